@@ -1,0 +1,104 @@
+//! One error type, by cause. Each message says what was wrong, where (file:line:column, key, or pass and
+//! Vulkan call) and what was expected, so that a command prints it and nothing else.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+pub type Result<T> = std::result::Result<T, Error>;
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Error {
+    /// Bad input: a scene file, a box file, a particle list, a value given with `--set`.
+    Scene { at: Place, what: String },
+    /// A shader that does not compile or does not match the host's declaration of it.
+    Shader { name: String, what: String },
+    /// A Vulkan call that failed, or no device to make it on.
+    Vulkan { call: String, what: String },
+    /// A wish beyond what the device or nimbus can hold; found before anything is allocated.
+    Limit { what: String },
+    /// A file that cannot be read or written.
+    Io { path: PathBuf, what: String },
+    /// Arguments that do not fit together.
+    Usage { what: String },
+    /// A check that was asked for and failed (validation messages, a comparison).
+    Check { what: String },
+    /// Ctrl-C; what was finished is kept.
+    Interrupted,
+}
+
+/// Where an input went wrong. Lines and columns count from 1; 0 means "the whole file".
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Place {
+    /// File name as given, or `--set key=value`.
+    pub source: String,
+    pub line: usize,
+    pub column: usize,
+}
+
+impl Place {
+    pub fn file(path: &Path) -> Self {
+        Place { source: path.display().to_string(), line: 0, column: 0 }
+    }
+
+    pub fn line(path: &Path, line: usize, column: usize) -> Self {
+        Place { source: path.display().to_string(), line, column }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.line, self.column) {
+            (0, _) => write!(f, "{}", self.source),
+            (line, 0) => write!(f, "{}:{line}", self.source),
+            (line, column) => write!(f, "{}:{line}:{column}", self.source),
+        }
+    }
+}
+
+impl Error {
+    pub fn scene(at: Place, what: impl Into<String>) -> Self {
+        Error::Scene { at, what: what.into() }
+    }
+
+    pub fn io(path: &Path, cause: impl fmt::Display) -> Self {
+        Error::Io { path: path.to_owned(), what: cause.to_string() }
+    }
+
+    pub fn vulkan(call: impl Into<String>, cause: impl fmt::Display) -> Self {
+        Error::Vulkan { call: call.into(), what: cause.to_string() }
+    }
+
+    pub fn limit(what: impl Into<String>) -> Self {
+        Error::Limit { what: what.into() }
+    }
+
+    pub fn usage(what: impl Into<String>) -> Self {
+        Error::Usage { what: what.into() }
+    }
+
+    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 130 interrupted.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Error::Check { .. } => 1,
+            Error::Scene { .. } | Error::Shader { .. } | Error::Limit { .. } | Error::Io { .. } | Error::Usage { .. } => 2,
+            Error::Vulkan { .. } => 3,
+            Error::Interrupted => 130,
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Error::Scene { at, what } => write!(f, "{at}: {what}"),
+            Error::Shader { name, what } => write!(f, "shader {name}: {what}"),
+            Error::Vulkan { call, what } => write!(f, "Vulkan: {call}: {what}"),
+            Error::Limit { what } => write!(f, "limit: {what}"),
+            Error::Io { path, what } => write!(f, "{}: {what}", path.display()),
+            Error::Usage { what } | Error::Check { what } => write!(f, "{what}"),
+            Error::Interrupted => write!(f, "interrupted"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}

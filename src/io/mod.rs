@@ -1,0 +1,1 @@
+//! Text and containers to plain data, and results to files.

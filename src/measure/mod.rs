@@ -1,0 +1,1 @@
+//! Clocks and statistics; knows nothing of clouds or Vulkan.

@@ -1,0 +1,159 @@
+//! A cloud: where its particles come from, and the frames of reference its particles are kept in.
+
+use glam::DVec3;
+
+use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
+
+/// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
+pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
+
+/// √(2π): optical depth through a blob's centre is √(2π) κ σ.
+pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cloud {
+    pub source: CloudSource,
+    /// Of the cloud's own origin at time 0, in the scene.
+    pub position: DVec3,
+    /// Scene units per second; the cloud's origin at time t is position + wind·t.
+    pub wind: DVec3,
+    /// Index into the scene's materials.
+    pub i_material: usize,
+    pub seed: u32,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum CloudSource {
+    /// P (1)–(11). `optical_depth` is through the centre of a blob of the box's mean radius; `radius_scale`
+    /// multiplies the file's radii.
+    Boxes { boxes: Vec<CloudBox>, form: Form, optical_depth: f64, radius_scale: f64 },
+    /// A list of blobs as given.
+    Particles(Vec<Particle>),
+}
+
+/// One Gaussian blob of extinction, relative to its cloud's position.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Particle {
+    pub position: DVec3,
+    pub sigma: f64,
+    /// Peak extinction per unit length.
+    pub kappa: f64,
+    /// Linear RGB: radiance where the lighting mode is "none", a factor on the material's K_d otherwise.
+    pub color: DVec3,
+}
+
+/// A run of consecutive particles that share an origin, so that their f32 positions keep their accuracy
+/// wherever the origin lies: a box, or a whole particle list.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Group {
+    pub i_cloud: usize,
+    pub i_first: u32,
+    pub n_particles: u32,
+    /// Origin of the group's positions, relative to the cloud's.
+    pub center: DVec3,
+    /// Positions lie within center ± half_extent.
+    pub half_extent: DVec3,
+    pub sigma_max: f64,
+    pub kappa_max: f64,
+}
+
+impl Cloud {
+    /// The cloud's origin at `time_s`.
+    pub fn origin_at(&self, time_s: f64) -> DVec3 {
+        self.position + self.wind * time_s
+    }
+
+    /// The cloud's own centre, relative to its origin: the mean of its groups' centres by particle count.
+    pub fn center(&self) -> DVec3 {
+        match &self.source {
+            CloudSource::Boxes { boxes, .. } => {
+                let n: f64 = boxes.iter().map(|b| f64::from(b.n_particles)).sum();
+                let sum: DVec3 = boxes.iter().map(|b| b.center * f64::from(b.n_particles)).sum();
+                if n > 0.0 { sum / n } else { DVec3::ZERO }
+            }
+            CloudSource::Particles(list) if list.is_empty() => DVec3::ZERO,
+            CloudSource::Particles(list) => list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64,
+        }
+    }
+
+    pub fn n_particles(&self) -> u64 {
+        match &self.source {
+            CloudSource::Boxes { boxes, .. } => boxes.iter().map(|b| u64::from(b.n_particles)).sum(),
+            CloudSource::Particles(list) => list.len() as u64,
+        }
+    }
+
+    /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups, so that a
+    /// group's number is its box's number.
+    pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
+        match &self.source {
+            CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
+                .iter()
+                .map(|b| {
+                    let group = Group {
+                        i_cloud,
+                        i_first,
+                        n_particles: b.n_particles,
+                        center: b.center,
+                        half_extent: 0.5 * b.extent,
+                        sigma_max: greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
+                        kappa_max: box_kappa(b, *form, *optical_depth, *radius_scale),
+                    };
+                    i_first += b.n_particles;
+                    group
+                })
+                .collect(),
+            CloudSource::Particles(list) => vec![list_group(list, i_cloud, i_first)],
+        }
+    }
+}
+
+/// κ of a box's blobs: √(2π) κ σ̄ = optical_depth at the mean radius (model.md §1). 0 where blobs have no size.
+pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64) -> f64 {
+    let sigma = mean_radius(form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
+    if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
+}
+
+fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
+    let low = list.iter().map(|p| p.position).reduce(DVec3::min).unwrap_or(DVec3::ZERO);
+    let high = list.iter().map(|p| p.position).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
+    Group {
+        i_cloud,
+        i_first,
+        n_particles: list.len() as u32,
+        center: 0.5 * (low + high),
+        half_extent: 0.5 * (high - low),
+        sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
+        kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kappa_gives_the_optical_depth_at_the_mean_radius() {
+        let b = CloudBox { n_particles: 5, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.2 };
+        let kappa = box_kappa(&b, Form::Centred, 1.5, 0.6);
+        let sigma = mean_radius(Form::Centred, 2.2) * 0.6 / 3.0;
+        assert!((SQRT_TAU * kappa * sigma - 1.5).abs() < 1e-14);
+        assert_eq!(box_kappa(&CloudBox { radius_max: 0.0, ..b }, Form::Centred, 1.5, 0.6), 0.0);
+    }
+
+    #[test]
+    fn groups_count_on_and_keep_empty_boxes() {
+        let b = |n| CloudBox { n_particles: n, extent: DVec3::ONE, center: DVec3::X, radius_max: 1.0 };
+        let source = CloudSource::Boxes {
+            boxes: vec![b(3), b(0), b(4)],
+            form: Form::Centred,
+            optical_depth: 1.0,
+            radius_scale: 1.0,
+        };
+        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::X, i_material: 0, seed: 1 };
+        let firsts: Vec<u32> = cloud.groups(0, 10).iter().map(|g| g.i_first).collect();
+        assert_eq!(firsts, [10, 13, 13]);
+        assert_eq!(cloud.center(), DVec3::X);
+        assert_eq!(cloud.origin_at(2.0), DVec3::new(2.0, 0.0, 0.0));
+    }
+}

@@ -1,0 +1,113 @@
+//! From linear radiance to a display: composition over the background, tone map, sRGB.
+
+use glam::DVec3;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FilmFormat {
+    Rgba16f,
+    Rgba32f,
+}
+
+impl FilmFormat {
+    pub const NAMES: [(&'static str, FilmFormat); 2] =
+        [("rgba16f", FilmFormat::Rgba16f), ("rgba32f", FilmFormat::Rgba32f)];
+
+    /// Unit round-off of one stored channel: half of the spacing of numbers in [1, 2).
+    pub fn unit_roundoff(self) -> f64 {
+        match self {
+            FilmFormat::Rgba16f => 2f64.powi(-11),
+            FilmFormat::Rgba32f => 2f64.powi(-24),
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ToneMap {
+    /// Khronos PBR Neutral: the identity for what a display can show, highlights compressed.
+    Neutral,
+    /// Cut at 1.
+    Clip,
+}
+
+impl ToneMap {
+    pub const NAMES: [(&'static str, ToneMap); 2] = [("neutral", ToneMap::Neutral), ("clip", ToneMap::Clip)];
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Film {
+    pub width: u32,
+    pub height: u32,
+    pub format: FilmFormat,
+    /// Linear RGB.
+    pub background: DVec3,
+    /// Factor before the tone map.
+    pub exposure: f64,
+    pub tone_map: ToneMap,
+}
+
+impl Film {
+    /// Display value in [0, 1]³ of one premultiplied linear pixel (alpha = 1 − transmittance).
+    pub fn display(&self, rgb: DVec3, alpha: f64) -> DVec3 {
+        let linear = self.exposure * (rgb + (1.0 - alpha) * self.background);
+        let mapped = match self.tone_map {
+            ToneMap::Neutral => neutral(linear),
+            ToneMap::Clip => linear,
+        };
+        DVec3::new(srgb_encode(mapped.x), srgb_encode(mapped.y), srgb_encode(mapped.z))
+    }
+}
+
+/// Khronos PBR Neutral tone mapper, with its published constants, without the Fresnel offset (that undoes the
+/// 4 % of a dielectric's specular reflection, which a cloud does not have).
+fn neutral(color: DVec3) -> DVec3 {
+    const START_COMPRESSION: f64 = 0.8;
+    const DESATURATION: f64 = 0.15;
+    let peak = color.max_element();
+    if peak.is_nan() || peak < START_COMPRESSION {
+        return color;
+    }
+    let d = 1.0 - START_COMPRESSION;
+    let new_peak = 1.0 - d * d / (peak + d - START_COMPRESSION);
+    let gray = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
+    (color * (new_peak / peak)).lerp(DVec3::splat(new_peak), gray)
+}
+
+/// IEC 61966-2-1, clamped to [0, 1]; NaN becomes 0.
+pub fn srgb_encode(linear: f64) -> f64 {
+    let v = if linear > 0.0 { linear.min(1.0) } else { 0.0 };
+    if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn film(tone_map: ToneMap) -> Film {
+        let background = DVec3::new(0.2, 0.4, 0.6);
+        Film { width: 1, height: 1, format: FilmFormat::Rgba16f, background, exposure: 1.0, tone_map }
+    }
+
+    #[test]
+    fn srgb_at_published_points() {
+        assert_eq!(srgb_encode(0.0), 0.0);
+        assert!((srgb_encode(1.0) - 1.0).abs() < 1e-12);
+        // 18 % grey is 118/255 in sRGB, within half a code value.
+        assert!((srgb_encode(0.18) * 255.0 - 118.0).abs() < 0.5);
+        assert_eq!(srgb_encode(f64::NAN), 0.0);
+        assert_eq!(srgb_encode(7.0), srgb_encode(1.0));
+    }
+
+    #[test]
+    fn background_shows_where_nothing_covers_it() {
+        let shown = film(ToneMap::Clip).display(DVec3::ZERO, 0.0);
+        assert_eq!(shown.y, srgb_encode(0.4));
+        assert_eq!(film(ToneMap::Clip).display(DVec3::ONE, 1.0), DVec3::splat(srgb_encode(1.0)));
+    }
+
+    #[test]
+    fn neutral_is_the_identity_below_its_knee_and_monotone_above() {
+        assert_eq!(neutral(DVec3::splat(0.79)), DVec3::splat(0.79));
+        let peaks: Vec<f64> = (0..100).map(|i| neutral(DVec3::splat(0.8 + 0.1 * f64::from(i))).x).collect();
+        assert!(peaks.windows(2).all(|w| w[0] < w[1]) && peaks[99] < 1.0);
+    }
+}

@@ -1,0 +1,12 @@
+//! What is drawn and lit, as plain f64 data and pure functions: no files, no GPU.
+//! Lengths are scene units, angles radians, times seconds, radiance and irradiance linear RGB.
+
+pub mod boxes;
+pub mod camera;
+pub mod cloud;
+pub mod film;
+pub mod grid;
+pub mod light;
+pub mod material;
+pub mod philox;
+pub mod scene;

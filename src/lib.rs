@@ -8,6 +8,7 @@
 //! holds the f64 twin of every pass, written from the mathematics, and meets the passes only in tests and studies.
 
 pub mod error;
+pub mod gpu;
 pub mod io;
 pub mod measure;
 pub mod model;

@@ -1,0 +1,293 @@
+//! Choosing and opening a Vulkan device; its limits; the allocator and its leak report.
+
+use std::ffi::CStr;
+use std::mem::ManuallyDrop;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ash::{ext, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+
+use super::instance::Instance;
+use crate::error::{Error, Result};
+
+/// What is known of a device before it is opened.
+#[derive(Debug, Clone)]
+pub struct DeviceInfo {
+    pub index: usize,
+    pub name: String,
+    pub driver: String,
+    pub api_version: (u32, u32, u32),
+    pub kind: &'static str,
+    pub uuid: String,
+    /// Why nimbus cannot use it, if it cannot.
+    pub unusable: Option<String>,
+    pub limits: Limits,
+    physical: vk::PhysicalDevice,
+    queue_family: u32,
+}
+
+/// The limits that nimbus's wishes are checked against.
+#[derive(Debug, Clone, Copy)]
+pub struct Limits {
+    /// Bytes of one storage buffer that a shader can see.
+    pub max_storage_buffer_bytes: u64,
+    /// Workgroups along x of one dispatch.
+    pub max_workgroups_x: u32,
+    pub max_workgroup_invocations: u32,
+    pub max_shared_memory_bytes: u32,
+    pub max_push_constant_bytes: u32,
+    pub max_image_extent: u32,
+    /// Size of the greatest device-local heap.
+    pub device_memory_bytes: u64,
+    pub subgroup_size: u32,
+    /// 0 where the queue has no timestamps.
+    pub timestamp_valid_bits: u32,
+    pub timestamp_period_ns: f64,
+}
+
+/// An open device. Dropping it reports every allocation that is still alive to the instance's messages.
+pub struct Device {
+    shared: Arc<Shared>,
+    info: DeviceInfo,
+}
+
+/// What every resource holds on to; destroyed with the last of them.
+pub(super) struct Shared {
+    pub raw: ash::Device,
+    pub queue: vk::Queue,
+    pub queue_family: u32,
+    pub limits: Limits,
+    pub allocator: ManuallyDrop<Mutex<Allocator>>,
+    debug: Option<ext::debug_utils::Device>,
+    pub instance: Arc<Instance>,
+}
+
+impl Device {
+    /// Every Vulkan device, usable or not, in the loader's order.
+    pub fn list(instance: &Instance) -> Result<Vec<DeviceInfo>> {
+        let physical = unsafe { instance.raw.enumerate_physical_devices() }
+            .map_err(|e| Error::vulkan("vkEnumeratePhysicalDevices", e))?;
+        Ok(physical.into_iter().enumerate().map(|(i, p)| describe(&instance.raw, i, p)).collect())
+    }
+
+    /// Opens the device named by `choice` (an index, or part of a name), else the best one: discrete, then
+    /// integrated, virtual, CPU.
+    pub fn open(instance: &Arc<Instance>, choice: Option<&str>) -> Result<Device> {
+        let info = choose(Self::list(instance)?, choice)?;
+        let raw = create(&instance.raw, &info)?;
+        let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
+        let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
+        // Device::drop reports leaks itself, into the messages that tests read.
+        debug_settings.log_leaks_on_shutdown = false;
+        let desc = AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: info.physical,
+            debug_settings,
+            buffer_device_address: false,
+            allocation_sizes: gpu_allocator::AllocationSizes::default(),
+        };
+        let allocator = Allocator::new(&desc).map_err(|e| {
+            unsafe { raw.destroy_device(None) };
+            Error::vulkan("creating the allocator", e)
+        })?;
+        let debug = instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
+        let shared = Arc::new(Shared {
+            raw,
+            queue,
+            queue_family: info.queue_family,
+            limits: info.limits,
+            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            debug,
+            instance: instance.clone(),
+        });
+        Ok(Device { shared, info })
+    }
+
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    pub fn limits(&self) -> &Limits {
+        &self.info.limits
+    }
+
+    pub(super) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        let instance = &self.shared.instance.raw;
+        unsafe { instance.get_physical_device_format_properties(self.info.physical, format) }.optimal_tiling_features
+    }
+
+    pub(super) fn shared(&self) -> &Arc<Shared> {
+        &self.shared
+    }
+
+    /// Bytes allocated on the device at present.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.shared.lock_allocator().generate_report().total_allocated_bytes
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        // An error here is a lost device, which the call that lost it has reported.
+        let _ = unsafe { self.shared.raw.device_wait_idle() };
+        let report = self.shared.lock_allocator().generate_report();
+        for leak in &report.allocations {
+            self.shared.instance.messages().push(format!("leak: {} ({} bytes)", leak.name, leak.size));
+        }
+    }
+}
+
+impl Shared {
+    pub fn lock_allocator(&self) -> std::sync::MutexGuard<'_, Allocator> {
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Names a handle for validation messages and frame debuggers.
+    pub fn name<H: vk::Handle>(&self, handle: H, name: &str) {
+        let Some(debug) = &self.debug else { return };
+        let Ok(name) = std::ffi::CString::new(name) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // A name that cannot be set is no reason to stop.
+        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+    }
+}
+
+impl Drop for Shared {
+    fn drop(&mut self) {
+        // SAFETY: the last owner; every resource held an Arc of this and is destroyed. The allocator frees its
+        // blocks through the device and so goes first.
+        unsafe {
+            ManuallyDrop::drop(&mut self.allocator);
+            self.raw.destroy_device(None);
+        }
+    }
+}
+
+fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> DeviceInfo {
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut id = vk::PhysicalDeviceIDProperties::default();
+    let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+    let mut all =
+        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut id).push_next(&mut subgroup);
+    unsafe { instance.get_physical_device_properties2(physical, &mut all) };
+    let properties = all.properties;
+    let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+    let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    let family = families.iter().position(|f| f.queue_flags.contains(wanted));
+    let memory = unsafe { instance.get_physical_device_memory_properties(physical) };
+    let device_memory_bytes = memory
+        .memory_heaps_as_slice()
+        .iter()
+        .filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+        .map(|h| h.size)
+        .max();
+    let version = properties.api_version;
+    let limits = properties.limits;
+    DeviceInfo {
+        index,
+        name: text(&properties.device_name),
+        driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)).trim().to_owned(),
+        api_version: (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
+        kind: kind(properties.device_type),
+        uuid: id.device_uuid.iter().map(|b| format!("{b:02x}")).collect(),
+        unusable: unusable(instance, physical, version, family),
+        limits: Limits {
+            max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+            max_workgroups_x: limits.max_compute_work_group_count[0],
+            max_workgroup_invocations: limits.max_compute_work_group_invocations,
+            max_shared_memory_bytes: limits.max_compute_shared_memory_size,
+            max_push_constant_bytes: limits.max_push_constants_size,
+            max_image_extent: limits
+                .max_image_dimension2_d
+                .min(limits.max_framebuffer_width)
+                .min(limits.max_framebuffer_height),
+            device_memory_bytes: device_memory_bytes.unwrap_or(0),
+            subgroup_size: subgroup.subgroup_size,
+            timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
+            timestamp_period_ns: f64::from(limits.timestamp_period),
+        },
+        physical,
+        queue_family: family.unwrap_or(0) as u32,
+    }
+}
+
+fn unusable(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    version: u32,
+    family: Option<usize>,
+) -> Option<String> {
+    if version < vk::API_VERSION_1_3 {
+        return Some("Vulkan 1.3 is needed".into());
+    }
+    if family.is_none() {
+        return Some("no queue for both graphics and compute".into());
+    }
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+    unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    let needs = [
+        (v12.timeline_semaphore, "timelineSemaphore"),
+        (v13.synchronization2, "synchronization2"),
+        (v13.dynamic_rendering, "dynamicRendering"),
+    ];
+    needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
+}
+
+fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
+    let names: Vec<String> = devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
+    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+    let found = match choice {
+        None => {
+            let rank = |d: &DeviceInfo| {
+                ["discrete", "integrated", "virtual", "cpu"].iter().position(|k| *k == d.kind).unwrap_or(9)
+            };
+            devices.into_iter().filter(|d| d.unusable.is_none()).min_by_key(rank)
+        }
+        Some(text) => match text.parse::<usize>() {
+            Ok(index) => devices.into_iter().find(|d| d.index == index),
+            Err(_) => devices.into_iter().find(|d| d.name.to_lowercase().contains(&text.to_lowercase())),
+        },
+    };
+    match (found, choice) {
+        (None, None) => Err(Error::vulkan(
+            "device choice",
+            format!("no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a software one"),
+        )),
+        (None, Some(text)) => {
+            Err(Error::usage(format!("--device {text}: expected an index or a part of a name; found: {names}")))
+        }
+        (Some(device), _) => match &device.unusable {
+            Some(why) => Err(Error::vulkan("device choice", format!("{}: {why}", device.name))),
+            None => Ok(device),
+        },
+    }
+}
+
+fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
+    let priorities = [1.0];
+    let queues =
+        [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
+    let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut v12).push_next(&mut v13);
+    unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
+}
+
+fn kind(t: vk::PhysicalDeviceType) -> &'static str {
+    match t {
+        vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+        vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+        vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+        vk::PhysicalDeviceType::CPU => "cpu",
+        _ => "other",
+    }
+}
+
+/// A fixed-size C string of Vulkan as text.
+fn text(chars: &[std::ffi::c_char]) -> String {
+    let bytes: Vec<u8> = chars.iter().map(|c| *c as u8).collect();
+    CStr::from_bytes_until_nul(&bytes).map_or(String::new(), |s| s.to_string_lossy().into_owned())
+}

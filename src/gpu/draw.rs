@@ -1,0 +1,107 @@
+//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers; premultiplied "over".
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::device::{Device, Shared};
+use super::kernel::{Field, Interface, Module, check_push, specialization};
+use super::memory::TargetFormat;
+use super::reflect::reflect;
+use super::shader::{Compiler, Optimize};
+use crate::error::{Error, Result};
+
+pub struct DrawPipeline {
+    pub(super) raw: vk::Pipeline,
+    pub(super) interface: Interface,
+    pub(super) name: String,
+    shared: Arc<Shared>,
+}
+
+impl DrawPipeline {
+    /// `name.vert` and `name.frag`, drawn as triangle strips, blended premultiplied over a target of `format`.
+    pub fn over(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        format: TargetFormat,
+    ) -> Result<DrawPipeline> {
+        let (vert_file, frag_file) = (format!("{name}.vert"), format!("{name}.frag"));
+        let vert = compiler.compile(&vert_file, Optimize::Yes)?;
+        let frag = compiler.compile(&frag_file, Optimize::Yes)?;
+        let (in_vert, in_frag) = (reflect(&vert_file, &vert)?, reflect(&frag_file, &frag)?);
+        check_push(&vert_file, &in_vert, push)?;
+        if in_frag.push.is_some() {
+            check_push(&frag_file, &in_frag, push)?;
+        }
+        let stages = [(&in_vert, vk::ShaderStageFlags::VERTEX), (&in_frag, vk::ShaderStageFlags::FRAGMENT)];
+        let interface = Interface::new(device, name, &stages, push)?;
+        let shared = device.shared().clone();
+        let vert = Module::new(&shared, &vert_file, &vert)?;
+        let frag = Module::new(&shared, &frag_file, &frag)?;
+        let raw = create(&shared, name, &vert, &frag, &interface, constants, format)?;
+        shared.name(raw, name);
+        Ok(DrawPipeline { raw, interface, name: name.to_owned(), shared })
+    }
+}
+
+impl Drop for DrawPipeline {
+    fn drop(&mut self) {
+        // SAFETY: commands that use the pipeline have been waited for by whoever drops it.
+        unsafe { self.shared.raw.destroy_pipeline(self.raw, None) };
+    }
+}
+
+fn create(
+    shared: &Shared,
+    name: &str,
+    vert: &Module,
+    frag: &Module,
+    interface: &Interface,
+    constants: &[(u32, u32)],
+    format: TargetFormat,
+) -> Result<vk::Pipeline> {
+    let (entries, data) = specialization(constants);
+    let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
+    let stage = |module: &Module, stage| {
+        let info = vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module.raw);
+        info.name(c"main").specialization_info(&specialization)
+    };
+    let stages = [stage(vert, vk::ShaderStageFlags::VERTEX), stage(frag, vk::ShaderStageFlags::FRAGMENT)];
+    let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_STRIP);
+    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+    let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+    let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let over = vk::PipelineColorBlendAttachmentState {
+        blend_enable: vk::TRUE,
+        src_color_blend_factor: vk::BlendFactor::ONE,
+        dst_color_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        color_blend_op: vk::BlendOp::ADD,
+        src_alpha_blend_factor: vk::BlendFactor::ONE,
+        dst_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        alpha_blend_op: vk::BlendOp::ADD,
+        color_write_mask: vk::ColorComponentFlags::RGBA,
+    };
+    let attachments = [over];
+    let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+    let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+    let formats = [format.raw()];
+    let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    let info = vk::GraphicsPipelineCreateInfo::default()
+        .stages(&stages)
+        .vertex_input_state(&vertex_input)
+        .input_assembly_state(&assembly)
+        .viewport_state(&viewport)
+        .rasterization_state(&raster)
+        .multisample_state(&samples)
+        .color_blend_state(&blend)
+        .dynamic_state(&dynamic)
+        .layout(interface.layout)
+        .push_next(&mut rendering);
+    let made = unsafe { shared.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+    Ok(made.map_err(|(_, e)| Error::vulkan(format!("vkCreateGraphicsPipelines {name}"), e))?[0])
+}

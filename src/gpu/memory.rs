@@ -1,0 +1,264 @@
+//! Buffers and images. Every one is named `room.thing`, and checked against the device's limits before it is
+//! allocated.
+
+use std::sync::Arc;
+
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::device::{Device, Limits, Shared};
+use crate::error::{Error, Result};
+
+/// Where a buffer lives, by who touches it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// Device only.
+    Device,
+    /// Written by the host, read by the device.
+    Upload,
+    /// Written by the device, read by the host.
+    Readback,
+}
+
+pub struct Buffer {
+    pub(super) raw: vk::Buffer,
+    allocation: Option<Allocation>,
+    bytes: u64,
+    name: String,
+    shared: Arc<Shared>,
+}
+
+impl Buffer {
+    /// A storage buffer of `n` records of type `T`; at least one record, since Vulkan has no empty buffers.
+    pub fn new<T: Pod>(device: &Device, name: &str, n: u64, place: Place) -> Result<Buffer> {
+        let bytes = storage_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
+        let shared = device.shared().clone();
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        let raw = unsafe { shared.raw.create_buffer(&info, None) }
+            .map_err(|e| Error::vulkan(format!("vkCreateBuffer {name}"), e))?;
+        shared.name(raw, name);
+        let requirements = unsafe { shared.raw.get_buffer_memory_requirements(raw) };
+        let location = match place {
+            Place::Device => MemoryLocation::GpuOnly,
+            Place::Upload => MemoryLocation::CpuToGpu,
+            Place::Readback => MemoryLocation::GpuToCpu,
+        };
+        let mut buffer = Buffer { raw, allocation: None, bytes, name: name.to_owned(), shared };
+        let allocation = allocate(&buffer.shared, name, requirements, location, true)?;
+        let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
+        buffer.allocation = Some(allocation);
+        unsafe { buffer.shared.raw.bind_buffer_memory(raw, memory, offset) }
+            .map_err(|e| Error::vulkan(format!("vkBindBufferMemory {name}"), e))?;
+        Ok(buffer)
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Copies `data` to the start of an upload buffer. The GPU must not be reading it.
+    pub fn write<T: Pod>(&mut self, data: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let mapped = self.allocation.as_mut().and_then(Allocation::mapped_slice_mut);
+        match mapped.and_then(|m| m.get_mut(..bytes.len())) {
+            Some(target) => {
+                target.copy_from_slice(bytes);
+                Ok(())
+            }
+            None => Err(Error::limit(format!(
+                "{}: {} bytes do not fit a host-visible buffer of {}",
+                self.name,
+                bytes.len(),
+                self.bytes
+            ))),
+        }
+    }
+
+    /// The first `n` records of a readback buffer. The GPU must have finished writing it.
+    pub fn read<T: Pod>(&self, n: usize) -> Result<Vec<T>> {
+        let mapped = self.allocation.as_ref().and_then(Allocation::mapped_slice);
+        match mapped.and_then(|m| m.get(..n * size_of::<T>())) {
+            // collect: the mapping's alignment is the allocator's, not T's.
+            Some(bytes) => Ok(bytemuck::pod_collect_to_vec(bytes)),
+            None => Err(Error::limit(format!(
+                "{}: {n} records do not lie in a host-visible buffer of {} bytes",
+                self.name, self.bytes
+            ))),
+        }
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: whoever drops a buffer has waited for the commands that use it (frame/ waits every frame).
+        unsafe { self.shared.raw.destroy_buffer(self.raw, None) };
+        free(&self.shared, self.allocation.take());
+    }
+}
+
+/// Bytes of `n` records, or the error that names the limit they break.
+pub fn storage_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> Result<u64> {
+    let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes);
+    match n.max(1).checked_mul(record_bytes) {
+        Some(bytes) if bytes <= most => Ok(bytes.next_multiple_of(4)),
+        _ => Err(Error::limit(format!(
+            "{name}: {n} records of {record_bytes} bytes are wanted, this device takes {} at most (maxStorageBufferRange {}, memory {} bytes)",
+            most / record_bytes,
+            limits.max_storage_buffer_bytes,
+            limits.device_memory_bytes
+        ))),
+    }
+}
+
+/// A colour target.
+pub struct Image {
+    pub(super) raw: vk::Image,
+    pub(super) view: vk::ImageView,
+    pub(super) layout: vk::ImageLayout,
+    pub(super) format: vk::Format,
+    pub(super) extent: vk::Extent2D,
+    allocation: Option<Allocation>,
+    shared: Arc<Shared>,
+}
+
+/// Formats a colour target can have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TargetFormat {
+    Rgba16f,
+    Rgba32f,
+}
+
+impl TargetFormat {
+    pub(super) fn raw(self) -> vk::Format {
+        match self {
+            TargetFormat::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
+            TargetFormat::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
+        }
+    }
+
+    pub fn bytes_per_pixel(self) -> u64 {
+        match self {
+            TargetFormat::Rgba16f => 8,
+            TargetFormat::Rgba32f => 16,
+        }
+    }
+}
+
+impl Image {
+    pub fn color_target(device: &Device, name: &str, width: u32, height: u32, format: TargetFormat) -> Result<Image> {
+        let most = device.limits().max_image_extent;
+        if width.max(height) > most {
+            return Err(Error::limit(format!(
+                "{name}: {width}×{height} pixels are wanted, this device takes {most} along a side"
+            )));
+        }
+        let bytes = u64::from(width) * u64::from(height) * format.bytes_per_pixel();
+        if bytes > device.limits().device_memory_bytes {
+            return Err(Error::limit(format!(
+                "{name}: {bytes} bytes are wanted, this device has {}",
+                device.limits().device_memory_bytes
+            )));
+        }
+        let shared = device.shared().clone();
+        check_blendable(device, format)?;
+        let extent = vk::Extent2D { width, height };
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(format.raw())
+            .extent(extent.into())
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC);
+        let raw = unsafe { shared.raw.create_image(&info, None) }
+            .map_err(|e| Error::vulkan(format!("vkCreateImage {name}"), e))?;
+        shared.name(raw, name);
+        let requirements = unsafe { shared.raw.get_image_memory_requirements(raw) };
+        let layout = vk::ImageLayout::UNDEFINED;
+        let mut image =
+            Image { raw, view: vk::ImageView::null(), layout, format: format.raw(), extent, allocation: None, shared };
+        let allocation = allocate(&image.shared, name, requirements, MemoryLocation::GpuOnly, false)?;
+        let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
+        image.allocation = Some(allocation);
+        unsafe { image.shared.raw.bind_image_memory(raw, memory, offset) }
+            .map_err(|e| Error::vulkan(format!("vkBindImageMemory {name}"), e))?;
+        let view = vk::ImageViewCreateInfo::default()
+            .image(raw)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(format.raw())
+            .subresource_range(COLOR_RANGE);
+        image.view = unsafe { image.shared.raw.create_image_view(&view, None) }
+            .map_err(|e| Error::vulkan(format!("vkCreateImageView {name}"), e))?;
+        image.shared.name(image.view, name);
+        Ok(image)
+    }
+
+    pub fn n_pixels(&self) -> u64 {
+        u64::from(self.extent.width) * u64::from(self.extent.height)
+    }
+}
+
+impl Drop for Image {
+    fn drop(&mut self) {
+        // SAFETY: as for buffers; a null view may be destroyed.
+        unsafe {
+            self.shared.raw.destroy_image_view(self.view, None);
+            self.shared.raw.destroy_image(self.raw, None);
+        }
+        free(&self.shared, self.allocation.take());
+    }
+}
+
+pub(super) const COLOR_RANGE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
+/// Blending is guaranteed for rgba16f; rgba32f is probed.
+fn check_blendable(device: &Device, format: TargetFormat) -> Result<()> {
+    let features = device.format_features(format.raw());
+    if features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND) {
+        return Ok(());
+    }
+    Err(Error::limit(format!("this device cannot blend into {format:?}; expected film.format = \"rgba16f\"")))
+}
+
+fn allocate(
+    shared: &Shared,
+    name: &str,
+    requirements: vk::MemoryRequirements,
+    location: MemoryLocation,
+    linear: bool,
+) -> Result<Allocation> {
+    let desc = AllocationCreateDesc {
+        name,
+        requirements,
+        location,
+        linear,
+        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+    };
+    shared
+        .lock_allocator()
+        .allocate(&desc)
+        .map_err(|e| Error::limit(format!("{name}: {} bytes of device memory: {e}", requirements.size)))
+}
+
+fn free(shared: &Shared, allocation: Option<Allocation>) {
+    if let Some(allocation) = allocation {
+        // Freeing fails only for an allocation of another allocator, which cannot be here.
+        let _ = shared.lock_allocator().free(allocation);
+    }
+}

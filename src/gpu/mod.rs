@@ -1,0 +1,23 @@
+//! Vulkan, and nothing of nimbus: instance, device, memory, shaders, kernels, command recording, timers.
+//!
+//! Vulkan 1.3 core (synchronization2, dynamic rendering, timeline semaphores). What a shader reads and writes is
+//! reflected from its SPIR-V, and the recorder derives the barriers from that.
+
+pub mod device;
+pub mod draw;
+pub mod instance;
+pub mod kernel;
+pub mod memory;
+pub mod recorder;
+pub mod reflect;
+pub mod shader;
+pub mod timer;
+
+pub use device::{Device, DeviceInfo};
+pub use draw::DrawPipeline;
+pub use instance::Instance;
+pub use kernel::{Field, Kernel};
+pub use memory::{Buffer, Image, Place};
+pub use recorder::{Barriers, Commands, Recorder};
+pub use shader::{Compiler, Sources};
+pub use timer::ScopeTime;

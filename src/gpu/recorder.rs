@@ -1,0 +1,396 @@
+//! Recording and submitting commands. The recorder knows from reflection what each pipeline reads and writes, and
+//! puts a barrier exactly where a later use depends on an earlier one.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::device::{Device, Shared};
+use super::draw::DrawPipeline;
+use super::kernel::{Interface, Kernel};
+use super::memory::{Buffer, COLOR_RANGE, Image};
+use super::timer::{ScopeTime, Timer};
+use crate::error::{Error, Result};
+
+/// A submission that takes longer is taken for a hang: no frame that nimbus draws comes near it.
+const TIMEOUT_NS: u64 = 120_000_000_000;
+const SETS_PER_POOL: u32 = 64;
+const MAX_SCOPES: u32 = 32;
+
+/// Whether the recorder places barriers. `Omitted` exists for the tests that prove that validation would notice.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Barriers {
+    Placed,
+    Omitted,
+}
+
+/// One command buffer with all that a submission needs: descriptors, timestamps, a timeline semaphore.
+pub struct Commands {
+    pool: vk::CommandPool,
+    buffer: vk::CommandBuffer,
+    semaphore: vk::Semaphore,
+    submitted: u64,
+    descriptors: Vec<vk::DescriptorPool>,
+    timer: Timer,
+    name: String,
+    shared: Arc<Shared>,
+}
+
+impl Commands {
+    pub fn new(device: &Device, name: &str) -> Result<Commands> {
+        let shared = device.shared().clone();
+        let fail = |call: &'static str| move |e| Error::vulkan(call, e);
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(shared.queue_family);
+        let timer = Timer::new(device, name, MAX_SCOPES)?;
+        let pool = unsafe { shared.raw.create_command_pool(&info, None) }.map_err(fail("vkCreateCommandPool"))?;
+        let (buffer, semaphore) = (vk::CommandBuffer::null(), vk::Semaphore::null());
+        let mut commands = Commands {
+            pool,
+            buffer,
+            semaphore,
+            submitted: 0,
+            descriptors: vec![],
+            timer,
+            name: name.to_owned(),
+            shared,
+        };
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+        commands.buffer = unsafe { commands.shared.raw.allocate_command_buffers(&info) }
+            .map_err(fail("vkAllocateCommandBuffers"))?[0];
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        commands.semaphore =
+            unsafe { commands.shared.raw.create_semaphore(&info, None) }.map_err(fail("vkCreateSemaphore"))?;
+        commands.add_descriptor_pool()?;
+        commands.shared.name(commands.semaphore, name);
+        commands.shared.name(commands.buffer, name);
+        Ok(commands)
+    }
+
+    /// Records anew what `f` asks for. The previous submission must have been waited for.
+    pub fn record(&mut self, barriers: Barriers, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
+        let raw = self.shared.raw.clone();
+        unsafe {
+            for pool in &self.descriptors {
+                let reset = raw.reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty());
+                reset.map_err(|e| Error::vulkan("vkResetDescriptorPool", e))?;
+            }
+            raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
+                .map_err(|e| Error::vulkan("vkResetCommandPool", e))?;
+            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            raw.begin_command_buffer(self.buffer, &begin).map_err(|e| Error::vulkan("vkBeginCommandBuffer", e))?;
+        }
+        self.timer.reset(self.buffer);
+        let mut recorder = Recorder { commands: self, uses: HashMap::new(), i_pool: 0, barriers };
+        f(&mut recorder)?;
+        recorder.make_visible_to_host();
+        unsafe { raw.end_command_buffer(self.buffer) }.map_err(|e| Error::vulkan("vkEndCommandBuffer", e))
+    }
+
+    /// Starts the recorded commands; returns at once.
+    pub fn submit(&mut self) -> Result<()> {
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
+        let value = self.submitted + 1;
+        let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.semaphore).value(value);
+        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let info = [vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals)];
+        unsafe { self.shared.raw.queue_submit2(self.shared.queue, &info, vk::Fence::null()) }
+            .map_err(|e| Error::vulkan(format!("vkQueueSubmit2 {}", self.name), e))?;
+        self.submitted = value;
+        Ok(())
+    }
+
+    /// Waits for the last submission and gives its scopes' times.
+    pub fn wait(&mut self) -> Result<Vec<ScopeTime>> {
+        let (semaphores, values) = ([self.semaphore], [self.submitted]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        unsafe { self.shared.raw.wait_semaphores(&info, TIMEOUT_NS) }
+            .map_err(|e| Error::vulkan(format!("vkWaitSemaphores {}", self.name), e))?;
+        self.timer.read()
+    }
+
+    /// Records, submits and waits.
+    pub fn run(&mut self, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<Vec<ScopeTime>> {
+        self.record(Barriers::Placed, f)?;
+        self.submit()?;
+        self.wait()
+    }
+
+    fn add_descriptor_pool(&mut self) -> Result<()> {
+        let size =
+            vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: 8 * SETS_PER_POOL };
+        let sizes = [size];
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
+        let pool = unsafe { self.shared.raw.create_descriptor_pool(&info, None) }
+            .map_err(|e| Error::vulkan("vkCreateDescriptorPool", e))?;
+        self.descriptors.push(pool);
+        Ok(())
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        // A submission still under way (after an error) must end before its memory goes; a lost device ends it too.
+        let (semaphores, values) = ([self.semaphore], [self.submitted]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        unsafe {
+            if self.submitted > 0 {
+                let _ = self.shared.raw.wait_semaphores(&info, TIMEOUT_NS);
+            }
+            for pool in self.descriptors.drain(..) {
+                self.shared.raw.destroy_descriptor_pool(pool, None);
+            }
+            self.shared.raw.destroy_semaphore(self.semaphore, None);
+            self.shared.raw.destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+/// How a buffer was used since the last barrier.
+#[derive(Default, Clone, Copy)]
+struct Use {
+    read: bool,
+    written: bool,
+}
+
+/// Stages in which nimbus touches memory.
+const STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
+    vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw()
+        | vk::PipelineStageFlags2::VERTEX_SHADER.as_raw()
+        | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
+        | vk::PipelineStageFlags2::ALL_TRANSFER.as_raw(),
+);
+const WRITES: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
+    vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw() | vk::AccessFlags2::TRANSFER_WRITE.as_raw(),
+);
+const READS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
+    vk::AccessFlags2::SHADER_STORAGE_READ.as_raw() | vk::AccessFlags2::TRANSFER_READ.as_raw(),
+);
+
+pub struct Recorder<'a> {
+    commands: &'a mut Commands,
+    uses: HashMap<vk::Buffer, Use>,
+    i_pool: usize,
+    barriers: Barriers,
+}
+
+impl Recorder<'_> {
+    /// Runs `f` between two timestamps under `name`.
+    pub fn scope(&mut self, name: &'static str, f: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        let i = self.commands.timer.begin(self.commands.buffer, name);
+        let done = f(self);
+        self.commands.timer.end(self.commands.buffer, i);
+        done
+    }
+
+    /// Runs `kernel` with one invocation a record; kernels stride, so that more records than the device has
+    /// invocations are still all done. `buffers` by binding number.
+    pub fn dispatch<P: Pod>(&mut self, kernel: &Kernel, buffers: &[&Buffer], push: &P, n_records: u32) -> Result<()> {
+        self.dispatch_groups(kernel, buffers, push, n_records.div_ceil(kernel.local_size_x()))
+    }
+
+    /// Runs `kernel` in `n_groups` workgroups, or as many as the device takes.
+    pub fn dispatch_groups<P: Pod>(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[&Buffer],
+        push: &P,
+        n_groups: u32,
+    ) -> Result<()> {
+        if n_groups == 0 {
+            return Ok(());
+        }
+        let n_groups = n_groups.min(self.commands.shared.limits.max_workgroups_x);
+        self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
+        unsafe { self.commands.shared.raw.cmd_dispatch(self.commands.buffer, n_groups, 1, 1) };
+        Ok(())
+    }
+
+    /// Clears `target` and draws `n_instances` strips of four vertices into it.
+    pub fn draw<P: Pod>(
+        &mut self,
+        pipeline: &DrawPipeline,
+        target: &mut Image,
+        buffers: &[&Buffer],
+        push: &P,
+        n_instances: u32,
+    ) -> Result<()> {
+        self.transition(target, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        self.bind(vk::PipelineBindPoint::GRAPHICS, pipeline.raw, &pipeline.interface, &pipeline.name, buffers, push)?;
+        let attachment = vk::RenderingAttachmentInfo::default()
+            .image_view(target.view)
+            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
+            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .store_op(vk::AttachmentStoreOp::STORE);
+        let attachments = [attachment];
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: target.extent };
+        let info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
+        let (width, height) = (target.extent.width as f32, target.extent.height as f32);
+        let viewport = vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
+        let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
+        unsafe {
+            raw.cmd_begin_rendering(commands, &info);
+            raw.cmd_set_viewport(commands, 0, &[viewport]);
+            raw.cmd_set_scissor(commands, 0, &[area]);
+            raw.cmd_draw(commands, 4, n_instances, 0, 0);
+            raw.cmd_end_rendering(commands);
+        }
+        Ok(())
+    }
+
+    /// Sets every 32-bit word of `buffer`.
+    pub fn fill(&mut self, buffer: &Buffer, word: u32) {
+        self.depend(&[(buffer.raw, false, true)]);
+        unsafe { self.commands.shared.raw.cmd_fill_buffer(self.commands.buffer, buffer.raw, 0, vk::WHOLE_SIZE, word) };
+    }
+
+    /// Copies the first bytes of `from` that fit into `to`.
+    pub fn copy(&mut self, from: &Buffer, to: &Buffer) {
+        self.depend(&[(from.raw, true, false), (to.raw, false, true)]);
+        let region = [vk::BufferCopy::default().size(from.bytes().min(to.bytes()))];
+        unsafe { self.commands.shared.raw.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &region) };
+    }
+
+    /// Copies the whole image, rows from the top, tightly packed.
+    pub fn copy_image(&mut self, from: &mut Image, to: &Buffer) {
+        self.transition(from, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+        self.depend(&[(to.raw, false, true)]);
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = [vk::BufferImageCopy::default().image_subresource(layers).image_extent(from.extent.into())];
+        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        unsafe {
+            self.commands.shared.raw.cmd_copy_image_to_buffer(self.commands.buffer, from.raw, layout, to.raw, &region)
+        };
+    }
+
+    fn bind<P: Pod>(
+        &mut self,
+        point: vk::PipelineBindPoint,
+        pipeline: vk::Pipeline,
+        interface: &Interface,
+        name: &str,
+        buffers: &[&Buffer],
+        push: &P,
+    ) -> Result<()> {
+        let mismatch = |what| Err(Error::Shader { name: name.to_owned(), what });
+        if buffers.len() != interface.access.len() {
+            return mismatch(format!("has {} bindings, the host gives {}", interface.access.len(), buffers.len()));
+        }
+        let bytes = bytemuck::bytes_of(push);
+        if bytes.len() != interface.push_bytes {
+            return mismatch(format!(
+                "has {} bytes of push constants, the host gives {}",
+                interface.push_bytes,
+                bytes.len()
+            ));
+        }
+        let uses: Vec<_> = buffers.iter().zip(&interface.access).map(|(b, a)| (b.raw, a.reads, a.writes)).collect();
+        self.depend(&uses);
+        let set = self.descriptor_set(interface.set_layout)?;
+        let infos: Vec<_> = buffers
+            .iter()
+            .map(|b| [vk::DescriptorBufferInfo { buffer: b.raw, offset: 0, range: vk::WHOLE_SIZE }])
+            .collect();
+        let writes: Vec<_> = infos
+            .iter()
+            .enumerate()
+            .map(|(k, info)| {
+                let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(k as u32);
+                write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
+            })
+            .collect();
+        let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
+        unsafe {
+            raw.update_descriptor_sets(&writes, &[]);
+            raw.cmd_bind_pipeline(commands, point, pipeline);
+            raw.cmd_bind_descriptor_sets(commands, point, interface.layout, 0, &[set], &[]);
+            if !bytes.is_empty() {
+                raw.cmd_push_constants(commands, interface.layout, interface.stages, 0, bytes);
+            }
+        }
+        Ok(())
+    }
+
+    /// A set from the pools; a new pool when they are used up, which happens in the first frame or never.
+    fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
+        loop {
+            if self.i_pool == self.commands.descriptors.len() {
+                self.commands.add_descriptor_pool()?;
+            }
+            let layouts = [layout];
+            let info = vk::DescriptorSetAllocateInfo::default()
+                .descriptor_pool(self.commands.descriptors[self.i_pool])
+                .set_layouts(&layouts);
+            match unsafe { self.commands.shared.raw.allocate_descriptor_sets(&info) } {
+                Ok(sets) => return Ok(sets[0]),
+                Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) => self.i_pool += 1,
+                Err(e) => return Err(Error::vulkan("vkAllocateDescriptorSets", e)),
+            }
+        }
+    }
+
+    /// Makes the coming use of (buffer, reads, writes) wait for what it depends on.
+    fn depend(&mut self, coming: &[(vk::Buffer, bool, bool)]) {
+        let hazard = coming.iter().any(|(b, reads, writes)| {
+            let before = self.uses.get(b).copied().unwrap_or_default();
+            (before.written && (*reads || *writes)) || (before.read && *writes)
+        });
+        if hazard {
+            if self.barriers == Barriers::Placed {
+                self.barrier(WRITES, STAGES, READS | WRITES);
+            }
+            self.uses.clear();
+        }
+        for (b, reads, writes) in coming {
+            let u = self.uses.entry(*b).or_default();
+            u.read |= reads;
+            u.written |= writes;
+        }
+    }
+
+    fn barrier(&self, src: vk::AccessFlags2, dst_stages: vk::PipelineStageFlags2, dst: vk::AccessFlags2) {
+        let barrier = vk::MemoryBarrier2::default().src_stage_mask(STAGES).src_access_mask(src);
+        let barrier = [barrier.dst_stage_mask(dst_stages).dst_access_mask(dst)];
+        let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
+        unsafe { self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+    }
+
+    fn make_visible_to_host(&self) {
+        self.barrier(WRITES, vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
+    }
+
+    fn transition(&self, image: &mut Image, to: vk::ImageLayout) {
+        let side = |layout| match layout {
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => (
+                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+                vk::AccessFlags2::COLOR_ATTACHMENT_READ | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+            ),
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL => {
+                (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_READ)
+            }
+            _ => (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE),
+        };
+        let (src_stage, src_access) = side(image.layout);
+        let (dst_stage, dst_access) = side(to);
+        let barrier = vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(src_stage)
+            .src_access_mask(src_access)
+            .dst_stage_mask(dst_stage)
+            .dst_access_mask(dst_access)
+            .old_layout(image.layout)
+            .new_layout(to)
+            .image(image.raw)
+            .subresource_range(COLOR_RANGE);
+        let barriers = [barrier];
+        let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        unsafe { self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+        image.layout = to;
+    }
+}

@@ -1,0 +1,162 @@
+//! GLSL to SPIR-V at run time by shaderc, cached on disk by content.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use sha2::{Digest, Sha256};
+
+use crate::error::{Error, Result};
+
+/// Shader texts by file name (`include/x.glsl` for includes).
+#[derive(Debug, Clone)]
+pub struct Sources(BTreeMap<String, String>);
+
+impl Sources {
+    /// The texts built into the binary.
+    pub fn embedded(texts: &[(&str, &str)]) -> Sources {
+        Sources(texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
+    }
+
+    /// The embedded texts, with those that `dir` holds in their place: `--shaders DIR`.
+    pub fn with_dir(mut self, dir: &Path) -> Result<Sources> {
+        if !dir.is_dir() {
+            return Err(Error::io(dir, "expected a folder of shaders"));
+        }
+        let mut n_found = 0;
+        for (name, text) in &mut self.0 {
+            let path = dir.join(name);
+            if path.is_file() {
+                *text = std::fs::read_to_string(&path).map_err(|e| Error::io(&path, e))?;
+                n_found += 1;
+            }
+        }
+        if n_found == 0 {
+            let names: Vec<&str> = self.0.keys().map(String::as_str).collect();
+            return Err(Error::io(dir, format!("holds none of nimbus's shaders ({})", names.join(", "))));
+        }
+        Ok(self)
+    }
+
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
+    /// Replaces one text; for tests that prove that a wrong shader is noticed.
+    pub fn replace(&mut self, name: &str, from: &str, to: &str) -> bool {
+        let Some(text) = self.0.get_mut(name) else { return false };
+        let changed = text.replace(from, to);
+        std::mem::replace(text, changed.clone()) != changed
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Optimize {
+    /// What runs.
+    Yes,
+    /// The twin with all its names, for reflection tests.
+    No,
+}
+
+pub struct Compiler {
+    raw: shaderc::Compiler,
+    sources: Sources,
+    cache: Option<PathBuf>,
+}
+
+impl Compiler {
+    /// `cache` is a folder for SPIR-V, made when first needed; without one every shader is compiled anew.
+    pub fn new(sources: Sources, cache: Option<PathBuf>) -> Result<Compiler> {
+        let raw =
+            shaderc::Compiler::new().map_err(|e| Error::Shader { name: "compiler".into(), what: e.to_string() })?;
+        Ok(Compiler { raw, sources, cache })
+    }
+
+    /// `$NIMBUS_CACHE_DIR`, else `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`, each with `spirv` below it.
+    pub fn default_cache() -> Option<PathBuf> {
+        let var = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+        let base = var("NIMBUS_CACHE_DIR")
+            .or_else(|| var("XDG_CACHE_HOME").map(|d| d.join("nimbus")))
+            .or_else(|| var("HOME").map(|d| d.join(".cache/nimbus")))?;
+        Some(base.join("spirv"))
+    }
+
+    pub fn sources(&self) -> &Sources {
+        &self.sources
+    }
+
+    /// SPIR-V of `file` (its extension gives the stage). Errors carry the compiler's file:line.
+    pub fn compile(&self, file: &str, optimize: Optimize) -> Result<Vec<u32>> {
+        let fail = |what: String| Error::Shader { name: file.to_owned(), what };
+        let Some(text) = self.sources.0.get(file) else { return Err(fail("no such shader".into())) };
+        let kind = match file.rsplit('.').next() {
+            Some("comp") => shaderc::ShaderKind::Compute,
+            Some("vert") => shaderc::ShaderKind::Vertex,
+            Some("frag") => shaderc::ShaderKind::Fragment,
+            _ => return Err(fail("expected a file ending in .comp, .vert or .frag".into())),
+        };
+        let cached = self.cache.as_ref().map(|dir| dir.join(format!("{}.spv", self.key(file, text, optimize))));
+        if let Some(words) = cached.as_deref().and_then(read_cached) {
+            return Ok(words);
+        }
+        let mut options = shaderc::CompileOptions::new().map_err(|e| fail(e.to_string()))?;
+        options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_3 as u32);
+        options.set_optimization_level(match optimize {
+            Optimize::Yes => shaderc::OptimizationLevel::Performance,
+            Optimize::No => shaderc::OptimizationLevel::Zero,
+        });
+        options.set_warnings_as_errors();
+        options.set_include_callback(|name, _, _, _| {
+            let full = format!("include/{name}");
+            let content = self.sources.0.get(&full).cloned().ok_or(format!("no include {full}"))?;
+            Ok(shaderc::ResolvedInclude { resolved_name: full, content })
+        });
+        let compiled =
+            self.raw.compile_into_spirv(text, kind, file, "main", Some(&options)).map_err(|e| fail(e.to_string()))?;
+        let words = compiled.as_binary().to_vec();
+        if let Some(path) = cached {
+            write_cached(&path, &words);
+        }
+        Ok(words)
+    }
+
+    /// Hash of all that the SPIR-V depends on: the text, every include, the options, the compiler.
+    fn key(&self, file: &str, text: &str, optimize: Optimize) -> String {
+        let mut hash = Sha256::new();
+        let (version, revision) = shaderc::get_spirv_version();
+        let crate_version = "shaderc-rs 0.10";
+        hash.update(format!("{crate_version} {version} {revision} vulkan1.3 {optimize:?} {file}\0{text}\0"));
+        for (name, include) in self.sources.0.iter().filter(|(n, _)| n.starts_with("include/")) {
+            hash.update(format!("{name}\0{include}\0"));
+        }
+        hex(&hash.finalize())
+    }
+}
+
+/// Lower-case hexadecimal.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A cached file is its words after their SHA-256; anything else is not there.
+fn read_cached(path: &Path) -> Option<Vec<u32>> {
+    let bytes = std::fs::read(path).ok()?;
+    let (sum, words) = bytes.split_at_checked(32)?;
+    if words.len() % 4 != 0 || Sha256::digest(words).as_slice() != sum {
+        return None;
+    }
+    Some(bytemuck::pod_collect_to_vec(words))
+}
+
+/// A cache that cannot be written costs time and nothing else, so failure is silent.
+fn write_cached(path: &Path, words: &[u32]) {
+    let bytes: &[u8] = bytemuck::cast_slice(words);
+    let temporary = path.with_extension(format!("{}-{:?}.tmp", std::process::id(), std::thread::current().id()));
+    let write = || -> std::io::Result<()> {
+        std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+        std::fs::write(&temporary, [Sha256::digest(bytes).as_slice(), bytes].concat())?;
+        std::fs::rename(&temporary, path)
+    };
+    if write().is_err() {
+        let _ = std::fs::remove_file(&temporary);
+    }
+}

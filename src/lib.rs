@@ -10,6 +10,8 @@
 pub mod error;
 pub mod gpu;
 pub mod io;
+pub mod layout;
 pub mod measure;
 pub mod model;
+pub mod passes;
 pub mod reference;

@@ -124,7 +124,6 @@ pub struct Image {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     pub(super) layout: vk::ImageLayout,
-    pub(super) format: vk::Format,
     pub(super) extent: vk::Extent2D,
     allocation: Option<Allocation>,
     shared: Arc<Shared>,
@@ -201,6 +200,11 @@ impl Image {
             .map_err(|e| Error::vulkan(format!("vkCreateImageView {name}"), e))?;
         image.shared.name(image.view, name);
         Ok(image)
+    }
+
+    /// Width and height in pixels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.extent.width, self.extent.height)
     }
 
     pub fn n_pixels(&self) -> u64 {

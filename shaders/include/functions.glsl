@@ -1,0 +1,43 @@
+// Functions whose accuracy Vulkan does not promise, or not where nimbus needs them.
+
+const float PI = 3.14159265358979;
+
+// sin x to 3.5 ulp after the reduction x - k pi with pi in four parts of few bits (Cody-Waite), so that k times each
+// part is exact for |k| < 2^14; beyond, the argument's own rounding error outgrows the reduction's. Built-in sin
+// promises 2^-11 absolute inside [-pi, pi] only. Coefficients: minimax on [-pi/2, pi/2] (as published in SLEEF).
+float sine(float x) {
+    float k = round(x * 0.318309886183790672);
+    float r = x - k * 3.140625;
+    r -= k * 0.0009670257568359375;
+    r -= k * 6.2771141529083251953e-07;
+    r -= k * 1.2154201256553420e-10;
+    // A huge argument reduces to anything; what is out of range is cut so that the result stays a sine.
+    r = clamp(r, -0.5 * PI, 0.5 * PI);
+    float s = r * r;
+    float u = 2.6083159809786593541503e-06;
+    u = u * s - 0.0001981069071916863322258;
+    u = u * s + 0.00833307858556509017944336;
+    u = u * s - 0.166666597127914428710938;
+    float value = s * (u * r) + r;
+    return (int(k) & 1) == 0 ? value : -value;
+}
+
+// erf x: Abramowitz and Stegun 7.1.28, |error| <= 3e-7; exact sign symmetry.
+float erf_approx(float x) {
+    float a = abs(x);
+    float d = 1.0 + a * (0.0705230784 + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143 + a * (0.0002765672 + a * 0.0000430638)))));
+    d *= d;
+    d *= d;
+    d *= d;
+    d *= d;
+    return sign(x) * (1.0 - 1.0 / d);
+}
+
+// 1 - e^-t for t >= 0, relative error below 1e-6 everywhere: the series where the difference would cancel. Eight terms
+// at t = 1/2 leave t^8/9! = 1e-8.
+float one_minus_exp(float t) {
+    if (t < 0.5) {
+        return t * (1.0 - t * (1.0 / 2.0) * (1.0 - t * (1.0 / 3.0) * (1.0 - t * (1.0 / 4.0) * (1.0 - t * (1.0 / 5.0) * (1.0 - t * (1.0 / 6.0) * (1.0 - t * (1.0 / 7.0) * (1.0 - t * (1.0 / 8.0))))))));
+    }
+    return 1.0 - exp(-t);
+}

@@ -1,0 +1,27 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "each.glsl"
+
+// Sort keys from view depth relative to the lighting origin; far to near is ascending (docs/model.md §11).
+
+layout(local_size_x = 64) in;
+
+layout(push_constant) uniform Push { vec3 forward; uint n_particles; float depth_high; float steps_per_depth; uint n_bits; } push;
+layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
+// (key, particle)
+layout(std430, binding = 1) writeonly buffer Entries { uvec2 entries[]; };
+
+void main() {
+    FOR_EACH(i, push.n_particles) {
+        float z = dot(push.forward, placed[i].position);
+        uint key;
+        if (push.n_bits == 16) {
+            key = uint(clamp((push.depth_high - z) * push.steps_per_depth, 0.0, 65535.0));
+        } else {
+            uint bits = floatBitsToUint(z);
+            key = ~((bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u);
+        }
+        entries[i] = uvec2(key, i);
+    }
+}

@@ -1,0 +1,35 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "sort.glsl"
+
+// Exclusive prefix sum of table[digit][tile] in one workgroup: an invocation a digit.
+
+layout(local_size_x = 256) in;
+
+layout(std430, binding = 0) buffer Table { uint table[]; };
+
+shared uint sums[N_DIGITS];
+
+void main() {
+    uint d = gl_LocalInvocationID.x;
+    uint row = d * push.n_tiles;
+    uint total = 0;
+    for (uint tile = 0; tile < push.n_tiles; ++tile) {
+        total += table[row + tile];
+    }
+    sums[d] = total;
+    barrier();
+    // Hillis-Steele over the 256 digits.
+    for (uint reach = 1; reach < N_DIGITS; reach *= 2) {
+        uint left = d >= reach ? sums[d - reach] : 0u;
+        barrier();
+        sums[d] += left;
+        barrier();
+    }
+    uint before = sums[d] - total;
+    for (uint tile = 0; tile < push.n_tiles; ++tile) {
+        uint count = table[row + tile];
+        table[row + tile] = before;
+        before += count;
+    }
+}

@@ -1,0 +1,49 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "sort.glsl"
+
+// Moves every entry to its place: the table's base for (digit, tile) plus its rank among its digit inside the tile.
+
+layout(local_size_x = 32) in;
+
+layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
+layout(std430, binding = 1) readonly buffer Table { uint table[]; };
+layout(std430, binding = 2) writeonly buffer Sorted { uvec2 entries_sorted[]; };
+
+// Counters of two digits a word: word w of invocation t at [w * 32 + t]. 16 KiB, which every Vulkan device has; a tile's
+// 1024 entries fit 16 bits.
+shared uint ranks[N_DIGITS / 2 * TILE_INVOCATIONS];
+
+void main() {
+    uint t = gl_LocalInvocationID.x;
+    for (uint tile = gl_WorkGroupID.x; tile < push.n_tiles; tile += gl_NumWorkGroups.x) {
+        uint first = tile * TILE + t * RUN;
+        uint n = first < push.n_entries ? min(RUN, push.n_entries - first) : 0u;
+        for (uint w = 0; w < N_DIGITS / 2; ++w) {
+            ranks[w * TILE_INVOCATIONS + t] = 0;
+        }
+        for (uint j = 0; j < n; ++j) {
+            uint d = digit_of(entries[first + j].x);
+            ranks[(d >> 1) * TILE_INVOCATIONS + t] += 1u << (16 * (d & 1));
+        }
+        barrier();
+        for (uint w = t; w < N_DIGITS / 2; w += TILE_INVOCATIONS) {
+            uint before = 0;
+            for (uint k = 0; k < TILE_INVOCATIONS; ++k) {
+                uint count = ranks[w * TILE_INVOCATIONS + k];
+                ranks[w * TILE_INVOCATIONS + k] = before;
+                before += count;
+            }
+        }
+        barrier();
+        for (uint j = 0; j < n; ++j) {
+            uvec2 entry = entries[first + j];
+            uint d = digit_of(entry.x);
+            uint word = (d >> 1) * TILE_INVOCATIONS + t;
+            uint rank = (ranks[word] >> (16 * (d & 1))) & 0xffffu;
+            ranks[word] += 1u << (16 * (d & 1));
+            entries_sorted[table[d * push.n_tiles + tile] + rank] = entry;
+        }
+        barrier();
+    }
+}

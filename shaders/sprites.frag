@@ -1,0 +1,28 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "functions.glsl"
+
+// Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md §9).
+
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float unused; } push;
+
+layout(location = 0) flat in vec4 in_blob;
+layout(location = 1) flat in vec3 in_radiance;
+layout(location = 0) out vec4 out_color;
+
+void main() {
+    // The ray (x, y, 1) through the pixel's centre; pixel = (2 tan_x/W, 2 tan_y/H).
+    vec2 ray = vec2(gl_FragCoord.x * push.pixel.x - push.camera.tan_x, push.camera.tan_y - gl_FragCoord.y * push.pixel.y);
+    // b^2 = |c x d|^2/|d|^2 with c = z (s, 1) and d = (s + delta, 1): one subtraction that can cancel, the delta.
+    vec2 s = in_blob.xy;
+    vec2 delta = ray - s;
+    float twist = s.x * delta.y - s.y * delta.x;
+    // b^2/(2 sigma^2)
+    float e = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
+    float alpha = 0.0;
+    if (e <= 0.5 * push.cutoff * push.cutoff) {
+        alpha = one_minus_exp(in_blob.w * exp(-e));
+    }
+    out_color = vec4(in_radiance * alpha, alpha);
+}

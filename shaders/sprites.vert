@@ -1,0 +1,57 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+
+// A screen-aligned quad around each blob's silhouette, far to near (docs/model.md §9).
+
+// 0: particle colours as given; 1: the radiance of the particle's facet.
+layout(constant_id = 0) const uint LIT = 1;
+
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float unused; } push;
+layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
+layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
+layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
+layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
+
+const float SQRT_TAU = 2.50662827463;
+// The quad is this much larger than the silhouette, so that rounding never cuts a pixel that the fragment shader would
+// keep; the fragment shader's own test decides.
+const float GROWTH = 1.0 + 1e-4;
+
+// Centre's slopes (x/z, y/z), z^2/(2 sigma^2), optical depth through the centre.
+layout(location = 0) flat out vec4 out_blob;
+layout(location = 1) flat out vec3 out_radiance;
+
+// Slopes of the two tangents from the eye to a circle of radius r at (a, z); unbounded sides become +-1e9.
+vec2 tangents(float a, float z, float r) {
+    float t2 = a * a + z * z - r * r;
+    if (t2 <= 0.0) {
+        return vec2(-1e9, 1e9);
+    }
+    float t = sqrt(t2);
+    float low = z * t + a * r, high = z * t - a * r;
+    return vec2(low > 0.0 ? (a * t - z * r) / low : -1e9, high > 0.0 ? (a * t + z * r) / high : 1e9);
+}
+
+void main() {
+    uint i = entries[gl_InstanceIndex].y;
+    vec3 c = placed[i].position - push.camera.eye;
+    float sigma = placed[i].sigma;
+    vec3 v = vec3(dot(push.camera.right, c), dot(push.camera.up, c), dot(push.camera.forward, c));
+    float tau = SQRT_TAU * particles[i].kappa * sigma;
+    out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
+    out_radiance = LIT != 0 ? lit[i].radiance.xyz : particles[i].color;
+    if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
+        // Nothing to draw: a quad without area.
+        gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+        return;
+    }
+    float r = GROWTH * push.cutoff * sigma;
+    vec2 x = tangents(v.x, v.z, r) / push.camera.tan_x;
+    vec2 y = tangents(v.y, v.z, r) / push.camera.tan_y;
+    // Only what lies on the screen: huge quads cost the rasteriser its accuracy.
+    x = clamp(x, -1.0, 1.0);
+    y = clamp(y, -1.0, 1.0);
+    bool right = (gl_VertexIndex & 1) != 0, top = (gl_VertexIndex & 2) != 0;
+    gl_Position = vec4(right ? x.y : x.x, -(top ? y.y : y.x), 0.0, 1.0);
+}

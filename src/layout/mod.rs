@@ -1,0 +1,25 @@
+//! The f32 records that shaders read, from the f64 model. Declared once, here; a test reflects every shader and
+//! compares names, offsets and sizes.
+
+pub mod facet;
+pub mod frame;
+pub mod particle;
+
+/// Declares a `repr(C)` record and lists its fields as (name, offset, bytes), for comparison with what the
+/// shaders declare.
+#[macro_export]
+macro_rules! record {
+    ($(#[$about:meta])* $vis:vis struct $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty),* $(,)? }) => {
+        $(#[$about])*
+        #[repr(C)]
+        #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]
+        $vis struct $name { $($(#[$doc])* pub $field: $type),* }
+
+        impl $name {
+            /// (name, offset, bytes) of every field in order.
+            pub const FIELDS: &'static [(&'static str, usize, usize)] = &[
+                $((stringify!($field), std::mem::offset_of!($name, $field), size_of::<$type>())),*
+            ];
+        }
+    };
+}

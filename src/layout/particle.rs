@@ -1,0 +1,128 @@
+//! Particles as the GPU holds them, and the boxes they are generated from.
+
+use glam::DVec3;
+
+use crate::model::boxes::{CloudBox, Form, radius_factor};
+use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::record;
+
+record! {
+    /// A Gaussian blob; position relative to its group's origin. Scene units, κ per unit.
+    pub struct ParticleRecord {
+        position: [f32; 3],
+        sigma: f32,
+        color: [f32; 3],
+        kappa: f32,
+    }
+}
+
+record! {
+    /// One box to generate from: P Table 1 with the constants of its laws.
+    pub struct BoxRecord {
+        /// X_L, Y_L, Z_L.
+        extent: [f32; 3],
+        /// R_max.
+        radius_max: f32,
+        /// σ of a particle over P (11)'s radius: the form's factor, `radius_scale` and 1/3.
+        sigma_factor: f32,
+        kappa: f32,
+        /// Philox key.
+        seed: u32,
+        i_box: u32,
+        /// Number of the box's first particle in the buffer.
+        i_first: u32,
+        n_particles: u32,
+        /// `FORM_CENTRED`, `FORM_PRINTED`, or `FORM_GIVEN` for a group that is no box.
+        form: u32,
+        unused: u32,
+    }
+}
+
+/// Values of [`BoxRecord::form`]; the shaders' `FORM_*`.
+pub const FORM_CENTRED: u32 = 0;
+pub const FORM_PRINTED: u32 = 1;
+pub const FORM_GIVEN: u32 = 2;
+
+impl ParticleRecord {
+    /// `particle` relative to `group`.
+    pub fn new(particle: &Particle, group: &Group) -> Self {
+        ParticleRecord {
+            position: (particle.position - group.center).as_vec3().to_array(),
+            sigma: particle.sigma as f32,
+            color: particle.color.as_vec3().to_array(),
+            kappa: particle.kappa as f32,
+        }
+    }
+}
+
+/// What a cloud says of all its boxes.
+#[derive(Debug, Clone, Copy)]
+pub struct BoxLaw {
+    pub form: Form,
+    pub optical_depth: f64,
+    pub radius_scale: f64,
+    pub seed: u32,
+}
+
+impl BoxRecord {
+    /// Box `i_box` of its cloud, whose particles start at `i_first`.
+    pub fn new(b: &CloudBox, law: &BoxLaw, i_box: u32, i_first: u32) -> Self {
+        BoxRecord {
+            extent: b.extent.as_vec3().to_array(),
+            radius_max: b.radius_max as f32,
+            sigma_factor: (radius_factor(law.form, b.radius_max) * law.radius_scale * SIGMA_PER_RADIUS) as f32,
+            kappa: box_kappa(b, law.form, law.optical_depth, law.radius_scale) as f32,
+            seed: law.seed,
+            i_box,
+            i_first,
+            n_particles: b.n_particles,
+            form: match law.form {
+                Form::Centred => FORM_CENTRED,
+                Form::Printed => FORM_PRINTED,
+            },
+            unused: 0,
+        }
+    }
+
+    /// Stands for a group whose particles are uploaded, not generated.
+    pub fn given() -> Self {
+        BoxRecord { form: FORM_GIVEN, ..BoxRecord::default() }
+    }
+}
+
+record! {
+    /// A particle where the frame has it: position relative to the lighting origin, and its σ.
+    pub struct PlacedRecord {
+        position: [f32; 3],
+        sigma: f32,
+    }
+}
+
+record! {
+    /// What moves a group this frame.
+    pub struct GroupRecord {
+        /// Cloud origin(t) + group centre − lighting origin.
+        offset: [f32; 3],
+        i_region: u32,
+        /// The cloud's centre relative to the lighting origin.
+        cloud_center: [f32; 3],
+        i_first: u32,
+        /// K_d of the cloud's material.
+        kd: [f32; 3],
+        n_particles: u32,
+    }
+}
+
+impl GroupRecord {
+    /// `origin_from_light`: the cloud's origin at the frame's time minus the lighting origin, in f64.
+    pub fn new(group: &Group, origin_from_light: DVec3, cloud_center: DVec3, kd: DVec3) -> Self {
+        GroupRecord {
+            offset: (origin_from_light + group.center).as_vec3().to_array(),
+            i_region: group.i_cloud as u32,
+            cloud_center: (origin_from_light + cloud_center).as_vec3().to_array(),
+            i_first: group.i_first,
+            kd: kd.as_vec3().to_array(),
+            n_particles: group.n_particles,
+        }
+    }
+}

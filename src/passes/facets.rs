@@ -1,0 +1,37 @@
+//! facets: what light falls on, one facet a particle.
+//!
+//! In: placed particles, κ, groups, density grid. Out: position, unit normal, area, region. Law: normal against the
+//! ball-averaged density gradient, blended to "away from the cloud's centre" where that is ill conditioned; position on
+//! the shell p + 1.5 σ n. Source: C §2.4, docs/model.md §5, §11. Error: the normal's grows as 1/(t·conditioning).
+
+use crate::error::Result;
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::layout::frame::GridRecord;
+use crate::record;
+
+record! {
+    pub struct Push { grid: GridRecord, n_particles: u32 }
+}
+
+pub struct Facets {
+    kernel: Kernel,
+}
+
+impl Facets {
+    pub fn new(device: &Device, compiler: &Compiler) -> Result<Facets> {
+        Ok(Facets { kernel: Kernel::new(device, compiler, "facets", Push::FIELDS, &[])? })
+    }
+
+    /// `placed`: PlacedRecord; `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord; `density`: f32;
+    /// `facets`: FacetRecord.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        [placed, particles, i_group, groups, density, facets]: [&Buffer; 6],
+        grid: &GridRecord,
+        n_particles: u32,
+    ) -> Result<()> {
+        let push = Push { grid: *grid, n_particles };
+        rec.dispatch(&self.kernel, &[placed, particles, i_group, groups, density, facets], &push, n_particles)
+    }
+}

@@ -1,0 +1,59 @@
+//! grid: the blobs' extinction on cubic cells.
+//!
+//! In: placed particles, their κ. Out: density (extinction per unit length), cell (x, y, z) at x + n_x (y + n_y z). Law:
+//! mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a weight's 3e-7 (erf), and half a quantum of
+//! the fixed-point sum a deposit.
+
+use crate::error::Result;
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
+use crate::layout::frame::GridRecord;
+use crate::record;
+
+record! {
+    pub struct DepositPush { grid: GridRecord, n_particles: u32, quanta_per_mass: f32 }
+}
+
+record! {
+    pub struct ResolvePush { n_cells: u32, density_per_quantum: f32 }
+}
+
+/// Quanta of the heaviest particle's mass: 2³¹ in one cell fits a 32-bit word with room for rounding up, and 2³³ such
+/// particles fit the 64-bit sum.
+const QUANTA_OF_HEAVIEST: f64 = 2_147_483_648.0;
+
+pub struct Grid {
+    deposit: Kernel,
+    resolve: Kernel,
+    sums: Buffer,
+}
+
+impl Grid {
+    /// Room for `n_cells` cells.
+    pub fn new(device: &Device, compiler: &Compiler, n_cells: u64) -> Result<Grid> {
+        Ok(Grid {
+            deposit: Kernel::new(device, compiler, "grid.deposit", DepositPush::FIELDS, &[])?,
+            resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS, &[])?,
+            sums: Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, Place::Device)?,
+        })
+    }
+
+    /// `placed`: PlacedRecord; `particles`: ParticleRecord; `density`: f32 by cell. `heaviest` is at least the greatest
+    /// mass κ (2π)^{3/2} σ³ of any particle.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        [placed, particles, density]: [&Buffer; 3],
+        grid: &GridRecord,
+        n_particles: u32,
+        heaviest: f64,
+    ) -> Result<()> {
+        rec.fill(&self.sums, 0);
+        let quanta_per_mass = if heaviest > 0.0 { QUANTA_OF_HEAVIEST / heaviest } else { 0.0 };
+        let push = DepositPush { grid: *grid, n_particles, quanta_per_mass: quanta_per_mass as f32 };
+        rec.dispatch_groups(&self.deposit, &[placed, particles, &self.sums], &push, n_particles)?;
+        let n_cells = grid.n_cells.iter().product();
+        let volume = f64::from(grid.cell).powi(3);
+        let density_per_quantum = (heaviest / QUANTA_OF_HEAVIEST / volume) as f32;
+        rec.dispatch(&self.resolve, &[&self.sums, density], &ResolvePush { n_cells, density_per_quantum }, n_cells)
+    }
+}

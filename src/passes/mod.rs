@@ -1,0 +1,44 @@
+//! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label and its column in the
+//! results share one name. `new` allocates and can fail; `record` only records. No pass knows another.
+
+pub mod facets;
+pub mod first;
+pub mod generate;
+pub mod grid;
+pub mod place;
+pub mod sort;
+pub mod sprites;
+pub mod transmit;
+
+use crate::gpu::Sources;
+
+macro_rules! shader_texts {
+    ($($name:literal),* $(,)?) => { &[$(($name, include_str!(concat!("../../shaders/", $name)))),*] };
+}
+
+/// Every shader and include, as built into the binary.
+pub const SHADERS: &[(&str, &str)] = shader_texts![
+    "facets.comp",
+    "first.comp",
+    "generate.comp",
+    "grid_deposit.comp",
+    "grid_resolve.comp",
+    "include/density.glsl",
+    "include/each.glsl",
+    "include/functions.glsl",
+    "include/philox.glsl",
+    "include/records.glsl",
+    "include/sort.glsl",
+    "place.comp",
+    "sort_count.comp",
+    "sort_key.comp",
+    "sort_scan.comp",
+    "sort_scatter.comp",
+    "sprites.frag",
+    "sprites.vert",
+    "transmit.comp",
+];
+
+pub fn sources() -> Sources {
+    Sources::embedded(SHADERS)
+}

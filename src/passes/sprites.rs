@@ -1,0 +1,43 @@
+//! sprites: the particles as thin Gaussian sprites, blended far to near.
+//!
+//! In: sorted entries, placed particles, particles (κ, colour), lit facets. Out: premultiplied linear RGBA in the film's
+//! format. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
+//! §9, §11. Error: α to a few 1e-6 relative, and the target's rounding at each layer.
+
+use crate::error::Result;
+use crate::gpu::memory::TargetFormat;
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Image, Recorder};
+use crate::layout::frame::CameraRecord;
+use crate::record;
+
+record! {
+    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, unused: f32 }
+}
+
+pub struct Sprites {
+    pipeline: DrawPipeline,
+}
+
+impl Sprites {
+    /// `lit`: colours come from the facets' radiance; else from the particles.
+    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, lit: bool) -> Result<Sprites> {
+        let constants = [(0, u32::from(lit))];
+        Ok(Sprites { pipeline: DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format)? })
+    }
+
+    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 4],
+        target: &mut Image,
+        camera: &CameraRecord,
+        cutoff: f64,
+        n_particles: u32,
+    ) -> Result<()> {
+        let (width, height) = target.size();
+        let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
+        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, unused: 0.0 };
+        rec.draw(&self.pipeline, target, &buffers, &push, n_particles)
+    }
+}

@@ -20,6 +20,7 @@ mod scene_lights;
 mod scene_sections;
 mod suggest;
 pub mod text_file;
+mod toml_depth;
 pub mod toml_override;
 pub mod toml_section;
 pub mod toml_tree;

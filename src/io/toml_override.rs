@@ -3,7 +3,8 @@
 
 use toml::de::DeValue;
 
-use super::toml_tree::{Document, Entry, Node, Origin, OutOfRange, Table, Value, convert};
+use super::toml_depth::{MAX_DOTS, too_deep};
+use super::toml_tree::{Document, Entry, Node, Origin, OutOfRange, TOO_DEEP, Table, Value, convert};
 use crate::error::{Error, Result};
 
 impl Document {
@@ -17,6 +18,9 @@ impl Document {
                 .split_once('=')
                 .ok_or_else(|| fault("expected key.path=VALUE, for example lighting.grid=32".to_owned()))?;
             let segments: Vec<&str> = path.split('.').map(str::trim).collect();
+            if segments.len() > MAX_DOTS + 1 || too_deep(value).is_some() {
+                return Err(fault(TOO_DEEP.to_owned()));
+            }
             if segments.iter().any(|s| s.is_empty()) {
                 return Err(fault("expected key.path=VALUE, found an empty key".to_owned()));
             }
@@ -40,7 +44,7 @@ fn parse_value(text: &str, origin: Origin) -> std::result::Result<Node, String> 
 
 /// Names and file names. Anything with TOML's own punctuation was meant as TOML and is reported as such.
 fn is_word(text: &str) -> bool {
-    text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | '/' | '\\' | ' '))
+    text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/' | '\\' | ' '))
 }
 
 /// Puts `value` at `segments[i..]` below `node`.
@@ -57,7 +61,7 @@ fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> std::result
             let item = segment.parse().ok().and_then(|k: usize| list.get_mut(k));
             let item = item.ok_or_else(|| match n {
                 0 => format!("`{}` is empty", here()),
-                _ => format!("`{}` has {n} elements: expected a number from 0 to {}, found `{segment}`", here(), n - 1),
+                _ => format!("`{}`: expected a number from 0 to {}, found `{segment}`", here(), n - 1),
             })?;
             put(item, segments, i + 1, value)
         }

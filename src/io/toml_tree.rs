@@ -7,12 +7,16 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::text_file::{self, line_column};
+use super::toml_depth::too_deep;
 use crate::error::{Error, Place, Result};
 
 pub struct Document {
     pub source: Source,
     pub root: Node,
 }
+
+/// Said of a key that [`too_deep`] finds.
+pub const TOO_DEEP: &str = "no key of nimbus has this many dots";
 
 /// What origins point into.
 pub struct Source {
@@ -65,6 +69,9 @@ impl Document {
 
     pub fn parse(text: String, path: &Path) -> Result<Document> {
         let source = Source { path: path.to_owned(), text, overrides: Vec::new() };
+        if let Some(offset) = too_deep(&source.text) {
+            return Err(Error::scene(source.place(Origin::File(offset)), TOO_DEEP));
+        }
         let root = match DeTable::parse(&source.text) {
             Ok(table) => convert_table(table.get_ref(), &Origin::File),
             Err(e) => {

@@ -58,3 +58,39 @@ impl Drop for Temporary {
         let _ = fs::remove_file(&self.path);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn a_failure_leaves_the_old_file_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        write_atomic(&path, |w| w.write_all(b"old")).unwrap();
+        let error =
+            write_atomic(&path, |w| w.write_all(b"half").and(Err(std::io::Error::other("no more")))).unwrap_err();
+        assert_eq!(error, Error::io(&path, "no more"));
+        let panic = std::panic::catch_unwind(|| write_atomic::<String>(&path, |_| panic!("midway")));
+        assert!(panic.is_err());
+        assert_eq!((fs::read(&path).unwrap(), names(dir.path())), (b"old".to_vec(), vec!["a.txt".to_owned()]));
+        write_atomic(&path, |w| w.write_all(b"new")).unwrap();
+        assert_eq!((fs::read(&path).unwrap(), names(dir.path())), (b"new".to_vec(), vec!["a.txt".to_owned()]));
+    }
+
+    #[test]
+    fn places_that_cannot_hold_a_file_are_refused_before_writing() {
+        let dir = tempfile::tempdir().unwrap();
+        let refuse =
+            |path: &Path| write_atomic::<String>(path, |_| panic!("must not be called")).unwrap_err().to_string();
+        let missing = dir.path().join("gone");
+        assert!(refuse(&missing.join("a.txt")).ends_with(&format!("the folder {} does not exist", missing.display())));
+        assert!(refuse(dir.path()).ends_with("exists and is not a regular file"));
+        assert!(refuse(Path::new("/")).ends_with("expected a file name"));
+        assert_eq!(names(dir.path()).len(), 0);
+    }
+}

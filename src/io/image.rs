@@ -85,6 +85,7 @@ fn dither(x: usize, y: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::film::{FilmFormat, ToneMap};
 
     #[test]
     fn bayers_matrix_holds_each_threshold_once() {
@@ -94,5 +95,59 @@ mod tests {
         let mut all: Vec<usize> = (0..64).map(|i| (dither(i % 8, i / 8) * 64.0 - 0.5) as usize).collect();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..64));
+    }
+
+    fn film(width: u32, height: u32) -> Film {
+        let background = DVec3::new(0.1, 0.5, 0.9);
+        Film { width, height, format: FilmFormat::Rgba16f, background, exposure: 1.0, tone_map: ToneMap::Clip }
+    }
+
+    #[test]
+    fn exr_keeps_every_bit_and_png_shows_the_composition() {
+        let dir = tempfile::tempdir().unwrap();
+        let (exr, png) = (dir.path().join("a.exr"), dir.path().join("a.PNG"));
+        let rgba: Vec<f32> = (0..5 * 3 * 4).map(|i| (i as f32 * 0.37).sin().abs() * 1e-3f32.powi(i % 5 - 2)).collect();
+        write(&exr, &film(5, 3), 5, 3, &rgba).unwrap();
+        let read = image::open(&exr).unwrap().into_rgba32f();
+        assert_eq!((read.dimensions(), read.as_raw()), ((5, 3), &rgba));
+
+        write(&png, &film(5, 3), 5, 3, &rgba).unwrap();
+        let read = image::open(&png).unwrap().into_rgb8();
+        for (pixel, shown) in rgba.chunks(4).zip(read.pixels()) {
+            let rgb = DVec3::new(f64::from(pixel[0]), f64::from(pixel[1]), f64::from(pixel[2]));
+            let exact = film(5, 3).display(rgb, f64::from(pixel[3])) * 255.0;
+            for channel in 0..3 {
+                // Rounding ½ and dither ½: less than one code value.
+                assert!((f64::from(shown[channel]) - exact[channel]).abs() < 1.0);
+            }
+        }
+        let bytes = std::fs::read(&png).unwrap();
+        write(&png, &film(5, 3), 5, 3, &rgba).unwrap();
+        assert_eq!(std::fs::read(&png).unwrap(), bytes);
+    }
+
+    #[test]
+    fn dither_keeps_the_mean_and_leaves_whole_code_values_alone() {
+        // Nothing covers the background; 64 pixels are one period of the matrix.
+        let empty = [0.0f32; 64 * 4];
+        let shown = display_bytes(&film(8, 8), 8, 8, &empty);
+        let exact = film(8, 8).display(DVec3::ZERO, 0.0) * 255.0;
+        for channel in 0..3 {
+            let mean = shown.iter().skip(channel).step_by(3).map(|v| f64::from(*v)).sum::<f64>() / 64.0;
+            // Thresholds are 1/64 apart and the mean counts those passed: right to half a step.
+            assert!((mean - exact[channel]).abs() <= 0.5 / 64.0 + 1e-9, "{mean} {}", exact[channel]);
+        }
+        let white: Vec<f32> = [2.0, 0.0, 1.0, 1.0].repeat(64);
+        assert!(display_bytes(&film(8, 8), 8, 8, &white).chunks(3).all(|c| c == [255, 0, 255]));
+        let nan: Vec<f32> = [f32::NAN, f32::INFINITY, 0.0, 1.0].repeat(64);
+        assert!(display_bytes(&film(8, 8), 8, 8, &nan).chunks(3).all(|c| c == [0, 255, 0]));
+    }
+
+    #[test]
+    fn other_extensions_are_a_usage_error() {
+        for name in ["a.jpg", "a", ".png", "png"] {
+            let error = write(Path::new(name), &film(1, 1), 1, 1, &[0.0; 4]).unwrap_err();
+            assert_eq!(error, Error::usage(format!("{name}: expected a file name that ends in .png or .exr")));
+        }
     }
 }

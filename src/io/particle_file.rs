@@ -28,9 +28,11 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
     let Some(header) = next().map_err(lost)? else {
         return Err(Error::scene(Place::file(path), "expected a header x,y,z,sigma,kappa[,r,g,b]"));
     };
+    file.check_quotes(&header)?;
     let columns = Columns::find(&file, &header)?;
     let mut particles = Vec::new();
     while let Some(row) = next().map_err(lost)? {
+        file.check_quotes(&row)?;
         if row.len() != header.len() {
             let i = row.len().min(header.len());
             let what = format!("expected {} fields as in the header, found {}", header.len(), row.len());
@@ -51,6 +53,14 @@ struct File<'a> {
 }
 
 impl File<'_> {
+    /// A quote that is not closed takes in all lines up to the next one; no name or number has two lines.
+    fn check_quotes(&self, row: &StringRecord) -> Result<()> {
+        match row.iter().position(|field| field.contains('\n')) {
+            Some(i) => Err(Error::scene(self.place(row, i), "the quote is not closed on its line")),
+            None => Ok(()),
+        }
+    }
+
     /// Where field `i` of a row starts; past the last one, where the row ends.
     fn place(&self, row: &StringRecord, i: usize) -> Place {
         let start = row.position().map_or(0, |p| p.byte() as usize).min(self.text.len());
@@ -155,5 +165,52 @@ impl Columns {
                 Some([r, g, b]) => DVec3::new(size(r, "r")?, size(g, "g")?, size(b, "b")?),
             },
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good(text: &str) -> Vec<Particle> {
+        parse(text, Path::new("p.csv")).unwrap()
+    }
+
+    #[test]
+    fn columns_come_in_any_order_and_colour_is_optional() {
+        let list = good("kappa, b,g,r, radius,z,y,x\n2,0.3,0.2,0.1,6,-3,2,1\n");
+        let position = DVec3::new(1.0, 2.0, -3.0);
+        let expected = Particle { position, sigma: 2.0, kappa: 2.0, color: DVec3::new(0.1, 0.2, 0.3) };
+        assert_eq!(list, [expected]);
+        let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
+        assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
+        assert_eq!(good("x,y,z,sigma,kappa"), []);
+    }
+
+    #[test]
+    fn faults_have_their_place_and_say_what_was_expected() {
+        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `kappa`, `r`, `g`, `b`)";
+        let row = |row: &str| format!("x,y,z,sigma,kappa\n0,0,0,1,1\r\n\r\n{row}\n");
+        for (text, expected) in [
+            ("x,y,z,sigma,kapa".to_owned(), format!("1:13: unknown column `kapa`; did you mean `kappa`? {known}")),
+            ("x,y,z,sigma,kappa,".to_owned(), format!("1:19: unknown column ``; did you mean `x`? {known}")),
+            ("x, x,y,z,sigma,kappa".to_owned(), "1:4: column `x` stands twice".to_owned()),
+            ("x,y,sigma,kappa".to_owned(), "1:1: missing column `z`".to_owned()),
+            ("x,y,z,kappa".to_owned(), "1:1: missing column `sigma` (or `radius` = 3 sigma)".to_owned()),
+            ("x,y,z,sigma,kappa,radius".to_owned(), "1:19: expected `sigma` or `radius`, found both".to_owned()),
+            ("x,y,z,sigma,kappa,r,b".to_owned(), "1:19: expected all of `r`, `g`, `b` or none; missing `g`".to_owned()),
+            ("\n1,2,3,4,5\n".to_owned(), "2:1: expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned()),
+            (row("0,0,0,1"), "4:8: expected 5 fields as in the header, found 4".to_owned()),
+            (row("0,0,0,1,1,7"), "4:11: expected 5 fields as in the header, found 6".to_owned()),
+            (row("0,0,zero,1,1"), "4:5: expected a finite number, found `zero`".to_owned()),
+            (row("0,0,,1,1"), "4:5: expected a finite number, found ``".to_owned()),
+            (row("0,\"0\", inf,1,1"), "4:8: expected a finite number, found `inf`".to_owned()),
+            (row("0,0,0,-1,1"), "4:7: sigma: expected at least 0, found -1".to_owned()),
+            (row("0,0,0,1,-2"), "4:9: kappa: expected at least 0, found -2".to_owned()),
+            (row("0,0,\"0,1,1"), "4:5: the quote is not closed on its line".to_owned()),
+        ] {
+            let error = parse(&text, Path::new("p.csv")).expect_err(&text).to_string();
+            assert_eq!(error, format!("p.csv:{expected}"), "for\n{text}");
+        }
     }
 }

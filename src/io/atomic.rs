@@ -1,0 +1,96 @@
+//! Results are written beside their place and moved into it, so that a reader, a crash or Ctrl-C meets either
+//! the old file or the new one whole.
+
+use std::fmt::Display;
+use std::fs::{self, File, OpenOptions};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use crate::error::{Error, Result};
+
+/// Writes `path` with `write`. When that fails or panics the old file stays, and nothing else is left behind.
+pub fn write_atomic<E: Display>(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), E>,
+) -> Result<()> {
+    let temporary = Temporary::beside(path)?;
+    let file = OpenOptions::new().write(true).create_new(true).open(&temporary.path);
+    let mut writer = BufWriter::new(file.map_err(|e| Error::io(path, format!("cannot be written: {e}")))?);
+    write(&mut writer).map_err(|e| Error::io(path, e))?;
+    writer.flush().map_err(|e| Error::io(path, e))?;
+    drop(writer);
+    fs::rename(&temporary.path, path).map_err(|e| Error::io(path, e))
+}
+
+/// Removes its file when dropped; after the rename there is none.
+struct Temporary {
+    path: PathBuf,
+}
+
+impl Temporary {
+    fn beside(path: &Path) -> Result<Temporary> {
+        let Some(name) = path.file_name() else {
+            return Err(Error::io(path, "expected a file name"));
+        };
+        let folder = match path.parent() {
+            Some(folder) if folder != Path::new("") => folder,
+            _ => Path::new("."),
+        };
+        if !folder.is_dir() {
+            return Err(Error::io(path, format!("the folder {} does not exist", folder.display())));
+        }
+        // Renaming over a device such as /dev/null would replace it.
+        if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
+            return Err(Error::io(path, "exists and is not a regular file"));
+        }
+        // Two threads of one process may write files of one name.
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let name = format!(".{}.{}-{count}.tmp", name.to_string_lossy(), std::process::id());
+        Ok(Temporary { path: folder.join(name) })
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        // Gone already when all went well; otherwise the error that led here is the one to report.
+        let _ = fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn a_failure_leaves_the_old_file_and_nothing_else() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.txt");
+        write_atomic(&path, |w| w.write_all(b"old")).unwrap();
+        let error =
+            write_atomic(&path, |w| w.write_all(b"half").and(Err(std::io::Error::other("no more")))).unwrap_err();
+        assert_eq!(error, Error::io(&path, "no more"));
+        let panic = std::panic::catch_unwind(|| write_atomic::<String>(&path, |_| panic!("midway")));
+        assert!(panic.is_err());
+        assert_eq!((fs::read(&path).unwrap(), names(dir.path())), (b"old".to_vec(), vec!["a.txt".to_owned()]));
+        write_atomic(&path, |w| w.write_all(b"new")).unwrap();
+        assert_eq!((fs::read(&path).unwrap(), names(dir.path())), (b"new".to_vec(), vec!["a.txt".to_owned()]));
+    }
+
+    #[test]
+    fn places_that_cannot_hold_a_file_are_refused_before_writing() {
+        let dir = tempfile::tempdir().unwrap();
+        let refuse =
+            |path: &Path| write_atomic::<String>(path, |_| panic!("must not be called")).unwrap_err().to_string();
+        let missing = dir.path().join("gone");
+        assert!(refuse(&missing.join("a.txt")).ends_with(&format!("the folder {} does not exist", missing.display())));
+        assert!(refuse(dir.path()).ends_with("exists and is not a regular file"));
+        assert!(refuse(Path::new("/")).ends_with("expected a file name"));
+        assert_eq!(names(dir.path()).len(), 0);
+    }
+}

@@ -1,0 +1,248 @@
+//! Box files, P Table 1: the number of particles, the number of boxes, then a line a box of
+//! `particles, x extent, y extent, z extent, x, y, z, radius`.
+
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::text_file::{DATA_LIMIT, line_column, read_text};
+use crate::error::{Error, Place, Result};
+use crate::model::boxes::CloudBox;
+
+const FIELDS: [&str; 8] = ["particles", "x extent", "y extent", "z extent", "x", "y", "z", "radius"];
+
+pub fn read(path: &Path) -> Result<Vec<CloudBox>> {
+    parse(&read_text(path, DATA_LIMIT)?, path)
+}
+
+/// Boxes from text; `path` is for messages. Commas, spaces and tabs separate, blank lines are passed over.
+pub fn parse(text: &str, path: &Path) -> Result<Vec<CloudBox>> {
+    let lines = text.lines().enumerate().map(|(i, line)| Line { number: i + 1, text: line, path });
+    let mut lines = lines.filter(|line| !line.text.trim().is_empty());
+    let (n_particles, at_particles) = header(lines.next(), "the number of particles", text, path)?;
+    let (n_boxes, at_boxes) = header(lines.next(), "the number of boxes", text, path)?;
+    let boxes = lines.map(|line| line.cloud_box()).collect::<Result<Vec<_>>>()?;
+    if boxes.len() as u64 != n_boxes {
+        return Err(Error::scene(at_boxes, format!("the file says {n_boxes} boxes and has {}", boxes.len())));
+    }
+    let sum: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
+    if sum != n_particles {
+        let what = format!("the file says {n_particles} particles and its boxes have {sum}");
+        return Err(Error::scene(at_particles, what));
+    }
+    Ok(boxes)
+}
+
+/// Text that [`parse`] reads back as equal values.
+pub fn format(boxes: &[CloudBox]) -> String {
+    let sum: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
+    let mut text = format!("{sum}\n{}\n", boxes.len());
+    for b in boxes {
+        let numbers = [b.extent.to_array().as_slice(), &b.center.to_array(), &[b.radius_max]].concat();
+        let numbers: Vec<String> = numbers.into_iter().map(shortest).collect();
+        text += &format!("{}, {}\n", b.n_particles, numbers.join(", "));
+    }
+    text
+}
+
+/// The fewest digits that read back as the same number; with an exponent where plain digits would run long.
+fn shortest(v: f64) -> String {
+    let plain = v == 0.0 || (1e-4..1e9).contains(&v.abs());
+    if plain { format!("{v}") } else { format!("{v:e}") }
+}
+
+struct Line<'a> {
+    number: usize,
+    text: &'a str,
+    path: &'a Path,
+}
+
+/// One field and its byte offset in the line.
+type Field<'a> = (usize, &'a str);
+
+fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<(u64, Place)> {
+    let Some(line) = line else {
+        let (number, column) = line_column(text, text.trim_end().len());
+        return Err(Error::scene(Place::line(path, number, column), format!("the file ends: expected {meaning}")));
+    };
+    let (fields, _) = line.fields()?;
+    if let Some(extra) = fields.get(1) {
+        return Err(line.fault(extra.0, format!("expected {meaning} alone on its line, found more: `{}`", extra.1)));
+    }
+    let (offset, word) = fields[0];
+    let n = word.parse().map_err(|_| line.fault(offset, format!("expected {meaning}, found `{word}`")))?;
+    Ok((n, line.place(offset)))
+}
+
+impl<'a> Line<'a> {
+    fn place(&self, offset: usize) -> Place {
+        Place::line(self.path, self.number, line_column(self.text, offset).1)
+    }
+
+    fn fault(&self, offset: usize, what: String) -> Error {
+        Error::scene(self.place(offset), what)
+    }
+
+    /// The words of a line that is not blank, at least one, and their number; of too many only the first too
+    /// many is kept, or a line of 64 MiB would take a GiB. An empty place between commas is an error, since
+    /// passing over it would shift every number after it.
+    fn fields(&self) -> Result<(Vec<Field<'a>>, usize)> {
+        let mut fields = Vec::new();
+        let mut n_fields = 0;
+        let mut start = 0;
+        for piece in self.text.split(',') {
+            let before = n_fields;
+            let mut rest = start;
+            for word in piece.split_whitespace() {
+                // Words come in order, so each is found at or after the end of the one before.
+                let offset = rest + self.text[rest..].find(word).unwrap_or(0);
+                if n_fields <= FIELDS.len() {
+                    fields.push((offset, word));
+                }
+                n_fields += 1;
+                rest = offset + word.len();
+            }
+            if n_fields == before {
+                return Err(self.fault(start, "expected a number, found nothing beside the comma".to_owned()));
+            }
+            start += piece.len() + 1;
+        }
+        Ok((fields, n_fields))
+    }
+
+    fn cloud_box(&self) -> Result<CloudBox> {
+        let (fields, n_fields) = self.fields()?;
+        if n_fields != FIELDS.len() {
+            // At the first one too many, or where the first missing one would stand.
+            let offset = fields.get(FIELDS.len()).map_or(self.text.trim_end().len(), |field| field.0);
+            let what = format!("expected 8 fields ({}), found {n_fields}", FIELDS.join(", "));
+            return Err(self.fault(offset, what));
+        }
+        let number = |i: usize| self.number(FIELDS[i], fields[i]);
+        let size = |i: usize| match number(i)? {
+            v if v >= 0.0 => Ok(v),
+            v => Err(self.fault(fields[i].0, format!("{}: expected at least 0, found {v}", FIELDS[i]))),
+        };
+        let (offset, word) = fields[0];
+        let n_particles = word.parse().map_err(|_| {
+            self.fault(offset, format!("particles: expected an integer from 0 to {}, found `{word}`", u32::MAX))
+        })?;
+        Ok(CloudBox {
+            n_particles,
+            extent: DVec3::new(size(1)?, size(2)?, size(3)?),
+            center: DVec3::new(number(4)?, number(5)?, number(6)?),
+            radius_max: size(7)?,
+        })
+    }
+
+    fn number(&self, name: &str, (offset, word): Field) -> Result<f64> {
+        match word.parse::<f64>() {
+            Ok(v) if v.is_finite() => Ok(v),
+            Ok(_) => Err(self.fault(offset, format!("{name}: expected a finite number, found `{word}`"))),
+            Err(_) => Err(self.fault(offset, format!("{name}: expected a number, found `{word}`"))),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(text: &str) -> String {
+        parse(text, Path::new("b.dat")).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn commas_blanks_line_ends_and_exponents_are_read() {
+        let boxes = parse("7\r\n2\r\n\r\n3,1,2,3,-4,5.5,6.12438e-007, 2\r\n4 1\t2  3 , 4 5 6,2\n\n \n", Path::new("b"))
+            .unwrap();
+        let first = CloudBox {
+            n_particles: 3,
+            extent: DVec3::new(1.0, 2.0, 3.0),
+            center: DVec3::new(-4.0, 5.5, 6.12438e-7),
+            radius_max: 2.0,
+        };
+        let center = DVec3::new(4.0, 5.0, 6.0);
+        assert_eq!(boxes, [first, CloudBox { n_particles: 4, center, ..first }]);
+        assert_eq!(parse("0\n0", Path::new("b")).unwrap(), []);
+    }
+
+    #[test]
+    fn faults_have_their_place_and_say_what_was_expected() {
+        let one = |line: &str| message(&format!("3\n1\n{line}\n"));
+        for (found, expected) in [
+            (
+                one("3, 1, 1, 1, 0, 0, 0"),
+                "3:20: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 7",
+            ),
+            (
+                one("3, 1, 1, 1, 0, 0, 0, 1, 5"),
+                "3:25: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 9",
+            ),
+            (one("3, 1, -1, 1, 0, 0, 0, 1"), "3:7: y extent: expected at least 0, found -1"),
+            (one("3, 1, 1, 1, 0, 0, 0, -0.5"), "3:22: radius: expected at least 0, found -0.5"),
+            (one("-3, 1, 1, 1, 0, 0, 0, 1"), "3:1: particles: expected an integer from 0 to 4294967295, found `-3`"),
+            (one("3.5, 1, 1, 1, 0, 0, 0, 1"), "3:1: particles: expected an integer from 0 to 4294967295, found `3.5`"),
+            (
+                one("4294967296, 1, 1, 1, 0, 0, 0, 1"),
+                "3:1: particles: expected an integer from 0 to 4294967295, found `4294967296`",
+            ),
+            (one("3, 1, 1, 1, nan, 0, 0, 1"), "3:13: x: expected a finite number, found `nan`"),
+            (one("3, 1, 1, 1, 0, 0, 1e999, 1"), "3:19: z: expected a finite number, found `1e999`"),
+            (one("3, 1, 1, 1, 0, o, 0, 1"), "3:16: y: expected a number, found `o`"),
+            (one("3, 1,, 1, 0, 0, 0, 1"), "3:6: expected a number, found nothing beside the comma"),
+            (one("3, 1, 1, 1, 0, 0, 0, 1,"), "3:24: expected a number, found nothing beside the comma"),
+            (one("ä, 1, 1, 1, 0, 0, 0, ö"), "3:1: particles: expected an integer from 0 to 4294967295, found `ä`"),
+            (
+                message(&format!("3\n1\n{}", "1 ".repeat(99))),
+                "3:17: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 99",
+            ),
+            (message("4\n1\n3, 1, 1, 1, 0, 0, 0, 1"), "1:1: the file says 4 particles and its boxes have 3"),
+            (message("3\n\n 2\n3, 1, 1, 1, 0, 0, 0, 1"), "3:2: the file says 2 boxes and has 1"),
+            (message("3\n0\n3, 1, 1, 1, 0, 0, 0, 1"), "2:1: the file says 0 boxes and has 1"),
+            (message("3\n"), "1:2: the file ends: expected the number of boxes"),
+            (message("3, 1\n1"), "1:4: expected the number of particles alone on its line, found more: `1`"),
+            (message("3\nx"), "2:1: expected the number of boxes, found `x`"),
+            (message("-1\n0"), "1:1: expected the number of particles, found `-1`"),
+        ] {
+            assert_eq!(found, format!("b.dat:{expected}"));
+        }
+    }
+
+    #[test]
+    fn what_is_written_reads_back_as_equal_bits() {
+        // Knuth's MMIX generator, its high bits.
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state >> 16
+        };
+        for n in 0..200 {
+            let boxes: Vec<CloudBox> = (0..n % 7)
+                .map(|_| {
+                    // Every exponent from the subnormals to the greatest, and both signs.
+                    let mut number = || loop {
+                        let v = f64::from_bits(next() << 32 ^ next());
+                        if v.is_finite() {
+                            return v;
+                        }
+                    };
+                    let mut vector = || DVec3::new(number(), number(), number());
+                    let (extent, center, radius_max) = (vector().abs(), vector(), vector().x.abs());
+                    CloudBox { n_particles: next() as u32, extent, center, radius_max }
+                })
+                .collect();
+            let text = format(&boxes);
+            let again = parse(&text, Path::new("b")).unwrap();
+            let bits = |b: &CloudBox| {
+                (b.n_particles, [b.extent, b.center].map(|v| v.to_array().map(f64::to_bits)), b.radius_max.to_bits())
+            };
+            assert!(boxes.iter().map(bits).eq(again.iter().map(bits)), "{text}");
+            assert_eq!(format(&again), text);
+        }
+        assert_eq!(
+            [0.0, -0.0, 0.1, -3.0, 6.12438e-7, 1e300].map(shortest),
+            ["0", "-0", "0.1", "-3", "6.12438e-7", "1e300"]
+        );
+    }
+}

@@ -1,0 +1,216 @@
+//! Particle lists: CSV with the header `x,y,z,sigma,kappa[,r,g,b]` in any order; `radius` may stand for
+//! sigma = radius / 3.
+
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord};
+use glam::DVec3;
+
+use super::suggest::{did_you_mean, list};
+use super::text_file::{DATA_LIMIT, line_column, read_text};
+use crate::error::{Error, Place, Result};
+use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
+
+const COLUMNS: [&str; 9] = ["x", "y", "z", "sigma", "radius", "kappa", "r", "g", "b"];
+
+pub fn read(path: &Path) -> Result<Vec<Particle>> {
+    parse(&read_text(path, DATA_LIMIT)?, path)
+}
+
+/// Particles from text; `path` is for messages.
+pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
+    let file = File { text, path };
+    let mut reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let mut rows = reader.records();
+    let mut next = || rows.find(|row| row.as_ref().map_or(true, |row| !is_blank(row))).transpose();
+    let lost = |e: csv::Error| Error::scene(Place::file(path), format!("not readable as CSV: {e}"));
+
+    let Some(header) = next().map_err(lost)? else {
+        return Err(Error::scene(Place::file(path), "expected a header x,y,z,sigma,kappa[,r,g,b]"));
+    };
+    file.check_quotes(&header)?;
+    let columns = Columns::find(&file, &header)?;
+    let mut particles = Vec::new();
+    while let Some(row) = next().map_err(lost)? {
+        file.check_quotes(&row)?;
+        if row.len() != header.len() {
+            let i = row.len().min(header.len());
+            let what = format!("expected {} fields as in the header, found {}", header.len(), row.len());
+            return Err(Error::scene(file.place(&row, i), what));
+        }
+        particles.push(columns.particle(&file, &row)?);
+    }
+    Ok(particles)
+}
+
+fn is_blank(row: &StringRecord) -> bool {
+    row.len() == 1 && row[0].trim().is_empty()
+}
+
+struct File<'a> {
+    text: &'a str,
+    path: &'a Path,
+}
+
+impl File<'_> {
+    /// A quote that is not closed takes in all lines up to the next one; no name or number has two lines.
+    fn check_quotes(&self, row: &StringRecord) -> Result<()> {
+        match row.iter().position(|field| field.contains('\n')) {
+            Some(i) => Err(Error::scene(self.place(row, i), "the quote is not closed on its line")),
+            None => Ok(()),
+        }
+    }
+
+    /// Where field `i` of a row starts; past the last one, where the row ends.
+    fn place(&self, row: &StringRecord, i: usize) -> Place {
+        let start = row.position().map_or(0, |p| p.byte() as usize).min(self.text.len());
+        // The reader's position of a row may still be before line ends that it passes over.
+        let start = start + self.text[start..].bytes().take_while(|b| matches!(b, b'\r' | b'\n')).count();
+        let mut is_quoted = false;
+        let mut n_fields = 0;
+        let mut offset = start;
+        for (k, byte) in self.text[start..].bytes().enumerate() {
+            if n_fields == i {
+                break;
+            }
+            match byte {
+                b'"' => is_quoted = !is_quoted,
+                b',' if !is_quoted => n_fields += 1,
+                b'\r' | b'\n' if !is_quoted => break,
+                _ => {}
+            }
+            offset = start + k + 1;
+        }
+        let blanks = self.text[offset..].bytes().take_while(|b| matches!(b, b' ' | b'\t')).count();
+        let (line, column) = line_column(self.text, offset + blanks);
+        Place::line(self.path, line, column)
+    }
+}
+
+/// Which field of a row is what.
+struct Columns {
+    position: [usize; 3],
+    sigma: usize,
+    /// Factor from the column to σ: 1, or 1/3 of a radius.
+    sigma_factor: f64,
+    kappa: usize,
+    color: Option<[usize; 3]>,
+}
+
+impl Columns {
+    fn find(file: &File, header: &StringRecord) -> Result<Columns> {
+        let fault = |i: usize, what: String| Err(Error::scene(file.place(header, i), what));
+        let names: Vec<&str> = header.iter().map(str::trim).collect();
+        if names.iter().all(|name| name.parse::<f64>().is_ok()) {
+            return fault(0, "expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned());
+        }
+        for (i, name) in names.iter().enumerate() {
+            if !COLUMNS.contains(name) {
+                let meant = did_you_mean(name, &COLUMNS);
+                return fault(i, format!("unknown column `{name}`{meant} (known: {})", list(&COLUMNS)));
+            }
+            if names[..i].contains(name) {
+                return fault(i, format!("column `{name}` stands twice"));
+            }
+        }
+        let find = |name: &str| names.iter().position(|n| *n == name);
+        let need = |name: &str| {
+            find(name).ok_or_else(|| Error::scene(file.place(header, 0), format!("missing column `{name}`")))
+        };
+        let (sigma, sigma_factor) = match (find("sigma"), find("radius")) {
+            (Some(i), Some(j)) => return fault(i.max(j), "expected `sigma` or `radius`, found both".to_owned()),
+            (Some(i), None) => (i, 1.0),
+            (None, Some(j)) => (j, SIGMA_PER_RADIUS),
+            (None, None) => return fault(0, "missing column `sigma` (or `radius` = 3 sigma)".to_owned()),
+        };
+        let color = match [find("r"), find("g"), find("b")] {
+            [None, None, None] => None,
+            [Some(r), Some(g), Some(b)] => Some([r, g, b]),
+            some => {
+                let missing: Vec<&str> =
+                    ["r", "g", "b"].into_iter().zip(some).filter(|(_, i)| i.is_none()).map(|(name, _)| name).collect();
+                let i = some.into_iter().flatten().min().unwrap_or(0);
+                return fault(i, format!("expected all of `r`, `g`, `b` or none; missing {}", list(&missing)));
+            }
+        };
+        Ok(Columns {
+            position: [need("x")?, need("y")?, need("z")?],
+            sigma,
+            sigma_factor,
+            kappa: need("kappa")?,
+            color,
+        })
+    }
+
+    fn particle(&self, file: &File, row: &StringRecord) -> Result<Particle> {
+        let number = |i: usize| {
+            let word = row[i].trim();
+            word.parse()
+                .ok()
+                .filter(|v: &f64| v.is_finite())
+                .ok_or_else(|| Error::scene(file.place(row, i), format!("expected a finite number, found `{word}`")))
+        };
+        let size = |i: usize, name: &str| match number(i)? {
+            v if v >= 0.0 => Ok(v),
+            v => Err(Error::scene(file.place(row, i), format!("{name}: expected at least 0, found {v}"))),
+        };
+        let [x, y, z] = self.position;
+        let name = if self.sigma_factor == 1.0 { "sigma" } else { "radius" };
+        Ok(Particle {
+            position: DVec3::new(number(x)?, number(y)?, number(z)?),
+            sigma: size(self.sigma, name)? * self.sigma_factor,
+            kappa: size(self.kappa, "kappa")?,
+            color: match self.color {
+                None => DVec3::ONE,
+                Some([r, g, b]) => DVec3::new(size(r, "r")?, size(g, "g")?, size(b, "b")?),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good(text: &str) -> Vec<Particle> {
+        parse(text, Path::new("p.csv")).unwrap()
+    }
+
+    #[test]
+    fn columns_come_in_any_order_and_colour_is_optional() {
+        let list = good("kappa, b,g,r, radius,z,y,x\n2,0.3,0.2,0.1,6,-3,2,1\n");
+        let position = DVec3::new(1.0, 2.0, -3.0);
+        let expected = Particle { position, sigma: 2.0, kappa: 2.0, color: DVec3::new(0.1, 0.2, 0.3) };
+        assert_eq!(list, [expected]);
+        let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
+        assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
+        assert_eq!(good("x,y,z,sigma,kappa"), []);
+    }
+
+    #[test]
+    fn faults_have_their_place_and_say_what_was_expected() {
+        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `kappa`, `r`, `g`, `b`)";
+        let row = |row: &str| format!("x,y,z,sigma,kappa\n0,0,0,1,1\r\n\r\n{row}\n");
+        for (text, expected) in [
+            ("x,y,z,sigma,kapa".to_owned(), format!("1:13: unknown column `kapa`; did you mean `kappa`? {known}")),
+            ("x,y,z,sigma,kappa,".to_owned(), format!("1:19: unknown column ``; did you mean `x`? {known}")),
+            ("x, x,y,z,sigma,kappa".to_owned(), "1:4: column `x` stands twice".to_owned()),
+            ("x,y,sigma,kappa".to_owned(), "1:1: missing column `z`".to_owned()),
+            ("x,y,z,kappa".to_owned(), "1:1: missing column `sigma` (or `radius` = 3 sigma)".to_owned()),
+            ("x,y,z,sigma,kappa,radius".to_owned(), "1:19: expected `sigma` or `radius`, found both".to_owned()),
+            ("x,y,z,sigma,kappa,r,b".to_owned(), "1:19: expected all of `r`, `g`, `b` or none; missing `g`".to_owned()),
+            ("\n1,2,3,4,5\n".to_owned(), "2:1: expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned()),
+            (row("0,0,0,1"), "4:8: expected 5 fields as in the header, found 4".to_owned()),
+            (row("0,0,0,1,1,7"), "4:11: expected 5 fields as in the header, found 6".to_owned()),
+            (row("0,0,zero,1,1"), "4:5: expected a finite number, found `zero`".to_owned()),
+            (row("0,0,,1,1"), "4:5: expected a finite number, found ``".to_owned()),
+            (row("0,\"0\", inf,1,1"), "4:8: expected a finite number, found `inf`".to_owned()),
+            (row("0,0,0,-1,1"), "4:7: sigma: expected at least 0, found -1".to_owned()),
+            (row("0,0,0,1,-2"), "4:9: kappa: expected at least 0, found -2".to_owned()),
+            (row("0,0,\"0,1,1"), "4:5: the quote is not closed on its line".to_owned()),
+        ] {
+            let error = parse(&text, Path::new("p.csv")).expect_err(&text).to_string();
+            assert_eq!(error, format!("p.csv:{expected}"), "for\n{text}");
+        }
+    }
+}

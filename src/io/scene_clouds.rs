@@ -1,0 +1,109 @@
+//! The scene's clouds, and the files they name.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use serde_json::json;
+use sha2::{Digest, Sha256};
+
+use super::suggest::{did_you_mean, list};
+use super::text_file::{DATA_LIMIT, read_text};
+use super::toml_section::{Bounds, Section};
+use super::{box_file, particle_file};
+use crate::error::{Error, Result};
+use crate::model::boxes::Form;
+use crate::model::cloud::{Cloud, CloudSource};
+use crate::model::material::Material;
+
+/// What a cloud's keys refer to.
+pub struct CloudReader<'a> {
+    folder: &'a Path,
+    materials: &'a [Material],
+    seed: Option<u32>,
+    /// Of every file read, in order.
+    pub digests: Vec<[u8; 32]>,
+}
+
+#[derive(Clone, Copy)]
+enum From {
+    Boxes,
+    Particles,
+}
+
+impl<'a> CloudReader<'a> {
+    /// Files are looked for in `folder`; `seed` N gives cloud i the seed N + i.
+    pub fn new(folder: &'a Path, materials: &'a [Material], seed: Option<u32>) -> CloudReader<'a> {
+        CloudReader { folder, materials, seed, digests: Vec::new() }
+    }
+
+    /// The text of the file that `file` names. What the file system refuses is reported where the scene names
+    /// it; what is wrong inside stays where it is.
+    fn read_named(&mut self, s: &mut Section) -> Result<(String, PathBuf)> {
+        let path = self.folder.join(s.required_string("file")?);
+        let text = read_text(&path, DATA_LIMIT).map_err(|e| match e {
+            Error::Io { path, what } => s.fault("file", format!("{}: {what}", path.display())),
+            other => other,
+        })?;
+        self.digests.push(Sha256::digest(&text).into());
+        Ok((text, path))
+    }
+
+    /// The named material; else the only one, else the one called "cloud".
+    fn read_material(&self, s: &mut Section) -> Result<usize> {
+        let names: Vec<&str> = self.materials.iter().map(|m| m.name.as_str()).collect();
+        let default = if names.len() == 1 { names[0] } else { "cloud" };
+        let name = s.string("material", default)?;
+        names.iter().position(|known| *known == name).ok_or_else(|| {
+            let meant = did_you_mean(&name, &names);
+            let meant = if meant.is_empty() { ";".to_owned() } else { meant };
+            match names.is_empty() {
+                true => s.fault("material", format!("unknown material `{name}`; the scene has none")),
+                false => {
+                    s.fault("material", format!("unknown material `{name}`{meant} the scene has {}", list(&names)))
+                }
+            }
+        })
+    }
+
+    fn read_seed(&self, s: &mut Section, i_cloud: usize) -> Result<u32> {
+        // Numbered with wrap-around, so that every u32 is a seed for every number of clouds.
+        let i = i_cloud as u32;
+        let own = s.u32("seed", i.wrapping_add(1), 0, u32::MAX)?;
+        let seed = self.seed.map_or(own, |seed| seed.wrapping_add(i));
+        s.record("seed", json!(seed));
+        Ok(seed)
+    }
+}
+
+pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> Result<Cloud> {
+    let from = [("boxes", From::Boxes), ("particles", From::Particles)];
+    let source = match s.required_choice("from", &from, &["disc", "weather"])? {
+        From::Boxes => read_boxes(s, reader)?,
+        From::Particles => {
+            s.expect_keys(&["from", "file", "material", "texture", "position", "wind", "seed"], &[])?;
+            let (text, path) = reader.read_named(s)?;
+            CloudSource::Particles(particle_file::parse(&text, &path)?)
+        }
+    };
+    s.only("texture", json!("none"), "blobs are drawn plain")?;
+    Ok(Cloud {
+        source,
+        position: s.vec3("position", DVec3::ZERO, Bounds::Any)?,
+        wind: s.vec3("wind", DVec3::ZERO, Bounds::Any)?,
+        i_material: reader.read_material(s)?,
+        seed: reader.read_seed(s, i_cloud)?,
+    })
+}
+
+fn read_boxes(s: &mut Section, reader: &mut CloudReader) -> Result<CloudSource> {
+    const KEYS: &[&str] =
+        &["from", "file", "form", "optical_depth", "radius_scale", "material", "texture", "position", "wind", "seed"];
+    s.expect_keys(KEYS, &[])?;
+    let (text, path) = reader.read_named(s)?;
+    Ok(CloudSource::Boxes {
+        boxes: box_file::parse(&text, &path)?,
+        form: s.choice("form", "centred", &Form::NAMES, &[])?,
+        optical_depth: s.f64("optical_depth", 1.0, Bounds::AtLeast(0.0))?,
+        radius_scale: s.f64("radius_scale", 1.0, Bounds::AtLeast(0.0))?,
+    })
+}

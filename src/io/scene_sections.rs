@@ -1,0 +1,134 @@
+//! The scene's single tables: film, camera, time, lighting, draw, threads.
+
+use glam::DVec3;
+use serde_json::json;
+
+use super::toml_section::{Bounds, Section};
+use crate::error::Result;
+use crate::model::camera::{Camera, CameraKey};
+use crate::model::film::{Film, FilmFormat, ToneMap};
+use crate::model::grid::MAX_CELLS;
+use crate::model::scene::{Draw, Lighting, LightingMode, Simulate, Threading, Threads, Time};
+
+/// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
+const MAX_SIDE: u32 = 16384;
+
+pub fn read_film(root: &mut Section) -> Result<Film> {
+    let mut s = root.section("film")?;
+    s.expect_keys(&["width", "height", "format", "background", "exposure", "tone_map"], &[])?;
+    let film = Film {
+        width: s.u32("width", 800, 1, MAX_SIDE)?,
+        height: s.u32("height", 600, 1, MAX_SIDE)?,
+        format: s.choice("format", "rgba16f", &FilmFormat::NAMES, &[])?,
+        background: s.vec3("background", DVec3::new(0.32, 0.52, 0.80), Bounds::AtLeast(0.0))?,
+        exposure: s.f64("exposure", 1.0, Bounds::AtLeast(0.0))?,
+        tone_map: s.choice("tone_map", "neutral", &ToneMap::NAMES, &[])?,
+    };
+    root.record("film", s.finish());
+    Ok(film)
+}
+
+pub fn read_camera(root: &mut Section) -> Result<Camera> {
+    let mut s = root.section("camera")?;
+    s.expect_keys(&["position", "target", "path", "up", "fov_y_deg", "near"], &[])?;
+    let is_path = s.has("path");
+    let keys = if is_path { read_path(&mut s)? } else { vec![read_fixed(&mut s)?] };
+    let camera = Camera {
+        keys,
+        up: s.vec3("up", DVec3::Y, Bounds::Any)?,
+        fov_y_rad: s.f64("fov_y_deg", 45.0, Bounds::Between(0.0, 180.0))?.to_radians(),
+        near: s.f64("near", 0.01, Bounds::Above(0.0))?,
+    };
+    if let Some(i) = camera.keys.iter().position(|key| camera.pose(key.time_s).is_none()) {
+        let what = "the camera looks nowhere: position equals target, or the view runs along `up`";
+        return Err(if is_path { s.sections("path")?[i].fault("position", what) } else { s.fault("position", what) });
+    }
+    root.record("camera", s.finish());
+    Ok(camera)
+}
+
+fn read_fixed(s: &mut Section) -> Result<CameraKey> {
+    let position = s.vec3("position", DVec3::new(0.0, 0.0, 18.0), Bounds::Any)?;
+    Ok(CameraKey { time_s: 0.0, position, target: s.vec3("target", DVec3::ZERO, Bounds::Any)? })
+}
+
+fn read_path(s: &mut Section) -> Result<Vec<CameraKey>> {
+    for key in ["position", "target"] {
+        if s.has(key) {
+            return Err(s.fault(key, "a camera has either `position` and `target`, or a `path`, not both"));
+        }
+    }
+    let mut keys: Vec<CameraKey> = Vec::new();
+    let mut resolved = Vec::new();
+    for mut item in s.sections("path")? {
+        item.expect_keys(&["time_s", "position", "target"], &[])?;
+        let time_s = item.required_f64("time_s", Bounds::Any)?;
+        if let Some(before) = keys.last().map(|k| k.time_s).filter(|before| time_s <= *before) {
+            return Err(item.fault("time_s", format!("times must grow, found {time_s} after {before}")));
+        }
+        let position = item.required_vec3("position", Bounds::Any)?;
+        keys.push(CameraKey { time_s, position, target: item.required_vec3("target", Bounds::Any)? });
+        resolved.push(item.finish());
+    }
+    if keys.is_empty() {
+        return Err(s.fault("path", "expected at least one { time_s, position, target }"));
+    }
+    s.record("path", json!(resolved));
+    Ok(keys)
+}
+
+pub fn read_time(root: &mut Section) -> Result<Time> {
+    let mut s = root.section("time")?;
+    s.expect_keys(&["start_s", "step_s", "frames"], &[])?;
+    let time = Time {
+        start_s: s.f64("start_s", 0.0, Bounds::Any)?,
+        step_s: s.f64("step_s", 0.0333, Bounds::AtLeast(0.0))?,
+        n_frames: s.u32("frames", 300, 1, u32::MAX)?,
+    };
+    if !time.at(time.n_frames - 1).is_finite() {
+        return Err(s.fault("step_s", "the last frame's time is beyond every number"));
+    }
+    root.record("time", s.finish());
+    Ok(time)
+}
+
+pub fn read_lighting(root: &mut Section) -> Result<Lighting> {
+    const LATER: &[&str] = &["sampling", "exponents", "gather", "theta", "facets_per_cloud"];
+    let mut s = root.section("lighting")?;
+    s.expect_keys(&["mode", "grid", "step", "forward", "bases"], LATER)?;
+    let lighting = Lighting {
+        mode: s.choice("mode", "first", &LightingMode::NAMES, &["two-reflection"])?,
+        // Below 8 cells the margins leave next to no grid.
+        grid: s.u32("grid", 64, 8, MAX_CELLS)?,
+        step: s.f64("step", 1.0, Bounds::Within(0.05, 16.0))?,
+        forward: s.f64("forward", 0.85, Bounds::Within(0.0, 1.0))?,
+    };
+    s.only("bases", json!(1), "the diffuse basis")?;
+    root.record("lighting", s.finish());
+    Ok(lighting)
+}
+
+pub fn read_draw(root: &mut Section) -> Result<Draw> {
+    let mut s = root.section("draw")?;
+    s.expect_keys(&["path", "cutoff", "sort_bits", "resolution"], &[])?;
+    s.choice("path", "sprites", &[("sprites", ())], &["tiles"])?;
+    let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
+    let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
+    if sort_bits != 16 && sort_bits != 32 {
+        return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
+    }
+    s.only("resolution", json!(1.0), "every pixel is drawn")?;
+    root.record("draw", s.finish());
+    Ok(Draw { cutoff, sort_bits })
+}
+
+pub fn read_threads(root: &mut Section) -> Result<Threads> {
+    let mut s = root.section("threads")?;
+    s.expect_keys(&["mode", "simulate"], &[])?;
+    let threads = Threads {
+        mode: s.choice("mode", "parallel", &Threading::NAMES, &[])?,
+        simulate: s.choice("simulate", "gpu", &Simulate::NAMES, &[])?,
+    };
+    root.record("threads", s.finish());
+    Ok(threads)
+}

@@ -1,0 +1,106 @@
+//! Reading an input file as text, with a limit that is looked at before the first byte is read.
+
+use std::fs::{self, File};
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use crate::error::{Error, Place, Result};
+
+/// A scene is written by hand; the greatest benchmark scene has a few KiB.
+pub const SCENE_LIMIT: u64 = 4 << 20;
+/// Box files and particle lists: 64 MiB is about a million particles as text.
+pub const DATA_LIMIT: u64 = 64 << 20;
+
+const BYTE_ORDER_MARK: char = '\u{feff}';
+
+/// The text of `path`. A byte-order mark is dropped. What the file system refuses is an [`Error::Io`]; content
+/// that is no text is an [`Error::Scene`] with its line and column.
+pub fn read_text(path: &Path, limit: u64) -> Result<String> {
+    let about = fs::metadata(path).map_err(|e| Error::io(path, plain(&e)))?;
+    if about.is_dir() {
+        return Err(Error::io(path, "is a folder, expected a file"));
+    }
+    if !about.is_file() {
+        // A pipe or a device has no size to check, and may never end.
+        return Err(Error::io(path, "is not a regular file"));
+    }
+    if about.len() > limit {
+        return Err(Error::io(path, too_large(about.len(), limit)));
+    }
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(|e| Error::io(path, plain(&e)))?;
+    // The file may have grown since its size was looked at.
+    file.take(limit + 1).read_to_end(&mut bytes).map_err(|e| Error::io(path, plain(&e)))?;
+    if bytes.len() as u64 > limit {
+        return Err(Error::io(path, too_large(bytes.len() as u64, limit)));
+    }
+    decode(bytes, path)
+}
+
+/// Line and column (characters), both from 1, of a byte offset; an offset past the end is the end.
+pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
+    let mut end = offset.min(text.len());
+    while !text.is_char_boundary(end) {
+        end -= 1;
+    }
+    let before = &text[..end];
+    let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+    (before.bytes().filter(|b| *b == b'\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
+fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
+    let at = |bytes: &[u8], offset: usize| {
+        // What stands before the offset may itself be no text; its line and column are then those of the
+        // replacement characters an editor would show.
+        let (line, column) = line_column(&String::from_utf8_lossy(&bytes[..offset]), usize::MAX);
+        Place::line(path, line, column)
+    };
+    if let Some(offset) = bytes.iter().position(|b| *b == 0) {
+        return Err(Error::scene(at(&bytes, offset), "not a text file: it holds a zero byte"));
+    }
+    let text = match String::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(e) => {
+            let offset = e.utf8_error().valid_up_to();
+            return Err(Error::scene(at(e.as_bytes(), offset), "not UTF-8 text"));
+        }
+    };
+    let text = match text.strip_prefix(BYTE_ORDER_MARK) {
+        Some(rest) => rest.to_owned(),
+        None => text,
+    };
+    if text.trim().is_empty() {
+        return Err(Error::scene(Place::file(path), "the file is empty"));
+    }
+    Ok(text)
+}
+
+fn too_large(size: u64, limit: u64) -> String {
+    format!("too large: {} MiB ({size} bytes), the limit is {} MiB", size.div_ceil(1 << 20), limit >> 20)
+}
+
+/// The operating system's words without its error number, which tells a user nothing.
+fn plain(e: &std::io::Error) -> String {
+    match e.kind() {
+        ErrorKind::NotFound => "no such file".to_owned(),
+        ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        _ => e.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_and_columns_count_characters_from_one() {
+        let text = "ab\nçd\r\ne";
+        assert_eq!(line_column(text, 0), (1, 1));
+        assert_eq!(line_column(text, 2), (1, 3));
+        assert_eq!(line_column(text, 3), (2, 1));
+        // The second byte of ç belongs to ç.
+        assert_eq!(line_column(text, 4), (2, 1));
+        assert_eq!(line_column(text, 5), (2, 2));
+        assert_eq!(line_column(text, usize::MAX), (3, 2));
+    }
+}

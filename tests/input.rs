@@ -1,0 +1,378 @@
+//! Scene files and what they name: what is read, what is refused, and where the message points.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use nimbus::error::Error;
+use nimbus::io::scene_file::{LoadedScene, load};
+use nimbus::model::boxes::Form;
+use nimbus::model::cloud::CloudSource;
+use nimbus::model::film::ToneMap;
+use nimbus::model::light::Light;
+use nimbus::model::scene::{Simulate, Threading};
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+const BOXES: &str = "3\n1\n3, 1, 1, 1, 0, 0, 0, 1\n";
+const CLOUD: &str = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
+
+/// A folder with `scene.toml` and the box file `b.dat`.
+fn folder(scene: &str) -> (TempDir, PathBuf) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("scene.toml");
+    fs::write(&path, scene).unwrap();
+    fs::write(dir.path().join("b.dat"), BOXES).unwrap();
+    (dir, path)
+}
+
+fn load_with(scene: &str, overrides: &[&str], seed: Option<u32>) -> Result<LoadedScene, Error> {
+    let (_dir, path) = folder(scene);
+    load(&path, &overrides.iter().map(|s| s.to_string()).collect::<Vec<_>>(), seed)
+}
+
+fn good(scene: &str) -> LoadedScene {
+    load_with(scene, &[], None).unwrap()
+}
+
+/// The message for `scene`, the folder cut off.
+fn message(scene: &str, overrides: &[&str]) -> String {
+    let (dir, path) = folder(scene);
+    let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
+    let error = load(&path, &overrides, None).expect_err(scene);
+    assert_eq!(error.exit_code(), 2);
+    error.to_string().replace(&format!("{}/", dir.path().display()), "")
+}
+
+fn assert_message(scene: &str, expected: &str) {
+    assert_eq!(message(scene, &[]), expected, "for\n{scene}");
+}
+
+/// A table in tests/data: `== line:column: message`, then the scene that earns it.
+fn assert_table(table: &str) {
+    for case in table.strip_prefix("== ").unwrap().split("\n== ") {
+        let (expected, scene) = case.split_once('\n').unwrap();
+        assert_message(scene, &format!("scene.toml:{expected}"));
+    }
+}
+
+#[test]
+fn a_cloud_alone_is_a_complete_scene() {
+    let loaded = good(CLOUD);
+    let scene = &loaded.scene;
+    assert_eq!((scene.film.width, scene.film.height, scene.film.tone_map), (800, 600, ToneMap::Neutral));
+    assert_eq!(scene.film.background, DVec3::new(0.32, 0.52, 0.80));
+    assert_eq!(scene.camera.keys[0].position, DVec3::new(0.0, 0.0, 18.0));
+    assert_eq!(scene.camera.fov_y_rad, 45f64.to_radians());
+    assert_eq!((scene.time.step_s, scene.time.n_frames), (0.0333, 300));
+    assert_eq!((scene.lighting.grid, scene.lighting.step, scene.lighting.forward), (64, 1.0, 0.85));
+    assert_eq!((scene.draw.cutoff, scene.draw.sort_bits), (3.0, 32));
+    assert_eq!((scene.threads.mode, scene.threads.simulate), (Threading::Parallel, Simulate::Gpu));
+    let [Light::Directional { direction, irradiance }, Light::Sky { constant, .. }] = scene.lights[..] else {
+        panic!("{:?}", scene.lights)
+    };
+    assert!((direction.length() - 1.0).abs() < 1e-15 && direction.dot(DVec3::new(-0.5, -0.8, -0.3)) > 0.98);
+    assert_eq!((irradiance, constant), (DVec3::new(3.0, 2.9, 2.7), 0.15));
+    assert_eq!((scene.materials[0].name.as_str(), scene.materials[0].ns), ("cloud", 8.0));
+    assert_eq!((scene.clouds[0].seed, scene.n_particles()), (1, 3));
+    assert!(matches!(
+        scene.clouds[0].source,
+        CloudSource::Boxes { form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0, .. }
+    ));
+    assert_eq!(loaded.warnings, [""; 0]);
+}
+
+#[test]
+fn a_scene_without_clouds_is_an_empty_sky() {
+    assert_eq!(good("title = 'sky'").scene.clouds, []);
+    assert_eq!(good("light = []\n# nothing").scene.lights, []);
+}
+
+#[test]
+fn toml_errors_point_at_the_place() {
+    assert!(message("[film]\nwidth = = 3\n", &[]).starts_with("scene.toml:2:9: "));
+    assert!(message("title = 'ä' x\n", &[]).starts_with("scene.toml:1:13: "));
+    assert!(message("[film]\nwidth = 3\nwidth = 4\n", &[]).starts_with("scene.toml:3:1: "));
+    assert!(message("title = \"open\n", &[]).starts_with("scene.toml:1:"));
+}
+
+#[test]
+fn unknown_keys_are_refused_with_the_nearest_and_all_known_ones() {
+    assert_message(
+        "[film]\nheight = 5\nwidht = 3\n",
+        "scene.toml:3:1: unknown key `film.widht`; did you mean `width`? known here: \
+         `width`, `height`, `format`, `background`, `exposure`, `tone_map`",
+    );
+    assert_message(
+        "[time]\nbanana = 1\n",
+        "scene.toml:2:1: unknown key `time.banana`; known here: `start_s`, `step_s`, `frames`",
+    );
+    assert!(message("[clouds]\n", &[]).starts_with("scene.toml:1:2: unknown key `clouds`; did you mean `cloud`?"));
+    // The first in file order, not in the alphabet's.
+    assert!(message("[film]\nzzzz = 1\naaaa = 1\n", &[]).starts_with("scene.toml:2:1: unknown key `film.zzzz`"));
+    assert!(
+        message("[[light]]\nkind = 'sky'\nirradiance = [1, 1, 1]\ndirection = [0, 1, 0]\n", &[])
+            .starts_with("scene.toml:4:1: unknown key `light.0.direction`")
+    );
+}
+
+#[test]
+fn wrong_types_and_ranges_name_what_was_expected_and_found() {
+    assert_table(include_str!("data/wrong-values.txt"));
+}
+
+#[test]
+fn a_camera_that_looks_nowhere_or_runs_backward_is_refused() {
+    let nowhere = "the camera looks nowhere: position equals target, or the view runs along `up`";
+    assert_message(
+        "[camera]\nposition = [1, 2, 3]\ntarget = [1, 2, 3]",
+        &format!("scene.toml:2:12: `camera.position`: {nowhere}"),
+    );
+    assert_message("[camera]\nup = [0, 0, 2]", &format!("scene.toml:1:1: `camera.position`: {nowhere}"));
+    let path = |second: &str| {
+        format!("[camera]\npath = [\n{{ time_s = 1, position = [0, 0, 9], target = [0, 0, 0] }},\n{second}\n]")
+    };
+    assert_message(
+        &path("{ time_s = 2, position = [0, 9, 0], target = [0, 0, 0] }"),
+        &format!("scene.toml:4:26: `camera.path.1.position`: {nowhere}"),
+    );
+    assert_message(
+        &path("{ time_s = 1, position = [0, 1, 9], target = [0, 0, 0] }"),
+        "scene.toml:4:12: `camera.path.1.time_s`: times must grow, found 1 after 1",
+    );
+    assert_message(
+        &path("{ time_s = 2 }"),
+        "scene.toml:4:1: missing key `camera.path.1.position`: expected three numbers",
+    );
+    assert!(message(&(path("") + "\ntarget = [0, 0, 0]"), &[]).contains("not both"));
+    let scene = good(&path("{ time_s = 3, position = [0, 1, 9], target = [0, 0, 0] }")).scene;
+    assert_eq!(scene.camera.keys.iter().map(|k| k.time_s).collect::<Vec<_>>(), [1.0, 3.0]);
+}
+
+#[test]
+fn what_later_versions_bring_is_called_so_and_its_only_present_value_is_accepted() {
+    assert_table(include_str!("data/later-versions.txt"));
+    assert!(
+        message("[[surface]]\ncenter = [0, 0, 0]", &[]).starts_with("scene.toml:1:3: `surface` belongs to a later")
+    );
+    good(
+        "[lighting]\nbases = 1\n[draw]\nresolution = 1.0\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\ntexture = 'none'",
+    );
+    good("[draw]\nresolution = 1");
+}
+
+#[test]
+fn overrides_are_laid_over_the_file() {
+    let set = [
+        "lighting.grid=32",
+        "cloud.0.seed = 5",
+        "light.0.irradiance=[1,1,1]",
+        "threads.mode=serial",
+        "film={width=7}",
+        "film.height=9",
+        "title='a=b'",
+    ];
+    let scene = load_with(CLOUD, &set, None).unwrap().scene;
+    assert_eq!((scene.lighting.grid, scene.clouds[0].seed), (32, 5));
+    assert_eq!(scene.lights[0].irradiance(), DVec3::ONE);
+    assert_eq!(scene.threads.mode, Threading::Serial);
+    assert_eq!((scene.film.width, scene.film.height, scene.title.as_str()), (7, 9, "a=b"));
+    let later = load_with(CLOUD, &["film.width=1", "film.width=2", "cloud.0.file=b.dat"], None).unwrap();
+    assert_eq!(later.scene.film.width, 2);
+}
+
+#[test]
+fn overrides_that_do_not_fit_are_named() {
+    for (set, expected) in [
+        ("film.width", "expected key.path=VALUE, for example lighting.grid=32"),
+        ("film..width=3", "expected key.path=VALUE, found an empty key"),
+        ("film.width=", "expected a value after `=`"),
+        ("film.width=wide", "`film.width`: expected an integer from 1 to 16384, found string \"wide\""),
+        (
+            "film.widht=3",
+            "unknown key `film.widht`; did you mean `width`? known here: `width`, `height`, `format`, `background`, `exposure`, `tone_map`",
+        ),
+        ("cloud.1.seed=3", "`cloud`: expected a number from 0 to 0, found `1`"),
+        ("material.0.kd=[1,1,2]", "`material.0.kd.2`: expected a number from 0 to 1, found 2.0"),
+        ("cloud.0.seed.x=3", "`cloud.0.seed` is no table: integer 4"),
+        ("surface.0.u=3", "the scene has no `surface`"),
+        ("film.exposure=inf", "`film.exposure`: expected a finite number of at least 0, found inf"),
+    ] {
+        assert_eq!(message(&format!("{CLOUD}seed = 4"), &[set]), format!("--set {set}: {expected}"));
+    }
+    assert!(
+        message(CLOUD, &["light.0.irradiance=[1,1"]).starts_with("--set light.0.irradiance=[1,1: the value is no TOML")
+    );
+    assert!(message(CLOUD, &["film.width=1 2"]).starts_with("--set film.width=1 2: "));
+}
+
+#[test]
+fn the_seed_argument_numbers_the_clouds() {
+    let two = format!("{CLOUD}seed = 9\n{CLOUD}");
+    let seeds = |seed| {
+        let loaded = load_with(&two, &[], seed).unwrap();
+        let resolved: Vec<_> = (0..2).map(|i| loaded.resolved["cloud"][i]["seed"].as_u64().unwrap() as u32).collect();
+        assert_eq!(loaded.scene.clouds.iter().map(|c| c.seed).collect::<Vec<_>>(), resolved);
+        resolved
+    };
+    assert_eq!(seeds(None), [9, 2]);
+    assert_eq!(seeds(Some(100)), [100, 101]);
+    assert_eq!(seeds(Some(u32::MAX)), [u32::MAX, 0]);
+}
+
+#[test]
+fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
+    let loaded = good(CLOUD);
+    assert_eq!(
+        loaded.resolved,
+        json!({
+            "title": "",
+            "film": { "width": 800, "height": 600, "format": "rgba16f", "background": [0.32, 0.52, 0.80], "exposure": 1.0, "tone_map": "neutral" },
+            "camera": { "position": [0.0, 0.0, 18.0], "target": [0.0, 0.0, 0.0], "up": [0.0, 1.0, 0.0], "fov_y_deg": 45.0, "near": 0.01 },
+            "time": { "start_s": 0.0, "step_s": 0.0333, "frames": 300 },
+            "lighting": { "mode": "first", "grid": 64, "step": 1.0, "forward": 0.85, "bases": 1 },
+            "draw": { "path": "sprites", "cutoff": 3.0, "sort_bits": 32, "resolution": 1.0 },
+            "threads": { "mode": "parallel", "simulate": "gpu" },
+            "light": [
+                { "kind": "directional", "direction": [-0.5, -0.8, -0.3], "irradiance": [3.0, 2.9, 2.7] },
+                { "kind": "sky", "irradiance": [0.35, 0.35, 0.35], "constant": 0.15 },
+            ],
+            "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0], "ns": 8.0 }],
+            "cloud": [{
+                "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none",
+                "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0], "material": "cloud", "seed": 1,
+            }],
+        })
+    );
+    let again = good(&to_toml(&loaded.resolved));
+    assert_eq!((&again.scene, &again.resolved, &again.hash), (&loaded.scene, &loaded.resolved, &loaded.hash));
+}
+
+/// JSON's strings, numbers and lists are TOML's; only `:` is `=` there.
+fn to_toml(resolved: &Value) -> String {
+    fn inline(v: &Value) -> String {
+        match v {
+            Value::Object(map) => {
+                format!(
+                    "{{ {} }}",
+                    map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect::<Vec<_>>().join(", ")
+                )
+            }
+            Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
+            other => other.to_string(),
+        }
+    }
+    resolved.as_object().unwrap().iter().map(|(k, v)| format!("{k} = {}\n", inline(v))).collect()
+}
+
+#[test]
+fn the_hash_follows_content_and_nothing_else() {
+    let (dir, path) = folder(CLOUD);
+    let hash = || load(&path, &[], None).unwrap().hash;
+    let first = hash();
+    assert!(first.len() == 64 && first.bytes().all(|b| b.is_ascii_hexdigit()));
+    fs::write(&path, format!("# another layout\n{CLOUD}seed = 1\n[film]\nexposure = 1\n")).unwrap();
+    assert_eq!(hash(), first, "layout and defaults written out do not count");
+    assert_eq!(good(CLOUD).hash, first, "nor does the folder");
+    fs::write(dir.path().join("b.dat"), BOXES.replace("0, 1\n", "0, 2\n")).unwrap();
+    assert_ne!(hash(), first, "a box that changed does");
+    fs::write(dir.path().join("b.dat"), BOXES).unwrap();
+    assert_eq!(hash(), first);
+    assert_ne!(load(&path, &["film.width=3".to_owned()], None).unwrap().hash, first);
+    assert_ne!(load(&path, &[], Some(7)).unwrap().hash, first);
+}
+
+#[test]
+fn warnings_say_what_and_where() {
+    let loaded = good("[[material]]\nname = 'wet'\nks = [0.02, 0.1, 0]\n");
+    assert_eq!(loaded.warnings.len(), 2);
+    assert!(
+        loaded.warnings[0].contains("scene.toml:3:6: material `wet` has K_d + 4 K_s = 1.300"),
+        "{:?}",
+        loaded.warnings
+    );
+    assert!(loaded.warnings[1].contains("is ignored"));
+}
+
+#[test]
+fn files_that_are_none_are_refused_where_they_are_named() {
+    let named = |file: &str| format!("[[cloud]]\nfrom = 'boxes'\nfile = '{file}'");
+    assert_message(&named("gone.dat"), "scene.toml:3:8: `cloud.0.file`: gone.dat: no such file");
+    assert_message(&named(""), "scene.toml:3:8: `cloud.0.file`: expected a string that is not empty");
+    let (dir, path) = folder(&named("sub"));
+    fs::create_dir(dir.path().join("sub")).unwrap();
+    assert!(load(&path, &[], None).unwrap_err().to_string().ends_with("sub: is a folder, expected a file"));
+    assert!(message(CLOUD, &["cloud.0.file=gone.dat"]).starts_with("--set cloud.0.file=gone.dat: `cloud.0.file`: "));
+    assert!(load(dir.path(), &[], None).unwrap_err().to_string().ends_with(": is a folder, expected a file"));
+    let gone = load(Path::new("gone.toml"), &[], None).unwrap_err();
+    assert_eq!(gone.to_string(), "gone.toml: no such file");
+}
+
+#[test]
+fn files_that_are_no_text_are_refused_at_once() {
+    let (dir, path) = folder(CLOUD);
+    let boxes = dir.path().join("b.dat");
+    let error = || load(&path, &[], None).unwrap_err().to_string().replace(&format!("{}/", dir.path().display()), "");
+    fs::File::create(&boxes).unwrap().set_len(1 << 30).unwrap();
+    assert_eq!(
+        error(),
+        "scene.toml:3:8: `cloud.0.file`: b.dat: too large: 1024 MiB (1073741824 bytes), the limit is 64 MiB"
+    );
+    fs::write(&boxes, "3\n1\n3, \0").unwrap();
+    assert_eq!(error(), "b.dat:3:4: not a text file: it holds a zero byte");
+    fs::write(&boxes, b"3\n1 \xff").unwrap();
+    assert_eq!(error(), "b.dat:2:3: not UTF-8 text");
+    fs::write(&boxes, " \n").unwrap();
+    assert_eq!(error(), "b.dat: the file is empty");
+    fs::write(&path, "").unwrap();
+    assert_eq!(error(), "scene.toml: the file is empty");
+    fs::write(&path, format!("title = '{}'", "x".repeat(4 << 20))).unwrap();
+    assert!(error().starts_with("scene.toml: too large: 5 MiB"));
+    fs::write(&path, "\u{feff}title = 3").unwrap();
+    assert_eq!(error(), "scene.toml:1:9: `title`: expected a string, found integer 3");
+}
+
+#[test]
+fn nesting_without_end_is_an_error_and_no_crash() {
+    for (scene, expected) in [
+        (format!("x = {}", "[".repeat(100_000)), "max recursion depth met"),
+        (format!("x = {}", "{a=".repeat(100_000)), "max recursion depth met"),
+        (format!("{}x = 1", "a.".repeat(100_000)), "no key of nimbus has this many dots"),
+        (format!("[{}x]", "a.".repeat(100_000)), "no key of nimbus has this many dots"),
+        // As deep as the bounds allow, so that it is the reader that must bear it.
+        (format!("x = {}", format!("{{{}x=", "a.".repeat(16)).repeat(70)) + "1" + &"}".repeat(70), "unknown key `x`"),
+    ] {
+        let found = message(&scene, &[]);
+        assert!(found.contains(expected), "expected {expected}, found {}", &found[..found.len().min(300)]);
+        message("title = 'x'", &[&scene]);
+    }
+}
+
+#[test]
+fn more_particles_than_can_be_numbered_are_refused() {
+    let (dir, path) = folder(&format!("{CLOUD}{CLOUD}"));
+    let n = u32::MAX;
+    fs::write(dir.path().join("b.dat"), format!("{n}\n1\n{n}, 1, 1, 1, 0, 0, 0, 1\n")).unwrap();
+    assert!(load(&path, &[], None).unwrap_err().to_string().ends_with("8589934590 particles: at most 4294967295"));
+}
+
+#[test]
+fn every_scene_of_the_repository_loads() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut n = 0;
+    for entry in fs::read_dir(scenes).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let loaded = load(&path, &[], None).unwrap_or_else(|e| panic!("{e}"));
+            assert_eq!(loaded.warnings, [""; 0], "{}", path.display());
+            assert!(loaded.scene.n_particles() > 0 && !loaded.scene.title.is_empty());
+            n += 1;
+        }
+    }
+    assert!(n >= 4, "{n}");
+    let count = |name: &str| {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
+        load(&path, &[], None).unwrap().scene.n_particles()
+    };
+    assert_eq!((count("cubes-554.toml"), count("cubes-615.toml"), count("threads.toml")), (554, 615, 11_690));
+}

@@ -80,7 +80,11 @@ impl Error {
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Check { .. } => 1,
-            Error::Scene { .. } | Error::Shader { .. } | Error::Limit { .. } | Error::Io { .. } | Error::Usage { .. } => 2,
+            Error::Scene { .. }
+            | Error::Shader { .. }
+            | Error::Limit { .. }
+            | Error::Io { .. }
+            | Error::Usage { .. } => 2,
             Error::Vulkan { .. } => 3,
             Error::Interrupted => 130,
         }

@@ -40,18 +40,18 @@ impl Rounded {
 
     /// An operation's result `value`, its inputs' errors giving `inherited`: the rounding is of the *computed*
     /// number, whose magnitude is at most |value| + inherited.
-    fn rounded(value: f64, inherited: f64, u: f64) -> Rounded {
+    fn operation(value: f64, inherited: f64, u: f64) -> Rounded {
         Rounded { value, error: inherited + u * (value.abs() + inherited) }
     }
 
     fn plus(self, b: Rounded, u: f64) -> Rounded {
-        Rounded::rounded(self.value + b.value, self.error + b.error, u)
+        Rounded::operation(self.value + b.value, self.error + b.error, u)
     }
 
     /// |ab − a'b'| ≤ |a|δb + |b|δa + δaδb.
     fn times(self, b: Rounded, u: f64) -> Rounded {
         let inherited = self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
-        Rounded::rounded(self.value * b.value, inherited, u)
+        Rounded::operation(self.value * b.value, inherited, u)
     }
 
     fn halved(self) -> Rounded {

@@ -31,3 +31,34 @@ pub fn order(keys: &[u32]) -> Vec<u32> {
     order.sort_by_key(|&i| keys[i as usize]);
     order
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_of_32_bits_run_against_depth() {
+        let far_to_near = [f32::INFINITY, 3.0, 1.0, 1e-40, 0.0, -0.0, -1e-40, -1.0, -3.0, f32::NEG_INFINITY];
+        assert!(far_to_near.windows(2).all(|z| key32(z[0]) < key32(z[1])));
+        // By hand: +0 has no bits, m = 2³¹, key = 2³¹ − 1; 1.0 is 0x3f80_0000.
+        assert_eq!((key32(0.0), key32(1.0)), (0x7fff_ffff, 0x407f_ffff));
+        // −1.0 is 0xbf80_0000, m = ~bits, the key is the bits again.
+        assert_eq!(key32(-1.0), 0xbf80_0000);
+        assert!(key32(f32::NAN) < key32(f32::INFINITY) && key32(-f32::NAN) > key32(f32::NEG_INFINITY));
+    }
+
+    #[test]
+    fn keys_of_16_bits_clamp() {
+        let key = |z| key16(z, 2.0);
+        // By hand: (2 − z)·65536/4.
+        assert_eq!([key(2.0), key(1.0), key(0.0), key(-1.0)], [0, 16384, 32768, 49152]);
+        assert_eq!([key(-2.0), key(-9.0), key(9.0), key(f64::NAN)], [65535, 65535, 0, 0]);
+        assert_eq!((key16(0.0, 0.0), key16(1.0, 0.0)), (0, 0));
+    }
+
+    #[test]
+    fn ties_keep_their_index_order() {
+        assert_eq!(order(&[5, 1, 5, 1, 0]), [4, 1, 3, 0, 2]);
+        assert!(order(&[]).is_empty());
+    }
+}

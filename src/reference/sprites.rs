@@ -83,7 +83,7 @@ impl View {
 fn slopes(side: f64, depth: f64, reach: f64) -> (f64, f64) {
     const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
     let sine = reach / side.hypot(depth);
-    if !(sine < 1.0) {
+    if sine.is_nan() || sine >= 1.0 {
         return ALL;
     }
     let (mid, spread) = (side.atan2(depth), sine.asin());

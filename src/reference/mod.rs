@@ -1,1 +1,25 @@
 //! The f64 twin of every GPU pass, one room a pass, written from the mathematics (model.md), never from a shader.
+//!
+//! Each room is plain functions over slices and takes its stage's inputs as arguments, so that a test can feed
+//! it exactly what the GPU had and so measure one stage alone.
+
+pub mod facets;
+pub mod first;
+pub mod generate;
+pub mod grid;
+pub mod place;
+pub mod rounding;
+pub mod sort;
+pub mod sprites;
+pub mod transmit;
+
+use glam::DVec3;
+
+/// One Gaussian blob of extinction, ρ(x) = κ exp(−|x − p|²/2σ²), its position relative to the lighting origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blob {
+    pub position: DVec3,
+    pub sigma: f64,
+    /// Peak extinction per unit length.
+    pub kappa: f64,
+}

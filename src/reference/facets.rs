@@ -1,0 +1,169 @@
+//! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, on the blob's shell, its normal from
+//! the density around it where that has a direction, else away from the cloud's centre.
+//! In: the density grid and the placed blobs. Out: positions relative to O, unit normals, areas in scene units².
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use super::Blob;
+use super::grid::sample;
+use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU};
+use crate::model::grid::GridSpec;
+
+/// Radius of the ball that the gradient is averaged over, in σ.
+pub const GRADIENT_RADIUS_SIGMA: f64 = 2.0;
+/// A facet's distance from its blob's centre, in σ.
+pub const SHELL_SIGMA: f64 = 1.5;
+/// Conditioning q below which only the cloud's centre decides, and above which only the gradient does.
+pub const CONDITIONING: (f64, f64) = (0.02, 0.10);
+/// Weights of the 14-point quadrature of degree 5 on the sphere: 6/15 + 8·3/40 = 1.
+const AXIS_WEIGHT: f64 = 1.0 / 15.0;
+const CORNER_WEIGHT: f64 = 3.0 / 40.0;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Facet {
+    pub position: DVec3,
+    pub normal: DVec3,
+    pub area: f64,
+    /// Number of the cloud.
+    pub region: u32,
+    /// q = |G|/S: 0 where the density around has no direction, at most 1.
+    pub conditioning: f64,
+}
+
+/// The 14 directions and their weights.
+pub fn directions() -> [(DVec3, f64); 14] {
+    let corner = 1.0 / 3f64.sqrt();
+    std::array::from_fn(|i| {
+        if i < 6 {
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            return (sign * DVec3::AXES[i / 2], AXIS_WEIGHT);
+        }
+        let sign = |bit: usize| if (i - 6) >> bit & 1 == 0 { corner } else { -corner };
+        (DVec3::new(sign(0), sign(1), sign(2)), CORNER_WEIGHT)
+    })
+}
+
+/// G = Σ w ρ(p + 2σd) d, which the divergence theorem makes a multiple of ∇ρ averaged over the ball, and
+/// S = Σ w ρ(p + 2σd).
+pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64) -> (DVec3, f64) {
+    directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
+        let density = w * sample(spec, cells, p + GRADIENT_RADIUS_SIGMA * sigma * d);
+        (g + density * d, s + density)
+    })
+}
+
+/// Unit normal and conditioning q of a blob at `p` in a cloud about `center`.
+pub fn normal(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, center: DVec3) -> (DVec3, f64) {
+    let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
+    let (g, s) = gradient(spec, cells, p, sigma);
+    let q = if s > 0.0 { g.length() / s } else { 0.0 };
+    let t = smoothstep(CONDITIONING, q);
+    // t > 0 only where q > 0, hence |G| > 0.
+    let down = if t > 0.0 { -g.normalize() } else { DVec3::ZERO };
+    ((t * down + (1.0 - t) * away).try_normalize().unwrap_or(away), q)
+}
+
+/// GLSL's smoothstep: the cubic with zero slope at both ends.
+pub fn smoothstep(ends: (f64, f64), x: f64) -> f64 {
+    let t = ((x - ends.0) / (ends.1 - ends.0)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// π R² (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ.
+pub fn area(sigma: f64, kappa: f64) -> f64 {
+    let radius = sigma / SIGMA_PER_RADIUS;
+    -PI * radius * radius * libm::expm1(-SQRT_TAU * kappa * sigma)
+}
+
+/// One facet a blob; `regions[j]` is the cloud of blob j, `cloud_centers` are relative to O.
+pub fn facets(spec: &GridSpec, cells: &[f64], blobs: &[Blob], regions: &[u32], cloud_centers: &[DVec3]) -> Vec<Facet> {
+    let facet = |(blob, &region): (&Blob, &u32)| {
+        let center = cloud_centers[region as usize];
+        let (normal, conditioning) = normal(spec, cells, blob.position, blob.sigma, center);
+        let position = blob.position + SHELL_SIGMA * blob.sigma * normal;
+        Facet { position, normal, area: area(blob.sigma, blob.kappa), region, conditioning }
+    };
+    blobs.iter().zip(regions).map(facet).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::reference::grid::deposit;
+    use glam::UVec3;
+
+    const SPEC: GridSpec = GridSpec { n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
+
+    fn ball() -> Vec<f64> {
+        deposit(&SPEC, &[Blob { position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
+    }
+
+    #[test]
+    fn the_directions_are_a_quadrature_of_degree_5() {
+        let mean = |f: &dyn Fn(DVec3) -> f64| directions().iter().map(|&(d, w)| w * f(d)).sum::<f64>();
+        // Moments over the unit sphere: 1, 1/3, 1/5, 1/15; odd ones vanish.
+        for (value, expected) in [
+            (mean(&|_| 1.0), 1.0),
+            (mean(&|d| d.y * d.y), 1.0 / 3.0),
+            (mean(&|d| d.z.powi(4)), 0.2),
+            (mean(&|d| (d.x * d.y).powi(2)), 1.0 / 15.0),
+            (mean(&|d| d.x * d.y), 0.0),
+            (mean(&|d| d.x * d.y * d.z), 0.0),
+        ] {
+            assert!((value - expected).abs() < 1e-15);
+        }
+        assert!(directions().iter().all(|(d, _)| (d.length() - 1.0).abs() < 1e-15));
+    }
+
+    #[test]
+    fn of_a_linear_density_the_gradient_is_exact() {
+        // ρ = 3 + 0.2 x − 0.1 z at the cell centres, which trilinear sampling keeps: G = (2σ/3)∇ρ, S = ρ(p).
+        let at = |i: usize, axis: u32| -4.9 + 0.2 * (i / 50usize.pow(axis) % 50) as f64;
+        let cells: Vec<f64> = (0..125_000).map(|i| 3.0 + 0.2 * at(i, 0) - 0.1 * at(i, 2)).collect();
+        let p = DVec3::new(0.33, -0.71, 0.52);
+        let (g, s) = gradient(&SPEC, &cells, p, 0.6);
+        assert!((g - 0.4 * DVec3::new(0.2, 0.0, -0.1)).length() < 1e-13);
+        assert!((s - (3.0 + 0.066 - 0.052)).abs() < 1e-13);
+    }
+
+    #[test]
+    fn normals_of_a_ball_point_outward_wherever_the_cloud_is_centred() {
+        let cells = ball();
+        for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)] {
+            let (n, q) = normal(&SPEC, &cells, p, 0.4, DVec3::new(3.0, 3.0, -3.0));
+            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction is off by what the deposit's
+            // cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below one degree.
+            assert!(q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(), "{p} {n} {q}");
+        }
+    }
+
+    #[test]
+    fn normals_blend_without_a_jump() {
+        let cells = ball();
+        let at = |k: i32| normal(&SPEC, &cells, DVec3::X * 1e-3 * f64::from(k), 0.3, DVec3::NEG_Y * 20.0);
+        // q grows by some 0.14 a unit, t by at most 1.5/0.08 times that, and the normal turns from +y to ±x
+        // by at most twice dt: 5e-3 a step of 1e-3.
+        for k in -1500..1500 {
+            assert!((at(k + 1).0 - at(k).0).length() < 1e-2, "{k}");
+        }
+        let middle = at(0);
+        assert!(middle.1 < CONDITIONING.0 && middle.0.dot(DVec3::Y) > 0.999);
+        assert!(at(1500).0.x > 0.99 && at(-1500).0.x < -0.99);
+        assert_eq!([0.02, 0.1, 7.0].map(|q| smoothstep(CONDITIONING, q)), [0.0, 1.0, 1.0]);
+        assert!((smoothstep(CONDITIONING, 0.06) - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_facet_lies_on_its_shell_and_without_direction_faces_up() {
+        let blob = Blob { position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
+        let empty = vec![0.0; 125_000];
+        let facets = facets(&SPEC, &empty, &[blob, blob], &[1, 0], &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE]);
+        assert_eq!((facets[0].normal, facets[0].conditioning, facets[0].region), (DVec3::Y, 0.0, 1));
+        assert_eq!(facets[0].position, DVec3::new(1.0, 1.75, 1.0));
+        assert_eq!((facets[1].normal, facets[1].position.z), (DVec3::NEG_Z, 0.25));
+        // τ₀ = √(2π); π·1.5²·(1 − e^{−2.5066…}) = 6.49216….
+        assert!((facets[0].area - 2.25 * PI * (1.0 - (-2.506_628_274_631f64).exp())).abs() < 1e-11);
+    }
+}

@@ -1,0 +1,62 @@
+//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first".
+//! In: normals, transmittance [facet × light]. Out: irradiance (W m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
+
+use std::f64::consts::PI;
+
+use glam::DVec3;
+
+use crate::model::light::Light;
+
+/// I_d,j = Σ_l E_l f_l(n_j, V(j, l)).
+pub fn irradiance(normals: &[DVec3], transmittance: &[f64], lights: &[Light]) -> Vec<DVec3> {
+    let at = |(j, &n): (usize, &DVec3)| {
+        let of = &transmittance[j * lights.len()..][..lights.len()];
+        lights.iter().zip(of).map(|(light, &v)| light.irradiance() * light.factor(n, v)).sum()
+    };
+    normals.iter().enumerate().map(at).collect()
+}
+
+/// L1_j = K_d c_j I_d,j/π: `kd` by region, `colors` by particle (1 for boxes).
+pub fn radiance(irradiance: &[DVec3], regions: &[u32], kd: &[DVec3], colors: &[DVec3]) -> Vec<DVec3> {
+    let of = |((&e, &region), &color): ((&DVec3, &u32), &DVec3)| kd[region as usize] * color * e / PI;
+    irradiance.iter().zip(regions).zip(colors).map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SUN: Light = Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) };
+
+    fn lit(light: Light, normal: DVec3, transmittance: f64) -> DVec3 {
+        let e = irradiance(&[normal], &[transmittance], &[light]);
+        radiance(&e, &[0], &[DVec3::ONE], &[DVec3::ONE])[0]
+    }
+
+    #[test]
+    fn a_white_facet_under_a_sun_of_pi_has_radiance_one() {
+        assert_eq!(lit(SUN, DVec3::Y, 1.0), DVec3::ONE);
+        assert_eq!(lit(SUN, DVec3::NEG_Y, 1.0), DVec3::ZERO);
+        // cos 60° = ½ and V = ½; the two roundings of the slant normal stay below 1e-15.
+        let slant = DVec3::new(3f64.sqrt() / 2.0, 0.5, 0.0);
+        assert!((lit(SUN, slant, 0.5).x - 0.25).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_sky_lights_from_above_and_a_constant_from_everywhere() {
+        let sky = Light::Sky { irradiance: DVec3::splat(PI), constant: 0.25 };
+        let l = |n, v| lit(sky, n, v).x;
+        assert_eq!((l(DVec3::Y, 1.0), l(DVec3::NEG_Y, 1.0), l(DVec3::X, 1.0)), (1.25, 0.25, 0.75));
+        assert_eq!(l(DVec3::Y, 0.0), 0.25);
+    }
+
+    #[test]
+    fn lights_add_and_regions_and_colors_choose_the_albedo() {
+        let sky = Light::Sky { irradiance: DVec3::splat(PI), constant: 0.0 };
+        let e = irradiance(&[DVec3::Y, DVec3::NEG_Y], &[1.0, 0.5, 1.0, 1.0], &[SUN, sky]);
+        assert_eq!(e, [DVec3::splat(1.5 * PI), DVec3::ZERO]);
+        let kd = [DVec3::ZERO, DVec3::new(1.0, 0.5, 0.0)];
+        let l = radiance(&e, &[1, 0], &kd, &[DVec3::new(1.0, 0.5, 1.0), DVec3::ONE]);
+        assert!((l[0] - DVec3::new(1.5, 0.375, 0.0)).length() < 1e-15 && l[1] == DVec3::ZERO);
+    }
+}

@@ -1,0 +1,186 @@
+//! Particles from boxes: P (1)–(11) and Fig. 1, both forms, as model.md §1 and §11 "generate" spell them out.
+//! In: a box, its number within its cloud, the cloud's seed. Out: positions relative to the box's centre (scene
+//! units), radii before `radius_scale`, σ and κ after it. `rounding.rs` bounds what an f32 evaluation may differ.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::DVec3;
+
+use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
+use crate::model::cloud::{Cloud, CloudSource, Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::philox::{philox4x32_10, uniform};
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Generated {
+    /// Relative to the group's origin: the box's centre, or the centre of a particle list's bounds.
+    pub position: DVec3,
+    /// R of P (11), before `radius_scale`.
+    pub radius: f64,
+    pub sigma: f64,
+    pub kappa: f64,
+    /// Attempts made, the kept one included; 0 where a particle was given and not generated.
+    pub n_attempts: u32,
+    pub folded: bool,
+    /// How far the closest of the particle's accept/reject decisions was from turning out the other way: over the
+    /// attempts the least [`decision_margin`]. Infinite where nothing was decided.
+    pub margin: f64,
+}
+
+/// Sums over some particles: the results that model.md §1 asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Acceptance {
+    pub n_attempts: u64,
+    /// Particles whose last attempt lay inside; the others were folded.
+    pub n_accepted: u64,
+    pub n_folded: u64,
+}
+
+impl Acceptance {
+    pub fn of(particles: &[Generated]) -> Acceptance {
+        let n_attempts = particles.iter().map(|p| u64::from(p.n_attempts)).sum();
+        let n_folded = particles.iter().filter(|p| p.folded).count() as u64;
+        let n_made = particles.iter().filter(|p| p.n_attempts > 0).count() as u64;
+        Acceptance { n_attempts, n_accepted: n_made - n_folded, n_folded }
+    }
+
+    /// Accepted over made attempts; `None` without attempts.
+    pub fn rate(&self) -> Option<f64> {
+        (self.n_attempts > 0).then(|| self.n_accepted as f64 / self.n_attempts as f64)
+    }
+}
+
+/// u₁…u₄ of one attempt: the words of Philox(key = (seed, box), counter = (particle, attempt, 0, 0)).
+pub fn uniforms(seed: u32, i_box: u32, i_particle: u32, attempt: u32) -> [f64; 4] {
+    philox4x32_10([seed, i_box], [i_particle, attempt, 0, 0]).map(uniform)
+}
+
+/// Offset from the box's centre that one attempt proposes, P (1)–(7); scene units.
+pub fn offset(extent: DVec3, form: Form, u: [f64; 3]) -> DVec3 {
+    // P (1)–(3).
+    let spread = |u: f64, length: f64| match form {
+        Form::Printed => u * length,
+        Form::Centred => (2.0 * u - 1.0) * length,
+    };
+    let (x, y, z) = (spread(u[0], extent.x), spread(u[1], extent.y), spread(u[2], extent.z));
+    // P (4): x takes Y and y takes X.
+    let mut p_x = FRAC_PI_2 * (0.5 * y).sin();
+    let mut p_y = FRAC_PI_2 * (0.5 * x).sin();
+    let p_z = FRAC_PI_2 * (0.5 * z).sin();
+    // P (5), in this order: the second line reads the new P_x.
+    p_x += PI * (0.5 * p_x * z).sin();
+    p_y += PI * (0.5 * p_x * z).sin();
+    // P (6)–(7).
+    let shifted = DVec3::new(x + p_x, y + p_y, z + p_z);
+    0.5 * match form {
+        Form::Printed => DVec3::new(shifted.x, shifted.z, shifted.z),
+        Form::Centred => shifted,
+    }
+}
+
+/// Fig. 1: inside the box, faces included.
+pub fn is_inside(v: DVec3, half: DVec3) -> bool {
+    v.abs().cmple(half).all()
+}
+
+/// How far the decision on offset `v` is from its opposite: inside, the distance to the nearest face; outside,
+/// the farthest that any axis sticks out, because all those that do would have to move in.
+pub fn decision_margin(v: DVec3, half: DVec3) -> f64 {
+    let out = v.abs() - half;
+    // The same expression serves both: inside, every entry is negative and the largest is the nearest face.
+    out.max_element().abs()
+}
+
+/// Mirrors `v` at ±`half` until it lies between (model.md §11 "generate").
+pub fn fold(v: f64, half: f64) -> f64 {
+    if half <= 0.0 {
+        return 0.0;
+    }
+    let w = (v + half).rem_euclid(4.0 * half);
+    if w <= 2.0 * half { w - half } else { 3.0 * half - w }
+}
+
+/// P (8)–(11): radius of a particle from its u₄, before `radius_scale`.
+pub fn radius(form: Form, radius_max: f64, u: f64) -> f64 {
+    radius_factor(form, radius_max) * radius_shape(u * radius_max)
+}
+
+/// Particle `i_particle` of box `i_box`, its number within its cloud.
+pub fn generate_particle(
+    b: &CloudBox,
+    i_box: u32,
+    seed: u32,
+    form: Form,
+    optical_depth: f64,
+    radius_scale: f64,
+    i_particle: u32,
+) -> Generated {
+    let half = 0.5 * b.extent;
+    let mut margin = f64::INFINITY;
+    let mut last = (DVec3::ZERO, 0.0);
+    let mut accepted_at = None;
+    for attempt in 0..MAX_ATTEMPTS {
+        let [u1, u2, u3, u4] = uniforms(seed, i_box, i_particle, attempt);
+        let v = offset(b.extent, form, [u1, u2, u3]);
+        margin = margin.min(decision_margin(v, half));
+        last = (v, u4);
+        if is_inside(v, half) {
+            accepted_at = Some(attempt);
+            break;
+        }
+    }
+    let (v, u4) = last;
+    let position = match accepted_at {
+        Some(_) => v,
+        None => DVec3::new(fold(v.x, half.x), fold(v.y, half.y), fold(v.z, half.z)),
+    };
+    let radius = radius(form, b.radius_max, u4);
+    Generated {
+        position,
+        radius,
+        sigma: radius * radius_scale * SIGMA_PER_RADIUS,
+        kappa: box_kappa(b, form, optical_depth, radius_scale),
+        n_attempts: accepted_at.map_or(MAX_ATTEMPTS, |a| a + 1),
+        folded: accepted_at.is_none(),
+        margin,
+    }
+}
+
+/// All particles of a box.
+pub fn generate_box(
+    b: &CloudBox,
+    i_box: u32,
+    seed: u32,
+    form: Form,
+    optical_depth: f64,
+    radius_scale: f64,
+) -> Vec<Generated> {
+    (0..b.n_particles).map(|i| generate_particle(b, i_box, seed, form, optical_depth, radius_scale, i)).collect()
+}
+
+/// All particles of a cloud in the order of its groups.
+pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
+    match &cloud.source {
+        CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
+            .iter()
+            .zip(0u32..)
+            .flat_map(|(b, i_box)| generate_box(b, i_box, cloud.seed, *form, *optical_depth, *radius_scale))
+            .collect(),
+        CloudSource::Particles(list) => {
+            let groups = cloud.groups(0, 0);
+            list.iter().map(|p| given(p, groups.first())).collect()
+        }
+    }
+}
+
+/// A particle of a list: nothing is drawn by lot, only its origin changes.
+fn given(p: &Particle, group: Option<&Group>) -> Generated {
+    Generated {
+        position: p.position - group.map_or(DVec3::ZERO, |g| g.center),
+        radius: p.sigma / SIGMA_PER_RADIUS,
+        sigma: p.sigma,
+        kappa: p.kappa,
+        n_attempts: 0,
+        folded: false,
+        margin: f64::INFINITY,
+    }
+}

@@ -1,0 +1,74 @@
+//! From group-relative positions to positions relative to the lighting origin O: model.md §11 "Frames of
+//! reference". All in f64; the GPU rounds the offset once and the sum once.
+
+use glam::DVec3;
+
+use super::Blob;
+use super::generate::Generated;
+use crate::model::cloud::{Cloud, Group};
+
+/// Offset of every group's particles: cloud origin(t) + group centre − O.
+pub fn offsets(groups: &[Group], clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
+    groups.iter().map(|g| clouds[g.i_cloud].origin_at(time_s) + g.center - origin).collect()
+}
+
+/// Centre of every cloud relative to O at `time_s`: what the facets' fallback normal points away from.
+pub fn cloud_centers(clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
+    clouds.iter().map(|c| c.origin_at(time_s) + c.center() - origin).collect()
+}
+
+/// Placed positions: particle k of group g at positions[g.i_first + k] + offsets[g].
+pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DVec3> {
+    let mut placed = positions.to_vec();
+    for (group, offset) in groups.iter().zip(offsets) {
+        let first = group.i_first as usize;
+        for p in &mut placed[first..first + group.n_particles as usize] {
+            *p += *offset;
+        }
+    }
+    placed
+}
+
+/// Number of the cloud (the region) that each particle belongs to.
+pub fn regions(groups: &[Group]) -> Vec<u32> {
+    groups.iter().flat_map(|g| std::iter::repeat_n(g.i_cloud as u32, g.n_particles as usize)).collect()
+}
+
+/// Generated particles at their placed positions.
+pub fn blobs(generated: &[Generated], placed: &[DVec3]) -> Vec<Blob> {
+    generated.iter().zip(placed).map(|(g, &position)| Blob { position, sigma: g.sigma, kappa: g.kappa }).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::cloud::{CloudSource, Particle};
+
+    #[test]
+    fn groups_are_placed_by_wind_centre_and_origin() {
+        let particle = |x| Particle { position: DVec3::X * x, sigma: 1.0, kappa: 1.0, color: DVec3::ONE };
+        let cloud = |list, y, wind| Cloud {
+            source: CloudSource::Particles(list),
+            position: DVec3::Y * y,
+            wind,
+            i_material: 0,
+            seed: 0,
+        };
+        let clouds =
+            [cloud(vec![particle(2.0), particle(6.0)], 1.0, DVec3::Z), cloud(vec![particle(1e9)], 0.0, DVec3::ZERO)];
+        let groups: Vec<Group> =
+            clouds.iter().zip([0, 2]).enumerate().flat_map(|(i, (c, first))| c.groups(i, first)).collect();
+        let origin = DVec3::new(1.0, 1.0, 1.0);
+        let offsets = offsets(&groups, &clouds, 10.0, origin);
+        // Bounds of the first list: x from 2 to 6, centre 4; 10 s of wind along z.
+        assert_eq!(offsets, [DVec3::new(3.0, 0.0, 9.0), DVec3::new(1e9 - 1.0, -1.0, -1.0)]);
+        let generated: Vec<Generated> = clouds.iter().flat_map(super::super::generate::cloud).collect();
+        let relative: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
+        assert_eq!(relative, [DVec3::X * -2.0, DVec3::X * 2.0, DVec3::ZERO]);
+        let placed = place(&relative, &groups, &offsets);
+        assert_eq!((placed[0], placed[1]), (DVec3::new(1.0, 0.0, 9.0), DVec3::new(5.0, 0.0, 9.0)));
+        assert_eq!(regions(&groups), [0, 0, 1]);
+        assert_eq!(cloud_centers(&clouds, 10.0, origin)[0], offsets[0]);
+        assert_eq!(blobs(&generated, &placed)[1], Blob { position: placed[1], sigma: 1.0, kappa: 1.0 });
+    }
+}

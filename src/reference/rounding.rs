@@ -1,0 +1,160 @@
+//! What an f32 evaluation of P (1)–(11) may differ from the f64 one: a running error analysis, each particle at
+//! its own values. The assumptions on the f32 side, which the shader must keep:
+//! +, −, × are correctly rounded (unit round-off u = 2⁻²⁴; a fused multiply-add only rounds less), multiplying
+//! by a power of two is exact, constants and extents are rounded to f32 once, the uniforms are exact (24 bits),
+//! and a sine's absolute error is at most [`SINE_ERROR`] at an argument that reduction has moved by at most
+//! [`REDUCTION_ERROR`]·u·|argument|. Underflow is left out: nothing here divides, so it costs less than 2⁻¹²⁰.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use glam::DVec3;
+
+use super::generate::{is_inside, offset, uniforms};
+use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor};
+
+/// Unit round-off of f32.
+pub const U_F32: f64 = 1.0 / 16_777_216.0;
+
+/// Greatest absolute error of the f32 sine at its reduced argument: 4 units of round-off at 1.
+pub const SINE_ERROR: f64 = 4.0 * U_F32;
+
+/// Argument reduction: the absolute error of the reduced argument, in u·|argument|.
+pub const REDUCTION_ERROR: f64 = 2.0;
+
+/// A number and a bound on how far its f32 evaluation may lie from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Rounded {
+    value: f64,
+    error: f64,
+}
+
+impl Rounded {
+    fn exact(value: f64) -> Rounded {
+        Rounded { value, error: 0.0 }
+    }
+
+    /// An input or constant that was rounded to f32 once.
+    fn once(value: f64, u: f64) -> Rounded {
+        Rounded { value, error: u * value.abs() }
+    }
+
+    /// An operation's result `value`, its inputs' errors giving `inherited`: the rounding is of the *computed*
+    /// number, whose magnitude is at most |value| + inherited.
+    fn operation(value: f64, inherited: f64, u: f64) -> Rounded {
+        Rounded { value, error: inherited + u * (value.abs() + inherited) }
+    }
+
+    fn plus(self, b: Rounded, u: f64) -> Rounded {
+        Rounded::operation(self.value + b.value, self.error + b.error, u)
+    }
+
+    /// |ab − a'b'| ≤ |a|δb + |b|δa + δaδb.
+    fn times(self, b: Rounded, u: f64) -> Rounded {
+        let inherited = self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
+        Rounded::operation(self.value * b.value, inherited, u)
+    }
+
+    fn halved(self) -> Rounded {
+        Rounded { value: 0.5 * self.value, error: 0.5 * self.error }
+    }
+
+    /// |sin(a + e) − sin a| ≤ |cos a||e| + e²/2, e the argument's own error and that of its reduction.
+    fn sine(self, u: f64) -> Rounded {
+        let e = self.error + REDUCTION_ERROR * u * (self.value.abs() + self.error);
+        let error = self.value.cos().abs() * e + 0.5 * e * e + SINE_ERROR;
+        Rounded { value: self.value.sin(), error }
+    }
+}
+
+/// Bound, axis by axis, on |f32 − f64| of the offset P (1)–(7) that the uniforms `u123` propose; `u` is the
+/// unit round-off ([`U_F32`]).
+pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec3 {
+    // P (1)–(3). 2u₁ − 1 is a multiple of 2⁻²³ in [−1, 1): exact. L carries its own rounding, the product one
+    // more: δX = 2u|X|.
+    let spread = |v: f64, length: f64| {
+        let share = match form {
+            Form::Printed => v,
+            Form::Centred => 2.0 * v - 1.0,
+        };
+        Rounded::exact(share).times(Rounded::once(length, u), u)
+    };
+    let (x, y, z) = (spread(u123[0], extent.x), spread(u123[1], extent.y), spread(u123[2], extent.z));
+    let (pi, half_pi) = (Rounded::once(PI, u), Rounded::once(FRAC_PI_2, u));
+    // P (4): δP = π/2 δsin + 2u|P|, δsin = |cos(Y/2)|(δY/2 + 2u|Y/2|) + SINE_ERROR.
+    let phase = |v: Rounded| half_pi.times(v.halved().sine(u), u);
+    let (p_x, p_y, p_z) = (phase(y), phase(x), phase(z));
+    // P (5): the argument t = P_x Z/2 has δt = |Z/2|δP_x + |P_x/2|δZ + u|t|, and P_x' = P_x + π sin t has
+    // δP_x' = δP_x + πδsin t + 2u|π sin t| + u|P_x'|. The second line starts from δP_x'.
+    let swirl = |p: Rounded| pi.times(p.times(z, u).halved().sine(u), u);
+    let p_x = p_x.plus(swirl(p_x), u);
+    let p_y = p_y.plus(swirl(p_x), u);
+    // P (6)–(7): one rounded sum, one exact halving.
+    let v = [x.plus(p_x, u), y.plus(p_y, u), z.plus(p_z, u)].map(|v| v.halved().error);
+    match form {
+        Form::Printed => DVec3::new(v[0], v[2], v[2]),
+        Form::Centred => DVec3::from_array(v),
+    }
+}
+
+/// Bound on |f32 − f64| of the radius P (8)–(11) at `u4`; the factor of the centred form is rounded to f32 once.
+pub fn radius_bound(form: Form, radius_max: f64, u4: f64, u: f64) -> f64 {
+    // δR = 2u|R| as for X above; R' = R + π/2 sin R; factor·R'.
+    let r = Rounded::exact(u4).times(Rounded::once(radius_max, u), u);
+    let r = r.plus(Rounded::once(FRAC_PI_2, u).times(r.sine(u), u), u);
+    match form {
+        // No factor, no rounding.
+        Form::Printed => r.error,
+        Form::Centred => Rounded::once(radius_factor(form, radius_max), u).times(r, u).error,
+    }
+}
+
+/// Bound on the folded offset of an offset `v` that is itself off by `error`, for w evaluated as
+/// a − 4h·floor(a/4h), a = v + h.
+pub fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
+    if half <= 0.0 {
+        return 0.0;
+    }
+    let k = ((v + half) / (4.0 * half)).floor().abs();
+    // The result is v − 4kh or 2h − v + 4kh, so it inherits δv and (2 + 4k)δh, δh = uh. Roundings: a; the product
+    // 4hk; the difference, below 4h; the last one, below 2h. A floor that errs by one beside a multiple
+    // of 4h costs nothing more, fold being continuous there.
+    let roundings = (v.abs() + half) + 4.0 * half * k + 4.0 * half + 2.0 * half;
+    // The computed a and k may lie one error further out: (1 + 4u) on every term covers it.
+    (error + u * ((2.0 + 4.0 * k) * half + roundings)) * (1.0 + 4.0 * u)
+}
+
+/// What an f32 evaluation of one particle may differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ParticleBound {
+    pub position: DVec3,
+    /// Of the radius before `radius_scale`.
+    pub radius: f64,
+    /// Whether the f32 evaluation must accept and reject the very attempts that the f64 one does. Where it is
+    /// false the attempts may differ, and position and radius then bound nothing.
+    pub decided: bool,
+}
+
+/// The bounds of particle `i_particle` as `generate::generate_particle` makes it.
+pub fn particle_bound(b: &CloudBox, i_box: u32, seed: u32, form: Form, i_particle: u32, u: f64) -> ParticleBound {
+    let half = 0.5 * b.extent;
+    let mut decided = true;
+    for attempt in 0..MAX_ATTEMPTS {
+        let [u1, u2, u3, u4] = uniforms(seed, i_box, i_particle, attempt);
+        let v = offset(b.extent, form, [u1, u2, u3]);
+        let error = position_bound(b.extent, form, [u1, u2, u3], u);
+        // The face is rounded too; the comparison itself is exact.
+        let reach = error + u * half;
+        let radius = radius_bound(form, b.radius_max, u4, u);
+        if is_inside(v, half) {
+            decided &= is_inside(v.abs() + reach, half);
+            return ParticleBound { position: error, radius, decided };
+        }
+        // One axis that surely sticks out is enough.
+        decided &= !is_inside(v.abs() - reach, half);
+        if attempt + 1 == MAX_ATTEMPTS {
+            let fold = |i: usize| fold_bound(v[i], half[i], error[i], u);
+            return ParticleBound { position: DVec3::new(fold(0), fold(1), fold(2)), radius, decided };
+        }
+    }
+    unreachable!("MAX_ATTEMPTS is not 0")
+}

@@ -26,6 +26,8 @@ shaderc_on_system() {
 # build would run for minutes and then fail at its last step.
 shaderc_links() {
     local library=$1 program
+    # Without a compiler nothing is known yet, and nothing will be built either.
+    command -v c++ > /dev/null || return 0
     program=$(mktemp) || return 0
     if printf '%s\n' 'extern "C" { void *shaderc_compiler_initialize(); void shaderc_compiler_release(void *);' \
         'void *shaderc_compile_into_spv(void *, const char *, unsigned long, int, const char *, const char *, void *); }' \
@@ -45,5 +47,5 @@ if [ -z "${SHADERC_LIB_DIR:-}" ] && [ -z "${VULKAN_SDK:-}" ] && broken=$(shaderc
     SHADERC_LIB_DIR="${XDG_CACHE_HOME:-$HOME/.cache}/nimbus/no-shaderc"
     mkdir -p "$SHADERC_LIB_DIR"
     export SHADERC_LIB_DIR
-    echo "nimbus: $broken does not link; building shaderc from source instead (SHADERC_LIB_DIR=$SHADERC_LIB_DIR)" >&2
+    [ -n "${quiet_env:-}" ] || echo "nimbus: $broken does not link; building shaderc from source instead (SHADERC_LIB_DIR=$SHADERC_LIB_DIR)" >&2
 fi

@@ -1,0 +1,59 @@
+//! Hands the git revision to the program as `NIMBUS_GIT_REVISION`, so that every result names the code it came from:
+//! twelve digits, with `-dirty` when what is built differs from the commit, or `unknown` outside a git checkout.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What goes into the binary. Only this makes a build dirty, and only this (and a new HEAD) makes the question worth
+/// asking again: whatever changes here compiles nimbus anew in any case. The index is not watched: staging a file
+/// changes nothing that is built.
+const BUILT_FROM: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
+
+fn main() {
+    let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| ".".into()));
+    println!("cargo:rustc-env=NIMBUS_GIT_REVISION={}", revision(&root).unwrap_or_else(|| "unknown".into()));
+    for path in BUILT_FROM.iter().map(|name| root.join(name)).chain(head_files(&root)) {
+        // A watched file that does not exist would make cargo run this script every time.
+        if path.exists() {
+            println!("cargo:rerun-if-changed={}", path.display());
+        }
+    }
+}
+
+fn revision(root: &Path) -> Option<String> {
+    if !is_our_checkout(root) {
+        return None;
+    }
+    let commit = git(root, &["rev-parse", "--short=12", "HEAD"])?;
+    let mut status = vec!["status", "--porcelain", "--"];
+    status.extend(BUILT_FROM);
+    let changes = git(root, &status)?;
+    Some(if changes.is_empty() { commit } else { format!("{commit}-dirty") })
+}
+
+/// Sources unpacked inside somebody else's repository must not carry that repository's revision.
+fn is_our_checkout(root: &Path) -> bool {
+    let Some(top) = git(root, &["rev-parse", "--show-toplevel"]) else { return false };
+    matches!((Path::new(&top).canonicalize(), root.canonicalize()), (Ok(top), Ok(root)) if top == root)
+}
+
+/// HEAD (another branch), its log (a commit, a reset) and the branch itself (where logs are off). `--git-path` finds
+/// them in worktrees too, where HEAD and the branches live in different folders.
+fn head_files(root: &Path) -> Vec<PathBuf> {
+    if !is_our_checkout(root) {
+        return Vec::new();
+    }
+    let branch = git(root, &["symbolic-ref", "-q", "HEAD"]);
+    let names = ["HEAD".to_owned(), "logs/HEAD".to_owned()].into_iter().chain(branch);
+    names.filter_map(|name| git(root, &["rev-parse", "--git-path", &name])).map(|path| root.join(path)).collect()
+}
+
+/// None when git is missing, refuses, or fails. Without optional locks: `status` would otherwise rewrite the index
+/// while another git command may be at work.
+fn git(root: &Path, arguments: &[&str]) -> Option<String> {
+    let output = Command::new("git").arg("--no-optional-locks").arg("-C").arg(root).args(arguments).output().ok()?;
+    if !output.status.success() {
+        return None;
+    }
+    Some(String::from_utf8(output.stdout).ok()?.trim_end().to_owned())
+}

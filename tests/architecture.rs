@@ -1,0 +1,269 @@
+//! The rules of ARCHITECTURE.md that a machine can keep: who may import whom, one room one name, names that say
+//! something, no file too long, no `.unwrap()`. The checker is shown bad trees first, so that silence means something.
+
+#[path = "architecture/source.rs"]
+mod source;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use source::{Source, Token};
+
+/// Who may import whom. Every room may import itself and `error`.
+const MAY_IMPORT: [(&str, &[&str]); 14] = [
+    ("error", &[]),
+    ("model", &[]),
+    ("io", &["model"]),
+    ("layout", &["model"]),
+    ("reference", &["model"]),
+    ("gpu", &[]),
+    ("passes", &["layout", "gpu"]),
+    ("frame", &["passes", "layout", "gpu", "model"]),
+    ("measure", &[]),
+    ("study", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
+    ("viewer", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
+    ("farm", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
+    ("cli", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study", "viewer", "farm"]),
+    ("main", &["cli"]),
+];
+
+/// Words that say nothing about what is inside.
+const EMPTY_WORDS: [&str; 9] =
+    ["manager", "managers", "util", "utils", "helper", "helpers", "common", "commons", "misc"];
+/// A little above the 400 that the project aims at: the machine stops what has got out of hand.
+const MAX_LINES: usize = 450;
+/// The only crates that the mathematics rests on.
+const MODEL_CRATES: [&str; 2] = ["glam", "libm"];
+const SHADER_KINDS: [&str; 3] = ["comp", "vert", "frag"];
+
+#[test]
+fn the_house_is_in_order() {
+    let complaints = check(Path::new(env!("CARGO_MANIFEST_DIR")));
+    assert!(complaints.is_empty(), "{} breaches:\n{}", complaints.len(), complaints.join("\n"));
+}
+
+fn check(root: &Path) -> Vec<String> {
+    let mut complaints = Vec::new();
+    let crates = dependencies(&fs::read_to_string(root.join("Cargo.toml")).unwrap());
+    for path in files_under(&root.join("src")) {
+        check_name_and_length(root, &path, &mut complaints);
+        if path.extension().is_some_and(|extension| extension == "rs") {
+            let relative = path.strip_prefix(root.join("src")).unwrap();
+            let source = Source::read(relative, &fs::read_to_string(&path).unwrap());
+            check_imports(&source, &mut complaints);
+            check_crates(&source, &crates, &mut complaints);
+            check_words_and_unwrap(&source, &mut complaints);
+        }
+    }
+    for path in files_under(&root.join("shaders")) {
+        check_name_and_length(root, &path, &mut complaints);
+    }
+    check_rooms(root, &mut complaints);
+    complaints
+}
+
+fn check_imports(source: &Source, complaints: &mut Vec<String>) {
+    let Some(from) = source.room() else { return };
+    let may = MAY_IMPORT.iter().find(|(room, _)| *room == from);
+    let Some((_, may)) = may else {
+        complaints.push(format!("src/{}: \"{from}\" is no room of the house", source.path));
+        return;
+    };
+    for import in source.imports() {
+        let at = format!("src/{}:{}", source.path, import.line);
+        let to = import.path[0].as_str();
+        // A pass and its reference meet in tests.
+        let meets_in_test = import.in_test && matches!((from, to), ("passes", "reference") | ("reference", "passes"));
+        let allowed = to == from || to == "error" || may.contains(&to) || meets_in_test;
+        if !allowed {
+            complaints.push(format!("{at}: {from} may not import {to}"));
+        }
+        if let (Some(own), "passes") = (source.pass(), to) {
+            let other = import.path.get(1).map_or("all passes", String::as_str);
+            if other != own {
+                complaints.push(format!("{at}: the pass {own} imports {other}, and no pass imports a pass"));
+            }
+        }
+    }
+}
+
+fn check_crates(source: &Source, crates: &[String], complaints: &mut Vec<String>) {
+    let Some(room) = source.room() else { return };
+    for Token { text, line, .. } in source.crate_mentions(crates) {
+        let at = format!("src/{}:{line}", source.path);
+        if room == "model" && !MODEL_CRATES.contains(&text.as_str()) {
+            complaints.push(format!("{at}: model rests on std, glam and libm, not on {text}"));
+        }
+        if text == "ash" && room != "gpu" && source.pass() != Some("sprites") {
+            complaints.push(format!("{at}: only gpu speaks ash"));
+        }
+    }
+}
+
+fn check_words_and_unwrap(source: &Source, complaints: &mut Vec<String>) {
+    for (i, token) in source.tokens.iter().enumerate() {
+        let next = |n: usize| source.tokens.get(i + n).map_or("", |token| token.text.as_str());
+        let at = || format!("src/{}:{}", source.path, token.line);
+        if token.text == "mod" && !empty_words(next(1)).is_empty() {
+            complaints.push(format!("{}: a module named {} says nothing", at(), next(1)));
+        }
+        if token.text == "." && next(1) == "unwrap" && next(2) == "(" && !token.in_test {
+            complaints.push(format!("{}: .unwrap() outside tests", at()));
+        }
+    }
+}
+
+fn check_name_and_length(root: &Path, path: &Path, complaints: &mut Vec<String>) {
+    let shown = path.strip_prefix(root).unwrap().display();
+    for part in path.strip_prefix(root).unwrap().components() {
+        for word in empty_words(&part.as_os_str().to_string_lossy()) {
+            complaints.push(format!("{shown}: \"{word}\" in a name says nothing"));
+        }
+    }
+    let n_lines = String::from_utf8_lossy(&fs::read(path).unwrap()).lines().count();
+    if n_lines > MAX_LINES {
+        complaints.push(format!("{shown}: {n_lines} lines, more than {MAX_LINES}"));
+    }
+}
+
+fn empty_words(name: &str) -> Vec<&str> {
+    let words = name.split(|c: char| !c.is_alphanumeric());
+    words.filter(|word| EMPTY_WORDS.contains(&word.to_lowercase().as_str())).collect()
+}
+
+/// Every pass has its reference, its test and its shader, all of one name.
+fn check_rooms(root: &Path, complaints: &mut Vec<String>) {
+    let shaders: Vec<String> = files_under(&root.join("shaders")).iter().map(|path| file_name(path)).collect();
+    for entry in fs::read_dir(root.join("src/passes")).into_iter().flatten() {
+        let path = entry.unwrap().path();
+        let room = path.file_stem().unwrap().to_string_lossy().into_owned();
+        if room == "mod" {
+            continue;
+        }
+        let reference = root.join("src/reference").join(&room);
+        let mut need = |there: bool, what: String| {
+            if !there {
+                complaints.push(format!("the pass {room} has no {what}"));
+            }
+        };
+        need(reference.with_extension("rs").is_file() || reference.is_dir(), format!("src/reference/{room}.rs"));
+        need(root.join(format!("tests/pass_{room}.rs")).is_file(), format!("tests/pass_{room}.rs"));
+        let is_shader = |name: &String| {
+            name.split_once('.').is_some_and(|(stem, kind)| stem.starts_with(&room) && SHADER_KINDS.contains(&kind))
+        };
+        need(shaders.iter().any(is_shader), format!("shaders/{room}*.{{comp,vert,frag}}"));
+    }
+}
+
+/// Keys of `[dependencies]`, as they are written in Rust.
+fn dependencies(cargo_toml: &str) -> Vec<String> {
+    let section = cargo_toml.lines().skip_while(|line| line.trim() != "[dependencies]").skip(1);
+    let section = section.take_while(|line| !line.starts_with('['));
+    section.filter_map(|line| Some(line.split_once('=')?.0.trim().replace('-', "_"))).collect()
+}
+
+fn files_under(folder: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).into_iter().flatten() {
+        let path = entry.unwrap().path();
+        if path.is_dir() { files.extend(files_under(&path)) } else { files.push(path) }
+    }
+    files.sort();
+    files
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap().to_string_lossy().into_owned()
+}
+
+/// A tree of files in a temporary folder, and what the checker says of it.
+fn complaints_of(files: &[(&str, &str)]) -> Vec<String> {
+    let folder = tempfile::tempdir().unwrap();
+    let cargo_toml = [("Cargo.toml", "[dependencies]\nash = \"1\"\nglam = \"1\"\nserde_json = \"1\"\n")];
+    for (path, text) in cargo_toml.iter().chain(files) {
+        let path = folder.path().join(path);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    check(folder.path())
+}
+
+#[test]
+fn a_tree_in_order_is_passed() {
+    let complaints = complaints_of(&[
+        ("src/lib.rs", "pub mod model; pub mod gpu;"),
+        ("src/main.rs", "use nimbus::{cli, error::Error}; fn main() {}"),
+        ("src/model/box.rs", "use super::life; use glam::DVec3; // use crate::gpu;\nconst A: &str = \"crate::gpu\";"),
+        ("src/model/life.rs", "fn f<'a>(x: &'a str) -> char { let _ = r#\"crate::\"gpu\"#; '\"' }"),
+        ("src/gpu/device.rs", "use ash::vk; use crate::error::Result; /* crate::model /* nested */ crate::io */"),
+        (
+            "src/passes/sort.rs",
+            "use crate::{gpu::{self, kernel::Kernel}, layout::key};\n#[cfg(test)]\nmod tests { use super::*; use crate::reference::sort; fn f() { g().unwrap(); } }",
+        ),
+        ("src/passes/sprites.rs", "pub use ash::vk;"),
+        ("src/reference/sort.rs", "use crate::model::{boxes, camera as eye};"),
+        ("src/reference/sprites/mod.rs", ""),
+        ("src/cli/bench.rs", "fn f() { let e = crate::study::records::cpu(); e.unwrap_or(1); }"),
+        ("tests/pass_sort.rs", ""),
+        ("tests/pass_sprites.rs", ""),
+        ("shaders/sort_scatter.comp", ""),
+        ("shaders/sprites.vert", ""),
+    ]);
+    assert_eq!(complaints, [""; 0]);
+}
+
+/// One bad file each, in a tree that is otherwise in order, and a part of the only complaint it must raise.
+const BREACHES: [(&str, &str, &str); 22] = [
+    ("src/model/a.rs", "use crate::io;", "a.rs:1: model may not import io"),
+    ("src/io/a.rs", "use crate::{\n    model,\n    gpu::device,\n};", "a.rs:3: io may not import gpu"),
+    ("src/io/a.rs", "use crate::{error::{Error, Result}, measure};", "io may not import measure"),
+    ("src/gpu/a.rs", "fn f() -> crate::model::Scene {}", "gpu may not import model"),
+    ("src/gpu/a/b.rs", "use super::super::super::model::film;", "gpu may not import model"),
+    ("src/gpu/a.rs", "#[cfg(test)]\nmod tests { use super::super::super::model; }", "a.rs:2: gpu may not import model"),
+    ("src/measure/a.rs", "use crate :: frame;", "measure may not import frame"),
+    ("src/frame/a.rs", "use crate::reference::sort;", "frame may not import reference"),
+    ("src/passes/sort.rs", "use crate::reference::sort;", "passes may not import reference"),
+    ("src/passes/sort.rs", "use crate::passes::grid::Grid;", "no pass imports a pass"),
+    ("src/passes/sort.rs", "use super::{grid::Grid};", "no pass imports a pass"),
+    ("src/error.rs", "use crate::model;", "error may not import model"),
+    ("src/model/a.rs", "use crate::*;", "model may not import *"),
+    ("src/main.rs", "use nimbus::gpu;", "main may not import gpu"),
+    ("src/odds/a.rs", "", "\"odds\" is no room"),
+    ("src/model/a.rs", "fn f() { serde_json::json!(1); }", "not on serde_json"),
+    ("src/frame/a.rs", "use ash::vk;", "only gpu speaks ash"),
+    ("src/model/a.rs", "fn f() { g().\n  unwrap(); }", "a.rs:1: .unwrap() outside tests"),
+    ("src/model/a.rs", "mod string_utils {}", "string_utils says nothing"),
+    ("src/model/box_helper.rs", "", "\"helper\" in a name"),
+    ("shaders/include/common.glsl", "", "\"common\" in a name"),
+    ("src/reference/long.rs", LONG, "lines, more than 450"),
+];
+
+/// 451 lines.
+const LONG: &str = {
+    const LINES: [u8; 451] = [b'\n'; 451];
+    match std::str::from_utf8(&LINES) {
+        Ok(text) => text,
+        Err(_) => "",
+    }
+};
+
+#[test]
+fn every_breach_is_reported() {
+    for (path, text, complaint) in BREACHES {
+        let mut files = vec![(path, text)];
+        if path == "src/passes/sort.rs" {
+            files.extend([("src/reference/sort.rs", ""), ("tests/pass_sort.rs", ""), ("shaders/sort.comp", "")]);
+        }
+        let complaints = complaints_of(&files);
+        assert!(complaints.len() == 1 && complaints[0].contains(complaint), "{path}: {text}\n{complaints:?}");
+    }
+}
+
+#[test]
+fn an_incomplete_room_is_reported() {
+    let complaints = complaints_of(&[("src/passes/mod.rs", ""), ("src/passes/grid.rs", "")]);
+    assert_eq!(complaints.len(), 3, "{complaints:?}");
+    for (complaint, what) in complaints.iter().zip(["src/reference/grid.rs", "tests/pass_grid.rs", "shaders/grid"]) {
+        assert!(complaint.contains(what), "{complaint}");
+    }
+}

@@ -1,0 +1,248 @@
+//! What is written is what the schema says, and both say the same keys.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use nimbus::measure::stats::{Bootstrap, Summary as Measured};
+use nimbus::study::records::{
+    Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, Summary, cpu,
+    environment, prepare_out_dir, read_run, revision, utc_now, write_results, write_run,
+};
+use serde_json::{Value, json};
+
+fn schema() -> Value {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/run.schema.json");
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn complaints(run: &Value) -> Vec<String> {
+    let validator = jsonschema::draft202012::new(&schema()).unwrap();
+    validator.iter_errors(run).map(|error| format!("{}: {error}", error.instance_path())).collect()
+}
+
+fn mode(threading: &str) -> Mode {
+    let ms = Summary::of(&[16.5, 17.0, 16.0, 40.25]);
+    Mode {
+        threading: threading.to_owned(),
+        simulate: "gpu".to_owned(),
+        frames: 4,
+        warm_up: 2,
+        blocks: 1,
+        frame_ms: ms,
+        game_ms: ms,
+        record_ms: ms,
+        render_ms: ms,
+        gpu_ms: None,
+        latency_ms: Summary::of(&[17.0]),
+        passes: vec![
+            Pass {
+                name: "sort".to_owned(),
+                p50_ms: Some(1.25),
+                share: Some(1.0),
+                n_run: 3,
+                n_skipped: 1,
+                reason: Some("camera did not move".to_owned()),
+                saved_ms: None,
+            },
+            Pass {
+                name: "first".to_owned(),
+                p50_ms: None,
+                share: None,
+                n_run: 0,
+                n_skipped: 4,
+                reason: None,
+                saved_ms: Some(0.5),
+            },
+        ],
+        image_hash: Some("0123456789abcdef".repeat(4)),
+    }
+}
+
+fn sample() -> Run {
+    Run {
+        schema: SCHEMA_VERSION,
+        nimbus: env!("CARGO_PKG_VERSION").to_owned(),
+        revision: revision().to_owned(),
+        date: utc_now(),
+        command: vec!["nimbus".to_owned(), "bench".to_owned(), "cubes.toml".to_owned()],
+        scene_hash: "ab".repeat(32),
+        scene: json!({ "title": "Seventeen boxes", "film": { "width": 800 } }),
+        device: Device {
+            name: "llvmpipe".to_owned(),
+            driver: "Mesa 22.3.6".to_owned(),
+            api: "1.3.230".to_owned(),
+            kind: "cpu".to_owned(),
+            uuid: "00".repeat(16),
+        },
+        cpu: cpu(),
+        environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
+        clocks: Clocks { resolution_ns: 1.0, overhead_ns: 22.5, timestamp_period_ns: None },
+        modes: vec![mode("serial"), mode("parallel")],
+        ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
+        interrupted: false,
+    }
+}
+
+fn row(i: u32) -> FrameRow {
+    FrameRow {
+        threading: "serial".to_owned(),
+        block: 0,
+        frame: i,
+        time_s: f64::from(i) * 0.1,
+        warm_up: i == 0,
+        frame_ms: 16.123456789012345,
+        game_ms: 1.0,
+        record_ms: 0.5,
+        submit_wait_ms: 15.0,
+        gpu_ms: None,
+        latency_ms: f64::NAN,
+        queue_depth: 1,
+        pass_ms: vec![Some(1.5), None],
+        image_hash: None,
+    }
+}
+
+#[test]
+fn a_full_and_a_bare_run_satisfy_the_schema() {
+    assert_eq!(complaints(&serde_json::to_value(sample()).unwrap()), [""; 0]);
+    let bare = Run {
+        revision: "unknown".to_owned(),
+        modes: Vec::new(),
+        ratio: None,
+        interrupted: true,
+        environment: environment(),
+        cpu: Cpu { model: "unknown".to_owned(), logical_cores: 1 },
+        ..sample()
+    };
+    assert_eq!(complaints(&serde_json::to_value(bare).unwrap()), [""; 0]);
+}
+
+#[test]
+fn the_schema_refuses_what_is_wrong() {
+    let good = serde_json::to_value(sample()).unwrap();
+    for (pointer, wrong) in [
+        ("/schema", json!(2)),
+        ("/date", json!("yesterday")),
+        ("/device/type", json!("toaster")),
+        ("/cpu/logical_cores", json!(0)),
+        ("/modes/0/threading", json!("both")),
+        ("/modes/0/frame_ms/p50", Value::Null),
+        ("/modes/0/passes/0/share", json!(1.5)),
+        ("/scene_hash", json!("ab")),
+    ] {
+        let mut bad = good.clone();
+        *bad.pointer_mut(pointer).unwrap() = wrong;
+        assert_eq!(complaints(&bad).len(), 1, "{pointer}: {:?}", complaints(&bad));
+    }
+}
+
+/// Every object of a written run, and the part of the schema that describes it.
+fn compare_keys(written: &Value, described: &Value, root: &Value, at: &str, n_compared: &mut usize) {
+    let described = resolve(described, root);
+    match written {
+        Value::Object(object) => {
+            let Some(properties) = described.get("properties").and_then(Value::as_object) else { return };
+            let keys: Vec<&String> = object.keys().collect();
+            assert_eq!(keys, properties.keys().collect::<Vec<_>>(), "{at}");
+            *n_compared += 1;
+            for (key, value) in object {
+                compare_keys(value, &properties[key], root, &format!("{at}/{key}"), n_compared);
+            }
+        }
+        Value::Array(items) => {
+            for item in items {
+                compare_keys(item, &described["items"], root, at, n_compared);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// Through `$ref`, and through the first branch of "this or null".
+fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
+    let described = described.get("anyOf").map_or(described, |branches| &branches[0]);
+    match described.get("$ref").and_then(Value::as_str) {
+        Some(name) => root.pointer(name.trim_start_matches('#')).unwrap(),
+        None => described,
+    }
+}
+
+#[test]
+fn keys_and_their_order_are_the_schema_s() {
+    let mut n_compared = 0;
+    compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
+    // The run, device, cpu, clocks, ratio; twice a mode with five summaries and two passes.
+    assert_eq!(n_compared, 5 + 2 * (1 + 5 + 2));
+}
+
+#[test]
+fn a_run_comes_back_as_it_was_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out_dir = folder.path().join("a/b");
+    prepare_out_dir(&out_dir, false).unwrap();
+    let passes = ["sort".to_owned(), "first".to_owned()];
+    write_results(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &passes, &[row(0), row(3)]).unwrap();
+    assert_eq!(read_run(&out_dir).unwrap(), sample_at("2024-02-29T12:34:56Z"));
+    assert_eq!(read_run(&out_dir.join(RUN_FILE)).unwrap(), sample_at("2024-02-29T12:34:56Z"));
+    let names: Vec<_> = fs::read_dir(&out_dir).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
+    assert_eq!(
+        fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
+        "i_row,threading,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_wait_ms,gpu_ms,latency_ms,\
+         queue_depth,gpu_sort_ms,gpu_first_ms,image_hash\n\
+         0,serial,0,0,0,true,16.123456789012344,1,0.5,15,,,1,1.5,,\n\
+         1,serial,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,15,,,1,1.5,,\n"
+    );
+}
+
+fn sample_at(date: &str) -> Run {
+    Run { date: date.to_owned(), ..sample() }
+}
+
+#[test]
+fn what_exists_is_refused_unless_forced() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = prepare_out_dir(folder.path(), false).unwrap_err();
+    assert!(refused.to_string().contains("--force"), "{refused}");
+    assert_eq!(refused.exit_code(), 2);
+    prepare_out_dir(folder.path(), true).unwrap();
+    let file = folder.path().join("file");
+    fs::write(&file, "mine").unwrap();
+    assert!(prepare_out_dir(&file, false).is_err());
+    assert!(prepare_out_dir(&file, true).is_err(), "a file is never replaced by a folder");
+    assert_eq!(fs::read_to_string(&file).unwrap(), "mine");
+}
+
+#[test]
+fn another_schema_and_another_file_are_named_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(RUN_FILE);
+    write_run(&path, &Run { schema: 7, ..sample() }).unwrap();
+    assert!(read_run(&path).unwrap_err().to_string().contains("schema 7"));
+    fs::write(&path, "{}").unwrap();
+    assert!(read_run(&path).unwrap_err().to_string().contains("not a run.json"));
+    fs::write(&path, "{").unwrap();
+    assert!(read_run(&path).is_err());
+    assert!(read_run(&folder.path().join("absent.json")).is_err());
+}
+
+#[test]
+fn a_row_with_too_few_pass_times_is_no_row() {
+    let folder = tempfile::tempdir().unwrap();
+    let passes = ["sort".to_owned()];
+    assert!(write_results(folder.path(), &sample(), &passes, &[row(0)]).is_err());
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn one_value_has_no_standard_deviation() {
+    let one = Measured::of(&[3.0]).map(Summary::from).unwrap();
+    assert_eq!((one.sd, one.n), (None, 1));
+}
+
+#[test]
+fn the_revision_is_one() {
+    let digits = revision().trim_end_matches("-dirty");
+    assert!(revision() == "unknown" || (digits.len() >= 12 && digits.chars().all(|c| c.is_ascii_hexdigit())));
+}

@@ -15,3 +15,4 @@ pub mod measure;
 pub mod model;
 pub mod passes;
 pub mod reference;
+pub mod study;

@@ -184,8 +184,7 @@ impl Image {
         shared.name(raw, name);
         let requirements = unsafe { shared.raw.get_image_memory_requirements(raw) };
         let layout = vk::ImageLayout::UNDEFINED;
-        let mut image =
-            Image { raw, view: vk::ImageView::null(), layout, format: format.raw(), extent, allocation: None, shared };
+        let mut image = Image { raw, view: vk::ImageView::null(), layout, extent, allocation: None, shared };
         let allocation = allocate(&image.shared, name, requirements, MemoryLocation::GpuOnly, false)?;
         let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
         image.allocation = Some(allocation);

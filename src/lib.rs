@@ -7,7 +7,9 @@
 //! `frame` runs them (game step → packet → render step); `study` measures; `cli` is what was typed. `reference`
 //! holds the f64 twin of every pass, written from the mathematics, and meets the passes only in tests and studies.
 
+pub mod cli;
 pub mod error;
+pub mod frame;
 pub mod gpu;
 pub mod io;
 pub mod layout;

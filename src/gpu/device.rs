@@ -73,7 +73,7 @@ impl Device {
     /// Opens the device named by `choice` (an index, or part of a name), else the best one: discrete, then
     /// integrated, virtual, CPU.
     pub fn open(instance: &Arc<Instance>, choice: Option<&str>) -> Result<Device> {
-        let info = choose(Self::list(instance)?, choice)?;
+        let info = Self::choose(Self::list(instance)?, choice)?;
         let raw = create(&instance.raw, &info)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
@@ -102,6 +102,37 @@ impl Device {
             instance: instance.clone(),
         });
         Ok(Device { shared, info })
+    }
+
+    /// The device that [`Device::open`] would take of `devices`.
+    pub fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
+        let names: Vec<String> = devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
+        let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let found = match choice {
+            None => {
+                let rank = |d: &DeviceInfo| {
+                    ["discrete", "integrated", "virtual", "cpu"].iter().position(|k| *k == d.kind).unwrap_or(9)
+                };
+                devices.into_iter().filter(|d| d.unusable.is_none()).min_by_key(rank)
+            }
+            Some(text) => match text.parse::<usize>() {
+                Ok(index) => devices.into_iter().find(|d| d.index == index),
+                Err(_) => devices.into_iter().find(|d| d.name.to_lowercase().contains(&text.to_lowercase())),
+            },
+        };
+        match (found, choice) {
+            (None, None) => Err(Error::vulkan(
+                "device choice",
+                format!("no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a software one"),
+            )),
+            (None, Some(text)) => {
+                Err(Error::usage(format!("--device {text}: expected an index or a part of a name; found: {names}")))
+            }
+            (Some(device), _) => match &device.unusable {
+                Some(why) => Err(Error::vulkan("device choice", format!("{}: {why}", device.name))),
+                None => Ok(device),
+            },
+        }
     }
 
     pub fn info(&self) -> &DeviceInfo {
@@ -234,36 +265,6 @@ fn unusable(
         (v13.dynamic_rendering, "dynamicRendering"),
     ];
     needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
-}
-
-fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
-    let names: Vec<String> = devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
-    let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-    let found = match choice {
-        None => {
-            let rank = |d: &DeviceInfo| {
-                ["discrete", "integrated", "virtual", "cpu"].iter().position(|k| *k == d.kind).unwrap_or(9)
-            };
-            devices.into_iter().filter(|d| d.unusable.is_none()).min_by_key(rank)
-        }
-        Some(text) => match text.parse::<usize>() {
-            Ok(index) => devices.into_iter().find(|d| d.index == index),
-            Err(_) => devices.into_iter().find(|d| d.name.to_lowercase().contains(&text.to_lowercase())),
-        },
-    };
-    match (found, choice) {
-        (None, None) => Err(Error::vulkan(
-            "device choice",
-            format!("no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a software one"),
-        )),
-        (None, Some(text)) => {
-            Err(Error::usage(format!("--device {text}: expected an index or a part of a name; found: {names}")))
-        }
-        (Some(device), _) => match &device.unusable {
-            Some(why) => Err(Error::vulkan("device choice", format!("{}: {why}", device.name))),
-            None => Ok(device),
-        },
-    }
 }
 
 fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {

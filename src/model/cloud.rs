@@ -83,6 +83,13 @@ impl Cloud {
         }
     }
 
+    pub fn n_groups(&self) -> u64 {
+        match &self.source {
+            CloudSource::Boxes { boxes, .. } => boxes.len() as u64,
+            CloudSource::Particles(_) => 1,
+        }
+    }
+
     /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups, so that a
     /// group's number is its box's number.
     pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
@@ -112,6 +119,12 @@ impl Cloud {
 pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64) -> f64 {
     let sigma = mean_radius(form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
     if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
+}
+
+/// Bounds the mass κ (2π)^{3/2} σ³ of every blob of `groups`.
+pub fn heaviest_blob(groups: &[Group]) -> f64 {
+    let mass = |g: &Group| g.kappa_max * (SQRT_TAU * g.sigma_max).powi(3);
+    groups.iter().filter(|g| g.n_particles > 0).map(mass).fold(0.0, f64::max)
 }
 
 fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {

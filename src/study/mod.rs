@@ -1,3 +1,7 @@
-//! What is measured and how it is written down.
+//! Measures a scene: runs it, compares it with the references, and writes down what came out.
 
+pub mod bench;
+pub mod inspect;
 pub mod records;
+pub mod stage;
+pub mod truth;

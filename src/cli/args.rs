@@ -1,0 +1,186 @@
+//! The command line, as typed.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
+
+/// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
+#[derive(Debug, Parser)]
+#[command(version, propagate_version = true, max_term_width = 100)]
+#[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
+    nimbus bench scenes/threads.toml\n  nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
+    Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 130 interrupted.")]
+pub struct Args {
+    #[command(subcommand)]
+    pub command: Command,
+    /// When to colour messages
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    pub color: ColorChoice,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Draw one frame to a PNG or EXR file
+    Render(RenderArgs),
+    /// Time a scene, one thread against two
+    Bench(BenchArgs),
+    /// Print a stage's buffer, or what f64 says it should be
+    Inspect(InspectArgs),
+    /// List Vulkan devices, their limits, and which one nimbus uses
+    Devices(DevicesArgs),
+}
+
+/// What every command with a scene takes.
+#[derive(Debug, ClapArgs)]
+pub struct SceneArgs {
+    /// Vulkan device, by index or part of its name (see `nimbus devices`)
+    #[arg(long, value_name = "INDEX|NAME", help_heading = "Device")]
+    pub device: Option<String>,
+    /// Folder with shaders that replace those built in
+    #[arg(long, value_name = "DIR", help_heading = "Device")]
+    pub shaders: Option<PathBuf>,
+    /// Run with the validation layers; any message fails the command
+    #[arg(long, help_heading = "Device")]
+    pub validation: bool,
+    /// Seed of the first cloud; the others count on from it
+    #[arg(long, value_name = "N", help_heading = "Scene")]
+    pub seed: Option<u32>,
+    /// Set any key of the scene, e.g. --set lighting.grid=128 or --set cloud.0.seed=7 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Scene")]
+    pub set: Vec<String>,
+    /// Picture size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Scene")]
+    pub size: Option<(u32, u32)>,
+    /// Run every pass in every frame; the pictures are the same, to the byte
+    #[arg(long, help_heading = "Scene")]
+    pub no_skip: bool,
+    /// No warnings, no progress
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say more: device, sizes, passes
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct RenderArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Picture: .png (tone-mapped, over the background) or .exr (linear RGBA, premultiplied)
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Frame number
+    #[arg(long, value_name = "N", default_value_t = 0, conflicts_with = "time")]
+    pub frame: u32,
+    /// Time in seconds, in place of a frame number
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub time: Option<f64>,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
+    #[command(flatten)]
+    pub common: SceneArgs,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct BenchArgs {
+    /// Scene files, timed one after the other
+    #[arg(required = true)]
+    pub scenes: Vec<PathBuf>,
+    /// Which loops to time; "both" runs them in alternating blocks
+    #[arg(long, value_enum, default_value = "both")]
+    pub threading: ThreadingArg,
+    /// Timed frames in a block [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub frames: Option<u32>,
+    /// Frames at the start of every block that are not counted
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub warmup: u32,
+    /// Blocks of each loop
+    #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
+    pub repeat: u32,
+    /// Folder for run.json and frames.csv (with several scenes: a folder each in it)
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Replace existing results
+    #[arg(long)]
+    pub force: bool,
+    /// Print run.json in place of the table
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub common: SceneArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ThreadingArg {
+    Serial,
+    Parallel,
+    Both,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(group = clap::ArgGroup::new("what").args(["boxes", "particles", "facets", "plan"]))]
+pub struct InspectArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Every box: particles, attempts, acceptance rate, folded (the default)
+    #[arg(long)]
+    pub boxes: bool,
+    /// Every particle, in the scene's coordinates
+    #[arg(long)]
+    pub particles: bool,
+    /// Every lighting facet: place, normal, area, irradiance, radiance
+    #[arg(long)]
+    pub facets: bool,
+    /// What the first frames run and skip, and why
+    #[arg(long)]
+    pub plan: bool,
+    /// The f64 reference's values in place of the device's
+    #[arg(long, conflicts_with = "plan")]
+    pub reference: bool,
+    /// Frame number (with --plan: the number of frames, default 3)
+    #[arg(long, value_name = "N")]
+    pub frame: Option<u32>,
+    /// JSON in place of CSV
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub common: SceneArgs,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct DevicesArgs {
+    /// The device to mark as used, by index or part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// JSON in place of the table
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let wrong = || format!("expected WIDTHxHEIGHT such as 800x600, found \"{text}\"");
+    let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
+    let parse = |t: &str| t.parse::<u32>().ok().filter(|n| *n > 0).ok_or_else(wrong);
+    Ok((parse(w)?, parse(h)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_declaration_is_consistent() {
+        use clap::CommandFactory;
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes() {
+        assert_eq!(parse_size("800x600"), Ok((800, 600)));
+        for wrong in ["800", "0x5", "ax3", "3x", "-1x2"] {
+            assert!(parse_size(wrong).is_err(), "{wrong}");
+        }
+    }
+}

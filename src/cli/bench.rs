@@ -1,0 +1,198 @@
+//! `nimbus bench SCENE…`.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use super::args::{BenchArgs, ThreadingArg};
+use super::{device_choice, load, output};
+use crate::error::{Error, Result};
+use crate::gpu::DeviceInfo;
+use crate::model::scene::Threading;
+use crate::study::bench::{self, BenchPlan, Outcome, pass_names};
+use crate::study::records::{self, Run, Summary};
+use crate::study::stage::Stage;
+
+pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
+    let outs = out_dirs(args)?;
+    // All scenes are read before the first is timed, so that a fault in the last does not cost the others.
+    for scene in &args.scenes {
+        load(scene, &quiet(args))?;
+    }
+    let mut runs = Vec::new();
+    let mut interrupted = false;
+    for (scene, out) in args.scenes.iter().zip(&outs) {
+        let run = bench_one(args, scene, out.as_deref(), stop)?;
+        interrupted = run.interrupted;
+        runs.push(run);
+        if interrupted {
+            break;
+        }
+    }
+    if args.json {
+        let text =
+            if let [run] = &runs[..] { serde_json::to_string_pretty(run) } else { serde_json::to_string_pretty(&runs) };
+        output::text(&(text.map_err(|e| Error::Io { path: "stdout".into(), what: e.to_string() })? + "\n"))?;
+    }
+    if interrupted { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+fn quiet(args: &BenchArgs) -> super::SceneArgs {
+    let c = &args.common;
+    super::SceneArgs {
+        device: c.device.clone(),
+        shaders: c.shaders.clone(),
+        set: c.set.clone(),
+        quiet: true,
+        verbose: false,
+        ..*c
+    }
+}
+
+/// A results folder for every scene, checked before any work.
+fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
+    let Some(out) = &args.out else { return Ok(vec![None; args.scenes.len()]) };
+    let single = args.scenes.len() == 1;
+    let names: Vec<PathBuf> = args.scenes.iter().map(|s| PathBuf::from(s.file_stem().unwrap_or_default())).collect();
+    if let Some(twice) = names.iter().enumerate().find(|(i, n)| !single && names[..*i].contains(n)) {
+        let what = format!("--out needs scenes of different names, found {} twice", twice.1.display());
+        return Err(Error::usage(what));
+    }
+    if !single {
+        records::prepare_out_dir(out, args.force)?;
+        let dirs: Vec<PathBuf> = names.iter().map(|n| out.join(n)).collect();
+        for dir in &dirs {
+            records::prepare_out_dir(dir, args.force)?;
+        }
+        return Ok(dirs.into_iter().map(Some).collect());
+    }
+    records::prepare_out_dir(out, args.force)?;
+    Ok(vec![Some(out.clone())])
+}
+
+fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBool) -> Result<Run> {
+    let loaded = load(path, &args.common)?;
+    let modes = match args.threading {
+        ThreadingArg::Serial => vec![Threading::Serial],
+        ThreadingArg::Parallel => vec![Threading::Parallel],
+        ThreadingArg::Both => vec![Threading::Serial, Threading::Parallel],
+    };
+    let n_frames = args.frames.unwrap_or(loaded.scene.time.n_frames);
+    let plan = BenchPlan { modes, n_frames, n_warm_up: args.warmup, n_blocks: args.repeat };
+    let simulate = loaded.scene.threads.simulate;
+    let mut stage = Stage::new(loaded.scene, &device_choice(&args.common), !args.common.no_skip)?;
+    let n_total = u64::from(plan.n_blocks) * plan.modes.len() as u64 * (u64::from(n_frames) + u64::from(args.warmup));
+    let bar = output::progress(n_total, &path.display().to_string(), args.common.quiet);
+    let outcome = bench::run(&mut stage, &plan, stop, &mut || bar.inc(1));
+    bar.finish_and_clear();
+    let outcome = outcome?;
+    let info = stage.info().clone();
+    let run = Run {
+        schema: records::SCHEMA_VERSION,
+        nimbus: env!("CARGO_PKG_VERSION").into(),
+        revision: records::revision().into(),
+        date: records::utc_now(),
+        command: std::env::args().collect(),
+        scene_hash: loaded.hash,
+        scene: loaded.resolved,
+        device: bench::device_record(&info),
+        cpu: records::cpu(),
+        environment: records::environment(),
+        clocks: bench::clocks_record(&info),
+        modes: plan.modes.iter().map(|m| outcome.mode(*m, simulate, &plan)).collect(),
+        ratio: outcome.ratio_record(),
+        interrupted: outcome.interrupted,
+    };
+    if let Some(dir) = out {
+        records::write_results(dir, &run, &pass_names(), &outcome.rows())?;
+    }
+    if !args.json {
+        output::text(&report(path, &run, &info, &outcome, args))?;
+    }
+    stage.close()?;
+    Ok(run)
+}
+
+/// The human table.
+fn report(path: &Path, run: &Run, info: &DeviceInfo, outcome: &Outcome, args: &BenchArgs) -> String {
+    let threads = run.environment.get("LP_NUM_THREADS").map_or(String::new(), |n| format!(", LP_NUM_THREADS={n}"));
+    let mut out = format!(
+        "{}\n{} ({}), {} ({} cores){threads}\n",
+        path.display(),
+        info.name,
+        info.driver,
+        run.cpu.model,
+        run.cpu.logical_cores
+    );
+    out += &format!(
+        "{} blocks of each loop in turn; the first {} frames of every block are not counted{}\n\n",
+        args.repeat,
+        args.warmup,
+        if outcome.interrupted { "; INTERRUPTED: what was finished" } else { "" }
+    );
+    out += &output::table(&time_rows(run));
+    out.push('\n');
+    out += &output::table(&pass_rows(run));
+    if let (Some(ratio), Some(ideal)) = (outcome.ratio(), outcome.ideal_ratio()) {
+        out += &format!(
+            "\nparallel / serial = {:.3} (95 % interval {:.3} to {:.3}); perfect overlap of game and render would give {ideal:.3}\n",
+            ratio.estimate, ratio.low, ratio.high
+        );
+    }
+    let hashes: Vec<&String> = outcome.image_hashes.values().collect();
+    if let [a, b] = hashes[..] {
+        out += if a == b {
+            "the last frames are the same, to the byte\n"
+        } else {
+            "THE LAST FRAMES DIFFER between the two loops\n"
+        };
+    }
+    out
+}
+
+fn time_rows(run: &Run) -> Vec<Vec<String>> {
+    let header = ["ms", "loop", "n", "p50", "mean", "sd", "min", "p5", "p95", "p99", "max"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    for (what, of) in [
+        ("frame", (|m| m.frame_ms.as_ref()) as fn(&records::Mode) -> Option<&Summary>),
+        ("game", |m| m.game_ms.as_ref()),
+        ("render", |m| m.render_ms.as_ref()),
+        ("gpu", |m| m.gpu_ms.as_ref()),
+        ("latency", |m| m.latency_ms.as_ref()),
+    ] {
+        for mode in &run.modes {
+            let Some(s) = of(mode) else { continue };
+            let mut row = vec![what.to_owned(), mode.threading.clone(), s.n.to_string()];
+            let sd = s.sd.map_or("-".to_owned(), ms);
+            row.extend([ms(s.p50), ms(s.mean), sd, ms(s.min), ms(s.p5), ms(s.p95), ms(s.p99), ms(s.max)]);
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn pass_rows(run: &Run) -> Vec<Vec<String>> {
+    let mut rows = vec![["pass", "loop", "p50", "share", "run", "skipped", "why"].map(str::to_owned).to_vec()];
+    let names: Vec<&String> = run.modes.first().map_or(vec![], |m| m.passes.iter().map(|p| &p.name).collect());
+    for name in names {
+        for mode in &run.modes {
+            let Some(p) = mode.passes.iter().find(|p| p.name == *name) else { continue };
+            let time = p.p50_ms.map_or("-".to_owned(), ms);
+            let share = p.share.filter(|_| p.n_run > 0).map_or("-".to_owned(), |s| format!("{:.1}%", 100.0 * s));
+            let why = p.reason.clone().unwrap_or_default();
+            rows.push(vec![
+                name.clone(),
+                mode.threading.clone(),
+                time,
+                share,
+                p.n_run.to_string(),
+                p.n_skipped.to_string(),
+                why,
+            ]);
+        }
+    }
+    rows
+}
+
+fn ms(value: f64) -> String {
+    format!("{value:.3}")
+}

@@ -1,0 +1,67 @@
+//! `nimbus devices`.
+
+use serde_json::json;
+
+use super::args::DevicesArgs;
+use super::output;
+use crate::error::Result;
+use crate::gpu::{Device, DeviceInfo, Instance};
+
+pub fn run(args: &DevicesArgs) -> Result<()> {
+    let instance = Instance::new(false)?;
+    let devices = Device::list(&instance)?;
+    let used = Device::choose(devices.clone(), args.device.as_deref());
+    let i_used = used.as_ref().ok().map(|d| d.index);
+    if args.json {
+        let list: Vec<_> = devices.iter().map(|d| to_json(d, i_used)).collect();
+        output::text(&format!("{:#}\n", json!(list)))?;
+    } else {
+        output::text(&devices.iter().map(|d| describe(d, i_used)).collect::<String>())?;
+    }
+    used.map(|_| ())
+}
+
+fn version(d: &DeviceInfo) -> String {
+    let (major, minor, patch) = d.api_version;
+    format!("{major}.{minor}.{patch}")
+}
+
+fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
+    let l = &d.limits;
+    let mark = if Some(d.index) == i_used { "  <- used" } else { "" };
+    let mib = |bytes: u64| format!("{} MiB", bytes >> 20);
+    let mut out = format!("{}: {} ({}){mark}\n", d.index, d.name, d.kind);
+    if let Some(why) = &d.unusable {
+        out += &format!("   not usable: {why}\n");
+    }
+    out += &format!("   driver {}, Vulkan {}, uuid {}\n", d.driver, version(d), d.uuid);
+    out += &format!("   memory {}, storage buffer {}\n", mib(l.device_memory_bytes), mib(l.max_storage_buffer_bytes));
+    out += &format!(
+        "   workgroups {} along x, {} invocations each, {} KiB shared; subgroup {}; push constants {} B\n",
+        l.max_workgroups_x,
+        l.max_workgroup_invocations,
+        l.max_shared_memory_bytes >> 10,
+        l.subgroup_size,
+        l.max_push_constant_bytes
+    );
+    let timestamps = match l.timestamp_valid_bits {
+        0 => "no timestamps: passes are not timed".to_owned(),
+        bits => format!("timestamps {bits} bits, {} ns a tick", l.timestamp_period_ns),
+    };
+    out + &format!("   images up to {} a side; {timestamps}\n", l.max_image_extent)
+}
+
+fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
+    let l = &d.limits;
+    json!({
+        "index": d.index, "name": d.name, "driver": d.driver, "api": version(d), "type": d.kind, "uuid": d.uuid,
+        "used": Some(d.index) == i_used, "unusable": d.unusable,
+        "limits": {
+            "device_memory_bytes": l.device_memory_bytes, "max_storage_buffer_bytes": l.max_storage_buffer_bytes,
+            "max_workgroups_x": l.max_workgroups_x, "max_workgroup_invocations": l.max_workgroup_invocations,
+            "max_shared_memory_bytes": l.max_shared_memory_bytes, "max_push_constant_bytes": l.max_push_constant_bytes,
+            "max_image_extent": l.max_image_extent, "subgroup_size": l.subgroup_size,
+            "timestamp_valid_bits": l.timestamp_valid_bits, "timestamp_period_ns": l.timestamp_period_ns,
+        },
+    })
+}

@@ -1,0 +1,71 @@
+//! `nimbus inspect SCENE`.
+
+use super::args::InspectArgs;
+use super::{device_choice, load, output};
+use crate::error::Result;
+use crate::study::inspect;
+use crate::study::stage::Stage;
+
+/// Frames that `--plan` shows: the first does everything, the second shows what a step of time changes, the third that
+/// it goes on so.
+const PLAN_FRAMES: u32 = 3;
+
+pub fn run(args: &InspectArgs) -> Result<()> {
+    let loaded = load(&args.scene, &args.common)?;
+    let i_frame = args.frame.unwrap_or(0);
+    if args.reference {
+        let scene = &loaded.scene;
+        return match (args.particles, args.facets) {
+            (true, _) => output::rows(&inspect::particles_reference(scene, i_frame)?, args.json),
+            (_, true) => output::rows(&inspect::facets_reference(scene, i_frame)?, args.json),
+            _ => boxes(&inspect::boxes_reference(scene), args.json),
+        };
+    }
+    let mut stage = Stage::new(loaded.scene, &device_choice(&args.common), !args.common.no_skip)?;
+    match (args.particles, args.facets, args.plan) {
+        (true, _, _) => output::rows(&inspect::particles(&mut stage, i_frame)?, args.json)?,
+        (_, true, _) => output::rows(&inspect::facets(&mut stage, i_frame)?, args.json)?,
+        (_, _, true) => plan(&inspect::plans(&mut stage, args.frame.unwrap_or(PLAN_FRAMES))?, args.json)?,
+        _ => boxes(&inspect::boxes(&mut stage)?, args.json)?,
+    }
+    stage.close()
+}
+
+fn boxes(rows: &[inspect::BoxRow], json: bool) -> Result<()> {
+    if json {
+        return output::rows(rows, true);
+    }
+    let rate = |accepted: Option<f64>| accepted.map_or("-".to_owned(), |a| format!("{a:.4}"));
+    let header = ["cloud", "box", "particles", "attempts", "acceptance", "folded"];
+    let mut table = vec![header.map(str::to_owned).to_vec()];
+    for r in rows {
+        let (particles, attempts) = (r.particles.to_string(), r.attempts.to_string());
+        let (cloud, number) = (r.cloud.to_string(), r.r#box.to_string());
+        table.push(vec![cloud, number, particles, attempts, rate(r.acceptance), r.folded.to_string()]);
+    }
+    let (particles, attempts) =
+        rows.iter().fold((0u64, 0u64), |(p, a), r| (p + u64::from(r.particles), a + r.attempts));
+    let folded: u64 = rows.iter().map(|r| u64::from(r.folded)).sum();
+    let all = (attempts > 0).then(|| (particles - folded) as f64 / attempts as f64);
+    table.push(vec![
+        "all".into(),
+        String::new(),
+        particles.to_string(),
+        attempts.to_string(),
+        rate(all),
+        folded.to_string(),
+    ]);
+    output::text(&output::table(&table))
+}
+
+fn plan(rows: &[inspect::PlanRow], json: bool) -> Result<()> {
+    if json {
+        return output::rows(rows, true);
+    }
+    let mut table = vec![["frame", "pass", "", "reason"].map(str::to_owned).to_vec()];
+    for r in rows {
+        let done = if r.run { "run" } else { "skip" };
+        table.push(vec![r.frame.to_string(), r.pass.into(), done.into(), r.reason.into()]);
+    }
+    output::text(&output::table(&table))
+}

@@ -1,0 +1,84 @@
+//! Writing for people and for programs.
+
+use std::io::{IsTerminal, Write};
+
+use clap::ColorChoice;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// `error: …` on stderr.
+pub fn error(error: &Error, color: ColorChoice) {
+    let colored = match color {
+        ColorChoice::Always => true,
+        ColorChoice::Never => false,
+        ColorChoice::Auto => std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+    };
+    let label = if colored { "\x1b[1;31merror:\x1b[0m" } else { "error:" };
+    eprintln!("{label} {error}");
+}
+
+/// Text to stdout. A reader that has gone away (`| head`) is no error.
+pub fn text(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::Io { path: "stdout".into(), what: e.to_string() })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Rows as CSV with a header, or as a JSON array.
+pub fn rows<T: Serialize>(rows: &[T], json: bool) -> Result<()> {
+    let fail = |e: String| Error::Io { path: "stdout".into(), what: e };
+    if json {
+        return text(&(serde_json::to_string_pretty(rows).map_err(|e| fail(e.to_string()))? + "\n"));
+    }
+    let mut writer = csv::Writer::from_writer(vec![]);
+    for row in rows {
+        writer.serialize(row).map_err(|e| fail(e.to_string()))?;
+    }
+    let bytes = writer.into_inner().map_err(|e| fail(e.to_string()))?;
+    text(&String::from_utf8_lossy(&bytes))
+}
+
+/// A progress bar on stderr; none when quiet or when stderr is no terminal.
+pub fn progress(n: u64, what: &str, quiet: bool) -> ProgressBar {
+    let hidden = quiet || !std::io::stderr().is_terminal();
+    let target = if hidden { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let bar = ProgressBar::with_draw_target(Some(n), target).with_message(what.to_owned());
+    match ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}") {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+/// Columns aligned: the first to the left, the others to the right.
+pub fn table(rows: &[Vec<String>]) -> String {
+    let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..n_columns).map(width).collect();
+    let mut out = String::new();
+    for row in rows {
+        let cells = row.iter().enumerate().map(|(c, t)| {
+            let pad = " ".repeat(widths[c] - t.chars().count());
+            if c == 0 { format!("{t}{pad}") } else { format!("{pad}{t}") }
+        });
+        out += cells.collect::<Vec<_>>().join("  ").trim_end();
+        out.push('\n');
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_line_up() {
+        let rows = vec![vec!["a".into(), "b".into()], vec!["long".into(), "1.25".into()]];
+        assert_eq!(table(&rows), "a        b\nlong  1.25\n");
+    }
+}

@@ -1,0 +1,127 @@
+//! The buffers that the passes hand to each other, and what they are filled with once.
+
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Device, Place};
+use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::frame::LightRecord;
+use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ParticleRecord, PlacedRecord};
+use crate::model::cloud::{CloudSource, Group};
+use crate::model::scene::Scene;
+
+use super::limits::n_cells_max;
+
+/// Named by content; record types as in [`crate::layout`].
+pub struct Buffers {
+    pub boxes: Buffer,
+    /// u32 by particle.
+    pub i_group: Buffer,
+    pub particles: Buffer,
+    /// u32 by particle: attempts, and whether it was folded.
+    pub status: Buffer,
+    /// Written by the host every frame.
+    pub groups: Buffer,
+    /// Written by the host every frame where the game thread places the particles.
+    pub placed_upload: Option<Buffer>,
+    pub placed: Buffer,
+    pub density: Buffer,
+    pub facets: Buffer,
+    /// Written by the host every frame.
+    pub lights: Buffer,
+    pub transmittance: Buffer,
+    pub lit: Buffer,
+    /// [key, particle].
+    pub entries: Buffer,
+}
+
+impl Buffers {
+    pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
+        let n = scene.n_particles();
+        let n_groups = groups.len() as u64;
+        let n_lights = scene.lights.len() as u64;
+        let placed_upload = match host_places {
+            true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
+            false => None,
+        };
+        Ok(Buffers {
+            boxes: Buffer::new::<BoxRecord>(device, "generate.boxes", n_groups, Place::Device)?,
+            i_group: Buffer::new::<u32>(device, "generate.i_group", n, Place::Device)?,
+            particles: Buffer::new::<ParticleRecord>(device, "generate.particles", n, Place::Device)?,
+            status: Buffer::new::<u32>(device, "generate.status", n, Place::Device)?,
+            groups: Buffer::new::<GroupRecord>(device, "place.groups", n_groups, Place::Upload)?,
+            placed_upload,
+            placed: Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?,
+            density: Buffer::new::<f32>(device, "grid.density", n_cells_max(scene), Place::Device)?,
+            facets: Buffer::new::<FacetRecord>(device, "facets.facets", n, Place::Device)?,
+            lights: Buffer::new::<LightRecord>(device, "transmit.lights", n_lights, Place::Upload)?,
+            transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n * n_lights, Place::Device)?,
+            lit: Buffer::new::<LitRecord>(device, "first.lit", n, Place::Device)?,
+            entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
+        })
+    }
+
+    /// Fills what never changes: the boxes, each particle's group, the particles of lists.
+    pub fn fill(&self, device: &Device, commands: &mut Commands, scene: &Scene, groups: &[Group]) -> Result<()> {
+        let i_group: Vec<u32> =
+            groups.iter().zip(0u32..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();
+        upload(device, commands, &box_records(scene, groups), &self.boxes)?;
+        upload(device, commands, &i_group, &self.i_group)?;
+        commands.run(|rec| {
+            rec.fill(&self.status, 0);
+            Ok(())
+        })?;
+        upload(device, commands, &given_particles(scene, groups), &self.particles)
+    }
+}
+
+/// A record a group, in order.
+fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
+    let mut records = Vec::with_capacity(groups.len());
+    for cloud in &scene.clouds {
+        match &cloud.source {
+            CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
+                let (form, optical_depth, radius_scale) = (*form, *optical_depth, *radius_scale);
+                let law = BoxLaw { form, optical_depth, radius_scale, seed: cloud.seed };
+                for (b, i_box) in boxes.iter().zip(0u32..) {
+                    records.push(BoxRecord::new(b, &law, i_box, groups[records.len()].i_first));
+                }
+            }
+            CloudSource::Particles(_) => records.push(BoxRecord::given()),
+        }
+    }
+    records
+}
+
+/// Every particle that comes from a list at its place; zeros where particles are generated. Empty without lists.
+fn given_particles(scene: &Scene, groups: &[Group]) -> Vec<ParticleRecord> {
+    let mut records = Vec::new();
+    for group in groups {
+        if let CloudSource::Particles(list) = &scene.clouds[group.i_cloud].source {
+            records.resize(group.i_first as usize, ParticleRecord::default());
+            records.extend(list.iter().map(|p| ParticleRecord::new(p, group)));
+        }
+    }
+    records
+}
+
+fn upload<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, data: &[T], to: &Buffer) -> Result<()> {
+    if data.is_empty() {
+        return Ok(());
+    }
+    let mut staging = Buffer::new::<T>(device, "frame.staging", data.len() as u64, Place::Upload)?;
+    staging.write(data)?;
+    commands.run(|rec| {
+        rec.copy(&staging, to);
+        Ok(())
+    })?;
+    Ok(())
+}
+
+/// The first `n` records of a device buffer.
+pub fn download<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, from: &Buffer, n: u32) -> Result<Vec<T>> {
+    let readback = Buffer::new::<T>(device, "frame.readback", u64::from(n), Place::Readback)?;
+    commands.run(|rec| {
+        rec.copy(from, &readback);
+        Ok(())
+    })?;
+    readback.read(n as usize)
+}

@@ -1,0 +1,114 @@
+//! The game step: where camera, clouds and (where the scene says so) every particle are at a frame's time.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3};
+
+use crate::error::{Error, Place, Result};
+use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+use crate::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use crate::model::camera::Pose;
+use crate::model::cloud::Group;
+use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
+use crate::model::scene::Scene;
+
+pub struct Game {
+    scene: Arc<Scene>,
+    groups: Vec<Group>,
+    /// Centre of each cloud relative to its origin.
+    cloud_centers: Vec<DVec3>,
+    /// Every particle relative to its group, where this thread moves them.
+    rest: Option<Vec<ParticleRecord>>,
+}
+
+/// What a frame's time says of the scene, before it becomes records: shared with the references.
+#[derive(Debug, Clone)]
+pub struct Setting {
+    pub time_s: f64,
+    pub pose: Pose,
+    /// The lighting origin O: centre of the scene's bounds (docs/model.md §11).
+    pub light_origin: DVec3,
+    /// The density grid, relative to O.
+    pub grid: GridSpec,
+    /// Half the diagonal of the bounds.
+    pub radius: f64,
+}
+
+impl Setting {
+    /// The scene at `time_s`; an error where the camera looks nowhere.
+    pub fn at(scene: &Scene, groups: &[Group], time_s: f64) -> Result<Setting> {
+        let pose = scene.camera.pose(time_s).ok_or_else(|| {
+            let at = Place { source: "camera".into(), line: 0, column: 0 };
+            Error::scene(
+                at,
+                format!(
+                    "has no direction at time {time_s} s; expected a target apart from the position, off the up axis"
+                ),
+            )
+        })?;
+        let (low, high) = scene.bounds(groups, time_s, DEPOSIT_CUT_SIGMA).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let light_origin = 0.5 * (low + high);
+        let half = 0.5 * (high - low);
+        let grid = GridSpec::fit(-half, half, scene.lighting.grid);
+        Ok(Setting { time_s, pose, light_origin, grid, radius: half.length() })
+    }
+}
+
+impl Game {
+    /// `rest` are all particles in order, given where the game thread is to move them (`simulate = "cpu"`).
+    pub fn new(scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) -> Game {
+        let groups = scene.groups();
+        let cloud_centers = scene.clouds.iter().map(|c| c.center()).collect();
+        Game { scene, groups, cloud_centers, rest }
+    }
+
+    /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
+    pub fn step(&mut self, i_frame: u32) -> Result<Packet> {
+        self.step_at(i_frame, self.scene.time.at(i_frame))
+    }
+
+    /// A frame at any time.
+    pub fn step_at(&mut self, i_frame: u32, time_s: f64) -> Result<Packet> {
+        let begin = Instant::now();
+        let setting = Setting::at(&self.scene, &self.groups, time_s)?;
+        let origins: Vec<DVec3> =
+            self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
+        let groups: Vec<GroupRecord> = self.groups.iter().map(|g| self.group(g, origins[g.i_cloud])).collect();
+        let placed = self.rest.as_ref().map(|rest| self.place(rest, &origins));
+        Ok(Packet {
+            i_frame,
+            time_s,
+            begin,
+            camera: CameraRecord::new(&self.scene.camera, &setting.pose, &self.scene.film, setting.light_origin),
+            groups,
+            placed,
+            lights: self.scene.lights.iter().map(LightRecord::from).collect(),
+            grid: GridRecord::from(&setting.grid),
+            radius: setting.radius,
+            game_ms: super::ms(begin, Instant::now()),
+        })
+    }
+
+    fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
+        let kd = self.scene.materials[self.scene.clouds[group.i_cloud].i_material].kd;
+        GroupRecord::new(group, origin, self.cloud_centers[group.i_cloud], kd)
+    }
+
+    /// Every particle at its group's place, in f64 until the last step.
+    fn place(&self, rest: &[ParticleRecord], origins: &[DVec3]) -> Vec<PlacedRecord> {
+        let mut placed = Vec::with_capacity(rest.len());
+        for group in &self.groups {
+            let offset = origins[group.i_cloud] + group.center;
+            let first = group.i_first as usize;
+            let particles = &rest[first..first + group.n_particles as usize];
+            placed.extend(particles.iter().map(|p| {
+                let position = (Vec3::from(p.position).as_dvec3() + offset).as_vec3();
+                PlacedRecord { position: position.to_array(), sigma: p.sigma }
+            }));
+        }
+        placed
+    }
+}
+
+use super::packet::Packet;

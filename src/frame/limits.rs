@@ -1,0 +1,69 @@
+//! A scene against a device's limits, before anything is allocated.
+
+use glam::DVec3;
+
+use crate::error::{Error, Result};
+use crate::gpu::device::Limits;
+use crate::gpu::memory::storage_bytes;
+use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::frame::LightRecord;
+use crate::layout::particle::{BoxRecord, GroupRecord, ParticleRecord, PlacedRecord};
+use crate::model::film::FilmFormat;
+use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
+use crate::model::scene::Scene;
+
+/// Checks every buffer that the scene will need, and their sum.
+pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
+    let n = scene.n_particles();
+    if u32::try_from(n).is_err() {
+        return Err(Error::limit(format!("the scene's {n} particles; nimbus numbers them with 32 bits")));
+    }
+    let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
+    let pixel = match scene.film.format {
+        FilmFormat::Rgba16f => 8,
+        FilmFormat::Rgba32f => 16,
+    };
+    let size = |record: usize| record as u64;
+    let wishes = [
+        ("the scene's particles", n, size(size_of::<ParticleRecord>())),
+        ("the particles' places", n, size(size_of::<PlacedRecord>())),
+        ("the particles' places, as uploaded", n, size(size_of::<PlacedRecord>())),
+        ("the particles' groups", n, 4),
+        ("the particles' generation status", n, 4),
+        ("the facets", n, size(size_of::<FacetRecord>())),
+        ("the facets' light", n, size(size_of::<LitRecord>())),
+        ("the transmittances", n * scene.lights.len() as u64, 4),
+        ("the sort's entries", 2 * n, 8),
+        ("the boxes", groups, size(size_of::<BoxRecord>())),
+        ("the groups", groups, size(size_of::<GroupRecord>())),
+        ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
+        ("the density grid's sums", n_cells_max(scene), 8),
+        ("the density grid", n_cells_max(scene), 4),
+        ("the film, read back", u64::from(scene.film.width) * u64::from(scene.film.height), pixel),
+    ];
+    let mut total = 0;
+    for (name, n, bytes) in wishes {
+        total += storage_bytes(limits, name, n, bytes)?;
+    }
+    if total > limits.device_memory_bytes {
+        return Err(Error::limit(format!(
+            "the scene needs {total} bytes, this device has {}",
+            limits.device_memory_bytes
+        )));
+    }
+    Ok(())
+}
+
+/// Most cells the grid can have at any time. Clouds that drift apart change its proportions, so a scene that moves needs
+/// room for a cube.
+pub fn n_cells_max(scene: &Scene) -> u64 {
+    let side = u64::from(scene.lighting.grid.min(MAX_CELLS));
+    let stands_still = scene.clouds.iter().all(|c| c.wind == DVec3::ZERO);
+    match scene.bounds(&scene.groups(), scene.time.start_s, DEPOSIT_CUT_SIGMA) {
+        Some((low, high)) if stands_still => {
+            let half = 0.5 * (high - low);
+            GridSpec::fit(-half, half, scene.lighting.grid).n_total()
+        }
+        _ => side * side * side,
+    }
+}

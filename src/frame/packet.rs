@@ -1,0 +1,24 @@
+//! All that the render step needs to know of one frame, and the only thing that crosses from game to render thread.
+
+use std::time::Instant;
+
+use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+use crate::layout::particle::{GroupRecord, PlacedRecord};
+
+#[derive(Debug, Clone)]
+pub struct Packet {
+    pub i_frame: u32,
+    pub time_s: f64,
+    /// When the game step began.
+    pub begin: Instant,
+    /// How long it took.
+    pub game_ms: f64,
+    pub camera: CameraRecord,
+    pub groups: Vec<GroupRecord>,
+    /// Every particle's place, where the game thread moves the particles.
+    pub placed: Option<Vec<PlacedRecord>>,
+    pub lights: Vec<LightRecord>,
+    pub grid: GridRecord,
+    /// Bounds |view depth| relative to the lighting origin.
+    pub radius: f64,
+}

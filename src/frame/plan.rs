@@ -1,0 +1,166 @@
+//! What a frame can leave out: a pure function of the last packet and the next. Skipping never changes a pixel: a pass
+//! is left out only where all that it reads is what it read the last time, to the bit.
+
+use super::packet::Packet;
+
+/// The passes in their order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pass {
+    Generate,
+    Place,
+    Grid,
+    Facets,
+    Transmit,
+    First,
+    Sort,
+    Sprites,
+}
+
+impl Pass {
+    pub const ALL: [Pass; 8] =
+        [Pass::Generate, Pass::Place, Pass::Grid, Pass::Facets, Pass::Transmit, Pass::First, Pass::Sort, Pass::Sprites];
+
+    /// The room's name: timer label and column in the results.
+    pub fn name(self) -> &'static str {
+        ["generate", "place", "grid", "facets", "transmit", "first", "sort", "sprites"][self as usize]
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Decision {
+    pub run: bool,
+    pub reason: &'static str,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Plan([Decision; Pass::ALL.len()]);
+
+impl Plan {
+    pub fn decision(&self, pass: Pass) -> Decision {
+        self.0[pass as usize]
+    }
+
+    pub fn runs(&self, pass: Pass) -> bool {
+        self.decision(pass).run
+    }
+}
+
+/// What of a scene the plan depends on, constant over a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Traits {
+    /// Some particles come from boxes.
+    pub has_boxes: bool,
+    pub n_particles: u32,
+    /// `lighting.mode` is not "none".
+    pub lit: bool,
+    /// False with `--no-skip`: all that a frame is made of is done anew.
+    pub skip: bool,
+}
+
+/// The plan for `next` after `last` (`None`: the first frame, nothing is there yet).
+pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
+    let last = last.filter(|_| traits.skip);
+    let same = |f: &dyn Fn(&Packet, &Packet) -> bool| last.is_some_and(|l| f(l, next));
+    let still = same(&|a, b| a.placed == b.placed && (b.placed.is_some() || a.groups == b.groups));
+    let same_grid = still && same(&|a, b| a.grid == b.grid);
+    let same_facets = same_grid && same(&|a, b| a.groups == b.groups);
+    let same_rays =
+        same_facets && same(&|a, b| a.lights.iter().map(|l| l.toward).eq(b.lights.iter().map(|l| l.toward)));
+    let same_light = same_facets && same(&|a, b| a.lights == b.lights);
+    let same_order = still && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
+    let same_view = same(&|a, b| a.camera == b.camera);
+    let same_picture = same_order && same_view && (same_light || !traits.lit);
+
+    let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
+    let lighting =
+        |same: bool, reason| if traits.lit { unless(same, reason) } else { skip("lighting.mode is \"none\"") };
+    let mut decisions = [
+        if traits.has_boxes { unless(last.is_some(), "the boxes are the same") } else { skip("no boxes to fill") },
+        if next.placed.is_some() {
+            skip("the game thread places the particles")
+        } else {
+            unless(still, "nothing moved")
+        },
+        lighting(same_grid, "nothing moved"),
+        lighting(same_facets, "nothing moved"),
+        lighting(same_rays, "facets and lights stand still"),
+        lighting(same_light, "facets and lights are the same"),
+        unless(same_order, "the order cannot have changed"),
+        unless(same_picture, "the picture is the same"),
+    ];
+    if traits.n_particles == 0 {
+        decisions[..Pass::Sprites as usize].fill(skip("no particles"));
+    }
+    Plan(decisions)
+}
+
+const RUN: Decision = Decision { run: true, reason: "needed" };
+
+fn skip(reason: &'static str) -> Decision {
+    Decision { run: false, reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+    use crate::layout::particle::GroupRecord;
+    use std::time::Instant;
+
+    const TRAITS: Traits = Traits { has_boxes: true, n_particles: 7, lit: true, skip: true };
+
+    fn packet() -> Packet {
+        Packet {
+            i_frame: 0,
+            time_s: 0.0,
+            begin: Instant::now(),
+            game_ms: 0.0,
+            camera: CameraRecord { forward: [0.0, 0.0, -1.0], ..CameraRecord::default() },
+            groups: vec![GroupRecord::default()],
+            placed: None,
+            lights: vec![LightRecord::default()],
+            grid: GridRecord::default(),
+            radius: 1.0,
+        }
+    }
+
+    fn running(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Vec<&'static str> {
+        let plan = plan(traits, last, next);
+        Pass::ALL.into_iter().filter(|p| plan.runs(*p)).map(Pass::name).collect()
+    }
+
+    #[test]
+    fn the_first_frame_runs_everything_and_a_still_one_nothing() {
+        let p = packet();
+        assert_eq!(running(&TRAITS, None, &p).len(), Pass::ALL.len());
+        assert!(running(&TRAITS, Some(&p), &p).is_empty());
+        assert_eq!(running(&Traits { skip: false, ..TRAITS }, Some(&p), &p).len(), Pass::ALL.len());
+    }
+
+    #[test]
+    fn each_change_runs_what_depends_on_it_and_no_more() {
+        let last = packet();
+        let after = |change: &dyn Fn(&mut Packet)| {
+            let mut next = packet();
+            change(&mut next);
+            running(&TRAITS, Some(&last), &next)
+        };
+        assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
+        assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
+        assert_eq!(after(&|p| p.lights[0].irradiance[1] = 2.0), ["first", "sprites"]);
+        assert_eq!(after(&|p| p.lights[0].toward[1] = 1.0), ["transmit", "first", "sprites"]);
+        let all_but_generate = ["place", "grid", "facets", "transmit", "first", "sort", "sprites"];
+        assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
+        assert_eq!(after(&|p| p.grid.cell = 0.5), ["grid", "facets", "transmit", "first", "sprites"]);
+    }
+
+    #[test]
+    fn unlit_empty_and_cpu_scenes_leave_out_what_they_do_not_need() {
+        let p = packet();
+        assert_eq!(running(&Traits { lit: false, ..TRAITS }, None, &p), ["generate", "place", "sort", "sprites"]);
+        assert_eq!(running(&Traits { n_particles: 0, ..TRAITS }, None, &p), ["sprites"]);
+        let mut cpu = packet();
+        cpu.placed = Some(vec![]);
+        assert!(!running(&TRAITS, None, &cpu).contains(&"place"));
+    }
+}

@@ -1,0 +1,257 @@
+//! The render step: the whole frame on one page.
+
+use std::time::Instant;
+
+use super::buffers::{Buffers, download};
+use super::packet::Packet;
+use super::plan::{Pass, Plan, Traits, plan};
+use super::{limits, ms};
+use crate::error::Result;
+use crate::gpu::memory::TargetFormat;
+use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Place, Recorder, ScopeTime};
+use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::particle::{ParticleRecord, PlacedRecord};
+use crate::model::boxes::MAX_ATTEMPTS;
+use crate::model::cloud::{CloudSource, heaviest_blob};
+use crate::model::film::FilmFormat;
+use crate::model::scene::{LightingMode, Scene, Simulate};
+use crate::passes::facets::Facets;
+use crate::passes::first::First;
+use crate::passes::generate::Generate;
+use crate::passes::grid::Grid;
+use crate::passes::place::Place as PlacePass;
+use crate::passes::sort::Sort;
+use crate::passes::sprites::Sprites;
+use crate::passes::transmit::Transmit;
+
+pub struct Renderer {
+    generate: Generate,
+    place: PlacePass,
+    grid: Grid,
+    facets: Facets,
+    transmit: Transmit,
+    first: First,
+    sort: Sort,
+    sprites: Sprites,
+    buffers: Buffers,
+    target: Image,
+    readback: Option<Buffer>,
+    commands: Commands,
+    settings: Settings,
+    traits: Traits,
+    last: Option<Packet>,
+}
+
+/// What of the scene the passes are told and that is constant over a run.
+struct Settings {
+    n_particles: u32,
+    n_lights: u32,
+    heaviest: f64,
+    step_cells: f64,
+    forward: f64,
+    sort_bits: u32,
+    cutoff: f64,
+    format: FilmFormat,
+}
+
+/// What a render step tells of itself.
+pub struct Rendered {
+    pub plan: Plan,
+    pub record_ms: f64,
+    pub submit_wait_ms: f64,
+    pub passes: Vec<ScopeTime>,
+}
+
+impl Renderer {
+    /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs. `skip`: leave out
+    /// what a frame does not need.
+    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, skip: bool) -> Result<Renderer> {
+        limits::check(scene, device.limits())?;
+        let groups = scene.groups();
+        let n_particles = scene.n_particles() as u32;
+        let lit = scene.lighting.mode != LightingMode::None;
+        let format = match scene.film.format {
+            FilmFormat::Rgba16f => TargetFormat::Rgba16f,
+            FilmFormat::Rgba32f => TargetFormat::Rgba32f,
+        };
+        let host_places = scene.threads.simulate == Simulate::Cpu;
+        let mut renderer = Renderer {
+            generate: Generate::new(device, compiler)?,
+            place: PlacePass::new(device, compiler)?,
+            grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
+            facets: Facets::new(device, compiler)?,
+            transmit: Transmit::new(device, compiler)?,
+            first: First::new(device, compiler)?,
+            sort: Sort::new(device, compiler, n_particles)?,
+            sprites: Sprites::new(device, compiler, format, lit)?,
+            buffers: Buffers::new(device, scene, &groups, host_places)?,
+            target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
+            readback: None,
+            commands: Commands::new(device, "frame")?,
+            settings: Settings {
+                n_particles,
+                n_lights: scene.lights.len() as u32,
+                heaviest: heaviest_blob(&groups),
+                step_cells: scene.lighting.step,
+                forward: scene.lighting.forward,
+                sort_bits: scene.draw.sort_bits,
+                cutoff: scene.draw.cutoff,
+                format: scene.film.format,
+            },
+            traits: Traits {
+                has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
+                n_particles,
+                lit,
+                skip,
+            },
+            last: None,
+        };
+        renderer.buffers.fill(device, &mut renderer.commands, scene, &groups)?;
+        Ok(renderer)
+    }
+
+    /// Draws one frame and waits for it.
+    pub fn step(&mut self, packet: Packet) -> Result<Rendered> {
+        let begin = Instant::now();
+        let plan = plan(&self.traits, self.last.as_ref(), &packet);
+        self.upload(&packet)?;
+        self.record(&packet, &plan)?;
+        let recorded = Instant::now();
+        self.commands.submit()?;
+        let passes = self.commands.wait()?;
+        self.last = Some(packet);
+        Ok(Rendered { plan, record_ms: ms(begin, recorded), submit_wait_ms: ms(recorded, Instant::now()), passes })
+    }
+
+    /// Forgets the last frame: the next one does everything, as the first did.
+    pub fn reset(&mut self) {
+        self.last = None;
+    }
+
+    fn upload(&mut self, packet: &Packet) -> Result<()> {
+        self.buffers.groups.write(&packet.groups)?;
+        self.buffers.lights.write(&packet.lights)?;
+        match (&mut self.buffers.placed_upload, &packet.placed) {
+            (Some(upload), Some(placed)) => upload.write(placed),
+            _ => Ok(()),
+        }
+    }
+
+    /// The frame, pass by pass.
+    fn record(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
+        let Renderer {
+            generate,
+            place,
+            grid,
+            facets,
+            transmit,
+            first,
+            sort,
+            sprites,
+            buffers: b,
+            target,
+            settings: s,
+            ..
+        } = self;
+        let n = s.n_particles;
+        self.commands.record(Barriers::Placed, |rec| {
+            let pass =
+                |rec: &mut Recorder<'_>, pass: Pass, f: &mut dyn FnMut(&mut Recorder<'_>) -> Result<()>| match plan
+                    .runs(pass)
+                {
+                    true => rec.scope(pass.name(), f),
+                    false => Ok(()),
+                };
+            pass(rec, Pass::Generate, &mut |rec| {
+                generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS)
+            })?;
+            if let Some(upload) = &b.placed_upload {
+                rec.scope("upload", |rec| {
+                    rec.copy(upload, &b.placed);
+                    Ok(())
+                })?;
+            }
+            pass(rec, Pass::Place, &mut |rec| place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.placed], n))?;
+            pass(rec, Pass::Grid, &mut |rec| {
+                grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
+            })?;
+            pass(rec, Pass::Facets, &mut |rec| {
+                let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
+                facets.record(rec, buffers, &packet.grid, n)
+            })?;
+            pass(rec, Pass::Transmit, &mut |rec| {
+                let buffers = [&b.facets, &b.lights, &b.density, &b.transmittance];
+                transmit.record(rec, buffers, &packet.grid, [n, s.n_lights], s.step_cells, s.forward)
+            })?;
+            pass(rec, Pass::First, &mut |rec| {
+                let from = [&b.facets, &b.lights, &b.transmittance, &b.particles, &b.i_group, &b.groups, &b.lit];
+                first.record(rec, from, n, s.n_lights)
+            })?;
+            pass(rec, Pass::Sort, &mut |rec| {
+                sort.record_keys(rec, [&b.placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
+                sort.record(rec, &b.entries, n, s.sort_bits)
+            })?;
+            pass(rec, Pass::Sprites, &mut |rec| {
+                let from = [&b.entries, &b.placed, &b.particles, &b.lit];
+                sprites.record(rec, from, target, &packet.camera, s.cutoff, n)
+            })
+        })
+    }
+
+    /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
+    pub fn image(&mut self, device: &Device) -> Result<Vec<f32>> {
+        let bytes = self.image_bytes(device)?;
+        Ok(match self.settings.format {
+            FilmFormat::Rgba16f => {
+                let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+                halves.into_iter().map(half::f16::to_f32).collect()
+            }
+            FilmFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
+        })
+    }
+
+    /// The last frame as it lies in the target: what "the same bytes" means.
+    pub fn image_bytes(&mut self, device: &Device) -> Result<Vec<u8>> {
+        let pixel = match self.settings.format {
+            FilmFormat::Rgba16f => 8,
+            FilmFormat::Rgba32f => 16,
+        };
+        let n = self.target.n_pixels() * pixel;
+        let readback = match self.readback.take() {
+            Some(buffer) => buffer,
+            None => Buffer::new::<u8>(device, "sprites.readback", n, Place::Readback)?,
+        };
+        let target = &mut self.target;
+        self.commands.run(|rec| {
+            rec.copy_image(target, &readback);
+            Ok(())
+        })?;
+        let bytes = readback.read(n as usize);
+        self.readback = Some(readback);
+        bytes
+    }
+
+    /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.
+    pub fn generate_now(&mut self, device: &Device) -> Result<(Vec<ParticleRecord>, Vec<u32>)> {
+        let n = self.settings.n_particles;
+        let (generate, b) = (&self.generate, &self.buffers);
+        if self.traits.has_boxes {
+            self.commands
+                .run(|rec| generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS))?;
+        }
+        let particles = download(device, &mut self.commands, &self.buffers.particles, n)?;
+        Ok((particles, download(device, &mut self.commands, &self.buffers.status, n)?))
+    }
+
+    /// Where the last frame had the particles, relative to its lighting origin.
+    pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
+        download(device, &mut self.commands, &self.buffers.placed, self.settings.n_particles)
+    }
+
+    /// The last frame's facets and their light; only meaningful where the scene is lit.
+    pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
+        let n = self.settings.n_particles;
+        let facets = download(device, &mut self.commands, &self.buffers.facets, n)?;
+        Ok((facets, download(device, &mut self.commands, &self.buffers.lit, n)?))
+    }
+}

@@ -1,0 +1,22 @@
+//! Game step and render step one after the other.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use super::game::Game;
+use super::render::Renderer;
+use super::{OnFrame, render_timed};
+use crate::error::Result;
+
+/// Runs `frames`; `on_frame` sees each as it ends.
+pub fn run(game: &mut Game, renderer: &mut Renderer, frames: Range<u32>, on_frame: &mut OnFrame<'_>) -> Result<()> {
+    let mut last_end = Instant::now();
+    for i_frame in frames {
+        let packet = game.step(i_frame)?;
+        let times = render_timed(renderer, packet, 1, &mut last_end)?;
+        if !on_frame(times, renderer)? {
+            break;
+        }
+    }
+    Ok(())
+}

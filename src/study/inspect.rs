@@ -1,0 +1,235 @@
+//! A stage's buffer as rows: what the device holds, or what the f64 reference says.
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use super::stage::Stage;
+use super::truth::{Truth, colors};
+use crate::error::{Error, Result};
+use crate::frame::game::Setting;
+use crate::frame::plan::Pass;
+use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
+use crate::model::scene::{LightingMode, Scene};
+use crate::passes::generate::FOLDED;
+use crate::reference::generate::Generated;
+
+/// A particle in the scene's coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParticleRow {
+    pub index: usize,
+    pub cloud: usize,
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub radius: f64,
+    pub sigma: f64,
+    pub kappa: f64,
+    pub r: f64,
+    pub g: f64,
+    pub b: f64,
+}
+
+/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera (the second reflection
+/// is not computed in this version, its columns are zero).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FacetRow {
+    pub index: usize,
+    pub region: u32,
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub nx: f64,
+    pub ny: f64,
+    pub nz: f64,
+    pub area: f64,
+    pub id_r: f64,
+    pub id_g: f64,
+    pub id_b: f64,
+    pub ii_r: f64,
+    pub ii_g: f64,
+    pub ii_b: f64,
+    pub l1_r: f64,
+    pub l1_g: f64,
+    pub l1_b: f64,
+    pub l2_r: f64,
+    pub l2_g: f64,
+    pub l2_b: f64,
+}
+
+/// What a box made of its particles.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoxRow {
+    pub cloud: usize,
+    pub r#box: usize,
+    pub particles: u32,
+    pub attempts: u64,
+    /// Particles over attempts; none for an empty box.
+    pub acceptance: Option<f64>,
+    pub folded: u32,
+}
+
+/// One pass of one frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlanRow {
+    pub frame: u32,
+    pub pass: &'static str,
+    pub run: bool,
+    pub reason: &'static str,
+}
+
+/// Particles of `i_frame` as the device has them.
+pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
+    let packet = stage.game.step(i_frame)?;
+    let time_s = packet.time_s;
+    stage.renderer.step(packet)?;
+    let placed = stage.renderer.placed(&stage.device)?;
+    let records = stage.renderer.generate_now(&stage.device)?.0;
+    let groups = stage.scene.groups();
+    let origin = Setting::at(&stage.scene, &groups, time_s)?.light_origin;
+    let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
+        let position = Vec3::from(p.position).as_dvec3() + origin;
+        let color = Vec3::from(r.color).as_dvec3();
+        particle_row(i, cloud_of(&groups, i), position, f64::from(p.sigma), f64::from(r.kappa), color)
+    });
+    Ok(rows.collect())
+}
+
+/// The same from the reference.
+pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
+    let mut unlit = scene.clone();
+    unlit.lighting.mode = LightingMode::None;
+    let truth = Truth::of(&unlit, scene.time.at(i_frame))?;
+    let colors = colors(scene);
+    let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
+        let position = b.position + truth.setting.light_origin;
+        particle_row(i, cloud_of(&truth.groups, i), position, b.sigma, b.kappa, *color)
+    });
+    Ok(rows.collect())
+}
+
+/// Facets of `i_frame` as the device has them.
+pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
+    check_lit(&stage.scene)?;
+    let packet = stage.game.step(i_frame)?;
+    let time_s = packet.time_s;
+    stage.renderer.step(packet)?;
+    let (facets, lit) = stage.renderer.facets(&stage.device)?;
+    let origin = Setting::at(&stage.scene, &stage.scene.groups(), time_s)?.light_origin;
+    let rgb = |v: [f32; 4]| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
+    let rows = facets.iter().zip(&lit).enumerate().map(|(i, (f, l))| {
+        let place = Vec3::from(f.position).as_dvec3() + origin;
+        let normal = Vec3::from(f.normal).as_dvec3();
+        facet_row(i, f.i_region, [place, normal, rgb(l.irradiance), rgb(l.radiance)], f64::from(f.area))
+    });
+    Ok(rows.collect())
+}
+
+/// The same from the reference.
+pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
+    check_lit(scene)?;
+    let truth = Truth::of(scene, scene.time.at(i_frame))?;
+    let rows = truth.facets.iter().enumerate().map(|(i, f)| {
+        let vectors = [f.position + truth.setting.light_origin, f.normal, truth.irradiance[i], truth.radiance[i]];
+        facet_row(i, f.region, vectors, f.area)
+    });
+    Ok(rows.collect())
+}
+
+/// Attempts and folded particles of every box, from the device.
+pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
+    let status = stage.renderer.generate_now(&stage.device)?.1;
+    let tries = status.iter().map(|s| (u64::from(s & !FOLDED), s & FOLDED != 0)).collect::<Vec<_>>();
+    Ok(box_rows(&stage.scene, &tries))
+}
+
+/// The same from the reference.
+pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
+    let tried = |g: Generated| (u64::from(g.n_attempts), g.folded);
+    let tries: Vec<_> = scene.clouds.iter().flat_map(crate::reference::generate::cloud).map(tried).collect();
+    box_rows(scene, &tries)
+}
+
+fn box_rows(scene: &Scene, tries: &[(u64, bool)]) -> Vec<BoxRow> {
+    let mut rows: Vec<BoxRow> = Vec::new();
+    for group in scene.groups() {
+        if !matches!(scene.clouds[group.i_cloud].source, CloudSource::Boxes { .. }) {
+            continue;
+        }
+        let first = group.i_first as usize;
+        let mine = &tries[first..first + group.n_particles as usize];
+        let attempts: u64 = mine.iter().map(|t| t.0).sum();
+        let folded = mine.iter().filter(|t| t.1).count() as u32;
+        let accepted = f64::from(group.n_particles - folded);
+        let i_box = rows.iter().filter(|r| r.cloud == group.i_cloud).count();
+        let acceptance = (attempts > 0).then(|| accepted / attempts as f64);
+        rows.push(BoxRow {
+            cloud: group.i_cloud,
+            r#box: i_box,
+            particles: group.n_particles,
+            attempts,
+            acceptance,
+            folded,
+        });
+    }
+    rows
+}
+
+/// What frames `0..n_frames` run and leave out, and why.
+pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
+    let mut rows = Vec::new();
+    let on_frame = &mut |times: crate::frame::FrameTimes, _: &mut _| {
+        rows.extend(Pass::ALL.iter().map(|pass| {
+            let decision = times.plan.decision(*pass);
+            PlanRow { frame: times.i_frame, pass: pass.name(), run: decision.run, reason: decision.reason }
+        }));
+        Ok(true)
+    };
+    let mode = stage.scene.threads.mode;
+    stage.run(mode, n_frames, on_frame)?;
+    Ok(rows)
+}
+
+fn check_lit(scene: &Scene) -> Result<()> {
+    match scene.lighting.mode {
+        LightingMode::None => Err(Error::usage("the scene has no facets: lighting.mode is \"none\"")),
+        LightingMode::First => Ok(()),
+    }
+}
+
+/// Groups are in order of their particles, so the last that begins at or before i holds it (empty ones begin where the
+/// next does, and come before it).
+fn cloud_of(groups: &[Group], i: usize) -> usize {
+    let after = groups.partition_point(|g| g.i_first as usize <= i);
+    groups[after.saturating_sub(1)].i_cloud
+}
+
+fn particle_row(index: usize, cloud: usize, p: DVec3, sigma: f64, kappa: f64, c: DVec3) -> ParticleRow {
+    let radius = sigma / SIGMA_PER_RADIUS;
+    ParticleRow { index, cloud, x: p.x, y: p.y, z: p.z, radius, sigma, kappa, r: c.x, g: c.y, b: c.z }
+}
+
+fn facet_row(index: usize, region: u32, [p, n, id, l1]: [DVec3; 4], area: f64) -> FacetRow {
+    FacetRow {
+        index,
+        region,
+        x: p.x,
+        y: p.y,
+        z: p.z,
+        nx: n.x,
+        ny: n.y,
+        nz: n.z,
+        area,
+        id_r: id.x,
+        id_g: id.y,
+        id_b: id.z,
+        ii_r: 0.0,
+        ii_g: 0.0,
+        ii_b: 0.0,
+        l1_r: l1.x,
+        l1_g: l1.y,
+        l1_b: l1.z,
+        l2_r: 0.0,
+        l2_g: 0.0,
+        l2_b: 0.0,
+    }
+}

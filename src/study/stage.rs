@@ -1,0 +1,77 @@
+//! A scene on a device, ready to run.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::frame::game::Game;
+use crate::frame::render::Renderer;
+use crate::frame::{OnFrame, parallel, serial};
+use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
+use crate::model::scene::{Scene, Simulate, Threading};
+use crate::passes;
+
+/// How to open a device.
+#[derive(Debug, Clone, Default)]
+pub struct DeviceChoice {
+    /// An index or a part of a name; the best device without.
+    pub device: Option<String>,
+    /// Shaders to use in place of those built in.
+    pub shaders: Option<PathBuf>,
+    pub validation: bool,
+}
+
+// Fields drop in order: what lies on the device before the device.
+pub struct Stage {
+    pub renderer: Renderer,
+    pub game: Game,
+    pub scene: Arc<Scene>,
+    pub device: Device,
+    instance: Arc<Instance>,
+}
+
+impl Stage {
+    /// Opens a device and makes everything the scene needs on it. `skip`: leave out what a frame does not need.
+    pub fn new(scene: Scene, choice: &DeviceChoice, skip: bool) -> Result<Stage> {
+        let instance = Instance::new(choice.validation)?;
+        let device = Device::open(&instance, choice.device.as_deref())?;
+        let mut sources = passes::sources();
+        if let Some(dir) = &choice.shaders {
+            sources = sources.with_dir(dir)?;
+        }
+        let compiler = Compiler::new(sources, Compiler::default_cache())?;
+        let scene = Arc::new(scene);
+        let mut renderer = Renderer::new(&device, &compiler, &scene, skip)?;
+        let rest = match scene.threads.simulate {
+            Simulate::Gpu => None,
+            Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
+        };
+        let game = Game::new(scene.clone(), rest);
+        Ok(Stage { renderer, game, scene, device, instance })
+    }
+
+    /// Runs frames `0..n_frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
+    pub fn run(&mut self, threading: Threading, n_frames: u32, on_frame: &mut OnFrame<'_>) -> Result<()> {
+        self.renderer.reset();
+        match threading {
+            Threading::Serial => serial::run(&mut self.game, &mut self.renderer, 0..n_frames, on_frame),
+            Threading::Parallel => parallel::run(&mut self.game, &mut self.renderer, 0..n_frames, on_frame),
+        }
+    }
+
+    pub fn info(&self) -> &DeviceInfo {
+        self.device.info()
+    }
+
+    /// Ends the stage; an error where validation or the leak report had anything to say.
+    pub fn close(self) -> Result<()> {
+        let Stage { renderer, game, scene: _, device, instance } = self;
+        drop((renderer, game));
+        drop(device);
+        let said = instance.messages().take();
+        if said.is_empty() {
+            return Ok(());
+        }
+        Err(Error::Check { what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")) })
+    }
+}

@@ -1,0 +1,73 @@
+//! A frame's f64 reference, stage by stage, from the scene alone.
+
+use glam::DVec3;
+
+use crate::error::Result;
+use crate::frame::game::Setting;
+use crate::model::cloud::{CloudSource, Group};
+use crate::model::scene::{LightingMode, Scene};
+use crate::reference::generate::Generated;
+use crate::reference::{self, Blob, facets::Facet};
+
+/// All stages of one frame up to the light on the facets. Positions relative to the lighting origin.
+pub struct Truth {
+    pub setting: Setting,
+    pub groups: Vec<Group>,
+    pub generated: Vec<Generated>,
+    pub colors: Vec<DVec3>,
+    pub blobs: Vec<Blob>,
+    /// Empty where lighting.mode is "none".
+    pub facets: Vec<Facet>,
+    pub irradiance: Vec<DVec3>,
+    pub radiance: Vec<DVec3>,
+}
+
+impl Truth {
+    pub fn of(scene: &Scene, time_s: f64) -> Result<Truth> {
+        let groups = scene.groups();
+        let setting = Setting::at(scene, &groups, time_s)?;
+        let generated: Vec<Generated> = scene.clouds.iter().flat_map(reference::generate::cloud).collect();
+        let offsets = reference::place::offsets(&groups, &scene.clouds, time_s, setting.light_origin);
+        let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
+        let placed = reference::place::place(&positions, &groups, &offsets);
+        let blobs = reference::place::blobs(&generated, &placed);
+        let colors = colors(scene);
+        let mut truth =
+            Truth { setting, groups, generated, colors, blobs, facets: vec![], irradiance: vec![], radiance: vec![] };
+        if scene.lighting.mode != LightingMode::None {
+            truth.light(scene);
+        }
+        Ok(truth)
+    }
+
+    fn light(&mut self, scene: &Scene) {
+        let grid = &self.setting.grid;
+        let cells = reference::grid::deposit(grid, &self.blobs);
+        let centers = reference::place::cloud_centers(&scene.clouds, self.setting.time_s, self.setting.light_origin);
+        let regions = reference::place::regions(&self.groups);
+        self.facets = reference::facets::facets(grid, &cells, &self.blobs, &regions, &centers);
+        let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
+        let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
+        let lighting = &scene.lighting;
+        let transmittance = reference::transmit::transmittance(
+            grid,
+            &cells,
+            &positions,
+            &scene.lights,
+            lighting.forward,
+            lighting.step,
+        );
+        self.irradiance = reference::first::irradiance(&normals, &transmittance, &scene.lights);
+        let kd: Vec<DVec3> = scene.clouds.iter().map(|c| scene.materials[c.i_material].kd).collect();
+        self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.colors);
+    }
+}
+
+/// Every particle's own colour.
+pub fn colors(scene: &Scene) -> Vec<DVec3> {
+    let of = |cloud: &crate::model::cloud::Cloud| match &cloud.source {
+        CloudSource::Boxes { .. } => vec![DVec3::ONE; cloud.n_particles() as usize],
+        CloudSource::Particles(list) => list.iter().map(|p| p.color).collect(),
+    };
+    scene.clouds.iter().flat_map(of).collect()
+}

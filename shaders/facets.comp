@@ -4,13 +4,15 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// One facet a particle (docs/model.md §5, §11): normal from the ball-averaged density gradient where that is well
+// One facet a particle (docs/model.md §5, §11): normal from the gradient of the smoothed density where that is well
 // conditioned, else away from the cloud's centre.
 
 layout(local_size_x = 64) in;
 
 const float SHELL_SIGMA = 1.5;
-const float BALL_SIGMA = 2.0;
+// Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard deviation s, here 2 sigma, to
+// degree 5.
+const float SMOOTH_SIGMA = 4.47213595;
 const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;
@@ -35,6 +37,8 @@ void main() {
         vec3 p = placed[i].position;
         float sigma = placed[i].sigma;
         Group group = groups[i_group[i]];
+        // The light on a small blob is that of the blobs it lies among: on its own scale it would be a speck.
+        float scale = max(sigma, group.sigma_mean);
         vec3 gradient = vec3(0.0);
         float sum = 0.0;
         // A quadrature of degree 5 on the sphere: 6 axes and 8 diagonals.
@@ -49,7 +53,7 @@ void main() {
                 d = vec3((k & 1) == 0 ? 1.0 : -1.0, (k & 2) == 0 ? 1.0 : -1.0, k < 10 ? 1.0 : -1.0) * 0.57735026919;
                 w = 3.0 / 40.0;
             }
-            float rho = w * density_at(p + BALL_SIGMA * sigma * d);
+            float rho = w * density_at(p + SMOOTH_SIGMA * scale * d);
             gradient += rho * d;
             sum += rho;
         }
@@ -60,6 +64,6 @@ void main() {
         vec3 n = t > 0.0 ? unit_or(t * (-gradient / slope) + (1.0 - t) * outward, outward) : outward;
         float radius = 3.0 * sigma;
         float opacity = one_minus_exp(SQRT_TAU * particles[i].kappa * sigma);
-        facets[i] = Facet(p + SHELL_SIGMA * sigma * n, PI * radius * radius * opacity, n, group.i_region);
+        facets[i] = Facet(p + SHELL_SIGMA * scale * n, PI * radius * radius * opacity, n, group.i_region);
     }
 }

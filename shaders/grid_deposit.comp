@@ -6,7 +6,11 @@
 // Deposits each blob's mass into the cells it meets (docs/model.md §8, "grid"): a workgroup a blob. Sums are 64-bit fixed
 // point, so that they do not depend on the order of the atomics.
 
-layout(local_size_x = 64) in;
+// One subgroup wide where the host says how wide that is: barriers are then cheap.
+#ifndef WORKGROUP
+#define WORKGROUP 32
+#endif
+layout(local_size_x = WORKGROUP) in;
 
 const uint MAX_CELLS = 512;
 const float CUT_SIGMA = 3.0;
@@ -48,18 +52,24 @@ void main() {
             }
         }
         barrier();
-        ivec3 n = end - begin + 1;
-        int n_cells = mass > 0.0 ? n.x * n.y * n.z : 0;
-        for (int k = int(gl_LocalInvocationID.x); k < n_cells; k += int(gl_WorkGroupSize.x)) {
-            ivec3 i = ivec3(k % n.x, (k / n.x) % n.y, k / (n.x * n.y));
-            float share = weights[0][i.x] * weights[1][i.y] * weights[2][i.z];
-            uint quanta = uint(mass * push.quanta_per_mass * share + 0.5);
-            ivec3 at = begin + i;
-            int cell = at.x + int(push.grid.n_cells.x) * (at.y + int(push.grid.n_cells.y) * at.z);
-            if (quanta > 0) {
-                uint before = atomicAdd(sums[2 * cell], quanta);
-                if (before + quanta < before) {
-                    atomicAdd(sums[2 * cell + 1], 1u);
+        ivec3 n = mass > 0.0 ? end - begin + 1 : ivec3(0);
+        float total_quanta = mass * push.quanta_per_mass;
+        int row = int(push.grid.n_cells.x), layer = row * int(push.grid.n_cells.y);
+        for (int z = 0; z < n.z; ++z) {
+            int first = begin.x + row * begin.y + layer * (begin.z + z);
+            float layer_quanta = total_quanta * weights[2][z];
+            // k / n.x by a float quotient: exact, as k < MAX_CELLS^2 = 2^18 leaves the half a margin of many ulp. Integer
+            // division is slow on most devices.
+            for (int k = int(gl_LocalInvocationID.x); k < n.x * n.y; k += int(gl_WorkGroupSize.x)) {
+                int y = int((float(k) + 0.5) / float(n.x));
+                int x = k - y * n.x;
+                uint quanta = uint(layer_quanta * (weights[0][x] * weights[1][y]) + 0.5);
+                int cell = first + x + row * y;
+                if (quanta > 0) {
+                    uint before = atomicAdd(sums[2 * cell], quanta);
+                    if (before + quanta < before) {
+                        atomicAdd(sums[2 * cell + 1], 1u);
+                    }
                 }
             }
         }

@@ -46,8 +46,20 @@ impl Kernel {
         push: &[Field],
         constants: &[(u32, u32)],
     ) -> Result<Kernel> {
+        Kernel::with_macros(device, compiler, name, push, constants, &[])
+    }
+
+    /// A variant of the kernel, by macros that its text asks for.
+    pub fn with_macros(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        macros: &[(&str, u32)],
+    ) -> Result<Kernel> {
         let file = format!("{}.comp", name.replace('.', "_"));
-        let words = compiler.compile(&file, Optimize::Yes)?;
+        let words = compiler.compile_with(&file, Optimize::Yes, macros)?;
         let found = reflect(&file, &words)?;
         check_push(&file, &found, push)?;
         check_limits(device, &file, &found)?;

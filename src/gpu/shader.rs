@@ -86,6 +86,11 @@ impl Compiler {
 
     /// SPIR-V of `file` (its extension gives the stage). Errors carry the compiler's file:line.
     pub fn compile(&self, file: &str, optimize: Optimize) -> Result<Vec<u32>> {
+        self.compile_with(file, optimize, &[])
+    }
+
+    /// The same with `macros` defined.
+    pub fn compile_with(&self, file: &str, optimize: Optimize, macros: &[(&str, u32)]) -> Result<Vec<u32>> {
         let fail = |what: String| Error::Shader { name: file.to_owned(), what };
         let Some(text) = self.sources.0.get(file) else { return Err(fail("no such shader".into())) };
         let kind = match file.rsplit('.').next() {
@@ -94,7 +99,7 @@ impl Compiler {
             Some("frag") => shaderc::ShaderKind::Fragment,
             _ => return Err(fail("expected a file ending in .comp, .vert or .frag".into())),
         };
-        let cached = self.cache.as_ref().map(|dir| dir.join(format!("{}.spv", self.key(file, text, optimize))));
+        let cached = self.cache.as_ref().map(|dir| dir.join(format!("{}.spv", self.key(file, text, optimize, macros))));
         if let Some(words) = cached.as_deref().and_then(read_cached) {
             return Ok(words);
         }
@@ -104,6 +109,9 @@ impl Compiler {
             Optimize::Yes => shaderc::OptimizationLevel::Performance,
             Optimize::No => shaderc::OptimizationLevel::Zero,
         });
+        for (name, value) in macros {
+            options.add_macro_definition(name, Some(&value.to_string()));
+        }
         options.set_warnings_as_errors();
         options.set_include_callback(|name, _, _, _| {
             let full = format!("include/{name}");
@@ -120,11 +128,11 @@ impl Compiler {
     }
 
     /// Hash of all that the SPIR-V depends on: the text, every include, the options, the compiler.
-    fn key(&self, file: &str, text: &str, optimize: Optimize) -> String {
+    fn key(&self, file: &str, text: &str, optimize: Optimize, macros: &[(&str, u32)]) -> String {
         let mut hash = Sha256::new();
         let (version, revision) = shaderc::get_spirv_version();
         let crate_version = "shaderc-rs 0.10";
-        hash.update(format!("{crate_version} {version} {revision} vulkan1.3 {optimize:?} {file}\0{text}\0"));
+        hash.update(format!("{crate_version} {version} {revision} vulkan1.3 {optimize:?} {macros:?} {file}\0{text}\0"));
         for (name, include) in self.sources.0.iter().filter(|(n, _)| n.starts_with("include/")) {
             hash.update(format!("{name}\0{include}\0"));
         }

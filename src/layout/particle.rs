@@ -106,10 +106,11 @@ record! {
         i_region: u32,
         /// The cloud's centre relative to the lighting origin.
         cloud_center: [f32; 3],
-        i_first: u32,
+        /// Mean σ of the group's particles.
+        sigma_mean: f32,
         /// K_d of the cloud's material.
         kd: [f32; 3],
-        n_particles: u32,
+        unused: u32,
     }
 }
 
@@ -120,9 +121,9 @@ impl GroupRecord {
             offset: (origin_from_light + group.center).as_vec3().to_array(),
             i_region: group.i_cloud as u32,
             cloud_center: (origin_from_light + cloud_center).as_vec3().to_array(),
-            i_first: group.i_first,
+            sigma_mean: group.sigma_mean as f32,
             kd: kd.as_vec3().to_array(),
-            n_particles: group.n_particles,
+            unused: 0,
         }
     }
 }

@@ -54,6 +54,7 @@ pub struct Group {
     /// Positions lie within center ± half_extent.
     pub half_extent: DVec3,
     pub sigma_max: f64,
+    pub sigma_mean: f64,
     pub kappa_max: f64,
 }
 
@@ -104,6 +105,7 @@ impl Cloud {
                         center: b.center,
                         half_extent: 0.5 * b.extent,
                         sigma_max: greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
+                        sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
                         kappa_max: box_kappa(b, *form, *optical_depth, *radius_scale),
                     };
                     i_first += b.n_particles;
@@ -137,6 +139,7 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         center: 0.5 * (low + high),
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
+        sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
     }
 }

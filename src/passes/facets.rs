@@ -1,7 +1,7 @@
 //! facets: what light falls on, one facet a particle.
 //!
 //! In: placed particles, κ, groups, density grid. Out: position, unit normal, area, region. Law: normal against the
-//! ball-averaged density gradient, blended to "away from the cloud's centre" where that is ill conditioned; position on
+//! gradient of the density smoothed to 2σ, blended to "away from the cloud's centre" where that is ill conditioned; position on
 //! the shell p + 1.5 σ n. Source: C §2.4, docs/model.md §5, §11. Error: the normal's grows as 1/(t·conditioning).
 
 use crate::error::Result;

@@ -30,8 +30,17 @@ pub struct Grid {
 impl Grid {
     /// Room for `n_cells` cells.
     pub fn new(device: &Device, compiler: &Compiler, n_cells: u64) -> Result<Grid> {
+        // A workgroup of one subgroup needs no waiting at its barriers, and a blob's few cells fill it.
+        let width = device.limits().subgroup_size.clamp(8, 64);
         Ok(Grid {
-            deposit: Kernel::new(device, compiler, "grid.deposit", DepositPush::FIELDS, &[])?,
+            deposit: Kernel::with_macros(
+                device,
+                compiler,
+                "grid.deposit",
+                DepositPush::FIELDS,
+                &[],
+                &[("WORKGROUP", width)],
+            )?,
             resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS, &[])?,
             sums: Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, Place::Device)?,
         })

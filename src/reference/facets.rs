@@ -11,8 +11,8 @@ use super::grid::sample;
 use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
-/// Radius of the ball that the gradient is averaged over, in σ.
-pub const GRADIENT_RADIUS_SIGMA: f64 = 2.0;
+/// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard deviation s = 2σ to degree 5.
+pub const GRADIENT_RADIUS_SIGMA: f64 = 4.472_135_954_999_58;
 /// A facet's distance from its blob's centre, in σ.
 pub const SHELL_SIGMA: f64 = 1.5;
 /// Conditioning q below which only the cloud's centre decides, and above which only the gradient does.
@@ -45,8 +45,7 @@ pub fn directions() -> [(DVec3, f64); 14] {
     })
 }
 
-/// G = Σ w ρ(p + 2σd) d, which the divergence theorem makes a multiple of ∇ρ averaged over the ball, and
-/// S = Σ w ρ(p + 2σd).
+/// G = Σ w ρ(p + 2√5 σ d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ d).
 pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64) -> (DVec3, f64) {
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
         let density = w * sample(spec, cells, p + GRADIENT_RADIUS_SIGMA * sigma * d);
@@ -77,15 +76,24 @@ pub fn area(sigma: f64, kappa: f64) -> f64 {
     -PI * radius * radius * libm::expm1(-SQRT_TAU * kappa * sigma)
 }
 
-/// One facet a blob; `regions[j]` is the cloud of blob j, `cloud_centers` are relative to O.
-pub fn facets(spec: &GridSpec, cells: &[f64], blobs: &[Blob], regions: &[u32], cloud_centers: &[DVec3]) -> Vec<Facet> {
-    let facet = |(blob, &region): (&Blob, &u32)| {
+/// One facet a blob. `sigma_means[j]` is the mean σ of blob j's group, which bounds the scale of its facet from below;
+/// `regions[j]` its cloud; `cloud_centers` are relative to O.
+pub fn facets(
+    spec: &GridSpec,
+    cells: &[f64],
+    blobs: &[Blob],
+    sigma_means: &[f64],
+    regions: &[u32],
+    cloud_centers: &[DVec3],
+) -> Vec<Facet> {
+    let facet = |((blob, &region), mean): ((&Blob, &u32), &f64)| {
+        let scale = blob.sigma.max(*mean);
         let center = cloud_centers[region as usize];
-        let (normal, conditioning) = normal(spec, cells, blob.position, blob.sigma, center);
-        let position = blob.position + SHELL_SIGMA * blob.sigma * normal;
+        let (normal, conditioning) = normal(spec, cells, blob.position, scale, center);
+        let position = blob.position + SHELL_SIGMA * scale * normal;
         Facet { position, normal, area: area(blob.sigma, blob.kappa), region, conditioning }
     };
-    blobs.iter().zip(regions).map(facet).collect()
+    blobs.iter().zip(regions).zip(sigma_means).map(facet).collect()
 }
 
 #[cfg(test)]
@@ -119,12 +127,13 @@ mod tests {
 
     #[test]
     fn of_a_linear_density_the_gradient_is_exact() {
-        // ρ = 3 + 0.2 x − 0.1 z at the cell centres, which trilinear sampling keeps: G = (2σ/3)∇ρ, S = ρ(p).
+        // ρ = 3 + 0.2 x − 0.1 z at the cell centres, which trilinear sampling keeps: G = (r/3)∇ρ, S = ρ(p).
         let at = |i: usize, axis: u32| -4.9 + 0.2 * (i / 50usize.pow(axis) % 50) as f64;
         let cells: Vec<f64> = (0..125_000).map(|i| 3.0 + 0.2 * at(i, 0) - 0.1 * at(i, 2)).collect();
         let p = DVec3::new(0.33, -0.71, 0.52);
         let (g, s) = gradient(&SPEC, &cells, p, 0.6);
-        assert!((g - 0.4 * DVec3::new(0.2, 0.0, -0.1)).length() < 1e-13);
+        let r = 2.0 * 5f64.sqrt() * 0.6;
+        assert!((g - r / 3.0 * DVec3::new(0.2, 0.0, -0.1)).length() < 1e-13);
         assert!((s - (3.0 + 0.066 - 0.052)).abs() < 1e-13);
     }
 

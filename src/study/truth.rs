@@ -45,7 +45,9 @@ impl Truth {
         let cells = reference::grid::deposit(grid, &self.blobs);
         let centers = reference::place::cloud_centers(&scene.clouds, self.setting.time_s, self.setting.light_origin);
         let regions = reference::place::regions(&self.groups);
-        self.facets = reference::facets::facets(grid, &cells, &self.blobs, &regions, &centers);
+        let scales: Vec<f64> =
+            self.groups.iter().flat_map(|g| std::iter::repeat_n(g.sigma_mean, g.n_particles as usize)).collect();
+        self.facets = reference::facets::facets(grid, &cells, &self.blobs, &scales, &regions, &centers);
         let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
         let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
         let lighting = &scene.lighting;

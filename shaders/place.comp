@@ -2,8 +2,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "each.glsl"
+#include "functions.glsl"
 
-// Positions relative to the lighting origin: placed = position + its group's offset (docs/model.md §11).
+// Positions relative to the lighting origin: position + its group's offset + the gusts' displacement (docs/model.md §11,
+// §12).
 
 layout(local_size_x = 64) in;
 
@@ -11,10 +13,18 @@ layout(push_constant) uniform Push { uint n_particles; } push;
 layout(std430, binding = 0) readonly buffer Particles { Particle particles[]; };
 layout(std430, binding = 1) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 2) readonly buffer Groups { Group groups[]; };
-layout(std430, binding = 3) writeonly buffer PlacedParticles { Placed placed[]; };
+layout(std430, binding = 3) readonly buffer Modes { Mode modes[]; };
+layout(std430, binding = 4) writeonly buffer PlacedParticles { Placed placed[]; };
 
 void main() {
     FOR_EACH(i, push.n_particles) {
-        placed[i] = Placed(particles[i].position + groups[i_group[i]].offset, particles[i].sigma);
+        Group group = groups[i_group[i]];
+        vec3 rest = particles[i].position;
+        vec3 x = rest + group.center;
+        vec3 d = vec3(0.0);
+        for (uint m = group.i_mode; m < group.i_mode + group.n_modes; ++m) {
+            d += modes[m].a * sine(dot(modes[m].k, x) + modes[m].phase);
+        }
+        placed[i] = Placed(rest + group.offset + d, particles[i].sigma);
     }
 }

@@ -3,7 +3,8 @@
 struct Particle { vec3 position; float sigma; vec3 color; float kappa; };
 struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uint seed; uint i_box; uint i_first; uint n_particles; uint form; uint unused; };
 struct Placed { vec3 position; float sigma; };
-struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 kd; uint unused; };
+struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 kd; uint n_modes; vec3 center; uint i_mode; };
+struct Mode { vec3 k; float phase; vec3 a; uint unused; };
 struct Facet { vec3 position; float area; vec3 normal; uint i_region; };
 struct Lit { vec4 irradiance; vec4 radiance; };
 struct Light { vec3 toward; uint kind; vec3 irradiance; float constant; };

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::Scene;
 
@@ -20,6 +20,8 @@ pub struct Buffers {
     pub status: Buffer,
     /// Written by the host every frame.
     pub groups: Buffer,
+    /// Written by the host every frame.
+    pub modes: Buffer,
     /// Written by the host every frame where the game thread places the particles.
     pub placed_upload: Option<Buffer>,
     pub placed: Buffer,
@@ -37,6 +39,7 @@ impl Buffers {
     pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
         let n = scene.n_particles();
         let n_groups = groups.len() as u64;
+        let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
         let placed_upload = match host_places {
             true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
@@ -48,6 +51,7 @@ impl Buffers {
             particles: Buffer::new::<ParticleRecord>(device, "generate.particles", n, Place::Device)?,
             status: Buffer::new::<u32>(device, "generate.status", n, Place::Device)?,
             groups: Buffer::new::<GroupRecord>(device, "place.groups", n_groups, Place::Upload)?,
+            modes: Buffer::new::<ModeRecord>(device, "place.modes", n_modes, Place::Upload)?,
             placed_upload,
             placed: Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?,
             density: Buffer::new::<f32>(device, "grid.density", n_cells_max(scene), Place::Device)?,

@@ -7,10 +7,11 @@ use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Place, Result};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-use crate::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::camera::Pose;
 use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
+use crate::model::gust::{Mode, displacement};
 use crate::model::scene::Scene;
 
 pub struct Game {
@@ -18,6 +19,8 @@ pub struct Game {
     groups: Vec<Group>,
     /// Centre of each cloud relative to its origin.
     cloud_centers: Vec<DVec3>,
+    /// Waves of each cloud's gusts.
+    modes: Vec<Vec<Mode>>,
     /// Every particle relative to its group, where this thread moves them.
     rest: Option<Vec<ParticleRecord>>,
 }
@@ -60,7 +63,8 @@ impl Game {
     pub fn new(scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) -> Game {
         let groups = scene.groups();
         let cloud_centers = scene.clouds.iter().map(|c| c.center()).collect();
-        Game { scene, groups, cloud_centers, rest }
+        let modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
+        Game { scene, groups, cloud_centers, modes, rest }
     }
 
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
@@ -75,13 +79,15 @@ impl Game {
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let groups: Vec<GroupRecord> = self.groups.iter().map(|g| self.group(g, origins[g.i_cloud])).collect();
-        let placed = self.rest.as_ref().map(|rest| self.place(rest, &origins));
+        let modes = self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect();
+        let placed = self.rest.as_ref().map(|rest| self.place(rest, &origins, time_s));
         Ok(Packet {
             i_frame,
             time_s,
             begin,
             camera: CameraRecord::new(&self.scene.camera, &setting.pose, &self.scene.film, setting.light_origin),
             groups,
+            modes,
             placed,
             lights: self.scene.lights.iter().map(LightRecord::from).collect(),
             grid: GridRecord::from(&setting.grid),
@@ -92,18 +98,24 @@ impl Game {
 
     fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
         let kd = self.scene.materials[self.scene.clouds[group.i_cloud].i_material].kd;
-        GroupRecord::new(group, origin, self.cloud_centers[group.i_cloud], kd)
+        let i_mode: usize = self.modes[..group.i_cloud].iter().map(Vec::len).sum();
+        let n_modes = self.modes[group.i_cloud].len();
+        GroupRecord::new(group, origin, self.cloud_centers[group.i_cloud], kd, (i_mode as u32, n_modes as u32))
     }
 
     /// Every particle at its group's place, in f64 until the last step.
-    fn place(&self, rest: &[ParticleRecord], origins: &[DVec3]) -> Vec<PlacedRecord> {
+    fn place(&self, rest: &[ParticleRecord], origins: &[DVec3], time_s: f64) -> Vec<PlacedRecord> {
         let mut placed = Vec::with_capacity(rest.len());
         for group in &self.groups {
             let offset = origins[group.i_cloud] + group.center;
+            let modes = &self.modes[group.i_cloud];
+            let phases: Vec<f64> = modes.iter().map(|m| m.phase_at(time_s)).collect();
             let first = group.i_first as usize;
             let particles = &rest[first..first + group.n_particles as usize];
             placed.extend(particles.iter().map(|p| {
-                let position = (Vec3::from(p.position).as_dvec3() + offset).as_vec3();
+                let rest = Vec3::from(p.position).as_dvec3();
+                let moved = rest + offset + displacement(modes, &phases, rest + group.center);
+                let position = moved.as_vec3();
                 PlacedRecord { position: position.to_array(), sigma: p.sigma }
             }));
         }

@@ -7,9 +7,10 @@ use crate::gpu::device::Limits;
 use crate::gpu::memory::storage_bytes;
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::{BoxRecord, GroupRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
+use crate::model::gust::N_MODES;
 use crate::model::scene::Scene;
 
 /// Checks every buffer that the scene will need, and their sum.
@@ -36,6 +37,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
         ("the sort's entries", 2 * n, 8),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),
+        ("the gusts", (scene.clouds.len() * N_MODES) as u64, size(size_of::<ModeRecord>())),
         ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
         ("the density grid's sums", n_cells_max(scene), 8),
         ("the density grid", n_cells_max(scene), 4),

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-use crate::layout::particle::{GroupRecord, PlacedRecord};
+use crate::layout::particle::{GroupRecord, ModeRecord, PlacedRecord};
 
 #[derive(Debug, Clone)]
 pub struct Packet {
@@ -15,6 +15,8 @@ pub struct Packet {
     pub game_ms: f64,
     pub camera: CameraRecord,
     pub groups: Vec<GroupRecord>,
+    /// Gusts of all clouds, one after the other.
+    pub modes: Vec<ModeRecord>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
     pub lights: Vec<LightRecord>,

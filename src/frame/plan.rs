@@ -61,7 +61,8 @@ pub struct Traits {
 pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let last = last.filter(|_| traits.skip);
     let same = |f: &dyn Fn(&Packet, &Packet) -> bool| last.is_some_and(|l| f(l, next));
-    let still = same(&|a, b| a.placed == b.placed && (b.placed.is_some() || a.groups == b.groups));
+    let still =
+        same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
     let same_grid = still && same(&|a, b| a.grid == b.grid);
     let same_facets = same_grid && same(&|a, b| a.groups == b.groups);
     let same_rays =
@@ -104,7 +105,7 @@ fn skip(reason: &'static str) -> Decision {
 mod tests {
     use super::*;
     use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-    use crate::layout::particle::GroupRecord;
+    use crate::layout::particle::{GroupRecord, ModeRecord};
     use std::time::Instant;
 
     const TRAITS: Traits = Traits { has_boxes: true, n_particles: 7, lit: true, skip: true };
@@ -117,6 +118,7 @@ mod tests {
             game_ms: 0.0,
             camera: CameraRecord { forward: [0.0, 0.0, -1.0], ..CameraRecord::default() },
             groups: vec![GroupRecord::default()],
+            modes: vec![],
             placed: None,
             lights: vec![LightRecord::default()],
             grid: GridRecord::default(),
@@ -151,6 +153,8 @@ mod tests {
         assert_eq!(after(&|p| p.lights[0].toward[1] = 1.0), ["transmit", "first", "sprites"]);
         let all_but_generate = ["place", "grid", "facets", "transmit", "first", "sort", "sprites"];
         assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
+        let gust = |p: &mut Packet| p.modes.push(ModeRecord::default());
+        assert_eq!(after(&gust), ["place", "grid", "facets", "transmit", "first", "sort", "sprites"]);
         assert_eq!(after(&|p| p.grid.cell = 0.5), ["grid", "facets", "transmit", "first", "sprites"]);
     }
 

@@ -130,6 +130,7 @@ impl Renderer {
 
     fn upload(&mut self, packet: &Packet) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
+        self.buffers.modes.write(&packet.modes)?;
         self.buffers.lights.write(&packet.lights)?;
         match (&mut self.buffers.placed_upload, &packet.placed) {
             (Some(upload), Some(placed)) => upload.write(placed),
@@ -171,7 +172,9 @@ impl Renderer {
                     Ok(())
                 })?;
             }
-            pass(rec, Pass::Place, &mut |rec| place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.placed], n))?;
+            pass(rec, Pass::Place, &mut |rec| {
+                place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.modes, &b.placed], n)
+            })?;
             pass(rec, Pass::Grid, &mut |rec| {
                 grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
             })?;

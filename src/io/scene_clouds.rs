@@ -13,6 +13,7 @@ use super::{box_file, particle_file};
 use crate::error::{Error, Result};
 use crate::model::boxes::Form;
 use crate::model::cloud::{Cloud, CloudSource};
+use crate::model::gust::Gust;
 use crate::model::material::Material;
 
 /// What a cloud's keys refer to.
@@ -23,6 +24,16 @@ pub struct CloudReader<'a> {
     /// Of every file read, in order.
     pub digests: Vec<[u8; 32]>,
 }
+
+/// Keys of every cloud, after those of its source.
+macro_rules! with_cloud_keys {
+    ($($own:literal),*) => {
+        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "seed"]
+    };
+}
+
+const LIST_KEYS: &[&str] = with_cloud_keys!["from", "file"];
+const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_depth", "radius_scale"];
 
 #[derive(Clone, Copy)]
 enum From {
@@ -80,7 +91,7 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
     let source = match s.required_choice("from", &from, &["disc", "weather"])? {
         From::Boxes => read_boxes(s, reader)?,
         From::Particles => {
-            s.expect_keys(&["from", "file", "material", "texture", "position", "wind", "seed"], &[])?;
+            s.expect_keys(LIST_KEYS, &[])?;
             let (text, path) = reader.read_named(s)?;
             CloudSource::Particles(particle_file::parse(&text, &path)?)
         }
@@ -90,15 +101,22 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         source,
         position: s.vec3("position", DVec3::ZERO, Bounds::Any)?,
         wind: s.vec3("wind", DVec3::ZERO, Bounds::Any)?,
+        gust: read_gust(s)?,
         i_material: reader.read_material(s)?,
         seed: reader.read_seed(s, i_cloud)?,
     })
 }
 
+fn read_gust(s: &mut Section) -> Result<Gust> {
+    Ok(Gust {
+        amplitude: s.f64("gust", 0.0, Bounds::AtLeast(0.0))?,
+        length: s.f64("gust_length", 4.0, Bounds::Above(0.0))?,
+        period_s: s.f64("gust_period_s", 8.0, Bounds::Above(0.0))?,
+    })
+}
+
 fn read_boxes(s: &mut Section, reader: &mut CloudReader) -> Result<CloudSource> {
-    const KEYS: &[&str] =
-        &["from", "file", "form", "optical_depth", "radius_scale", "material", "texture", "position", "wind", "seed"];
-    s.expect_keys(KEYS, &[])?;
+    s.expect_keys(BOX_KEYS, &[])?;
     let (text, path) = reader.read_named(s)?;
     Ok(CloudSource::Boxes {
         boxes: box_file::parse(&text, &path)?,

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use crate::model::boxes::{CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::gust::Mode;
 use crate::record;
 
 record! {
@@ -110,19 +111,53 @@ record! {
         sigma_mean: f32,
         /// K_d of the cloud's material.
         kd: [f32; 3],
-        unused: u32,
+        n_modes: u32,
+        /// The group's centre relative to its cloud's origin.
+        center: [f32; 3],
+        /// Its cloud's first gust mode.
+        i_mode: u32,
     }
 }
 
 impl GroupRecord {
     /// `origin_from_light`: the cloud's origin at the frame's time minus the lighting origin, in f64.
-    pub fn new(group: &Group, origin_from_light: DVec3, cloud_center: DVec3, kd: DVec3) -> Self {
+    /// `modes`: first gust mode of the cloud, and how many it has.
+    pub fn new(
+        group: &Group,
+        origin_from_light: DVec3,
+        cloud_center: DVec3,
+        kd: DVec3,
+        (i_mode, n_modes): (u32, u32),
+    ) -> Self {
         GroupRecord {
             offset: (origin_from_light + group.center).as_vec3().to_array(),
             i_region: group.i_cloud as u32,
             cloud_center: (origin_from_light + cloud_center).as_vec3().to_array(),
             sigma_mean: group.sigma_mean as f32,
             kd: kd.as_vec3().to_array(),
+            n_modes,
+            center: group.center.as_vec3().to_array(),
+            i_mode,
+        }
+    }
+}
+
+record! {
+    /// One wave of a cloud's gusts at the frame's time: a sin(k·x + phase).
+    pub struct ModeRecord {
+        k: [f32; 3],
+        phase: f32,
+        a: [f32; 3],
+        unused: u32,
+    }
+}
+
+impl ModeRecord {
+    pub fn new(mode: &Mode, time_s: f64) -> Self {
+        ModeRecord {
+            k: mode.k.as_vec3().to_array(),
+            phase: mode.phase_at(time_s) as f32,
+            a: mode.a.as_vec3().to_array(),
             unused: 0,
         }
     }

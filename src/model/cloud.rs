@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
+use super::gust::Gust;
 
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
 pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
@@ -17,6 +18,7 @@ pub struct Cloud {
     pub position: DVec3,
     /// Scene units per second; the cloud's origin at time t is position + wind·t.
     pub wind: DVec3,
+    pub gust: Gust,
     /// Index into the scene's materials.
     pub i_material: usize,
     pub seed: u32,
@@ -166,7 +168,7 @@ mod tests {
             optical_depth: 1.0,
             radius_scale: 1.0,
         };
-        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::X, i_material: 0, seed: 1 };
+        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::X, gust: Gust::CALM, i_material: 0, seed: 1 };
         let firsts: Vec<u32> = cloud.groups(0, 10).iter().map(|g| g.i_first).collect();
         assert_eq!(firsts, [10, 13, 13]);
         assert_eq!(cloud.center(), DVec3::X);

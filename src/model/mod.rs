@@ -6,6 +6,7 @@ pub mod camera;
 pub mod cloud;
 pub mod film;
 pub mod grid;
+pub mod gust;
 pub mod light;
 pub mod material;
 pub mod philox;

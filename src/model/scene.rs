@@ -118,7 +118,7 @@ impl Scene {
     pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
         let boxes = groups.iter().filter(|g| g.n_particles > 0).map(|g| {
             let center = self.clouds[g.i_cloud].origin_at(time_s) + g.center;
-            let reach = g.half_extent + DVec3::splat(n_sigma * g.sigma_max);
+            let reach = g.half_extent + DVec3::splat(n_sigma * g.sigma_max + self.clouds[g.i_cloud].gust.reach());
             (center - reach, center + reach)
         });
         boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))

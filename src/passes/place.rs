@@ -1,7 +1,8 @@
 //! place: where the particles are this frame.
 //!
-//! In: particles relative to their groups, group of each, groups' offsets. Out: position relative to the lighting
-//! origin, and σ. Law: placed = position + offset. Source: docs/model.md §11. Error: half an ulp of the sum.
+//! In: particles relative to their groups, group of each, groups' offsets, gust modes. Out: position relative to the
+//! lighting origin, and σ. Law: placed = position + offset + Σ a sin(k·x + phase). Source: docs/model.md §11, §12. Error: an
+//! ulp of the sums; of each wave |a| (3.5 ulp of the sine + the argument's rounding).
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -20,13 +21,13 @@ impl Place {
         Ok(Place { kernel: Kernel::new(device, compiler, "place", Push::FIELDS, &[])? })
     }
 
-    /// `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord; `placed`: PlacedRecord.
+    /// `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord; `modes`: ModeRecord; `placed`: PlacedRecord.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        [particles, i_group, groups, placed]: [&Buffer; 4],
+        [particles, i_group, groups, modes, placed]: [&Buffer; 5],
         n_particles: u32,
     ) -> Result<()> {
-        rec.dispatch(&self.kernel, &[particles, i_group, groups, placed], &Push { n_particles }, n_particles)
+        rec.dispatch(&self.kernel, &[particles, i_group, groups, modes, placed], &Push { n_particles }, n_particles)
     }
 }

@@ -168,7 +168,7 @@ mod tests {
     fn a_facet_lies_on_its_shell_and_without_direction_faces_up() {
         let blob = Blob { position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
         let empty = vec![0.0; 125_000];
-        let facets = facets(&SPEC, &empty, &[blob, blob], &[1, 0], &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE]);
+        let facets = facets(&SPEC, &empty, &[blob, blob], &[0.0; 2], &[1, 0], &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE]);
         assert_eq!((facets[0].normal, facets[0].conditioning, facets[0].region), (DVec3::Y, 0.0, 1));
         assert_eq!(facets[0].position, DVec3::new(1.0, 1.75, 1.0));
         assert_eq!((facets[1].normal, facets[1].position.z), (DVec3::NEG_Z, 0.25));

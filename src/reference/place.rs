@@ -29,6 +29,22 @@ pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DV
     placed
 }
 
+/// Adds the gusts of model.md §12 to placed positions: d(x, t) = Σ a sin(k·x + ω t + φ), x the particle at rest relative
+/// to its cloud's origin. `rest` are the group-relative positions.
+pub fn add_gusts(placed: &mut [DVec3], rest: &[DVec3], groups: &[Group], clouds: &[Cloud], time_s: f64) {
+    for group in groups {
+        let cloud = &clouds[group.i_cloud];
+        let modes = cloud.gust.modes(cloud.seed);
+        let first = group.i_first as usize;
+        for i in first..first + group.n_particles as usize {
+            let x = rest[i] + group.center;
+            for m in &modes {
+                placed[i] += m.a * (m.k.dot(x) + m.omega * time_s + m.phase).sin();
+            }
+        }
+    }
+}
+
 /// Number of the cloud (the region) that each particle belongs to.
 pub fn regions(groups: &[Group]) -> Vec<u32> {
     groups.iter().flat_map(|g| std::iter::repeat_n(g.i_cloud as u32, g.n_particles as usize)).collect()
@@ -43,6 +59,7 @@ pub fn blobs(generated: &[Generated], placed: &[DVec3]) -> Vec<Blob> {
 mod tests {
     use super::*;
     use crate::model::cloud::{CloudSource, Particle};
+    use crate::model::gust::Gust;
 
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
@@ -51,6 +68,7 @@ mod tests {
             source: CloudSource::Particles(list),
             position: DVec3::Y * y,
             wind,
+            gust: Gust::CALM,
             i_material: 0,
             seed: 0,
         };

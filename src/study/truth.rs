@@ -29,7 +29,8 @@ impl Truth {
         let generated: Vec<Generated> = scene.clouds.iter().flat_map(reference::generate::cloud).collect();
         let offsets = reference::place::offsets(&groups, &scene.clouds, time_s, setting.light_origin);
         let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
-        let placed = reference::place::place(&positions, &groups, &offsets);
+        let mut placed = reference::place::place(&positions, &groups, &offsets);
+        reference::place::add_gusts(&mut placed, &positions, &groups, &scene.clouds, time_s);
         let blobs = reference::place::blobs(&generated, &placed);
         let colors = colors(scene);
         let mut truth =

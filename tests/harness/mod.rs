@@ -79,6 +79,10 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
     let bad: Vec<_> = (0..values.len()).filter_map(check).collect();
     if let Some((i, error)) = bad.first() {
         let (value, truth, bound) = (values[*i], truths[*i], bounds[*i]);
-        panic!("{what}: {} of {} out of bound; first [{i}] {value} against {truth}: error {error:e}, bound {bound:e}", bad.len(), values.len());
+        panic!(
+            "{what}: {} of {} out of bound; first [{i}] {value} against {truth}: error {error:e}, bound {bound:e}",
+            bad.len(),
+            values.len()
+        );
     }
 }

@@ -1,0 +1,149 @@
+//! Whatever way a frame is made, it is the same frame: serial and parallel, with and without skipping, twice, alone or
+//! after others. Compared byte for byte as it lies in the target, every frame of a short run.
+
+mod harness;
+
+use harness::Gpu;
+use nimbus::frame::FrameTimes;
+use nimbus::frame::game::Game;
+use nimbus::frame::plan::Pass;
+use nimbus::frame::render::Renderer;
+use nimbus::frame::{parallel, serial};
+use nimbus::io::scene_file;
+use nimbus::model::scene::{Scene, Simulate, Threading};
+use std::path::Path;
+use std::sync::Arc;
+
+const N_FRAMES: u32 = 6;
+
+/// A moving camera, two drifting clouds with gusts, a list beside boxes: every pass has something to do.
+fn scene(overrides: &[&str]) -> Scene {
+    let mut all = vec!["film.width=160", "film.height=120", "lighting.grid=24"];
+    all.extend(overrides);
+    let all: Vec<String> = all.into_iter().map(str::to_owned).collect();
+    scene_file::load(Path::new("tests/data/modes.toml"), &all, None).expect("the scene loads").scene
+}
+
+/// Every frame's bytes, and what each ran.
+fn run(scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTimes)> {
+    let gpu = Gpu::new();
+    let scene = Arc::new(scene);
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, skip).expect("a renderer");
+    let rest = match scene.threads.simulate {
+        Simulate::Gpu => None,
+        Simulate::Cpu => Some(renderer.generate_now(&gpu.device).expect("particles").0),
+    };
+    let mut game = Game::new(scene.clone(), rest);
+    let mut frames = Vec::new();
+    let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
+        frames.push((renderer.image_bytes(&gpu.device)?, times));
+        Ok(true)
+    };
+    let done = match threading {
+        Threading::Serial => serial::run(&mut game, &mut renderer, 0..N_FRAMES, on_frame),
+        Threading::Parallel => parallel::run(&mut game, &mut renderer, 0..N_FRAMES, on_frame),
+    };
+    done.expect("the frames run");
+    assert_eq!(frames.len(), N_FRAMES as usize);
+    assert!(frames.iter().all(|(bytes, _)| bytes.iter().any(|b| *b != 0)), "a frame is empty");
+    frames
+}
+
+fn images(frames: Vec<(Vec<u8>, FrameTimes)>) -> Vec<Vec<u8>> {
+    frames.into_iter().map(|f| f.0).collect()
+}
+
+#[test]
+fn two_runs_serial_parallel_and_no_skip_give_the_same_bytes_for_every_frame() {
+    for simulate in ["threads.simulate=gpu", "threads.simulate=cpu"] {
+        for motion in [&[][..], &["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"]] {
+            let overrides = [&[simulate], motion].concat();
+            let first = images(run(scene(&overrides), Threading::Serial, true));
+            assert_eq!(first, images(run(scene(&overrides), Threading::Serial, true)), "{overrides:?}: twice");
+            assert_eq!(first, images(run(scene(&overrides), Threading::Parallel, true)), "{overrides:?}: parallel");
+            assert_eq!(first, images(run(scene(&overrides), Threading::Serial, false)), "{overrides:?}: no skip");
+            // The comparison can fail: the camera moves, so no two frames are alike.
+            assert!(first.windows(2).all(|w| w[0] != w[1]));
+        }
+    }
+}
+
+#[test]
+fn a_still_scene_skips_and_a_moving_one_does_not() {
+    let still = ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
+    let frames = run(scene(&still), Threading::Serial, true);
+    let plan = frames[2].1.plan;
+    for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Facets, Pass::Transmit, Pass::First] {
+        assert!(!plan.runs(pass), "{}", pass.name());
+    }
+    assert!(plan.runs(Pass::Sprites));
+    let frames = run(scene(&[]), Threading::Serial, true);
+    assert!(Pass::ALL[1..].iter().all(|p| frames[2].1.plan.runs(*p)));
+}
+
+#[test]
+fn a_frame_made_alone_is_the_frame_of_the_run() {
+    let in_run = images(run(scene(&[]), Threading::Serial, true));
+    let gpu = Gpu::new();
+    let scene = Arc::new(scene(&[]));
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    let mut game = Game::new(scene.clone(), None);
+    for i_frame in [4, 1] {
+        renderer.step(game.step(i_frame).expect("a packet")).expect("a frame");
+        assert_eq!(renderer.image_bytes(&gpu.device).expect("bytes"), in_run[i_frame as usize], "frame {i_frame}");
+    }
+}
+
+#[test]
+fn the_game_thread_and_the_gpu_place_particles_alike() {
+    let placed = |simulate: &str| {
+        let gpu = Gpu::new();
+        let scene = Arc::new(scene(&[simulate]));
+        let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+        let rest = renderer.generate_now(&gpu.device).expect("particles").0;
+        let rest = (scene.threads.simulate == Simulate::Cpu).then_some(rest);
+        let mut game = Game::new(scene.clone(), rest);
+        renderer.step(game.step(3).expect("a packet")).expect("a frame");
+        renderer.placed(&gpu.device).expect("places")
+    };
+    let (gpu, cpu) = (placed("threads.simulate=gpu"), placed("threads.simulate=cpu"));
+    assert_eq!(gpu.len(), cpu.len());
+    for (a, b) in gpu.iter().zip(&cpu) {
+        for axis in 0..3 {
+            // f32 roundings of sums of magnitude < 16 (2⁻²⁰ each, a handful) and of 16 waves whose amplitudes sum to less
+            // than 1 and whose arguments, below 64, are off by 2⁻¹⁸.
+            assert!((a.position[axis] - b.position[axis]).abs() < 1e-5, "{a:?} {b:?}");
+        }
+    }
+}
+
+#[test]
+fn an_error_of_the_game_step_ends_the_parallel_loop() {
+    // The camera passes through its target between two keys.
+    let turn = r#"camera.path=[{time_s=0,position=[0,0,10],target=[0,0,0]},{time_s=0.0333,position=[0,0,0],target=[0,0,1]},{time_s=0.0666,position=[0,0,-10],target=[0,0,0]}]"#;
+    let scene = Arc::new(scene(&[turn, "time.step_s=0.01"]));
+    let mut broken = (*scene).clone();
+    broken.camera.keys[1].target = broken.camera.keys[1].position;
+    let broken = Arc::new(broken);
+    let gpu = Gpu::new();
+    for parallel in [false, true] {
+        let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &broken, true).expect("a renderer");
+        let mut game = Game::new(broken.clone(), None);
+        game.step_at(0, broken.camera.keys[1].time_s).expect_err("the camera looks nowhere there");
+        let frames = 0..u32::MAX;
+        let mut n = 0;
+        // Frames at multiples of the key's time: the second one fails.
+        let mut scene = (*broken).clone();
+        scene.time.step_s = scene.camera.keys[1].time_s;
+        let mut failing = Game::new(Arc::new(scene), None);
+        let on_frame = &mut |_: FrameTimes, _: &mut Renderer| {
+            n += 1;
+            Ok(true)
+        };
+        let done = match parallel {
+            true => parallel::run(&mut failing, &mut renderer, frames, on_frame),
+            false => serial::run(&mut failing, &mut renderer, frames, on_frame),
+        };
+        assert_eq!((done.expect_err("the error comes through").exit_code(), n), (2, 1));
+    }
+}

@@ -36,7 +36,7 @@ fn run(scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTim
     let mut game = Game::new(scene.clone(), rest);
     let mut frames = Vec::new();
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
-        frames.push((renderer.image_bytes(&gpu.device)?, times));
+        frames.push((renderer.image_bytes()?, times));
         Ok(true)
     };
     let done = match threading {
@@ -90,7 +90,7 @@ fn a_frame_made_alone_is_the_frame_of_the_run() {
     let mut game = Game::new(scene.clone(), None);
     for i_frame in [4, 1] {
         renderer.step(game.step(i_frame).expect("a packet")).expect("a frame");
-        assert_eq!(renderer.image_bytes(&gpu.device).expect("bytes"), in_run[i_frame as usize], "frame {i_frame}");
+        assert_eq!(renderer.image_bytes().expect("bytes"), in_run[i_frame as usize], "frame {i_frame}");
     }
 }
 

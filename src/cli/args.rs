@@ -102,6 +102,9 @@ pub struct BenchArgs {
     /// Folder for run.json and frames.csv (with several scenes: a folder each in it)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Write every frame's image hash to frames.csv; reading the frames back disturbs the times
+    #[arg(long, requires = "out")]
+    pub hash_frames: bool,
     /// Replace existing results
     #[arg(long)]
     pub force: bool,

@@ -77,7 +77,8 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         ThreadingArg::Both => vec![Threading::Serial, Threading::Parallel],
     };
     let n_frames = args.frames.unwrap_or(loaded.scene.time.n_frames);
-    let plan = BenchPlan { modes, n_frames, n_warm_up: args.warmup, n_blocks: args.repeat };
+    let plan =
+        BenchPlan { modes, n_frames, n_warm_up: args.warmup, n_blocks: args.repeat, hash_frames: args.hash_frames };
     let simulate = loaded.scene.threads.simulate;
     let mut stage = Stage::new(loaded.scene, &device_choice(&args.common), !args.common.no_skip)?;
     let n_total = u64::from(plan.n_blocks) * plan.modes.len() as u64 * (u64::from(n_frames) + u64::from(args.warmup));

@@ -20,7 +20,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let mut stage = Stage::new(loaded.scene, &device_choice(&args.common), !args.common.no_skip)?;
     let packet = stage.game.step_at(args.frame, time_s)?;
     let rendered = stage.renderer.step(packet)?;
-    let rgba = stage.renderer.image(&stage.device)?;
+    let rgba = stage.renderer.image()?;
     if args.common.verbose {
         eprintln!("{} ({})", stage.info().name, stage.info().driver);
         for pass in Pass::ALL {

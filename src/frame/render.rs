@@ -35,7 +35,7 @@ pub struct Renderer {
     sprites: Sprites,
     buffers: Buffers,
     target: Image,
-    readback: Option<Buffer>,
+    readback: Buffer,
     commands: Commands,
     settings: Settings,
     traits: Traits,
@@ -51,7 +51,7 @@ struct Settings {
     forward: f64,
     sort_bits: u32,
     cutoff: f64,
-    format: FilmFormat,
+    format: TargetFormat,
 }
 
 /// What a render step tells of itself.
@@ -74,6 +74,7 @@ impl Renderer {
             FilmFormat::Rgba16f => TargetFormat::Rgba16f,
             FilmFormat::Rgba32f => TargetFormat::Rgba32f,
         };
+        let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut renderer = Renderer {
             generate: Generate::new(device, compiler)?,
@@ -86,7 +87,7 @@ impl Renderer {
             sprites: Sprites::new(device, compiler, format, lit)?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
-            readback: None,
+            readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
             commands: Commands::new(device, "frame")?,
             settings: Settings {
                 n_particles,
@@ -96,7 +97,7 @@ impl Renderer {
                 forward: scene.lighting.forward,
                 sort_bits: scene.draw.sort_bits,
                 cutoff: scene.draw.cutoff,
-                format: scene.film.format,
+                format,
             },
             traits: Traits {
                 has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
@@ -202,36 +203,25 @@ impl Renderer {
     }
 
     /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
-    pub fn image(&mut self, device: &Device) -> Result<Vec<f32>> {
-        let bytes = self.image_bytes(device)?;
+    pub fn image(&mut self) -> Result<Vec<f32>> {
+        let bytes = self.image_bytes()?;
         Ok(match self.settings.format {
-            FilmFormat::Rgba16f => {
+            TargetFormat::Rgba16f => {
                 let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
                 halves.into_iter().map(half::f16::to_f32).collect()
             }
-            FilmFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
+            TargetFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
         })
     }
 
     /// The last frame as it lies in the target: what "the same bytes" means.
-    pub fn image_bytes(&mut self, device: &Device) -> Result<Vec<u8>> {
-        let pixel = match self.settings.format {
-            FilmFormat::Rgba16f => 8,
-            FilmFormat::Rgba32f => 16,
-        };
-        let n = self.target.n_pixels() * pixel;
-        let readback = match self.readback.take() {
-            Some(buffer) => buffer,
-            None => Buffer::new::<u8>(device, "sprites.readback", n, Place::Readback)?,
-        };
-        let target = &mut self.target;
+    pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
+        let (target, readback) = (&mut self.target, &self.readback);
         self.commands.run(|rec| {
-            rec.copy_image(target, &readback);
+            rec.copy_image(target, readback);
             Ok(())
         })?;
-        let bytes = readback.read(n as usize);
-        self.readback = Some(readback);
-        bytes
+        readback.read((target.n_pixels() * self.settings.format.bytes_per_pixel()) as usize)
     }
 
     /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.

@@ -10,6 +10,8 @@ use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
 use crate::frame::plan::Pass;
+use crate::frame::render::Renderer;
+use crate::gpu::shader::hex;
 use crate::measure::clock::Clock;
 use crate::measure::stats::{Bootstrap, Interval, median};
 use crate::model::scene::{Simulate, Threading};
@@ -24,6 +26,8 @@ pub struct BenchPlan {
     pub n_warm_up: u32,
     /// Blocks of each mode.
     pub n_blocks: u32,
+    /// Read back and hash every frame, which adds to the next one's time.
+    pub hash_frames: bool,
 }
 
 /// One frame of one block.
@@ -33,6 +37,7 @@ pub struct Sample {
     pub i_block: u32,
     pub warm_up: bool,
     pub times: FrameTimes,
+    pub image_hash: Option<String>,
 }
 
 /// What a bench came to. Kept whole also when it was interrupted.
@@ -72,8 +77,9 @@ pub fn run(stage: &mut Stage, plan: &BenchPlan, stop: &AtomicBool, tick: &mut dy
         .ok_or_else(|| Error::usage("--frames and --warmup together exceed 32 bits"))?;
     for (i_block, threading) in block_order(&plan.modes, plan.n_blocks) {
         let samples = &mut outcome.samples;
-        let on_frame = &mut |times: FrameTimes, _: &mut _| {
-            samples.push(Sample { threading, i_block, warm_up: times.i_frame < plan.n_warm_up, times });
+        let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
+            let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
+            samples.push(Sample { threading, i_block, warm_up: times.i_frame < plan.n_warm_up, times, image_hash });
             tick();
             Ok(!stop.load(Ordering::Relaxed))
         };
@@ -82,10 +88,14 @@ pub fn run(stage: &mut Stage, plan: &BenchPlan, stop: &AtomicBool, tick: &mut dy
             outcome.interrupted = true;
             break;
         }
-        let bytes = stage.renderer.image_bytes(&stage.device)?;
-        outcome.image_hashes.insert(name_of(threading), crate::gpu::shader::hex(&Sha256::digest(&bytes)));
+        outcome.image_hashes.insert(name_of(threading), image_hash(&mut stage.renderer)?);
     }
     Ok(outcome)
+}
+
+/// SHA-256 of the last frame, as it lies in the target.
+fn image_hash(renderer: &mut Renderer) -> Result<String> {
+    Ok(hex(&Sha256::digest(renderer.image_bytes()?)))
 }
 
 impl FrameTimes {
@@ -167,7 +177,7 @@ impl Outcome {
             latency_ms: s.times.latency_ms,
             queue_depth: s.times.queue_depth as usize,
             pass_ms: names.iter().map(|n| s.times.pass_ms(n)).collect(),
-            image_hash: None,
+            image_hash: s.image_hash.clone(),
         };
         self.samples.iter().map(row).collect()
     }

@@ -49,7 +49,7 @@ impl Scene {
         let centers = [DVec3::new(-3.0, 0.1, 0.0), DVec3::new(3.2, -0.3, 0.2)];
         let blob = |i: u32| {
             let [a, b, c, d] = uniforms(0xface, 0, i, 0);
-            let spread = if i % 50 == 0 { 4.5 } else { 2.0 };
+            let spread = if i.is_multiple_of(50) { 4.5 } else { 2.0 };
             let position = centers[(i / 1500) as usize] + spread * (DVec3::new(a, b, c) * 2.0 - 1.0);
             let sigma = f64::from((0.05 + 0.5 * d * d) as f32);
             Blob { position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }

@@ -30,7 +30,8 @@ shared float weights[3][MAX_CELLS];
 // Share of a unit Gaussian at 0 between cell faces a and b (in sigma), cut at +-CUT_SIGMA.
 float weight(float a, float b) {
     float low = clamp(a, -CUT_SIGMA, CUT_SIGMA), high = clamp(b, -CUT_SIGMA, CUT_SIGMA);
-    return 0.5 / WITHIN_CUT * (erf_approx(high * 0.70710678118) - erf_approx(low * 0.70710678118));
+    // Not negative even where rounding makes it so: a negative float has no defined uint.
+    return max(0.5 / WITHIN_CUT * (erf_approx(high * 0.70710678118) - erf_approx(low * 0.70710678118)), 0.0);
 }
 
 void main() {

@@ -22,7 +22,8 @@ float sine(float x) {
     return (int(k) & 1) == 0 ? value : -value;
 }
 
-// erf x: Abramowitz and Stegun 7.1.28, |error| <= 3e-7; exact sign symmetry.
+// erf x: Abramowitz and Stegun 7.1.28, whose own error is at most 3e-7; exact sign symmetry. In f32 the 16th power
+// multiplies d's rounding: |error| <= 2.5e-6 near 0, falling to 4e-7 where the result is near 1.
 float erf_approx(float x) {
     float a = abs(x);
     float d = 1.0 + a * (0.0705230784 + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143 + a * (0.0002765672 + a * 0.0000430638)))));

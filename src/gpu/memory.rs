@@ -68,8 +68,10 @@ impl Buffer {
     /// Copies `data` to the start of an upload buffer. The GPU must not be reading it.
     pub fn write<T: Pod>(&mut self, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
+        // The allocation may be larger than the buffer.
+        let size = self.bytes as usize;
         let mapped = self.allocation.as_mut().and_then(Allocation::mapped_slice_mut);
-        match mapped.and_then(|m| m.get_mut(..bytes.len())) {
+        match mapped.and_then(|m| m.get_mut(..size)?.get_mut(..bytes.len())) {
             Some(target) => {
                 target.copy_from_slice(bytes);
                 Ok(())
@@ -86,7 +88,7 @@ impl Buffer {
     /// The first `n` records of a readback buffer. The GPU must have finished writing it.
     pub fn read<T: Pod>(&self, n: usize) -> Result<Vec<T>> {
         let mapped = self.allocation.as_ref().and_then(Allocation::mapped_slice);
-        match mapped.and_then(|m| m.get(..n * size_of::<T>())) {
+        match mapped.and_then(|m| m.get(..self.bytes as usize)?.get(..n.checked_mul(size_of::<T>())?)) {
             // collect: the mapping's alignment is the allocator's, not T's.
             Some(bytes) => Ok(bytemuck::pod_collect_to_vec(bytes)),
             None => Err(Error::limit(format!(

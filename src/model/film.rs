@@ -66,6 +66,10 @@ fn neutral(color: DVec3) -> DVec3 {
     if peak.is_nan() || peak < START_COMPRESSION {
         return color;
     }
+    // The curve's limit; its quotient would be ∞·0.
+    if peak == f64::INFINITY {
+        return DVec3::ONE;
+    }
     let d = 1.0 - START_COMPRESSION;
     let new_peak = 1.0 - d * d / (peak + d - START_COMPRESSION);
     let gray = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
@@ -109,5 +113,16 @@ mod tests {
         assert_eq!(neutral(DVec3::splat(0.79)), DVec3::splat(0.79));
         let peaks: Vec<f64> = (0..100).map(|i| neutral(DVec3::splat(0.8 + 0.1 * f64::from(i))).x).collect();
         assert!(peaks.windows(2).all(|w| w[0] < w[1]) && peaks[99] < 1.0);
+    }
+
+    #[test]
+    fn what_is_infinitely_bright_is_white() {
+        for tone_map in [ToneMap::Neutral, ToneMap::Clip] {
+            let white = film(tone_map).display(DVec3::INFINITY, 1.0);
+            assert_eq!(white, DVec3::splat(srgb_encode(1.0)));
+        }
+        // One channel alone desaturates as any highlight does.
+        assert_eq!(neutral(DVec3::new(f64::INFINITY, 0.2, 0.0)), DVec3::ONE);
+        assert!((neutral(DVec3::new(1e30, 0.2, 0.0)) - DVec3::ONE).length() < 1e-12);
     }
 }

@@ -45,6 +45,14 @@ pub fn add_gusts(placed: &mut [DVec3], rest: &[DVec3], groups: &[Group], clouds:
     }
 }
 
+/// Bound, axis by axis, on |f32 − f64| of a placed position: the position's own error, the offset rounded to f32
+/// once (u|offset|), and the sum rounded once. That last rounding is of the *computed* sum, which lies within the two
+/// first errors of `placed`.
+pub fn placed_bound(position_bound: DVec3, offset: DVec3, placed: DVec3, u: f64) -> DVec3 {
+    let inherited = position_bound + u * offset.abs();
+    inherited + u * (placed.abs() + inherited)
+}
+
 /// Number of the cloud (the region) that each particle belongs to.
 pub fn regions(groups: &[Group]) -> Vec<u32> {
     groups.iter().flat_map(|g| std::iter::repeat_n(g.i_cloud as u32, g.n_particles as usize)).collect()
@@ -86,6 +94,9 @@ mod tests {
         let placed = place(&relative, &groups, &offsets);
         assert_eq!((placed[0], placed[1]), (DVec3::new(1.0, 0.0, 9.0), DVec3::new(5.0, 0.0, 9.0)));
         assert_eq!(regions(&groups), [0, 0, 1]);
+        // By hand with u = 1/8: 1 + 4/8 inherited, the sum at most 10 + 1.5 in magnitude.
+        let bound = placed_bound(DVec3::ONE, DVec3::splat(-4.0), DVec3::splat(10.0), 0.125);
+        assert_eq!(bound, DVec3::splat(1.5 + 11.5 / 8.0));
         assert_eq!(cloud_centers(&clouds, 10.0, origin)[0], offsets[0]);
         assert_eq!(blobs(&generated, &placed)[1], Blob { position: placed[1], sigma: 1.0, kappa: 1.0 });
     }

@@ -3,7 +3,8 @@
 //! +, −, × are correctly rounded (unit round-off u = 2⁻²⁴; a fused multiply-add only rounds less), multiplying
 //! by a power of two is exact, constants and extents are rounded to f32 once, the uniforms are exact (24 bits),
 //! and a sine's absolute error is at most [`SINE_ERROR`] at an argument that reduction has moved by at most
-//! [`REDUCTION_ERROR`]·u·|argument|. Underflow is left out: nothing here divides, so it costs less than 2⁻¹²⁰.
+//! [`REDUCTION_ERROR`]·u·|argument|. A division errs by at most [`DIVISION_ERROR`]·u. Underflow is left out:
+//! what is divided is only floored, so it costs less than 2⁻¹²⁰.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -20,6 +21,9 @@ pub const SINE_ERROR: f64 = 4.0 * U_F32;
 
 /// Argument reduction: the absolute error of the reduced argument, in u·|argument|.
 pub const REDUCTION_ERROR: f64 = 2.0;
+
+/// Greatest relative error of an f32 division, in u: Vulkan's 2.5 ulp, an ulp being at most 2u.
+pub const DIVISION_ERROR: f64 = 5.0;
 
 /// A number and a bound on how far its f32 evaluation may lie from it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -109,16 +113,18 @@ pub fn radius_bound(form: Form, radius_max: f64, u4: f64, u: f64) -> f64 {
 }
 
 /// Bound on the folded offset of an offset `v` that is itself off by `error`, for w evaluated as
-/// a − 4h·floor(a/4h), a = v + h.
+/// a − 4h·floor(a/4h), a = v + h, and the result cut to [−h, h].
 pub fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
     if half <= 0.0 {
         return 0.0;
     }
     let k = ((v + half) / (4.0 * half)).floor().abs();
     // The result is v − 4kh or 2h − v + 4kh, so it inherits δv and (2 + 4k)δh, δh = uh. Roundings: a; the product
-    // 4hk; the difference, below 4h; the last one, below 2h. A floor that errs by one beside a multiple
-    // of 4h costs nothing more, fold being continuous there.
+    // 4hk; the difference, below 4h; the last one, below 2h.
     let roundings = (v.abs() + half) + 4.0 * half * k + 4.0 * half + 2.0 * half;
+    // A quotient off by DIVISION_ERROR errs in its floor only that near to a multiple of 4h. There w leaves [0, 4h) by
+    // as much, the result is cut to the face, and the true one lies as far inside.
+    let roundings = roundings + DIVISION_ERROR * (k + 1.0) * 4.0 * half;
     // The computed a and k may lie one error further out: (1 + 4u) on every term covers it.
     (error + u * ((2.0 + 4.0 * k) * half + roundings)) * (1.0 + 4.0 * u)
 }

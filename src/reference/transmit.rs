@@ -7,7 +7,8 @@ use super::grid::sample;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 
-/// Greatest number of march steps: 8 a cell along the longest axis of the largest grid, so that no `step` knob can hang a GPU.
+/// Greatest number of march steps, 8 a cell along the longest axis of the largest grid: no `step` knob hangs a GPU.
+/// A march that would need more ends after this many.
 pub const MAX_STEPS: u32 = 4096;
 
 /// Distance from `p` along unit `d` to where the ray leaves the grid's box; 0 where `p` is not inside.
@@ -26,19 +27,22 @@ pub fn exit_distance(spec: &GridSpec, p: DVec3, d: DVec3) -> f64 {
     if length.is_finite() { length } else { 0.0 }
 }
 
-/// Number of equal march steps over `length`; `step` is in cells.
+/// Number of march steps over `length`, the last one shorter; `step` is in cells.
 pub fn n_steps(spec: &GridSpec, length: f64, step: f64) -> u32 {
     // `as` saturates; NaN (0/0) becomes 0 and then 1.
     ((length / (step * spec.cell)).ceil() as u32).clamp(1, MAX_STEPS)
 }
 
-/// τ = Σ ρ(x_k) s by midpoints from `p` toward unit `d`.
+/// τ = Σ ρ(x_k) s_k from `p` toward unit `d`: steps of `step` cells, the last one shorter, so that τ is continuous in
+/// the length; x_k is the middle of step k.
 pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, step: f64) -> f64 {
     let length = exit_distance(spec, p, d);
-    let n = n_steps(spec, length, step);
-    let s = length / f64::from(n);
-    let sum: f64 = (0..n).map(|k| sample(spec, cells, p + (f64::from(k) + 0.5) * s * d)).sum();
-    sum * s
+    let of_step = |k: u32| {
+        let from = f64::from(k) * step * spec.cell;
+        let s = (step * spec.cell).min(length - from);
+        sample(spec, cells, p + (from + 0.5 * s) * d) * s
+    };
+    (0..n_steps(spec, length, step)).map(of_step).sum()
 }
 
 /// τ of every facet toward every light.
@@ -100,5 +104,24 @@ mod tests {
         assert_eq!(exit_distance(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0)), 0.25 / 0.6);
         assert_eq!([n_steps(&SPEC, 3.75, 0.5), n_steps(&SPEC, 3.76, 0.5), n_steps(&SPEC, 0.0, 0.5)], [15, 16, 1]);
         assert_eq!(n_steps(&SPEC, 3.75, 1e-9), MAX_STEPS);
+    }
+
+    #[test]
+    fn the_last_step_is_shorter_and_the_depth_continuous() {
+        // ρ = x between the centres of the first and the last cell: the midpoint rule is exact on whole steps.
+        let cells: Vec<f64> = (0..128).map(|i| 0.25 + 0.5 * f64::from(i % 8)).collect();
+        let tau = |x: f64| optical_depth(&SPEC, &cells, DVec3::new(x, 1.0, 1.0), DVec3::X, 1.0);
+        // By hand, steps of ½ from 2.8: midpoints 3.05, 3.55; the last from 3.8 to 4 is 0.2 long, its midpoint at
+        // 3.9 beyond the last centre. From 2.1 the last lies at 3.6…4, its midpoint 3.8 outside too.
+        assert!((tau(2.8) - 0.5 * (3.05 + 3.55)).abs() < 1e-14);
+        assert!((tau(2.1) - 0.5 * (2.35 + 2.85 + 3.35)).abs() < 1e-14);
+        // Where a ray's length passes a whole number of steps, the step that comes in has length 0. With an empty
+        // margin, as a scene's grid has it, the density is continuous too.
+        let margin: Vec<f64> = (0..128).map(|i| if i % 8 == 7 { 0.0 } else { cells[i] }).collect();
+        let tau = |x: f64| optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, 1.0);
+        assert!(tau(2.5) > 0.0 && (tau(2.5 - 1e-9) - tau(2.5 + 1e-9)).abs() < 1e-7);
+        // In a grid the march ends after MAX_STEPS.
+        let short = optical_depth(&SPEC, &[1.0; 128], DVec3::ONE, DVec3::X, 1e-4);
+        assert!((short - 4096.0 * 0.5e-4).abs() < 1e-12);
     }
 }

@@ -3,6 +3,8 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+pub mod bounds;
+
 use std::sync::Arc;
 
 use bytemuck::Pod;
@@ -84,5 +86,54 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
             bad.len(),
             values.len()
         );
+    }
+}
+
+impl Gpu {
+    /// The test's own kernel `name`, which may include what nimbus's shaders include.
+    pub fn test_kernel(&self, name: &str, text: &str, push: &[nimbus::gpu::Field]) -> nimbus::gpu::Kernel {
+        let file = format!("{name}.comp");
+        let texts = [&[(file.as_str(), text)], passes::SHADERS].concat();
+        let compiler = Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).expect("shaderc");
+        nimbus::gpu::Kernel::new(&self.device, &compiler, name, push, &[]).expect("the test's kernel")
+    }
+
+    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant that a test must notice.
+    pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
+        let mut sources = passes::sources();
+        assert!(sources.replace(file, from, to), "{file} does not hold {from}");
+        Compiler::new(sources, None).expect("shaderc")
+    }
+}
+
+/// The greatest error/bound over all elements, or what is out of bound: [`assert_within`] for checks that must fail.
+pub fn check_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) -> Result<f64, String> {
+    assert!(values.len() == truths.len() && values.len() == bounds.len(), "{what}: lengths");
+    let error = |i: usize| (values[i] - truths[i]).abs();
+    // Written so that NaN is bad.
+    let bad: Vec<usize> = (0..values.len()).filter(|i| !matches!(error(*i), e if e <= bounds[*i])).collect();
+    if let Some(&i) = bad.first() {
+        let (value, truth, bound) = (values[i], truths[i], bounds[i]);
+        let n = values.len();
+        return Err(format!("{what}: {} of {n} out of bound; [{i}] {value} against {truth} ± {bound:e}", bad.len()));
+    }
+    Ok((0..values.len()).map(|i| if error(i) > 0.0 { error(i) / bounds[i] } else { 0.0 }).fold(0.0, f64::max))
+}
+
+/// Asserts that all elements are within their bounds, says how much of its bound the worst one used, and proves that
+/// one element just beyond its bound, wherever it lies, or one NaN would have been noticed.
+pub fn assert_within_and_say(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
+    match check_within(what, values, truths, bounds) {
+        Ok(ratio) => println!("{what}: {} elements, greatest error/bound {ratio:.3}", values.len()),
+        Err(bad) => panic!("{bad}"),
+    }
+    for i in [0, values.len() / 2, values.len() - 1] {
+        // Half a bound beyond it; where the bound is 0, any difference.
+        let beyond = truths[i] + 1.5 * bounds[i] + 1e-30 + 1e-15 * truths[i].abs();
+        for wrong in [beyond, f64::NAN] {
+            let mut corrupted = values.to_vec();
+            corrupted[i] = wrong;
+            assert!(check_within(what, &corrupted, truths, bounds).is_err(), "{what}: {wrong} at {i} was not noticed");
+        }
     }
 }

@@ -1,0 +1,271 @@
+//! gpu/ itself: what it refuses, what it reports, and that the reports would come: missing barriers, leaks, limits, shaders
+//! that do not compile or do not fit, the SPIR-V cache.
+
+mod harness;
+
+use std::path::Path;
+
+use glam::{DVec3, UVec3};
+use harness::Gpu;
+use nimbus::error::Error;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::shader::Optimize;
+use nimbus::gpu::{Barriers, Buffer, Compiler, Device, Image, Instance, Kernel, Place, Sources};
+use nimbus::layout::frame::GridRecord;
+use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use nimbus::model::grid::GridSpec;
+use nimbus::passes;
+use nimbus::passes::{grid, place};
+use sha2::{Digest, Sha256};
+
+/// What validation says of place followed by the grid's deposit, which reads what place wrote; recorded, never submitted.
+fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
+    let spec = GridSpec { n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
+    let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
+    let grid = grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total()).unwrap();
+    let (particles, i_group) = (gpu.buffer::<ParticleRecord>(64), gpu.buffer::<u32>(64));
+    let (groups, placed) = (gpu.buffer::<GroupRecord>(1), gpu.buffer::<PlacedRecord>(64));
+    let density = gpu.buffer::<f32>(512);
+    let record = GridRecord::from(&spec);
+    let recorded = gpu.commands.record(barriers, |rec| {
+        place.record(rec, [&particles, &i_group, &groups, &placed], 64)?;
+        grid.record(rec, [&placed, &particles, &density], &record, 64, 1.0)
+    });
+    recorded.unwrap();
+    // Without their buffers the commands are void; what comes next is recorded anew.
+    gpu.commands.record(Barriers::Placed, |_| Ok(())).unwrap();
+    gpu.instance.messages().take()
+}
+
+#[test]
+fn a_missing_barrier_between_dispatches_is_reported() {
+    let mut gpu = Gpu::new();
+    let without = hazards_of_two_dispatches(&mut gpu, Barriers::Omitted);
+    assert!(without.iter().any(|m| m.contains("SYNC-HAZARD-READ-AFTER-WRITE")), "{without:?}");
+    assert_eq!(hazards_of_two_dispatches(&mut gpu, Barriers::Placed), [""; 0]);
+}
+
+#[test]
+fn a_missing_barrier_between_copies_is_reported() {
+    let mut gpu = Gpu::new();
+    let [a, b, c] = [(); 3].map(|()| gpu.buffer::<u32>(1000));
+    // Read after write, write after read, write after write.
+    let cases: [(&str, [&Buffer; 4]); 3] = [
+        ("SYNC-HAZARD-READ-AFTER-WRITE", [&a, &b, &b, &c]),
+        ("SYNC-HAZARD-WRITE-AFTER-READ", [&a, &b, &c, &a]),
+        ("SYNC-HAZARD-WRITE-AFTER-WRITE", [&a, &b, &c, &b]),
+    ];
+    for (hazard, [from, to, then_from, then_to]) in cases {
+        for barriers in [Barriers::Omitted, Barriers::Placed] {
+            let recorded = gpu.commands.record(barriers, |rec| {
+                rec.copy(from, to);
+                rec.copy(then_from, then_to);
+                Ok(())
+            });
+            recorded.unwrap();
+            let said = gpu.instance.messages().take();
+            match barriers {
+                Barriers::Omitted => assert!(said.iter().any(|m| m.contains(hazard)), "{hazard}: {said:?}"),
+                Barriers::Placed => assert!(said.is_empty(), "{said:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn a_leaked_buffer_is_reported_by_name_and_size() {
+    let instance = Instance::new(true).unwrap();
+    let device = Device::open(&instance, None).unwrap();
+    let kept = Buffer::new::<u32>(&device, "test.freed", 10, Place::Device).unwrap();
+    let leaked = Buffer::new::<u32>(&device, "test.leaked", 1000, Place::Device).unwrap();
+    drop(kept);
+    std::mem::forget(leaked);
+    drop(device);
+    let said = instance.messages().take();
+    assert_eq!(said.len(), 1, "{said:?}");
+    let bytes: u64 =
+        said[0].strip_prefix("leak: test.leaked (").unwrap().strip_suffix(" bytes)").unwrap().parse().unwrap();
+    // The allocation may be rounded up to what the device aligns to.
+    assert!((4000..=4000 + 65_536).contains(&bytes), "{bytes}");
+}
+
+#[test]
+fn without_a_leak_nothing_is_said() {
+    let gpu = Gpu::new();
+    let instance = gpu.instance.clone();
+    let buffer = gpu.buffer::<u32>(10);
+    drop(buffer);
+    drop(gpu);
+    assert_eq!(instance.messages().take(), [""; 0]);
+}
+
+#[test]
+fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
+    let gpu = Gpu::new();
+    let before = gpu.device.allocated_bytes();
+    for n in [1_000_000_000, u64::MAX / 2] {
+        let refused = Buffer::new::<[u32; 8]>(&gpu.device, "test.huge", n, Place::Device).err().unwrap();
+        let Error::Limit { what } = &refused else { panic!("{refused:?}") };
+        let limit = gpu.device.limits().max_storage_buffer_bytes;
+        assert!(what.contains(&format!("test.huge: {n} records of 32 bytes")), "{what}");
+        assert!(what.contains(&format!("maxStorageBufferRange {limit}")), "{what}");
+    }
+    let refused = Image::color_target(&gpu.device, "test.wide", 10_000_000, 4, TargetFormat::Rgba16f).err().unwrap();
+    let most = gpu.device.limits().max_image_extent;
+    assert!(matches!(&refused, Error::Limit { what } if what.contains(&format!("{most} along a side"))), "{refused}");
+    assert_eq!(gpu.device.allocated_bytes(), before);
+    // What just fits by the count is counted right: one record more than the limit, and one that is none.
+    let limits = gpu.device.limits();
+    let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes) / 32;
+    assert_eq!(nimbus::gpu::memory::storage_bytes(limits, "test", most, 32), Ok(32 * most));
+    assert!(nimbus::gpu::memory::storage_bytes(limits, "test", most + 1, 32).is_err());
+    assert_eq!(nimbus::gpu::memory::storage_bytes(limits, "test", 0, 32), Ok(32));
+}
+
+#[test]
+fn a_device_that_is_not_there_lists_those_that_are() {
+    let instance = Instance::new(true).unwrap();
+    let names: Vec<String> = Device::list(&instance).unwrap().into_iter().map(|d| d.name).collect();
+    assert!(!names.is_empty());
+    for choice in ["no such device", "4096"] {
+        let refused = Device::open(&instance, Some(choice)).err().unwrap();
+        assert!(matches!(refused, Error::Usage { .. }), "{refused:?}");
+        let text = refused.to_string();
+        assert!(text.contains(choice) && names.iter().all(|n| text.contains(n.as_str())), "{text}");
+    }
+    // A part of a name in any case, and an index.
+    assert_eq!(Device::open(&instance, Some(&names[0].to_uppercase())).unwrap().info().index, 0);
+    assert_eq!(Device::open(&instance, Some("0")).unwrap().info().name, names[0]);
+    assert_eq!(instance.messages().take(), [""; 0]);
+}
+
+#[test]
+fn errors_of_shaders_carry_file_and_line() {
+    let line_of = |file: &str, text: &str| {
+        let source = passes::SHADERS.iter().find(|(n, _)| *n == file).unwrap().1;
+        1 + source.lines().position(|l| l.contains(text)).unwrap()
+    };
+    for (file, from) in [("place.comp", "FOR_EACH(i"), ("include/functions.glsl", "float s = r * r;")] {
+        let compiler = Gpu::wrong_compiler(file, from, &format!("nonsense {from}"));
+        let user = if file.starts_with("include") { "facets.comp" } else { file };
+        let refused = compiler.compile(user, Optimize::Yes).err().unwrap();
+        let Error::Shader { name, what } = refused else { panic!("{refused:?}") };
+        assert_eq!(name, user);
+        assert!(what.contains(&format!("{file}:{}:", line_of(file, from))), "{what}");
+    }
+    let compiler = Compiler::new(passes::sources(), None).unwrap();
+    for file in ["absent.comp", "include/records.glsl"] {
+        assert!(matches!(compiler.compile(file, Optimize::Yes), Err(Error::Shader { .. })));
+    }
+}
+
+#[test]
+fn what_does_not_fit_the_shader_is_refused() {
+    let mut gpu = Gpu::new();
+    let new = |push: &[nimbus::gpu::Field]| Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", push, &[]).err();
+    assert!(new(grid::ResolvePush::FIELDS).is_none());
+    let wrong: [&[nimbus::gpu::Field]; 4] = [
+        &[("n_cells", 0, 4)],
+        &[("n_cells", 0, 4), ("density_per_quantum", 8, 4)],
+        &[("n_cells", 0, 4), ("density_per_quantum", 4, 8)],
+        &[("n_cells", 0, 4), ("density_per_quantum", 4, 4), ("more", 8, 4)],
+    ];
+    for push in wrong {
+        let refused = new(push).unwrap();
+        assert!(matches!(&refused, Error::Shader { name, .. } if name == "grid_resolve.comp"), "{refused:?}");
+    }
+    // While recording: a buffer too few, push constants of another size.
+    let kernel = Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[]).unwrap();
+    let (sums, density) = (gpu.buffer::<[u32; 2]>(8), gpu.buffer::<f32>(8));
+    let push = grid::ResolvePush { n_cells: 8, density_per_quantum: 1.0 };
+    let too_few = gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &[&sums], &push, 8));
+    assert!(matches!(too_few, Err(Error::Shader { .. })));
+    let buffers = [&sums, &density];
+    let too_small = gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &buffers, &8u32, 8));
+    assert!(matches!(too_small, Err(Error::Shader { .. })));
+    // And all is well afterwards.
+    gpu.run(|rec| {
+        rec.fill(&sums, 1);
+        rec.dispatch(&kernel, &buffers, &push, 8)
+    });
+    assert_eq!(gpu.download::<f32>(&density, 8), [4_294_967_297.0f64 as f32; 8]);
+}
+
+#[test]
+fn host_memory_is_checked_against_its_size() {
+    let gpu = Gpu::new();
+    let mut upload = Buffer::new::<u32>(&gpu.device, "test.upload", 4, Place::Upload).unwrap();
+    assert!(upload.write(&[1u32; 4]).is_ok());
+    // The allocation behind it may be larger; the buffer is not.
+    assert!(matches!(upload.write(&[1u8; 17]), Err(Error::Limit { .. })));
+    let readback = Buffer::new::<u32>(&gpu.device, "test.readback", 4, Place::Readback).unwrap();
+    assert!(readback.read::<u32>(4).is_ok());
+    assert!(matches!(readback.read::<u32>(5), Err(Error::Limit { .. })));
+    assert!(matches!(readback.read::<u32>(usize::MAX / 2), Err(Error::Limit { .. })));
+    let device = Buffer::new::<u32>(&gpu.device, "test.device", 4, Place::Device).unwrap();
+    assert!(device.bytes() == 16 && device.name() == "test.device");
+}
+
+fn cached_files(folder: &Path) -> Vec<std::path::PathBuf> {
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn the_cache_is_read_checked_and_mended() {
+    let folder = tempfile::tempdir().unwrap();
+    let cache = folder.path().join("below/spirv");
+    let compiler = |sources: Sources| Compiler::new(sources, Some(cache.clone())).unwrap();
+    let compile = |c: &Compiler| c.compile("place.comp", Optimize::Yes).unwrap();
+    let words = compile(&compiler(passes::sources()));
+    let files = cached_files(&cache);
+    assert_eq!(files.len(), 1);
+    let good = std::fs::read(&files[0]).unwrap();
+    // What lies there is what comes back: here the words with one added, under a right sum.
+    let other: Vec<u32> = [&words[..], &[7]].concat();
+    let bytes: &[u8] = bytemuck::cast_slice(&other);
+    std::fs::write(&files[0], [Sha256::digest(bytes).as_slice(), bytes].concat()).unwrap();
+    assert_eq!(compile(&compiler(passes::sources())), other);
+    // A wrong bit, a cut, nothing at all: compiled anew, and the file is whole again.
+    let mut flipped = good.clone();
+    flipped[100] ^= 4;
+    for bad in [flipped, good[..good.len() - 4].to_vec(), good[..20].to_vec(), vec![]] {
+        std::fs::write(&files[0], &bad).unwrap();
+        assert_eq!(compile(&compiler(passes::sources())), words);
+        assert_eq!(std::fs::read(&files[0]).unwrap(), good);
+    }
+    // Another include, other options: other files. No temporary file is left.
+    let mut sources = passes::sources();
+    assert!(sources.replace("include/each.glsl", "// One", "// Two"));
+    compile(&compiler(sources));
+    compiler(passes::sources()).compile("place.comp", Optimize::No).unwrap();
+    let files = cached_files(&cache);
+    assert_eq!(files.len(), 3);
+    assert!(files.iter().all(|f| f.extension().is_some_and(|e| e == "spv")), "{files:?}");
+    // A cache that cannot be written costs time only: its folder is a file.
+    let file = folder.path().join("file");
+    std::fs::write(&file, "").unwrap();
+    assert_eq!(compile(&Compiler::new(passes::sources(), Some(file)).unwrap()), words);
+}
+
+#[test]
+fn a_folder_of_shaders_takes_the_place_of_the_embedded_ones() {
+    let folder = tempfile::tempdir().unwrap();
+    let compile = |s: Sources| Compiler::new(s, None).unwrap().compile("place.comp", Optimize::Yes).unwrap();
+    let embedded = compile(passes::sources());
+    let empty = passes::sources().with_dir(folder.path()).err().unwrap();
+    assert!(matches!(&empty, Error::Io { what, .. } if what.contains("place.comp")), "{empty}");
+    assert!(matches!(passes::sources().with_dir(&folder.path().join("absent")), Err(Error::Io { .. })));
+    let text = passes::SHADERS.iter().find(|(n, _)| *n == "place.comp").unwrap().1;
+    std::fs::write(folder.path().join("place.comp"), text.replace("+ groups", "- groups")).unwrap();
+    assert_ne!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
+    std::fs::write(folder.path().join("place.comp"), text).unwrap();
+    assert_eq!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
+    // Includes too.
+    std::fs::create_dir(folder.path().join("include")).unwrap();
+    std::fs::write(folder.path().join("include/records.glsl"), "nonsense").unwrap();
+    let sources = passes::sources().with_dir(folder.path()).unwrap();
+    let refused = Compiler::new(sources, None).unwrap().compile("place.comp", Optimize::Yes).err().unwrap();
+    assert!(refused.to_string().contains("include/records.glsl:1:"), "{refused}");
+}

@@ -1,0 +1,261 @@
+//! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared with the host's records,
+//! push constants and shared constants.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use nimbus::gpu::Compiler;
+use nimbus::gpu::kernel::Field;
+use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
+use nimbus::gpu::shader::Optimize;
+use nimbus::layout::facet::{FacetRecord, LitRecord};
+use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_SKY, LightRecord};
+use nimbus::layout::particle::PlacedRecord;
+use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
+use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
+use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, transmit};
+
+/// A host record: GLSL's name of it, its fields, its size.
+type Record = (&'static str, &'static [Field], usize);
+
+const RECORDS: [Record; 9] = [
+    ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
+    ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
+    ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
+    ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
+    ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
+    ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
+    ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
+    ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
+    ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
+];
+
+/// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or the
+/// bytes of a plain element.
+const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
+    ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
+    ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
+    ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
+    ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
+    ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
+    ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Placed")]),
+    ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
+    ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),
+    ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
+    ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
+    ("sprites.frag", sprites::Push::FIELDS, &[]),
+    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
+    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), B(4), B(4)]),
+];
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Element {
+    Record(&'static str),
+    Bytes(u32),
+}
+use Element::{Bytes as B, Record as R};
+
+fn compare_fields(what: &str, members: &[Member], fields: &[Field], complaints: &mut Vec<String>) {
+    let declared = members.iter().map(|m| (m.name.as_str(), m.offset as usize, m.bytes as usize));
+    let declared: Vec<(&str, usize, usize)> = declared.collect();
+    if declared != fields {
+        complaints.push(format!("{what}: the shader has {declared:?}, the host {fields:?}"));
+    }
+}
+
+/// GLSL appends _0, _1 … to a struct's name where two blocks lay it out differently.
+fn plain(name: &str) -> &str {
+    name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('_')
+}
+
+fn compare_record(file: &str, found: &Struct, stride: u32, expected: &str, complaints: &mut Vec<String>) {
+    let name = plain(&found.name);
+    let Some((_, fields, size)) = RECORDS.iter().find(|(n, _, _)| *n == name) else {
+        complaints.push(format!("{file}: struct {name} is no record of the host"));
+        return;
+    };
+    if name != expected {
+        complaints.push(format!("{file}: a buffer of {name}, the host gives {expected}"));
+    }
+    if stride as usize != *size {
+        complaints.push(format!("{file}: {name} every {stride} bytes, the host's record has {size}"));
+    }
+    compare_fields(&format!("{file}: {name}"), &found.members, fields, complaints);
+}
+
+fn compare(file: &str, found: &Reflection, push: &[Field], elements: &[Element]) -> Vec<String> {
+    let mut complaints = vec![];
+    let members = found.push.as_ref().map_or(&[][..], |p| &p.members);
+    compare_fields(&format!("{file}: push constants"), members, push, &mut complaints);
+    let bindings: Vec<u32> = found.bindings.iter().map(|b| b.binding).collect();
+    if bindings != (0..elements.len() as u32).collect::<Vec<_>>() {
+        complaints.push(format!("{file}: bindings {bindings:?}, the host gives {}", elements.len()));
+        return complaints;
+    }
+    for (binding, element) in found.bindings.iter().zip(elements) {
+        match (&binding.element, element) {
+            (Some(s), R(expected)) => compare_record(file, s, binding.stride, expected, &mut complaints),
+            (None, B(bytes)) if binding.stride == *bytes => {}
+            (found, _) => {
+                let found = found.as_ref().map_or(format!("{} bytes", binding.stride), |s| s.name.clone());
+                complaints.push(format!("{file}: {} holds {found}, the host gives {element:?}", binding.name));
+            }
+        }
+    }
+    complaints
+}
+
+fn unoptimised(compiler: &Compiler, file: &str) -> Reflection {
+    reflect(file, &compiler.compile(file, Optimize::No).unwrap()).unwrap()
+}
+
+fn embedded() -> Compiler {
+    Compiler::new(passes::sources(), Compiler::default_cache()).unwrap()
+}
+
+fn shaders_folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders")
+}
+
+#[test]
+fn every_shader_declares_what_the_host_writes() {
+    let compiler = embedded();
+    let complaints: Vec<String> = INTERFACES
+        .iter()
+        .flat_map(|(file, push, elements)| compare(file, &unoptimised(&compiler, file), push, elements))
+        .collect();
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+    // The grid and the camera lie in push constants; their inner layout is read from the text's own struct by use in a
+    // buffer, since reflection gives a nested member's size only.
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+layout(local_size_x = 1) in;
+layout(std430, binding = 0) buffer Grids { Grid grids[]; };
+layout(std430, binding = 1) buffer Cameras { Camera cameras[]; };
+void main() { grids[0].cell = cameras[0].near; }
+"#;
+    let texts = [&[("nested.comp", text)], SHADERS].concat();
+    let compiler = Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).unwrap();
+    let complaints = compare("nested.comp", &unoptimised(&compiler, "nested.comp"), &[], &[R("Grid"), R("Camera")]);
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
+}
+
+#[test]
+fn every_shader_and_every_record_is_covered() {
+    let listed: BTreeSet<&str> = SHADERS.iter().map(|(name, _)| *name).collect();
+    let compared: BTreeSet<&str> = INTERFACES.iter().map(|(file, _, _)| *file).collect();
+    let compiled: BTreeSet<&str> = listed.iter().copied().filter(|name| !name.starts_with("include/")).collect();
+    assert_eq!(compared, compiled);
+    let mut on_disk = BTreeSet::new();
+    for (folder, prefix) in [("", ""), ("include", "include/")] {
+        for entry in std::fs::read_dir(shaders_folder().join(folder)).unwrap().map(Result::unwrap) {
+            if entry.path().is_file() {
+                on_disk.insert(format!("{prefix}{}", entry.file_name().to_string_lossy()));
+            }
+        }
+    }
+    assert_eq!(on_disk, listed.iter().map(|s| (*s).to_owned()).collect());
+    let structs = records_glsl().lines().filter_map(|l| l.strip_prefix("struct ")?.split(' ').next()).collect();
+    let known: BTreeSet<&str> = RECORDS.iter().map(|(name, _, _)| *name).collect();
+    assert_eq!(known, structs);
+}
+
+fn text_of(name: &str) -> &'static str {
+    SHADERS.iter().find(|(n, _)| *n == name).unwrap().1
+}
+
+fn records_glsl() -> &'static str {
+    text_of("include/records.glsl")
+}
+
+/// The number of `const uint NAME = …;` or `const float NAME = …;`.
+fn constant(text: &str, name: &str) -> Option<f64> {
+    let line = text.lines().find_map(|l| {
+        let rest = l.trim().strip_prefix("const ")?;
+        rest.split_once(' ')?.1.strip_prefix(name)?.strip_prefix(" = ")
+    })?;
+    line.split(';').next()?.parse().ok()
+}
+
+#[test]
+fn shared_constants_have_one_value() {
+    let shared = [
+        ("include/records.glsl", "FORM_CENTRED", f64::from(FORM_CENTRED)),
+        ("include/records.glsl", "FORM_PRINTED", f64::from(FORM_PRINTED)),
+        ("include/records.glsl", "FORM_GIVEN", f64::from(FORM_GIVEN)),
+        ("include/records.glsl", "LIGHT_DIRECTIONAL", f64::from(LIGHT_DIRECTIONAL)),
+        ("include/records.glsl", "LIGHT_SKY", f64::from(LIGHT_SKY)),
+        ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
+        ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
+        ("facets.comp", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
+        ("facets.comp", "BALL_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
+        ("facets.comp", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
+        ("facets.comp", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
+    ];
+    for (file, name, host) in shared {
+        assert_eq!(constant(text_of(file), name), Some(host), "{file}: {name}");
+    }
+    // Every FORM_ and LIGHT_ is in the list above.
+    let n = records_glsl().lines().filter(|l| l.starts_with("const uint ")).count();
+    assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
+    assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
+    // TILE = TILE_INVOCATIONS·RUN, and the host's is private to its pass: both stand in the text.
+    let sort = text_of("include/sort.glsl");
+    let tile = constant(sort, "TILE_INVOCATIONS").unwrap() * constant(sort, "RUN").unwrap();
+    let host = std::fs::read_to_string(shaders_folder().join("../src/passes/sort.rs")).unwrap();
+    let host = host.lines().find_map(|l| l.strip_prefix("const TILE: u32 = ")?.strip_suffix(';')).unwrap();
+    assert_eq!(host.parse(), Ok(tile));
+    let bits = constant(sort, "N_DIGITS").unwrap();
+    assert_eq!(bits, 256.0);
+    // FOLDED is a number in an expression.
+    assert!(text_of("generate.comp").contains(&format!("{:#x}u", generate::FOLDED)));
+    // The checker sees what is not there, and what differs.
+    assert_eq!(constant("const uint TILE = 7;", "TIL"), None);
+    assert_eq!(constant("const uint TILE = 7;", "TILE"), Some(7.0));
+}
+
+#[test]
+fn wrong_declarations_are_reported() {
+    let wrong = [
+        // A renamed, a swapped, a widened and a missing field; push constants likewise; another record in a buffer.
+        (
+            "place.comp",
+            "include/records.glsl",
+            "struct Placed { vec3 position; float sigma; }",
+            "float sigma",
+            "float s",
+        ),
+        ("place.comp", "include/records.glsl", "struct Group {", "uint i_region; vec3", "vec3"),
+        ("generate.comp", "include/records.glsl", "struct Box {", "uint seed; uint i_box;", "uint i_box; uint seed;"),
+        (
+            "first.comp",
+            "include/records.glsl",
+            "struct Lit {",
+            "vec4 irradiance; vec4 radiance",
+            "vec4 radiance; vec4 irradiance",
+        ),
+        (
+            "transmit.comp",
+            "transmit.comp",
+            "uniform Push {",
+            "float step_length; float backward;",
+            "float backward; float step_length;",
+        ),
+        ("grid_resolve.comp", "grid_resolve.comp", "uvec2 sums[]", "uvec2 sums[]", "uvec4 sums[]"),
+    ];
+    for (file, in_text, line_with, from, to) in wrong {
+        let line = text_of(in_text).lines().find(|l| l.contains(line_with)).unwrap();
+        let mut sources = passes::sources();
+        assert!(sources.replace(in_text, line, &line.replace(from, to)), "{in_text}: {from}");
+        let compiler = Compiler::new(sources, None).unwrap();
+        let (_, push, elements) = INTERFACES.iter().find(|(f, _, _)| *f == file).unwrap();
+        match compiler.compile(file, Optimize::No) {
+            Ok(words) => {
+                let complaints = compare(file, &reflect(file, &words).unwrap(), push, elements);
+                assert!(!complaints.is_empty(), "{file}: {to} was not reported");
+            }
+            Err(e) => panic!("{file}: the wrong declaration does not even compile: {e}"),
+        }
+    }
+}

@@ -8,6 +8,9 @@
 
 layout(local_size_x = 64) in;
 
+// Particles an invocation makes; src/passes/generate.rs says why that many.
+const uint PER_INVOCATION = 16;
+
 layout(push_constant) uniform Push { uint n_particles; uint max_attempts; } push;
 layout(std430, binding = 0) readonly buffer Boxes { Box boxes[]; };
 layout(std430, binding = 1) readonly buffer GroupOf { uint i_group[]; };
@@ -37,35 +40,55 @@ vec3 fold(vec3 v, vec3 h) {
     return clamp(folded, -h, h);
 }
 
-void main() {
-    uint stride = gl_NumWorkGroups.x * gl_WorkGroupSize.x;
-    uint i = gl_GlobalInvocationID.x;
+// Attempts of the particles found so far, a byte each with the last one lowest: 16 fit.
+const uint BYTE_OUTSIDE = 0x80u;
+
+// The particles begin, begin + hop, ... below end, all of box b. First the search, one attempt a turn of whichever
+// particle this invocation is at: a lucky one goes on to its next particle instead of waiting for its neighbours. Then
+// the particles, from the attempts that were kept: computed twice, but stored without neighbours waiting.
+void make(Box b, uint begin, uint end, uint hop) {
+    uvec2 key = uvec2(b.seed, b.i_box);
+    vec3 h = 0.5 * b.extent;
+    uvec4 found = uvec4(0);
+    uint i = begin;
     uint attempt = 0;
-    Box b;
-    // One attempt a turn, of whichever particle this invocation is at: an invocation that is lucky goes on to its next
-    // particle instead of waiting for its neighbours.
-    while (i < push.n_particles) {
-        if (attempt == 0) {
-            b = boxes[i_group[i]];
-            if (b.form == FORM_GIVEN) {
-                i += stride;
-                continue;
-            }
-        }
-        vec4 u = uniforms(philox4x32_10(uvec2(b.seed, b.i_box), uvec4(i - b.i_first, attempt, 0, 0)));
-        vec3 v = offset_of(u.xyz, b);
-        vec3 h = 0.5 * b.extent;
-        bool inside = all(lessThanEqual(abs(v), h));
+    while (i < end) {
+        vec4 u = uniforms(philox4x32_10(key, uvec4(i - b.i_first, attempt, 0, 0)));
+        bool inside = all(lessThanEqual(abs(offset_of(u.xyz, b)), h));
         ++attempt;
-        if (!inside && attempt < push.max_attempts) {
-            continue;
-        }
+        bool done = inside || attempt >= push.max_attempts;
+        uvec4 longer = found << 8 | uvec4(attempt | (inside ? 0u : BYTE_OUTSIDE), found.xyz >> 24);
+        found = done ? longer : found;
+        i += done ? hop : 0u;
+        attempt = done ? 0u : attempt;
+    }
+    while (i > begin) {
+        i -= hop;
+        uint n_attempts = found.x & (BYTE_OUTSIDE - 1u);
+        bool inside = (found.x & BYTE_OUTSIDE) == 0;
+        found = found >> 8 | uvec4(found.yzw << 24, 0);
+        vec4 u = uniforms(philox4x32_10(key, uvec4(i - b.i_first, n_attempts - 1, 0, 0)));
+        vec3 v = offset_of(u.xyz, b);
         float r = u.w * b.radius_max;
         float radius = r + 0.5 * PI * sine(r);
-        vec3 position = inside ? v : fold(v, h);
-        particles[i] = Particle(position, b.sigma_factor * radius, vec3(1.0), b.kappa);
-        status[i] = attempt | (inside ? 0u : 0x80000000u);
-        attempt = 0;
-        i += stride;
+        particles[i] = Particle(inside ? v : fold(v, h), b.sigma_factor * radius, vec3(1.0), b.kappa);
+        status[i] = n_attempts | (inside ? 0u : 0x80000000u);
+    }
+}
+
+void main() {
+    uint n_chunk = gl_WorkGroupSize.x * PER_INVOCATION;
+    for (uint chunk = gl_WorkGroupID.x * n_chunk; chunk < push.n_particles; chunk += gl_NumWorkGroups.x * n_chunk) {
+        uint chunk_end = min(chunk + n_chunk, push.n_particles);
+        // Groups are runs of consecutive particles, so that a workgroup reads a box once and not for each of them.
+        uint last = i_group[chunk_end - 1];
+        for (uint g = i_group[chunk]; g <= last; ++g) {
+            Box b = boxes[g];
+            if (b.form == FORM_GIVEN) {
+                continue;
+            }
+            uint begin = max(chunk, b.i_first), end = min(chunk_end, b.i_first + b.n_particles);
+            make(b, begin + gl_LocalInvocationID.x, end, gl_WorkGroupSize.x);
+        }
     }
 }

@@ -22,15 +22,21 @@ const float GROWTH = 1.0 + 1e-4;
 layout(location = 0) flat out vec4 out_blob;
 layout(location = 1) flat out vec3 out_radiance;
 
-// Slopes of the two tangents from the eye to a circle of radius r at (a, z); unbounded sides become +-1e9.
+// Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is snapped.
+const float SNAP = 1.0 / 16.0;
+
+// Slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the circle reaches beside the eye,
+// lines of either sign meet it, before the eye or behind: no bounds.
 vec2 tangents(float a, float z, float r) {
     float t2 = a * a + z * z - r * r;
-    if (t2 <= 0.0) {
-        return vec2(-1e9, 1e9);
+    if (t2 > 0.0) {
+        float t = sqrt(t2);
+        float low = z * t + a * r, high = z * t - a * r;
+        if (min(low, high) > 0.0) {
+            return vec2((a * t - z * r) / low, (a * t + z * r) / high);
+        }
     }
-    float t = sqrt(t2);
-    float low = z * t + a * r, high = z * t - a * r;
-    return vec2(low > 0.0 ? (a * t - z * r) / low : -1e9, high > 0.0 ? (a * t + z * r) / high : 1e9);
+    return vec2(-1e9, 1e9);
 }
 
 void main() {
@@ -47,8 +53,8 @@ void main() {
         return;
     }
     float r = GROWTH * push.cutoff * sigma;
-    vec2 x = tangents(v.x, v.z, r) / push.camera.tan_x;
-    vec2 y = tangents(v.y, v.z, r) / push.camera.tan_y;
+    vec2 x = (tangents(v.x, v.z, r) + vec2(-SNAP, SNAP) * push.pixel.x) / push.camera.tan_x;
+    vec2 y = (tangents(v.y, v.z, r) + vec2(-SNAP, SNAP) * push.pixel.y) / push.camera.tan_y;
     // Only what lies on the screen: huge quads cost the rasteriser its accuracy.
     x = clamp(x, -1.0, 1.0);
     y = clamp(y, -1.0, 1.0);

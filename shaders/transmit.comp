@@ -44,6 +44,8 @@ void main() {
             float ds = min(push.step_length, length_total - t0);
             tau += density_at(p + (t0 + 0.5 * ds) * d) * ds;
         }
-        transmittance[k] = exp(-push.backward * tau);
+        // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing.
+        float depth = push.backward * tau;
+        transmittance[k] = depth > 0.0 ? exp(-depth) : 1.0;
     }
 }

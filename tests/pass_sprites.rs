@@ -1,0 +1,201 @@
+//! sprites: whole pictures against the f64 reference, both formats, within its bound at each layer.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+#[path = "harness/picture.rs"]
+mod picture;
+
+use std::path::Path;
+
+use bounded::{Random, greatest_ratio};
+use glam::DVec3;
+use harness::{Gpu, assert_within};
+use nimbus::gpu::Compiler;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::io::scene_file;
+use nimbus::layout::facet::LitRecord;
+use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
+use nimbus::model::film::FilmFormat;
+use nimbus::passes;
+use nimbus::reference::{generate, place};
+use picture::{FORMATS, Picture};
+
+const EYE: DVec3 = DVec3::new(0.3, -0.2, 5.0);
+
+fn front() -> Picture {
+    Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 0.1)
+}
+
+/// Draws `picture` in both formats, lit and unlit, and compares every number of every pixel. Greatest value seen.
+fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
+    let mut greatest = 0f64;
+    let mut random = Random(77);
+    let lit = |_: &PlacedRecord| {
+        let radiance = [random.within(0.0, 4.0), random.within(0.0, 1.0), random.within(0.0, 0.01), 0.0];
+        LitRecord { irradiance: [9.0; 4], radiance }
+    };
+    let lit = Some(picture.placed.iter().map(lit).collect());
+    for picture in [picture.clone(), Picture { lit, ..picture.clone() }] {
+        for (target, format) in FORMATS {
+            let what = format!("{what}, {format:?}, {}", if picture.lit.is_some() { "lit" } else { "unlit" });
+            let values = picture.draw(gpu, None, target);
+            let (truths, bounds) = picture.truth(format);
+            let r = picture.rounding(format);
+            let ratio = greatest_ratio(&values, &truths, &bounds);
+            println!("{what}: error/bound {ratio:.3}; α {:.1e}, edge {:.1e}", r.alpha, r.edge);
+            assert_within(&what, &values, &truths, &bounds);
+            greatest = truths.iter().fold(greatest, |a, b| a.max(*b));
+        }
+    }
+    greatest
+}
+
+#[test]
+fn one_blob_centred_and_off_axis() {
+    let mut gpu = Gpu::new();
+    for (what, at, tau) in [("centred", (0.0, 0.0), 1.0), ("off axis", (1.7, 1.1), 0.3), ("dense", (-1.9, 0.9), 30.0)] {
+        let picture = front();
+        let position = picture.at(at.0, at.1, 5.0);
+        let drawn = compare(&mut gpu, what, &picture.blob(position, 0.4, tau));
+        assert!(drawn > 0.2, "{what} is in the picture");
+    }
+}
+
+#[test]
+fn the_papers_cloud() {
+    let mut gpu = Gpu::new();
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/cubes-554.toml");
+    let scene = scene_file::load(&file, &[], None).expect("the scene").scene;
+    let groups = scene.groups();
+    let generated = generate::cloud(&scene.clouds[0]);
+    let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
+    let placed = place::place(&positions, &groups, &place::offsets(&groups, &scene.clouds, 0.0, DVec3::ZERO));
+    let mut picture = Picture::new(DVec3::new(-0.2, -0.3, 18.0), DVec3::new(-0.2, -0.3, 0.0), 45.0, 0.1);
+    for (position, g) in placed.iter().zip(&generated) {
+        let tau = g.kappa * g.sigma * nimbus::model::cloud::SQRT_TAU;
+        picture = picture.blob(*position, g.sigma, tau);
+    }
+    assert_eq!(picture.placed.len(), 554);
+    assert!(compare(&mut gpu, "554 particles", &picture) > 0.9);
+}
+
+#[test]
+fn the_near_plane_cuts_by_the_centres_depth() {
+    let mut gpu = Gpu::new();
+    // 1e-4 from the plane: the depth's rounding is some 1e-6.
+    let empty = Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 1.0);
+    let near = |z: f64| empty.clone().blob(empty.at(0.05, 0.02, z), 0.1, 1.0);
+    assert_eq!(compare(&mut gpu, "before the near plane", &near(0.9999)), 0.0);
+    assert!(compare(&mut gpu, "behind the near plane", &near(1.0001)) > 0.5);
+    assert_eq!(compare(&mut gpu, "behind the eye", &near(-2.0)), 0.0);
+}
+
+#[test]
+fn blobs_around_beside_and_far_from_the_camera() {
+    let mut gpu = Gpu::new();
+    let around = front();
+    let at = around.at(0.2, 0.1, 0.5);
+    assert!(compare(&mut gpu, "around the camera", &around.blob(at, 2.0, 1.0)) > 0.5);
+    let far = front();
+    for (x, y, z) in [(1e4, 0.0, 5.0), (-300.0, 40.0, 5.0), (0.0, -1e3, 5.0), (3.0, 1e6, 100.0), (0.0, 0.0, -50.0)] {
+        assert_eq!(compare(&mut gpu, "far off", &far.clone().blob(far.at(x, y, z), 0.5, 1.0)), 0.0);
+    }
+}
+
+#[test]
+fn huge_and_sub_pixel_blobs() {
+    let mut gpu = Gpu::new();
+    let huge = front();
+    let at = huge.at(30.0, 10.0, 40.0);
+    assert!(compare(&mut gpu, "huge", &huge.blob(at, 1e4, 0.7)) > 0.3);
+    // Pixels of 0.0345 at this depth; the blobs reach 0.0015, on a pixel's ray and between four.
+    let small = front();
+    let ray = small.view.ray(100, 30) * 5.0;
+    let on = small.clone().blob(EYE + ray, 0.0005, 1.0);
+    assert!(compare(&mut gpu, "sub-pixel on a ray", &on) > 0.5);
+    let between = small.view.ray(100, 30) * 2.5 + small.view.ray(101, 31) * 2.5;
+    assert_eq!(compare(&mut gpu, "sub-pixel between rays", &small.blob(EYE + between, 0.0005, 1.0)), 0.0);
+}
+
+#[test]
+fn nothing_to_draw_clears_the_target() {
+    let mut gpu = Gpu::new();
+    assert_eq!(compare(&mut gpu, "no particles", &front()), 0.0);
+    let picture = front();
+    let at = picture.at(0.0, 0.0, 5.0);
+    assert_eq!(compare(&mut gpu, "no size", &picture.clone().blob(at, 0.0, 1.0)), 0.0);
+    assert_eq!(compare(&mut gpu, "no extinction", &picture.clone().blob(at, 0.5, 0.0)), 0.0);
+    let both = picture.blob(at, 0.0, 1.0).blob(at, 0.5, 0.0).blob(at, 0.3, 0.5);
+    assert!(compare(&mut gpu, "among others", &both) > 0.3);
+}
+
+#[test]
+fn equal_layers_compose_to_a_power() {
+    let mut gpu = Gpu::new();
+    let mut picture = front();
+    let at = picture.at(0.3, 0.0, 5.0);
+    for _ in 0..64 {
+        picture = picture.blob(at, 0.5, 0.02);
+    }
+    assert!(compare(&mut gpu, "64 layers", &picture) > 0.7);
+    // In f32 the transmittance through the 64 is that of their sum: 64·0.02, looked at where the ray meets the centre.
+    let values = picture.draw(&mut gpu, None, TargetFormat::Rgba32f);
+    let most = values.iter().skip(3).step_by(4).cloned().fold(0.0, f64::max);
+    // The nearest ray passes within half a pixel's diagonal, 0.025 = 0.05 σ: less by at most 0.13 %.
+    let whole = -(-1.28f64).exp_m1();
+    assert!(most <= whole * (1.0 + 1e-5) && most >= whole * (1.0 - 2e-3), "{most} {whole}");
+}
+
+/// Blobs over a field of view of 120 degrees (133 across): in the corner, beside the eye, reaching behind it.
+fn wide() -> Picture {
+    let p = Picture::new(EYE, DVec3::new(3.0, 1.0, 0.0), 120.0, 0.1);
+    let (a, b, c, d) = (p.at(2.0, 1.5, 1.0), p.at(-3.0, -2.4, 1.5), p.at(4.0, 0.0, 2.3), p.at(0.1, -1.0, 0.5));
+    p.blob(a, 0.2, 1.0).blob(b, 0.5, 0.5).blob(c, 1.4, 0.4).blob(d, 0.33, 0.7)
+}
+
+#[test]
+fn narrow_and_wide_fields_of_view() {
+    let mut gpu = Gpu::new();
+    assert!(compare(&mut gpu, "120 degrees", &wide()) > 0.5);
+    let narrow = Picture::new(EYE, DVec3::new(1.0, 0.7, -40.0), 1.0, 0.1);
+    let (a, b) = (narrow.at(0.1, 0.2, 45.0), narrow.at(-0.3, -0.1, 60.0));
+    assert!(compare(&mut gpu, "1 degree", &narrow.blob(a, 0.05, 1.0).blob(b, 0.1, 2.0)) > 0.5);
+}
+
+#[test]
+fn wrong_pictures_are_noticed() {
+    let mut gpu = Gpu::new();
+    let picture = wide();
+    let (truths, bounds) = picture.truth(FilmFormat::Rgba16f);
+    let mut values = picture.draw(&mut gpu, None, TargetFormat::Rgba16f);
+    assert!(greatest_ratio(&values, &truths, &bounds) <= 1.0);
+    let i = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).expect("pixels");
+    values[i] -= 2.0 * bounds[i];
+    assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "one corrupted number");
+    for (file, from, to) in [
+        ("sprites.frag", "0.5 * push.cutoff * push.cutoff", "0.45 * push.cutoff * push.cutoff"),
+        ("sprites.frag", " + twist * twist", ""),
+        ("sprites.frag", " / (1.0 + dot(ray, ray))", ""),
+        ("sprites.frag", "exp(-e)", "(1.0 - e)"),
+        ("sprites.vert", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
+        ("sprites.vert", "min(low, high) > 0.0", "true"),
+        ("sprites.vert", "-(top ? y.y : y.x)", "(top ? y.y : y.x)"),
+        ("sprites.vert", "entries[gl_InstanceIndex].y", "gl_InstanceIndex"),
+    ] {
+        let mut sources = passes::sources();
+        assert!(sources.replace(file, from, to), "{from}");
+        let compiler = Compiler::new(sources, None).expect("shaderc");
+        let values = picture.draw(&mut gpu, Some(&compiler), TargetFormat::Rgba16f);
+        assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+#[test]
+fn the_records_say_what_the_reference_is_given() {
+    // A picture's blobs are its records, so that a slip in either would show as a difference of the other.
+    let picture = front().blob(DVec3::ONE, 0.25, 2.0);
+    let ParticleRecord { sigma, kappa, .. } = picture.particles[0];
+    assert!((f64::from(kappa) * f64::from(sigma) * nimbus::model::cloud::SQRT_TAU - 2.0).abs() < 1e-6);
+    assert_eq!((picture.placed[0].position, picture.placed[0].sigma), ([1.0; 3], 0.25));
+}

@@ -12,7 +12,7 @@ use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::shader::Optimize;
 use nimbus::gpu::{Barriers, Buffer, Compiler, Device, Image, Instance, Kernel, Place, Sources};
 use nimbus::layout::frame::GridRecord;
-use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::grid::GridSpec;
 use nimbus::passes;
 use nimbus::passes::{grid, place};
@@ -25,10 +25,10 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let grid = grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total()).unwrap();
     let (particles, i_group) = (gpu.buffer::<ParticleRecord>(64), gpu.buffer::<u32>(64));
     let (groups, placed) = (gpu.buffer::<GroupRecord>(1), gpu.buffer::<PlacedRecord>(64));
-    let density = gpu.buffer::<f32>(512);
+    let (density, modes) = (gpu.buffer::<f32>(512), gpu.buffer::<ModeRecord>(1));
     let record = GridRecord::from(&spec);
     let recorded = gpu.commands.record(barriers, |rec| {
-        place.record(rec, [&particles, &i_group, &groups, &placed], 64)?;
+        place.record(rec, [&particles, &i_group, &groups, &modes, &placed], 64)?;
         grid.record(rec, [&placed, &particles, &density], &record, 64, 1.0)
     });
     recorded.unwrap();

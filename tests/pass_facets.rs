@@ -20,6 +20,8 @@ use nimbus::reference::grid::mass;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 const U: f64 = U_F32;
+/// Mean σ of the two groups' particles: some are smaller, some larger.
+const SIGMA_MEANS: [f32; 2] = [0.15, 0.25];
 /// Two clouds, numbers 3 and 1.
 const REGIONS: [u32; 2] = [3, 1];
 /// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
@@ -63,6 +65,7 @@ impl Scene {
         let group = |k: usize| GroupRecord {
             cloud_center: centers[k].as_vec3().to_array(),
             i_region: REGIONS[k],
+            sigma_mean: SIGMA_MEANS[k],
             ..GroupRecord::default()
         };
         let i_group = (0..3000).map(|i| i / 1500).collect();
@@ -101,7 +104,8 @@ impl Scene {
 
     fn reference(&self, cells: &[f64]) -> Vec<Facet> {
         let regions: Vec<u32> = self.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
-        facets(&self.spec, cells, &self.blobs, &regions, &self.centers())
+        let means: Vec<f64> = self.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
+        facets(&self.spec, cells, &self.blobs, &means, &regions, &self.centers())
     }
 
     /// Bound on the sampled density at `p`, where the sample's own position is rounded: its f32 evaluation meets a cell
@@ -110,7 +114,7 @@ impl Scene {
     fn sample_error(&self, cells: &[f64], p: DVec3, sigma: f64) -> f64 {
         let n = self.spec.n_cells.as_ivec3();
         let g = (p - self.spec.low) / self.spec.cell - 0.5;
-        // p + 2σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded; less ½.
+        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded; less ½.
         let reach = p.abs() + 3.0 * GRADIENT_RADIUS_SIGMA * sigma;
         let e = (U * (reach + (p - self.spec.low).abs() * 3.0) / self.spec.cell + U * g.abs()) * (1.0 + 8.0 * U);
         // All cells that the sample or one beside it can meet.
@@ -132,11 +136,12 @@ impl Scene {
     /// Bounds on normal, position and area of blob `i`.
     fn bound(&self, cells: &[f64], i: usize, facet: &Facet) -> (f64, DVec3, f64) {
         let (blob, center) = (&self.blobs[i], self.centers()[facet.region as usize]);
-        let (g, s) = gradient(&self.spec, cells, blob.position, blob.sigma);
+        let scale = blob.sigma.max(f64::from(SIGMA_MEANS[self.i_group[i] as usize]));
+        let (g, s) = gradient(&self.spec, cells, blob.position, scale);
         // Σ w δρ over the directions, and 14 sums and a product each of the running total.
         let sampled = |(d, w): &(DVec3, f64)| {
-            let p = blob.position + GRADIENT_RADIUS_SIGMA * blob.sigma * *d;
-            w * self.sample_error(cells, p, blob.sigma)
+            let p = blob.position + GRADIENT_RADIUS_SIGMA * scale * *d;
+            w * self.sample_error(cells, p, scale)
         };
         let dg = directions().iter().map(sampled).sum::<f64>() + 18.0 * U * s;
         let to_center = (blob.position - center).length();
@@ -165,7 +170,7 @@ impl Scene {
         };
         // No two unit vectors are farther apart than 2.
         let normal = normal.min(2.0 + 1e-6);
-        let shell = SHELL_SIGMA * blob.sigma;
+        let shell = SHELL_SIGMA * scale;
         // 1.5σ, its product with n, and the sum.
         let position = shell * normal * DVec3::ONE + U * (3.0 * shell + facet.position.abs() + blob.position.abs());
         // π, 3σ twice, three products, and the argument's four roundings, which 1 − e^−τ passes on at most once.
@@ -248,8 +253,9 @@ fn a_wrong_shader_is_noticed() {
     let mut gpu = Gpu::new();
     let scene = Scene::new();
     let mutations = [
+        ("facets.comp", "max(sigma, group.sigma_mean)", "sigma"),
         ("facets.comp", "SHELL_SIGMA = 1.5", "SHELL_SIGMA = 1.501"),
-        ("facets.comp", "BALL_SIGMA = 2.0", "BALL_SIGMA = 2.01"),
+        ("facets.comp", "SMOOTH_SIGMA = 4.47213595", "SMOOTH_SIGMA = 4.49"),
         ("facets.comp", "CONDITION_LOW = 0.02", "CONDITION_LOW = 0.03"),
         ("facets.comp", "w = 3.0 / 40.0", "w = 3.1 / 40.0"),
         ("facets.comp", "-gradient / slope", "gradient / slope"),

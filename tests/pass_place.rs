@@ -5,18 +5,19 @@ mod harness;
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
-use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::cloud::{Cloud, CloudSource, Group, Particle};
+use nimbus::model::gust::Gust;
 use nimbus::passes::place::Place;
 use nimbus::reference::generate::{cloud as generated, uniforms};
-use nimbus::reference::place::{cloud_centers, offsets, place, placed_bound};
-use nimbus::reference::rounding::U_F32;
+use nimbus::reference::place::{add_gusts, cloud_centers, offsets, place, placed_bound};
+use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32};
 
 const TIME_S: f64 = 3600.25;
 const ORIGIN: DVec3 = DVec3::new(1_000_123.456, 2000.5, -3e5);
 
 /// Lists of particles, one of them empty, one far from the others; the wind carries them for an hour.
-fn clouds() -> Vec<Cloud> {
+fn clouds(gust: Gust) -> Vec<Cloud> {
     let particle = |i: u32, spread: f64| {
         let [a, b, c, d] = uniforms(0x91ace, 0, i, 0);
         let position = spread * (DVec3::new(a, b, c) - 0.5) + 1e4;
@@ -26,8 +27,9 @@ fn clouds() -> Vec<Cloud> {
         source: CloudSource::Particles((0..n).map(|i| particle(i, spread)).collect()),
         position,
         wind,
+        gust,
         i_material: 0,
-        seed: 0,
+        seed: 5,
     };
     vec![
         cloud(1000, 30.0, ORIGIN - 1e4, DVec3::ZERO),
@@ -38,6 +40,8 @@ fn clouds() -> Vec<Cloud> {
 }
 
 struct Scene {
+    clouds: Vec<Cloud>,
+    modes: Vec<ModeRecord>,
     positions: Vec<DVec3>,
     sigmas: Vec<f64>,
     particles: Vec<ParticleRecord>,
@@ -47,8 +51,8 @@ struct Scene {
     offsets: Vec<DVec3>,
 }
 
-fn scene() -> Scene {
-    let clouds = clouds();
+fn scene(gust: Gust) -> Scene {
+    let clouds = clouds(gust);
     let mut groups = vec![];
     for (i, cloud) in clouds.iter().enumerate() {
         let first = groups.last().map_or(0, |g: &Group| g.i_first + g.n_particles);
@@ -64,7 +68,9 @@ fn scene() -> Scene {
     let i_group = groups.iter().zip(0..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();
     let record = |g: &Group| {
         let cloud = &clouds[g.i_cloud];
-        GroupRecord::new(g, cloud.origin_at(TIME_S) - ORIGIN, cloud.center(), DVec3::ONE)
+        let n_modes = cloud.gust.modes(cloud.seed).len() as u32;
+        let modes = (g.i_cloud as u32 * n_modes, n_modes);
+        GroupRecord::new(g, cloud.origin_at(TIME_S) - ORIGIN, cloud.center(), DVec3::ONE, modes)
     };
     let records = groups.iter().map(record).collect();
     let offsets = offsets(&groups, &clouds, TIME_S, ORIGIN);
@@ -76,15 +82,19 @@ fn scene() -> Scene {
         assert!(off.cmple(U_F32 * center.abs() * (1.0 + 1e-6)).all(), "{off}");
         assert_eq!(r.i_region, g.i_cloud as u32);
     }
-    Scene { positions, sigmas, particles, i_group, groups, records, offsets }
+    let waves = |c: &Cloud| c.gust.modes(c.seed).iter().map(|m| ModeRecord::new(m, TIME_S)).collect::<Vec<_>>();
+    let modes = clouds.iter().flat_map(waves).collect();
+    Scene { clouds, modes, positions, sigmas, particles, i_group, groups, records, offsets }
 }
 
 fn run(gpu: &mut Gpu, compiler: &Compiler, scene: &Scene) -> Vec<PlacedRecord> {
     let pass = Place::new(&gpu.device, compiler).unwrap();
     let n = scene.particles.len();
     let (particles, i_group) = (gpu.upload(&scene.particles), gpu.upload(&scene.i_group));
+    // A buffer holds at least one record, also where there is no wind.
+    let modes = if scene.modes.is_empty() { gpu.buffer::<ModeRecord>(1) } else { gpu.upload(&scene.modes) };
     let (groups, placed) = (gpu.upload(&scene.records), gpu.buffer::<PlacedRecord>(n));
-    gpu.run(|rec| pass.record(rec, [&particles, &i_group, &groups, &placed], n as u32));
+    gpu.run(|rec| pass.record(rec, [&particles, &i_group, &groups, &modes, &placed], n as u32));
     gpu.download(&placed, n)
 }
 
@@ -95,7 +105,7 @@ fn flat(v: impl Iterator<Item = DVec3>) -> Vec<f64> {
 #[test]
 fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
     let mut gpu = Gpu::new();
-    let scene = scene();
+    let scene = scene(Gust::CALM);
     let compiler = Compiler::new(nimbus::passes::sources(), None).unwrap();
     let placed = run(&mut gpu, &compiler, &scene);
     let exact = place(&scene.positions, &scene.groups, &scene.offsets);
@@ -117,4 +127,48 @@ fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
         let placed = run(&mut gpu, &wrong, &scene);
         assert!(check_within("wrong", &values(&placed), &truths, &bounds).is_err(), "{to} was not noticed");
     }
+}
+
+/// Bound on the f32 error of the gusts' displacement of particle `i`, alike on every axis. A wave's argument k·x + phase: x is
+/// the rounded position plus the rounded centre, rounded; k rounds once and the scalar product five times; the phase
+/// rounds once, the sum once. Then the reduction and the sine, the product with a rounded a, and a running sum of 16.
+fn gust_bound(scene: &Scene, i: usize) -> f64 {
+    let group = &scene.groups[scene.i_group[i] as usize];
+    let cloud = &scene.clouds[group.i_cloud];
+    let (rest, x) = (scene.positions[i], scene.positions[i] + group.center);
+    let dx = U_F32 * (rest.abs() + group.center.abs() + x.abs());
+    let wave = |m: &nimbus::model::gust::Mode| {
+        let (k, phase) = (m.k.abs(), m.phase_at(TIME_S));
+        let kx = k.dot(x.abs());
+        let argument = k.dot(dx) + 6.0 * U_F32 * kx + U_F32 * phase + U_F32 * (kx + phase);
+        let sine = SINE_ERROR + argument + REDUCTION_ERROR * U_F32 * (kx + phase);
+        m.a.length() * (sine + 2.0 * U_F32)
+    };
+    let modes = cloud.gust.modes(cloud.seed);
+    let sum: f64 = modes.iter().map(|m| m.a.length()).sum();
+    (modes.iter().map(wave).sum::<f64>() + modes.len() as f64 * U_F32 * sum) * (1.0 + 1e-4)
+}
+
+#[test]
+fn gusts_move_particles_as_their_closed_form_says() {
+    let mut gpu = Gpu::new();
+    let scene = scene(Gust { amplitude: 0.4, length: 3.0, period_s: 7.0 });
+    let compiler = Compiler::new(nimbus::passes::sources(), None).unwrap();
+    let mut exact = place(&scene.positions, &scene.groups, &scene.offsets);
+    let still = exact.clone();
+    add_gusts(&mut exact, &scene.positions, &scene.groups, &scene.clouds, TIME_S);
+    assert!(exact.iter().zip(&still).filter(|(a, b)| a.distance(**b) > 0.05).count() > exact.len() / 2);
+    let bound = |i: usize| {
+        let own = U_F32 * scene.positions[i].abs();
+        let inherited = placed_bound(own, scene.offsets[scene.i_group[i] as usize], still[i], U_F32);
+        // One more sum, rounded.
+        inherited + gust_bound(&scene, i) + U_F32 * (exact[i].abs() + 1.0)
+    };
+    let bounds = flat((0..exact.len()).map(bound));
+    let truths = flat(exact.iter().copied());
+    let values = |placed: &[PlacedRecord]| flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()));
+    assert_within_and_say("gusts", &values(&run(&mut gpu, &compiler, &scene)), &truths, &bounds);
+    // At 10⁴ units from its origin a particle's own f32 rounding decides much of its phase; nearer it does not.
+    let wrong = Gpu::wrong_compiler("place.comp", "+ modes[m].phase", "- modes[m].phase");
+    assert!(check_within("wrong", &values(&run(&mut gpu, &wrong, &scene)), &truths, &bounds).is_err());
 }

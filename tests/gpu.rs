@@ -1,5 +1,5 @@
-//! gpu/ itself: what it refuses, what it reports, and that the reports would come: missing barriers, leaks, limits, shaders
-//! that do not compile or do not fit, the SPIR-V cache.
+//! gpu/ itself: what it refuses, what it reports, and that the reports would come: missing barriers, leaks, limits,
+//! shaders that do not compile or do not fit, the SPIR-V cache.
 
 mod harness;
 
@@ -18,7 +18,8 @@ use nimbus::passes;
 use nimbus::passes::{grid, place};
 use sha2::{Digest, Sha256};
 
-/// What validation says of place followed by the grid's deposit, which reads what place wrote; recorded, never submitted.
+/// What validation says of place followed by the grid's deposit, which reads what place wrote; recorded and never
+/// submitted.
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let spec = GridSpec { n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();

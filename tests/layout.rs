@@ -1,5 +1,5 @@
-//! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared with the host's records,
-//! push constants and shared constants.
+//! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared with the host's
+//! records, push constants and shared constants.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -30,8 +30,8 @@ const RECORDS: [Record; 9] = [
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
 ];
 
-/// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or the
-/// bytes of a plain element.
+/// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
+/// the bytes of a plain element.
 const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
@@ -218,7 +218,7 @@ fn shared_constants_have_one_value() {
 #[test]
 fn wrong_declarations_are_reported() {
     let wrong = [
-        // A renamed, a swapped, a widened and a missing field; push constants likewise; another record in a buffer.
+        // A renamed, a missing and two swapped fields; push constants swapped; a plain element widened.
         (
             "place.comp",
             "include/records.glsl",

@@ -26,8 +26,8 @@ const SIGMA_MEANS: [f32; 2] = [0.15, 0.25];
 const REGIONS: [u32; 2] = [3, 1];
 /// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
 const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
-/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the root, which Vulkan derives
-/// from inversesqrt (2 ulp = 4 u) and a division (5 u).
+/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the root, which Vulkan
+/// derives from inversesqrt (2 ulp = 4 u) and a division (5 u).
 const LENGTH_ERROR: f64 = 2.5 + 4.0 + DIVISION_ERROR;
 
 struct Scene {

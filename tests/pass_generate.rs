@@ -216,6 +216,21 @@ fn a_million_particles_agree_but_for_decisions_within_rounding_of_a_face() {
     assert!(outcome.farthest_other < 1e-5);
 }
 
+/// P (5) amplifies: its argument P_x Z/2 multiplies P_x's error by half the extent, twice in a row, so that the bound
+/// on y grows with the square of the extent and more: some 1e-1 here, and in boxes of thousands it says nothing any more.
+#[test]
+fn in_large_boxes_decisions_turn_only_within_their_bound() {
+    let mut gpu = Gpu::new();
+    let law = law(Form::Centred);
+    let boxes = [one_box(200_000, [300.0, 300.0, 200.0], 9.0)];
+    let made = generate(&mut gpu, &boxes, &law);
+    let outcome = compare(&reference(&boxes, &law), &made, &law);
+    outcome.assert("large boxes");
+    println!("large boxes: the farthest decision that turned, {:e} from its face", outcome.farthest_other);
+    // A bound of 1e-1 beside half extents of 150, on either side of two faces, in three attempts or so: some 0.5 %.
+    assert!(outcome.n_undecided <= made.0.len() / 100 && outcome.farthest_other < 0.5);
+}
+
 #[test]
 fn needles_plates_and_points_are_folded() {
     let mut gpu = Gpu::new();

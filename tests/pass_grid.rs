@@ -121,8 +121,8 @@ const SHARE: f64 = 0.5 / 0.997_300_203_936_739_8;
 /// The normal density at 3σ over erf(3/√2).
 const PHI_3: f64 = 4.44e-3;
 /// Roundings of a deposit that are relative: the mass 5 (4 products, a constant), quanta a mass 2, the product with the
-/// share and the share's two 3, adding ½ before the cut to whole quanta 1; and of the sum: two words to f32, their sum, the
-/// density of a quantum and its product 5.
+/// share and the share's two 3, adding ½ before the cut to whole quanta 1; and of the sum: two words to f32, their
+/// sum, the density of a quantum and its product 5.
 const ROUNDINGS: f64 = 16.0;
 
 /// Error of erf(c/√2), c the face `a` cut to ±3 that is itself off by `e`.

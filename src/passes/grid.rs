@@ -1,7 +1,7 @@
 //! grid: the blobs' extinction on cubic cells.
 //!
-//! In: placed particles, their κ. Out: density (extinction per unit length), cell (x, y, z) at x + n_x (y + n_y z). Law:
-//! mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a weight's 2.5e-6 (erf's formula 3e-7,
+//! In: placed particles, their κ. Out: density (extinction per unit length), cell (x, y, z) at x + n_x (y + n_y z).
+//! Law: mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a weight's 2.5e-6 (erf's formula 3e-7,
 //! the rest its rounding) at the most, some 1e-6 measured, and half a quantum of the fixed-point sum a deposit.
 
 use crate::error::Result;

@@ -3,7 +3,8 @@
 use nimbus::reference::rounding::U_F32;
 
 /// |formula − erf| of Abramowitz and Stegun 7.1.28, and on top of it what f32 makes of the formula at `x`: a running
-/// bound over Horner's scheme, four squarings (which double a relative error), a division of 2.5 ulp = 5 u, a subtraction.
+/// bound over Horner's scheme, four squarings (which double a relative error), a division of 2.5 ulp = 5 u, and a
+/// subtraction.
 pub fn erf_bound(x: f64) -> f64 {
     const FORMULA: f64 = 3e-7;
     const COEFFICIENTS: [f64; 6] = [0.0705230784, 0.0422820123, 0.0092705272, 0.0001520143, 0.0002765672, 0.0000430638];

@@ -98,7 +98,8 @@ impl Gpu {
         nimbus::gpu::Kernel::new(&self.device, &compiler, name, push, &[]).expect("the test's kernel")
     }
 
-    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant that a test must notice.
+    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant that a test must
+    /// notice.
     pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{file} does not hold {from}");

@@ -40,6 +40,11 @@ vec3 fold(vec3 v, vec3 h) {
     return clamp(folded, -h, h);
 }
 
+// u1 to u4 of one attempt of particle i.
+vec4 draw(Box b, uint i, uint attempt) {
+    return uniforms(philox4x32_10(uvec2(b.seed, b.i_box), uvec4(i - b.i_first, attempt, 0, 0)));
+}
+
 // Attempts of the particles found so far, a byte each with the last one lowest: 16 fit.
 const uint BYTE_OUTSIDE = 0x80u;
 
@@ -47,14 +52,13 @@ const uint BYTE_OUTSIDE = 0x80u;
 // particle this invocation is at: a lucky one goes on to its next particle instead of waiting for its neighbours. Then
 // the particles, from the attempts that were kept: computed twice, but stored without neighbours waiting.
 void make(Box b, uint begin, uint end, uint hop) {
-    uvec2 key = uvec2(b.seed, b.i_box);
     vec3 h = 0.5 * b.extent;
     uvec4 found = uvec4(0);
     uint i = begin;
     uint attempt = 0;
     while (i < end) {
-        vec4 u = uniforms(philox4x32_10(key, uvec4(i - b.i_first, attempt, 0, 0)));
-        bool inside = all(lessThanEqual(abs(offset_of(u.xyz, b)), h));
+        vec3 v = offset_of(draw(b, i, attempt).xyz, b);
+        bool inside = all(lessThanEqual(abs(v), h));
         ++attempt;
         bool done = inside || attempt >= push.max_attempts;
         uvec4 longer = found << 8 | uvec4(attempt | (inside ? 0u : BYTE_OUTSIDE), found.xyz >> 24);
@@ -67,7 +71,7 @@ void make(Box b, uint begin, uint end, uint hop) {
         uint n_attempts = found.x & (BYTE_OUTSIDE - 1u);
         bool inside = (found.x & BYTE_OUTSIDE) == 0;
         found = found >> 8 | uvec4(found.yzw << 24, 0);
-        vec4 u = uniforms(philox4x32_10(key, uvec4(i - b.i_first, n_attempts - 1, 0, 0)));
+        vec4 u = draw(b, i, n_attempts - 1);
         vec3 v = offset_of(u.xyz, b);
         float r = u.w * b.radius_max;
         float radius = r + 0.5 * PI * sine(r);

@@ -12,7 +12,7 @@ layout(local_size_x = 64) in;
 const float SHELL_SIGMA = 1.5;
 // Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard deviation s, here 2 sigma, to
 // degree 5.
-const float SMOOTH_SIGMA = 4.47213595;
+const float SMOOTH_SIGMA = 4.47213595499958;
 const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;

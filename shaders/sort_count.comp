@@ -4,7 +4,7 @@
 
 // Digits of each tile: table[digit][tile].
 
-layout(local_size_x = 32) in;
+layout(local_size_x = TILE_INVOCATIONS) in;
 
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) writeonly buffer Table { uint table[]; };

@@ -4,14 +4,14 @@
 
 // Moves every entry to its place: the table's base for (digit, tile) plus its rank among its digit inside the tile.
 
-layout(local_size_x = 32) in;
+layout(local_size_x = TILE_INVOCATIONS) in;
 
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer Table { uint table[]; };
 layout(std430, binding = 2) writeonly buffer Sorted { uvec2 entries_sorted[]; };
 
-// Counters of two digits a word: word w of invocation t at [w * 32 + t]. 16 KiB, which every Vulkan device has; a tile's
-// 1024 entries fit 16 bits.
+// Counters of two digits a word: word w of invocation t at [w * TILE_INVOCATIONS + t]. 16 KiB for 32 invocations, which every
+// Vulkan device has; a tile's 1024 entries fit 16 bits.
 shared uint ranks[N_DIGITS / 2 * TILE_INVOCATIONS];
 
 void main() {

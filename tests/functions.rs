@@ -6,8 +6,8 @@ mod harness;
 use harness::bounds::erf_bound;
 use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::{Compiler, Kernel, Sources};
+use nimbus::layout::record;
 use nimbus::passes::SHADERS;
-use nimbus::record;
 use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32};
 
 record! {

@@ -259,7 +259,7 @@ fn a_folder_of_shaders_takes_the_place_of_the_embedded_ones() {
     assert!(matches!(&empty, Error::Io { what, .. } if what.contains("place.comp")), "{empty}");
     assert!(matches!(passes::sources().with_dir(&folder.path().join("absent")), Err(Error::Io { .. })));
     let text = passes::SHADERS.iter().find(|(n, _)| *n == "place.comp").unwrap().1;
-    std::fs::write(folder.path().join("place.comp"), text.replace("+ groups", "- groups")).unwrap();
+    std::fs::write(folder.path().join("place.comp"), text.replace("+ group.offset", "- group.offset")).unwrap();
     assert_ne!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
     std::fs::write(folder.path().join("place.comp"), text).unwrap();
     assert_eq!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);

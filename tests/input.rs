@@ -240,7 +240,8 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0], "ns": 8.0 }],
             "cloud": [{
                 "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none",
-                "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0], "material": "cloud", "seed": 1,
+                "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0],
+                "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "material": "cloud", "seed": 1,
             }],
         })
     );

@@ -10,17 +10,18 @@ use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
 use nimbus::layout::facet::{FacetRecord, LitRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_SKY, LightRecord};
-use nimbus::layout::particle::PlacedRecord;
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
+use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 9] = [
+const RECORDS: [Record; 10] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
+    ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
     ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
@@ -38,7 +39,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
-    ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Placed")]),
+    ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
@@ -189,7 +190,7 @@ fn shared_constants_have_one_value() {
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("facets.comp", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
-        ("facets.comp", "BALL_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
+        ("facets.comp", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
         ("facets.comp", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
         ("facets.comp", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
     ];
@@ -200,9 +201,9 @@ fn shared_constants_have_one_value() {
     let n = records_glsl().lines().filter(|l| l.starts_with("const uint ")).count();
     assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
-    // TILE = TILE_INVOCATIONS·RUN, and the host's is private to its pass: both stand in the text.
+    // The host's TILE is private to its pass: both stand in the text.
     let sort = text_of("include/sort.glsl");
-    let tile = constant(sort, "TILE_INVOCATIONS").unwrap() * constant(sort, "RUN").unwrap();
+    let tile = constant(sort, "TILE").unwrap();
     let host = std::fs::read_to_string(shaders_folder().join("../src/passes/sort.rs")).unwrap();
     let host = host.lines().find_map(|l| l.strip_prefix("const TILE: u32 = ")?.strip_suffix(';')).unwrap();
     assert_eq!(host.parse(), Ok(tile));

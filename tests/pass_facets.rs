@@ -255,7 +255,7 @@ fn a_wrong_shader_is_noticed() {
     let mutations = [
         ("facets.comp", "max(sigma, group.sigma_mean)", "sigma"),
         ("facets.comp", "SHELL_SIGMA = 1.5", "SHELL_SIGMA = 1.501"),
-        ("facets.comp", "SMOOTH_SIGMA = 4.47213595", "SMOOTH_SIGMA = 4.49"),
+        ("facets.comp", "SMOOTH_SIGMA = 4.47213595499958", "SMOOTH_SIGMA = 4.49"),
         ("facets.comp", "CONDITION_LOW = 0.02", "CONDITION_LOW = 0.03"),
         ("facets.comp", "w = 3.0 / 40.0", "w = 3.1 / 40.0"),
         ("facets.comp", "-gradient / slope", "gradient / slope"),

@@ -263,7 +263,7 @@ fn a_wrong_shader_is_noticed() {
         ("grid_deposit.comp", "15.7496099457224", "15.75"),
         ("grid_deposit.comp", "const float CUT_SIGMA = 3.0", "const float CUT_SIGMA = 2.9"),
         ("grid_deposit.comp", "float(i + 1)", "(float(i) + 0.99)"),
-        ("grid_deposit.comp", "at.y + int(push.grid.n_cells.y) * at.z", "at.z + int(push.grid.n_cells.z) * at.y"),
+        ("grid_deposit.comp", "first + x + row * y", "first + y + row * x"),
     ];
     for (file, from, to) in mutations {
         let values = scene.run(&mut gpu, &Gpu::wrong_compiler(file, from, to));

@@ -122,7 +122,9 @@ fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
     assert!(placed.iter().zip(&scene.sigmas).all(|(p, s)| p.sigma == *s as f32));
     assert_eq!(run(&mut gpu, &compiler, &scene), placed);
 
-    for (from, to) in [("+ groups", "- groups"), ("groups[i_group[i]]", "groups[0]"), (".offset", ".cloud_center")] {
+    for (from, to) in
+        [("+ group.offset", "- group.offset"), ("groups[i_group[i]]", "groups[0]"), (".offset", ".cloud_center")]
+    {
         let wrong = Gpu::wrong_compiler("place.comp", from, to);
         let placed = run(&mut gpu, &wrong, &scene);
         assert!(check_within("wrong", &values(&placed), &truths, &bounds).is_err(), "{to} was not noticed");

@@ -1,6 +1,6 @@
 //! Facets and what they receive and send.
 
-use crate::record;
+use crate::layout::record;
 
 record! {
     /// A lighting facet (model.md §5), position relative to the lighting origin.

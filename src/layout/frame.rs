@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
+use crate::layout::record;
 use crate::model::camera::{Camera, Pose};
 use crate::model::film::Film;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
-use crate::record;
 
 /// Kinds of [`LightRecord`]; the shaders' `LIGHT_*`.
 pub const LIGHT_DIRECTIONAL: u32 = 0;

@@ -8,7 +8,8 @@ pub mod particle;
 /// Declares a `repr(C)` record and lists its fields as (name, offset, bytes), for comparison with what the
 /// shaders declare.
 #[macro_export]
-macro_rules! record {
+#[doc(hidden)]
+macro_rules! __record {
     ($(#[$about:meta])* $vis:vis struct $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty),* $(,)? }) => {
         $(#[$about])*
         #[repr(C)]
@@ -23,3 +24,5 @@ macro_rules! record {
         }
     };
 }
+
+pub use __record as record;

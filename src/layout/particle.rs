@@ -2,10 +2,10 @@
 
 use glam::DVec3;
 
+use crate::layout::record;
 use crate::model::boxes::{CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::gust::Mode;
-use crate::record;
 
 record! {
     /// A Gaussian blob; position relative to its group's origin. Scene units, κ per unit.

@@ -7,7 +7,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
-use crate::record;
+use crate::layout::record;
 
 record! {
     pub struct Push { grid: GridRecord, n_particles: u32 }

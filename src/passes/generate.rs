@@ -7,7 +7,7 @@
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
-use crate::record;
+use crate::layout::record;
 
 record! {
     pub struct Push { n_particles: u32, max_attempts: u32 }

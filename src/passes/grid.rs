@@ -7,7 +7,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
 use crate::layout::frame::GridRecord;
-use crate::record;
+use crate::layout::record;
 
 record! {
     pub struct DepositPush { grid: GridRecord, n_particles: u32, quanta_per_mass: f32 }

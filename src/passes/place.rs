@@ -6,7 +6,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
-use crate::record;
+use crate::layout::record;
 
 record! {
     pub struct Push { n_particles: u32 }

@@ -6,7 +6,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
-use crate::record;
+use crate::layout::record;
 
 record! {
     pub struct KeyPush {
@@ -39,7 +39,9 @@ pub struct Sort {
 impl Sort {
     /// Room for `n_max` entries.
     pub fn new(device: &Device, compiler: &Compiler, n_max: u32) -> Result<Sort> {
-        let kernel = |name, push| Kernel::new(device, compiler, name, push, &[]);
+        // One subgroup a tile, and no more than shared memory holds counters for.
+        let macros = [("TILE_INVOCATIONS", device.limits().subgroup_size.clamp(8, 32))];
+        let kernel = |name, push| Kernel::with_macros(device, compiler, name, push, &[], &macros);
         Ok(Sort {
             key: kernel("sort.key", KeyPush::FIELDS)?,
             count: kernel("sort.count", DigitPush::FIELDS)?,

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Image, Recorder};
 use crate::layout::frame::CameraRecord;
-use crate::record;
+use crate::layout::record;
 
 record! {
     pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, unused: f32 }

@@ -85,7 +85,7 @@ fn bad_input_is_one_clear_message_and_nothing_written() {
         (&["scenes/hello.toml", "--shaders", "scenes"], "none of nimbus's shaders"),
         (&["scenes/hello.toml", "--set", "film.width=20000"], "film.width"),
         (&["scenes/hello.toml", "--time", "nan"], "finite"),
-        (&["scenes/hello.toml", "--set", "camera.target=[0,0.4,6.5]"], "camera"),
+        (&["scenes/hello.toml", "--set", "camera.target=[0,0.55,6.2]"], "camera"),
     ] {
         let (code, stdout, stderr) = run(&[&["render", "-o", &out], args].concat());
         assert_eq!((code, stdout.as_str()), (2, ""), "{args:?}: {stderr}");

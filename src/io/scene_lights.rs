@@ -16,7 +16,8 @@ direction = [-0.5, -0.8, -0.3]
 irradiance = [3.0, 2.9, 2.7]
 [[light]]
 kind = "sky"
-irradiance = [0.35, 0.35, 0.35]
+irradiance = [0.8, 0.87, 1.0]
+constant = 0.55
 "#;
 
 /// The material of a scene without any `[[material]]`.

@@ -72,7 +72,7 @@ fn a_cloud_alone_is_a_complete_scene() {
         panic!("{:?}", scene.lights)
     };
     assert!((direction.length() - 1.0).abs() < 1e-15 && direction.dot(DVec3::new(-0.5, -0.8, -0.3)) > 0.98);
-    assert_eq!((irradiance, constant), (DVec3::new(3.0, 2.9, 2.7), 0.15));
+    assert_eq!((irradiance, constant), (DVec3::new(3.0, 2.9, 2.7), 0.55));
     assert_eq!((scene.materials[0].name.as_str(), scene.materials[0].ns), ("cloud", 8.0));
     assert_eq!((scene.clouds[0].seed, scene.n_particles()), (1, 3));
     assert!(matches!(
@@ -235,7 +235,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "threads": { "mode": "parallel", "simulate": "gpu" },
             "light": [
                 { "kind": "directional", "direction": [-0.5, -0.8, -0.3], "irradiance": [3.0, 2.9, 2.7] },
-                { "kind": "sky", "irradiance": [0.35, 0.35, 0.35], "constant": 0.15 },
+                { "kind": "sky", "irradiance": [0.8, 0.87, 1.0], "constant": 0.55 },
             ],
             "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0], "ns": 8.0 }],
             "cloud": [{

@@ -79,7 +79,7 @@ pub struct RenderArgs {
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
-    pub common: SceneArgs,
+    pub options: SceneArgs,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -112,7 +112,7 @@ pub struct BenchArgs {
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
-    pub common: SceneArgs,
+    pub options: SceneArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -149,7 +149,7 @@ pub struct InspectArgs {
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
-    pub common: SceneArgs,
+    pub options: SceneArgs,
 }
 
 #[derive(Debug, ClapArgs)]

@@ -37,7 +37,7 @@ pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
 }
 
 fn quiet(args: &BenchArgs) -> super::SceneArgs {
-    let c = &args.common;
+    let c = &args.options;
     super::SceneArgs {
         device: c.device.clone(),
         shaders: c.shaders.clone(),
@@ -70,7 +70,7 @@ fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
 }
 
 fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBool) -> Result<Run> {
-    let loaded = load(path, &args.common)?;
+    let loaded = load(path, &args.options)?;
     let modes = match args.threading {
         ThreadingArg::Serial => vec![Threading::Serial],
         ThreadingArg::Parallel => vec![Threading::Parallel],
@@ -80,9 +80,9 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
     let plan =
         BenchPlan { modes, n_frames, n_warm_up: args.warmup, n_blocks: args.repeat, hash_frames: args.hash_frames };
     let simulate = loaded.scene.threads.simulate;
-    let mut stage = Stage::new(loaded.scene, &device_choice(&args.common), !args.common.no_skip)?;
+    let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
     let n_total = u64::from(plan.n_blocks) * plan.modes.len() as u64 * (u64::from(n_frames) + u64::from(args.warmup));
-    let bar = output::progress(n_total, &path.display().to_string(), args.common.quiet);
+    let bar = output::progress(n_total, &path.display().to_string(), args.options.quiet);
     let outcome = bench::run(&mut stage, &plan, stop, &mut || bar.inc(1));
     bar.finish_and_clear();
     let outcome = outcome?;

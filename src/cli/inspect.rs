@@ -11,7 +11,7 @@ use crate::study::stage::Stage;
 const PLAN_FRAMES: u32 = 3;
 
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let loaded = load(&args.scene, &args.common)?;
+    let loaded = load(&args.scene, &args.options)?;
     let i_frame = args.frame.unwrap_or(0);
     if args.reference {
         let scene = &loaded.scene;
@@ -21,7 +21,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
             _ => boxes(&inspect::boxes_reference(scene), args.json),
         };
     }
-    let mut stage = Stage::new(loaded.scene, &device_choice(&args.common), !args.common.no_skip)?;
+    let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
     match (args.particles, args.facets, args.plan) {
         (true, _, _) => output::rows(&inspect::particles(&mut stage, i_frame)?, args.json)?,
         (_, true, _) => output::rows(&inspect::facets(&mut stage, i_frame)?, args.json)?,

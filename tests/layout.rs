@@ -201,6 +201,7 @@ fn shared_constants_have_one_value() {
     let n = records_glsl().lines().filter(|l| l.starts_with("const uint ")).count();
     assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
+    assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
     // The host's TILE is private to its pass: both stand in the text.
     let sort = text_of("include/sort.glsl");
     let tile = constant(sort, "TILE").unwrap();

@@ -128,12 +128,12 @@ fn compare(truth: &[(Generated, ParticleBound)], made: &Made, law: &BoxLaw) -> O
         if !bound.decided {
             o.n_undecided += 1;
             if !same {
+                // Another attempt was kept: nothing of the two is alike.
                 o.n_other += 1;
                 o.farthest_other = o.farthest_other.max(exact.margin);
+                continue;
             }
-            continue;
-        }
-        if !same {
+        } else if !same {
             o.wrongly.push(i);
         }
         for axis in 0..3 {

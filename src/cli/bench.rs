@@ -14,7 +14,8 @@ use crate::study::stage::Stage;
 
 pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
     let outs = out_dirs(args)?;
-    // All scenes are read before the first is timed, so that a fault in the last does not cost the others.
+    // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no folder
+    // is made for results that will not come.
     for scene in &args.scenes {
         load(scene, &quiet(args))?;
     }
@@ -48,28 +49,24 @@ fn quiet(args: &BenchArgs) -> super::SceneArgs {
     }
 }
 
-/// A results folder for every scene, checked before any work.
+/// A results folder for every scene. What exists already is refused here, before any work; what does not is made once
+/// its scene is ready to run.
 fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
     let Some(out) = &args.out else { return Ok(vec![None; args.scenes.len()]) };
-    let single = args.scenes.len() == 1;
+    super::refuse_existing(out, args.force)?;
+    if args.scenes.len() == 1 {
+        return Ok(vec![Some(out.clone())]);
+    }
     let names: Vec<PathBuf> = args.scenes.iter().map(|s| PathBuf::from(s.file_stem().unwrap_or_default())).collect();
-    if let Some(twice) = names.iter().enumerate().find(|(i, n)| !single && names[..*i].contains(n)) {
-        let what = format!("--out needs scenes of different names, found {} twice", twice.1.display());
+    if let Some((_, twice)) = names.iter().enumerate().find(|(i, n)| names[..*i].contains(n)) {
+        let what = format!("--out needs scenes of different names, found {} twice", twice.display());
         return Err(Error::usage(what));
     }
-    if !single {
-        records::prepare_out_dir(out, args.force)?;
-        let dirs: Vec<PathBuf> = names.iter().map(|n| out.join(n)).collect();
-        for dir in &dirs {
-            records::prepare_out_dir(dir, args.force)?;
-        }
-        return Ok(dirs.into_iter().map(Some).collect());
-    }
-    records::prepare_out_dir(out, args.force)?;
-    Ok(vec![Some(out.clone())])
+    Ok(names.into_iter().map(|n| Some(out.join(n))).collect())
 }
 
 fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBool) -> Result<Run> {
+    let date = records::utc_now();
     let loaded = load(path, &args.options)?;
     let modes = match args.threading {
         ThreadingArg::Serial => vec![Threading::Serial],
@@ -81,6 +78,13 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         BenchPlan { modes, n_frames, n_warm_up: args.warmup, n_blocks: args.repeat, hash_frames: args.hash_frames };
     let simulate = loaded.scene.threads.simulate;
     let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
+    if let Some(dir) = out {
+        // What stood here was refused or forced above.
+        records::prepare_out_dir(dir, true)?;
+    }
+    if args.options.verbose {
+        describe(&stage);
+    }
     let n_total = u64::from(plan.n_blocks) * plan.modes.len() as u64 * (u64::from(n_frames) + u64::from(args.warmup));
     let bar = output::progress(n_total, &path.display().to_string(), args.options.quiet);
     let outcome = bench::run(&mut stage, &plan, stop, &mut || bar.inc(1));
@@ -91,7 +95,7 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         schema: records::SCHEMA_VERSION,
         nimbus: env!("CARGO_PKG_VERSION").into(),
         revision: records::revision().into(),
-        date: records::utc_now(),
+        date,
         command: std::env::args().collect(),
         scene_hash: loaded.hash,
         scene: loaded.resolved,
@@ -111,6 +115,16 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
     }
     stage.close()?;
     Ok(run)
+}
+
+/// What is run, and where.
+fn describe(stage: &Stage) {
+    let (info, scene) = (stage.info(), &stage.scene);
+    let film = scene.film;
+    eprintln!("{} ({})", info.name, info.driver);
+    let groups = scene.groups().len();
+    eprintln!("{} particles in {groups} groups, {}×{} pixels", scene.n_particles(), film.width, film.height);
+    eprintln!("{} bytes of device memory", stage.device.allocated_bytes());
 }
 
 /// The human table.

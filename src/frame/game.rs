@@ -19,8 +19,9 @@ pub struct Game {
     groups: Vec<Group>,
     /// Centre of each cloud relative to its origin.
     cloud_centers: Vec<DVec3>,
-    /// Waves of each cloud's gusts.
+    /// Waves of each cloud's gusts, and how many those before it have.
     modes: Vec<Vec<Mode>>,
+    i_modes: Vec<u32>,
     /// Every particle relative to its group, where this thread moves them.
     rest: Option<Vec<ParticleRecord>>,
 }
@@ -63,8 +64,10 @@ impl Game {
     pub fn new(scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) -> Game {
         let groups = scene.groups();
         let cloud_centers = scene.clouds.iter().map(|c| c.center()).collect();
-        let modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
-        Game { scene, groups, cloud_centers, modes, rest }
+        let modes: Vec<Vec<Mode>> = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
+        let count = |n: &mut u32, waves: &Vec<Mode>| Some(std::mem::replace(n, *n + waves.len() as u32));
+        let i_modes = modes.iter().scan(0, count).collect();
+        Game { scene, groups, cloud_centers, modes, i_modes, rest }
     }
 
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
@@ -98,9 +101,8 @@ impl Game {
 
     fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
         let kd = self.scene.materials[self.scene.clouds[group.i_cloud].i_material].kd;
-        let i_mode: usize = self.modes[..group.i_cloud].iter().map(Vec::len).sum();
-        let n_modes = self.modes[group.i_cloud].len();
-        GroupRecord::new(group, origin, self.cloud_centers[group.i_cloud], kd, (i_mode as u32, n_modes as u32))
+        let modes = (self.i_modes[group.i_cloud], self.modes[group.i_cloud].len() as u32);
+        GroupRecord::new(group, origin, self.cloud_centers[group.i_cloud], kd, modes)
     }
 
     /// Every particle at its group's place, in f64 until the last step.

@@ -1,4 +1,4 @@
-//! A scene against a device's limits, before anything is allocated.
+//! A scene against a device's limits, before anything is allocated, and what it will cost where that is easily too much.
 
 use glam::DVec3;
 
@@ -8,12 +8,14 @@ use crate::gpu::memory::storage_bytes;
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::gust::N_MODES;
-use crate::model::scene::Scene;
+use crate::model::scene::{LightingMode, Scene};
 
-/// Checks every buffer that the scene will need, and their sum.
+/// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
+/// target) each checks for itself when it is made.
 pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
     let n = scene.n_particles();
     if u32::try_from(n).is_err() {
@@ -68,4 +70,32 @@ pub fn n_cells_max(scene: &Scene) -> u64 {
         }
         _ => side * side * side,
     }
+}
+
+/// Cell updates of one deposit of all blobs into the density grid: particles × cells a blob covers.
+pub fn n_deposits(scene: &Scene) -> f64 {
+    let groups = scene.groups();
+    let Some((low, high)) = scene.bounds(&groups, scene.time.start_s, DEPOSIT_CUT_SIGMA) else { return 0.0 };
+    let grid = GridSpec::fit(low, high, scene.lighting.grid);
+    let blob = |g: &Group| {
+        let across = 2.0 * DEPOSIT_CUT_SIGMA * g.sigma_mean / grid.cell + 1.0;
+        let covered = DVec3::splat(across).min(grid.n_cells.as_dvec3());
+        f64::from(g.n_particles) * covered.x * covered.y * covered.z
+    };
+    groups.iter().map(blob).sum()
+}
+
+/// What a demanding scene should be told before it runs; nothing for most.
+pub fn advice(scene: &Scene) -> Option<String> {
+    /// Some ten seconds on two cores of a software device.
+    const MANY: f64 = 1e9;
+    let n = n_deposits(scene);
+    if scene.lighting.mode == LightingMode::None || n < MANY {
+        return None;
+    }
+    let grid = scene.lighting.grid;
+    Some(format!(
+        "lighting.grid = {grid} makes its cells far smaller than the blobs: {n:.1e} cell updates each time they move; \
+         half the cells a side take about an eighth of that"
+    ))
 }

@@ -77,11 +77,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         |same: bool, reason| if traits.lit { unless(same, reason) } else { skip("lighting.mode is \"none\"") };
     let mut decisions = [
         if traits.has_boxes { unless(last.is_some(), "the boxes are the same") } else { skip("no boxes to fill") },
-        if next.placed.is_some() {
-            skip("the game thread places the particles")
-        } else {
-            unless(still, "nothing moved")
-        },
+        unless(still, "nothing moved"),
         lighting(same_grid, "nothing moved"),
         lighting(same_facets, "nothing moved"),
         lighting(same_rays, "facets and lights stand still"),
@@ -163,8 +159,11 @@ mod tests {
         let p = packet();
         assert_eq!(running(&Traits { lit: false, ..TRAITS }, None, &p), ["generate", "place", "sort", "sprites"]);
         assert_eq!(running(&Traits { n_particles: 0, ..TRAITS }, None, &p), ["sprites"]);
-        let mut cpu = packet();
-        cpu.placed = Some(vec![]);
-        assert!(!running(&TRAITS, None, &cpu).contains(&"place"));
+        // Where the game thread places the particles, its places decide and not the groups' offsets.
+        let (mut last, mut next) = (packet(), packet());
+        (last.placed, next.placed) = (Some(vec![]), Some(vec![]));
+        assert!(running(&TRAITS, Some(&last), &next).is_empty());
+        next.placed = Some(vec![Default::default()]);
+        assert!(running(&TRAITS, Some(&last), &next).contains(&"place"));
     }
 }

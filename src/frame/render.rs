@@ -115,7 +115,7 @@ impl Renderer {
     pub fn step(&mut self, packet: Packet) -> Result<Rendered> {
         let begin = Instant::now();
         let plan = plan(&self.traits, self.last.as_ref(), &packet);
-        self.upload(&packet)?;
+        self.upload(&packet, &plan)?;
         self.record(&packet, &plan)?;
         let recorded = Instant::now();
         self.commands.submit()?;
@@ -129,12 +129,12 @@ impl Renderer {
         self.last = None;
     }
 
-    fn upload(&mut self, packet: &Packet) -> Result<()> {
+    fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
         self.buffers.modes.write(&packet.modes)?;
         self.buffers.lights.write(&packet.lights)?;
         match (&mut self.buffers.placed_upload, &packet.placed) {
-            (Some(upload), Some(placed)) => upload.write(placed),
+            (Some(upload), Some(placed)) if plan.runs(Pass::Place) => upload.write(placed),
             _ => Ok(()),
         }
     }
@@ -167,14 +167,12 @@ impl Renderer {
             pass(rec, Pass::Generate, &mut |rec| {
                 generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS)
             })?;
-            if let Some(upload) = &b.placed_upload {
-                rec.scope("upload", |rec| {
+            pass(rec, Pass::Place, &mut |rec| match &b.placed_upload {
+                Some(upload) => {
                     rec.copy(upload, &b.placed);
                     Ok(())
-                })?;
-            }
-            pass(rec, Pass::Place, &mut |rec| {
-                place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.modes, &b.placed], n)
+                }
+                None => place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.modes, &b.placed], n),
             })?;
             pass(rec, Pass::Grid, &mut |rec| {
                 grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)

@@ -7,7 +7,7 @@ use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::film::{Film, FilmFormat, ToneMap};
-use crate::model::grid::MAX_CELLS;
+use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::scene::{Draw, Lighting, LightingMode, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
@@ -103,6 +103,14 @@ pub fn read_lighting(root: &mut Section) -> Result<Lighting> {
         step: s.f64("step", 1.0, Bounds::Within(0.05, 16.0))?,
         forward: s.f64("forward", 0.85, Bounds::Within(0.0, 1.0))?,
     };
+    let least = least_step(lighting.grid);
+    if lighting.step < least {
+        let (step, grid) = (lighting.step, lighting.grid);
+        let limit = format!("a march takes {MAX_MARCH_STEPS} steps at most");
+        return Err(
+            s.fault("step", format!("expected at least {least:.4} cells where grid = {grid} ({limit}), found {step}"))
+        );
+    }
     s.only("bases", json!(1), "the diffuse basis")?;
     root.record("lighting", s.finish());
     Ok(lighting)

@@ -57,7 +57,8 @@ pub struct Group {
     pub half_extent: DVec3,
     pub sigma_max: f64,
     pub sigma_mean: f64,
-    pub kappa_max: f64,
+    /// Greatest mass κ (2π)^{3/2} σ³ of a blob.
+    pub mass_max: f64,
 }
 
 impl Cloud {
@@ -100,15 +101,16 @@ impl Cloud {
             CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
                 .iter()
                 .map(|b| {
+                    let sigma_max = greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
                     let group = Group {
                         i_cloud,
                         i_first,
                         n_particles: b.n_particles,
                         center: b.center,
                         half_extent: 0.5 * b.extent,
-                        sigma_max: greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
+                        sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
-                        kappa_max: box_kappa(b, *form, *optical_depth, *radius_scale),
+                        mass_max: mass(box_kappa(b, *form, *optical_depth, *radius_scale), sigma_max),
                     };
                     i_first += b.n_particles;
                     group
@@ -125,10 +127,14 @@ pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64
     if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
-/// Bounds the mass κ (2π)^{3/2} σ³ of every blob of `groups`.
+/// Integral of a blob's extinction, κ (2π)^{3/2} σ³.
+pub fn mass(kappa: f64, sigma: f64) -> f64 {
+    kappa * (SQRT_TAU * sigma).powi(3)
+}
+
+/// Bounds the mass of every blob of `groups`.
 pub fn heaviest_blob(groups: &[Group]) -> f64 {
-    let mass = |g: &Group| g.kappa_max * (SQRT_TAU * g.sigma_max).powi(3);
-    groups.iter().filter(|g| g.n_particles > 0).map(mass).fold(0.0, f64::max)
+    groups.iter().filter(|g| g.n_particles > 0).map(|g| g.mass_max).fold(0.0, f64::max)
 }
 
 fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
@@ -142,7 +148,7 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
-        kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
+        mass_max: list.iter().map(|p| mass(p.kappa, p.sigma)).fold(0.0, f64::max),
     }
 }
 
@@ -173,5 +179,14 @@ mod tests {
         assert_eq!(firsts, [10, 13, 13]);
         assert_eq!(cloud.center(), DVec3::X);
         assert_eq!(cloud.origin_at(2.0), DVec3::new(2.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn the_heaviest_blob_is_a_blob_and_not_two_maxima() {
+        let blob = |sigma, kappa| Particle { position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
+        let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
+        let gust = Gust::CALM;
+        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, i_material: 0, seed: 1 };
+        assert_eq!(heaviest_blob(&cloud.groups(0, 0)), mass(2.0, 1.0));
     }
 }

@@ -14,6 +14,15 @@ pub const MARGIN_CELLS: u32 = 2;
 /// are 6 KiB of the 16 KiB every Vulkan device has.
 pub const MAX_CELLS: u32 = 512;
 
+/// Most steps of one march toward a light. A scene whose step is finer than its grid's diagonal in this many is refused,
+/// so that no march is ever cut short.
+pub const MAX_MARCH_STEPS: u32 = 4096;
+
+/// The finest march step, in cells, of a grid of `n` cells a side.
+pub fn least_step(n: u32) -> f64 {
+    3f64.sqrt() * f64::from(n) / f64::from(MAX_MARCH_STEPS)
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridSpec {
     pub n_cells: UVec3,

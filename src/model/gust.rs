@@ -47,10 +47,7 @@ impl Gust {
         if self.is_calm() {
             return vec![];
         }
-        let scale = |m: usize| SPECTRUM_WIDTH.powf(m as f64 / (N_MODES - 1) as f64);
-        // Mean square of the sum is half the sum of the squares.
-        let sum: f64 = (0..N_MODES).map(|m| 0.5 * scale(m).powi(-2)).sum();
-        let first = self.amplitude / sum.sqrt();
+        let first = self.first_amplitude();
         (0..N_MODES)
             .map(|m| {
                 let words = philox4x32_10([seed, STREAM], [m as u32, 0, 0, STREAM]);
@@ -69,9 +66,15 @@ impl Gust {
             .collect()
     }
 
-    /// No displacement is longer.
+    /// No displacement is longer: Σ|a|.
     pub fn reach(&self) -> f64 {
-        self.modes(0).iter().map(|m| m.a.length()).sum()
+        if self.is_calm() { 0.0 } else { (0..N_MODES).map(|m| self.first_amplitude() / scale(m)).sum() }
+    }
+
+    /// |a| of the first wave: the mean square of the sum is half the sum of the squares.
+    fn first_amplitude(&self) -> f64 {
+        let sum: f64 = (0..N_MODES).map(|m| 0.5 * scale(m).powi(-2)).sum();
+        self.amplitude / sum.sqrt()
     }
 }
 
@@ -85,6 +88,11 @@ impl Mode {
 /// d(x, t) of `modes` whose phases at t are `phases`; x relative to the cloud's origin.
 pub fn displacement(modes: &[Mode], phases: &[f64], x: DVec3) -> DVec3 {
     modes.iter().zip(phases).map(|(m, phase)| m.a * (m.k.dot(x) + phase).sin()).sum()
+}
+
+/// Wave number of wave m over the first one's.
+fn scale(m: usize) -> f64 {
+    SPECTRUM_WIDTH.powf(m as f64 / (N_MODES - 1) as f64)
 }
 
 fn on_sphere(u: f64, v: f64) -> DVec3 {

@@ -116,9 +116,10 @@ impl Scene {
 
     /// Bounds (low, high) of everything at `time_s`, blobs included out to `n_sigma` σ; `None` without particles.
     pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
+        let reach: Vec<f64> = self.clouds.iter().map(|c| c.gust.reach()).collect();
         let boxes = groups.iter().filter(|g| g.n_particles > 0).map(|g| {
             let center = self.clouds[g.i_cloud].origin_at(time_s) + g.center;
-            let reach = g.half_extent + DVec3::splat(n_sigma * g.sigma_max + self.clouds[g.i_cloud].gust.reach());
+            let reach = g.half_extent + DVec3::splat(n_sigma * g.sigma_max + reach[g.i_cloud]);
             (center - reach, center + reach)
         });
         boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))

@@ -20,7 +20,8 @@ record! {
     }
 }
 
-/// Most steps of one march: √3 · 512 cells at 0.22 cells a step. A finer step is cut off here, and a march with it.
+/// Most steps of one march. The model refuses a scene whose marches need more; here the bound keeps a wrong input from
+/// becoming an endless loop.
 pub const MAX_STEPS: u32 = 4096;
 
 pub struct Transmit {

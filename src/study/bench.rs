@@ -1,6 +1,6 @@
 //! The serial and the parallel loop on the same frames, in interleaved blocks.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use sha2::{Digest, Sha256};
@@ -34,6 +34,7 @@ pub struct BenchPlan {
 #[derive(Debug, Clone)]
 pub struct Sample {
     pub threading: Threading,
+    /// Counts over the whole run.
     pub i_block: u32,
     pub warm_up: bool,
     pub times: FrameTimes,
@@ -57,13 +58,13 @@ pub fn name_of(threading: Threading) -> &'static str {
 }
 
 /// Blocks in the order A B, B A, A B, …: whatever drifts over the run (heat, neighbours) falls on both alike.
-pub fn block_order(modes: &[Threading], n_blocks: u32) -> Vec<(u32, Threading)> {
+pub fn block_order(modes: &[Threading], n_blocks: u32) -> Vec<Threading> {
     let of_block = |i: u32| {
         let mut order = modes.to_vec();
         if i % 2 == 1 {
             order.reverse();
         }
-        order.into_iter().map(move |mode| (i, mode))
+        order
     };
     (0..n_blocks).flat_map(of_block).collect()
 }
@@ -75,7 +76,7 @@ pub fn run(stage: &mut Stage, plan: &BenchPlan, stop: &AtomicBool, tick: &mut dy
         .n_warm_up
         .checked_add(plan.n_frames)
         .ok_or_else(|| Error::usage("--frames and --warmup together exceed 32 bits"))?;
-    for (i_block, threading) in block_order(&plan.modes, plan.n_blocks) {
+    for (i_block, threading) in (0..).zip(block_order(&plan.modes, plan.n_blocks)) {
         let samples = &mut outcome.samples;
         let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
             let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
@@ -138,13 +139,14 @@ impl Outcome {
         let summary = |f: &dyn Fn(&FrameTimes) -> Option<f64>| {
             Summary::of(&timed.iter().filter_map(|t| f(t)).collect::<Vec<f64>>())
         };
-        let blocks = self.samples.iter().filter(|s| s.threading == threading).map(|s| s.i_block + 1).max();
+        let blocks: BTreeSet<u32> =
+            self.samples.iter().filter(|s| s.threading == threading).map(|s| s.i_block).collect();
         Mode {
             threading: name_of(threading).into(),
             simulate: if simulate == Simulate::Cpu { "cpu" } else { "gpu" }.into(),
             frames: timed.len(),
             warm_up: plan.n_warm_up as usize,
-            blocks: blocks.unwrap_or(0) as usize,
+            blocks: blocks.len(),
             frame_ms: summary(&|t| Some(t.frame_ms)),
             game_ms: summary(&|t| Some(t.game_ms)),
             record_ms: summary(&|t| Some(t.record_ms)),
@@ -183,30 +185,27 @@ impl Outcome {
     }
 }
 
-/// Timer scopes of a frame: the upload of the game thread's particles, and the passes.
+/// Timer scopes of a frame.
 pub fn pass_names() -> Vec<String> {
-    std::iter::once("upload").chain(Pass::ALL.iter().map(|p| p.name())).map(str::to_owned).collect()
+    Pass::ALL.iter().map(|p| p.name().to_owned()).collect()
 }
 
 fn pass_records(timed: &[&FrameTimes]) -> Vec<PassRecord> {
     let total: f64 = timed.iter().filter_map(|t| t.gpu_ms()).sum();
-    let record = |name: String| {
-        let ms: Vec<f64> = timed.iter().filter_map(|t| t.pass_ms(&name)).collect();
-        let pass = Pass::ALL.into_iter().find(|p| p.name() == name);
-        let skipped = |t: &&&FrameTimes| pass.is_some_and(|p| !t.plan.runs(p));
-        let reason = timed.iter().rev().find(skipped).and_then(|t| pass.map(|p| t.plan.decision(p).reason.to_owned()));
-        let n_skipped = timed.iter().filter(skipped).count();
+    let record = |pass: Pass| {
+        let ms: Vec<f64> = timed.iter().filter_map(|t| t.pass_ms(pass.name())).collect();
+        let skipped: Vec<&&FrameTimes> = timed.iter().filter(|t| !t.plan.runs(pass)).collect();
         PassRecord {
+            name: pass.name().to_owned(),
             p50_ms: median(&ms),
             share: (total > 0.0).then(|| ms.iter().sum::<f64>() / total),
-            n_run: if pass.is_some() { timed.len() - n_skipped } else { ms.len() },
-            n_skipped,
-            reason,
+            n_run: timed.len() - skipped.len(),
+            n_skipped: skipped.len(),
+            reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_owned()),
             saved_ms: None,
-            name,
         }
     };
-    pass_names().into_iter().map(record).filter(|p| p.n_run + p.n_skipped > 0).collect()
+    Pass::ALL.into_iter().map(record).collect()
 }
 
 /// The device as results name it.
@@ -234,7 +233,6 @@ mod tests {
     #[test]
     fn blocks_alternate_their_order() {
         use Threading::{Parallel as P, Serial as S};
-        let order: Vec<Threading> = block_order(&[S, P], 3).into_iter().map(|(_, m)| m).collect();
-        assert_eq!(order, [S, P, P, S, S, P]);
+        assert_eq!(block_order(&[S, P], 3), [S, P, P, S, S, P]);
     }
 }

@@ -151,6 +151,7 @@ pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
 
 fn box_rows(scene: &Scene, tries: &[(u64, bool)]) -> Vec<BoxRow> {
     let mut rows: Vec<BoxRow> = Vec::new();
+    let mut n_before = 0;
     for group in scene.groups() {
         if !matches!(scene.clouds[group.i_cloud].source, CloudSource::Boxes { .. }) {
             continue;
@@ -160,7 +161,10 @@ fn box_rows(scene: &Scene, tries: &[(u64, bool)]) -> Vec<BoxRow> {
         let attempts: u64 = mine.iter().map(|t| t.0).sum();
         let folded = mine.iter().filter(|t| t.1).count() as u32;
         let accepted = f64::from(group.n_particles - folded);
-        let i_box = rows.iter().filter(|r| r.cloud == group.i_cloud).count();
+        if rows.last().is_some_and(|r| r.cloud != group.i_cloud) {
+            n_before = rows.len();
+        }
+        let i_box = rows.len() - n_before;
         let acceptance = (attempts > 0).then(|| accepted / attempts as f64);
         rows.push(BoxRow {
             cloud: group.i_cloud,

@@ -5,12 +5,14 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
+use crate::io::atomic::write_atomic;
 use crate::measure::clock::Clock;
 use crate::measure::stats;
 
@@ -225,7 +227,7 @@ pub fn write_results(out_dir: &Path, run: &Run, pass_names: &[String], rows: &[F
 pub fn write_run(path: &Path, run: &Run) -> Result<()> {
     let mut text = serde_json::to_string_pretty(run).map_err(|cause| Error::io(path, cause))?;
     text.push('\n');
-    write_whole(path, text.as_bytes())
+    write_atomic(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// Reads `run.json`, or the `run.json` in a folder.
@@ -258,7 +260,7 @@ pub fn write_frames(path: &Path, pass_names: &[String], rows: &[FrameRow]) -> Re
         writer.write_record(fields(i_row, row)).map_err(failed)?;
     }
     let bytes = writer.into_inner().map_err(|cause| Error::io(path, cause))?;
-    write_whole(path, &bytes)
+    write_atomic(path, |file| file.write_all(&bytes))
 }
 
 fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
@@ -285,19 +287,6 @@ fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
 /// The shortest text that reads back as the same f64.
 fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map(|value| value.to_string()).unwrap_or_default()
-}
-
-/// Beside its place, then renamed: a reader, or a crash, never sees half a file.
-fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.tmp", std::process::id()));
-    let temporary = path.with_file_name(name);
-    let written = fs::write(&temporary, bytes).and_then(|()| fs::rename(&temporary, path));
-    written.map_err(|cause| {
-        // What was being written is lost either way; the cause of that is what the reader needs.
-        let _ = fs::remove_file(&temporary);
-        Error::io(path, cause)
-    })
 }
 
 /// The revision that was built (see build.rs).

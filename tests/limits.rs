@@ -1,0 +1,34 @@
+//! What a scene may ask for, and what it is told before it costs dearly.
+
+use nimbus::frame::limits::{advice, n_deposits};
+use nimbus::io::scene_file;
+use nimbus::model::scene::Scene;
+
+fn scene(n_particles: u32, grid: u32, mode: &str) -> Scene {
+    let dir = tempfile::tempdir().unwrap();
+    let boxes = format!("{n_particles}\n1\n{n_particles}, 1, 1, 1, 0, 0, 0, 2\n");
+    std::fs::write(dir.path().join("b.dat"), boxes).unwrap();
+    let path = dir.path().join("s.toml");
+    std::fs::write(&path, "[[cloud]]\nfrom = \"boxes\"\nfile = \"b.dat\"\nradius_scale = 0.6\n").unwrap();
+    let set = [format!("lighting.grid={grid}"), format!("lighting.mode={mode}")];
+    scene_file::load(&path, &set, None).unwrap().scene
+}
+
+#[test]
+fn blobs_much_larger_than_cells_are_told_of() {
+    assert_eq!(advice(&scene(500, 64, "first")), None);
+    assert!(advice(&scene(300_000, 64, "first")).is_some_and(|a| a.contains("lighting.grid = 64")));
+    assert_eq!(advice(&scene(300_000, 64, "none")), None);
+    // The inner cells halve: 60 to 30 a side.
+    assert!(n_deposits(&scene(1000, 64, "first")) > 6.0 * n_deposits(&scene(1000, 34, "first")));
+}
+
+#[test]
+fn a_step_that_would_cut_a_march_short_is_refused_by_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("s.toml");
+    std::fs::write(&path, "[lighting]\ngrid = 512\nstep = 0.2\n").unwrap();
+    let error = scene_file::load(&path, &[], None).unwrap_err().to_string();
+    assert!(error.contains("s.toml:3:") && error.contains("0.2165") && error.contains("grid = 512"), "{error}");
+    assert!(scene_file::load(&path, &["lighting.step=0.22".into()], None).is_ok());
+}

@@ -12,7 +12,7 @@ use crate::frame::FrameTimes;
 use crate::frame::plan::Pass;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
-use crate::measure::clock::Clock;
+use crate::measure::clock::ClockQuality;
 use crate::measure::stats::{Bootstrap, Interval, median};
 use crate::model::scene::{Simulate, Threading};
 
@@ -223,7 +223,7 @@ pub fn device_record(info: &crate::gpu::DeviceInfo) -> records::Device {
 /// The host's clock and the device's.
 pub fn clocks_record(info: &crate::gpu::DeviceInfo) -> records::Clocks {
     let has_timestamps = info.limits.timestamp_valid_bits > 0;
-    records::Clocks::of(&Clock::start(), has_timestamps.then_some(info.limits.timestamp_period_ns))
+    records::Clocks::of(&ClockQuality::measure(), has_timestamps.then_some(info.limits.timestamp_period_ns))
 }
 
 #[cfg(test)]

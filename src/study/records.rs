@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
-use crate::measure::clock::Clock;
+use crate::measure::clock::ClockQuality;
 use crate::measure::stats;
 
 pub const SCHEMA_VERSION: u32 = 1;
@@ -159,8 +159,8 @@ impl From<stats::Interval> for Ratio {
 }
 
 impl Clocks {
-    pub fn of(clock: &Clock, timestamp_period_ns: Option<f64>) -> Self {
-        Clocks { resolution_ns: clock.resolution_ns() as f64, overhead_ns: clock.overhead_ns(), timestamp_period_ns }
+    pub fn of(clock: &ClockQuality, timestamp_period_ns: Option<f64>) -> Self {
+        Clocks { resolution_ns: clock.resolution_ns as f64, overhead_ns: clock.overhead_ns, timestamp_period_ns }
     }
 }
 

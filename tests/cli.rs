@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use assert_cmd::Command;
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 fn nimbus() -> Command {
     Command::cargo_bin("nimbus").expect("the program is built")
@@ -83,8 +84,19 @@ fn bad_input_is_one_clear_message_and_nothing_written() {
         (&["scenes/none.toml"], "scenes/none.toml"),
         (&["scenes/hello.toml", "--device", "no such device"], "expected an index or a part of a name"),
         (&["scenes/hello.toml", "--shaders", "scenes"], "none of nimbus's shaders"),
+        (&["scenes/hello.toml", "--device", ""], "expected an index or a part of a name; found: 0: "),
+        (&["scenes/hello.toml", "--device", "4090"], "expected an index or a part of a name; found: 0: "),
         (&["scenes/hello.toml", "--set", "film.width=20000"], "film.width"),
+        (
+            &["scenes/hello.toml", "--size", "20000x10"],
+            "'--size <WxH>': expected WIDTHxHEIGHT such as 800x600, each from 1",
+        ),
         (&["scenes/hello.toml", "--time", "nan"], "finite"),
+        (&["scenes/hello.toml", "--time", "1e300"], "time 1e300 s: expected a finite number from -1e15 to 1e15"),
+        (
+            &["scenes/threads.toml", "--set", "cloud.0.wind=[1e9,0,0]", "--time", "1e12"],
+            "carries a cloud's origin too far",
+        ),
         (&["scenes/hello.toml", "--set", "camera.target=[0,0.55,6.2]"], "camera"),
     ] {
         let (code, stdout, stderr) = run(&[&["render", "-o", &out], args].concat());
@@ -149,18 +161,88 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     let dir = temp();
     let out = path(&dir, "run");
     let program = assert_cmd::cargo::cargo_bin("nimbus");
-    let args = ["bench", "scenes/hello.toml", "--frames", "1000000", "--out", &out];
-    let mut child = std::process::Command::new(program).args(args).stdout(Stdio::piped()).spawn().expect("a child");
-    std::thread::sleep(Duration::from_secs(3));
-    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
-    let begin = Instant::now();
-    let status = child.wait().expect("it ends");
-    assert_eq!(status.code(), Some(130));
-    assert!(begin.elapsed() < Duration::from_secs(20));
+    let args = ["bench", "scenes/hello.toml", "--frames", "1000000", "--warmup", "0", "--out", &out];
+    // Shaders are compiled here, so that the time below is not theirs.
+    assert_eq!(run(&["bench", "scenes/hello.toml", "--frames", "1", "--warmup", "0", "--repeat", "1"]).0, 0);
+    // The folder is made before the first frame, and one frame is always finished.
+    let is_begun = || Path::new(&out).exists();
+    let (code, stderr, took) = interrupt(std::process::Command::new(program).args(args), &is_begun);
+    assert_eq!(code, Some(130));
+    assert!(stderr.contains("keeps what is done") && stderr.lines().count() == 2, "{stderr}");
+    assert!(took < Duration::from_secs(20));
     let json: Value =
         serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json")).expect("JSON");
     assert_eq!(json["interrupted"], true);
     assert!(json["modes"][0]["frames"].as_u64().is_some_and(|n| n > 0));
+}
+
+/// Sends Ctrl-C's signal once `is_begun`: the exit code, stderr, and the time from the signal to the end.
+fn interrupt(command: &mut std::process::Command, is_begun: &dyn Fn() -> bool) -> (Option<i32>, String, Duration) {
+    let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("a child");
+    let deadline = Instant::now() + Duration::from_secs(120);
+    while !is_begun() {
+        assert!(Instant::now() < deadline, "it never begins");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    let begin = Instant::now();
+    let output = child.wait_with_output().expect("it ends");
+    (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"), begin.elapsed())
+}
+
+#[test]
+fn an_interrupted_render_ends_at_once_and_leaves_nothing() {
+    let dir = temp();
+    let out = path(&dir, "long.exr");
+    // As many pixels as the software device takes: seconds to draw, most of a second to write.
+    let args = ["render", "scenes/cubes-554.toml", "--size", "4000x4000", "-o", &out];
+    let program = assert_cmd::cargo::cargo_bin("nimbus");
+    let names = || std::fs::read_dir(dir.path()).expect("the folder").count();
+    let start = Instant::now();
+    let while_drawing = || start.elapsed() > Duration::from_millis(300);
+    // The first file to appear is the temporary one.
+    let while_writing = || names() > 0;
+    for is_begun in [&while_drawing as &dyn Fn() -> bool, &while_writing] {
+        let (code, stderr, took) = interrupt(std::process::Command::new(&program).args(args), is_begun);
+        assert_eq!((code, stderr.as_str()), (Some(130), ""));
+        assert!(took < Duration::from_secs(5), "{took:?}");
+        assert_eq!(names(), 0, "neither a picture nor a part of one");
+    }
+}
+
+#[test]
+fn render_says_what_it_drew() {
+    let dir = temp();
+    let out = path(&dir, "a.exr");
+    let (code, json, stderr) = run(&["render", "scenes/hello.toml", "-o", &out, "--frame", "3", "--json"]);
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!((&json["file"], &json["width"], &json["height"]), (&out.as_str().into(), &320.into(), &240.into()));
+    assert_eq!((&json["frame"], &json["not_finite"]), (&3.into(), &0.into()));
+    assert!(json["time_s"].as_f64().is_some_and(|t| t > 0.0) && json["device"]["name"].is_string());
+    let pixels = image::open(&out).expect("a picture").into_rgba32f();
+    let bytes: Vec<u8> = pixels.as_raw().iter().flat_map(|v| v.to_le_bytes()).collect();
+    assert_eq!(json["image_hash"], format!("{:x}", Sha256::digest(bytes)));
+    let passes = json["passes"].as_array().expect("a list");
+    assert_eq!(passes.len(), 8);
+    assert!(passes.iter().all(|p| p["name"].is_string() && p["reason"].is_string() && p["run"].is_boolean()));
+    assert!(passes.iter().all(|p| p["ms"].is_null() || p["run"] == true));
+
+    let (_, json, _) = run(&["render", "scenes/hello.toml", "-o", &out, "--force", "--time", "0.5", "--json"]);
+    let json: Value = serde_json::from_str(&json).expect("JSON");
+    assert_eq!((&json["frame"], &json["time_s"]), (&Value::Null, &0.5.into()));
+}
+
+#[test]
+fn inspect_says_more_on_stderr_when_asked() {
+    for more in [&[][..], &["--reference"]] {
+        let (code, quiet, nothing) = run(&[&["inspect", "scenes/cubes-615.toml"], more].concat());
+        assert_eq!((code, nothing.as_str()), (0, ""));
+        let (_, stdout, stderr) = run(&[&["inspect", "scenes/cubes-615.toml", "-v"], more].concat());
+        assert_eq!(stdout, quiet);
+        assert!(stderr.contains("615 particles in 23 groups, film "), "{stderr}");
+        assert_eq!(stderr.lines().count(), if more.is_empty() { 2 } else { 1 });
+    }
 }
 
 #[test]
@@ -207,6 +289,12 @@ fn devices_lists_at_least_the_one_that_is_used() {
     assert_eq!(devices.as_array().expect("a list").iter().filter(|d| d["used"] == true).count(), 1);
     let (code, table, _) = run(&["devices"]);
     assert!(code == 0 && table.contains("<- used"));
+    let (code, validated, stderr) = run(&["devices", "--validation", "-q"]);
+    assert_eq!((code, validated.as_str(), stderr.as_str()), (0, table.as_str(), ""));
+    let (code, _, stderr) = run(&["devices", "-v"]);
+    assert!(code == 0 && stderr.contains(" is used: "), "{stderr}");
+    let (code, listed, stderr) = run(&["devices", "--device", ""]);
+    assert!(code == 2 && listed.contains("0: ") && stderr.contains("found: 0: "), "{stderr}");
 }
 
 #[test]

@@ -196,7 +196,7 @@ fn overrides_that_do_not_fit_are_named() {
         ("material.0.kd=[1,1,2]", "`material.0.kd.2`: expected a number from 0 to 1, found 2.0"),
         ("cloud.0.seed.x=3", "`cloud.0.seed` is no table: integer 4"),
         ("surface.0.u=3", "the scene has no `surface`"),
-        ("film.exposure=inf", "`film.exposure`: expected a finite number of at least 0, found inf"),
+        ("film.exposure=inf", "`film.exposure`: expected a number from 0 to 1e15, found inf"),
     ] {
         assert_eq!(message(&format!("{CLOUD}seed = 4"), &[set]), format!("--set {set}: {expected}"));
     }
@@ -324,13 +324,30 @@ fn files_that_are_no_text_are_refused_at_once() {
     fs::write(&boxes, b"3\n1 \xff").unwrap();
     assert_eq!(error(), "b.dat:2:3: not UTF-8 text");
     fs::write(&boxes, " \n").unwrap();
-    assert_eq!(error(), "b.dat: the file is empty");
+    assert_eq!(error(), "b.dat:1:1: the file is empty: expected the number of particles");
     fs::write(&path, "").unwrap();
-    assert_eq!(error(), "scene.toml: the file is empty");
+    assert_eq!(error(), "scene.toml:1:1: the file is empty: expected a scene's tables, such as [camera] and [[cloud]]");
     fs::write(&path, format!("title = '{}'", "x".repeat(4 << 20))).unwrap();
     assert!(error().starts_with("scene.toml: too large: 5 MiB"));
     fs::write(&path, "\u{feff}title = 3").unwrap();
     assert_eq!(error(), "scene.toml:1:9: `title`: expected a string, found integer 3");
+}
+
+#[test]
+fn an_empty_or_too_heavy_particle_list_is_refused_by_line() {
+    let (dir, path) = folder("[[cloud]]\nfrom = 'particles'\nfile = 'p.csv'\n");
+    let error = |text: &str| {
+        fs::write(dir.path().join("p.csv"), text).unwrap();
+        load(&path, &[], None).unwrap_err().to_string().replace(&format!("{}/", dir.path().display()), "")
+    };
+    assert_eq!(error(""), "p.csv:1:1: the file is empty: expected a header x,y,z,sigma,kappa[,r,g,b]");
+    assert_eq!(
+        error("x,y,z,sigma,kappa\n\n0,0,0,1e12,1\n0,0,0,1,1e4\n"),
+        "scene.toml:3:8: `cloud.0.file`: κ (2π)^{3/2} σ³ of the greatest σ (line 3) and the greatest κ (line 4): \
+         expected at most 1e37, found 1.575e41"
+    );
+    fs::write(dir.path().join("p.csv"), "x,y,z,sigma,kappa\n1e15,-1e15,0,1e-15,1e15\n0,0,0,0,0\n").unwrap();
+    assert_eq!(load(&path, &[], None).unwrap().scene.n_particles(), 2);
 }
 
 #[test]

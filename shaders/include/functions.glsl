@@ -19,7 +19,8 @@ float sine(float x) {
     u = u * s + 0.00833307858556509017944336;
     u = u * s - 0.166666597127914428710938;
     float value = s * (u * r) + r;
-    return (int(k) & 1) == 0 ? value : -value;
+    // Parity in floats: exact for every k, while int(k) is undefined where k has no int.
+    return k - 2.0 * floor(k * 0.5) == 0.0 ? value : -value;
 }
 
 // erf x: Abramowitz and Stegun 7.1.28, whose own error is at most 3e-7; exact sign symmetry. In f32 the 16th power

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
+use crate::io::scene_file::MAX_SIDE;
+
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, max_term_width = 100)]
@@ -78,6 +80,9 @@ pub struct RenderArgs {
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
+    /// Print what was drawn as JSON: hash of the picture, device, passes
+    #[arg(long)]
+    pub json: bool,
     #[command(flatten)]
     pub options: SceneArgs,
 }
@@ -160,12 +165,21 @@ pub struct DevicesArgs {
     /// JSON in place of the table
     #[arg(long)]
     pub json: bool,
+    /// List them under the validation layers; any message fails the command
+    #[arg(long)]
+    pub validation: bool,
+    /// No warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Say more: which device is used, and why
+    #[arg(short, long, conflicts_with = "quiet")]
+    pub verbose: bool,
 }
 
 fn parse_size(text: &str) -> Result<(u32, u32), String> {
-    let wrong = || format!("expected WIDTHxHEIGHT such as 800x600, found \"{text}\"");
+    let wrong = || format!("expected WIDTHxHEIGHT such as 800x600, each from 1 to {MAX_SIDE}, found \"{text}\"");
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
-    let parse = |t: &str| t.parse::<u32>().ok().filter(|n| *n > 0).ok_or_else(wrong);
+    let parse = |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
     Ok((parse(w)?, parse(h)?))
 }
 
@@ -182,7 +196,8 @@ mod tests {
     #[test]
     fn sizes() {
         assert_eq!(parse_size("800x600"), Ok((800, 600)));
-        for wrong in ["800", "0x5", "ax3", "3x", "-1x2"] {
+        assert_eq!(parse_size("16384x1"), Ok((16384, 1)));
+        for wrong in ["800", "0x5", "ax3", "3x", "-1x2", "16385x1", "1x99999999999"] {
             assert!(parse_size(wrong).is_err(), "{wrong}");
         }
     }

@@ -4,11 +4,11 @@ use serde_json::json;
 
 use super::args::DevicesArgs;
 use super::output;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Device, DeviceInfo, Instance};
 
 pub fn run(args: &DevicesArgs) -> Result<()> {
-    let instance = Instance::new(false)?;
+    let instance = Instance::new(args.validation)?;
     let devices = Device::list(&instance)?;
     let used = Device::choose(devices.clone(), args.device.as_deref());
     let i_used = used.as_ref().ok().map(|d| d.index);
@@ -18,7 +18,19 @@ pub fn run(args: &DevicesArgs) -> Result<()> {
     } else {
         output::text(&devices.iter().map(|d| describe(d, i_used)).collect::<String>())?;
     }
-    used.map(|_| ())
+    let used = used?;
+    if args.verbose {
+        let why = match &args.device {
+            Some(choice) => format!("named by --device \"{choice}\""),
+            None => "the first of the best kind: discrete, integrated, virtual, cpu".to_owned(),
+        };
+        eprintln!("device {}: {} is used: {why}", used.index, used.name);
+    }
+    let said = instance.messages().take();
+    if said.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Check { what: format!("{} validation messages:\n{}", said.len(), said.join("\n")) })
 }
 
 fn version(d: &DeviceInfo) -> String {

@@ -1,7 +1,7 @@
 //! `nimbus inspect SCENE`.
 
 use super::args::InspectArgs;
-use super::{device_choice, load, output};
+use super::{check_time, device_choice, load, output, say_sizes};
 use crate::error::Result;
 use crate::study::inspect;
 use crate::study::stage::Stage;
@@ -13,22 +13,51 @@ const PLAN_FRAMES: u32 = 3;
 pub fn run(args: &InspectArgs) -> Result<()> {
     let loaded = load(&args.scene, &args.options)?;
     let i_frame = args.frame.unwrap_or(0);
+    check_time(&loaded.scene, loaded.scene.time.at(i_frame))?;
+    let spinner = output::spinner("inspecting", args.options.quiet);
     if args.reference {
         let scene = &loaded.scene;
-        return match (args.particles, args.facets) {
-            (true, _) => output::rows(&inspect::particles_reference(scene, i_frame)?, args.json),
-            (_, true) => output::rows(&inspect::facets_reference(scene, i_frame)?, args.json),
-            _ => boxes(&inspect::boxes_reference(scene), args.json),
+        let found = match (args.particles, args.facets) {
+            (true, _) => Found::Particles(inspect::particles_reference(scene, i_frame)?),
+            (_, true) => Found::Facets(inspect::facets_reference(scene, i_frame)?),
+            _ => Found::Boxes(inspect::boxes_reference(scene)),
         };
+        drop(spinner);
+        if args.options.verbose {
+            say_sizes(scene, None);
+        }
+        return print(&found, args.json);
     }
     let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
-    match (args.particles, args.facets, args.plan) {
-        (true, _, _) => output::rows(&inspect::particles(&mut stage, i_frame)?, args.json)?,
-        (_, true, _) => output::rows(&inspect::facets(&mut stage, i_frame)?, args.json)?,
-        (_, _, true) => plan(&inspect::plans(&mut stage, args.frame.unwrap_or(PLAN_FRAMES))?, args.json)?,
-        _ => boxes(&inspect::boxes(&mut stage)?, args.json)?,
+    let found = match (args.particles, args.facets, args.plan) {
+        (true, _, _) => Found::Particles(inspect::particles(&mut stage, i_frame)?),
+        (_, true, _) => Found::Facets(inspect::facets(&mut stage, i_frame)?),
+        (_, _, true) => Found::Plan(inspect::plans(&mut stage, args.frame.unwrap_or(PLAN_FRAMES))?),
+        _ => Found::Boxes(inspect::boxes(&mut stage)?),
+    };
+    drop(spinner);
+    if args.options.verbose {
+        say_sizes(&stage.scene, Some(&stage));
     }
+    print(&found, args.json)?;
     stage.close()
+}
+
+/// What was asked for, complete before the first line of it is printed.
+enum Found {
+    Particles(Vec<inspect::ParticleRow>),
+    Facets(Vec<inspect::FacetRow>),
+    Boxes(Vec<inspect::BoxRow>),
+    Plan(Vec<inspect::PlanRow>),
+}
+
+fn print(found: &Found, json: bool) -> Result<()> {
+    match found {
+        Found::Particles(rows) => output::rows(rows, json),
+        Found::Facets(rows) => output::rows(rows, json),
+        Found::Boxes(rows) => boxes(rows, json),
+        Found::Plan(rows) => plan(rows, json),
+    }
 }
 
 fn boxes(rows: &[inspect::BoxRow], json: bool) -> Result<()> {

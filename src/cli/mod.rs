@@ -14,25 +14,29 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Parser;
 
 use crate::error::{Error, Result};
+use crate::io::atomic;
+use crate::io::magnitude::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
-use crate::study::stage::DeviceChoice;
+use crate::model::scene::Scene;
+use crate::study::stage::{DeviceChoice, Stage};
 use args::{Args, Command, SceneArgs};
 
-/// Set by the first Ctrl-C; long work looks at it between frames. The second one ends the process.
+/// Set by Ctrl-C where [`GRACEFUL`] is: the command looks at it between frames.
 static STOP: AtomicBool = AtomicBool::new(false);
+/// Whether the command keeps what it has finished: then only a second Ctrl-C ends the process at once.
+static GRACEFUL: AtomicBool = AtomicBool::new(false);
 
 /// Parses the command line, runs the command, prints an error and gives the exit code.
 pub fn main() -> ExitCode {
     let args = Args::parse();
     // Without a handler Ctrl-C still ends the program, only less cleanly.
-    let _ = ctrlc::set_handler(|| {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(i32::from(Error::Interrupted.exit_code()));
-        }
-    });
+    let _ = ctrlc::set_handler(interrupted);
     let done = match &args.command {
         Command::Render(a) => render::run(a),
-        Command::Bench(a) => bench::run(a, &STOP),
+        Command::Bench(a) => {
+            GRACEFUL.store(true, Ordering::Relaxed);
+            bench::run(a, &STOP)
+        }
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
     };
@@ -43,6 +47,21 @@ pub fn main() -> ExitCode {
             ExitCode::from(error.exit_code())
         }
     }
+}
+
+/// What Ctrl-C does; runs on a thread of its own.
+fn interrupted() {
+    if GRACEFUL.load(Ordering::Relaxed) && !STOP.swap(true, Ordering::Relaxed) {
+        eprintln!("interrupted: finishes this frame and keeps what is done; once more ends at once");
+        return;
+    }
+    atomic::abandon();
+    // std::process::exit would run the exit handlers of a driver that other threads are still inside of.
+    unsafe extern "C" {
+        fn _exit(code: std::ffi::c_int) -> !;
+    }
+    // SAFETY: ends the process; nothing after it runs.
+    unsafe { _exit(i32::from(Error::Interrupted.exit_code())) }
 }
 
 /// Loads a scene with all that was typed about it; prints what is allowed but hardly meant.
@@ -63,6 +82,31 @@ fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
 
 fn device_choice(args: &SceneArgs) -> DeviceChoice {
     DeviceChoice { device: args.device.clone(), shaders: args.shaders.clone(), validation: args.validation }
+}
+
+/// Refuses a time at which the scene is where f32 cannot follow; the frames of the scene itself are not such times.
+fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
+    // Not a number is refused too.
+    let in_time = time_s.abs() <= GREATEST;
+    if in_time && scene.clouds.iter().all(|c| is_carried_place(c.origin_at(time_s))) {
+        return Ok(());
+    }
+    let greatest = shortest(GREATEST);
+    Err(Error::usage(if in_time {
+        format!("time {} s: the wind carries a cloud's origin too far: expected at most {greatest}", shortest(time_s))
+    } else {
+        format!("time {} s: expected a finite number from -{greatest} to {greatest}", shortest(time_s))
+    }))
+}
+
+/// Device and sizes on stderr, for `-v`.
+fn say_sizes(scene: &Scene, stage: Option<&Stage>) {
+    if let Some(stage) = stage {
+        eprintln!("{} ({})", stage.info().name, stage.info().driver);
+    }
+    let film = scene.film;
+    let (particles, groups) = (scene.n_particles(), scene.groups().len());
+    eprintln!("{particles} particles in {groups} groups, film {} x {}", film.width, film.height);
 }
 
 /// A result that exists is not replaced unless asked for.

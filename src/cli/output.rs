@@ -1,6 +1,9 @@
 //! Writing for people and for programs.
 
 use std::io::{IsTerminal, Write};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
 use clap::ColorChoice;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -52,6 +55,47 @@ pub fn progress(n: u64, what: &str, quiet: bool) -> ProgressBar {
     match ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}") {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
+    }
+}
+
+/// Work without a count of its parts: dropped when the work ends.
+pub struct Spinner {
+    /// Never sent on; its end ends the thread.
+    done: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// Shows on stderr that work is going on, once it has lasted a second; never when quiet or when stderr is no terminal.
+pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
+    if quiet || !std::io::stderr().is_terminal() {
+        return Spinner { done: None, thread: None };
+    }
+    let (done, waiting) = mpsc::channel();
+    let thread = std::thread::spawn(move || {
+        if waiting.recv_timeout(SPINNER_DELAY) != Err(RecvTimeoutError::Timeout) {
+            return;
+        }
+        let spinner = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_message(what);
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+            spinner.set_style(style);
+        }
+        spinner.set_elapsed(SPINNER_DELAY);
+        while waiting.recv_timeout(SPINNER_STEP) == Err(RecvTimeoutError::Timeout) {
+            spinner.tick();
+        }
+        spinner.finish_and_clear();
+    });
+    Spinner { done: Some(done), thread: Some(thread) }
+}
+
+const SPINNER_DELAY: Duration = Duration::from_secs(1);
+const SPINNER_STEP: Duration = Duration::from_millis(100);
+
+impl Drop for Spinner {
+    fn drop(&mut self) {
+        self.done = None;
+        // The line is cleared before anything else is printed; a thread that failed has drawn nothing to clear.
+        let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 

@@ -1,10 +1,16 @@
 //! `nimbus render SCENE -o FILE`.
 
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
 use super::args::RenderArgs;
-use super::{device_choice, load, refuse_existing};
-use crate::error::{Error, Result};
+use super::{check_time, device_choice, load, output, refuse_existing, say_sizes};
+use crate::error::Result;
 use crate::frame::plan::Pass;
+use crate::frame::render::Rendered;
 use crate::io::image::{self, ImageKind};
+use crate::model::film::FilmFormat;
+use crate::study::bench::device_record;
 use crate::study::stage::Stage;
 
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -13,27 +19,92 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     refuse_existing(&args.output, args.force)?;
     let loaded = load(&args.scene, &args.options)?;
     let time_s = args.time.unwrap_or_else(|| loaded.scene.time.at(args.frame));
-    if !time_s.is_finite() {
-        return Err(Error::usage(format!("--time {time_s}: expected a finite number of seconds")));
-    }
+    check_time(&loaded.scene, time_s)?;
     let film = loaded.scene.film;
+    let quiet = args.options.quiet;
+
+    let spinner = output::spinner("drawing", quiet);
     let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
     let packet = stage.game.step_at(args.frame, time_s)?;
     let rendered = stage.renderer.step(packet)?;
     let rgba = stage.renderer.image()?;
+    drop(spinner);
+
+    let device = device_record(stage.info());
     if args.options.verbose {
-        eprintln!("{} ({})", stage.info().name, stage.info().driver);
+        say_sizes(&stage.scene, Some(&stage));
         for pass in Pass::ALL {
-            let decision = rendered.plan.decision(pass);
-            let time = rendered.passes.iter().find(|p| p.name == pass.name());
-            let time = time.map_or(String::from("-"), |t| format!("{:.3} ms", t.ms()));
-            eprintln!("  {:9} {time:>12}  {}", pass.name(), decision.reason);
+            let time = pass_ms(&rendered, pass).map_or(String::from("-"), |ms| format!("{ms:.3} ms"));
+            eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }
     stage.close()?;
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
-    if n_bad > 0 && !args.options.quiet {
-        eprintln!("warning: {n_bad} of {} values of the picture are not finite", rgba.len());
+    if n_bad > 0 && !quiet {
+        eprintln!("warning: {}", not_finite(n_bad, rgba.len(), film.format));
     }
-    image::write(&args.output, &film, film.width, film.height, &rgba)
+    let spinner = output::spinner("writing", quiet);
+    image::write(&args.output, &film, film.width, film.height, &rgba)?;
+    let hash = args.json.then(|| image_hash(&rgba));
+    drop(spinner);
+    let Some(hash) = hash else { return Ok(()) };
+    output::text(&format!(
+        "{:#}\n",
+        json!({
+            "file": args.output.display().to_string(), "width": film.width, "height": film.height,
+            "image_hash": hash, "device": device,
+            // A time that was asked for is no frame's.
+            "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad,
+            "passes": Pass::ALL.map(|pass| pass_json(&rendered, pass)),
+        })
+    ))
+}
+
+fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
+    let hint = match format {
+        FilmFormat::Rgba16f => "; film.format = \"rgba32f\" holds more than 65504",
+        FilmFormat::Rgba32f => "",
+    };
+    format!("{n_bad} of {n} values of the picture are not finite{hint}")
+}
+
+fn pass_json(rendered: &Rendered, pass: Pass) -> Value {
+    let decision = rendered.plan.decision(pass);
+    json!({
+        "name": pass.name(), "run": decision.run, "reason": decision.reason, "ms": pass_ms(rendered, pass),
+    })
+}
+
+/// GPU time of a pass that ran, where the device has timestamps.
+fn pass_ms(rendered: &Rendered, pass: Pass) -> Option<f64> {
+    rendered.passes.iter().find(|p| p.name == pass.name()).map(|p| p.ms())
+}
+
+/// SHA-256 (hex) over the pixels as little-endian f32, whatever the machine's own order.
+fn image_hash(rgba: &[f32]) -> String {
+    let mut hasher = Sha256::new();
+    for part in rgba.chunks(4096) {
+        hasher.update(part.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    }
+    format!("{:x}", hasher.finalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_finite_is_warned_of_with_the_way_out() {
+        let plain = "3 of 8 values of the picture are not finite";
+        assert_eq!(not_finite(3, 8, FilmFormat::Rgba32f), plain);
+        let half = not_finite(3, 8, FilmFormat::Rgba16f);
+        assert_eq!(half, format!("{plain}; film.format = \"rgba32f\" holds more than 65504"));
+    }
+
+    #[test]
+    fn the_hash_is_over_the_values_in_little_endian_order() {
+        let rgba: Vec<f32> = (0..5000).map(|i| i as f32 * 0.37).collect();
+        let bytes: Vec<u8> = rgba.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(image_hash(&rgba), format!("{:x}", Sha256::digest(&bytes)));
+    }
 }

@@ -108,26 +108,31 @@ impl Device {
     pub fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
         let names: Vec<String> = devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
         let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
-        let found = match choice {
+        let unknown = |text: &str| {
+            Err(Error::usage(format!("--device \"{text}\": expected an index or a part of a name; found: {names}")))
+        };
+        let found = match choice.map(str::trim) {
+            // Part of every name, and hardly meant: an unset variable in a script.
+            Some("") => return unknown(""),
             None => {
                 let rank = |d: &DeviceInfo| {
                     ["discrete", "integrated", "virtual", "cpu"].iter().position(|k| *k == d.kind).unwrap_or(9)
                 };
                 devices.into_iter().filter(|d| d.unusable.is_none()).min_by_key(rank)
             }
-            Some(text) => match text.parse::<usize>() {
-                Ok(index) => devices.into_iter().find(|d| d.index == index),
-                Err(_) => devices.into_iter().find(|d| d.name.to_lowercase().contains(&text.to_lowercase())),
-            },
+            Some(text) => {
+                // Names hold numbers too: "4090".
+                let index = text.parse().ok().and_then(|index: usize| devices.iter().position(|d| d.index == index));
+                let named = || devices.iter().position(|d| d.name.to_lowercase().contains(&text.to_lowercase()));
+                index.or_else(named).map(|i| devices[i].clone())
+            }
         };
         match (found, choice) {
             (None, None) => Err(Error::vulkan(
                 "device choice",
                 format!("no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a software one"),
             )),
-            (None, Some(text)) => {
-                Err(Error::usage(format!("--device {text}: expected an index or a part of a name; found: {names}")))
-            }
+            (None, Some(text)) => unknown(text),
             (Some(device), _) => match &device.unusable {
                 Some(why) => Err(Error::vulkan("device choice", format!("{}: {why}", device.name))),
                 None => Ok(device),
@@ -291,4 +296,55 @@ fn kind(t: vk::PhysicalDeviceType) -> &'static str {
 fn text(chars: &[std::ffi::c_char]) -> String {
     let bytes: Vec<u8> = chars.iter().map(|c| *c as u8).collect();
     CStr::from_bytes_until_nul(&bytes).map_or(String::new(), |s| s.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(index: usize, name: &str, kind: &'static str) -> DeviceInfo {
+        let limits = Limits {
+            max_storage_buffer_bytes: 0,
+            max_workgroups_x: 0,
+            max_workgroup_invocations: 0,
+            max_shared_memory_bytes: 0,
+            max_push_constant_bytes: 0,
+            max_image_extent: 0,
+            device_memory_bytes: 0,
+            subgroup_size: 0,
+            timestamp_valid_bits: 0,
+            timestamp_period_ns: 0.0,
+        };
+        DeviceInfo {
+            index,
+            name: name.to_owned(),
+            driver: String::new(),
+            api_version: (1, 3, 0),
+            kind,
+            uuid: String::new(),
+            unusable: None,
+            limits,
+            physical: vk::PhysicalDevice::null(),
+            queue_family: 0,
+        }
+    }
+
+    #[test]
+    fn a_device_is_chosen_by_index_or_name_or_kind() {
+        let devices = || vec![device(0, "llvmpipe (LLVM 15)", "cpu"), device(1, "GeForce RTX 4090", "discrete")];
+        let chosen = |choice| Device::choose(devices(), choice).map(|d| d.index);
+        assert_eq!(chosen(None), Ok(1));
+        assert_eq!(chosen(Some("0")), Ok(0));
+        assert_eq!(chosen(Some("4090")), Ok(1));
+        assert_eq!(chosen(Some("GEFORCE")), Ok(1));
+        // 1 is an index although it stands in both names.
+        assert_eq!(chosen(Some("1")), Ok(1));
+        assert_eq!(chosen(Some("15")), Ok(0));
+        for wrong in ["", "  ", "7", "Radeon"] {
+            let error = chosen(Some(wrong)).expect_err(wrong);
+            assert_eq!(error.exit_code(), 2);
+            let said = error.to_string();
+            assert!(said.contains("0: llvmpipe (LLVM 15), 1: GeForce RTX 4090"), "{said}");
+        }
+    }
 }

@@ -1,25 +1,44 @@
 //! Results are written beside their place and moved into it, so that a reader, a crash or Ctrl-C meets either
-//! the old file or the new one whole.
+//! the old file or the new one whole; [`abandon`] is what Ctrl-C has to call for that.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::{Error, Result};
+
+/// The temporaries that exist. Files are made, renamed and removed under its lock.
+static IN_PROGRESS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
+    // A list of paths is whole at every moment, so a panic beside it leaves nothing to mistrust.
+    IN_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes what is half written, and lets no thread begin or finish a file any more: the process is to end at once.
+pub fn abandon() {
+    let paths = in_progress();
+    for path in paths.iter() {
+        // Nobody is left to be told.
+        let _ = fs::remove_file(path);
+    }
+    std::mem::forget(paths);
+}
 
 /// Writes `path` with `write`. When that fails or panics the old file stays, and nothing else is left behind.
 pub fn write_atomic<E: Display>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), E>,
 ) -> Result<()> {
-    let temporary = Temporary::beside(path)?;
-    let file = OpenOptions::new().write(true).create_new(true).open(&temporary.path);
-    let mut writer = BufWriter::new(file.map_err(|e| Error::io(path, format!("cannot be written: {e}")))?);
+    let (temporary, file) = Temporary::beside(path)?;
+    let mut writer = BufWriter::new(file);
     write(&mut writer).map_err(|e| Error::io(path, e))?;
     writer.flush().map_err(|e| Error::io(path, e))?;
     drop(writer);
+    let _lock = in_progress();
     fs::rename(&temporary.path, path).map_err(|e| Error::io(path, e))
 }
 
@@ -29,7 +48,7 @@ struct Temporary {
 }
 
 impl Temporary {
-    fn beside(path: &Path) -> Result<Temporary> {
+    fn beside(path: &Path) -> Result<(Temporary, File)> {
         let Some(name) = path.file_name() else {
             return Err(Error::io(path, "expected a file name"));
         };
@@ -48,14 +67,22 @@ impl Temporary {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let name = format!(".{}.{}-{count}.tmp", name.to_string_lossy(), std::process::id());
-        Ok(Temporary { path: folder.join(name) })
+        let temporary = Temporary { path: folder.join(name) };
+        let mut paths = in_progress();
+        let file = OpenOptions::new().write(true).create_new(true).open(&temporary.path);
+        // Before it is known to be there: `temporary` goes through the list when it is dropped, and must find no lock.
+        paths.push(temporary.path.clone());
+        drop(paths);
+        Ok((temporary, file.map_err(|e| Error::io(path, format!("cannot be written: {e}")))?))
     }
 }
 
 impl Drop for Temporary {
     fn drop(&mut self) {
+        let mut paths = in_progress();
         // Gone already when all went well; otherwise the error that led here is the one to report.
         let _ = fs::remove_file(&self.path);
+        paths.retain(|path| *path != self.path);
     }
 }
 

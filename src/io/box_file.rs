@@ -5,21 +5,25 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::magnitude::{LEAST_EXTENT, shortest, wrong_coordinate, wrong_size};
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
 use crate::model::boxes::CloudBox;
 
 const FIELDS: [&str; 8] = ["particles", "x extent", "y extent", "z extent", "x", "y", "z", "radius"];
 
+/// What a box file begins with.
+pub const FIRST: &str = "the number of particles";
+
 pub fn read(path: &Path) -> Result<Vec<CloudBox>> {
-    parse(&read_text(path, DATA_LIMIT)?, path)
+    parse(&read_text(path, DATA_LIMIT, FIRST)?, path)
 }
 
 /// Boxes from text; `path` is for messages. Commas, spaces and tabs separate, blank lines are passed over.
 pub fn parse(text: &str, path: &Path) -> Result<Vec<CloudBox>> {
     let lines = text.lines().enumerate().map(|(i, line)| Line { number: i + 1, text: line, path });
     let mut lines = lines.filter(|line| !line.text.trim().is_empty());
-    let (n_particles, at_particles) = header(lines.next(), "the number of particles", text, path)?;
+    let (n_particles, at_particles) = header(lines.next(), FIRST, text, path)?;
     let (n_boxes, at_boxes) = header(lines.next(), "the number of boxes", text, path)?;
     let boxes = lines.map(|line| line.cloud_box()).collect::<Result<Vec<_>>>()?;
     if boxes.len() as u64 != n_boxes {
@@ -43,12 +47,6 @@ pub fn format(boxes: &[CloudBox]) -> String {
         text += &format!("{}, {}\n", b.n_particles, numbers.join(", "));
     }
     text
-}
-
-/// The fewest digits that read back as the same number; with an exponent where plain digits would run long.
-fn shortest(v: f64) -> String {
-    let plain = v == 0.0 || (1e-4..1e9).contains(&v.abs());
-    if plain { format!("{v}") } else { format!("{v:e}") }
 }
 
 struct Line<'a> {
@@ -118,21 +116,28 @@ impl<'a> Line<'a> {
             let what = format!("expected 8 fields ({}), found {n_fields}", FIELDS.join(", "));
             return Err(self.fault(offset, what));
         }
-        let number = |i: usize| self.number(FIELDS[i], fields[i]);
-        let size = |i: usize| match number(i)? {
-            v if v >= 0.0 => Ok(v),
-            v => Err(self.fault(fields[i].0, format!("{}: expected at least 0, found {v}", FIELDS[i]))),
-        };
+        let size = |i: usize, least: f64| self.bounded(FIELDS[i], fields[i], &|v| wrong_size(v, least));
+        let coordinate = |i: usize| self.bounded(FIELDS[i], fields[i], &wrong_coordinate);
         let (offset, word) = fields[0];
         let n_particles = word.parse().map_err(|_| {
             self.fault(offset, format!("particles: expected an integer from 0 to {}, found `{word}`", u32::MAX))
         })?;
         Ok(CloudBox {
             n_particles,
-            extent: DVec3::new(size(1)?, size(2)?, size(3)?),
-            center: DVec3::new(number(4)?, number(5)?, number(6)?),
-            radius_max: size(7)?,
+            extent: DVec3::new(size(1, LEAST_EXTENT)?, size(2, LEAST_EXTENT)?, size(3, LEAST_EXTENT)?),
+            center: DVec3::new(coordinate(4)?, coordinate(5)?, coordinate(6)?),
+            // How small it may be depends on `radius_scale`.
+            radius_max: size(7, 0.0)?,
         })
+    }
+
+    /// A number in which `wrong` finds nothing; else it says what was expected.
+    fn bounded(&self, name: &str, field: Field, wrong: &dyn Fn(f64) -> Option<String>) -> Result<f64> {
+        let v = self.number(name, field)?;
+        match wrong(v) {
+            None => Ok(v),
+            Some(expected) => Err(self.fault(field.0, format!("{name}: expected {expected}, found `{}`", field.1))),
+        }
     }
 
     fn number(&self, name: &str, (offset, word): Field) -> Result<f64> {
@@ -179,8 +184,8 @@ mod tests {
                 one("3, 1, 1, 1, 0, 0, 0, 1, 5"),
                 "3:25: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 9",
             ),
-            (one("3, 1, -1, 1, 0, 0, 0, 1"), "3:7: y extent: expected at least 0, found -1"),
-            (one("3, 1, 1, 1, 0, 0, 0, -0.5"), "3:22: radius: expected at least 0, found -0.5"),
+            (one("3, 1, -1, 1, 0, 0, 0, 1"), "3:7: y extent: expected 0 or a number from 1e-30 to 1e15, found `-1`"),
+            (one("3, 1, 1, 1, 0, 0, 0, -0.5"), "3:22: radius: expected a number from 0 to 1e15, found `-0.5`"),
             (one("-3, 1, 1, 1, 0, 0, 0, 1"), "3:1: particles: expected an integer from 0 to 4294967295, found `-3`"),
             (one("3.5, 1, 1, 1, 0, 0, 0, 1"), "3:1: particles: expected an integer from 0 to 4294967295, found `3.5`"),
             (
@@ -189,6 +194,16 @@ mod tests {
             ),
             (one("3, 1, 1, 1, nan, 0, 0, 1"), "3:13: x: expected a finite number, found `nan`"),
             (one("3, 1, 1, 1, 0, 0, 1e999, 1"), "3:19: z: expected a finite number, found `1e999`"),
+            (
+                one("3, 1, 1, 1e300, 0, 0, 0, 1"),
+                "3:10: z extent: expected 0 or a number from 1e-30 to 1e15, found `1e300`",
+            ),
+            (
+                one("3, 1e-31, 1, 1, 0, 0, 0, 1"),
+                "3:4: x extent: expected 0 or a number from 1e-30 to 1e15, found `1e-31`",
+            ),
+            (one("3, 1, 1, 1, 0, -1e30, 0, 1"), "3:16: y: expected a number from -1e15 to 1e15, found `-1e30`"),
+            (one("3, 1, 1, 1, 0, 0, 0, 1e16"), "3:22: radius: expected a number from 0 to 1e15, found `1e16`"),
             (one("3, 1, 1, 1, 0, o, 0, 1"), "3:16: y: expected a number, found `o`"),
             (one("3, 1,, 1, 0, 0, 0, 1"), "3:6: expected a number, found nothing beside the comma"),
             (one("3, 1, 1, 1, 0, 0, 0, 1,"), "3:24: expected a number, found nothing beside the comma"),
@@ -220,15 +235,17 @@ mod tests {
         for n in 0..200 {
             let boxes: Vec<CloudBox> = (0..n % 7)
                 .map(|_| {
-                    // Every exponent from the subnormals to the greatest, and both signs.
-                    let mut number = || loop {
+                    // Every exponent that is allowed, and both signs: coordinates and radii from the subnormals on,
+                    // edges from their least.
+                    let mut number = |least: f64| loop {
                         let v = f64::from_bits(next() << 32 ^ next());
-                        if v.is_finite() {
+                        if wrong_size(v.abs(), least).is_none() {
                             return v;
                         }
                     };
-                    let mut vector = || DVec3::new(number(), number(), number());
-                    let (extent, center, radius_max) = (vector().abs(), vector(), vector().x.abs());
+                    let mut vector = |least| DVec3::new(number(least), number(least), number(least));
+                    let (extent, center) = (vector(LEAST_EXTENT).abs(), vector(0.0));
+                    let radius_max = vector(0.0).x.abs();
                     CloudBox { n_particles: next() as u32, extent, center, radius_max }
                 })
                 .collect();
@@ -240,9 +257,5 @@ mod tests {
             assert!(boxes.iter().map(bits).eq(again.iter().map(bits)), "{text}");
             assert_eq!(format(&again), text);
         }
-        assert_eq!(
-            [0.0, -0.0, 0.1, -3.0, 6.12438e-7, 1e300].map(shortest),
-            ["0", "-0", "0.1", "-3", "6.12438e-7", "1e300"]
-        );
     }
 }

@@ -6,6 +6,7 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord};
 use glam::DVec3;
 
+use super::magnitude::{LEAST, wrong_coordinate, wrong_size};
 use super::suggest::{did_you_mean, list};
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
@@ -13,12 +14,20 @@ use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
 
 const COLUMNS: [&str; 9] = ["x", "y", "z", "sigma", "radius", "kappa", "r", "g", "b"];
 
+/// What a particle list begins with.
+pub const FIRST: &str = "a header x,y,z,sigma,kappa[,r,g,b]";
+
 pub fn read(path: &Path) -> Result<Vec<Particle>> {
-    parse(&read_text(path, DATA_LIMIT)?, path)
+    parse(&read_text(path, DATA_LIMIT, FIRST)?, path)
 }
 
 /// Particles from text; `path` is for messages.
 pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
+    Ok(parse_with_lines(text, path)?.0)
+}
+
+/// The same, and the line of each particle.
+pub fn parse_with_lines(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
     let file = File { text, path };
     let mut reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
     let mut rows = reader.records();
@@ -26,11 +35,13 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
     let lost = |e: csv::Error| Error::scene(Place::file(path), format!("not readable as CSV: {e}"));
 
     let Some(header) = next().map_err(lost)? else {
-        return Err(Error::scene(Place::file(path), "expected a header x,y,z,sigma,kappa[,r,g,b]"));
+        return Err(Error::scene(Place::line(path, 1, 1), format!("the file is empty: expected {FIRST}")));
     };
     file.check_quotes(&header)?;
     let columns = Columns::find(&file, &header)?;
-    let mut particles = Vec::new();
+    let (mut particles, mut lines) = (Vec::new(), Vec::new());
+    // Counted on from row to row: from the start each time, a long file would take its length squared.
+    let (mut line, mut counted) = (1, 0);
     while let Some(row) = next().map_err(lost)? {
         file.check_quotes(&row)?;
         if row.len() != header.len() {
@@ -39,8 +50,12 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
             return Err(Error::scene(file.place(&row, i), what));
         }
         particles.push(columns.particle(&file, &row)?);
+        let start = file.start(&row);
+        line += text[counted..start].bytes().filter(|b| *b == b'\n').count();
+        counted = start;
+        lines.push(line);
     }
-    Ok(particles)
+    Ok((particles, lines))
 }
 
 fn is_blank(row: &StringRecord) -> bool {
@@ -61,11 +76,16 @@ impl File<'_> {
         }
     }
 
-    /// Where field `i` of a row starts; past the last one, where the row ends.
-    fn place(&self, row: &StringRecord, i: usize) -> Place {
+    /// The byte at which a row starts.
+    fn start(&self, row: &StringRecord) -> usize {
         let start = row.position().map_or(0, |p| p.byte() as usize).min(self.text.len());
         // The reader's position of a row may still be before line ends that it passes over.
-        let start = start + self.text[start..].bytes().take_while(|b| matches!(b, b'\r' | b'\n')).count();
+        start + self.text[start..].bytes().take_while(|b| matches!(b, b'\r' | b'\n')).count()
+    }
+
+    /// Where field `i` of a row starts; past the last one, where the row ends.
+    fn place(&self, row: &StringRecord, i: usize) -> Place {
+        let start = self.start(row);
         let mut is_quoted = false;
         let mut n_fields = 0;
         let mut offset = start;
@@ -150,15 +170,23 @@ impl Columns {
                 .filter(|v: &f64| v.is_finite())
                 .ok_or_else(|| Error::scene(file.place(row, i), format!("expected a finite number, found `{word}`")))
         };
-        let size = |i: usize, name: &str| match number(i)? {
-            v if v >= 0.0 => Ok(v),
-            v => Err(Error::scene(file.place(row, i), format!("{name}: expected at least 0, found {v}"))),
+        let bounded = |i: usize, name: &str, wrong: &dyn Fn(f64) -> Option<String>| {
+            let v = number(i)?;
+            match wrong(v) {
+                None => Ok(v),
+                Some(expected) => {
+                    let what = format!("{name}: expected {expected}, found `{}`", row[i].trim());
+                    Err(Error::scene(file.place(row, i), what))
+                }
+            }
         };
+        let size = |i: usize, name: &str| bounded(i, name, &|v| wrong_size(v, 0.0));
+        let coordinate = |i: usize, name: &str| bounded(i, name, &wrong_coordinate);
         let [x, y, z] = self.position;
         let name = if self.sigma_factor == 1.0 { "sigma" } else { "radius" };
         Ok(Particle {
-            position: DVec3::new(number(x)?, number(y)?, number(z)?),
-            sigma: size(self.sigma, name)? * self.sigma_factor,
+            position: DVec3::new(coordinate(x, "x")?, coordinate(y, "y")?, coordinate(z, "z")?),
+            sigma: bounded(self.sigma, name, &|v| wrong_size(v, LEAST))? * self.sigma_factor,
             kappa: size(self.kappa, "kappa")?,
             color: match self.color {
                 None => DVec3::ONE,
@@ -185,6 +213,8 @@ mod tests {
         let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
         assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
         assert_eq!(good("x,y,z,sigma,kappa"), []);
+        let text = "\nx,y,z,sigma,kappa\r\n\r\n1,2,3,4,5\n \n1,2,3,4,5\n1,2,3,4,5";
+        assert_eq!(parse_with_lines(text, Path::new("p.csv")).unwrap().1, [4, 6, 7]);
     }
 
     #[test]
@@ -205,8 +235,11 @@ mod tests {
             (row("0,0,zero,1,1"), "4:5: expected a finite number, found `zero`".to_owned()),
             (row("0,0,,1,1"), "4:5: expected a finite number, found ``".to_owned()),
             (row("0,\"0\", inf,1,1"), "4:8: expected a finite number, found `inf`".to_owned()),
-            (row("0,0,0,-1,1"), "4:7: sigma: expected at least 0, found -1".to_owned()),
-            (row("0,0,0,1,-2"), "4:9: kappa: expected at least 0, found -2".to_owned()),
+            (row("0,0,0,-1,1"), "4:7: sigma: expected 0 or a number from 1e-15 to 1e15, found `-1`".to_owned()),
+            (row("0,0,0,1,-2"), "4:9: kappa: expected a number from 0 to 1e15, found `-2`".to_owned()),
+            (row("0,0,0,1e-300,1"), "4:7: sigma: expected 0 or a number from 1e-15 to 1e15, found `1e-300`".to_owned()),
+            (row("0,0,0,1,1e300"), "4:9: kappa: expected a number from 0 to 1e15, found `1e300`".to_owned()),
+            (row("0,1e30,0,1,1"), "4:3: y: expected a number from -1e15 to 1e15, found `1e30`".to_owned()),
             (row("0,0,\"0,1,1"), "4:5: the quote is not closed on its line".to_owned()),
         ] {
             let error = parse(&text, Path::new("p.csv")).expect_err(&text).to_string();

@@ -6,10 +6,11 @@ use glam::DVec3;
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
+use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
 use super::suggest::{did_you_mean, list};
 use super::text_file::{DATA_LIMIT, read_text};
-use super::toml_section::{Bounds, Section};
-use super::{box_file, particle_file};
+use super::toml_section::Section;
+use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
 use crate::model::boxes::Form;
 use crate::model::cloud::{Cloud, CloudSource};
@@ -36,7 +37,7 @@ const LIST_KEYS: &[&str] = with_cloud_keys!["from", "file"];
 const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_depth", "radius_scale"];
 
 #[derive(Clone, Copy)]
-enum From {
+enum SourceKind {
     Boxes,
     Particles,
 }
@@ -47,11 +48,11 @@ impl<'a> CloudReader<'a> {
         CloudReader { folder, materials, seed, digests: Vec::new() }
     }
 
-    /// The text of the file that `file` names. What the file system refuses is reported where the scene names
+    /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
     /// it; what is wrong inside stays where it is.
-    fn read_named(&mut self, s: &mut Section) -> Result<(String, PathBuf)> {
+    fn read_named(&mut self, s: &mut Section, first: &str) -> Result<(String, PathBuf)> {
         let path = self.folder.join(s.required_string("file")?);
-        let text = read_text(&path, DATA_LIMIT).map_err(|e| match e {
+        let text = read_text(&path, DATA_LIMIT, first).map_err(|e| match e {
             Error::Io { path, what } => s.fault("file", format!("{}: {what}", path.display())),
             other => other,
         })?;
@@ -87,41 +88,48 @@ impl<'a> CloudReader<'a> {
 }
 
 pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> Result<Cloud> {
-    let from = [("boxes", From::Boxes), ("particles", From::Particles)];
+    let from = [("boxes", SourceKind::Boxes), ("particles", SourceKind::Particles)];
+    let mut lines = Vec::new();
     let source = match s.required_choice("from", &from, &["disc", "weather"])? {
-        From::Boxes => read_boxes(s, reader)?,
-        From::Particles => {
+        SourceKind::Boxes => read_boxes(s, reader)?,
+        SourceKind::Particles => {
             s.expect_keys(LIST_KEYS, &[])?;
-            let (text, path) = reader.read_named(s)?;
-            CloudSource::Particles(particle_file::parse(&text, &path)?)
+            let (text, path) = reader.read_named(s, particle_file::FIRST)?;
+            let (particles, of_particles) = particle_file::parse_with_lines(&text, &path)?;
+            lines = of_particles;
+            CloudSource::Particles(particles)
         }
     };
     s.only("texture", json!("none"), "blobs are drawn plain")?;
-    Ok(Cloud {
+    let cloud = Cloud {
         source,
-        position: s.vec3("position", DVec3::ZERO, Bounds::Any)?,
-        wind: s.vec3("wind", DVec3::ZERO, Bounds::Any)?,
+        position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
+        wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
         i_material: reader.read_material(s)?,
         seed: reader.read_seed(s, i_cloud)?,
-    })
+    };
+    match magnitude::beyond(&cloud, &lines) {
+        Some(what) => Err(s.fault("file", what)),
+        None => Ok(cloud),
+    }
 }
 
 fn read_gust(s: &mut Section) -> Result<Gust> {
     Ok(Gust {
-        amplitude: s.f64("gust", 0.0, Bounds::AtLeast(0.0))?,
-        length: s.f64("gust_length", 4.0, Bounds::Above(0.0))?,
-        period_s: s.f64("gust_period_s", 8.0, Bounds::Above(0.0))?,
+        amplitude: s.f64("gust", 0.0, AMOUNT)?,
+        length: s.f64("gust_length", 4.0, DIVISOR)?,
+        period_s: s.f64("gust_period_s", 8.0, DIVISOR)?,
     })
 }
 
 fn read_boxes(s: &mut Section, reader: &mut CloudReader) -> Result<CloudSource> {
     s.expect_keys(BOX_KEYS, &[])?;
-    let (text, path) = reader.read_named(s)?;
+    let (text, path) = reader.read_named(s, box_file::FIRST)?;
     Ok(CloudSource::Boxes {
         boxes: box_file::parse(&text, &path)?,
         form: s.choice("form", "centred", &Form::NAMES, &[])?,
-        optical_depth: s.f64("optical_depth", 1.0, Bounds::AtLeast(0.0))?,
-        radius_scale: s.f64("radius_scale", 1.0, Bounds::AtLeast(0.0))?,
+        optical_depth: s.f64("optical_depth", 1.0, AMOUNT)?,
+        radius_scale: s.f64("radius_scale", 1.0, AMOUNT)?,
     })
 }

@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value as Json, json};
 use sha2::{Digest, Sha256};
 
+use super::magnitude::{GREATEST, is_carried_place, shortest};
 use super::scene_clouds::{CloudReader, read_cloud};
+pub use super::scene_sections::MAX_SIDE;
 use super::toml_section::Section;
 use super::toml_tree::Document;
 use super::{scene_lights, scene_sections};
@@ -54,8 +56,14 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
     let mut resolved_clouds = Vec::new();
     for (i, mut section) in root.sections("cloud")?.into_iter().enumerate() {
         let cloud = read_cloud(&mut section, i, &mut reader)?;
-        if !cloud.origin_at(time.at(time.n_frames - 1)).is_finite() {
-            return Err(section.fault("wind", "carries the cloud beyond every number before the last frame"));
+        // Origins run along straight lines, so the first and the last frame's are the farthest.
+        for (time_s, when) in [(time.start_s, "at the first frame"), (time.at(time.n_frames - 1), "at the last frame")]
+        {
+            if !is_carried_place(cloud.origin_at(time_s)) {
+                let expected = shortest(GREATEST);
+                let what = format!("carries the cloud's origin too far: expected at most {expected} {when}");
+                return Err(section.fault("wind", what));
+            }
         }
         clouds.push(cloud);
         resolved_clouds.push(section.finish());

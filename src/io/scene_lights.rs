@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde_json::json;
 
+use super::magnitude::{AMOUNT, GREATEST_SHARE};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::light::Light;
@@ -41,8 +42,8 @@ pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
             Kind::Directional => read_directional(&mut s)?,
             Kind::Sky => {
                 s.expect_keys(&["kind", "irradiance", "constant"], &[])?;
-                let irradiance = s.required_vec3("irradiance", Bounds::AtLeast(0.0))?;
-                Light::Sky { irradiance, constant: s.f64("constant", 0.15, Bounds::AtLeast(0.0))? }
+                let irradiance = s.required_vec3("irradiance", AMOUNT)?;
+                Light::Sky { irradiance, constant: s.f64("constant", 0.15, Bounds::Within(0.0, GREATEST_SHARE))? }
             }
         });
         resolved.push(s.finish());
@@ -57,7 +58,7 @@ fn read_directional(s: &mut Section) -> Result<Light> {
     // Scaled first: the square of a long or short vector's length has no number.
     let direction = (direction / direction.abs().max_element()).try_normalize();
     let direction = direction.ok_or_else(|| s.fault("direction", "expected a direction, found [0, 0, 0]"))?;
-    Ok(Light::Directional { direction, irradiance: s.required_vec3("irradiance", Bounds::AtLeast(0.0))? })
+    Ok(Light::Directional { direction, irradiance: s.required_vec3("irradiance", AMOUNT)? })
 }
 
 pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<Vec<Material>> {
@@ -72,8 +73,8 @@ pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<
         let material = Material {
             name,
             kd: s.vec3("kd", DVec3::splat(0.9), Bounds::Within(0.0, 1.0))?,
-            ks: s.vec3("ks", DVec3::ZERO, Bounds::AtLeast(0.0))?,
-            ns: s.f64("ns", 8.0, Bounds::AtLeast(0.0))?,
+            ks: s.vec3("ks", DVec3::ZERO, AMOUNT)?,
+            ns: s.f64("ns", 8.0, AMOUNT)?,
         };
         warn(&s, &material, warnings);
         materials.push(material);

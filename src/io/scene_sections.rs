@@ -3,6 +3,7 @@
 use glam::DVec3;
 use serde_json::json;
 
+use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, shortest};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::camera::{Camera, CameraKey};
@@ -11,7 +12,7 @@ use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::scene::{Draw, Lighting, LightingMode, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
-const MAX_SIDE: u32 = 16384;
+pub const MAX_SIDE: u32 = 16384;
 
 pub fn read_film(root: &mut Section) -> Result<Film> {
     let mut s = root.section("film")?;
@@ -20,8 +21,8 @@ pub fn read_film(root: &mut Section) -> Result<Film> {
         width: s.u32("width", 800, 1, MAX_SIDE)?,
         height: s.u32("height", 600, 1, MAX_SIDE)?,
         format: s.choice("format", "rgba16f", &FilmFormat::NAMES, &[])?,
-        background: s.vec3("background", DVec3::new(0.32, 0.52, 0.80), Bounds::AtLeast(0.0))?,
-        exposure: s.f64("exposure", 1.0, Bounds::AtLeast(0.0))?,
+        background: s.vec3("background", DVec3::new(0.32, 0.52, 0.80), AMOUNT)?,
+        exposure: s.f64("exposure", 1.0, AMOUNT)?,
         tone_map: s.choice("tone_map", "neutral", &ToneMap::NAMES, &[])?,
     };
     root.record("film", s.finish());
@@ -35,9 +36,10 @@ pub fn read_camera(root: &mut Section) -> Result<Camera> {
     let keys = if is_path { read_path(&mut s)? } else { vec![read_fixed(&mut s)?] };
     let camera = Camera {
         keys,
-        up: s.vec3("up", DVec3::Y, Bounds::Any)?,
-        fov_y_rad: s.f64("fov_y_deg", 45.0, Bounds::Between(0.0, 180.0))?.to_radians(),
-        near: s.f64("near", 0.01, Bounds::Above(0.0))?,
+        up: s.vec3("up", DVec3::Y, COORDINATE)?,
+        // Narrower, and pixels are nearer to one another than f32 tells directions apart.
+        fov_y_rad: s.f64("fov_y_deg", 45.0, Bounds::Between(1e-6, 180.0))?.to_radians(),
+        near: s.f64("near", 0.01, DIVISOR)?,
     };
     if let Some(i) = camera.keys.iter().position(|key| camera.pose(key.time_s).is_none()) {
         let what = "the camera looks nowhere: position equals target, or the view runs along `up`";
@@ -48,8 +50,8 @@ pub fn read_camera(root: &mut Section) -> Result<Camera> {
 }
 
 fn read_fixed(s: &mut Section) -> Result<CameraKey> {
-    let position = s.vec3("position", DVec3::new(0.0, 0.0, 18.0), Bounds::Any)?;
-    Ok(CameraKey { time_s: 0.0, position, target: s.vec3("target", DVec3::ZERO, Bounds::Any)? })
+    let position = s.vec3("position", DVec3::new(0.0, 0.0, 18.0), COORDINATE)?;
+    Ok(CameraKey { time_s: 0.0, position, target: s.vec3("target", DVec3::ZERO, COORDINATE)? })
 }
 
 fn read_path(s: &mut Section) -> Result<Vec<CameraKey>> {
@@ -62,12 +64,12 @@ fn read_path(s: &mut Section) -> Result<Vec<CameraKey>> {
     let mut resolved = Vec::new();
     for mut item in s.sections("path")? {
         item.expect_keys(&["time_s", "position", "target"], &[])?;
-        let time_s = item.required_f64("time_s", Bounds::Any)?;
+        let time_s = item.required_f64("time_s", COORDINATE)?;
         if let Some(before) = keys.last().map(|k| k.time_s).filter(|before| time_s <= *before) {
             return Err(item.fault("time_s", format!("times must grow, found {time_s} after {before}")));
         }
-        let position = item.required_vec3("position", Bounds::Any)?;
-        keys.push(CameraKey { time_s, position, target: item.required_vec3("target", Bounds::Any)? });
+        let position = item.required_vec3("position", COORDINATE)?;
+        keys.push(CameraKey { time_s, position, target: item.required_vec3("target", COORDINATE)? });
         resolved.push(item.finish());
     }
     if keys.is_empty() {
@@ -81,12 +83,14 @@ pub fn read_time(root: &mut Section) -> Result<Time> {
     let mut s = root.section("time")?;
     s.expect_keys(&["start_s", "step_s", "frames"], &[])?;
     let time = Time {
-        start_s: s.f64("start_s", 0.0, Bounds::Any)?,
-        step_s: s.f64("step_s", 0.0333, Bounds::AtLeast(0.0))?,
+        start_s: s.f64("start_s", 0.0, COORDINATE)?,
+        step_s: s.f64("step_s", 0.0333, AMOUNT)?,
         n_frames: s.u32("frames", 300, 1, u32::MAX)?,
     };
-    if !time.at(time.n_frames - 1).is_finite() {
-        return Err(s.fault("step_s", "the last frame's time is beyond every number"));
+    let last_s = time.at(time.n_frames - 1);
+    if last_s > GREATEST {
+        let what = format!("the last frame's time: expected at most {}, found {last_s:.3e}", shortest(GREATEST));
+        return Err(s.fault("step_s", what));
     }
     root.record("time", s.finish());
     Ok(time)

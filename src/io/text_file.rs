@@ -13,9 +13,9 @@ pub const DATA_LIMIT: u64 = 64 << 20;
 
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// The text of `path`. A byte-order mark is dropped. What the file system refuses is an [`Error::Io`]; content
+/// The text of `path`, whose kind begins with `first`. A byte-order mark is dropped. What the file system refuses is an [`Error::Io`]; content
 /// that is no text is an [`Error::Scene`] with its line and column.
-pub fn read_text(path: &Path, limit: u64) -> Result<String> {
+pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     let about = fs::metadata(path).map_err(|e| Error::io(path, plain(&e)))?;
     if about.is_dir() {
         return Err(Error::io(path, "is a folder, expected a file"));
@@ -34,7 +34,11 @@ pub fn read_text(path: &Path, limit: u64) -> Result<String> {
     if bytes.len() as u64 > limit {
         return Err(Error::io(path, too_large(bytes.len() as u64, limit)));
     }
-    decode(bytes, path)
+    let text = decode(bytes, path)?;
+    if text.trim().is_empty() {
+        return Err(Error::scene(Place::line(path, 1, 1), format!("the file is empty: expected {first}")));
+    }
+    Ok(text)
 }
 
 /// Line and column (characters), both from 1, of a byte offset; an offset past the end is the end.
@@ -65,14 +69,10 @@ fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
             return Err(Error::scene(at(e.as_bytes(), offset), "not UTF-8 text"));
         }
     };
-    let text = match text.strip_prefix(BYTE_ORDER_MARK) {
+    Ok(match text.strip_prefix(BYTE_ORDER_MARK) {
         Some(rest) => rest.to_owned(),
         None => text,
-    };
-    if text.trim().is_empty() {
-        return Err(Error::scene(Place::file(path), "the file is empty"));
-    }
-    Ok(text)
+    })
 }
 
 fn too_large(size: u64, limit: u64) -> String {

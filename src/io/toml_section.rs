@@ -6,6 +6,7 @@ use std::fmt;
 use glam::DVec3;
 use serde_json::{Map, Value as Json, json};
 
+use super::magnitude::shortest;
 use super::suggest::{did_you_mean, list};
 use super::toml_tree::{Document, Node, Origin, Source, Table, Value};
 use crate::error::{Error, Place, Result};
@@ -14,8 +15,6 @@ use crate::error::{Error, Place, Result};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
     Any,
-    AtLeast(f64),
-    Above(f64),
     /// Both ends allowed.
     Within(f64, f64),
     /// Neither end allowed.
@@ -27,8 +26,6 @@ impl Bounds {
         v.is_finite()
             && match self {
                 Bounds::Any => true,
-                Bounds::AtLeast(low) => v >= low,
-                Bounds::Above(low) => v > low,
                 Bounds::Within(low, high) => (low..=high).contains(&v),
                 Bounds::Between(low, high) => v > low && v < high,
             }
@@ -39,10 +36,8 @@ impl fmt::Display for Bounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Bounds::Any => write!(f, "a finite number"),
-            Bounds::AtLeast(low) => write!(f, "a finite number of at least {low}"),
-            Bounds::Above(low) => write!(f, "a finite number above {low}"),
-            Bounds::Within(low, high) => write!(f, "a number from {low} to {high}"),
-            Bounds::Between(low, high) => write!(f, "a number above {low} and below {high}"),
+            Bounds::Within(low, high) => write!(f, "a number from {} to {}", shortest(*low), shortest(*high)),
+            Bounds::Between(low, high) => write!(f, "a number above {} and below {}", shortest(*low), shortest(*high)),
         }
     }
 }

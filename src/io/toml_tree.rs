@@ -64,7 +64,10 @@ pub struct Entry {
 
 impl Document {
     pub fn read(path: &Path) -> Result<Document> {
-        Document::parse(text_file::read_text(path, text_file::SCENE_LIMIT)?, path)
+        Document::parse(
+            text_file::read_text(path, text_file::SCENE_LIMIT, "a scene's tables, such as [camera] and [[cloud]]")?,
+            path,
+        )
     }
 
     pub fn parse(text: String, path: &Path) -> Result<Document> {

@@ -1,0 +1,153 @@
+//! How great and how small an input's numbers may be, so that the f32 arithmetic on the device carries all that is
+//! made of them. f32's normal numbers run from 1.2e-38 to 3.4e38.
+//!
+//! A number of at most 1e15 can be squared and summed over a vector (3e30), and a length can be multiplied with a
+//! wave number or divided by a distance of 1e-15 (1e30), with orders of magnitude left for constants. Three such
+//! factors are too many, so the one place that has a cube, a blob's mass κ (2π)^{3/2} σ³, is checked itself.
+
+use glam::DVec3;
+
+use super::toml_section::Bounds;
+use crate::model::cloud::{Cloud, CloudSource, Group, SQRT_TAU};
+
+/// Coordinates, lengths, times, κ, optical depths, irradiance, colours.
+pub const GREATEST: f64 = 1e15;
+/// Lengths that something is divided by: σ, wavelengths, the near distance. Its square is 1e-30, and 1e15 / 1e-15 is
+/// 1e30: both are normal numbers.
+pub const LEAST: f64 = 1e-15;
+/// Box edges are only multiplied with numbers that have 24 bits: 1e-30 · 2⁻²⁴ is 6e-38, still a normal number.
+pub const LEAST_EXTENT: f64 = 1e-30;
+/// κ σ and the mass κ (2π)^{3/2} σ³, and with both κ σ², which lies between them. κ and σ of 1e15 give κ σ = 1e30.
+pub const GREATEST_PRODUCT: f64 = 1e37;
+/// A factor on an irradiance that colours are a factor on too: 1e15 · 1e15 · 1e6 is 1e36.
+pub const GREATEST_SHARE: f64 = 1e6;
+
+/// Either sign.
+pub const COORDINATE: Bounds = Bounds::Within(-GREATEST, GREATEST);
+/// What cannot be negative.
+pub const AMOUNT: Bounds = Bounds::Within(0.0, GREATEST);
+/// What is divided by.
+pub const DIVISOR: Bounds = Bounds::Within(LEAST, GREATEST);
+
+/// The fewest digits that read back as the same number; with an exponent where plain digits would run long.
+pub fn shortest(v: f64) -> String {
+    let plain = v == 0.0 || (1e-4..1e9).contains(&v.abs());
+    if plain { format!("{v}") } else { format!("{v:e}") }
+}
+
+/// What is expected of a coordinate, where `v` is none.
+pub fn wrong_coordinate(v: f64) -> Option<String> {
+    (!is_carried(v)).then(|| format!("a number from {} to {}", shortest(-GREATEST), shortest(GREATEST)))
+}
+
+/// What is expected of a size, where `v` is none: 0, or a number from `least` (0 where any will do) on.
+pub fn wrong_size(v: f64, least: f64) -> Option<String> {
+    if v == 0.0 || (least..=GREATEST).contains(&v) {
+        return None;
+    }
+    let greatest = shortest(GREATEST);
+    Some(match least {
+        0.0 => format!("a number from 0 to {greatest}"),
+        _ => format!("0 or a number from {} to {greatest}", shortest(least)),
+    })
+}
+
+/// Whether a place can be handed to the device.
+pub fn is_carried_place(place: DVec3) -> bool {
+    place.to_array().into_iter().all(is_carried)
+}
+
+fn is_carried(v: f64) -> bool {
+    v.abs() <= GREATEST
+}
+
+/// What of a cloud's particles the device could not carry although each number that was given is in its bounds;
+/// `lines` are those of a particle list.
+pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
+    let groups = cloud.groups(0, 0);
+    match &cloud.source {
+        CloudSource::Boxes { boxes, radius_scale, .. } => {
+            let scaled = boxes.iter().map(|b| b.radius_max * radius_scale).enumerate();
+            let is_vanishing = |i: usize, v: f64| boxes[i].radius_max > 0.0 && *radius_scale > 0.0 && v < LEAST;
+            let wrong = scaled.filter(|(i, v)| *v > GREATEST || is_vanishing(*i, *v));
+            // The largest where some are too large.
+            if let Some((i, v)) = wrong.max_by(|a, b| a.1.total_cmp(&b.1)) {
+                let (low, high) = (shortest(LEAST), shortest(GREATEST));
+                let what = format!("expected 0 or a number from {low} to {high}, found {}", rounded(v));
+                return Some(format!("box {i}: radius times `radius_scale`: {what}"));
+            }
+            let kappa = "κ = optical_depth / (√(2π) σ)";
+            too_great(&groups, kappa, GREATEST, &|g| g.kappa_max)
+                .or_else(|| too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &mass))
+                .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_max))
+        }
+        CloudSource::Particles(list) => {
+            let group = groups.first()?;
+            let found = mass(group);
+            if found <= GREATEST_PRODUCT {
+                return None;
+            }
+            // The group is a bound for all its blobs, so its σ and κ may stand on two lines.
+            let line_of = |v: f64, of: &dyn Fn(usize) -> f64| {
+                let i = (0..list.len()).find(|i| of(*i) == v);
+                i.and_then(|i| lines.get(i)).map_or("?".to_owned(), usize::to_string)
+            };
+            let sigma = line_of(group.sigma_max, &|i| list[i].sigma);
+            let kappa = line_of(group.kappa_max, &|i| list[i].kappa);
+            Some(format!(
+                "κ (2π)^{{3/2}} σ³ of the greatest σ (line {sigma}) and the greatest κ (line {kappa}): expected at most \
+                 {}, found {}",
+                shortest(GREATEST_PRODUCT),
+                rounded(found)
+            ))
+        }
+    }
+}
+
+fn mass(g: &Group) -> f64 {
+    g.kappa_max * (SQRT_TAU * g.sigma_max).powi(3)
+}
+
+fn too_great(groups: &[Group], what: &str, greatest: f64, of: &dyn Fn(&Group) -> f64) -> Option<String> {
+    let (i, found) = groups.iter().map(of).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let expected = shortest(greatest);
+    (found > greatest).then(|| format!("box {i}: {what}: expected at most {expected}, found {}", rounded(found)))
+}
+
+/// A computed number in a message: its last digits say nothing.
+fn rounded(v: f64) -> String {
+    format!("{v:.3e}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_are_what_f32_carries() {
+        let f = |v: f64| v as f32;
+        assert!((f(GREATEST) * f(GREATEST) * 1e6).is_finite());
+        assert!(f(GREATEST_PRODUCT).is_finite() && (f(GREATEST) / f(LEAST)).is_finite());
+        assert!((f(LEAST) * f(LEAST)).is_normal() && (f(LEAST_EXTENT) * 2f32.powi(-24)).is_normal());
+    }
+
+    #[test]
+    fn sizes_have_two_ends_and_zero() {
+        for good in [0.0, 1e-15, 1.0, 1e15] {
+            assert_eq!(wrong_size(good, LEAST), None);
+        }
+        for bad in [-1.0, 9e-16, 1.1e15, f64::NAN] {
+            assert_eq!(wrong_size(bad, LEAST).as_deref(), Some("0 or a number from 1e-15 to 1e15"));
+        }
+        assert_eq!(wrong_size(1e-300, 0.0), None);
+        assert_eq!(wrong_size(-1.0, 0.0).as_deref(), Some("a number from 0 to 1e15"));
+        assert_eq!(wrong_coordinate(-1.1e15).as_deref(), Some("a number from -1e15 to 1e15"));
+        assert_eq!(wrong_coordinate(-1e15), None);
+    }
+
+    #[test]
+    fn numbers_are_written_short() {
+        let short = [0.0, -0.0, 0.1, -3.0, 6.12438e-7, 1e300].map(shortest);
+        assert_eq!(short, ["0", "-0", "0.1", "-3", "6.12438e-7", "1e300"]);
+    }
+}

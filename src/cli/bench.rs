@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::args::{BenchArgs, ThreadingArg};
-use super::{device_choice, load, output};
+use super::{device_choice, load, output, say_sizes};
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
 use crate::model::scene::Threading;
@@ -83,7 +83,7 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         records::prepare_out_dir(dir, true)?;
     }
     if args.options.verbose {
-        describe(&stage);
+        say_sizes(&stage.scene, Some(&stage));
     }
     let n_total = u64::from(plan.n_blocks) * plan.modes.len() as u64 * (u64::from(n_frames) + u64::from(args.warmup));
     let bar = output::progress(n_total, &path.display().to_string(), args.options.quiet);
@@ -115,16 +115,6 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
     }
     stage.close()?;
     Ok(run)
-}
-
-/// What is run, and where.
-fn describe(stage: &Stage) {
-    let (info, scene) = (stage.info(), &stage.scene);
-    let film = scene.film;
-    eprintln!("{} ({})", info.name, info.driver);
-    let groups = scene.groups().len();
-    eprintln!("{} particles in {groups} groups, {}×{} pixels", scene.n_particles(), film.width, film.height);
-    eprintln!("{} bytes of device memory", stage.device.allocated_bytes());
 }
 
 /// The human table.

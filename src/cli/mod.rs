@@ -14,6 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use clap::Parser;
 
 use crate::error::{Error, Result};
+use crate::frame::limits::advice;
 use crate::io::atomic;
 use crate::io::magnitude::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
@@ -73,7 +74,7 @@ fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
     }
     let loaded = scene_file::load(path, &overrides, args.seed)?;
     if !args.quiet {
-        for warning in &loaded.warnings {
+        for warning in loaded.warnings.iter().chain(&advice(&loaded.scene)) {
             eprintln!("warning: {warning}");
         }
     }

@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use super::toml_section::Bounds;
-use crate::model::cloud::{Cloud, CloudSource, Group, SQRT_TAU};
+use crate::model::cloud::{Cloud, CloudSource, Group, mass};
 
 /// Coordinates, lengths, times, κ, optical depths, irradiance, colours.
 pub const GREATEST: f64 = 1e15;
@@ -78,34 +78,20 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
             }
             let kappa = "κ = optical_depth / (√(2π) σ)";
             too_great(&groups, kappa, GREATEST, &|g| g.kappa_max)
-                .or_else(|| too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &mass))
+                .or_else(|| too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &|g| g.mass_max))
                 .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_max))
         }
         CloudSource::Particles(list) => {
-            let group = groups.first()?;
-            let found = mass(group);
-            if found <= GREATEST_PRODUCT {
+            let (i, heaviest) =
+                list.iter().map(|p| mass(p.kappa, p.sigma)).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            if heaviest <= GREATEST_PRODUCT {
                 return None;
             }
-            // The group is a bound for all its blobs, so its σ and κ may stand on two lines.
-            let line_of = |v: f64, of: &dyn Fn(usize) -> f64| {
-                let i = (0..list.len()).find(|i| of(*i) == v);
-                i.and_then(|i| lines.get(i)).map_or("?".to_owned(), usize::to_string)
-            };
-            let sigma = line_of(group.sigma_max, &|i| list[i].sigma);
-            let kappa = line_of(group.kappa_max, &|i| list[i].kappa);
-            Some(format!(
-                "κ (2π)^{{3/2}} σ³ of the greatest σ (line {sigma}) and the greatest κ (line {kappa}): expected at most \
-                 {}, found {}",
-                shortest(GREATEST_PRODUCT),
-                rounded(found)
-            ))
+            let line = lines.get(i).map_or("?".to_owned(), usize::to_string);
+            let (expected, found) = (shortest(GREATEST_PRODUCT), rounded(heaviest));
+            Some(format!("line {line}: κ (2π)^{{3/2}} σ³: expected at most {expected}, found {found}"))
         }
     }
-}
-
-fn mass(g: &Group) -> f64 {
-    g.kappa_max * (SQRT_TAU * g.sigma_max).powi(3)
 }
 
 fn too_great(groups: &[Group], what: &str, greatest: f64, of: &dyn Fn(&Group) -> f64) -> Option<String> {

@@ -57,6 +57,7 @@ pub struct Group {
     pub half_extent: DVec3,
     pub sigma_max: f64,
     pub sigma_mean: f64,
+    pub kappa_max: f64,
     /// Greatest mass κ (2π)^{3/2} σ³ of a blob.
     pub mass_max: f64,
 }
@@ -102,6 +103,7 @@ impl Cloud {
                 .iter()
                 .map(|b| {
                     let sigma_max = greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
+                    let kappa = box_kappa(b, *form, *optical_depth, *radius_scale);
                     let group = Group {
                         i_cloud,
                         i_first,
@@ -110,7 +112,8 @@ impl Cloud {
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
-                        mass_max: mass(box_kappa(b, *form, *optical_depth, *radius_scale), sigma_max),
+                        kappa_max: kappa,
+                        mass_max: mass(kappa, sigma_max),
                     };
                     i_first += b.n_particles;
                     group
@@ -148,6 +151,7 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
+        kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
         mass_max: list.iter().map(|p| mass(p.kappa, p.sigma)).fold(0.0, f64::max),
     }
 }

@@ -145,6 +145,21 @@ fn bench_prints_its_table_and_writes_its_results_once() {
 }
 
 #[test]
+fn several_scenes_get_a_folder_each_and_a_bad_one_none() {
+    let dir = temp();
+    let out = path(&dir, "runs");
+    let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--out", &out];
+    let (code, _, stderr) = run(&[&["bench", "scenes/hello.toml", "scenes/absent.toml"], &short[..]].concat());
+    assert!(code == 2 && stderr.contains("absent.toml"), "{stderr}");
+    assert!(!Path::new(&out).exists(), "no folder for results that did not come");
+    let (code, _, stderr) = run(&[&["bench", "scenes/hello.toml", "tests/data/modes.toml"], &short[..]].concat());
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    for name in ["hello", "modes"] {
+        assert!(Path::new(&out).join(name).join("run.json").exists(), "{name}");
+    }
+}
+
+#[test]
 fn bench_json_is_json_and_nothing_else() {
     let (code, stdout, _) =
         run(&["bench", "scenes/hello.toml", "--frames", "3", "--warmup", "1", "--repeat", "1", "--json"]);

@@ -9,10 +9,11 @@ use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::cloud::Group;
-use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::gust::N_MODES;
 use crate::model::scene::{LightingMode, Scene};
+
+use super::render::target_format;
 
 /// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
 /// target) each checks for itself when it is made.
@@ -22,10 +23,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
         return Err(Error::limit(format!("the scene's {n} particles; nimbus numbers them with 32 bits")));
     }
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
-    let pixel = match scene.film.format {
-        FilmFormat::Rgba16f => 8,
-        FilmFormat::Rgba32f => 16,
-    };
+    let pixel = target_format(scene.film.format).bytes_per_pixel();
     let size = |record: usize| record as u64;
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),

@@ -70,10 +70,7 @@ impl Renderer {
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
-        let format = match scene.film.format {
-            FilmFormat::Rgba16f => TargetFormat::Rgba16f,
-            FilmFormat::Rgba32f => TargetFormat::Rgba32f,
-        };
+        let format = target_format(scene.film.format);
         let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut renderer = Renderer {
@@ -244,5 +241,13 @@ impl Renderer {
         let n = self.settings.n_particles;
         let facets = download(device, &mut self.commands, &self.buffers.facets, n)?;
         Ok((facets, download(device, &mut self.commands, &self.buffers.lit, n)?))
+    }
+}
+
+/// The film's format as a render target.
+pub fn target_format(format: FilmFormat) -> TargetFormat {
+    match format {
+        FilmFormat::Rgba16f => TargetFormat::Rgba16f,
+        FilmFormat::Rgba32f => TargetFormat::Rgba32f,
     }
 }

@@ -154,43 +154,36 @@ impl Renderer {
         } = self;
         let n = s.n_particles;
         self.commands.record(Barriers::Placed, |rec| {
-            let pass =
-                |rec: &mut Recorder<'_>, pass: Pass, f: &mut dyn FnMut(&mut Recorder<'_>) -> Result<()>| match plan
-                    .runs(pass)
-                {
-                    true => rec.scope(pass.name(), f),
-                    false => Ok(()),
-                };
-            pass(rec, Pass::Generate, &mut |rec| {
+            pass(rec, plan, Pass::Generate, |rec| {
                 generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS)
             })?;
-            pass(rec, Pass::Place, &mut |rec| match &b.placed_upload {
+            pass(rec, plan, Pass::Place, |rec| match &b.placed_upload {
                 Some(upload) => {
                     rec.copy(upload, &b.placed);
                     Ok(())
                 }
                 None => place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.modes, &b.placed], n),
             })?;
-            pass(rec, Pass::Grid, &mut |rec| {
+            pass(rec, plan, Pass::Grid, |rec| {
                 grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
             })?;
-            pass(rec, Pass::Facets, &mut |rec| {
+            pass(rec, plan, Pass::Facets, |rec| {
                 let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
                 facets.record(rec, buffers, &packet.grid, n)
             })?;
-            pass(rec, Pass::Transmit, &mut |rec| {
+            pass(rec, plan, Pass::Transmit, |rec| {
                 let buffers = [&b.facets, &b.lights, &b.density, &b.transmittance];
                 transmit.record(rec, buffers, &packet.grid, [n, s.n_lights], s.step_cells, s.forward)
             })?;
-            pass(rec, Pass::First, &mut |rec| {
+            pass(rec, plan, Pass::First, |rec| {
                 let from = [&b.facets, &b.lights, &b.transmittance, &b.particles, &b.i_group, &b.groups, &b.lit];
                 first.record(rec, from, n, s.n_lights)
             })?;
-            pass(rec, Pass::Sort, &mut |rec| {
+            pass(rec, plan, Pass::Sort, |rec| {
                 sort.record_keys(rec, [&b.placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
                 sort.record(rec, &b.entries, n, s.sort_bits)
             })?;
-            pass(rec, Pass::Sprites, &mut |rec| {
+            pass(rec, plan, Pass::Sprites, |rec| {
                 let from = [&b.entries, &b.placed, &b.particles, &b.lit];
                 sprites.record(rec, from, target, &packet.camera, s.cutoff, n)
             })
@@ -242,6 +235,16 @@ impl Renderer {
         let facets = download(device, &mut self.commands, &self.buffers.facets, n)?;
         Ok((facets, download(device, &mut self.commands, &self.buffers.lit, n)?))
     }
+}
+
+/// Runs `f` under the pass's timer label where the plan has it run.
+fn pass(
+    rec: &mut Recorder<'_>,
+    plan: &Plan,
+    pass: Pass,
+    f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
+) -> Result<()> {
+    if plan.runs(pass) { rec.scope(pass.name(), f) } else { Ok(()) }
 }
 
 /// The film's format as a render target.

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use nimbus::measure::stats::{Bootstrap, Summary as Measured};
+use nimbus::measure::stats::{Bootstrap, Summary};
 use nimbus::study::records::{
-    Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, Summary, cpu,
-    environment, prepare_out_dir, read_run, revision, utc_now, write_results, write_run,
+    Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, cpu, environment,
+    prepare_out_dir, read_run, revision, utc_now, write_results, write_run,
 };
 use serde_json::{Value, json};
 
@@ -237,7 +237,7 @@ fn a_row_with_too_few_pass_times_is_no_row() {
 
 #[test]
 fn one_value_has_no_standard_deviation() {
-    let one = Measured::of(&[3.0]).map(Summary::from).unwrap();
+    let one = Summary::of(&[3.0]).unwrap();
     assert_eq!((one.sd, one.n), (None, 1));
 }
 

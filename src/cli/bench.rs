@@ -7,9 +7,10 @@ use super::args::{BenchArgs, ThreadingArg};
 use super::{device_choice, load, output, say_sizes};
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
+use crate::measure::stats::Summary;
 use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Outcome, pass_names};
-use crate::study::records::{self, Run, Summary};
+use crate::study::records::{self, Run};
 use crate::study::stage::Stage;
 
 pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {

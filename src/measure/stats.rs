@@ -4,15 +4,17 @@
 //! NumPy and R): the p-th of n sorted values lies at position (n − 1) p counted from 0. Values that are not finite
 //! are counted and left out, never averaged in.
 
-/// All in the unit of the values. `sd` divides by n − 1 and is NaN for a single value, which has no spread to show.
-#[derive(Debug, Clone, Copy, PartialEq)]
+use serde::{Deserialize, Serialize};
+
+/// All in the unit of the values. `sd` divides by n − 1; a single value has none.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Finite values.
     pub n: usize,
     /// Values left out because they are NaN or infinite.
     pub n_not_finite: usize,
     pub mean: f64,
-    pub sd: f64,
+    pub sd: Option<f64>,
     pub min: f64,
     pub p1: f64,
     pub p5: f64,
@@ -33,7 +35,7 @@ impl Summary {
             n: sorted.len(),
             n_not_finite: values.len() - sorted.len(),
             mean,
-            sd: standard_deviation(&sorted, mean),
+            sd: Some(standard_deviation(&sorted, mean)).filter(|sd| sd.is_finite()),
             min,
             p1: at(0.01),
             p5: at(0.05),
@@ -208,7 +210,7 @@ mod tests {
         let summary = Summary::of(&[4.0, 1.0, 3.0, 2.0]).unwrap();
         assert_eq!((summary.n, summary.min, summary.max, summary.mean), (4, 1.0, 4.0, 2.5));
         // Squares of −1.5, −0.5, 0.5, 1.5 sum to 5; 5 / 3.
-        assert_eq!(summary.sd, (5.0_f64 / 3.0).sqrt());
+        assert_eq!(summary.sd, Some((5.0_f64 / 3.0).sqrt()));
         // Positions 3p: 0.03, 0.15, 1.5, 2.85, 2.97. Half an ulp each way of the product.
         let expected = [1.03, 1.15, 2.5, 3.85, 3.97];
         for (got, want) in [summary.p1, summary.p5, summary.p50, summary.p95, summary.p99].iter().zip(expected) {
@@ -227,7 +229,7 @@ mod tests {
     #[test]
     fn one_value_has_no_spread_and_none_has_no_summary() {
         let one = Summary::of(&[7.0]).unwrap();
-        assert!(one.sd.is_nan());
+        assert_eq!(one.sd, None);
         assert_eq!((one.p1, one.p50, one.p99), (7.0, 7.0, 7.0));
         assert_eq!(Summary::of(&[]), None);
         assert_eq!(Summary::of(&[f64::NAN]), None);
@@ -243,7 +245,7 @@ mod tests {
     fn a_small_spread_on_a_large_mean_survives() {
         // E[x²] − E[x]² in f64 would give 0 or a negative number here.
         let summary = Summary::of(&[1e9, 1e9 + 1.0, 1e9 + 2.0]).unwrap();
-        assert_eq!(summary.sd, 1.0);
+        assert_eq!(summary.sd, Some(1.0));
     }
 
     #[test]
@@ -253,7 +255,7 @@ mod tests {
         assert!(summary.p50.abs() < 5.0 * 0.0040);
         assert!((summary.p99 - 2.3263).abs() < 5.0 * 0.0118 && (summary.p1 + 2.3263).abs() < 5.0 * 0.0118);
         // The standard error of a normal sample's sd is sd / sqrt(2n) = 0.0022.
-        assert!((summary.sd - 1.0).abs() < 5.0 * 0.0022);
+        assert!(summary.sd.is_some_and(|sd| (sd - 1.0).abs() < 5.0 * 0.0022));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use sha2::{Digest, Sha256};
 
-use super::records::{self, FrameRow, Mode, Pass as PassRecord, Ratio, Summary};
+use super::records::{self, FrameRow, Mode, Pass as PassRecord, Ratio};
 use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
@@ -13,7 +13,7 @@ use crate::frame::plan::Pass;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
 use crate::measure::clock::ClockQuality;
-use crate::measure::stats::{Bootstrap, Interval, median};
+use crate::measure::stats::{Bootstrap, Interval, Summary, median};
 use crate::model::scene::{Simulate, Threading};
 
 /// How long and how often.

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::measure::clock::ClockQuality;
-use crate::measure::stats;
+use crate::measure::stats::{Interval, Summary};
 
 pub const SCHEMA_VERSION: u32 = 1;
 pub const RUN_FILE: &str = "run.json";
@@ -123,37 +123,8 @@ pub struct Ratio {
     pub high: f64,
 }
 
-/// `measure::stats::Summary` as it is stored: a single value has no standard deviation, and JSON no NaN.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Summary {
-    pub n: usize,
-    pub n_not_finite: usize,
-    pub mean: f64,
-    pub sd: Option<f64>,
-    pub min: f64,
-    pub p1: f64,
-    pub p5: f64,
-    pub p50: f64,
-    pub p95: f64,
-    pub p99: f64,
-    pub max: f64,
-}
-
-impl From<stats::Summary> for Summary {
-    fn from(from: stats::Summary) -> Self {
-        let stats::Summary { n, n_not_finite, mean, sd, min, p1, p5, p50, p95, p99, max } = from;
-        Summary { n, n_not_finite, mean, sd: sd.is_finite().then_some(sd), min, p1, p5, p50, p95, p99, max }
-    }
-}
-
-impl Summary {
-    pub fn of(values: &[f64]) -> Option<Summary> {
-        stats::Summary::of(values).map(Summary::from)
-    }
-}
-
-impl From<stats::Interval> for Ratio {
-    fn from(interval: stats::Interval) -> Self {
+impl From<Interval> for Ratio {
+    fn from(interval: Interval) -> Self {
         Ratio { parallel_by_serial: interval.estimate, low: interval.low, high: interval.high }
     }
 }

@@ -17,7 +17,7 @@ const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;
 
-layout(push_constant) uniform Push { Grid grid; uint n_particles; } push;
+layout(push_constant) uniform Push { Grid grid; uint n_particles; uint i_first_facet; } push;
 layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
 layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
@@ -64,6 +64,7 @@ void main() {
         vec3 n = t > 0.0 ? unit_or(t * (-gradient / slope) + (1.0 - t) * outward, outward) : outward;
         float radius = 3.0 * sigma;
         float opacity = one_minus_exp(SQRT_TAU * particles[i].kappa * sigma);
-        facets[i] = Facet(p + SHELL_SIGMA * scale * n, PI * radius * radius * opacity, n, group.i_region);
+        facets[push.i_first_facet + i] =
+            Facet(p + SHELL_SIGMA * scale * n, PI * radius * radius * opacity, n, group.i_region, particles[i].color, 0u);
     }
 }

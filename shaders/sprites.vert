@@ -46,7 +46,7 @@ void main() {
     vec3 v = vec3(dot(push.camera.right, c), dot(push.camera.up, c), dot(push.camera.forward, c));
     float tau = SQRT_TAU * particles[i].kappa * sigma;
     out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
-    out_radiance = LIT != 0 ? lit[i].radiance.xyz : particles[i].color;
+    out_radiance = LIT != 0 ? lit[i].first + lit[i].second : particles[i].color;
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
         // Nothing to draw: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);

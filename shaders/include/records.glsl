@@ -3,11 +3,12 @@
 struct Particle { vec3 position; float sigma; vec3 color; float kappa; };
 struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uint seed; uint i_box; uint i_first; uint n_particles; uint form; uint unused; };
 struct Placed { vec3 position; float sigma; };
-struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 kd; uint n_modes; vec3 center; uint i_mode; };
+struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 center; uint i_mode; uint n_modes; uint unused; uvec2 unused_too; };
 struct Mode { vec3 k; float phase; vec3 a; uint unused; };
-struct Facet { vec3 position; float area; vec3 normal; uint i_region; };
-struct Lit { vec4 irradiance; vec4 radiance; };
-struct Light { vec3 toward; uint kind; vec3 irradiance; float constant; };
+struct Facet { vec3 position; float area; vec3 normal; uint i_region; vec3 color; uint unused; };
+struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float unused; vec3 second; float unused_too; };
+struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; };
+struct Light { vec3 toward; uint kind; vec3 energy; float constant; vec3 position; float radius; float cone_scale; float cone_offset; vec2 unused; };
 struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; };
 struct Camera { vec3 eye; float tan_x; vec3 right; float tan_y; vec3 up; float near; vec3 forward; float unused; };
 
@@ -17,3 +18,8 @@ const uint FORM_GIVEN = 2;
 
 const uint LIGHT_DIRECTIONAL = 0;
 const uint LIGHT_SKY = 1;
+const uint LIGHT_POINT = 2;
+
+const uint REGION_SURFACE = 0;
+const uint REGION_CLOUD = 1;
+const uint NO_LOBE = 0xFFFFFFFFu;

@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place};
-use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::cloud::{CloudSource, Group};
@@ -28,6 +28,8 @@ pub struct Buffers {
     pub density: Buffer,
     pub facets: Buffer,
     /// Written by the host every frame.
+    pub regions: Buffer,
+    /// Written by the host every frame.
     pub lights: Buffer,
     pub transmittance: Buffer,
     pub lit: Buffer,
@@ -38,6 +40,7 @@ pub struct Buffers {
 impl Buffers {
     pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
         let n = scene.n_particles();
+        let n_facets = scene.n_facets();
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
@@ -55,10 +58,11 @@ impl Buffers {
             placed_upload,
             placed: Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?,
             density: Buffer::new::<f32>(device, "grid.density", n_cells_max(scene), Place::Device)?,
-            facets: Buffer::new::<FacetRecord>(device, "facets.facets", n, Place::Device)?,
+            facets: Buffer::new::<FacetRecord>(device, "facets.facets", n_facets, Place::Device)?,
+            regions: Buffer::new::<RegionRecord>(device, "first.regions", scene.n_regions() as u64, Place::Upload)?,
             lights: Buffer::new::<LightRecord>(device, "transmit.lights", n_lights, Place::Upload)?,
-            transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n * n_lights, Place::Device)?,
-            lit: Buffer::new::<LitRecord>(device, "first.lit", n, Place::Device)?,
+            transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
+            lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
         })
     }

@@ -6,6 +6,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Place, Result};
+use crate::layout::facet::{NO_LOBE, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::camera::Pose;
@@ -51,7 +52,8 @@ impl Setting {
                 ),
             )
         })?;
-        let (low, high) = scene.bounds(groups, time_s, DEPOSIT_CUT_SIGMA).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let (low, high) =
+            scene.lighting_bounds(groups, time_s, DEPOSIT_CUT_SIGMA).unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let light_origin = 0.5 * (low + high);
         let half = 0.5 * (high - low);
         let grid = GridSpec::fit(-half, half, scene.lighting.grid);
@@ -92,17 +94,37 @@ impl Game {
             groups,
             modes,
             placed,
-            lights: self.scene.lights.iter().map(LightRecord::from).collect(),
+            regions: self.regions(time_s, setting.light_origin),
+            lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
             grid: GridRecord::from(&setting.grid),
             radius: setting.radius,
             game_ms: super::ms(begin, Instant::now()),
         })
     }
 
+    /// The regions and their materials, surfaces before clouds.
+    fn regions(&self, time_s: f64, light_origin: DVec3) -> Vec<RegionRecord> {
+        let scene = &self.scene;
+        let mut i_facet = 0;
+        let of = |i: usize| {
+            let brdf = scene.region_material(i).at(time_s);
+            let record = match scene.surfaces.get(i) {
+                Some(surface) => RegionRecord::surface(surface, light_origin, &brdf, NO_LOBE, i_facet),
+                None => {
+                    let n_facets = scene.n_cloud_facets(&scene.clouds[i - scene.surfaces.len()]) as u32;
+                    RegionRecord::cloud(&brdf, NO_LOBE, i_facet, n_facets)
+                }
+            };
+            i_facet += record.n_facets;
+            record
+        };
+        (0..scene.n_regions()).map(of).collect()
+    }
+
     fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
-        let kd = self.scene.materials[self.scene.clouds[group.i_cloud].i_material].kd;
+        let i_region = (self.scene.surfaces.len() + group.i_cloud) as u32;
         let modes = (self.i_modes[group.i_cloud], self.modes[group.i_cloud].len() as u32);
-        GroupRecord::new(group, origin, self.cloud_centers[group.i_cloud], kd, modes)
+        GroupRecord::new(group, i_region, origin, self.cloud_centers[group.i_cloud], modes)
     }
 
     /// Every particle at its group's place, in f64 until the last step.

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use crate::layout::facet::RegionRecord;
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, PlacedRecord};
 
@@ -19,6 +20,8 @@ pub struct Packet {
     pub modes: Vec<ModeRecord>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
+    /// Surfaces, then clouds, with their materials at this time.
+    pub regions: Vec<RegionRecord>,
     pub lights: Vec<LightRecord>,
     pub grid: GridRecord,
     /// Bounds |view depth| relative to the lighting origin.

@@ -67,7 +67,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let same_facets = same_grid && same(&|a, b| a.groups == b.groups);
     let same_rays =
         same_facets && same(&|a, b| a.lights.iter().map(|l| l.toward).eq(b.lights.iter().map(|l| l.toward)));
-    let same_light = same_facets && same(&|a, b| a.lights == b.lights);
+    let same_light = same_facets && same(&|a, b| a.lights == b.lights && a.regions == b.regions);
     let same_order = still && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
     let same_picture = same_order && same_view && (same_light || !traits.lit);
@@ -100,6 +100,7 @@ fn skip(reason: &'static str) -> Decision {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::facet::RegionRecord;
     use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
     use crate::layout::particle::{GroupRecord, ModeRecord};
     use std::time::Instant;
@@ -116,6 +117,7 @@ mod tests {
             groups: vec![GroupRecord::default()],
             modes: vec![],
             placed: None,
+            regions: vec![RegionRecord::default()],
             lights: vec![LightRecord::default()],
             grid: GridRecord::default(),
             radius: 1.0,
@@ -145,7 +147,7 @@ mod tests {
         };
         assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
         assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
-        assert_eq!(after(&|p| p.lights[0].irradiance[1] = 2.0), ["first", "sprites"]);
+        assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
         assert_eq!(after(&|p| p.lights[0].toward[1] = 1.0), ["transmit", "first", "sprites"]);
         let all_but_generate = ["place", "grid", "facets", "transmit", "first", "sort", "sprites"];
         assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);

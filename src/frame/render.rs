@@ -129,6 +129,7 @@ impl Renderer {
     fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
         self.buffers.modes.write(&packet.modes)?;
+        self.buffers.regions.write(&packet.regions)?;
         self.buffers.lights.write(&packet.lights)?;
         match (&mut self.buffers.placed_upload, &packet.placed) {
             (Some(upload), Some(placed)) if plan.runs(Pass::Place) => upload.write(placed),
@@ -169,14 +170,14 @@ impl Renderer {
             })?;
             pass(rec, plan, Pass::Facets, |rec| {
                 let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
-                facets.record(rec, buffers, &packet.grid, n)
+                facets.record(rec, buffers, &packet.grid, n, 0)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
                 let buffers = [&b.facets, &b.lights, &b.density, &b.transmittance];
                 transmit.record(rec, buffers, &packet.grid, [n, s.n_lights], s.step_cells, s.forward)
             })?;
             pass(rec, plan, Pass::First, |rec| {
-                let from = [&b.facets, &b.lights, &b.transmittance, &b.particles, &b.i_group, &b.groups, &b.lit];
+                let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.lit];
                 first.record(rec, from, n, s.n_lights)
             })?;
             pass(rec, plan, Pass::Sort, |rec| {

@@ -22,6 +22,11 @@ pub const GREATEST_PRODUCT: f64 = 1e37;
 /// A factor on an irradiance that colours are a factor on too: 1e15 · 1e15 · 1e6 is 1e36.
 pub const GREATEST_SHARE: f64 = 1e6;
 
+/// n_s: a lobe a thousandth of a degree wide. A narrower one has no number between two neighbouring directions in f32.
+pub const GREATEST_EXPONENT: f64 = 1e6;
+/// Nearer to a point light than this the irradiance does not grow: 1e15 / (1e-9)² is 1e33, still a normal number.
+pub const LEAST_LIGHT_RADIUS: f64 = 1e-9;
+
 /// Either sign.
 pub const COORDINATE: Bounds = Bounds::Within(-GREATEST, GREATEST);
 /// What cannot be negative.

@@ -20,6 +20,7 @@ mod scene_clouds;
 pub mod scene_file;
 mod scene_lights;
 mod scene_sections;
+mod scene_surfaces;
 mod suggest;
 pub mod text_file;
 mod toml_depth;

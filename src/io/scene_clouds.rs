@@ -7,7 +7,7 @@ use serde_json::json;
 use sha2::{Digest, Sha256};
 
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
-use super::suggest::{did_you_mean, list};
+use super::scene_lights::material_named;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::Section;
 use super::{box_file, magnitude, particle_file};
@@ -60,23 +60,6 @@ impl<'a> CloudReader<'a> {
         Ok((text, path))
     }
 
-    /// The named material; else the only one, else the one called "cloud".
-    fn read_material(&self, s: &mut Section) -> Result<usize> {
-        let names: Vec<&str> = self.materials.iter().map(|m| m.name.as_str()).collect();
-        let default = if names.len() == 1 { names[0] } else { "cloud" };
-        let name = s.string("material", default)?;
-        names.iter().position(|known| *known == name).ok_or_else(|| {
-            let meant = did_you_mean(&name, &names);
-            let meant = if meant.is_empty() { ";".to_owned() } else { meant };
-            match names.is_empty() {
-                true => s.fault("material", format!("unknown material `{name}`; the scene has none")),
-                false => {
-                    s.fault("material", format!("unknown material `{name}`{meant} the scene has {}", list(&names)))
-                }
-            }
-        })
-    }
-
     fn read_seed(&self, s: &mut Section, i_cloud: usize) -> Result<u32> {
         // Numbered with wrap-around, so that every u32 is a seed for every number of clouds.
         let i = i_cloud as u32;
@@ -106,7 +89,7 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
-        i_material: reader.read_material(s)?,
+        i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
     match magnitude::beyond(&cloud, &lines) {

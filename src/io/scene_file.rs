@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DVec3;
 use serde_json::{Value as Json, json};
 use sha2::{Digest, Sha256};
 
@@ -10,7 +11,7 @@ use super::scene_clouds::{CloudReader, read_cloud};
 pub use super::scene_sections::MAX_SIDE;
 use super::toml_section::Section;
 use super::toml_tree::Document;
-use super::{scene_lights, scene_sections};
+use super::{scene_lights, scene_sections, scene_surfaces};
 use crate::error::{Error, Result};
 use crate::model::scene::Scene;
 
@@ -28,7 +29,7 @@ pub struct LoadedScene {
 }
 
 const ROOT_KEYS: &[&str] =
-    &["title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "cloud"];
+    &["title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "cloud"];
 
 /// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
 /// N + i, whatever the scene says.
@@ -38,18 +39,21 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
     document.default_to("material", scene_lights::DEFAULT_MATERIAL);
     document.apply(overrides)?;
     let mut root = Section::root(&document)?;
-    root.expect_keys(ROOT_KEYS, &["surface"])?;
+    root.expect_keys(ROOT_KEYS, &[])?;
     let title = root.string("title", "")?;
 
     let mut warnings = Vec::new();
     let film = scene_sections::read_film(&mut root)?;
     let camera = scene_sections::read_camera(&mut root)?;
     let time = scene_sections::read_time(&mut root)?;
-    let lighting = scene_sections::read_lighting(&mut root)?;
     let draw = scene_sections::read_draw(&mut root)?;
     let threads = scene_sections::read_threads(&mut root)?;
     let lights = scene_lights::read_lights(&mut root)?;
     let materials = scene_lights::read_materials(&mut root, &mut warnings)?;
+    let glossy = materials.iter().flat_map(|m| &m.keys).filter(|k| k.brdf.ks != DVec3::ZERO);
+    let exponents: Vec<f64> = glossy.map(|k| k.brdf.ns).collect();
+    let lighting = scene_sections::read_lighting(&mut root, &exponents)?;
+    let surfaces = scene_surfaces::read_surfaces(&mut root, &materials)?;
 
     let mut reader = CloudReader::new(path.parent().unwrap_or(Path::new("")), &materials, seed);
     let mut clouds = Vec::new();
@@ -71,12 +75,17 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
     let digests = reader.digests;
     root.record("cloud", json!(resolved_clouds));
 
-    let scene = Scene { title, film, camera, time, lighting, draw, threads, lights, materials, clouds };
+    let scene = Scene { title, film, camera, time, lighting, draw, threads, lights, materials, surfaces, clouds };
     // Particles are numbered in u32, on the device as in the model.
-    if u32::try_from(scene.n_particles()).is_err() {
+    if u32::try_from(scene.n_particles() + scene.n_surface_facets()).is_err() {
         return Err(Error::scene(
             root.place("cloud"),
-            format!("{} particles: at most {}", scene.n_particles(), u32::MAX),
+            format!(
+                "{} particles and {} facets of surfaces: at most {} together",
+                scene.n_particles(),
+                scene.n_surface_facets(),
+                u32::MAX
+            ),
         ));
     }
     let resolved = root.finish();

@@ -3,11 +3,12 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::magnitude::{AMOUNT, GREATEST_SHARE};
+use super::magnitude::{AMOUNT, COORDINATE, GREATEST, GREATEST_EXPONENT, GREATEST_SHARE, LEAST_LIGHT_RADIUS};
+use super::suggest::{did_you_mean, list};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::light::Light;
-use crate::model::material::Material;
+use crate::model::material::{Brdf, Material, MaterialKey};
 
 /// What lights a scene without any `[[light]]`: a sun from the upper right, and the sky.
 pub const DEFAULT_LIGHTS: &str = r#"
@@ -30,6 +31,8 @@ name = "cloud"
 #[derive(Clone, Copy)]
 enum Kind {
     Directional,
+    Point,
+    Spot,
     Sky,
 }
 
@@ -37,9 +40,12 @@ pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     let mut resolved = Vec::new();
     for mut s in root.sections("light")? {
-        let kinds = [("directional", Kind::Directional), ("sky", Kind::Sky)];
-        lights.push(match s.required_choice("kind", &kinds, &["point", "spot"])? {
+        let kinds =
+            [("directional", Kind::Directional), ("point", Kind::Point), ("spot", Kind::Spot), ("sky", Kind::Sky)];
+        lights.push(match s.required_choice("kind", &kinds, &[])? {
             Kind::Directional => read_directional(&mut s)?,
+            Kind::Point => read_point(&mut s)?,
+            Kind::Spot => read_spot(&mut s)?,
             Kind::Sky => {
                 s.expect_keys(&["kind", "irradiance", "constant"], &[])?;
                 let irradiance = s.required_vec3("irradiance", AMOUNT)?;
@@ -52,36 +58,121 @@ pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
     Ok(lights)
 }
 
-fn read_directional(s: &mut Section) -> Result<Light> {
-    s.expect_keys(&["kind", "direction", "irradiance"], &[])?;
+const LIGHT_RADIUS: Bounds = Bounds::Within(LEAST_LIGHT_RADIUS, GREATEST);
+/// Nearer than this a point light's irradiance does not grow, where the scene does not say.
+const DEFAULT_LIGHT_RADIUS: f64 = 1e-3;
+
+fn read_point(s: &mut Section) -> Result<Light> {
+    s.expect_keys(&["kind", "position", "intensity", "radius"], &[])?;
+    Ok(Light::Point {
+        position: s.required_vec3("position", COORDINATE)?,
+        intensity: s.required_vec3("intensity", AMOUNT)?,
+        radius: s.f64("radius", DEFAULT_LIGHT_RADIUS, LIGHT_RADIUS)?,
+    })
+}
+
+fn read_spot(s: &mut Section) -> Result<Light> {
+    s.expect_keys(&["kind", "position", "direction", "intensity", "inner_deg", "outer_deg", "radius"], &[])?;
+    let outer = s.f64("outer_deg", 45.0, Bounds::Within(0.0, 180.0))?;
+    let inner = s.f64("inner_deg", 0.0, Bounds::Within(0.0, 180.0))?;
+    if inner > outer {
+        let what = format!("expected at most outer_deg = {outer} (both are half angles), found {inner}");
+        return Err(s.fault("inner_deg", what));
+    }
+    Ok(Light::Spot {
+        position: s.required_vec3("position", COORDINATE)?,
+        direction: read_direction(s)?,
+        intensity: s.required_vec3("intensity", AMOUNT)?,
+        radius: s.f64("radius", DEFAULT_LIGHT_RADIUS, LIGHT_RADIUS)?,
+        cos_inner: inner.to_radians().cos(),
+        cos_outer: outer.to_radians().cos(),
+    })
+}
+
+fn read_direction(s: &mut Section) -> Result<DVec3> {
     let direction = s.required_vec3("direction", Bounds::Any)?;
     // Scaled first: the square of a long or short vector's length has no number.
     let direction = (direction / direction.abs().max_element()).try_normalize();
-    let direction = direction.ok_or_else(|| s.fault("direction", "expected a direction, found [0, 0, 0]"))?;
-    Ok(Light::Directional { direction, irradiance: s.required_vec3("irradiance", AMOUNT)? })
+    direction.ok_or_else(|| s.fault("direction", "expected a direction, found [0, 0, 0]"))
+}
+
+fn read_directional(s: &mut Section) -> Result<Light> {
+    s.expect_keys(&["kind", "direction", "irradiance"], &[])?;
+    Ok(Light::Directional { direction: read_direction(s)?, irradiance: s.required_vec3("irradiance", AMOUNT)? })
 }
 
 pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<Vec<Material>> {
     let mut materials: Vec<Material> = Vec::new();
     let mut resolved = Vec::new();
     for mut s in root.sections("material")? {
-        s.expect_keys(&["name", "kd", "ks", "ns"], &[])?;
+        s.expect_keys(&["name", "kd", "ks", "ns", "path"], &[])?;
         let name = s.required_string("name")?;
         if let Some(i) = materials.iter().position(|m| m.name == name) {
             return Err(s.fault("name", format!("`{name}` is already the name of material {i}")));
         }
-        let material = Material {
-            name,
-            kd: s.vec3("kd", DVec3::splat(0.9), Bounds::Within(0.0, 1.0))?,
-            ks: s.vec3("ks", DVec3::ZERO, AMOUNT)?,
-            ns: s.f64("ns", 8.0, AMOUNT)?,
+        let keys = match s.has("path") {
+            true => read_edits(&mut s)?,
+            false => vec![MaterialKey { time_s: 0.0, brdf: read_brdf(&mut s, PLAIN)? }],
         };
+        let material = Material { name, keys };
         warn(&s, &material, warnings);
         materials.push(material);
         resolved.push(s.finish());
     }
     root.record("material", json!(resolved));
     Ok(materials)
+}
+
+/// What a material is where its table does not say.
+const PLAIN: Brdf = Brdf { kd: DVec3::splat(0.9), ks: DVec3::ZERO, ns: 8.0 };
+
+fn read_brdf(s: &mut Section, otherwise: Brdf) -> Result<Brdf> {
+    Ok(Brdf {
+        kd: s.vec3("kd", otherwise.kd, Bounds::Within(0.0, 1.0))?,
+        ks: s.vec3("ks", otherwise.ks, AMOUNT)?,
+        ns: s.f64("ns", otherwise.ns, Bounds::Within(0.0, GREATEST_EXPONENT))?,
+    })
+}
+
+/// The keys of a material that is edited over time; what a key leaves out is as in the key before it.
+fn read_edits(s: &mut Section) -> Result<Vec<MaterialKey>> {
+    for key in ["kd", "ks", "ns"] {
+        if s.has(key) {
+            return Err(s.fault(key, "a material has either `kd`, `ks`, `ns` or a `path` of them, not both"));
+        }
+    }
+    let mut keys: Vec<MaterialKey> = Vec::new();
+    let mut resolved = Vec::new();
+    for mut item in s.sections("path")? {
+        item.expect_keys(&["time_s", "kd", "ks", "ns"], &[])?;
+        let time_s = item.required_f64("time_s", COORDINATE)?;
+        if let Some(before) = keys.last().map(|k| k.time_s).filter(|before| time_s <= *before) {
+            return Err(item.fault("time_s", format!("times must grow, found {time_s} after {before}")));
+        }
+        let brdf = read_brdf(&mut item, keys.last().map_or(PLAIN, |k| k.brdf))?;
+        keys.push(MaterialKey { time_s, brdf });
+        resolved.push(item.finish());
+    }
+    if keys.is_empty() {
+        return Err(s.fault("path", "expected at least one { time_s, kd, ks, ns }"));
+    }
+    s.record("path", json!(resolved));
+    Ok(keys)
+}
+
+/// The material that the key `material` names; without it the only one, else the one called "cloud".
+pub fn material_named(s: &mut Section, materials: &[Material]) -> Result<usize> {
+    let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
+    let default = if names.len() == 1 { names[0] } else { "cloud" };
+    let name = s.string("material", default)?;
+    names.iter().position(|known| *known == name).ok_or_else(|| {
+        let meant = did_you_mean(&name, &names);
+        let meant = if meant.is_empty() { ";".to_owned() } else { meant };
+        match names.is_empty() {
+            true => s.fault("material", format!("unknown material `{name}`; the scene has none")),
+            false => s.fault("material", format!("unknown material `{name}`{meant} the scene has {}", list(&names))),
+        }
+    })
 }
 
 fn warn(s: &Section, material: &Material, warnings: &mut Vec<String>) {
@@ -91,9 +182,6 @@ fn warn(s: &Section, material: &Material, warnings: &mut Vec<String>) {
         warnings.push(format!(
             "{at}: material `{name}` has K_d + 4 K_s = {albedo:.3}: above 1 it can reflect more light than it receives"
         ));
-    }
-    if material.ks.max_element() > 0.0 {
-        warnings.push(format!("{at}: K_s of material `{name}` is ignored: this version lights with the diffuse basis"));
     }
 }
 
@@ -112,6 +200,6 @@ mod tests {
         let mut root = Section::root(&document).unwrap();
         assert_eq!(read_lights(&mut root).unwrap().len(), 2);
         let material = &read_materials(&mut root, &mut Vec::new()).unwrap()[0];
-        assert_eq!((material.name.as_str(), material.kd), ("cloud", DVec3::splat(0.9)));
+        assert_eq!((material.name.as_str(), material.at(0.0)), ("cloud", PLAIN));
     }
 }

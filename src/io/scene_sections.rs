@@ -3,13 +3,15 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, shortest};
+use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, GREATEST_EXPONENT, shortest};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
+use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
-use crate::model::scene::{Draw, Lighting, LightingMode, Simulate, Threading, Threads, Time};
+use crate::model::scene::MAX_PAIR_LEVELS;
+use crate::model::scene::{Draw, Gather, Lighting, LightingMode, Pairs, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -96,16 +98,30 @@ pub fn read_time(root: &mut Section) -> Result<Time> {
     Ok(time)
 }
 
-pub fn read_lighting(root: &mut Section) -> Result<Lighting> {
-    const LATER: &[&str] = &["sampling", "exponents", "gather", "theta", "facets_per_cloud"];
+/// `exponents` are the n_s of the scene's materials: without a range of its own the basis is made for all of them.
+pub fn read_lighting(root: &mut Section, exponents: &[f64]) -> Result<Lighting> {
     let mut s = root.section("lighting")?;
-    s.expect_keys(&["mode", "grid", "step", "forward", "bases"], LATER)?;
+    s.expect_keys(LIGHTING_KEYS, &[])?;
     let lighting = Lighting {
-        mode: s.choice("mode", "first", &LightingMode::NAMES, &["two-reflection"])?,
+        mode: s.choice("mode", "two-reflection", &LightingMode::NAMES, &[])?,
         // Below 8 cells the margins leave next to no grid.
         grid: s.u32("grid", 64, 8, MAX_CELLS)?,
         step: s.f64("step", 1.0, Bounds::Within(0.05, 16.0))?,
         forward: s.f64("forward", 0.85, Bounds::Within(0.0, 1.0))?,
+        bases: s.u32("bases", 8, 1, MAX_BASES)?,
+        sampling: s.choice("sampling", "log", &Sampling::NAMES, &[])?,
+        exponents: read_exponents(&mut s, exponents)?,
+        gather: s.choice("gather", "auto", &Gather::NAMES, &[])?,
+        theta: s.f64("theta", 0.5, Bounds::Within(0.0, 2.0))?,
+        facets_per_cloud: match s.u32("facets_per_cloud", 0, 0, u32::MAX)? {
+            0 => None,
+            n => Some(n),
+        },
+        pairs: Pairs {
+            size: s.f64("pair_size", 0.5, Bounds::Within(0.01, 100.0))?,
+            levels: s.u32("pair_levels", 6, 0, MAX_PAIR_LEVELS)?,
+            steps: s.u32("pair_steps", 16, 1, MAX_MARCH_STEPS)?,
+        },
     };
     let least = least_step(lighting.grid);
     if lighting.step < least {
@@ -115,9 +131,41 @@ pub fn read_lighting(root: &mut Section) -> Result<Lighting> {
             s.fault("step", format!("expected at least {least:.4} cells where grid = {grid} ({limit}), found {step}"))
         );
     }
-    s.only("bases", json!(1), "the diffuse basis")?;
     root.record("lighting", s.finish());
     Ok(lighting)
+}
+
+const LIGHTING_KEYS: &[&str] = &[
+    "mode",
+    "grid",
+    "step",
+    "forward",
+    "bases",
+    "sampling",
+    "exponents",
+    "gather",
+    "theta",
+    "facets_per_cloud",
+    "pair_size",
+    "pair_levels",
+    "pair_steps",
+];
+
+/// The range of n_s: as given, and then every lobe must lie in it; else [1, 256], or as wide as the materials need.
+fn read_exponents(s: &mut Section, of_materials: &[f64]) -> Result<[f64; 2]> {
+    let low = of_materials.iter().copied().fold(1.0, f64::min);
+    let high = of_materials.iter().copied().fold(256.0, f64::max);
+    let given = s.has("exponents");
+    let range = s.numbers("exponents", [low, high], Bounds::Within(0.0, GREATEST_EXPONENT))?;
+    if range[0] > range[1] {
+        return Err(s.fault("exponents", format!("expected [least, greatest], found [{}, {}]", range[0], range[1])));
+    }
+    let outside = of_materials.iter().find(|ns| !(range[0]..=range[1]).contains(*ns));
+    if let Some(ns) = outside.filter(|_| given) {
+        let what = format!("a material's ns = {ns} lies outside [{}, {}]", range[0], range[1]);
+        return Err(s.fault("exponents", what));
+    }
+    Ok(range)
 }
 
 pub fn read_draw(root: &mut Section) -> Result<Draw> {

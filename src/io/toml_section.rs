@@ -170,18 +170,49 @@ impl<'a> Section<'a> {
     }
 
     pub fn vec3(&mut self, key: &str, default: DVec3, bounds: Bounds) -> Result<DVec3> {
-        let v = match self.get(key) {
-            None => default,
-            Some(node) => match &node.value {
-                Value::Array(items) if items.len() == 3 => {
-                    let item = |i: usize| self.number(&items[i], &format!("{}.{i}", self.name(key)), bounds);
-                    DVec3::new(item(0)?, item(1)?, item(2)?)
-                }
-                other => return Err(self.fault(key, format!("expected three numbers, found {}", other.describe()))),
-            },
-        };
-        self.record(key, json!(v.to_array()));
+        Ok(DVec3::from_array(self.numbers(key, default.to_array(), bounds)?))
+    }
+
+    /// As many numbers as the default has, each within `bounds`.
+    pub fn numbers<const N: usize>(&mut self, key: &str, default: [f64; N], bounds: Bounds) -> Result<[f64; N]> {
+        let mut v = default;
+        if let Some(node) = self.get(key) {
+            let items = self.items::<N>(key, node, "numbers")?;
+            for (i, item) in items.iter().enumerate() {
+                v[i] = self.number(item, &format!("{}.{i}", self.name(key)), bounds)?;
+            }
+        }
+        self.record(key, json!(v.as_slice()));
         Ok(v)
+    }
+
+    /// Two integers from `low` to `high`.
+    pub fn u32_pair(&mut self, key: &str, default: [u32; 2], low: u32, high: u32) -> Result<[u32; 2]> {
+        let mut v = default;
+        if let Some(node) = self.get(key) {
+            for (i, item) in self.items::<2>(key, node, "integers")?.iter().enumerate() {
+                let found = match &item.value {
+                    Value::Integer(found) => u32::try_from(*found).ok().filter(|n| (low..=high).contains(n)),
+                    _ => None,
+                };
+                let wrong = || {
+                    let (name, found) = (self.name(key), item.value.describe());
+                    let what = format!("`{name}.{i}`: expected an integer from {low} to {high}, found {found}");
+                    Error::scene(self.source.place(item.origin), what)
+                };
+                v[i] = found.ok_or_else(wrong)?;
+            }
+        }
+        self.record(key, json!(v));
+        Ok(v)
+    }
+
+    fn items<const N: usize>(&self, key: &str, node: &'a Node, of: &str) -> Result<&'a [Node]> {
+        const WORDS: [&str; 4] = ["no", "one", "two", "three"];
+        match &node.value {
+            Value::Array(items) if items.len() == N => Ok(items),
+            other => Err(self.fault(key, format!("expected {} {of}, found {}", WORDS[N], other.describe()))),
+        }
     }
 
     pub fn required_vec3(&mut self, key: &str, bounds: Bounds) -> Result<DVec3> {

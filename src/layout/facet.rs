@@ -1,6 +1,10 @@
-//! Facets and what they receive and send.
+//! Facets, the regions they make up, and what they receive and send.
+
+use glam::DVec3;
 
 use crate::layout::record;
+use crate::model::material::Brdf;
+use crate::model::surface::Surface;
 
 record! {
     /// A lighting facet (model.md §5), position relative to the lighting origin.
@@ -9,13 +13,85 @@ record! {
         area: f32,
         normal: [f32; 3],
         i_region: u32,
+        /// A factor on its material's K_d.
+        color: [f32; 3],
+        unused: u32,
     }
 }
 
 record! {
-    /// I_d (irradiance) and L1 (radiance), linear RGB. The fourth components are unused and zero.
+    /// What a facet receives and sends toward the camera, linear RGB.
     pub struct LitRecord {
-        irradiance: [f32; 4],
-        radiance: [f32; 4],
+        /// I_d.
+        direct: [f32; 3],
+        /// Pairs of this receiver that stayed wider than asked for at the last level.
+        n_unresolved: f32,
+        /// I_i.
+        indirect: [f32; 3],
+        /// Bound on what those pairs may change of L2's greatest channel.
+        unresolved: f32,
+        first: [f32; 3],
+        unused: f32,
+        second: [f32; 3],
+        unused_too: f32,
+    }
+}
+
+/// Kinds of [`RegionRecord`]; the shaders' `REGION_*`.
+pub const REGION_SURFACE: u32 = 0;
+pub const REGION_CLOUD: u32 = 1;
+
+/// `i_lobe` of a region without a lobe.
+pub const NO_LOBE: u32 = u32::MAX;
+
+record! {
+    /// Facets of one material (C's R_i): a surface, with its rectangle, or a cloud.
+    pub struct RegionRecord {
+        kd: [f32; 3],
+        kind: u32,
+        ks: [f32; 3],
+        /// Row of its lobe in the table of lobes.
+        i_lobe: u32,
+        /// Of a surface, relative to the lighting origin.
+        center: [f32; 3],
+        i_first_facet: u32,
+        /// Half axes.
+        u: [f32; 3],
+        n_facets: u32,
+        v: [f32; 3],
+        /// Facets along u.
+        n_u: u32,
+        normal: [f32; 3],
+        /// Facets along v.
+        n_v: u32,
+    }
+}
+
+impl RegionRecord {
+    /// A cloud of `n_facets` facets.
+    pub fn cloud(brdf: &Brdf, i_lobe: u32, i_first_facet: u32, n_facets: u32) -> Self {
+        RegionRecord {
+            kd: brdf.kd.as_vec3().to_array(),
+            kind: REGION_CLOUD,
+            ks: brdf.ks.as_vec3().to_array(),
+            i_lobe,
+            i_first_facet,
+            n_facets,
+            ..RegionRecord::default()
+        }
+    }
+
+    /// A surface; `origin` is the lighting origin.
+    pub fn surface(surface: &Surface, origin: DVec3, brdf: &Brdf, i_lobe: u32, i_first_facet: u32) -> Self {
+        RegionRecord {
+            kind: REGION_SURFACE,
+            center: (surface.center - origin).as_vec3().to_array(),
+            u: surface.u.as_vec3().to_array(),
+            v: surface.v.as_vec3().to_array(),
+            n_u: surface.subdivide[0],
+            n_v: surface.subdivide[1],
+            normal: surface.normal().as_vec3().to_array(),
+            ..RegionRecord::cloud(brdf, i_lobe, i_first_facet, surface.n_facets() as u32)
+        }
     }
 }

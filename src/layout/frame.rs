@@ -6,33 +6,62 @@ use crate::layout::record;
 use crate::model::camera::{Camera, Pose};
 use crate::model::film::Film;
 use crate::model::grid::GridSpec;
-use crate::model::light::Light;
+use crate::model::light::{LEAST_PENUMBRA, Light, UP};
 
 /// Kinds of [`LightRecord`]; the shaders' `LIGHT_*`.
 pub const LIGHT_DIRECTIONAL: u32 = 0;
 pub const LIGHT_SKY: u32 = 1;
+pub const LIGHT_POINT: u32 = 2;
 
 record! {
+    /// A light. A spot is a point light with a cone.
     pub struct LightRecord {
-        /// Unit vector toward the light.
+        /// Unit vector toward a directional light, for the sky up, for a spot against its axis.
         toward: [f32; 3],
         kind: u32,
-        irradiance: [f32; 3],
+        /// Irradiance; of point lights intensity.
+        energy: [f32; 3],
+        /// The sky's share from everywhere.
         constant: f32,
+        /// Relative to the lighting origin.
+        position: [f32; 3],
+        /// Nearer than this a point light does not grow brighter.
+        radius: f32,
+        /// A spot's share is (cone_scale · cos + cone_offset) cut to [0, 1], squared; of other lights 1.
+        cone_scale: f32,
+        cone_offset: f32,
+        unused: [f32; 2],
     }
 }
 
-impl From<&Light> for LightRecord {
-    fn from(light: &Light) -> Self {
-        let (kind, constant) = match light {
-            Light::Directional { .. } => (LIGHT_DIRECTIONAL, 0.0),
-            Light::Sky { constant, .. } => (LIGHT_SKY, *constant as f32),
-        };
-        LightRecord {
-            toward: light.toward().as_vec3().to_array(),
-            kind,
-            irradiance: light.irradiance().as_vec3().to_array(),
-            constant,
+impl LightRecord {
+    /// `origin`: the lighting origin.
+    pub fn new(light: &Light, origin: DVec3) -> Self {
+        let f32s = |v: DVec3| v.as_vec3().to_array();
+        let record =
+            LightRecord { energy: f32s(light.energy()), cone_offset: 1.0, radius: 1.0, ..LightRecord::default() };
+        match *light {
+            Light::Directional { direction, .. } => {
+                LightRecord { toward: f32s(-direction), kind: LIGHT_DIRECTIONAL, ..record }
+            }
+            Light::Sky { constant, .. } => {
+                LightRecord { toward: f32s(UP), kind: LIGHT_SKY, constant: constant as f32, ..record }
+            }
+            Light::Point { position, radius, .. } => {
+                LightRecord { position: f32s(position - origin), kind: LIGHT_POINT, radius: radius as f32, ..record }
+            }
+            Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
+                let scale = 1.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA);
+                LightRecord {
+                    toward: f32s(-direction),
+                    position: f32s(position - origin),
+                    kind: LIGHT_POINT,
+                    radius: radius as f32,
+                    cone_scale: scale as f32,
+                    cone_offset: (-cos_outer * scale) as f32,
+                    ..record
+                }
+            }
         }
     }
 }

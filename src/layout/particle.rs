@@ -109,35 +109,36 @@ record! {
         cloud_center: [f32; 3],
         /// Mean σ of the group's particles.
         sigma_mean: f32,
-        /// K_d of the cloud's material.
-        kd: [f32; 3],
-        n_modes: u32,
         /// The group's centre relative to its cloud's origin.
         center: [f32; 3],
         /// Its cloud's first gust mode.
         i_mode: u32,
+        n_modes: u32,
+        unused: u32,
+        unused_too: [u32; 2],
     }
 }
 
 impl GroupRecord {
     /// `origin_from_light`: the cloud's origin at the frame's time minus the lighting origin, in f64.
-    /// `modes`: first gust mode of the cloud, and how many it has.
+    /// `i_region`: the cloud's; `modes`: first gust mode of the cloud, and how many it has.
     pub fn new(
         group: &Group,
+        i_region: u32,
         origin_from_light: DVec3,
         cloud_center: DVec3,
-        kd: DVec3,
         (i_mode, n_modes): (u32, u32),
     ) -> Self {
         GroupRecord {
             offset: (origin_from_light + group.center).as_vec3().to_array(),
-            i_region: group.i_cloud as u32,
+            i_region,
             cloud_center: (origin_from_light + cloud_center).as_vec3().to_array(),
             sigma_mean: group.sigma_mean as f32,
-            kd: kd.as_vec3().to_array(),
-            n_modes,
             center: group.center.as_vec3().to_array(),
             i_mode,
+            n_modes,
+            unused: 0,
+            unused_too: [0; 2],
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Lights: C's I(x, y, z, θ, φ, λ) as a direction and an irradiance, and the sky beside it (model.md §7, §8).
+//! Lights: C's I(x, y, z, θ, φ, λ) as directional, point and spot lights, and the sky beside them (model.md §7, §8).
 
 use glam::DVec3;
 
@@ -6,34 +6,117 @@ use glam::DVec3;
 pub enum Light {
     /// Parallel light: `direction` of travel (unit), irradiance on a plane across it.
     Directional { direction: DVec3, irradiance: DVec3 },
-    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant.
+    /// Intensity (power per solid angle) alike in every direction. Nearer than `radius` the irradiance does not grow.
+    Point { position: DVec3, intensity: DVec3, radius: f64 },
+    /// A point light inside a cone about `direction` (unit): full inside the inner angle, nothing outside the outer.
+    Spot { position: DVec3, direction: DVec3, intensity: DVec3, radius: f64, cos_inner: f64, cos_outer: f64 },
+    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant; reflected by the diffuse basis alone.
     Sky { irradiance: DVec3, constant: f64 },
 }
 
 /// The sky's up, whatever the camera's.
 pub const UP: DVec3 = DVec3::Y;
 
-impl Light {
+/// Least difference of a spot's cosines, as KHR_lights_punctual has it: the edge of a cone without penumbra.
+pub const LEAST_PENUMBRA: f64 = 1e-3;
+
+/// How a light reaches a point where nothing is in its way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Arrival {
     /// Unit vector toward the light; for the sky, up.
-    pub fn toward(&self) -> DVec3 {
-        match self {
-            Light::Directional { direction, .. } => -*direction,
-            Light::Sky { .. } => UP,
+    pub toward: DVec3,
+    /// How far the light is; infinite for directional lights and the sky.
+    pub distance: f64,
+    /// Irradiance across `toward`, as a share of the light's energy: 1, or 1/d² times the cone's share.
+    pub falloff: f64,
+}
+
+impl Light {
+    pub fn arrival(&self, p: DVec3) -> Arrival {
+        match *self {
+            Light::Directional { direction, .. } => {
+                Arrival { toward: -direction, distance: f64::INFINITY, falloff: 1.0 }
+            }
+            Light::Sky { .. } => Arrival { toward: UP, distance: f64::INFINITY, falloff: 1.0 },
+            Light::Point { position, radius, .. } => from_point(position, radius, p),
+            Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
+                let arrival = from_point(position, radius, p);
+                let width = (cos_inner - cos_outer).max(LEAST_PENUMBRA);
+                let share = ((-arrival.toward.dot(direction) - cos_outer) / width).clamp(0.0, 1.0);
+                Arrival { falloff: arrival.falloff * share * share, ..arrival }
+            }
         }
     }
 
-    /// Share of the light's irradiance that a facet of normal `n` receives where the transmittance toward it
-    /// is `transmittance`.
-    pub fn factor(&self, n: DVec3, transmittance: f64) -> f64 {
+    /// Irradiance on a facet of normal `n` as a share of the light's energy, the transmittance toward it being
+    /// `transmittance`.
+    pub fn share(&self, n: DVec3, arrival: &Arrival, transmittance: f64) -> f64 {
         match self {
-            Light::Directional { direction, .. } => transmittance * n.dot(-*direction).max(0.0),
             Light::Sky { constant, .. } => transmittance * (0.5 + 0.5 * n.dot(UP)) + constant,
+            _ => transmittance * arrival.falloff * n.dot(arrival.toward).max(0.0),
         }
     }
 
-    pub fn irradiance(&self) -> DVec3 {
-        match self {
-            Light::Directional { irradiance, .. } | Light::Sky { irradiance, .. } => *irradiance,
+    /// Irradiance of directional lights and the sky, intensity of point and spot lights; linear RGB.
+    pub fn energy(&self) -> DVec3 {
+        match *self {
+            Light::Directional { irradiance, .. } | Light::Sky { irradiance, .. } => irradiance,
+            Light::Point { intensity, .. } | Light::Spot { intensity, .. } => intensity,
         }
+    }
+
+    /// The sky has no direction that a lobe could reflect.
+    pub fn is_sky(&self) -> bool {
+        matches!(self, Light::Sky { .. })
+    }
+}
+
+fn from_point(position: DVec3, radius: f64, p: DVec3) -> Arrival {
+    let offset = position - p;
+    let distance = offset.length();
+    // At the light itself every direction is as good as another.
+    let toward = if distance > 0.0 { offset / distance } else { UP };
+    Arrival { toward, distance, falloff: distance.max(radius).powi(-2) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_point_light_falls_with_the_square_down_to_its_radius() {
+        let light = Light::Point { position: DVec3::Y, intensity: DVec3::ONE, radius: 0.5 };
+        let a = light.arrival(DVec3::new(0.0, -3.0, 0.0));
+        assert_eq!(a, Arrival { toward: DVec3::Y, distance: 4.0, falloff: 1.0 / 16.0 });
+        assert_eq!(light.arrival(DVec3::Y * 0.9).falloff, 4.0);
+        assert_eq!(light.arrival(DVec3::Y), Arrival { toward: UP, distance: 0.0, falloff: 4.0 });
+        assert_eq!(light.share(DVec3::NEG_Y, &a, 1.0), 0.0);
+    }
+
+    #[test]
+    fn a_spot_fades_between_its_angles() {
+        let spot = |cos_inner, cos_outer| Light::Spot {
+            position: DVec3::ZERO,
+            direction: DVec3::NEG_Y,
+            intensity: DVec3::ONE,
+            radius: 0.0,
+            cos_inner,
+            cos_outer,
+        };
+        // 45° off the axis at distance √2; the cone's cosines around cos 45°.
+        let p = DVec3::new(1.0, -1.0, 0.0);
+        let c = 0.5f64.sqrt();
+        let falloff = |light: Light| light.arrival(p).falloff;
+        assert!((falloff(spot(c - 0.1, c - 0.2)) - 0.5).abs() < 1e-15);
+        assert_eq!(falloff(spot(c + 0.2, c + 0.1)), 0.0);
+        assert!((falloff(spot(c + 0.1, c - 0.1)) - 0.5 * 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_sky_lights_from_above_and_a_constant_from_everywhere() {
+        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.25 };
+        let a = sky.arrival(DVec3::ONE);
+        assert_eq!((sky.share(DVec3::Y, &a, 1.0), sky.share(DVec3::NEG_Y, &a, 1.0)), (1.25, 0.25));
+        assert_eq!(sky.share(DVec3::X, &a, 0.5), 0.5);
     }
 }

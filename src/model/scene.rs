@@ -2,11 +2,13 @@
 
 use glam::DVec3;
 
+use super::basis::Sampling;
 use super::camera::Camera;
 use super::cloud::{Cloud, Group};
 use super::film::Film;
 use super::light::Light;
 use super::material::Material;
+use super::surface::Surface;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
@@ -19,6 +21,7 @@ pub struct Scene {
     pub threads: Threads,
     pub lights: Vec<Light>,
     pub materials: Vec<Material>,
+    pub surfaces: Vec<Surface>,
     pub clouds: Vec<Cloud>,
 }
 
@@ -42,10 +45,29 @@ pub enum LightingMode {
     None,
     /// The first reflection, C (15).
     First,
+    /// The first and the second, C (15) and (16).
+    TwoReflection,
 }
 
 impl LightingMode {
-    pub const NAMES: [(&'static str, LightingMode); 2] = [("none", LightingMode::None), ("first", LightingMode::First)];
+    pub const NAMES: [(&'static str, LightingMode); 3] =
+        [("none", LightingMode::None), ("first", LightingMode::First), ("two-reflection", LightingMode::TwoReflection)];
+}
+
+/// How the second reflection is gathered.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Gather {
+    /// Exact or tree, whichever is the faster at the scene's number of facets.
+    Auto,
+    /// Every pair of facets.
+    Exact,
+    /// Clusters of facets, opened where they are large against their distance.
+    Tree,
+}
+
+impl Gather {
+    pub const NAMES: [(&'static str, Gather); 3] =
+        [("auto", Gather::Auto), ("exact", Gather::Exact), ("tree", Gather::Tree)];
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,6 +79,31 @@ pub struct Lighting {
     pub step: f64,
     /// g: the share of τ that does not count on light's way through a cloud.
     pub forward: f64,
+    /// N_b: the diffuse basis and N_b − 1 of lobes (model.md §6).
+    pub bases: u32,
+    pub sampling: Sampling,
+    /// Range of n_s that the basis is made for.
+    pub exponents: [f64; 2],
+    pub gather: Gather,
+    /// Clusters are opened where their radius is more than this share of their distance.
+    pub theta: f64,
+    /// Facets of a cloud; `None`: one a particle.
+    pub facets_per_cloud: Option<u32>,
+    pub pairs: Pairs,
+}
+
+/// An emitter that is quartered this often is 2¹⁶ times smaller.
+pub const MAX_PAIR_LEVELS: u32 = 16;
+
+/// How closely a pair of facets is looked at (model.md §7).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pairs {
+    /// An emitter is quartered while it is wider than this share of its distance.
+    pub size: f64,
+    /// How often, at most.
+    pub levels: u32,
+    /// Most steps of the march through the density grid between two facets.
+    pub steps: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,7 +161,39 @@ impl Scene {
         groups
     }
 
-    /// Bounds (low, high) of everything at `time_s`, blobs included out to `n_sigma` σ; `None` without particles.
+    /// Facets of the surfaces, which come before those of the clouds.
+    pub fn n_surface_facets(&self) -> u64 {
+        self.surfaces.iter().map(Surface::n_facets).sum()
+    }
+
+    /// Facets of one cloud.
+    pub fn n_cloud_facets(&self, cloud: &Cloud) -> u64 {
+        let n = cloud.n_particles();
+        self.lighting.facets_per_cloud.map_or(n, |most| n.min(u64::from(most)))
+    }
+
+    pub fn n_facets(&self) -> u64 {
+        self.n_surface_facets() + self.clouds.iter().map(|c| self.n_cloud_facets(c)).sum::<u64>()
+    }
+
+    /// Facets of one material each, C's R_i: the surfaces, then the clouds.
+    pub fn n_regions(&self) -> usize {
+        self.surfaces.len() + self.clouds.len()
+    }
+
+    /// The material of region `i`.
+    pub fn region_material(&self, i: usize) -> &Material {
+        let of_surface = self.surfaces.get(i).map(|s| s.i_material);
+        &self.materials[of_surface.unwrap_or_else(|| self.clouds[i - self.surfaces.len()].i_material)]
+    }
+
+    /// Bounds (low, high) of the clouds, as [`Scene::bounds`] has them; without particles, of the surfaces.
+    pub fn lighting_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
+        let of_surfaces = || self.surfaces.iter().map(Surface::bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        self.bounds(groups, time_s, n_sigma).or_else(of_surfaces)
+    }
+
+    /// Bounds (low, high) of all particles at `time_s`, blobs included out to `n_sigma` σ; `None` without particles.
     pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
         let reach: Vec<f64> = self.clouds.iter().map(|c| c.gust.reach()).collect();
         let boxes = groups.iter().filter(|g| g.n_particles > 0).map(|g| {

@@ -10,7 +10,7 @@ use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
 record! {
-    pub struct Push { grid: GridRecord, n_particles: u32 }
+    pub struct Push { grid: GridRecord, n_particles: u32, i_first_facet: u32 }
 }
 
 pub struct Facets {
@@ -30,8 +30,9 @@ impl Facets {
         [placed, particles, i_group, groups, density, facets]: [&Buffer; 6],
         grid: &GridRecord,
         n_particles: u32,
+        i_first_facet: u32,
     ) -> Result<()> {
-        let push = Push { grid: *grid, n_particles };
+        let push = Push { grid: *grid, n_particles, i_first_facet };
         rec.dispatch(&self.kernel, &[placed, particles, i_group, groups, density, facets], &push, n_particles)
     }
 }

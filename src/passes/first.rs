@@ -1,6 +1,6 @@
 //! first: irradiance and first reflection of every facet.
 //!
-//! In: facets, lights, transmittance, particle colours, groups (K_d). Out: I_d and L1, linear RGB. Law:
+//! In: facets, lights, transmittance, regions (materials). Out: I_d and L1, linear RGB. Law:
 //! L1 = K_d/π Σ E V max(0, n·ω), and the sky. Source: C (15), docs/model.md §7, §8, §11. Error: a few ulp a light.
 
 use crate::error::Result;
@@ -20,9 +20,8 @@ impl First {
         Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS, &[])? })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32; `particles`: ParticleRecord; `i_group`: u32;
-    /// `groups`: GroupRecord; `lit`: LitRecord.
-    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 7], n_facets: u32, n_lights: u32) -> Result<()> {
+    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32; `regions`: RegionRecord; `lit`: LitRecord.
+    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 5], n_facets: u32, n_lights: u32) -> Result<()> {
         rec.dispatch(&self.kernel, &buffers, &Push { n_facets, n_lights }, n_facets)
     }
 }

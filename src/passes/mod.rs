@@ -26,6 +26,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/density.glsl",
     "include/each.glsl",
     "include/functions.glsl",
+    "include/light.glsl",
+    "include/occlude.glsl",
     "include/philox.glsl",
     "include/records.glsl",
     "include/sort.glsl",

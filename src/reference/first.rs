@@ -11,7 +11,7 @@ use crate::model::light::Light;
 pub fn irradiance(normals: &[DVec3], transmittance: &[f64], lights: &[Light]) -> Vec<DVec3> {
     let at = |(j, &n): (usize, &DVec3)| {
         let of = &transmittance[j * lights.len()..][..lights.len()];
-        lights.iter().zip(of).map(|(light, &v)| light.irradiance() * light.factor(n, v)).sum()
+        lights.iter().zip(of).map(|(light, &v)| light.energy() * light.share(n, &light.arrival(DVec3::ZERO), v)).sum()
     };
     normals.iter().enumerate().map(at).collect()
 }

@@ -47,7 +47,7 @@ pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, step: f
 
 /// τ of every facet toward every light.
 pub fn optical_depths(spec: &GridSpec, cells: &[f64], positions: &[DVec3], lights: &[Light], step: f64) -> Vec<f64> {
-    let toward_all = |&p: &DVec3| lights.iter().map(move |l| optical_depth(spec, cells, p, l.toward(), step));
+    let toward_all = |&p: &DVec3| lights.iter().map(move |l| optical_depth(spec, cells, p, l.arrival(p).toward, step));
     positions.iter().flat_map(toward_all).collect()
 }
 

@@ -115,11 +115,11 @@ pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
     stage.renderer.step(packet)?;
     let (facets, lit) = stage.renderer.facets(&stage.device)?;
     let origin = Setting::at(&stage.scene, &stage.scene.groups(), time_s)?.light_origin;
-    let rgb = |v: [f32; 4]| DVec3::new(f64::from(v[0]), f64::from(v[1]), f64::from(v[2]));
+    let rgb = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let rows = facets.iter().zip(&lit).enumerate().map(|(i, (f, l))| {
         let place = Vec3::from(f.position).as_dvec3() + origin;
         let normal = Vec3::from(f.normal).as_dvec3();
-        facet_row(i, f.i_region, [place, normal, rgb(l.irradiance), rgb(l.radiance)], f64::from(f.area))
+        facet_row(i, f.i_region, [place, normal, rgb(l.direct), rgb(l.first)], f64::from(f.area))
     });
     Ok(rows.collect())
 }
@@ -196,7 +196,7 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
 fn check_lit(scene: &Scene) -> Result<()> {
     match scene.lighting.mode {
         LightingMode::None => Err(Error::usage("the scene has no facets: lighting.mode is \"none\"")),
-        LightingMode::First => Ok(()),
+        _ => Ok(()),
     }
 }
 

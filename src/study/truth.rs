@@ -61,7 +61,8 @@ impl Truth {
             lighting.step,
         );
         self.irradiance = reference::first::irradiance(&normals, &transmittance, &scene.lights);
-        let kd: Vec<DVec3> = scene.clouds.iter().map(|c| scene.materials[c.i_material].kd).collect();
+        let kd: Vec<DVec3> =
+            scene.clouds.iter().map(|c| scene.materials[c.i_material].at(self.setting.time_s).kd).collect();
         self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.colors);
     }
 }

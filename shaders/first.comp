@@ -4,29 +4,43 @@
 #include "each.glsl"
 #include "light.glsl"
 
-// The first reflection, C (15), in the diffuse basis (docs/model.md §7, §11).
+// The first reflection, C (15), toward the eye (docs/model.md §7, §11).
 
 layout(local_size_x = 64) in;
 
 const float INV_PI = 0.318309886183791;
 
-layout(push_constant) uniform Push { uint n_facets; uint n_lights; } push;
+layout(push_constant) uniform Push { vec3 eye; uint n_facets; uint n_lights; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
 layout(std430, binding = 3) readonly buffer Regions { Region regions[]; };
-layout(std430, binding = 4) writeonly buffer LitFacets { Lit lit[]; };
+layout(std430, binding = 4) readonly buffer Table { float table[]; };
+layout(std430, binding = 5) writeonly buffer LitFacets { Lit lit[]; };
+
+#include "lobe.glsl"
 
 void main() {
     FOR_EACH(j, push.n_facets) {
         Facet facet = facets[j];
+        Region region = regions[facet.i_region];
+        vec3 outgoing = normalize(push.eye - facet.position);
+        // The lobe is the front side's, and none costs no lookup.
+        bool shines = region.i_lobe != NO_LOBE && dot(outgoing, facet.normal) > 0.0;
+        uint n_shiny = shines ? 1u : 0u;
         vec3 irradiance = vec3(0.0);
+        vec3 glossy = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             Arrival a = arrival_at(light, facet.position);
-            irradiance += light.energy * share_of(light, a, facet.normal, transmittance[j * push.n_lights + l]);
+            vec3 e = light.energy * share_of(light, a, facet.normal, transmittance[j * push.n_lights + l]);
+            irradiance += e;
+            uint n_lobes = light.kind == LIGHT_SKY ? 0u : n_shiny;
+            for (uint s = 0; s < n_lobes; ++s) {
+                glossy += e * lobe_between(region.i_lobe, facet.normal, a.toward, outgoing);
+            }
         }
-        vec3 albedo = regions[facet.i_region].kd * facet.color;
-        lit[j] = Lit(irradiance, 0.0, vec3(0.0), 0.0, albedo * irradiance * INV_PI, 0.0, vec3(0.0), 0.0);
+        vec3 first = region.kd * facet.color * irradiance * INV_PI + region.ks * glossy;
+        lit[j] = Lit(irradiance, 0.0, vec3(0.0), 0.0, first, 0.0, vec3(0.0), 0.0);
     }
 }

@@ -5,6 +5,8 @@ use crate::gpu::{Buffer, Commands, Device, Place};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::second::SourceRecord;
+use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::Scene;
 
@@ -33,6 +35,12 @@ pub struct Buffers {
     pub lights: Buffer,
     pub transmittance: Buffer,
     pub lit: Buffer,
+    /// Region of each facet of a surface.
+    pub i_region: Buffer,
+    /// Lobes, N_NODES numbers each; written by the host every frame.
+    pub table: Buffer,
+    pub sources: Buffer,
+    pub fluxes: Buffer,
     /// [key, particle].
     pub entries: Buffer,
 }
@@ -62,6 +70,10 @@ impl Buffers {
             regions: Buffer::new::<RegionRecord>(device, "first.regions", scene.n_regions() as u64, Place::Upload)?,
             lights: Buffer::new::<LightRecord>(device, "transmit.lights", n_lights, Place::Upload)?,
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
+            i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
+            table: Buffer::new::<f32>(device, "first.table", (scene.materials.len() * N_NODES) as u64, Place::Upload)?,
+            sources: Buffer::new::<SourceRecord>(device, "second.sources", n_facets, Place::Device)?,
+            fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_facets * n_lights, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
         })
@@ -71,6 +83,9 @@ impl Buffers {
     pub fn fill(&self, device: &Device, commands: &mut Commands, scene: &Scene, groups: &[Group]) -> Result<()> {
         let i_group: Vec<u32> =
             groups.iter().zip(0u32..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();
+        let surfaces = scene.surfaces.iter().zip(0u32..);
+        let i_region: Vec<u32> = surfaces.flat_map(|(s, i)| std::iter::repeat_n(i, s.n_facets() as usize)).collect();
+        upload(device, commands, &i_region, &self.i_region)?;
         upload(device, commands, &box_records(scene, groups), &self.boxes)?;
         upload(device, commands, &i_group, &self.i_group)?;
         commands.run(|rec| {
@@ -111,7 +126,8 @@ fn given_particles(scene: &Scene, groups: &[Group]) -> Vec<ParticleRecord> {
     records
 }
 
-fn upload<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, data: &[T], to: &Buffer) -> Result<()> {
+/// Fills a device buffer with `data`.
+pub fn upload<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, data: &[T], to: &Buffer) -> Result<()> {
     if data.is_empty() {
         return Ok(());
     }

@@ -23,6 +23,7 @@ pub struct Game {
     /// Waves of each cloud's gusts, and how many those before it have.
     modes: Vec<Vec<Mode>>,
     i_modes: Vec<u32>,
+    table: Arc<Vec<f32>>,
     /// Every particle relative to its group, where this thread moves them.
     rest: Option<Vec<ParticleRecord>>,
 }
@@ -69,7 +70,8 @@ impl Game {
         let modes: Vec<Vec<Mode>> = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
         let count = |n: &mut u32, waves: &Vec<Mode>| Some(std::mem::replace(n, *n + waves.len() as u32));
         let i_modes = modes.iter().scan(0, count).collect();
-        Game { scene, groups, cloud_centers, modes, i_modes, rest }
+        let table = Arc::new(lobes(&scene));
+        Game { scene, groups, cloud_centers, modes, i_modes, table, rest }
     }
 
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
@@ -94,6 +96,7 @@ impl Game {
             groups,
             modes,
             placed,
+            table: self.table.clone(),
             regions: self.regions(time_s, setting.light_origin),
             lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
             grid: GridRecord::from(&setting.grid),
@@ -106,13 +109,17 @@ impl Game {
     fn regions(&self, time_s: f64, light_origin: DVec3) -> Vec<RegionRecord> {
         let scene = &self.scene;
         let mut i_facet = 0;
+        let i_lobe = |i: usize| match is_glossy(scene, i) {
+            true => scene.region_i_material(i) as u32,
+            false => NO_LOBE,
+        };
         let of = |i: usize| {
             let brdf = scene.region_material(i).at(time_s);
             let record = match scene.surfaces.get(i) {
-                Some(surface) => RegionRecord::surface(surface, light_origin, &brdf, NO_LOBE, i_facet),
+                Some(surface) => RegionRecord::surface(surface, light_origin, &brdf, i_lobe(i), i_facet),
                 None => {
                     let n_facets = scene.n_cloud_facets(&scene.clouds[i - scene.surfaces.len()]) as u32;
-                    RegionRecord::cloud(&brdf, NO_LOBE, i_facet, n_facets)
+                    RegionRecord::cloud(&brdf, i_lobe(i), i_facet, n_facets)
                 }
             };
             i_facet += record.n_facets;
@@ -147,4 +154,13 @@ impl Game {
     }
 }
 
+/// A row a material.
+fn lobes(scene: &Scene) -> Vec<f32> {
+    let row = |m: &Material| (0..N_NODES).map(|i| Brdf::lobe(m.at(0.0).ns, node(i)) as f32).collect::<Vec<f32>>();
+    scene.materials.iter().flat_map(row).collect()
+}
+
+use super::exchange::is_glossy;
 use super::packet::Packet;
+use crate::model::basis::{N_NODES, node};
+use crate::model::material::{Brdf, Material};

@@ -2,6 +2,7 @@
 //! [`parallel`] are two loops around these two; [`plan`] says what a frame can leave out.
 
 pub mod buffers;
+pub mod exchange;
 pub mod game;
 pub mod limits;
 pub mod packet;

@@ -1,5 +1,6 @@
 //! All that the render step needs to know of one frame, and the only thing that crosses from game to render thread.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use crate::layout::facet::RegionRecord;
@@ -22,6 +23,8 @@ pub struct Packet {
     pub placed: Option<Vec<PlacedRecord>>,
     /// Surfaces, then clouds, with their materials at this time.
     pub regions: Vec<RegionRecord>,
+    /// The lobe of every glossy material at this time, N_NODES numbers each.
+    pub table: Arc<Vec<f32>>,
     pub lights: Vec<LightRecord>,
     pub grid: GridRecord,
     /// Bounds |view depth| relative to the lighting origin.

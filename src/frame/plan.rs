@@ -12,17 +12,27 @@ pub enum Pass {
     Facets,
     Transmit,
     First,
+    Second,
     Sort,
     Sprites,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 8] =
-        [Pass::Generate, Pass::Place, Pass::Grid, Pass::Facets, Pass::Transmit, Pass::First, Pass::Sort, Pass::Sprites];
+    pub const ALL: [Pass; 9] = [
+        Pass::Generate,
+        Pass::Place,
+        Pass::Grid,
+        Pass::Facets,
+        Pass::Transmit,
+        Pass::First,
+        Pass::Second,
+        Pass::Sort,
+        Pass::Sprites,
+    ];
 
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
-        ["generate", "place", "grid", "facets", "transmit", "first", "sort", "sprites"][self as usize]
+        ["generate", "place", "grid", "facets", "transmit", "first", "second", "sort", "sprites"][self as usize]
     }
 }
 
@@ -51,8 +61,11 @@ pub struct Traits {
     /// Some particles come from boxes.
     pub has_boxes: bool,
     pub n_particles: u32,
+    pub n_facets: u32,
     /// `lighting.mode` is not "none".
     pub lit: bool,
+    /// `lighting.mode` is "two-reflection".
+    pub two_reflections: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
 }
@@ -82,11 +95,23 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         lighting(same_facets, "nothing moved"),
         lighting(same_rays, "facets and lights stand still"),
         lighting(same_light, "facets and lights are the same"),
+        if traits.two_reflections {
+            unless(same_light, "facets and lights are the same")
+        } else {
+            skip("lighting.mode is not \"two-reflection\"")
+        },
         unless(same_order, "the order cannot have changed"),
         unless(same_picture, "the picture is the same"),
     ];
     if traits.n_particles == 0 {
-        decisions[..Pass::Sprites as usize].fill(skip("no particles"));
+        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Sort] {
+            decisions[pass as usize] = skip("no particles");
+        }
+    }
+    if traits.n_facets == 0 {
+        for pass in [Pass::Facets, Pass::Transmit, Pass::First, Pass::Second] {
+            decisions[pass as usize] = skip("no facets");
+        }
     }
     Plan(decisions)
 }

@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use super::buffers::{Buffers, download};
+use super::exchange::Exchange;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::{limits, ms};
@@ -14,12 +15,13 @@ use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::{CloudSource, heaviest_blob};
 use crate::model::film::FilmFormat;
-use crate::model::scene::{LightingMode, Scene, Simulate};
+use crate::model::scene::{LightingMode, Pairs, Scene, Simulate};
 use crate::passes::facets::Facets;
-use crate::passes::first::First;
+use crate::passes::first::{First, Push as FirstPush};
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::place::Place as PlacePass;
+use crate::passes::second::{GatherPush, Receivers, Second, SourcesPush};
 use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
 use crate::passes::transmit::Transmit;
@@ -31,6 +33,7 @@ pub struct Renderer {
     facets: Facets,
     transmit: Transmit,
     first: First,
+    second: Option<SecondStage>,
     sort: Sort,
     sprites: Sprites,
     buffers: Buffers,
@@ -45,7 +48,11 @@ pub struct Renderer {
 /// What of the scene the passes are told and that is constant over a run.
 struct Settings {
     n_particles: u32,
+    n_surface_facets: u32,
+    n_facets: u32,
     n_lights: u32,
+    pairs: Pairs,
+    theta: f64,
     heaviest: f64,
     step_cells: f64,
     forward: f64,
@@ -73,6 +80,12 @@ impl Renderer {
         let format = target_format(scene.film.format);
         let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
+        let mut commands = Commands::new(device, "frame")?;
+        let two_reflections = scene.lighting.mode == LightingMode::TwoReflection;
+        let second = match two_reflections {
+            true => Some(SecondStage::new(device, compiler, &mut commands, scene)?),
+            false => None,
+        };
         let mut renderer = Renderer {
             generate: Generate::new(device, compiler)?,
             place: PlacePass::new(device, compiler)?,
@@ -80,14 +93,19 @@ impl Renderer {
             facets: Facets::new(device, compiler)?,
             transmit: Transmit::new(device, compiler)?,
             first: First::new(device, compiler)?,
+            second,
             sort: Sort::new(device, compiler, n_particles)?,
             sprites: Sprites::new(device, compiler, format, lit)?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
             readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
-            commands: Commands::new(device, "frame")?,
+            commands,
             settings: Settings {
                 n_particles,
+                n_surface_facets: scene.n_surface_facets() as u32,
+                n_facets: scene.n_facets() as u32,
+                pairs: scene.lighting.pairs,
+                theta: scene.lighting.theta,
                 n_lights: scene.lights.len() as u32,
                 heaviest: heaviest_blob(&groups),
                 step_cells: scene.lighting.step,
@@ -99,7 +117,9 @@ impl Renderer {
             traits: Traits {
                 has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
                 n_particles,
+                n_facets: scene.n_facets() as u32,
                 lit,
+                two_reflections,
                 skip,
             },
             last: None,
@@ -129,6 +149,7 @@ impl Renderer {
     fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
         self.buffers.modes.write(&packet.modes)?;
+        self.buffers.table.write(&packet.table)?;
         self.buffers.regions.write(&packet.regions)?;
         self.buffers.lights.write(&packet.lights)?;
         match (&mut self.buffers.placed_upload, &packet.placed) {
@@ -146,6 +167,7 @@ impl Renderer {
             facets,
             transmit,
             first,
+            second,
             sort,
             sprites,
             buffers: b,
@@ -170,15 +192,21 @@ impl Renderer {
             })?;
             pass(rec, plan, Pass::Facets, |rec| {
                 let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
-                facets.record(rec, buffers, &packet.grid, n, 0)
+                facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
+                facets.record_surfaces(rec, [&b.regions, &b.i_region, &b.facets], s.n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
                 let buffers = [&b.facets, &b.lights, &b.density, &b.transmittance];
-                transmit.record(rec, buffers, &packet.grid, [n, s.n_lights], s.step_cells, s.forward)
+                transmit.record(rec, buffers, &packet.grid, [s.n_facets, s.n_lights], s.step_cells, s.forward)
             })?;
             pass(rec, plan, Pass::First, |rec| {
-                let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.lit];
-                first.record(rec, from, n, s.n_lights)
+                let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &b.lit];
+                let push = FirstPush { eye: packet.camera.eye, n_facets: s.n_facets, n_lights: s.n_lights };
+                first.record(rec, from, &push)
+            })?;
+            pass(rec, plan, Pass::Second, |rec| match second {
+                Some(second) => second.record(rec, b, packet, s),
+                None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {
                 sort.record_keys(rec, [&b.placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
@@ -232,9 +260,61 @@ impl Renderer {
 
     /// The last frame's facets and their light; only meaningful where the scene is lit.
     pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
-        let n = self.settings.n_particles;
+        let n = self.settings.n_facets;
         let facets = download(device, &mut self.commands, &self.buffers.facets, n)?;
         Ok((facets, download(device, &mut self.commands, &self.buffers.lit, n)?))
+    }
+}
+
+/// The second reflection and what it is gathered with.
+struct SecondStage {
+    second: Second,
+    exchange: Exchange,
+}
+
+impl SecondStage {
+    fn new(device: &Device, compiler: &Compiler, commands: &mut Commands, scene: &Scene) -> Result<SecondStage> {
+        let second = Second::new(device, compiler, scene.n_particles() > 0)?;
+        let exchange = Exchange::new(device, commands, scene, second.block_len())?;
+        Ok(SecondStage { second, exchange })
+    }
+
+    fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
+        let x = &self.exchange;
+        let push = SourcesPush { n_facets: s.n_facets, n_lights: s.n_lights };
+        let buffers = [&b.facets, &b.lights, &b.transmittance, &b.regions, &x.order, &x.leaves, &b.sources, &b.fluxes];
+        self.second.record_sources(rec, buffers, &push)?;
+        for receivers in [Receivers::Diffuse, Receivers::Glossy] {
+            let (i_first_block, n_blocks) = x.blocks_of(receivers);
+            let push = GatherPush {
+                grid: packet.grid,
+                eye: packet.camera.eye,
+                n_lights: s.n_lights,
+                pair_size: s.pairs.size as f32,
+                pair_levels: s.pairs.levels,
+                step_length: s.step_cells as f32 * packet.grid.cell,
+                backward: (1.0 - s.forward) as f32,
+                pair_steps: s.pairs.steps,
+                i_first_block,
+                theta: s.theta as f32,
+            };
+            let buffers = [
+                &x.blocks,
+                &x.pairings,
+                &x.occluders,
+                &x.order,
+                &b.facets,
+                &b.regions,
+                &b.lights,
+                &b.sources,
+                &b.fluxes,
+                &b.table,
+                &b.density,
+                &b.lit,
+            ];
+            self.second.record(rec, buffers, &push, receivers, n_blocks)?;
+        }
+        Ok(())
     }
 }
 

@@ -15,3 +15,11 @@ impl Sampling {
 
 /// Most bases: the diffuse one and 31 of lobes.
 pub const MAX_BASES: u32 = 32;
+
+/// Nodes of a tabulated lobe.
+pub const N_NODES: usize = 1024;
+
+/// 1 − cos γ at node i.
+pub fn node(i: usize) -> f64 {
+    (i as f64 / (N_NODES - 1) as f64).powi(4)
+}

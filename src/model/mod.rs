@@ -10,6 +10,7 @@ pub mod grid;
 pub mod gust;
 pub mod light;
 pub mod material;
+pub mod pairings;
 pub mod philox;
 pub mod scene;
 pub mod surface;

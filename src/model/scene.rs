@@ -181,10 +181,14 @@ impl Scene {
         self.surfaces.len() + self.clouds.len()
     }
 
-    /// The material of region `i`.
-    pub fn region_material(&self, i: usize) -> &Material {
+    /// Index of the material of region `i`.
+    pub fn region_i_material(&self, i: usize) -> usize {
         let of_surface = self.surfaces.get(i).map(|s| s.i_material);
-        &self.materials[of_surface.unwrap_or_else(|| self.clouds[i - self.surfaces.len()].i_material)]
+        of_surface.unwrap_or_else(|| self.clouds[i - self.surfaces.len()].i_material)
+    }
+
+    pub fn region_material(&self, i: usize) -> &Material {
+        &self.materials[self.region_i_material(i)]
     }
 
     /// Bounds (low, high) of the clouds, as [`Scene::bounds`] has them; without particles, of the surfaces.

@@ -1,6 +1,7 @@
-//! facets: what light falls on, one facet a particle.
+//! facets: what light falls on: the grids of the surfaces, and one facet a particle.
 //!
-//! In: placed particles, κ, groups, density grid. Out: position, unit normal, area, region. Law: normal against the
+//! In: regions (rectangles), placed particles, κ, groups, density grid. Out: position, unit normal, area, region, colour.
+//! Law: rectangles' grids row by row; a particle's normal against the
 //! gradient of the density smoothed to 2σ, blended to "away from the cloud's centre" where that is ill conditioned; position on
 //! the shell p + 1.5 σ n. Source: C §2.4, docs/model.md §5, §11. Error: the normal's grows as 1/(t·conditioning).
 
@@ -13,13 +14,26 @@ record! {
     pub struct Push { grid: GridRecord, n_particles: u32, i_first_facet: u32 }
 }
 
+record! {
+    pub struct SurfacesPush { n_facets: u32 }
+}
+
 pub struct Facets {
     kernel: Kernel,
+    surfaces: Kernel,
 }
 
 impl Facets {
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Facets> {
-        Ok(Facets { kernel: Kernel::new(device, compiler, "facets", Push::FIELDS, &[])? })
+        Ok(Facets {
+            kernel: Kernel::new(device, compiler, "facets", Push::FIELDS, &[])?,
+            surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
+        })
+    }
+
+    /// The first `n_facets` of `facets` (FacetRecord) from `regions` (RegionRecord); `i_region`: u32 by facet.
+    pub fn record_surfaces(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 3], n_facets: u32) -> Result<()> {
+        rec.dispatch(&self.surfaces, &buffers, &SurfacesPush { n_facets }, n_facets)
     }
 
     /// `placed`: PlacedRecord; `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord; `density`: f32;

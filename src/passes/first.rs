@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
-    pub struct Push { n_facets: u32, n_lights: u32 }
+    pub struct Push { eye: [f32; 3], n_facets: u32, n_lights: u32 }
 }
 
 pub struct First {
@@ -20,8 +20,9 @@ impl First {
         Ok(First { kernel: Kernel::new(device, compiler, "first", Push::FIELDS, &[])? })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32; `regions`: RegionRecord; `lit`: LitRecord.
-    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 5], n_facets: u32, n_lights: u32) -> Result<()> {
-        rec.dispatch(&self.kernel, &buffers, &Push { n_facets, n_lights }, n_facets)
+    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32 [facet][light]; `regions`: RegionRecord; `table`:
+    /// f32, a lobe a row; `lit`: LitRecord.
+    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 6], push: &Push) -> Result<()> {
+        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
     }
 }

@@ -6,6 +6,7 @@ pub mod first;
 pub mod generate;
 pub mod grid;
 pub mod place;
+pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod transmit;
@@ -19,6 +20,7 @@ macro_rules! shader_texts {
 /// Every shader and include, as built into the binary.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
     "facets.comp",
+    "facets_surfaces.comp",
     "first.comp",
     "generate.comp",
     "grid_deposit.comp",
@@ -26,12 +28,17 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/density.glsl",
     "include/each.glsl",
     "include/functions.glsl",
+    "include/gather.glsl",
     "include/light.glsl",
+    "include/lobe.glsl",
     "include/occlude.glsl",
     "include/philox.glsl",
     "include/records.glsl",
     "include/sort.glsl",
+    "include/veil.glsl",
     "place.comp",
+    "second_gather.comp",
+    "second_sources.comp",
     "sort_count.comp",
     "sort_key.comp",
     "sort_scan.comp",

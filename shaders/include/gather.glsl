@@ -1,0 +1,57 @@
+// What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of second_gather.comp.
+
+const float PI_INVERSE = 0.318309886183791;
+
+// cos cos / (d^2 + A/pi) of unit `way` from receiver to source; 0 where either turns its back.
+float form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float area) {
+    float at_source = -dot(source_normal, way), at_receiver = dot(receiver_normal, way);
+    return max(at_source, 0.0) * max(at_receiver, 0.0) / (d2 + area * PI_INVERSE);
+}
+
+// 1 where no surface of the veil hides q from p. Nothing is looked at where nothing would come.
+float visible(Pairing pairing, Veil veil, vec3 p, vec3 q, bool wanted) {
+    uint n = wanted ? veil.n : 0u;
+    bool clear = true;
+    for (uint k = 0u; k < n; ++k) {
+        clear = clear && !hides(regions[occluder_of(pairing, veil, k)], p, q);
+    }
+    return clear ? 1.0 : 0.0;
+}
+
+#if MARCH
+// e^{-(1-g) tau} between p and q through the density grid: equal steps over what lies in the grid's box, no longer than
+// the march's own and no more than the pair's greatest number, midpoint samples.
+float attenuation(vec3 p, vec3 q, bool wanted) {
+    vec3 d = q - p;
+    vec3 low = push.grid.low;
+    vec3 high = low + push.grid.cell * vec3(push.grid.n_cells);
+    // A way along an axis' planes divides by zero: the infinities sort themselves out, 0/0 is kept out.
+    vec3 inverse = 1.0 / mix(d, vec3(1e-30), equal(d, vec3(0.0)));
+    vec3 a = (low - p) * inverse, b = (high - p) * inverse;
+    vec3 nearer = min(a, b), farther = max(a, b);
+    float enter = max(max(nearer.x, nearer.y), max(nearer.z, 0.0));
+    float leave = min(min(farther.x, farther.y), min(farther.z, 1.0));
+    float part = max(leave - enter, 0.0);
+    float distance = part * length(d);
+    uint n = wanted && distance > 0.0 ? clamp(uint(ceil(distance / push.step_length)), 1u, push.pair_steps) : 0u;
+    float sum = 0.0;
+    for (uint k = 0; k < n; ++k) {
+        sum += density_at(p + d * (enter + part * (float(k) + 0.5) / float(n)));
+    }
+    float depth = n > 0u ? push.backward * sum * distance / float(n) : 0.0;
+    return depth > 0.0 ? exp(-depth) : 1.0;
+}
+#endif
+
+// What a source's lobe sends along `outgoing`, by light: radiance times area. `flux_scale` is the share of the source that
+// is looked at, `p` where.
+vec3 lobe_flux(uint i_source, Region emitter, vec3 p, vec3 normal, vec3 outgoing, float flux_scale) {
+    vec3 sum = vec3(0.0);
+    for (uint l = 0; l < push.n_lights; ++l) {
+        Light light = lights[l];
+        float g = light.kind == LIGHT_SKY ? 0.0 : fluxes[i_source * push.n_lights + l].w;
+        vec3 toward = arrival_at(light, p).toward;
+        sum += light.energy * (g * lobe_between(emitter.i_lobe, normal, toward, outgoing));
+    }
+    return emitter.ks * sum * flux_scale;
+}

@@ -1,0 +1,22 @@
+// Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector (docs/model.md §6). Needs
+// `float table[]`, a lobe a row.
+
+const uint N_NODES = 1024;
+
+float lobe_at(uint i_row, float w) {
+    float t = sqrt(sqrt(clamp(w, 0.0, 1.0))) * float(N_NODES - 1u);
+    uint i = min(uint(t), N_NODES - 2u);
+    uint k = i_row * N_NODES + i;
+    return mix(table[k], table[k + 1u], t - float(i));
+}
+
+// 1 - cos gamma of the half vector of unit a and b, without the cancellation: half the square of the chord from n to it.
+float half_vector_gap(vec3 n, vec3 a, vec3 b) {
+    vec3 h = a + b;
+    vec3 chord = n - h * inversesqrt(max(dot(h, h), 1e-30));
+    return 0.5 * dot(chord, chord);
+}
+
+float lobe_between(uint i_row, vec3 n, vec3 a, vec3 b) {
+    return lobe_at(i_row, half_vector_gap(n, a, b));
+}

@@ -1,0 +1,103 @@
+//! Who receives light from whom: the constant part of the second reflection's gather, made once a scene.
+
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Device, Place};
+use crate::layout::second::{BlockRecord, PairingRecord};
+use crate::model::pairings::{Pairing, pairings};
+use crate::model::scene::Scene;
+use crate::passes::second::Receivers;
+
+use super::buffers::upload;
+
+/// Buffers of the exchange, and how many blocks of receivers there are without and with a lobe.
+pub struct Exchange {
+    pub blocks: Buffer,
+    pub pairings: Buffer,
+    pub occluders: Buffer,
+    /// Facet of each place.
+    pub order: Buffer,
+    /// Source of each place.
+    pub leaves: Buffer,
+    n_diffuse_blocks: u32,
+    n_glossy_blocks: u32,
+}
+
+/// The records behind the buffers.
+#[derive(Debug, Clone, PartialEq)]
+struct Lists {
+    diffuse: Vec<BlockRecord>,
+    glossy: Vec<BlockRecord>,
+    pairings: Vec<PairingRecord>,
+    occluders: Vec<u32>,
+}
+
+impl Exchange {
+    /// Blocks hold at most `block_len` receivers.
+    pub fn new(device: &Device, commands: &mut Commands, scene: &Scene, block_len: u32) -> Result<Exchange> {
+        let lists = Lists::of(scene, block_len);
+        let places: Vec<u32> = (0..scene.n_facets() as u32).collect();
+        let blocks = [&lists.diffuse[..], &lists.glossy[..]].concat();
+        let mut made = |name: &str, data: &[u32], words: usize| -> Result<Buffer> {
+            let n = (data.len() as u64).max(words as u64);
+            let buffer = Buffer::new::<u32>(device, name, n, Place::Device)?;
+            upload(device, commands, data, &buffer)?;
+            Ok(buffer)
+        };
+        Ok(Exchange {
+            blocks: made("second.blocks", bytemuck::cast_slice(&blocks), 4)?,
+            pairings: made("second.pairings", bytemuck::cast_slice(&lists.pairings), 4)?,
+            occluders: made("second.occluders", &lists.occluders, 1)?,
+            order: made("second.order", &places, 1)?,
+            leaves: made("second.leaves", &places, 1)?,
+            n_diffuse_blocks: lists.diffuse.len() as u32,
+            n_glossy_blocks: lists.glossy.len() as u32,
+        })
+    }
+
+    /// First block and number of blocks.
+    pub fn blocks_of(&self, receivers: Receivers) -> (u32, u32) {
+        match receivers {
+            Receivers::Diffuse => (0, self.n_diffuse_blocks),
+            Receivers::Glossy => (self.n_diffuse_blocks, self.n_glossy_blocks),
+        }
+    }
+}
+
+/// Facets of each region.
+pub fn region_sizes(scene: &Scene) -> Vec<u32> {
+    let of_surfaces = scene.surfaces.iter().map(|s| s.n_facets() as u32);
+    of_surfaces.chain(scene.clouds.iter().map(|c| scene.n_cloud_facets(c) as u32)).collect()
+}
+
+/// Whether a region's lobe is to be computed.
+pub fn is_glossy(scene: &Scene, i_region: usize) -> bool {
+    scene.lighting.bases > 1 && scene.region_material(i_region).is_glossy()
+}
+
+impl Lists {
+    fn of(scene: &Scene, block_len: u32) -> Lists {
+        let sizes = region_sizes(scene);
+        let firsts: Vec<u32> = sizes.iter().scan(0, |first, n| Some(std::mem::replace(first, *first + n))).collect();
+        let mut lists = Lists { diffuse: vec![], glossy: vec![], pairings: vec![], occluders: vec![] };
+        for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
+            let i_pairing = lists.pairings.len() as u32;
+            for pairing in from.iter().filter(|p| sizes[p.i_emitter] > 0) {
+                lists.push_pairing(pairing, firsts[pairing.i_emitter]);
+            }
+            let n_pairings = lists.pairings.len() as u32 - i_pairing;
+            let blocks = if is_glossy(scene, i) { &mut lists.glossy } else { &mut lists.diffuse };
+            for first in (0..sizes[i]).step_by(block_len as usize) {
+                let n_facets = block_len.min(sizes[i] - first);
+                blocks.push(BlockRecord { i_first: firsts[i] + first, n_facets, i_pairing, n_pairings });
+            }
+        }
+        lists
+    }
+
+    fn push_pairing(&mut self, pairing: &Pairing, i_source: u32) {
+        let i_occluder = self.occluders.len() as u32;
+        self.occluders.extend(pairing.occluders.iter().map(|i| *i as u32));
+        let n_occluders = pairing.occluders.len() as u32;
+        self.pairings.push(PairingRecord { i_region: pairing.i_emitter as u32, i_occluder, n_occluders, i_source });
+    }
+}

@@ -1,0 +1,43 @@
+//! What the second reflection is gathered from (docs/model.md §7).
+
+use crate::layout::record;
+
+record! {
+    /// Light on its way from a facet, or from a cluster of facets of one region.
+    pub struct SourceRecord {
+        /// A cluster's: mean of its facets' by their flux.
+        position: [f32; 3],
+        /// No point of it is farther from the position.
+        radius: f32,
+        /// Mean normal by flux; shorter than 1 where a cluster's normals differ.
+        normal: [f32; 3],
+        /// Mean area of its facets, by area: what bounds the form factor as the distance goes to 0.
+        area: f32,
+        /// Σ A_i L1_i of the diffuse basis, linear RGB.
+        flux: [f32; 3],
+        /// Σ A_i.
+        total_area: f32,
+    }
+}
+
+record! {
+    /// Receivers that are gathered for together: consecutive places in the order of facets, all of one region.
+    pub struct BlockRecord {
+        i_first: u32,
+        n_facets: u32,
+        i_pairing: u32,
+        n_pairings: u32,
+    }
+}
+
+record! {
+    /// One region as seen from another.
+    pub struct PairingRecord {
+        i_region: u32,
+        /// Surfaces that may stand between the two.
+        i_occluder: u32,
+        n_occluders: u32,
+        /// Its first source.
+        i_source: u32,
+    }
+}

@@ -1,0 +1,84 @@
+//! second: the second reflection on every facet, gathered from all others.
+//!
+//! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid. Out: I_i and L2 in
+//! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11.
+
+use crate::error::Result;
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::layout::frame::GridRecord;
+use crate::layout::record;
+
+record! {
+    pub struct SourcesPush { n_facets: u32, n_lights: u32 }
+}
+
+record! {
+    pub struct GatherPush {
+        grid: GridRecord,
+        eye: [f32; 3],
+        n_lights: u32,
+        pair_size: f32,
+        pair_levels: u32,
+        step_length: f32,
+        backward: f32,
+        pair_steps: u32,
+        i_first_block: u32,
+        theta: f32,
+    }
+}
+
+pub struct Second {
+    sources: Kernel,
+    /// For receivers without a lobe, and with.
+    gather: [Kernel; 2],
+    /// Receivers of one block.
+    block: u32,
+}
+
+/// Blocks of receivers, by whether they have a lobe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Receivers {
+    Diffuse,
+    Glossy,
+}
+
+impl Second {
+    /// `has_clouds`: light between facets is attenuated by the density grid.
+    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool) -> Result<Second> {
+        let width = device.limits().subgroup_size.clamp(8, 64);
+        let gather = |glossy: u32| {
+            let macros = [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy)];
+            Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
+        };
+        Ok(Second {
+            sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS, &[])?,
+            gather: [gather(0)?, gather(1)?],
+            block: width,
+        })
+    }
+
+    /// Most receivers of a block.
+    pub fn block_len(&self) -> u32 {
+        self.block
+    }
+
+    /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: f32 [facet][light]; `regions`: RegionRecord; `order`: u32,
+    /// the facet of each place; `leaves`: u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4]
+    /// [source][light].
+    pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 8], push: &SourcesPush) -> Result<()> {
+        rec.dispatch(&self.sources, &buffers, push, push.n_facets)
+    }
+
+    /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
+    /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `lit`: LitRecord.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 12],
+        push: &GatherPush,
+        receivers: Receivers,
+        n_blocks: u32,
+    ) -> Result<()> {
+        rec.dispatch_groups(&self.gather[receivers as usize], &buffers, push, n_blocks)
+    }
+}

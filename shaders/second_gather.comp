@@ -21,6 +21,14 @@
 
 layout(local_size_x = WORKGROUP) in;
 
+// A lobe is met within this many of its widths (e^-18 of its peak beyond).
+const float LOBE_REACH = 6.0;
+// Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
+// width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
+const float LOBE_STEP = 3.0;
+// Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
+const uint MAX_STEPS = 65536u;
+
 layout(push_constant) uniform Push {
     Grid grid;
     vec3 eye;
@@ -53,33 +61,77 @@ layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 #include "veil.glsl"
 #include "gather.glsl"
 
-struct Sum { vec3 indirect; vec3 glossy; };
+struct Sum {
+    vec3 indirect;
+    vec3 glossy;
+    // Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest channel.
+    float n_unresolved;
+    float unresolved;
+};
 
-// Adds what the sources of a pairing send to the receiver: as many as `n`, behind the veil or without one.
-void gather(inout Sum sum, Pairing pairing, Region emitter, Region own, Veil veil, const bool veiled, uint n, vec3 p, vec3 normal, vec3 outgoing) {
+struct Taker { vec3 position; vec3 normal; vec3 outgoing; Region region; };
+
+// Adds what the first `n` sources of a pairing send to the receiver. One step is one cell: a whole facet, or a quarter of
+// a cell that was too wide for its distance, so that neighbouring invocations need not wait for each other's near facets.
+void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uint n) {
+    bool flat_emitter = emitter.kind == REGION_SURFACE;
+    vec3 half_u = flat_emitter ? emitter.u / float(emitter.n_u) : vec3(0.0);
+    vec3 half_v = flat_emitter ? emitter.v / float(emitter.n_v) : vec3(0.0);
+    float side = 2.0 * sqrt(max(dot(half_u, half_u), dot(half_v, half_v)));
     uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
-    for (uint s = 0u; s < n; ++s) {
+    Cell cell = Cell(0u, uvec2(0u));
+    uint n_steps = 0u;
+    for (uint s = 0u; s < n;) {
         uint i = pairing.i_source + s;
         Source source = sources[i];
-        vec3 offset = source.position - p;
+        float scale = cell_scale(cell);
+        vec2 at = (2.0 * vec2(cell.at) + 1.0) * scale - 1.0;
+        vec3 q = source.position + at.x * half_u + at.y * half_v;
+        vec3 offset = q - taker.position;
         float d2 = dot(offset, offset);
-        vec3 way = offset * inversesqrt(max(d2, 1e-30));
-        float share = form(normal, source.normal, way, d2, source.area);
+        float inverse = inversesqrt(max(d2, 1e-30));
+        vec3 way = offset * inverse;
+        float part = scale * scale;
+        float share = part * form(taker.normal, source.normal, way, d2, part * source.area);
+        // Width over distance: of geometry, and of the half vector's turn where a lobe can be met.
+        float width = side * scale * inverse;
+        float excess = width / push.pair_size;
+        vec3 leaving = source.flux;
+        float turn = 0.75 * width;
+        for (uint g = 0u; g < n_shiny; ++g) {
+            float gap;
+            leaving += lobe_flux(i, emitter, q, source.normal, -way, gap);
+            bool met = sqrt(2.0 * gap) < turn + LOBE_REACH * emitter.lobe_width;
+            excess = max(excess, met ? width / (LOBE_STEP * push.pair_size * emitter.lobe_width) : 0.0);
+        }
+#if GLOSSY
+        float gap = half_vector_gap(taker.normal, way, taker.outgoing);
+        bool met = sqrt(2.0 * gap) < turn + LOBE_REACH * taker.region.lobe_width;
+        excess = max(excess, met ? width / (LOBE_STEP * push.pair_size * taker.region.lobe_width) : 0.0);
+#endif
+        // Some of the cell may be before the receiver, and the receiver is before all of it or none.
+        bool faces = dot(source.normal, offset) < 0.0 && dot(taker.normal, offset) > -side * scale;
+        bool wide = faces && excess > 1.0;
+        bool split = wide && cell.level < push.pair_levels && n_steps < MAX_STEPS;
+        share = split ? 0.0 : share;
         if (veiled) {
-            share *= visible(pairing, veil, p, source.position, share > 0.0);
+            share *= visible(pairing, veil, taker.position, q, share > 0.0);
         }
 #if MARCH
-        share *= attenuation(p, source.position, share > 0.0);
+        share *= attenuation(taker.position, q, share > 0.0);
 #endif
-        vec3 leaving = source.flux;
-        for (uint g = 0u; g < n_shiny; ++g) {
-            leaving += lobe_flux(i, emitter, source.position, source.normal, -way, 1.0);
-        }
         vec3 e = leaving * share;
         sum.indirect += e;
 #if GLOSSY
-        sum.glossy += e * lobe_between(own.i_lobe, normal, way, outgoing);
+        vec3 g = e * lobe_at(taker.region.i_lobe, gap);
+        sum.glossy += g;
 #endif
+        bool open = wide && !split;
+        sum.n_unresolved += open ? 1.0 : 0.0;
+        Cell next = next_cell(cell);
+        s += !split && next.level == 0u ? 1u : 0u;
+        n_steps = next.level == 0u ? 0u : n_steps + 1u;
+        cell = split ? Cell(cell.level + 1u, cell.at * 2u) : next;
     }
 }
 
@@ -89,21 +141,22 @@ void main() {
     uint j = order[place];
     Facet facet = facets[j];
     Region own = regions[facet.i_region];
-    vec3 p = facet.position, normal = facet.normal;
-    vec3 outgoing = normalize(push.eye - p);
-    Sum sum = Sum(vec3(0.0), vec3(0.0));
+    Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), own);
+    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0);
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];
-        Veil veil = veil_of(pairing, emitter, p);
+        Veil veil = veil_of(pairing, emitter, facet.position);
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
         uint n_clear = veil.n == 0u ? emitter.n_facets : 0u;
         uint n_veiled = veil.n > 0u && !veil.closed ? emitter.n_facets : 0u;
-        gather(sum, pairing, emitter, own, veil, false, n_clear, p, normal, outgoing);
-        gather(sum, pairing, emitter, own, veil, true, n_veiled, p, normal, outgoing);
+        gather(sum, pairing, emitter, taker, veil, false, n_clear);
+        gather(sum, pairing, emitter, taker, veil, true, n_veiled);
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
         lit[j].indirect = sum.indirect;
         lit[j].second = own.kd * facet.color * sum.indirect * PI_INVERSE + own.ks * sum.glossy;
+        lit[j].n_unresolved = sum.n_unresolved;
+        lit[j].unresolved = sum.unresolved;
     }
 }

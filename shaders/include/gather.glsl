@@ -43,15 +43,34 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
 }
 #endif
 
-// What a source's lobe sends along `outgoing`, by light: radiance times area. `flux_scale` is the share of the source that
-// is looked at, `p` where.
-vec3 lobe_flux(uint i_source, Region emitter, vec3 p, vec3 normal, vec3 outgoing, float flux_scale) {
+// The lobe of a cell of a source toward `outgoing`, by light: radiance per area of the source times its whole area.
+// `gap`: the least 1 - cos gamma of any light.
+vec3 lobe_flux(uint i_source, Region emitter, vec3 p, vec3 normal, vec3 outgoing, out float gap) {
     vec3 sum = vec3(0.0);
-    for (uint l = 0; l < push.n_lights; ++l) {
+    gap = 2.0;
+    for (uint l = 0u; l < push.n_lights; ++l) {
         Light light = lights[l];
         float g = light.kind == LIGHT_SKY ? 0.0 : fluxes[i_source * push.n_lights + l].w;
-        vec3 toward = arrival_at(light, p).toward;
-        sum += light.energy * (g * lobe_between(emitter.i_lobe, normal, toward, outgoing));
+        float w = half_vector_gap(normal, arrival_at(light, p).toward, outgoing);
+        gap = g > 0.0 ? min(gap, w) : gap;
+        sum += light.energy * (g * lobe_at(emitter.i_lobe, w));
     }
-    return emitter.ks * sum * flux_scale;
+    return emitter.ks * sum;
+}
+
+// A cell of a facet: 4^level of them, row by row in Z order. Clouds' facets have no axes and are one cell.
+struct Cell { uint level; uvec2 at; };
+
+float cell_scale(Cell cell) { return uintBitsToFloat((127u - cell.level) << 23); }
+
+// The next cell in Z order, (0, 0) of level 0 after the last.
+Cell next_cell(Cell cell) {
+    // Last children of last children are done together.
+    uint up = min(uint(findLSB(~(cell.at.x & cell.at.y))), cell.level);
+    cell.level -= up;
+    cell.at >>= up;
+    bool odd = (cell.at.x & 1u) != 0u;
+    uvec2 next = odd ? uvec2(cell.at.x - 1u, cell.at.y + 1u) : uvec2(cell.at.x + 1u, cell.at.y);
+    cell.at = cell.level == 0u ? uvec2(0u) : next;
+    return cell;
 }

@@ -64,6 +64,11 @@ record! {
         normal: [f32; 3],
         /// Facets along v.
         n_v: u32,
+        /// 1/√n_s: half the width of its lobe in radians of γ.
+        lobe_width: f32,
+        unused_1: f32,
+        unused_2: f32,
+        unused_3: f32,
     }
 }
 
@@ -77,6 +82,7 @@ impl RegionRecord {
             i_lobe,
             i_first_facet,
             n_facets,
+            lobe_width: brdf.ns.max(1.0).powf(-0.5) as f32,
             ..RegionRecord::default()
         }
     }

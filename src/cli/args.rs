@@ -128,7 +128,7 @@ pub enum ThreadingArg {
 }
 
 #[derive(Debug, ClapArgs)]
-#[command(group = clap::ArgGroup::new("what").args(["boxes", "particles", "facets", "plan"]))]
+#[command(group = clap::ArgGroup::new("what").args(["boxes", "particles", "facets", "plan", "basis"]))]
 pub struct InspectArgs {
     /// Scene file
     pub scene: PathBuf,
@@ -144,6 +144,10 @@ pub struct InspectArgs {
     /// What the first frames run and skip, and why
     #[arg(long)]
     pub plan: bool,
+    /// The BRDF basis of the scene's settings; needs no device. All three come with --json
+    #[arg(long, value_enum, value_name = "WHAT", num_args = 0..=1, default_missing_value = "table")]
+    #[arg(conflicts_with_all = ["reference", "frame"])]
+    pub basis: Option<BasisArg>,
     /// The f64 reference's values in place of the device's
     #[arg(long, conflicts_with = "plan")]
     pub reference: bool,
@@ -155,6 +159,16 @@ pub struct InspectArgs {
     pub json: bool,
     #[command(flatten)]
     pub options: SceneArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BasisArg {
+    /// Every basis function over γ, node by node (the default)
+    Table,
+    /// The singular values, and which were kept
+    Values,
+    /// The relative error over the range of exponents, and of every glossy material
+    Errors,
 }
 
 #[derive(Debug, ClapArgs)]

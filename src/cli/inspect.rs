@@ -1,10 +1,10 @@
 //! `nimbus inspect SCENE`.
 
-use super::args::InspectArgs;
+use super::args::{BasisArg, InspectArgs};
 use super::{check_time, device_choice, load, output, say_sizes};
 use crate::error::Result;
-use crate::study::inspect;
 use crate::study::stage::Stage;
+use crate::study::{basis, inspect};
 
 /// Frames that `--plan` shows: the first does everything, the second shows what a step of time changes, the third that
 /// it goes on so.
@@ -12,6 +12,9 @@ const PLAN_FRAMES: u32 = 3;
 
 pub fn run(args: &InspectArgs) -> Result<()> {
     let loaded = load(&args.scene, &args.options)?;
+    if let Some(what) = args.basis {
+        return print_basis(&basis::report(&loaded.scene), what, args);
+    }
     let i_frame = args.frame.unwrap_or(0);
     check_time(&loaded.scene, loaded.scene.time.at(i_frame))?;
     let spinner = output::spinner("inspecting", args.options.quiet);
@@ -57,6 +60,18 @@ fn print(found: &Found, json: bool) -> Result<()> {
         Found::Facets(rows) => output::rows(rows, json),
         Found::Boxes(rows) => boxes(rows, json),
         Found::Plan(rows) => plan(rows, json),
+    }
+}
+
+fn print_basis(report: &basis::BasisReport, what: BasisArg, args: &InspectArgs) -> Result<()> {
+    if let Some(note) = basis::note(report).filter(|_| !args.options.quiet) {
+        eprintln!("note: {note}");
+    }
+    match what {
+        _ if args.json => output::object(report),
+        BasisArg::Table => output::numbers(&report.table.names(), report.table.rows()),
+        BasisArg::Values => output::rows(&report.singular_values, false),
+        BasisArg::Errors => output::rows(&report.errors, false),
     }
 }
 

@@ -26,25 +26,44 @@ pub fn error(error: &Error, color: ColorChoice) {
 pub fn text(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(Error::Io { path: "stdout".into(), what: e.to_string() })
-        }
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(fail(e)),
         _ => Ok(()),
     }
 }
 
 /// Rows as CSV with a header, or as a JSON array.
 pub fn rows<T: Serialize>(rows: &[T], json: bool) -> Result<()> {
-    let fail = |e: String| Error::Io { path: "stdout".into(), what: e };
     if json {
-        return text(&(serde_json::to_string_pretty(rows).map_err(|e| fail(e.to_string()))? + "\n"));
+        return object(rows);
     }
     let mut writer = csv::Writer::from_writer(vec![]);
     for row in rows {
-        writer.serialize(row).map_err(|e| fail(e.to_string()))?;
+        writer.serialize(row).map_err(fail)?;
     }
-    let bytes = writer.into_inner().map_err(|e| fail(e.to_string()))?;
-    text(&String::from_utf8_lossy(&bytes))
+    csv_text(writer)
+}
+
+/// Rows whose columns are known only now, as CSV.
+pub fn numbers(names: &[String], rows: impl Iterator<Item = Vec<f64>>) -> Result<()> {
+    let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(vec![]);
+    writer.serialize(names).map_err(fail)?;
+    for row in rows {
+        writer.serialize(row).map_err(fail)?;
+    }
+    csv_text(writer)
+}
+
+/// Anything as JSON.
+pub fn object<T: Serialize + ?Sized>(object: &T) -> Result<()> {
+    text(&(serde_json::to_string_pretty(object).map_err(fail)? + "\n"))
+}
+
+fn csv_text(writer: csv::Writer<Vec<u8>>) -> Result<()> {
+    text(&String::from_utf8_lossy(&writer.into_inner().map_err(fail)?))
+}
+
+fn fail(what: impl std::fmt::Display) -> Error {
+    Error::Io { path: "stdout".into(), what: what.to_string() }
 }
 
 /// A progress bar on stderr; none when quiet or when stderr is no terminal.

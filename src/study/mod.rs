@@ -1,5 +1,6 @@
 //! Measures a scene: runs it, compares it with the references, and writes down what came out.
 
+pub mod basis;
 pub mod bench;
 pub mod inspect;
 pub mod records;

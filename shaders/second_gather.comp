@@ -21,14 +21,6 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-// A lobe is met within this many of its widths (e^-18 of its peak beyond).
-const float LOBE_REACH = 6.0;
-// Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
-// width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
-const float LOBE_STEP = 3.0;
-// Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
-const uint MAX_STEPS = 65536u;
-
 layout(push_constant) uniform Push {
     Grid grid;
     vec3 eye;
@@ -60,6 +52,7 @@ layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 #endif
 #include "veil.glsl"
 #include "gather.glsl"
+#include "cells.glsl"
 
 struct Sum {
     vec3 indirect;
@@ -69,70 +62,72 @@ struct Sum {
     float unresolved;
 };
 
-struct Taker { vec3 position; vec3 normal; vec3 outgoing; Region region; };
-
 // Adds what the first `n` sources of a pairing send to the receiver. One step is one cell: a whole facet, or a quarter of
 // a cell that was too wide for its distance, so that neighbouring invocations need not wait for each other's near facets.
 void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uint n) {
-    bool flat_emitter = emitter.kind == REGION_SURFACE;
-    vec3 half_u = flat_emitter ? emitter.u / float(emitter.n_u) : vec3(0.0);
-    vec3 half_v = flat_emitter ? emitter.v / float(emitter.n_v) : vec3(0.0);
-    float side = 2.0 * sqrt(max(dot(half_u, half_u), dot(half_v, half_v)));
-    uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
-    Cell cell = Cell(0u, uvec2(0u));
-    uint n_steps = 0u;
-    for (uint s = 0u; s < n;) {
-        uint i = pairing.i_source + s;
-        Source source = sources[i];
-        float scale = cell_scale(cell);
-        vec2 at = (2.0 * vec2(cell.at) + 1.0) * scale - 1.0;
-        vec3 q = source.position + at.x * half_u + at.y * half_v;
-        vec3 offset = q - taker.position;
-        float d2 = dot(offset, offset);
-        float inverse = inversesqrt(max(d2, 1e-30));
-        vec3 way = offset * inverse;
-        float part = scale * scale;
-        float share = part * form(taker.normal, source.normal, way, d2, part * source.area);
-        // Width over distance: of geometry, and of the half vector's turn where a lobe can be met.
-        float width = side * scale * inverse;
-        float excess = width / push.pair_size;
-        vec3 leaving = source.flux;
-        float turn = 0.75 * width;
-        for (uint g = 0u; g < n_shiny; ++g) {
-            float gap;
-            leaving += lobe_flux(i, emitter, q, source.normal, -way, gap);
-            bool met = sqrt(2.0 * gap) < turn + LOBE_REACH * emitter.lobe_width;
-            excess = max(excess, met ? width / (LOBE_STEP * push.pair_size * emitter.lobe_width) : 0.0);
-        }
-#if GLOSSY
-        float gap = half_vector_gap(taker.normal, way, taker.outgoing);
-        bool met = sqrt(2.0 * gap) < turn + LOBE_REACH * taker.region.lobe_width;
-        excess = max(excess, met ? width / (LOBE_STEP * push.pair_size * taker.region.lobe_width) : 0.0);
-#endif
-        // Some of the cell may be before the receiver, and the receiver is before all of it or none.
-        bool faces = dot(source.normal, offset) < 0.0 && dot(taker.normal, offset) > -side * scale;
-        bool wide = faces && excess > 1.0;
-        bool split = wide && cell.level < push.pair_levels && n_steps < MAX_STEPS;
-        share = split ? 0.0 : share;
+    Pane pane = pane_of(emitter);
+    Walk walk = start_walk();
+    while (walk.s < n) {
+        uint i = pairing.i_source + walk.s;
+        View view = look(sources[i], i, walk, pane, emitter, taker);
+        float share = view.split ? 0.0 : view.share;
         if (veiled) {
-            share *= visible(pairing, veil, taker.position, q, share > 0.0);
+            share *= visible(pairing, veil, taker.position, view.position, share > 0.0);
         }
 #if MARCH
-        share *= attenuation(taker.position, q, share > 0.0);
+        share *= attenuation(taker.position, view.position, share > 0.0);
 #endif
-        vec3 e = leaving * share;
+        vec3 e = view.leaving * share;
         sum.indirect += e;
 #if GLOSSY
-        vec3 g = e * lobe_at(taker.region.i_lobe, gap);
-        sum.glossy += g;
+        sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
 #endif
-        bool open = wide && !split;
-        sum.n_unresolved += open ? 1.0 : 0.0;
-        Cell next = next_cell(cell);
-        s += !split && next.level == 0u ? 1u : 0u;
-        n_steps = next.level == 0u ? 0u : n_steps + 1u;
-        cell = split ? Cell(cell.level + 1u, cell.at * 2u) : next;
+        sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+        walk = advance(walk, view.split);
     }
+}
+
+// The lobe's gap where it is nearest to its peak in a cell that turns the half vector by `turn`.
+float nearest_gap(float gap, float turn) {
+    float angle = max(sqrt(2.0 * gap) - turn, 0.0);
+    return 0.5 * angle * angle;
+}
+
+// A bound on what the cells that stayed too wide may change (docs/model.md §11 "unresolved").
+float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint n) {
+    Pane pane = pane_of(emitter);
+    Walk walk = start_walk();
+    float bound = 0.0;
+    while (walk.s < n) {
+        uint i = pairing.i_source + walk.s;
+        Source source = sources[i];
+        View view = look(source, i, walk, pane, emitter, taker);
+        float scale = cell_scale(walk.level);
+        float turn = TURN * view.width;
+        // Nothing is nearer than the centre less half a diagonal, and no cell fills more than the hemisphere.
+        float nearest = max(1.0 - 0.70710678 * view.width, 0.0) * pane.side * scale / max(view.width, 1e-30);
+        float most = min(PI / source.area, scale * scale / max(nearest * nearest, 1e-30));
+        vec3 sent = source.flux;
+        for (uint l = 0u; l < push.n_lights; ++l) {
+            float g = lights[l].kind == LIGHT_SKY || emitter.i_lobe == NO_LOBE ? 0.0 : fluxes[i * push.n_lights + l].w;
+            float peak = g > 0.0 ? lobe_at(emitter.i_lobe, nearest_gap(view.emitter_gap, turn)) : 0.0;
+            sent += emitter.ks * lights[l].energy * (g * peak);
+        }
+        vec3 received = albedo, taken = albedo;
+#if GLOSSY
+        received += taker.region.ks * lobe_at(taker.region.i_lobe, view.taker_gap);
+        taken += taker.region.ks * lobe_at(taker.region.i_lobe, nearest_gap(view.taker_gap, turn));
+#endif
+        // Of geometry: all that it may be where the cell is wider than far, else the midpoint rule's error. Of lobes: their
+        // greatest values in place of those met.
+        vec3 met = abs(view.leaving * received);
+        vec3 geometry = met * (view.width > 1.0 ? most : view.share * view.width * view.width);
+        vec3 lobes = max(sent * taken - met, vec3(0.0)) * (view.width > 1.0 ? most : view.share);
+        vec3 e = geometry + lobes;
+        bound += view.wide && !view.split ? max(e.x, max(e.y, e.z)) : 0.0;
+        walk = advance(walk, view.split);
+    }
+    return bound;
 }
 
 void main() {
@@ -141,7 +136,9 @@ void main() {
     uint j = order[place];
     Facet facet = facets[j];
     Region own = regions[facet.i_region];
-    Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), own);
+    vec3 to_eye = push.eye - facet.position;
+    Taker taker = Taker(facet.position, facet.normal, normalize(to_eye), own);
+    vec3 albedo = own.kd * facet.color * PI_INVERSE;
     Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0);
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
@@ -150,12 +147,17 @@ void main() {
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
         uint n_clear = veil.n == 0u ? emitter.n_facets : 0u;
         uint n_veiled = veil.n > 0u && !veil.closed ? emitter.n_facets : 0u;
+        float n_before = sum.n_unresolved;
         gather(sum, pairing, emitter, taker, veil, false, n_clear);
         gather(sum, pairing, emitter, taker, veil, true, n_veiled);
+        uint n_audit = sum.n_unresolved > n_before ? emitter.n_facets : 0u;
+        sum.unresolved += audit(pairing, emitter, taker, albedo, n_audit);
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
         lit[j].indirect = sum.indirect;
-        lit[j].second = own.kd * facet.color * sum.indirect * PI_INVERSE + own.ks * sum.glossy;
+        // The lobe is the front side's.
+        float front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
+        lit[j].second = albedo * sum.indirect + front * own.ks * sum.glossy;
         lit[j].n_unresolved = sum.n_unresolved;
         lit[j].unresolved = sum.unresolved;
     }

@@ -1,6 +1,10 @@
 // What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of second_gather.comp.
 
+const float PI = 3.14159265358979;
 const float PI_INVERSE = 0.318309886183791;
+
+// The receiver: where it is, and whither it reflects.
+struct Taker { vec3 position; vec3 normal; vec3 outgoing; Region region; };
 
 // cos cos / (d^2 + A/pi) of unit `way` from receiver to source; 0 where either turns its back.
 float form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float area) {
@@ -56,21 +60,4 @@ vec3 lobe_flux(uint i_source, Region emitter, vec3 p, vec3 normal, vec3 outgoing
         sum += light.energy * (g * lobe_at(emitter.i_lobe, w));
     }
     return emitter.ks * sum;
-}
-
-// A cell of a facet: 4^level of them, row by row in Z order. Clouds' facets have no axes and are one cell.
-struct Cell { uint level; uvec2 at; };
-
-float cell_scale(Cell cell) { return uintBitsToFloat((127u - cell.level) << 23); }
-
-// The next cell in Z order, (0, 0) of level 0 after the last.
-Cell next_cell(Cell cell) {
-    // Last children of last children are done together.
-    uint up = min(uint(findLSB(~(cell.at.x & cell.at.y))), cell.level);
-    cell.level -= up;
-    cell.at >>= up;
-    bool odd = (cell.at.x & 1u) != 0u;
-    uvec2 next = odd ? uvec2(cell.at.x - 1u, cell.at.y + 1u) : uvec2(cell.at.x + 1u, cell.at.y);
-    cell.at = cell.level == 0u ? uvec2(0u) : next;
-    return cell;
 }

@@ -1,7 +1,7 @@
 // Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector (docs/model.md §6). Needs
 // `float table[]`, a lobe a row.
 
-const uint N_NODES = 1024;
+const uint N_NODES = 1025;
 
 float lobe_at(uint i_row, float w) {
     float t = sqrt(sqrt(clamp(w, 0.0, 1.0))) * float(N_NODES - 1u);

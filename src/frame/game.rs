@@ -154,13 +154,21 @@ impl Game {
     }
 }
 
-/// A row a material.
+/// The lobe of every material as the basis represents it, a row a material; zeros where there is none.
 fn lobes(scene: &Scene) -> Vec<f32> {
-    let row = |m: &Material| (0..N_NODES).map(|i| Brdf::lobe(m.at(0.0).ns, node(i)) as f32).collect::<Vec<f32>>();
-    scene.materials.iter().flat_map(row).collect()
+    if !(0..scene.n_regions()).any(|i| is_glossy(scene, i)) {
+        return vec![];
+    }
+    let lighting = &scene.lighting;
+    let basis = Basis::new(lighting.exponents, lighting.bases, lighting.sampling);
+    let row = |m: &Material| match m.is_glossy() {
+        true => basis.lobe(m.at(0.0).ns),
+        false => vec![0.0; N_NODES],
+    };
+    scene.materials.iter().flat_map(row).map(|v| v as f32).collect()
 }
 
 use super::exchange::is_glossy;
 use super::packet::Packet;
-use crate::model::basis::{N_NODES, node};
-use crate::model::material::{Brdf, Material};
+use crate::model::basis::{Basis, N_NODES};
+use crate::model::material::Material;

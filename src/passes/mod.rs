@@ -25,6 +25,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "generate.comp",
     "grid_deposit.comp",
     "grid_resolve.comp",
+    "include/cells.glsl",
     "include/density.glsl",
     "include/each.glsl",
     "include/functions.glsl",

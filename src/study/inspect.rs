@@ -29,8 +29,8 @@ pub struct ParticleRow {
     pub b: f64,
 }
 
-/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera (the second reflection
-/// is not computed in this version, its columns are zero).
+/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera, which a surface's back
+/// does not have. I_i and L2 are zero where lighting.mode is "first".
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FacetRow {
     pub index: usize,
@@ -114,12 +114,15 @@ pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
     let time_s = packet.time_s;
     stage.renderer.step(packet)?;
     let (facets, lit) = stage.renderer.facets(&stage.device)?;
-    let origin = Setting::at(&stage.scene, &stage.scene.groups(), time_s)?.light_origin;
+    let setting = Setting::at(&stage.scene, &stage.scene.groups(), time_s)?;
+    let (origin, eye) = (setting.light_origin, setting.pose.position);
     let rgb = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let rows = facets.iter().zip(&lit).enumerate().map(|(i, (f, l))| {
         let place = Vec3::from(f.position).as_dvec3() + origin;
         let normal = Vec3::from(f.normal).as_dvec3();
-        facet_row(i, f.i_region, [place, normal, rgb(l.direct), rgb(l.first)], f64::from(f.area))
+        let lit = [rgb(l.direct), rgb(l.indirect), rgb(l.first), rgb(l.second)];
+        let lit = toward_camera(&stage.scene, f.i_region, eye - place, normal, lit);
+        facet_row(i, f.i_region, [place, normal], f64::from(f.area), lit)
     });
     Ok(rows.collect())
 }
@@ -129,8 +132,9 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     check_lit(scene)?;
     let truth = Truth::of(scene, scene.time.at(i_frame))?;
     let rows = truth.facets.iter().enumerate().map(|(i, f)| {
-        let vectors = [f.position + truth.setting.light_origin, f.normal, truth.irradiance[i], truth.radiance[i]];
-        facet_row(i, f.region, vectors, f.area)
+        let place = f.position + truth.setting.light_origin;
+        let lit = [truth.irradiance[i], DVec3::ZERO, truth.radiance[i], DVec3::ZERO];
+        facet_row(i, f.region, [place, f.normal], f.area, lit)
     });
     Ok(rows.collect())
 }
@@ -212,7 +216,13 @@ fn particle_row(index: usize, cloud: usize, p: DVec3, sigma: f64, kappa: f64, c:
     ParticleRow { index, cloud, x: p.x, y: p.y, z: p.z, radius, sigma, kappa, r: c.x, g: c.y, b: c.z }
 }
 
-fn facet_row(index: usize, region: u32, [p, n, id, l1]: [DVec3; 4], area: f64) -> FacetRow {
+/// L1 and L2 (the last two) are zero where the camera sees a surface's back.
+fn toward_camera(scene: &Scene, region: u32, to_eye: DVec3, normal: DVec3, lit: [DVec3; 4]) -> [DVec3; 4] {
+    let is_back = (region as usize) < scene.surfaces.len() && normal.dot(to_eye) <= 0.0;
+    if is_back { [lit[0], lit[1], DVec3::ZERO, DVec3::ZERO] } else { lit }
+}
+
+fn facet_row(index: usize, region: u32, [p, n]: [DVec3; 2], area: f64, [id, ii, l1, l2]: [DVec3; 4]) -> FacetRow {
     FacetRow {
         index,
         region,
@@ -226,14 +236,14 @@ fn facet_row(index: usize, region: u32, [p, n, id, l1]: [DVec3; 4], area: f64) -
         id_r: id.x,
         id_g: id.y,
         id_b: id.z,
-        ii_r: 0.0,
-        ii_g: 0.0,
-        ii_b: 0.0,
+        ii_r: ii.x,
+        ii_g: ii.y,
+        ii_b: ii.z,
         l1_r: l1.x,
         l1_g: l1.y,
         l1_b: l1.z,
-        l2_r: 0.0,
-        l2_g: 0.0,
-        l2_b: 0.0,
+        l2_r: l2.x,
+        l2_g: l2.y,
+        l2_b: l2.z,
     }
 }

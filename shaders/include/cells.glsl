@@ -1,0 +1,101 @@
+// How a receiver goes through a region's sources: facet by facet, and a facet too wide for its distance cell by cell
+// (docs/model.md §7, §11 "second"). Needs gather.glsl.
+
+// A lobe is met within this many of its widths (e^-18 of its peak beyond).
+const float LOBE_REACH = 6.0;
+// Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
+// width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
+const float LOBE_STEP = 3.0;
+// The half vector turns by at most this share of a cell's width over its distance between its centre and its corner: half
+// the direction's turn, of half a diagonal of sqrt 2; twice that where the light is as near as the receiver.
+const float TURN = 0.75;
+// Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
+const uint MAX_STEPS = 65536u;
+
+// What the cells of a region's facets have in common. A cloud's facets have no axes and are one cell.
+struct Pane { vec3 half_u; vec3 half_v; float side; };
+
+Pane pane_of(Region emitter) {
+    bool is_surface = emitter.kind == REGION_SURFACE;
+    vec3 u = is_surface ? emitter.u / float(emitter.n_u) : vec3(0.0);
+    vec3 v = is_surface ? emitter.v / float(emitter.n_v) : vec3(0.0);
+    return Pane(u, v, 2.0 * sqrt(max(dot(u, u), dot(v, v))));
+}
+
+// Source s of the region, and cell `at` of the 4^level it is divided into, in Z order.
+struct Walk { uint s; uint level; uvec2 at; uint n_steps; };
+
+Walk start_walk() { return Walk(0u, 0u, uvec2(0u), 0u); }
+
+// 2^-level.
+float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
+
+// Into the cell's first quarter, or on to the next cell, or, after a facet's last, to the next source.
+Walk advance(Walk walk, bool split) {
+    // Last quarters of last quarters are done together.
+    uint up = min(uint(findLSB(~(walk.at.x & walk.at.y))), walk.level);
+    uint level = walk.level - up;
+    uvec2 at = walk.at >> up;
+    bool odd = (at.x & 1u) != 0u;
+    uvec2 next = odd ? uvec2(at.x - 1u, at.y + 1u) : uvec2(at.x + 1u, at.y);
+    bool done = !split && level == 0u;
+    next = done ? uvec2(0u) : next;
+    return Walk(
+        walk.s + (done ? 1u : 0u), split ? walk.level + 1u : level, split ? walk.at * 2u : next,
+        done ? 0u : walk.n_steps + 1u);
+}
+
+// A cell as the receiver sees it.
+struct View {
+    vec3 position;
+    vec3 way;
+    // Width over distance.
+    float width;
+    // cos cos / (d^2 + A/pi), times the cell's part of its facet.
+    float share;
+    // Radiance toward the receiver times the facet's area.
+    vec3 leaving;
+    // Least 1 - cos gamma at the emitter, and at the receiver.
+    float emitter_gap;
+    float taker_gap;
+    // Wider than asked for; and to be quartered.
+    bool wide;
+    bool split;
+};
+
+bool is_met(float gap, float turn, float lobe_width) { return sqrt(2.0 * gap) < turn + LOBE_REACH * lobe_width; }
+
+View look(Source source, uint i, Walk walk, Pane pane, Region emitter, Taker taker) {
+    View view;
+    float scale = cell_scale(walk.level);
+    vec2 at = (2.0 * vec2(walk.at) + 1.0) * scale - 1.0;
+    view.position = source.position + at.x * pane.half_u + at.y * pane.half_v;
+    vec3 offset = view.position - taker.position;
+    float d2 = dot(offset, offset);
+    float inverse = inversesqrt(max(d2, 1e-30));
+    view.way = offset * inverse;
+    float part = scale * scale;
+    view.share = part * form(taker.normal, source.normal, view.way, d2, part * source.area);
+    view.width = pane.side * scale * inverse;
+    view.leaving = source.flux;
+    float excess = view.width / push.pair_size;
+    float turn = TURN * view.width;
+    view.emitter_gap = 2.0;
+    uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
+    for (uint g = 0u; g < n_shiny; ++g) {
+        view.leaving += lobe_flux(i, emitter, view.position, source.normal, -view.way, view.emitter_gap);
+        bool met = is_met(view.emitter_gap, turn, emitter.lobe_width);
+        excess = max(excess, met ? view.width / (LOBE_STEP * push.pair_size * emitter.lobe_width) : 0.0);
+    }
+    view.taker_gap = 2.0;
+#if GLOSSY
+    view.taker_gap = half_vector_gap(taker.normal, view.way, taker.outgoing);
+    bool met = is_met(view.taker_gap, turn, taker.region.lobe_width);
+    excess = max(excess, met ? view.width / (LOBE_STEP * push.pair_size * taker.region.lobe_width) : 0.0);
+#endif
+    // Some of the cell may be before the receiver; the receiver is before all of it or none.
+    bool faces = dot(source.normal, offset) < 0.0 && dot(taker.normal, offset) > -pane.side * scale;
+    view.wide = faces && excess > 1.0;
+    view.split = view.wide && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+    return view;
+}

@@ -64,7 +64,7 @@ impl Case {
         let pass = Transmit::new(&gpu.device, compiler.unwrap_or(&gpu.compiler)).expect("transmit");
         let facet = |&position: &[f32; 3]| FacetRecord { position, ..FacetRecord::default() };
         let facets = gpu.upload(&self.positions.iter().map(facet).collect::<Vec<_>>());
-        let lights = gpu.upload(&self.lights.iter().map(LightRecord::from).collect::<Vec<_>>());
+        let lights = gpu.upload(&self.lights.iter().map(|l| LightRecord::new(l, DVec3::ZERO)).collect::<Vec<_>>());
         let density = gpu.upload(&self.density);
         let n = [self.positions.len() as u32, self.lights.len() as u32];
         let n_total = self.positions.len() * self.lights.len();
@@ -86,7 +86,7 @@ impl Case {
     fn bounds(&self, step: f64, forward: f64) -> Vec<f64> {
         let cells = self.cells();
         let one = |&p: &[f32; 3], l: &Light| {
-            let tau = self.depth(&cells, double(p), l.toward(), step);
+            let tau = self.depth(&cells, double(p), l.arrival(double(p)).toward, step);
             let depth = tau.times(Bounded::once(1.0 - forward));
             // Transmittance through nothing is exact by the shader's own test.
             if depth.value + depth.error > 0.0 { depth.scaled(-1.0).exp().error * (1.0 + 1e-6) } else { 0.0 }

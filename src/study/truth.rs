@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::frame::game::Setting;
 use crate::model::cloud::{CloudSource, Group};
+use crate::model::light::Light;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::generate::Generated;
 use crate::reference::{self, Blob, facets::Facet};
@@ -52,15 +53,10 @@ impl Truth {
         let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
         let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
         let lighting = &scene.lighting;
-        let transmittance = reference::transmit::transmittance(
-            grid,
-            &cells,
-            &positions,
-            &scene.lights,
-            lighting.forward,
-            lighting.step,
-        );
-        self.irradiance = reference::first::irradiance(&normals, &transmittance, &scene.lights);
+        let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(self.setting.light_origin)).collect();
+        let transmittance =
+            reference::transmit::transmittance(grid, &cells, &positions, &lights, lighting.forward, lighting.step);
+        self.irradiance = reference::first::irradiance(&positions, &normals, &transmittance, &lights);
         let kd: Vec<DVec3> =
             scene.clouds.iter().map(|c| scene.materials[c.i_material].at(self.setting.time_s).kd).collect();
         self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.colors);

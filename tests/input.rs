@@ -1,60 +1,20 @@
 //! Scene files and what they name: what is read, what is refused, and where the message points.
 
+#[path = "harness/scene_text.rs"]
+mod scene_text;
+
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::DVec3;
-use nimbus::error::Error;
-use nimbus::io::scene_file::{LoadedScene, load};
+use nimbus::io::scene_file::load;
 use nimbus::model::boxes::Form;
 use nimbus::model::cloud::CloudSource;
 use nimbus::model::film::ToneMap;
 use nimbus::model::light::Light;
 use nimbus::model::scene::{Simulate, Threading};
-use serde_json::{Value, json};
-use tempfile::TempDir;
-
-const BOXES: &str = "3\n1\n3, 1, 1, 1, 0, 0, 0, 1\n";
-const CLOUD: &str = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
-
-/// A folder with `scene.toml` and the box file `b.dat`.
-fn folder(scene: &str) -> (TempDir, PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("scene.toml");
-    fs::write(&path, scene).unwrap();
-    fs::write(dir.path().join("b.dat"), BOXES).unwrap();
-    (dir, path)
-}
-
-fn load_with(scene: &str, overrides: &[&str], seed: Option<u32>) -> Result<LoadedScene, Error> {
-    let (_dir, path) = folder(scene);
-    load(&path, &overrides.iter().map(|s| s.to_string()).collect::<Vec<_>>(), seed)
-}
-
-fn good(scene: &str) -> LoadedScene {
-    load_with(scene, &[], None).unwrap()
-}
-
-/// The message for `scene`, the folder cut off.
-fn message(scene: &str, overrides: &[&str]) -> String {
-    let (dir, path) = folder(scene);
-    let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
-    let error = load(&path, &overrides, None).expect_err(scene);
-    assert_eq!(error.exit_code(), 2);
-    error.to_string().replace(&format!("{}/", dir.path().display()), "")
-}
-
-fn assert_message(scene: &str, expected: &str) {
-    assert_eq!(message(scene, &[]), expected, "for\n{scene}");
-}
-
-/// A table in tests/data: `== line:column: message`, then the scene that earns it.
-fn assert_table(table: &str) {
-    for case in table.strip_prefix("== ").unwrap().split("\n== ") {
-        let (expected, scene) = case.split_once('\n').unwrap();
-        assert_message(scene, &format!("scene.toml:{expected}"));
-    }
-}
+use scene_text::{BOXES, CLOUD, assert_message, assert_table, folder, good, load_with, message, to_toml};
+use serde_json::json;
 
 #[test]
 fn a_cloud_alone_is_a_complete_scene() {
@@ -247,23 +207,6 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
     );
     let again = good(&to_toml(&loaded.resolved));
     assert_eq!((&again.scene, &again.resolved, &again.hash), (&loaded.scene, &loaded.resolved, &loaded.hash));
-}
-
-/// JSON's strings, numbers and lists are TOML's; only `:` is `=` there.
-fn to_toml(resolved: &Value) -> String {
-    fn inline(v: &Value) -> String {
-        match v {
-            Value::Object(map) => {
-                format!(
-                    "{{ {} }}",
-                    map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect::<Vec<_>>().join(", ")
-                )
-            }
-            Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
-            other => other.to_string(),
-        }
-    }
-    resolved.as_object().unwrap().iter().map(|(k, v)| format!("{k} = {}\n", inline(v))).collect()
 }
 
 #[test]

@@ -47,7 +47,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
-    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), B(4), B(4)]),
+    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(4)]),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -209,6 +209,10 @@ fn shared_constants_have_one_value() {
     // Every constant beside the records is in the list above.
     let n = records_glsl().lines().filter(|l| l.starts_with("const uint ")).count();
     assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
+    let in_plane = constant(text_of("include/occlude.glsl"), "IN_PLANE");
+    assert_eq!(in_plane, Some(nimbus::reference::occlude::IN_PLANE));
+    let share_side = constant(text_of("transmit.comp"), "SHARE_SIDE");
+    assert_eq!(share_side, Some(f64::from(nimbus::reference::transmit::SHARE_SIDE)));
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
     assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
     // The host's TILE is private to its pass: both stand in the text.

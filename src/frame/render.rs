@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::buffers::{Buffers, download};
+use super::buffers::{Buffers, download, has_shares};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::{limits, ms};
@@ -46,6 +46,7 @@ pub struct Renderer {
 struct Settings {
     n_particles: u32,
     n_lights: u32,
+    n_surfaces: u32,
     heaviest: f64,
     step_cells: f64,
     forward: f64,
@@ -78,7 +79,7 @@ impl Renderer {
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler)?,
-            transmit: Transmit::new(device, compiler)?,
+            transmit: Transmit::new(device, compiler, has_shares(scene))?,
             first: First::new(device, compiler)?,
             sort: Sort::new(device, compiler, n_particles)?,
             sprites: Sprites::new(device, compiler, format, lit)?,
@@ -89,9 +90,11 @@ impl Renderer {
             settings: Settings {
                 n_particles,
                 n_lights: scene.lights.len() as u32,
+                n_surfaces: scene.surfaces.len() as u32,
                 heaviest: heaviest_blob(&groups),
                 step_cells: scene.lighting.step,
-                forward: scene.lighting.forward,
+                // Without particles there is nothing to march through.
+                forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
                 sort_bits: scene.draw.sort_bits,
                 cutoff: scene.draw.cutoff,
                 format,
@@ -173,8 +176,8 @@ impl Renderer {
                 facets.record(rec, buffers, &packet.grid, n, 0)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
-                let buffers = [&b.facets, &b.lights, &b.density, &b.transmittance];
-                transmit.record(rec, buffers, &packet.grid, [n, s.n_lights], s.step_cells, s.forward)
+                let buffers = [&b.facets, &b.lights, &b.regions, &b.density, &b.transmittance, &b.shares];
+                transmit.record(rec, buffers, &packet.grid, [n, s.n_lights, s.n_surfaces], s.step_cells, s.forward)
             })?;
             pass(rec, plan, Pass::First, |rec| {
                 let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.lit];

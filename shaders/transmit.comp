@@ -2,50 +2,107 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "each.glsl"
+#include "light.glsl"
+#include "occlude.glsl"
 
-// Transmittance from every facet toward every light through the density grid (docs/model.md §8, §11).
+// How much of every light arrives at every facet, past the surfaces and through the density grid (docs/model.md §8, §11).
 
 layout(local_size_x = 64) in;
 
-layout(push_constant) uniform Push { Grid grid; uint n_facets; uint n_lights; float step_length; float backward; uint max_steps; } push;
+// Whether the area means are wanted, too.
+layout(constant_id = 0) const uint SHARES = 0;
+// Points of a facet along each side, of which its share is the mean.
+const uint SHARE_SIDE = 4;
+
+layout(push_constant) uniform Push { Grid grid; uint n_facets; uint n_lights; uint n_surfaces; float step_length; float backward; uint max_steps; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 2) readonly buffer Density { float density[]; };
+layout(std430, binding = 2) readonly buffer Regions { Region regions[]; };
+layout(std430, binding = 3) readonly buffer Density { float density[]; };
 // [facet][light]
-layout(std430, binding = 3) writeonly buffer Transmittance { float transmittance[]; };
+layout(std430, binding = 4) writeonly buffer Transmittance { float transmittance[]; };
+layout(std430, binding = 5) writeonly buffer Shares { float shares[]; };
 
 #include "density.glsl"
 
-// Distance from p along d to where the ray leaves the grid's box; 0 from outside.
-float exit_distance(vec3 p, vec3 d) {
+// From where to where the way from p along d, so far, leads through the grid's box; the end before the begin where it
+// misses the box.
+vec2 crossing(vec3 p, vec3 d, float distance) {
     vec3 low = push.grid.low;
     vec3 high = low + push.grid.cell * vec3(push.grid.n_cells);
-    if (any(lessThan(p, low)) || any(greaterThan(p, high))) {
-        return 0.0;
-    }
-    float t = 3.4e38;
+    float enter = 0.0, leave = distance;
     for (int axis = 0; axis < 3; ++axis) {
         if (d[axis] != 0.0) {
-            t = min(t, ((d[axis] > 0.0 ? high[axis] : low[axis]) - p[axis]) / d[axis]);
+            float a = (low[axis] - p[axis]) / d[axis], b = (high[axis] - p[axis]) / d[axis];
+            enter = max(enter, min(a, b));
+            leave = min(leave, max(a, b));
+        } else if (p[axis] < low[axis] || p[axis] > high[axis]) {
+            leave = -1.0;
         }
     }
-    return max(t, 0.0);
+    return vec2(enter, leave);
+}
+
+// Whether no surface but the facet's own hides the light from p.
+bool is_clear(vec3 p, Light light, uint i_own) {
+    for (uint i = 0; i < push.n_surfaces; ++i) {
+        Region r = regions[i];
+        if (i != i_own && (light.kind == LIGHT_POINT ? hides(r, p, light.position) : shades(r, p, light.toward))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+// The share of the facet's 4 x 4 parts whose middles the light reaches; of a cloud's facet all or nothing.
+float clear_share(Facet facet, Light light, bool is_center_clear) {
+    if (facet.i_region >= push.n_surfaces) {
+        return is_center_clear ? 1.0 : 0.0;
+    }
+    Region r = regions[facet.i_region];
+    vec3 u = r.u / float(r.n_u), v = r.v / float(r.n_v);
+    uint n_clear = 0;
+    for (uint i = 0; i < SHARE_SIDE * SHARE_SIDE; ++i) {
+        vec2 at = (vec2(i % SHARE_SIDE, i / SHARE_SIDE) + 0.5) * (2.0 / float(SHARE_SIDE)) - 1.0;
+        n_clear += is_clear(facet.position + at.x * u + at.y * v, light, facet.i_region) ? 1u : 0u;
+    }
+    return float(n_clear) * (1.0 / float(SHARE_SIDE * SHARE_SIDE));
+}
+
+// e^-(1-g)tau from p to the light.
+float through_the_cloud(vec3 p, Arrival way) {
+    vec3 d = way.toward;
+    vec2 part = crossing(p, d, way.distance);
+    float length_total = part.y - part.x;
+    // Where no light is lost there is nothing to march for, nor where the way misses the box.
+    bool is_marched = push.backward > 0.0 && length_total > 0.0;
+    uint n = is_marched ? clamp(uint(ceil(length_total / push.step_length)), 1u, push.max_steps) : 0u;
+    float tau = 0.0;
+    for (uint j = 0; j < n; ++j) {
+        float t0 = float(j) * push.step_length;
+        float ds = min(push.step_length, length_total - t0);
+        tau += density_at(p + (part.x + (t0 + 0.5 * ds)) * d) * ds;
+    }
+    // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing.
+    float depth = push.backward * tau;
+    return depth > 0.0 ? exp(-depth) : 1.0;
 }
 
 void main() {
     FOR_EACH(k, push.n_facets * push.n_lights) {
-        vec3 p = facets[k / push.n_lights].position;
-        vec3 d = lights[k % push.n_lights].toward;
-        float length_total = exit_distance(p, d);
-        uint n = clamp(uint(ceil(length_total / push.step_length)), 1u, push.max_steps);
-        float tau = 0.0;
-        for (uint j = 0; j < n; ++j) {
-            float t0 = float(j) * push.step_length;
-            float ds = min(push.step_length, length_total - t0);
-            tau += density_at(p + (t0 + 0.5 * ds) * d) * ds;
+        Facet facet = facets[k / push.n_lights];
+        Light light = lights[k % push.n_lights];
+        // What a light without energy brings is multiplied by 0 anyway.
+        bool is_on = any(notEqual(light.energy, vec3(0.0)));
+        bool is_center_clear = is_on && is_clear(facet.position, light, facet.i_region);
+        float share = SHARES != 0 && is_on ? clear_share(facet, light, is_center_clear) : 0.0;
+        float through = 0.0;
+        if (is_center_clear || share > 0.0) {
+            through = through_the_cloud(facet.position, arrival_at(light, facet.position));
         }
-        // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing.
-        float depth = push.backward * tau;
-        transmittance[k] = depth > 0.0 ? exp(-depth) : 1.0;
+        transmittance[k] = is_center_clear ? through : 0.0;
+        if (SHARES != 0) {
+            shares[k] = share * through;
+        }
     }
 }

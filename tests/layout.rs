@@ -8,8 +8,8 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
-use nimbus::layout::facet::{FacetRecord, LitRecord};
-use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_SKY, LightRecord};
+use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_SURFACE, RegionRecord};
+use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
@@ -18,7 +18,7 @@ use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 10] = [
+const RECORDS: [Record; 11] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
@@ -26,6 +26,7 @@ const RECORDS: [Record; 10] = [
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
+    ("Region", RegionRecord::FIELDS, size_of::<RegionRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
@@ -35,7 +36,7 @@ const RECORDS: [Record; 10] = [
 /// the bytes of a plain element.
 const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
-    ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
+    ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), R("Lit")]),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
@@ -46,7 +47,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
-    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), B(4), B(4)]),
+    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(4)]),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -170,13 +171,17 @@ fn records_glsl() -> &'static str {
     text_of("include/records.glsl")
 }
 
-/// The number of `const uint NAME = …;` or `const float NAME = …;`.
+/// The number of `const uint NAME = …;` (decimal, or 0x…u) or `const float NAME = …;`.
 fn constant(text: &str, name: &str) -> Option<f64> {
     let line = text.lines().find_map(|l| {
         let rest = l.trim().strip_prefix("const ")?;
         rest.split_once(' ')?.1.strip_prefix(name)?.strip_prefix(" = ")
     })?;
-    line.split(';').next()?.parse().ok()
+    let number = line.split(';').next()?;
+    match number.strip_prefix("0x").and_then(|n| n.strip_suffix('u')) {
+        Some(digits) => u32::from_str_radix(digits, 16).ok().map(f64::from),
+        None => number.parse().ok(),
+    }
 }
 
 #[test]
@@ -187,6 +192,10 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "FORM_GIVEN", f64::from(FORM_GIVEN)),
         ("include/records.glsl", "LIGHT_DIRECTIONAL", f64::from(LIGHT_DIRECTIONAL)),
         ("include/records.glsl", "LIGHT_SKY", f64::from(LIGHT_SKY)),
+        ("include/records.glsl", "LIGHT_POINT", f64::from(LIGHT_POINT)),
+        ("include/records.glsl", "REGION_SURFACE", f64::from(REGION_SURFACE)),
+        ("include/records.glsl", "REGION_CLOUD", f64::from(REGION_CLOUD)),
+        ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("facets.comp", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
@@ -197,9 +206,13 @@ fn shared_constants_have_one_value() {
     for (file, name, host) in shared {
         assert_eq!(constant(text_of(file), name), Some(host), "{file}: {name}");
     }
-    // Every FORM_ and LIGHT_ is in the list above.
+    // Every constant beside the records is in the list above.
     let n = records_glsl().lines().filter(|l| l.starts_with("const uint ")).count();
     assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
+    let in_plane = constant(text_of("include/occlude.glsl"), "IN_PLANE");
+    assert_eq!(in_plane, Some(nimbus::reference::occlude::IN_PLANE));
+    let share_side = constant(text_of("transmit.comp"), "SHARE_SIDE");
+    assert_eq!(share_side, Some(f64::from(nimbus::reference::transmit::SHARE_SIDE)));
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
     assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
     // The host's TILE is private to its pass: both stand in the text.
@@ -215,6 +228,7 @@ fn shared_constants_have_one_value() {
     // The checker sees what is not there, and what differs.
     assert_eq!(constant("const uint TILE = 7;", "TIL"), None);
     assert_eq!(constant("const uint TILE = 7;", "TILE"), Some(7.0));
+    assert_eq!(constant("const uint MANY = 0xFFu;", "MANY"), Some(255.0));
 }
 
 #[test]
@@ -234,8 +248,8 @@ fn wrong_declarations_are_reported() {
             "first.comp",
             "include/records.glsl",
             "struct Lit {",
-            "vec4 irradiance; vec4 radiance",
-            "vec4 radiance; vec4 irradiance",
+            "vec3 direct; float n_unresolved; vec3 indirect;",
+            "vec3 indirect; float n_unresolved; vec3 direct;",
         ),
         (
             "transmit.comp",

@@ -70,7 +70,7 @@ fn scene(gust: Gust) -> Scene {
         let cloud = &clouds[g.i_cloud];
         let n_modes = cloud.gust.modes(cloud.seed).len() as u32;
         let modes = (g.i_cloud as u32 * n_modes, n_modes);
-        GroupRecord::new(g, cloud.origin_at(TIME_S) - ORIGIN, cloud.center(), DVec3::ONE, modes)
+        GroupRecord::new(g, g.i_cloud as u32, cloud.origin_at(TIME_S) - ORIGIN, cloud.center(), modes)
     };
     let records = groups.iter().map(record).collect();
     let offsets = offsets(&groups, &clouds, TIME_S, ORIGIN);

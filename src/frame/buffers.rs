@@ -8,7 +8,7 @@ use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, Partic
 use crate::layout::second::SourceRecord;
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
-use crate::model::scene::Scene;
+use crate::model::scene::{LightingMode, Scene};
 
 use super::limits::n_cells_max;
 
@@ -34,6 +34,8 @@ pub struct Buffers {
     /// Written by the host every frame.
     pub lights: Buffer,
     pub transmittance: Buffer,
+    /// Its mean over each facet; empty where nothing asks for it.
+    pub shares: Buffer,
     pub lit: Buffer,
     /// Region of each facet of a surface.
     pub i_region: Buffer,
@@ -52,6 +54,7 @@ impl Buffers {
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
+        let n_shares = if has_shares(scene) { n_facets * n_lights } else { 0 };
         let placed_upload = match host_places {
             true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
             false => None,
@@ -74,6 +77,7 @@ impl Buffers {
             table: Buffer::new::<f32>(device, "first.table", (scene.materials.len() * N_NODES) as u64, Place::Upload)?,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_facets, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_facets * n_lights, Place::Device)?,
+            shares: Buffer::new::<f32>(device, "transmit.shares", n_shares, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
         })
@@ -94,6 +98,11 @@ impl Buffers {
         })?;
         upload(device, commands, &given_particles(scene, groups), &self.particles)
     }
+}
+
+/// Whether the transmittance's area means are wanted: the second reflection's emitters are areas.
+pub fn has_shares(scene: &Scene) -> bool {
+    scene.lighting.mode == LightingMode::TwoReflection
 }
 
 /// A record a group, in order.

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
 use crate::gpu::memory::storage_bytes;
-use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::cloud::Group;
@@ -31,9 +31,11 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
         ("the particles' places, as uploaded", n, size(size_of::<PlacedRecord>())),
         ("the particles' groups", n, 4),
         ("the particles' generation status", n, 4),
-        ("the facets", n, size(size_of::<FacetRecord>())),
-        ("the facets' light", n, size(size_of::<LitRecord>())),
-        ("the transmittances", n * scene.lights.len() as u64, 4),
+        ("the facets", scene.n_facets(), size(size_of::<FacetRecord>())),
+        ("the facets' light", scene.n_facets(), size(size_of::<LitRecord>())),
+        ("the transmittances", scene.n_facets() * scene.lights.len() as u64, 4),
+        ("the transmittances' means", scene.n_facets() * scene.lights.len() as u64, 4),
+        ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),

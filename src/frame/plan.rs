@@ -2,6 +2,8 @@
 //! is left out only where all that it reads is what it read the last time, to the bit.
 
 use super::packet::Packet;
+use crate::layout::facet::RegionRecord;
+use crate::layout::frame::LightRecord;
 
 /// The passes in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,8 +80,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
     let same_grid = still && same(&|a, b| a.grid == b.grid);
     let same_facets = same_grid && same(&|a, b| a.groups == b.groups);
-    let same_rays =
-        same_facets && same(&|a, b| a.lights.iter().map(|l| l.toward).eq(b.lights.iter().map(|l| l.toward)));
+    let same_rays = same_facets && same(&|a, b| has_same_rays(a, b));
     let same_light = same_facets && same(&|a, b| a.lights == b.lights && a.regions == b.regions);
     let same_order = still && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
@@ -116,6 +117,14 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     Plan(decisions)
 }
 
+/// Whether the ways from the facets to the lights, and what hides them, are the same; a light without energy has none.
+fn has_same_rays(a: &Packet, b: &Packet) -> bool {
+    let way = |l: &LightRecord| (l.toward, l.position, l.kind, l.energy != [0.0; 3]);
+    let rectangle = |r: &RegionRecord| (r.kind, r.center, r.u, r.v, r.normal, r.n_u, r.n_v);
+    a.lights.iter().map(way).eq(b.lights.iter().map(way))
+        && a.regions.iter().map(rectangle).eq(b.regions.iter().map(rectangle))
+}
+
 const RUN: Decision = Decision { run: true, reason: "needed" };
 
 fn skip(reason: &'static str) -> Decision {
@@ -125,8 +134,7 @@ fn skip(reason: &'static str) -> Decision {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::facet::RegionRecord;
-    use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+    use crate::layout::frame::{CameraRecord, GridRecord};
     use crate::layout::particle::{GroupRecord, ModeRecord};
     use std::time::Instant;
 
@@ -143,7 +151,7 @@ mod tests {
             modes: vec![],
             placed: None,
             regions: vec![RegionRecord::default()],
-            lights: vec![LightRecord::default()],
+            lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
             grid: GridRecord::default(),
             radius: 1.0,
         }
@@ -173,7 +181,17 @@ mod tests {
         assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
         assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
         assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
-        assert_eq!(after(&|p| p.lights[0].toward[1] = 1.0), ["transmit", "first", "sprites"]);
+        assert_eq!(after(&|p| p.regions[0].kd[1] = 0.5), ["first", "sprites"]);
+        let of_rays: [&dyn Fn(&mut Packet); 5] = [
+            &|p| p.lights[0].toward[1] = 1.0,
+            &|p| p.lights[0].position[1] = 1.0,
+            &|p| p.lights[0].energy = [0.0; 3],
+            &|p| p.regions[0].center[0] = 1.0,
+            &|p| p.regions[0].u[2] = 1.0,
+        ];
+        for change in of_rays {
+            assert_eq!(after(change), ["transmit", "first", "sprites"]);
+        }
         let all_but_generate = ["place", "grid", "facets", "transmit", "first", "sort", "sprites"];
         assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
         let gust = |p: &mut Packet| p.modes.push(ModeRecord::default());

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::buffers::{Buffers, download};
+use super::buffers::{Buffers, download, has_shares};
 use super::exchange::Exchange;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
@@ -53,6 +53,7 @@ struct Settings {
     n_lights: u32,
     pairs: Pairs,
     theta: f64,
+    n_surfaces: u32,
     heaviest: f64,
     step_cells: f64,
     forward: f64,
@@ -91,7 +92,7 @@ impl Renderer {
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler)?,
-            transmit: Transmit::new(device, compiler)?,
+            transmit: Transmit::new(device, compiler, has_shares(scene))?,
             first: First::new(device, compiler)?,
             second,
             sort: Sort::new(device, compiler, n_particles)?,
@@ -107,9 +108,11 @@ impl Renderer {
                 pairs: scene.lighting.pairs,
                 theta: scene.lighting.theta,
                 n_lights: scene.lights.len() as u32,
+                n_surfaces: scene.surfaces.len() as u32,
                 heaviest: heaviest_blob(&groups),
                 step_cells: scene.lighting.step,
-                forward: scene.lighting.forward,
+                // Without particles there is nothing to march through.
+                forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
                 sort_bits: scene.draw.sort_bits,
                 cutoff: scene.draw.cutoff,
                 format,
@@ -196,8 +199,8 @@ impl Renderer {
                 facets.record_surfaces(rec, [&b.regions, &b.i_region, &b.facets], s.n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
-                let buffers = [&b.facets, &b.lights, &b.density, &b.transmittance];
-                transmit.record(rec, buffers, &packet.grid, [s.n_facets, s.n_lights], s.step_cells, s.forward)
+                let buffers = [&b.facets, &b.lights, &b.regions, &b.density, &b.transmittance, &b.shares];
+                transmit.record(rec, buffers, &packet.grid, [s.n_facets, s.n_lights, s.n_surfaces], s.step_cells, s.forward)
             })?;
             pass(rec, plan, Pass::First, |rec| {
                 let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &b.lit];
@@ -282,7 +285,7 @@ impl SecondStage {
     fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
         let x = &self.exchange;
         let push = SourcesPush { n_facets: s.n_facets, n_lights: s.n_lights };
-        let buffers = [&b.facets, &b.lights, &b.transmittance, &b.regions, &x.order, &x.leaves, &b.sources, &b.fluxes];
+        let buffers = [&b.facets, &b.lights, &b.shares, &b.regions, &x.order, &x.leaves, &b.sources, &b.fluxes];
         self.second.record_sources(rec, buffers, &push)?;
         for receivers in [Receivers::Diffuse, Receivers::Glossy] {
             let (i_first_block, n_blocks) = x.blocks_of(receivers);

@@ -32,6 +32,14 @@ pub struct Arrival {
 }
 
 impl Light {
+    /// The light as it is seen from `origin`: facets' positions are relative to O.
+    pub fn relative_to(mut self, origin: DVec3) -> Light {
+        if let Light::Point { position, .. } | Light::Spot { position, .. } = &mut self {
+            *position -= origin;
+        }
+        self
+    }
+
     pub fn arrival(&self, p: DVec3) -> Arrival {
         match *self {
             Light::Directional { direction, .. } => {

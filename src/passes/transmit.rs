@@ -1,8 +1,10 @@
 //! transmit: how much of each light arrives at each facet.
 //!
-//! In: facets, lights, density grid. Out: transmittance [facet][light]. Law: e^{−(1−g)τ}, τ by the midpoint rule along
-//! the grid. Source: docs/model.md §8, §11. Error: against the same march in f64, (1−g)τ times the samples' relative
-//! rounding plus 3 + 2|x| ulp of exp; against the closed form, the grid's.
+//! In: facets, lights, regions (rectangles), density grid. Out: transmittance [facet][light], and where it is asked for
+//! its area mean (shares). Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
+//! docs/model.md §8, §11. Error: against the same march in f64, (1−g)τ times the samples' relative rounding plus
+//! 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few ulp may be hidden
+//! or not.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -14,6 +16,7 @@ record! {
         grid: GridRecord,
         n_facets: u32,
         n_lights: u32,
+        n_surfaces: u32,
         step_length: f32,
         backward: f32,
         max_steps: u32,
@@ -29,24 +32,27 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    pub fn new(device: &Device, compiler: &Compiler) -> Result<Transmit> {
-        Ok(Transmit { kernel: Kernel::new(device, compiler, "transmit", Push::FIELDS, &[])? })
+    /// `shares`: the area means are written, too.
+    pub fn new(device: &Device, compiler: &Compiler, shares: bool) -> Result<Transmit> {
+        let constants = [(0, u32::from(shares))];
+        Ok(Transmit { kernel: Kernel::new(device, compiler, "transmit", Push::FIELDS, &constants)? })
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `density`: f32; `transmittance`: f32. `step_cells` is the step in
-    /// cells, `forward` is g.
+    /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord, the surfaces' first; `density`: f32;
+    /// `transmittance` and `shares`: f32, the latter empty where it was not asked for. `step_cells` is the step in
+    /// cells, `forward` is g: where it is 1, nothing is marched.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        [facets, lights, density, transmittance]: [&Buffer; 4],
+        buffers: [&Buffer; 6],
         grid: &GridRecord,
-        [n_facets, n_lights]: [u32; 2],
+        [n_facets, n_lights, n_surfaces]: [u32; 3],
         step_cells: f64,
         forward: f64,
     ) -> Result<()> {
         let step_length = (step_cells * f64::from(grid.cell)) as f32;
         let backward = (1.0 - forward) as f32;
-        let push = Push { grid: *grid, n_facets, n_lights, step_length, backward, max_steps: MAX_STEPS };
-        rec.dispatch(&self.kernel, &[facets, lights, density, transmittance], &push, n_facets * n_lights)
+        let push = Push { grid: *grid, n_facets, n_lights, n_surfaces, step_length, backward, max_steps: MAX_STEPS };
+        rec.dispatch(&self.kernel, &buffers, &push, n_facets * n_lights)
     }
 }

@@ -1,5 +1,5 @@
 //! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first".
-//! In: normals, transmittance [facet × light]. Out: irradiance (W m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
+//! In: positions and normals, transmittance [facet × light], lights relative to O. Out: irradiance (W m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
 
 use std::f64::consts::PI;
 
@@ -8,15 +8,15 @@ use glam::DVec3;
 use crate::model::light::Light;
 
 /// I_d,j = Σ_l E_l f_l(n_j, V(j, l)).
-pub fn irradiance(normals: &[DVec3], transmittance: &[f64], lights: &[Light]) -> Vec<DVec3> {
-    let at = |(j, &n): (usize, &DVec3)| {
+pub fn irradiance(positions: &[DVec3], normals: &[DVec3], transmittance: &[f64], lights: &[Light]) -> Vec<DVec3> {
+    let at = |(j, (&p, &n)): (usize, (&DVec3, &DVec3))| {
         let of = &transmittance[j * lights.len()..][..lights.len()];
-        lights.iter().zip(of).map(|(light, &v)| light.energy() * light.share(n, &light.arrival(DVec3::ZERO), v)).sum()
+        lights.iter().zip(of).map(|(light, &v)| light.energy() * light.share(n, &light.arrival(p), v)).sum()
     };
-    normals.iter().enumerate().map(at).collect()
+    positions.iter().zip(normals).enumerate().map(at).collect()
 }
 
-/// L1_j = K_d c_j I_d,j/π: `kd` by region, `colors` by particle (1 for boxes).
+/// L1_j = K_d c_j I_d,j/π: `kd` by region, `colors` by facet (1 for boxes and surfaces).
 pub fn radiance(irradiance: &[DVec3], regions: &[u32], kd: &[DVec3], colors: &[DVec3]) -> Vec<DVec3> {
     let of = |((&e, &region), &color): ((&DVec3, &u32), &DVec3)| kd[region as usize] * color * e / PI;
     irradiance.iter().zip(regions).zip(colors).map(of).collect()
@@ -29,7 +29,7 @@ mod tests {
     const SUN: Light = Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) };
 
     fn lit(light: Light, normal: DVec3, transmittance: f64) -> DVec3 {
-        let e = irradiance(&[normal], &[transmittance], &[light]);
+        let e = irradiance(&[DVec3::ZERO], &[normal], &[transmittance], &[light]);
         radiance(&e, &[0], &[DVec3::ONE], &[DVec3::ONE])[0]
     }
 
@@ -53,10 +53,21 @@ mod tests {
     #[test]
     fn lights_add_and_regions_and_colors_choose_the_albedo() {
         let sky = Light::Sky { irradiance: DVec3::splat(PI), constant: 0.0 };
-        let e = irradiance(&[DVec3::Y, DVec3::NEG_Y], &[1.0, 0.5, 1.0, 1.0], &[SUN, sky]);
+        let e = irradiance(&[DVec3::ZERO; 2], &[DVec3::Y, DVec3::NEG_Y], &[1.0, 0.5, 1.0, 1.0], &[SUN, sky]);
         assert_eq!(e, [DVec3::splat(1.5 * PI), DVec3::ZERO]);
         let kd = [DVec3::ZERO, DVec3::new(1.0, 0.5, 0.0)];
         let l = radiance(&e, &[1, 0], &kd, &[DVec3::new(1.0, 0.5, 1.0), DVec3::ONE]);
         assert!((l[0] - DVec3::new(1.5, 0.375, 0.0)).length() < 1e-15 && l[1] == DVec3::ZERO);
+    }
+    #[test]
+    fn a_point_light_is_as_near_as_the_facet_has_it() {
+        let light = Light::Point { position: DVec3::new(0.0, 3.0, 0.0), intensity: DVec3::splat(PI), radius: 1e-3 };
+        // 2 above the first facet, and 5 from the second, 3 up and 4 aside: I/d² · 3/5.
+        let positions = [DVec3::Y, DVec3::new(4.0, 0.0, 0.0)];
+        let e = irradiance(&positions, &[DVec3::Y; 2], &[0.5, 1.0], &[light]);
+        assert_eq!(e[0], DVec3::splat(PI / 8.0));
+        assert!((e[1] - DVec3::splat(PI / 25.0 * 0.6)).length() < 1e-15);
+        let apart = light.relative_to(DVec3::Y);
+        assert_eq!(irradiance(&[DVec3::ZERO], &[DVec3::Y], &[0.5], &[apart])[0], e[0]);
     }
 }

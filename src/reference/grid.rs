@@ -230,7 +230,7 @@ mod tests {
             let blob = Blob { position: DVec3::ZERO, sigma, kappa };
             let cells = deposit(&spec, &[blob]);
             let start = DVec3::X * spec.low.x;
-            let tau = transmit::optical_depth(&spec, &cells, start, DVec3::X, 0.5);
+            let tau = transmit::optical_depth(&spec, &cells, start, DVec3::X, f64::INFINITY, 0.5);
             // What the cut gives to the rest is no error of h: model.md's 0.54 %, on the two axes across the line.
             let kept = erf(3.0 / 2f64.sqrt());
             // The whole line: what its own axis cuts off is within the grid too.

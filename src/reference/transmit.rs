@@ -1,9 +1,11 @@
-//! Transmittance from every facet toward every light through the density grid, model.md §8 and §11 "transmit".
-//! In: the grid, positions relative to O. Out: [facet × light], light fastest; dimensionless.
+//! How much of every light arrives at every facet: past the surfaces and through the density grid, model.md §8 and §11
+//! "transmit". In: grid, rectangles, facets and lights, all relative to O. Out: [facet × light], light fastest;
+//! dimensionless.
 
 use glam::DVec3;
 
 use super::grid::sample;
+use super::occlude::{Rectangle, is_clear};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 
@@ -11,20 +13,44 @@ use crate::model::light::Light;
 /// A march that would need more ends after this many.
 pub const MAX_STEPS: u32 = 4096;
 
-/// Distance from `p` along unit `d` to where the ray leaves the grid's box; 0 where `p` is not inside.
-pub fn exit_distance(spec: &GridSpec, p: DVec3, d: DVec3) -> f64 {
+/// Points of a facet along each side, of which its share is the mean.
+pub const SHARE_SIDE: u32 = 4;
+
+/// What light can meet on its way, and how it is marched through.
+#[derive(Debug, Clone, Copy)]
+pub struct Obstacles<'a> {
+    pub spec: &'a GridSpec,
+    pub cells: &'a [f64],
+    /// Of the surfaces, which are the first regions.
+    pub rectangles: &'a [Rectangle],
+    /// In cells.
+    pub step: f64,
+    /// g.
+    pub forward: f64,
+}
+
+/// Where light arrives: a facet's centre, and its region.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Receiver {
+    pub position: DVec3,
+    pub i_region: u32,
+}
+
+/// From where to where the way from `p` along unit `d`, `distance` long, leads through the grid's box, faces included;
+/// `None` where it misses the box.
+pub fn crossing(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64) -> Option<(f64, f64)> {
     let (low, high) = (spec.low, spec.high());
-    if !(p.cmpge(low).all() && p.cmple(high).all()) {
-        return 0.0;
+    let (mut enter, mut leave) = (0f64, distance);
+    for i in 0..3 {
+        if d[i] != 0.0 {
+            let (a, b) = ((low[i] - p[i]) / d[i], (high[i] - p[i]) / d[i]);
+            (enter, leave) = (enter.max(a.min(b)), leave.min(a.max(b)));
+        } else if !(low[i]..=high[i]).contains(&p[i]) {
+            return None;
+        }
     }
-    let along = |i: usize| match d[i] {
-        v if v > 0.0 => (high[i] - p[i]) / v,
-        v if v < 0.0 => (low[i] - p[i]) / v,
-        _ => f64::INFINITY,
-    };
-    let length = along(0).min(along(1)).min(along(2));
     // Without a direction there is no way to go.
-    if length.is_finite() { length } else { 0.0 }
+    (enter <= leave && leave.is_finite()).then_some((enter, leave))
 }
 
 /// Number of march steps over `length`, the last one shorter; `step` is in cells.
@@ -33,35 +59,66 @@ pub fn n_steps(spec: &GridSpec, length: f64, step: f64) -> u32 {
     ((length / (step * spec.cell)).ceil() as u32).clamp(1, MAX_STEPS)
 }
 
-/// τ = Σ ρ(x_k) s_k from `p` toward unit `d`: steps of `step` cells, the last one shorter, so that τ is continuous in
-/// the length; x_k is the middle of step k.
-pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, step: f64) -> f64 {
-    let length = exit_distance(spec, p, d);
+/// τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`: steps of `step` cells from where the way enters the grid's
+/// box, the last one shorter, so that τ is continuous in the length; x_k is the middle of step k.
+pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, distance: f64, step: f64) -> f64 {
+    let Some((enter, leave)) = crossing(spec, p, d, distance) else { return 0.0 };
+    let length = leave - enter;
     let of_step = |k: u32| {
         let from = f64::from(k) * step * spec.cell;
         let s = (step * spec.cell).min(length - from);
-        sample(spec, cells, p + (from + 0.5 * s) * d) * s
+        sample(spec, cells, p + (enter + (from + 0.5 * s)) * d) * s
     };
     (0..n_steps(spec, length, step)).map(of_step).sum()
 }
 
-/// τ of every facet toward every light.
-pub fn optical_depths(spec: &GridSpec, cells: &[f64], positions: &[DVec3], lights: &[Light], step: f64) -> Vec<f64> {
-    let toward_all = |&p: &DVec3| lights.iter().map(move |l| optical_depth(spec, cells, p, l.arrival(p).toward, step));
-    positions.iter().flat_map(toward_all).collect()
+impl Obstacles<'_> {
+    /// e^{−(1−g)τ} on the way from `p` to the light.
+    pub fn through_the_cloud(&self, p: DVec3, light: &Light) -> f64 {
+        let way = light.arrival(p);
+        let tau = optical_depth(self.spec, self.cells, p, way.toward, way.distance, self.step);
+        (-(1.0 - self.forward) * tau).exp()
+    }
+
+    fn is_clear(&self, receiver: &Receiver, p: DVec3, light: &Light) -> bool {
+        is_clear(self.rectangles, receiver.i_region, p, light)
+    }
+
+    /// V = [nothing hides the way] e^{−(1−g)τ} of every facet toward every light; 0 toward lights without energy.
+    pub fn transmittance(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
+        let one = |r: &Receiver, light: &Light| {
+            let is_lit = light.energy() != DVec3::ZERO && self.is_clear(r, r.position, light);
+            if is_lit { self.through_the_cloud(r.position, light) } else { 0.0 }
+        };
+        receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
+    }
+
+    /// The area mean of V: a surface's facet by 4 × 4 points that may be hidden, each behind as much cloud as the centre;
+    /// of cloud facets V itself.
+    pub fn shares(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
+        let one = |r: &Receiver, light: &Light| {
+            if light.energy() == DVec3::ZERO {
+                return 0.0;
+            }
+            let clear = match self.rectangles.get(r.i_region as usize) {
+                Some(rectangle) => {
+                    let points = share_points(r.position, rectangle.facet);
+                    let n = points.iter().filter(|p| self.is_clear(r, **p, light)).count();
+                    n as f64 / points.len() as f64
+                }
+                None => f64::from(u8::from(self.is_clear(r, r.position, light))),
+            };
+            clear * self.through_the_cloud(r.position, light)
+        };
+        receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
+    }
 }
 
-/// V = e^{−(1−g)τ}, g = `forward`, of every facet toward every light.
-pub fn transmittance(
-    spec: &GridSpec,
-    cells: &[f64],
-    positions: &[DVec3],
-    lights: &[Light],
-    forward: f64,
-    step: f64,
-) -> Vec<f64> {
-    let tau = optical_depths(spec, cells, positions, lights, step);
-    tau.iter().map(|tau| (-(1.0 - forward) * tau).exp()).collect()
+/// The middles of the 4 × 4 parts of the facet at `center` with half axes (u, v).
+pub fn share_points(center: DVec3, (u, v): (DVec3, DVec3)) -> Vec<DVec3> {
+    let n = SHARE_SIDE;
+    let at = |i: u32| f64::from(2 * i + 1) / f64::from(n) - 1.0;
+    (0..n * n).map(|i| center + at(i % n) * u + at(i / n) * v).collect()
 }
 
 #[cfg(test)]
@@ -73,13 +130,18 @@ mod tests {
     const SPEC: GridSpec = GridSpec { n_cells: UVec3::new(8, 4, 4), cell: 0.5, low: DVec3::ZERO };
     const SUN: Light = Light::Directional { direction: DVec3::NEG_X, irradiance: DVec3::ONE };
 
+    fn transmittance(cells: &[f64], positions: &[DVec3], light: Light, forward: f64) -> Vec<f64> {
+        let receivers: Vec<_> = positions.iter().map(|&position| Receiver { position, i_region: 0 }).collect();
+        Obstacles { spec: &SPEC, cells, rectangles: &[], step: 0.5, forward }.transmittance(&receivers, &[light])
+    }
+
     #[test]
     fn through_a_uniform_block_transmittance_is_an_exponential() {
         let cells = vec![1.5; 128];
         let p = DVec3::new(0.25, 1.0, 1.0);
         // From the first cell's centre to the last one's: L = 3.5; the half cell beyond lies outside the hull
         // of the centres and holds nothing. Midpoints of half cells meet every face exactly.
-        let v = |forward| transmittance(&SPEC, &cells, &[p], &[SUN], forward, 0.5)[0];
+        let v = |forward| transmittance(&cells, &[p], SUN, forward)[0];
         for forward in [0.0, 0.85] {
             assert!((v(forward) / (-(1.0 - forward) * 1.5 * 3.5f64).exp() - 1.0).abs() < 1e-14);
         }
@@ -87,21 +149,68 @@ mod tests {
     }
 
     #[test]
-    fn rays_that_leave_at_once_or_start_outside_meet_nothing() {
+    fn rays_that_leave_at_once_or_miss_the_box_meet_nothing() {
         let cells = vec![1.5; 128];
-        let leaving = [DVec3::new(4.0, 1.0, 1.0), DVec3::new(4.1, 1.0, 1.0), DVec3::new(-1.0, 1.0, 1.0)];
-        assert_eq!(transmittance(&SPEC, &cells, &leaving, &[SUN], 0.0, 0.5), [1.0; 3]);
-        assert_eq!(exit_distance(&SPEC, DVec3::ONE, DVec3::ZERO), 0.0);
+        let leaving = [DVec3::new(4.0, 1.0, 1.0), DVec3::new(4.1, 1.0, 1.0), DVec3::new(-1.0, 2.1, 1.0)];
+        assert_eq!(transmittance(&cells, &leaving, SUN, 0.0), [1.0; 3]);
+        assert_eq!(crossing(&SPEC, DVec3::ONE, DVec3::ZERO, f64::INFINITY), None);
+        // Along a face it is inside, beyond its corner it is not.
+        assert_eq!(crossing(&SPEC, DVec3::ZERO, DVec3::X, f64::INFINITY), Some((0.0, 4.0)));
+        assert_eq!(crossing(&SPEC, DVec3::new(-1.0, 3.5, 1.0), DVec3::new(0.6, -0.8, 0.0), 9.0), Some((1.875, 4.375)));
+        assert_eq!(crossing(&SPEC, DVec3::new(-1.0, 1.0, 1.0), DVec3::X, 0.9), None);
+    }
+
+    #[test]
+    fn ways_begin_outside_and_end_at_lamps() {
+        let cells = vec![1.0; 128];
+        let lamp = |x: f64| {
+            let position = DVec3::new(x, 1.0, 1.0);
+            Light::Point { position, intensity: DVec3::ONE, radius: 1e-3 }
+        };
+        let v = |from: f64, light: Light| transmittance(&cells, &[DVec3::new(from, 1.0, 1.0)], light, 0.0)[0];
+        // From the hull of the centres at ¼ on: to a lamp at 3, and back; to a lamp before the box; through all of it.
+        assert!((v(-2.0, lamp(3.0)) / (-2.75f64).exp() - 1.0).abs() < 1e-14);
+        assert!((v(3.0, lamp(-2.0)) / (-2.75f64).exp() - 1.0).abs() < 1e-14);
+        assert!((v(1.0, lamp(3.0)) / (-2.0f64).exp() - 1.0).abs() < 1e-14);
+        assert_eq!((v(-2.0, lamp(-0.5)), v(-2.0, lamp(-2.0))), (1.0, 1.0));
+        assert!((v(-2.0, SUN) / (-3.5f64).exp() - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn rectangles_hide_and_shares_are_means() {
+        use crate::model::surface::Surface;
+        let surface =
+            |center, subdivide| Surface { center, u: 2.0 * DVec3::Z, v: 2.0 * DVec3::X, i_material: 0, subdivide };
+        // A floor of one facet, and above it a lid over x −3…1, z −2…2.
+        let floor = Rectangle::new(&surface(DVec3::NEG_Y, [1, 1]), DVec3::ZERO);
+        let lid = Rectangle::new(&surface(DVec3::new(-1.0, 5.0, 0.0), [2, 2]), DVec3::ZERO);
+        let (cells, rectangles) = (vec![1.0; 128], [floor, lid]);
+        let all = Obstacles { spec: &SPEC, cells: &cells, rectangles: &rectangles, step: 0.5, forward: 0.5 };
+        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+        let dark = Light::Sky { irradiance: DVec3::ZERO, constant: 0.0 };
+        let at = |x: f64, y: f64, i_region| Receiver { position: DVec3::new(x, y, 1.0), i_region };
+        // On the floor, in the cloud under the lid and beside it, on the lid itself.
+        let receivers = [at(0.0, -1.0, 0), at(0.75, 1.0, 2), at(1.25, 1.0, 2), at(-1.0, 5.0, 1)];
+        let through = (-0.5f64 * 0.75).exp();
+        assert_eq!(all.transmittance(&receivers, &[sky]), [0.0, 0.0, through, 1.0]);
+        // The floor's points are at x ±0.5, ±1.5, z 1 ± 0.5, 1 ± 1.5: clear of the lid are the four with x = 1.5 and three
+        // with z = 2.5. The way from its centre passes the cloud's hull by.
+        assert_eq!(all.shares(&receivers, &[sky]), [7.0 / 16.0, 0.0, through, 1.0]);
+        assert_eq!(all.transmittance(&receivers, &[dark]), [0.0; 4]);
+        assert_eq!(all.shares(&receivers, &[dark]), [0.0; 4]);
     }
 
     #[test]
     fn facets_run_slower_than_lights_and_steps_are_counted() {
         let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
         let p = [DVec3::new(0.25, 1.0, 1.0), DVec3::new(2.25, 1.0, 1.0)];
-        let tau = optical_depths(&SPEC, &vec![1.0; 128], &p, &[SUN, sky], 0.5);
+        let receivers = p.map(|position| Receiver { position, i_region: 0 });
+        let all = Obstacles { spec: &SPEC, cells: &[1.0; 128], rectangles: &[], step: 0.5, forward: 0.0 };
         // +x: 3.5 and 1.5; +y: from 1 to the last centre at 1.75. Sums of exact halves and quarters.
-        assert_eq!(tau, [3.5, 0.75, 1.5, 0.75]);
-        assert_eq!(exit_distance(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0)), 0.25 / 0.6);
+        let expected = [3.5f64, 0.75, 1.5, 0.75].map(|tau| (-tau).exp());
+        assert_eq!(all.transmittance(&receivers, &[SUN, sky]), expected);
+        let leave = crossing(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0), f64::INFINITY);
+        assert_eq!(leave, Some((0.0, 0.25 / 0.6)));
         assert_eq!([n_steps(&SPEC, 3.75, 0.5), n_steps(&SPEC, 3.76, 0.5), n_steps(&SPEC, 0.0, 0.5)], [15, 16, 1]);
         assert_eq!(n_steps(&SPEC, 3.75, 1e-9), MAX_STEPS);
     }
@@ -110,7 +219,7 @@ mod tests {
     fn the_last_step_is_shorter_and_the_depth_continuous() {
         // ρ = x between the centres of the first and the last cell: the midpoint rule is exact on whole steps.
         let cells: Vec<f64> = (0..128).map(|i| 0.25 + 0.5 * f64::from(i % 8)).collect();
-        let tau = |x: f64| optical_depth(&SPEC, &cells, DVec3::new(x, 1.0, 1.0), DVec3::X, 1.0);
+        let tau = |x: f64| optical_depth(&SPEC, &cells, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0);
         // By hand, steps of ½ from 2.8: midpoints 3.05, 3.55; the last from 3.8 to 4 is 0.2 long, its midpoint at
         // 3.9 beyond the last centre. From 2.1 the last lies at 3.6…4, its midpoint 3.8 outside too.
         assert!((tau(2.8) - 0.5 * (3.05 + 3.55)).abs() < 1e-14);
@@ -118,10 +227,10 @@ mod tests {
         // Where a ray's length passes a whole number of steps, the step that comes in has length 0. With an empty
         // margin, as a scene's grid has it, the density is continuous too.
         let margin: Vec<f64> = (0..128).map(|i| if i % 8 == 7 { 0.0 } else { cells[i] }).collect();
-        let tau = |x: f64| optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, 1.0);
+        let tau = |x: f64| optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0);
         assert!(tau(2.5) > 0.0 && (tau(2.5 - 1e-9) - tau(2.5 + 1e-9)).abs() < 1e-7);
         // In a grid the march ends after MAX_STEPS.
-        let short = optical_depth(&SPEC, &[1.0; 128], DVec3::ONE, DVec3::X, 1e-4);
+        let short = optical_depth(&SPEC, &[1.0; 128], DVec3::ONE, DVec3::X, f64::INFINITY, 1e-4);
         assert!((short - 4096.0 * 0.5e-4).abs() < 1e-12);
     }
 }

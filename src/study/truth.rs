@@ -5,8 +5,11 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::frame::game::Setting;
 use crate::model::cloud::{CloudSource, Group};
+use crate::model::light::Light;
 use crate::model::scene::{LightingMode, Scene};
 use crate::reference::generate::Generated;
+use crate::reference::occlude::Rectangle;
+use crate::reference::transmit::{Obstacles, Receiver};
 use crate::reference::{self, Blob, facets::Facet};
 
 /// All stages of one frame up to the light on the facets. Positions relative to the lighting origin.
@@ -52,17 +55,27 @@ impl Truth {
         let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
         let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
         let lighting = &scene.lighting;
-        let transmittance = reference::transmit::transmittance(
-            grid,
-            &cells,
-            &positions,
-            &scene.lights,
-            lighting.forward,
-            lighting.step,
-        );
-        self.irradiance = reference::first::irradiance(&normals, &transmittance, &scene.lights);
+        let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(self.setting.light_origin)).collect();
+        let rectangles: Vec<Rectangle> =
+            scene.surfaces.iter().map(|s| Rectangle::new(s, self.setting.light_origin)).collect();
+        let obstacles = Obstacles {
+            spec: grid,
+            cells: &cells,
+            rectangles: &rectangles,
+            step: lighting.step,
+            forward: lighting.forward,
+        };
+        // Surfaces are the first regions.
+        for facet in &mut self.facets {
+            facet.region += scene.surfaces.len() as u32;
+        }
+        let receivers: Vec<Receiver> =
+            self.facets.iter().map(|f| Receiver { position: f.position, i_region: f.region }).collect();
+        let transmittance = obstacles.transmittance(&receivers, &lights);
+        self.irradiance = reference::first::irradiance(&positions, &normals, &transmittance, &lights);
         let kd: Vec<DVec3> =
-            scene.clouds.iter().map(|c| scene.materials[c.i_material].at(self.setting.time_s).kd).collect();
+            (0..scene.n_regions()).map(|i| scene.region_material(i).at(self.setting.time_s).kd).collect();
+        let regions: Vec<u32> = self.facets.iter().map(|f| f.region).collect();
         self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.colors);
     }
 }

@@ -1,6 +1,6 @@
 //! Running error analysis of an f32 evaluation: a number and a bound on how far its f32 evaluation may lie from it, by
 //! what Vulkan promises of each operation (specification, "Precision and Operation of SPIR-V Instructions"): +, −, ×
-//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp 3 + 2|x| ulp. An ulp is at most 2u of
+//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp 3 + 2|x| ulp, inversesqrt 2 ulp. An ulp is at most 2u of
 //! the result, u = 2⁻²⁴; a result below the least normal number may be flushed to zero.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
@@ -64,6 +64,23 @@ impl Bounded {
     /// max(self, 0), which moves errors no further apart.
     pub fn at_least_0(self) -> Bounded {
         Bounded { value: self.value.max(0.0), error: self.error }
+    }
+
+    /// max(self, a), `a` an f32 number.
+    pub fn at_least(self, a: f64) -> Bounded {
+        Bounded { value: self.value.max(a), error: self.error }
+    }
+
+    /// Cut to [0, 1], which moves errors no further apart.
+    pub fn within_0_and_1(self) -> Bounded {
+        Bounded { value: self.value.clamp(0.0, 1.0), error: self.error }
+    }
+
+    /// √self: 1 / inversesqrt, which is 2 ulp and a division.
+    pub fn root(self) -> Bounded {
+        let value = self.value.sqrt();
+        let inherited = value - (self.value - self.error).max(0.0).sqrt();
+        Bounded::rounded(value, inherited, 4.0 + 5.0)
     }
 
     pub fn exp(self) -> Bounded {

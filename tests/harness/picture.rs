@@ -76,10 +76,8 @@ impl Picture {
 
     fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
-            Some(lit) => lit
-                .iter()
-                .map(|l| DVec3::new(l.radiance[0].into(), l.radiance[1].into(), l.radiance[2].into()))
-                .collect(),
+            // Their f32 sum is rounded alike on both sides.
+            Some(lit) => lit.iter().map(|l| double([0, 1, 2].map(|i| l.first[i] + l.second[i]))).collect(),
             None => self.particles.iter().map(|p| double(p.color)).collect(),
         }
     }

@@ -1,0 +1,124 @@
+//! Whether rectangles hide a way as f32 decides it (shaders/include/occlude.glsl): a verdict that holds whatever the
+//! rounding, or none, where an edge or a plane is nearer than the rounding.
+
+use glam::DVec3;
+use nimbus::model::light::Light;
+use nimbus::model::surface::Surface;
+use nimbus::reference::occlude::IN_PLANE;
+
+use crate::bounded::{Bounded, dot};
+use crate::lights::arrival;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    Clear,
+    Hidden,
+    Unsure,
+}
+
+type Point = [Bounded; 3];
+
+/// Vectors that are f32 numbers.
+fn exact(v: DVec3) -> Point {
+    v.to_array().map(Bounded::exact)
+}
+
+fn plus(a: Point, b: Point) -> Point {
+    [0, 1, 2].map(|i| a[i].plus(b[i]))
+}
+
+fn minus(a: Point, b: Point) -> Point {
+    [0, 1, 2].map(|i| a[i].minus(b[i]))
+}
+
+fn times(a: Point, by: Bounded) -> Point {
+    a.map(|a| a.times(by))
+}
+
+/// a ≤ b, if that is sure.
+fn at_most(a: Bounded, b: Bounded) -> Option<bool> {
+    ((a.value - b.value).abs() > a.error + b.error).then_some(a.value <= b.value)
+}
+
+fn absolute(a: Bounded) -> Bounded {
+    Bounded { value: a.value.abs(), error: a.error }
+}
+
+fn normal(s: &Surface) -> Point {
+    s.normal().to_array().map(Bounded::once)
+}
+
+/// The signed distance from the plane, or exactly 0 within it; nothing where that is not sure.
+fn side(s: &Surface, p: Point) -> Option<Bounded> {
+    let o = minus(p, exact(s.center));
+    let e = dot(normal(s), o);
+    let [x, y, z] = o.map(absolute);
+    let threshold = x.plus(y).plus(z).times(Bounded::exact(IN_PLANE));
+    Some(if at_most(absolute(e), threshold)? { Bounded::exact(0.0) } else { e })
+}
+
+/// Whether the signs differ; a direction along the plane has none.
+fn are_apart(a: Bounded, b: Bounded) -> Option<bool> {
+    // What is 0 but for underflow is a sum of exact zeros.
+    const NOTHING: f64 = 1e-30;
+    let sign = |v: Bounded| match v {
+        v if v.value == 0.0 && v.error < NOTHING => Some(0.0),
+        v if v.value.abs() > v.error => Some(v.value.signum()),
+        _ => None,
+    };
+    match (sign(a), sign(b)) {
+        (Some(0.0), _) | (_, Some(0.0)) => Some(false),
+        (Some(a), Some(b)) => Some(a != b),
+        _ => None,
+    }
+}
+
+fn holds(s: &Surface, x: Point) -> Option<bool> {
+    let o = minus(x, exact(s.center));
+    let within = |axis: DVec3| at_most(absolute(dot(o, exact(axis))), dot(exact(axis), exact(axis)));
+    match (within(s.u), within(s.v)) {
+        (Some(false), _) | (_, Some(false)) => Some(false),
+        (Some(true), Some(true)) => Some(true),
+        _ => None,
+    }
+}
+
+fn hides(s: &Surface, p: Point, light: &Light) -> Option<bool> {
+    let (a, b, along) = match *light {
+        Light::Point { position, .. } | Light::Spot { position, .. } => {
+            let q = exact(position);
+            (side(s, p)?, side(s, q)?, minus(q, p))
+        }
+        _ => {
+            let d = arrival(light, [0.0; 3]).toward;
+            (side(s, p)?, dot(normal(s), d), d)
+        }
+    };
+    if !are_apart(a, b)? {
+        return Some(false);
+    }
+    match light {
+        Light::Point { .. } | Light::Spot { .. } => holds(s, plus(p, times(along, a.over(a.minus(b))))),
+        _ => holds(s, minus(p, times(along, a.over(b)))),
+    }
+}
+
+/// Whether anything but surface `i_own` hides the light from `p`.
+pub fn verdict(surfaces: &[Surface], i_own: u32, p: Point, light: &Light) -> Verdict {
+    let others = surfaces.iter().zip(0u32..).filter(|(_, i)| *i != i_own);
+    let all: Vec<Option<bool>> = others.map(|(s, _)| hides(s, p, light)).collect();
+    match (all.contains(&Some(true)), all.contains(&None)) {
+        (true, _) => Verdict::Hidden,
+        (_, true) => Verdict::Unsure,
+        _ => Verdict::Clear,
+    }
+}
+
+/// The middles of the 4 × 4 parts of a facet, as the shader finds them.
+pub fn share_points(s: &Surface, center: [f32; 3]) -> Vec<Point> {
+    let [u, v] = [(s.u, s.subdivide[0]), (s.v, s.subdivide[1])]
+        .map(|(axis, n)| exact(axis).map(|a| a.over(Bounded::exact(f64::from(n)))));
+    let at = |i: u32| Bounded::exact(f64::from(i) * 0.5 - 0.75);
+    let center = exact(DVec3::from(center.map(f64::from)));
+    (0..16).map(|i| plus(plus(center, times(u, at(i % 4))), times(v, at(i / 4)))).collect()
+}

@@ -8,23 +8,24 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
-use nimbus::layout::facet::{FacetRecord, LitRecord};
+use nimbus::layout::facet::{FacetRecord, LitRecord, RegionBoundsRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, transmit};
+use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, sort, sprites, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 10] = [
+const RECORDS: [Record; 11] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
     ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
+    ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
@@ -33,12 +34,14 @@ const RECORDS: [Record; 10] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 15] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
+    ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
+    ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),

@@ -8,25 +8,32 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
-use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_SURFACE, RegionRecord};
+use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_SURFACE};
+use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
+use nimbus::layout::second::{BlockRecord, NodeRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, transmit};
+use nimbus::passes::{self, SHADERS, second, facets, first, generate, grid, morton, place, sort, sprites, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 11] = [
+const RECORDS: [Record; 16] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
     ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
+    ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
     ("Region", RegionRecord::FIELDS, size_of::<RegionRecord>()),
+    ("Source", SourceRecord::FIELDS, size_of::<SourceRecord>()),
+    ("Node", NodeRecord::FIELDS, size_of::<NodeRecord>()),
+    ("Block", BlockRecord::FIELDS, size_of::<BlockRecord>()),
+    ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
@@ -34,12 +41,18 @@ const RECORDS: [Record; 11] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 19] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
-    ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), R("Lit")]),
+    ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), R("Lit")]),
+    ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, &[R("Region"), B(4), R("Facet")]),
+    ("second_sources.comp", second::SourcesPush::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Source"), B(16)]),
+    ("second_merge.comp", second::MergePush::FIELDS, &[B(4), R("Node"), R("Source"), B(16)]),
+    ("second_gather.comp", second::GatherPush::FIELDS, &[R("Block"), R("Pairing"), B(4), B(4), R("Facet"), R("Region"), R("Light"), R("Source"), B(16), B(4), B(4), R("Node"), R("Lit")]),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
+    ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
+    ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),

@@ -101,3 +101,48 @@ impl RegionRecord {
         }
     }
 }
+
+record! {
+    /// Where a region's points lie, for their Morton order.
+    pub struct RegionBoundsRecord {
+        /// Low corner, relative to the lighting origin.
+        low: [f32; 3],
+        unused: u32,
+        /// Cells per unit along each axis; 0 where the region has no extent.
+        scale: [f32; 3],
+        unused_too: u32,
+    }
+}
+
+/// An extent below this share of the greatest coordinate is four roundings of an f32 there: no extent.
+const LEAST_EXTENT: f64 = 1.0 / 4_194_304.0;
+
+impl RegionBoundsRecord {
+    /// `low` and `high` in the scene; `origin` is the lighting origin.
+    pub fn new((low, high): (DVec3, DVec3), origin: DVec3, bits: KeyBits) -> Self {
+        let (low, high) = (low - origin, high - origin);
+        let least = LEAST_EXTENT * low.abs().max(high.abs()).max_element();
+        let n_cells = f64::from(1u32 << bits.axis);
+        let scale = (high - low).to_array().map(|e| if e > least { (n_cells / e) as f32 } else { 0.0 });
+        // So small a region that its cells are beyond f32 is a point.
+        let scale = scale.map(|s| if s.is_finite() { s } else { 0.0 });
+        RegionBoundsRecord { low: low.as_vec3().to_array(), unused: 0, scale, unused_too: 0 }
+    }
+}
+
+/// How a Morton key's 32 bits are shared out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KeyBits {
+    /// Above: the region's number.
+    pub region: u32,
+    /// Below: this many of each axis, of 10 at most.
+    pub axis: u32,
+}
+
+impl KeyBits {
+    /// As many as number the regions; the rest by thirds.
+    pub fn of(n_regions: u32) -> Self {
+        let region = u32::BITS - n_regions.saturating_sub(1).leading_zeros();
+        KeyBits { region, axis: ((u32::BITS - region) / 3).min(10) }
+    }
+}

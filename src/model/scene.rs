@@ -197,14 +197,30 @@ impl Scene {
         self.bounds(groups, time_s, n_sigma).or_else(of_surfaces)
     }
 
+    /// Bounds (low, high) of every region at `time_s`: of a surface its rectangle's, of a cloud as [`Scene::bounds`] has
+    /// them, its origin where it has no particles.
+    pub fn region_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Vec<(DVec3, DVec3)> {
+        let mut of_clouds: Vec<_> = self.clouds.iter().map(|c| (c.origin_at(time_s), None)).collect();
+        for group in groups.iter().filter(|g| g.n_particles > 0) {
+            let (low, high) = self.group_bounds(group, time_s, n_sigma);
+            let of_cloud = &mut of_clouds[group.i_cloud].1;
+            let (l, h) = of_cloud.unwrap_or((low, high));
+            *of_cloud = Some((low.min(l), high.max(h)));
+        }
+        let of_clouds = of_clouds.into_iter().map(|(origin, bounds)| bounds.unwrap_or((origin, origin)));
+        self.surfaces.iter().map(Surface::bounds).chain(of_clouds).collect()
+    }
+
     /// Bounds (low, high) of all particles at `time_s`, blobs included out to `n_sigma` σ; `None` without particles.
     pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
-        let reach: Vec<f64> = self.clouds.iter().map(|c| c.gust.reach()).collect();
-        let boxes = groups.iter().filter(|g| g.n_particles > 0).map(|g| {
-            let center = self.clouds[g.i_cloud].origin_at(time_s) + g.center;
-            let reach = g.half_extent + DVec3::splat(n_sigma * g.sigma_max + reach[g.i_cloud]);
-            (center - reach, center + reach)
-        });
+        let boxes = groups.iter().filter(|g| g.n_particles > 0).map(|g| self.group_bounds(g, time_s, n_sigma));
         boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    fn group_bounds(&self, group: &Group, time_s: f64, n_sigma: f64) -> (DVec3, DVec3) {
+        let cloud = &self.clouds[group.i_cloud];
+        let center = cloud.origin_at(time_s) + group.center;
+        let reach = group.half_extent + DVec3::splat(n_sigma * group.sigma_max + cloud.gust.reach());
+        (center - reach, center + reach)
     }
 }

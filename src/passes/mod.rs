@@ -5,6 +5,7 @@ pub mod facets;
 pub mod first;
 pub mod generate;
 pub mod grid;
+pub mod morton;
 pub mod place;
 pub mod second;
 pub mod sort;
@@ -37,6 +38,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/records.glsl",
     "include/sort.glsl",
     "include/veil.glsl",
+    "morton_key.comp",
+    "morton_order.comp",
     "place.comp",
     "second_gather.comp",
     "second_sources.comp",

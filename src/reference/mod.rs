@@ -7,6 +7,7 @@ pub mod facets;
 pub mod first;
 pub mod generate;
 pub mod grid;
+pub mod morton;
 pub mod occlude;
 pub mod place;
 pub mod rounding;

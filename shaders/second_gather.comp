@@ -14,6 +14,10 @@
 #ifndef MARCH
 #define MARCH 1
 #endif
+// 1: sources are the nodes of a tree, 0: facets.
+#ifndef TREE
+#define TREE 1
+#endif
 // 1: the receivers have a lobe.
 #ifndef GLOSSY
 #define GLOSSY 1
@@ -44,7 +48,8 @@ layout(std430, binding = 7) readonly buffer Sources { Source sources[]; };
 layout(std430, binding = 8) readonly buffer Fluxes { vec4 fluxes[]; };
 layout(std430, binding = 9) readonly buffer Table { float table[]; };
 layout(std430, binding = 10) readonly buffer Density { float density[]; };
-layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
+layout(std430, binding = 11) readonly buffer Nodes { Node nodes[]; };
+layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -53,6 +58,14 @@ layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 #include "veil.glsl"
 #include "gather.glsl"
 #include "cells.glsl"
+
+uint nodes_of(uint i) {
+#if TREE
+    return nodes[i].n_nodes;
+#else
+    return 1u;
+#endif
+}
 
 struct Sum {
     vec3 indirect;
@@ -69,7 +82,8 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
     Walk walk = start_walk();
     while (walk.s < n) {
         uint i = pairing.i_source + walk.s;
-        View view = look(sources[i], i, walk, pane, emitter, taker);
+        uint n_nodes = nodes_of(i);
+        View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
         if (veiled) {
             share *= visible(pairing, veil, taker.position, view.position, share > 0.0);
@@ -83,7 +97,7 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
 #endif
         sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
-        walk = advance(walk, view.split);
+        walk = advance(walk, view.split, n_nodes);
     }
 }
 
@@ -101,7 +115,8 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint n) {
     while (walk.s < n) {
         uint i = pairing.i_source + walk.s;
         Source source = sources[i];
-        View view = look(source, i, walk, pane, emitter, taker);
+        uint n_nodes = nodes_of(i);
+        View view = look(source, i, n_nodes, walk, pane, emitter, taker);
         float scale = cell_scale(walk.level);
         float turn = TURN * view.width;
         // Nothing is nearer than the centre less half a diagonal, and no cell fills more than the hemisphere.
@@ -125,7 +140,7 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint n) {
         vec3 lobes = max(sent * taken - met, vec3(0.0)) * (view.width > 1.0 ? most : view.share);
         vec3 e = geometry + lobes;
         bound += view.wide && !view.split ? max(e.x, max(e.y, e.z)) : 0.0;
-        walk = advance(walk, view.split);
+        walk = advance(walk, view.split, n_nodes);
     }
     return bound;
 }
@@ -145,12 +160,12 @@ void main() {
         Region emitter = regions[pairing.i_region];
         Veil veil = veil_of(pairing, emitter, facet.position);
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
-        uint n_clear = veil.n == 0u ? emitter.n_facets : 0u;
-        uint n_veiled = veil.n > 0u && !veil.closed ? emitter.n_facets : 0u;
+        uint n_clear = veil.n == 0u ? pairing.n_sources : 0u;
+        uint n_veiled = veil.n > 0u && !veil.closed ? pairing.n_sources : 0u;
         float n_before = sum.n_unresolved;
         gather(sum, pairing, emitter, taker, veil, false, n_clear);
         gather(sum, pairing, emitter, taker, veil, true, n_veiled);
-        uint n_audit = sum.n_unresolved > n_before ? emitter.n_facets : 0u;
+        uint n_audit = sum.n_unresolved > n_before ? pairing.n_sources : 0u;
         sum.unresolved += audit(pairing, emitter, taker, albedo, n_audit);
     }
     if (gl_LocalInvocationID.x < block.n_facets) {

@@ -9,6 +9,8 @@ const float LOBE_STEP = 3.0;
 // The half vector turns by at most this share of a cell's width over its distance between its centre and its corner: half
 // the direction's turn, of half a diagonal of sqrt 2; twice that where the light is as near as the receiver.
 const float TURN = 0.75;
+// A cluster whose mean normal is at least this long has, but for rounding, a single normal.
+const float EVEN = 0.9999;
 // Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
 const uint MAX_STEPS = 65536u;
 
@@ -30,18 +32,21 @@ Walk start_walk() { return Walk(0u, 0u, uvec2(0u), 0u); }
 // 2^-level.
 float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
 
-// Into the cell's first quarter, or on to the next cell, or, after a facet's last, to the next source.
-Walk advance(Walk walk, bool split) {
+// Into the cell's first quarter or the cluster's first child, or on to the next cell, or, after a facet's last, to the next
+// source: past the `n_nodes` of this one's subtree, 1 for a facet.
+Walk advance(Walk walk, bool split, uint n_nodes) {
     // Last quarters of last quarters are done together.
     uint up = min(uint(findLSB(~(walk.at.x & walk.at.y))), walk.level);
     uint level = walk.level - up;
     uvec2 at = walk.at >> up;
     bool odd = (at.x & 1u) != 0u;
     uvec2 next = odd ? uvec2(at.x - 1u, at.y + 1u) : uvec2(at.x + 1u, at.y);
-    bool done = !split && level == 0u;
+    bool enters = split && n_nodes > 1u;
+    bool done = enters || (!split && level == 0u);
     next = done ? uvec2(0u) : next;
+    bool quarters = split && !enters;
     return Walk(
-        walk.s + (done ? 1u : 0u), split ? walk.level + 1u : level, split ? walk.at * 2u : next,
+        walk.s + (done ? (enters ? 1u : n_nodes) : 0u), quarters ? walk.level + 1u : level, quarters ? walk.at * 2u : next,
         done ? 0u : walk.n_steps + 1u);
 }
 
@@ -65,8 +70,20 @@ struct View {
 
 bool is_met(float gap, float turn, float lobe_width) { return sqrt(2.0 * gap) < turn + LOBE_REACH * lobe_width; }
 
-View look(Source source, uint i, Walk walk, Pane pane, Region emitter, Taker taker) {
+View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emitter, Taker taker) {
     View view;
+#if TREE
+    bool is_cluster = n_nodes > 1u;
+    pane.half_u = is_cluster ? vec3(0.0) : pane.half_u;
+    pane.half_v = is_cluster ? vec3(0.0) : pane.half_v;
+    pane.side = is_cluster ? 2.0 * source.radius : pane.side;
+    vec3 face = is_cluster ? source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30)) : source.normal;
+    // A cluster is opened by its radius, and where its facets look different ways.
+    float limit = is_cluster ? 2.0 * push.theta : push.pair_size;
+#else
+    vec3 face = source.normal;
+    float limit = push.pair_size;
+#endif
     float scale = cell_scale(walk.level);
     vec2 at = (2.0 * vec2(walk.at) + 1.0) * scale - 1.0;
     view.position = source.position + at.x * pane.half_u + at.y * pane.half_v;
@@ -78,12 +95,12 @@ View look(Source source, uint i, Walk walk, Pane pane, Region emitter, Taker tak
     view.share = part * form(taker.normal, source.normal, view.way, d2, part * source.area);
     view.width = pane.side * scale * inverse;
     view.leaving = source.flux;
-    float excess = view.width / push.pair_size;
+    float excess = view.width / limit;
     float turn = TURN * view.width;
     view.emitter_gap = 2.0;
     uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
     for (uint g = 0u; g < n_shiny; ++g) {
-        view.leaving += lobe_flux(i, emitter, view.position, source.normal, -view.way, view.emitter_gap);
+        view.leaving += lobe_flux(i, emitter, view.position, face, -view.way, view.emitter_gap);
         bool met = is_met(view.emitter_gap, turn, emitter.lobe_width);
         excess = max(excess, met ? view.width / (LOBE_STEP * push.pair_size * emitter.lobe_width) : 0.0);
     }
@@ -94,8 +111,16 @@ View look(Source source, uint i, Walk walk, Pane pane, Region emitter, Taker tak
     excess = max(excess, met ? view.width / (LOBE_STEP * push.pair_size * taker.region.lobe_width) : 0.0);
 #endif
     // Some of the cell may be before the receiver; the receiver is before all of it or none.
-    bool faces = dot(source.normal, offset) < 0.0 && dot(taker.normal, offset) > -pane.side * scale;
-    view.wide = faces && excess > 1.0;
+    bool before = dot(taker.normal, offset) > -pane.side * scale;
+    bool faces = dot(source.normal, offset) < 0.0;
+#if TREE
+    // A cluster with normals of its own each may send what its mean does not say.
+    faces = faces || (is_cluster && dot(source.normal, source.normal) < EVEN * EVEN);
+    view.split = before && faces && excess > 1.0 && (is_cluster || (walk.level < push.pair_levels && walk.n_steps < MAX_STEPS));
+    view.wide = before && faces && excess > 1.0 && !is_cluster;
+#else
+    view.wide = before && faces && excess > 1.0;
     view.split = view.wide && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+#endif
     return view;
 }

@@ -11,7 +11,8 @@ struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_fi
 struct RegionBounds { vec3 low; uint unused; vec3 scale; uint unused_too; };
 struct Source { vec3 position; float radius; vec3 normal; float area; vec3 flux; float total_area; };
 struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
-struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; };
+struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; uint n_sources; };
+struct Node { uint n_nodes; };
 struct Light { vec3 toward; uint kind; vec3 energy; float constant; vec3 position; float radius; float cone_scale; float cone_offset; vec2 unused; };
 struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; };
 struct Camera { vec3 eye; float tan_x; vec3 right; float tan_y; vec3 up; float near; vec3 forward; float unused; };

@@ -5,7 +5,6 @@ use crate::gpu::{Buffer, Commands, Device, Place};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
-use crate::layout::second::SourceRecord;
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
@@ -41,8 +40,6 @@ pub struct Buffers {
     pub i_region: Buffer,
     /// Lobes, N_NODES numbers each; written by the host every frame.
     pub table: Buffer,
-    pub sources: Buffer,
-    pub fluxes: Buffer,
     /// [key, particle].
     pub entries: Buffer,
 }
@@ -75,8 +72,6 @@ impl Buffers {
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
             i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
             table: Buffer::new::<f32>(device, "first.table", (scene.materials.len() * N_NODES) as u64, Place::Upload)?,
-            sources: Buffer::new::<SourceRecord>(device, "second.sources", n_facets, Place::Device)?,
-            fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_facets * n_lights, Place::Device)?,
             shares: Buffer::new::<f32>(device, "transmit.shares", n_shares, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,

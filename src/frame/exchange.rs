@@ -2,9 +2,10 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place};
-use crate::layout::second::{BlockRecord, PairingRecord};
+use crate::layout::second::{BlockRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
-use crate::model::scene::Scene;
+use crate::model::scene::{Gather, Scene};
+use crate::model::tree::Tree;
 use crate::passes::second::Receivers;
 
 use super::buffers::upload;
@@ -14,27 +15,46 @@ pub struct Exchange {
     pub blocks: Buffer,
     pub pairings: Buffer,
     pub occluders: Buffer,
-    /// Facet of each place.
+    /// Facet of each place: as they are, or in Morton order where there is a tree.
     pub order: Buffer,
     /// Source of each place.
     pub leaves: Buffer,
+    pub nodes: Buffer,
+    /// Clusters by height.
+    pub merges: Buffer,
+    /// First and number of those of each height.
+    pub heights: Vec<(u32, u32)>,
+    pub sources: Buffer,
+    pub fluxes: Buffer,
     n_diffuse_blocks: u32,
     n_glossy_blocks: u32,
 }
 
 /// The records behind the buffers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 struct Lists {
     diffuse: Vec<BlockRecord>,
     glossy: Vec<BlockRecord>,
     pairings: Vec<PairingRecord>,
     occluders: Vec<u32>,
+    /// Without clusters where every pair is gathered.
+    tree: Tree,
 }
 
 impl Exchange {
     /// Blocks hold at most `block_len` receivers.
-    pub fn new(device: &Device, commands: &mut Commands, scene: &Scene, block_len: u32) -> Result<Exchange> {
-        let lists = Lists::of(scene, block_len);
+    pub fn new(
+        device: &Device,
+        commands: &mut Commands,
+        scene: &Scene,
+        block_len: u32,
+        tree: bool,
+    ) -> Result<Exchange> {
+        let lists = Lists::of(scene, block_len, tree);
+        let n_sources = lists.tree.n_nodes.len() as u64;
+        let n_fluxes = n_sources * scene.lights.len() as u64;
+        let counts = lists.tree.merges.iter().map(|m| m.len() as u32);
+        let heights = counts.scan(0, |first, n| Some((std::mem::replace(first, *first + n), n))).collect();
         let places: Vec<u32> = (0..scene.n_facets() as u32).collect();
         let blocks = [&lists.diffuse[..], &lists.glossy[..]].concat();
         let mut made = |name: &str, data: &[u32], words: usize| -> Result<Buffer> {
@@ -45,10 +65,15 @@ impl Exchange {
         };
         Ok(Exchange {
             blocks: made("second.blocks", bytemuck::cast_slice(&blocks), 4)?,
-            pairings: made("second.pairings", bytemuck::cast_slice(&lists.pairings), 4)?,
+            pairings: made("second.pairings", bytemuck::cast_slice(&lists.pairings), 5)?,
             occluders: made("second.occluders", &lists.occluders, 1)?,
             order: made("second.order", &places, 1)?,
-            leaves: made("second.leaves", &places, 1)?,
+            leaves: made("second.leaves", &lists.tree.leaves, 1)?,
+            nodes: made("second.nodes", &lists.tree.n_nodes, 1)?,
+            merges: made("second.merges", &lists.tree.merges.concat(), 1)?,
+            heights,
+            sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
+            fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
             n_diffuse_blocks: lists.diffuse.len() as u32,
             n_glossy_blocks: lists.glossy.len() as u32,
         })
@@ -60,6 +85,18 @@ impl Exchange {
             Receivers::Diffuse => (0, self.n_diffuse_blocks),
             Receivers::Glossy => (self.n_diffuse_blocks, self.n_glossy_blocks),
         }
+    }
+}
+
+/// From this many facets on the tree is the faster (docs/measured.md).
+const TREE_PAYS: u64 = 2048;
+
+/// Whether the second reflection is gathered from a tree.
+pub fn gathers_from_tree(scene: &Scene) -> bool {
+    match scene.lighting.gather {
+        Gather::Exact => false,
+        Gather::Tree => true,
+        Gather::Auto => scene.n_facets() >= TREE_PAYS,
     }
 }
 
@@ -75,14 +112,18 @@ pub fn is_glossy(scene: &Scene, i_region: usize) -> bool {
 }
 
 impl Lists {
-    fn of(scene: &Scene, block_len: u32) -> Lists {
+    fn of(scene: &Scene, block_len: u32, tree: bool) -> Lists {
         let sizes = region_sizes(scene);
         let firsts: Vec<u32> = sizes.iter().scan(0, |first, n| Some(std::mem::replace(first, *first + n))).collect();
-        let mut lists = Lists { diffuse: vec![], glossy: vec![], pairings: vec![], occluders: vec![] };
+        let tree_of = if tree { Tree::push } else { Tree::push_flat };
+        let mut lists = Lists::default();
+        let roots: Vec<u32> = sizes.iter().map(|n| tree_of(&mut lists.tree, *n)).collect();
+        let ends = roots.iter().skip(1).copied().chain([lists.tree.n_nodes.len() as u32]);
+        let sources: Vec<(u32, u32)> = roots.iter().zip(ends).map(|(root, end)| (*root, end - root)).collect();
         for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
             let i_pairing = lists.pairings.len() as u32;
             for pairing in from.iter().filter(|p| sizes[p.i_emitter] > 0) {
-                lists.push_pairing(pairing, firsts[pairing.i_emitter]);
+                lists.push_pairing(pairing, sources[pairing.i_emitter]);
             }
             let n_pairings = lists.pairings.len() as u32 - i_pairing;
             let blocks = if is_glossy(scene, i) { &mut lists.glossy } else { &mut lists.diffuse };
@@ -94,10 +135,11 @@ impl Lists {
         lists
     }
 
-    fn push_pairing(&mut self, pairing: &Pairing, i_source: u32) {
+    fn push_pairing(&mut self, pairing: &Pairing, (i_source, n_sources): (u32, u32)) {
         let i_occluder = self.occluders.len() as u32;
         self.occluders.extend(pairing.occluders.iter().map(|i| *i as u32));
         let n_occluders = pairing.occluders.len() as u32;
-        self.pairings.push(PairingRecord { i_region: pairing.i_emitter as u32, i_occluder, n_occluders, i_source });
+        let i_region = pairing.i_emitter as u32;
+        self.pairings.push(PairingRecord { i_region, i_occluder, n_occluders, i_source, n_sources });
     }
 }

@@ -8,6 +8,7 @@ pub mod limits;
 pub mod packet;
 pub mod parallel;
 pub mod plan;
+pub mod relay;
 pub mod render;
 pub mod serial;
 

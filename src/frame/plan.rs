@@ -150,6 +150,7 @@ mod tests {
             groups: vec![GroupRecord::default()],
             modes: vec![],
             placed: None,
+            bounds: vec![],
             regions: vec![RegionRecord::default()],
             lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
             grid: GridRecord::default(),

@@ -3,9 +3,9 @@
 use std::time::Instant;
 
 use super::buffers::{Buffers, download, has_shares};
-use super::exchange::Exchange;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
+use super::relay::Relay;
 use super::{limits, ms};
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
@@ -15,13 +15,12 @@ use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::{CloudSource, heaviest_blob};
 use crate::model::film::FilmFormat;
-use crate::model::scene::{LightingMode, Pairs, Scene, Simulate};
+use crate::model::scene::{LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
 use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::place::Place as PlacePass;
-use crate::passes::second::{GatherPush, Receivers, Second, SourcesPush};
 use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
 use crate::passes::transmit::Transmit;
@@ -33,7 +32,7 @@ pub struct Renderer {
     facets: Facets,
     transmit: Transmit,
     first: First,
-    second: Option<SecondStage>,
+    second: Option<Relay>,
     sort: Sort,
     sprites: Sprites,
     buffers: Buffers,
@@ -51,8 +50,6 @@ struct Settings {
     n_surface_facets: u32,
     n_facets: u32,
     n_lights: u32,
-    pairs: Pairs,
-    theta: f64,
     n_surfaces: u32,
     heaviest: f64,
     step_cells: f64,
@@ -84,7 +81,7 @@ impl Renderer {
         let mut commands = Commands::new(device, "frame")?;
         let two_reflections = scene.lighting.mode == LightingMode::TwoReflection;
         let second = match two_reflections {
-            true => Some(SecondStage::new(device, compiler, &mut commands, scene)?),
+            true => Some(Relay::new(device, compiler, &mut commands, scene)?),
             false => None,
         };
         let mut renderer = Renderer {
@@ -105,8 +102,6 @@ impl Renderer {
                 n_particles,
                 n_surface_facets: scene.n_surface_facets() as u32,
                 n_facets: scene.n_facets() as u32,
-                pairs: scene.lighting.pairs,
-                theta: scene.lighting.theta,
                 n_lights: scene.lights.len() as u32,
                 n_surfaces: scene.surfaces.len() as u32,
                 heaviest: heaviest_blob(&groups),
@@ -152,6 +147,9 @@ impl Renderer {
     fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
         self.buffers.modes.write(&packet.modes)?;
+        if let Some(second) = &mut self.second {
+            second.upload(packet)?;
+        }
         self.buffers.table.write(&packet.table)?;
         self.buffers.regions.write(&packet.regions)?;
         self.buffers.lights.write(&packet.lights)?;
@@ -208,7 +206,7 @@ impl Renderer {
                 first.record(rec, from, &push)
             })?;
             pass(rec, plan, Pass::Second, |rec| match second {
-                Some(second) => second.record(rec, b, packet, s),
+                Some(second) => second.record(rec, plan, b, packet),
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {
@@ -266,58 +264,6 @@ impl Renderer {
         let n = self.settings.n_facets;
         let facets = download(device, &mut self.commands, &self.buffers.facets, n)?;
         Ok((facets, download(device, &mut self.commands, &self.buffers.lit, n)?))
-    }
-}
-
-/// The second reflection and what it is gathered with.
-struct SecondStage {
-    second: Second,
-    exchange: Exchange,
-}
-
-impl SecondStage {
-    fn new(device: &Device, compiler: &Compiler, commands: &mut Commands, scene: &Scene) -> Result<SecondStage> {
-        let second = Second::new(device, compiler, scene.n_particles() > 0)?;
-        let exchange = Exchange::new(device, commands, scene, second.block_len())?;
-        Ok(SecondStage { second, exchange })
-    }
-
-    fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
-        let x = &self.exchange;
-        let push = SourcesPush { n_facets: s.n_facets, n_lights: s.n_lights };
-        let buffers = [&b.facets, &b.lights, &b.shares, &b.regions, &x.order, &x.leaves, &b.sources, &b.fluxes];
-        self.second.record_sources(rec, buffers, &push)?;
-        for receivers in [Receivers::Diffuse, Receivers::Glossy] {
-            let (i_first_block, n_blocks) = x.blocks_of(receivers);
-            let push = GatherPush {
-                grid: packet.grid,
-                eye: packet.camera.eye,
-                n_lights: s.n_lights,
-                pair_size: s.pairs.size as f32,
-                pair_levels: s.pairs.levels,
-                step_length: s.step_cells as f32 * packet.grid.cell,
-                backward: (1.0 - s.forward) as f32,
-                pair_steps: s.pairs.steps,
-                i_first_block,
-                theta: s.theta as f32,
-            };
-            let buffers = [
-                &x.blocks,
-                &x.pairings,
-                &x.occluders,
-                &x.order,
-                &b.facets,
-                &b.regions,
-                &b.lights,
-                &b.sources,
-                &b.fluxes,
-                &b.table,
-                &b.density,
-                &b.lit,
-            ];
-            self.second.record(rec, buffers, &push, receivers, n_blocks)?;
-        }
-        Ok(())
     }
 }
 

@@ -37,7 +37,15 @@ record! {
         /// Surfaces that may stand between the two.
         i_occluder: u32,
         n_occluders: u32,
-        /// Its first source.
+        /// Its first source, and how many there are: its facets, or the nodes of its tree.
         i_source: u32,
+        n_sources: u32,
+    }
+}
+
+record! {
+    /// What the walk needs of a source: the nodes of its subtree, itself included; 1 for a facet.
+    pub struct NodeRecord {
+        n_nodes: u32,
     }
 }

@@ -14,3 +14,4 @@ pub mod pairings;
 pub mod philox;
 pub mod scene;
 pub mod surface;
+pub mod tree;

@@ -42,6 +42,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "morton_order.comp",
     "place.comp",
     "second_gather.comp",
+    "second_merge.comp",
     "second_sources.comp",
     "sort_count.comp",
     "sort_key.comp",

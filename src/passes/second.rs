@@ -13,6 +13,10 @@ record! {
 }
 
 record! {
+    pub struct MergePush { i_first: u32, n_merges: u32, n_lights: u32 }
+}
+
+record! {
     pub struct GatherPush {
         grid: GridRecord,
         eye: [f32; 3],
@@ -29,6 +33,7 @@ record! {
 
 pub struct Second {
     sources: Kernel,
+    merge: Kernel,
     /// For receivers without a lobe, and with.
     gather: [Kernel; 2],
     /// Receivers of one block.
@@ -43,15 +48,17 @@ pub enum Receivers {
 }
 
 impl Second {
-    /// `has_clouds`: light between facets is attenuated by the density grid.
-    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool) -> Result<Second> {
+    /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree.
+    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool) -> Result<Second> {
         let width = device.limits().subgroup_size.clamp(8, 64);
         let gather = |glossy: u32| {
-            let macros = [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy)];
+            let macros = [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy),
+                ("TREE", u32::from(tree))];
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
         };
         Ok(Second {
             sources: Kernel::new(device, compiler, "second.sources", SourcesPush::FIELDS, &[])?,
+            merge: Kernel::new(device, compiler, "second.merge", MergePush::FIELDS, &[])?,
             gather: [gather(0)?, gather(1)?],
             block: width,
         })
@@ -69,12 +76,18 @@ impl Second {
         rec.dispatch(&self.sources, &buffers, push, push.n_facets)
     }
 
+    /// The clusters of one height. `merges`: u32, nodes by height; `nodes`: NodeRecord; `sources` and `fluxes` as above.
+    pub fn record_merge(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 4], push: &MergePush) -> Result<()> {
+        rec.dispatch(&self.merge, &buffers, push, push.n_merges)
+    }
+
     /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
-    /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `lit`: LitRecord.
+    /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `nodes`: NodeRecord;
+    /// `lit`: LitRecord.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 12],
+        buffers: [&Buffer; 13],
         push: &GatherPush,
         receivers: Receivers,
         n_blocks: u32,

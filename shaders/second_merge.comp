@@ -1,0 +1,56 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "each.glsl"
+
+// Clusters of sources from the clusters or facets below them, one height of the tree at a time (docs/model.md §7, §11
+// "tree").
+
+layout(local_size_x = 64) in;
+
+layout(push_constant) uniform Push { uint i_first; uint n_merges; uint n_lights; } push;
+// Nodes by height.
+layout(std430, binding = 0) readonly buffer Merges { uint merges[]; };
+layout(std430, binding = 1) readonly buffer Nodes { Node nodes[]; };
+layout(std430, binding = 2) buffer Sources { Source sources[]; };
+layout(std430, binding = 3) buffer Fluxes { vec4 fluxes[]; };
+
+void main() {
+    FOR_EACH(k, push.n_merges) {
+        uint i = merges[push.i_first + k];
+        uint end = i + nodes[i].n_nodes;
+        vec3 flux = vec3(0.0), by_flux = vec3(0.0), by_area = vec3(0.0), normal_by_flux = vec3(0.0), normal_by_area = vec3(0.0);
+        float weight = 0.0, total_area = 0.0, square_area = 0.0;
+        for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
+            Source child = sources[c];
+            float w = child.flux.x + child.flux.y + child.flux.z;
+            weight += w;
+            by_flux += w * child.position;
+            normal_by_flux += w * child.normal;
+            by_area += child.total_area * child.position;
+            normal_by_area += child.total_area * child.normal;
+            flux += child.flux;
+            total_area += child.total_area;
+            square_area += child.total_area * child.area;
+        }
+        // Where nothing shines the middle is as good, and facets without area lie where they lie.
+        bool shines = weight > 0.0;
+        float whole = shines ? weight : total_area;
+        float inverse = whole > 0.0 ? 1.0 / whole : 0.0;
+        vec3 position = whole > 0.0 ? (shines ? by_flux : by_area) * inverse : sources[i + 1u].position;
+        vec3 normal = whole > 0.0 ? (shines ? normal_by_flux : normal_by_area) * inverse : sources[i + 1u].normal;
+        float radius = 0.0;
+        for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
+            radius = max(radius, distance(sources[c].position, position) + sources[c].radius);
+        }
+        float area = total_area > 0.0 ? square_area / total_area : 0.0;
+        sources[i] = Source(position, radius, normal, area, flux, total_area);
+        for (uint l = 0u; l < push.n_lights; ++l) {
+            vec4 sum = vec4(0.0);
+            for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
+                sum += fluxes[c * push.n_lights + l];
+            }
+            fluxes[i * push.n_lights + l] = sum;
+        }
+    }
+}

@@ -1,0 +1,123 @@
+//! The second reflection and what it is gathered with.
+
+use super::buffers::Buffers;
+use super::exchange::{Exchange, gathers_from_tree};
+use super::packet::Packet;
+use super::plan::{Pass, Plan};
+use crate::error::Result;
+use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
+use crate::layout::facet::RegionBoundsRecord;
+use crate::model::scene::{Pairs, Scene};
+use crate::passes::morton::Morton;
+use crate::passes::second::{GatherPush, MergePush, Receivers, Second, SourcesPush};
+use crate::passes::sort::Sort;
+
+pub struct Relay {
+    second: Second,
+    exchange: Exchange,
+    order: Option<Order>,
+    n_facets: u32,
+    n_lights: u32,
+    step_cells: f64,
+    backward: f64,
+    pairs: Pairs,
+    theta: f64,
+}
+
+/// What puts the facets into Morton order, where there is a tree over them.
+struct Order {
+    morton: Morton,
+    sort: Sort,
+    entries: Buffer,
+    /// Written by the host every frame.
+    bounds: Buffer,
+    n_regions: u32,
+}
+
+impl Relay {
+    pub fn new(device: &Device, compiler: &Compiler, commands: &mut Commands, scene: &Scene) -> Result<Relay> {
+        let tree = gathers_from_tree(scene);
+        let second = Second::new(device, compiler, scene.n_particles() > 0, tree)?;
+        let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
+        let lighting = &scene.lighting;
+        Ok(Relay {
+            second,
+            exchange,
+            order: if tree { Some(Order::new(device, compiler, scene)?) } else { None },
+            n_facets: scene.n_facets() as u32,
+            n_lights: scene.lights.len() as u32,
+            step_cells: lighting.step,
+            backward: 1.0 - lighting.forward,
+            pairs: lighting.pairs,
+            theta: lighting.theta,
+        })
+    }
+
+    pub fn upload(&mut self, packet: &Packet) -> Result<()> {
+        self.order.as_mut().map_or(Ok(()), |order| order.bounds.write(&packet.bounds))
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, plan: &Plan, b: &Buffers, packet: &Packet) -> Result<()> {
+        let x = &self.exchange;
+        // The order follows from the facets alone.
+        if let Some(order) = self.order.as_ref().filter(|_| plan.runs(Pass::Facets)) {
+            order.record(rec, b, &x.order, self.n_facets)?;
+        }
+        self.record_sources(rec, b)?;
+        for receivers in [Receivers::Diffuse, Receivers::Glossy] {
+            let (i_first_block, n_blocks) = x.blocks_of(receivers);
+            let push = GatherPush {
+                grid: packet.grid,
+                eye: packet.camera.eye,
+                n_lights: self.n_lights,
+                pair_size: self.pairs.size as f32,
+                pair_levels: self.pairs.levels,
+                step_length: self.step_cells as f32 * packet.grid.cell,
+                backward: self.backward as f32,
+                pair_steps: self.pairs.steps,
+                i_first_block,
+                theta: self.theta as f32,
+            };
+            let (lists, lights) = ([&x.blocks, &x.pairings, &x.occluders, &x.order], [&b.facets, &b.regions, &b.lights]);
+            let light = [&x.sources, &x.fluxes, &b.table, &b.density, &x.nodes, &b.lit];
+            let [l0, l1, l2, l3] = lists;
+            let [f, r, l] = lights;
+            let [s0, s1, s2, s3, s4, s5] = light;
+            let buffers = [l0, l1, l2, l3, f, r, l, s0, s1, s2, s3, s4, s5];
+            self.second.record(rec, buffers, &push, receivers, n_blocks)?;
+        }
+        Ok(())
+    }
+
+    /// Facets as sources, then cluster by cluster.
+    fn record_sources(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
+        let x = &self.exchange;
+        let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights };
+        let buffers = [&b.facets, &b.lights, &b.shares, &b.regions, &x.order, &x.leaves, &x.sources, &x.fluxes];
+        self.second.record_sources(rec, buffers, &push)?;
+        for (i_first, n_merges) in x.heights.iter().copied() {
+            let push = MergePush { i_first, n_merges, n_lights: self.n_lights };
+            self.second.record_merge(rec, [&x.merges, &x.nodes, &x.sources, &x.fluxes], &push)?;
+        }
+        Ok(())
+    }
+}
+
+impl Order {
+    fn new(device: &Device, compiler: &Compiler, scene: &Scene) -> Result<Order> {
+        let (n, n_regions) = (scene.n_facets(), scene.n_regions());
+        Ok(Order {
+            morton: Morton::new(device, compiler)?,
+            sort: Sort::new(device, compiler, n as u32)?,
+            entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, Place::Device)?,
+            bounds: Buffer::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64, Place::Upload)?,
+            n_regions: n_regions as u32,
+        })
+    }
+
+    fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, order: &Buffer, n_facets: u32) -> Result<()> {
+        self.morton.record_facets(rec, [&b.facets, &self.bounds, &self.entries], n_facets, self.n_regions)?;
+        self.sort.record(rec, &self.entries, n_facets, 32)?;
+        self.morton.record_order(rec, [&self.entries, order], n_facets)
+    }
+}

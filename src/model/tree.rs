@@ -1,0 +1,99 @@
+//! The tree of clusters over the facets of a region: its form follows from their number alone, so that it is laid out
+//! once a scene, and only what the nodes hold follows from the frame (model.md §7, "tree").
+
+/// Children of a node. Four are a quadrant each on a surface in Morton order; a cloud's octants are two heights.
+pub const FAN: u32 = 4;
+
+/// Nodes in the order of a depth-first walk, a node before its children.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Tree {
+    /// Nodes of each one's subtree, itself included: where the walk goes on that does not enter it. 1 is a facet.
+    pub n_nodes: Vec<u32>,
+    /// Node of each place in the order of facets.
+    pub leaves: Vec<u32>,
+    /// Clusters by height: those of `merges[h]` need only those before.
+    pub merges: Vec<Vec<u32>>,
+}
+
+impl Tree {
+    /// Adds the tree over the next `n` places and gives its root, which is no node where n is 0.
+    pub fn push(&mut self, n: u32) -> u32 {
+        let root = self.n_nodes.len() as u32;
+        if n > 0 {
+            self.push_node(n);
+        }
+        root
+    }
+
+    /// Adds the next `n` places without clusters and gives the first one's node.
+    pub fn push_flat(&mut self, n: u32) -> u32 {
+        let root = self.n_nodes.len() as u32;
+        self.leaves.extend(root..root + n);
+        self.n_nodes.resize((root + n) as usize, 1);
+        root
+    }
+
+    /// Gives the node's height: 0 for a facet.
+    fn push_node(&mut self, n: u32) -> usize {
+        let i = self.n_nodes.len();
+        self.n_nodes.push(1);
+        if n == 1 {
+            self.leaves.push(i as u32);
+            return 0;
+        }
+        // Children are full but for the last: runs of a power of FAN places, that a power of two's quadrants fit.
+        let mut run = 1;
+        while run < n.div_ceil(FAN) {
+            run *= FAN;
+        }
+        let mut height = 0;
+        for first in (0..n).step_by(run as usize) {
+            height = height.max(self.push_node(run.min(n - first)));
+        }
+        self.n_nodes[i] = (self.n_nodes.len() - i) as u32;
+        if self.merges.len() <= height {
+            self.merges.resize(height + 1, vec![]);
+        }
+        self.merges[height].push(i as u32);
+        height + 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_node_stands_before_its_children_and_its_run_holds_them() {
+        let mut tree = Tree::default();
+        assert_eq!(tree.push(6), 0);
+        // 6 places: a full run of 4 and one of 2.
+        assert_eq!(tree.n_nodes, [9, 5, 1, 1, 1, 1, 3, 1, 1]);
+        assert_eq!(tree.leaves, [2, 3, 4, 5, 7, 8]);
+        assert_eq!(tree.merges, [vec![1, 6], vec![0]]);
+        assert_eq!((tree.push(0), tree.push(1)), (9, 9));
+        assert_eq!((tree.leaves.len(), tree.n_nodes.len()), (7, 10));
+    }
+
+    #[test]
+    fn every_place_is_a_leaf_once_and_every_cluster_merges_after_its_children() {
+        for n in [2u32, 3, 4, 5, 16, 17, 64, 1000] {
+            let mut tree = Tree::default();
+            tree.push(n);
+            assert_eq!(tree.leaves.len(), n as usize);
+            let mut done: Vec<bool> = tree.n_nodes.iter().map(|k| *k == 1).collect();
+            for merge in tree.merges.iter().flatten() {
+                let i = *merge as usize;
+                let mut child = i + 1;
+                while child < i + tree.n_nodes[i] as usize {
+                    assert!(done[child], "{n}: {child} before {i}");
+                    child += tree.n_nodes[child] as usize;
+                }
+                done[i] = true;
+            }
+            assert!(done.iter().all(|d| *d) && tree.n_nodes[0] as usize == done.len());
+            // A third of the facets, and a last run at each height that may not be full.
+            assert!(done.len() as u32 <= n + n / 3 + 12, "{n}: {}", done.len());
+        }
+    }
+}

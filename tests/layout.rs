@@ -15,7 +15,7 @@ use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, second, facets, first, generate, grid, morton, place, sort, sprites, transmit};
+use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, second, sort, sprites, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -45,9 +45,31 @@ const INTERFACES: [(&str, &[Field], &[Element]); 19] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), R("Lit")]),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, &[R("Region"), B(4), R("Facet")]),
-    ("second_sources.comp", second::SourcesPush::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Source"), B(16)]),
+    (
+        "second_sources.comp",
+        second::SourcesPush::FIELDS,
+        &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Source"), B(16)],
+    ),
     ("second_merge.comp", second::MergePush::FIELDS, &[B(4), R("Node"), R("Source"), B(16)]),
-    ("second_gather.comp", second::GatherPush::FIELDS, &[R("Block"), R("Pairing"), B(4), B(4), R("Facet"), R("Region"), R("Light"), R("Source"), B(16), B(4), B(4), R("Node"), R("Lit")]),
+    (
+        "second_gather.comp",
+        second::GatherPush::FIELDS,
+        &[
+            R("Block"),
+            R("Pairing"),
+            B(4),
+            B(4),
+            R("Facet"),
+            R("Region"),
+            R("Light"),
+            R("Source"),
+            B(16),
+            B(4),
+            B(4),
+            R("Node"),
+            R("Lit"),
+        ],
+    ),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),

@@ -1,8 +1,8 @@
 // How a receiver goes through a region's sources: facet by facet, and a facet too wide for its distance cell by cell
 // (docs/model.md §7, §11 "second"). Needs gather.glsl.
 
-// A lobe is met within this many of its widths (e^-18 of its peak beyond).
-const float LOBE_REACH = 6.0;
+// A lobe is met within this many of its widths (e^-8 of its peak beyond).
+const float LOBE_REACH = 4.0;
 // Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
 // width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
 const float LOBE_STEP = 3.0;
@@ -80,9 +80,11 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     vec3 face = is_cluster ? source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30)) : source.normal;
     // A cluster is opened by its radius, and where its facets look different ways.
     float limit = is_cluster ? 2.0 * push.theta : push.pair_size;
+    float lobe_limit = is_cluster ? LOBE_STEP * push.theta : LOBE_STEP * push.pair_size;
 #else
     vec3 face = source.normal;
     float limit = push.pair_size;
+    float lobe_limit = LOBE_STEP * push.pair_size;
 #endif
     float scale = cell_scale(walk.level);
     vec2 at = (2.0 * vec2(walk.at) + 1.0) * scale - 1.0;
@@ -102,13 +104,13 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     for (uint g = 0u; g < n_shiny; ++g) {
         view.leaving += lobe_flux(i, emitter, view.position, face, -view.way, view.emitter_gap);
         bool met = is_met(view.emitter_gap, turn, emitter.lobe_width);
-        excess = max(excess, met ? view.width / (LOBE_STEP * push.pair_size * emitter.lobe_width) : 0.0);
+        excess = max(excess, met ? view.width / (lobe_limit * emitter.lobe_width) : 0.0);
     }
     view.taker_gap = 2.0;
 #if GLOSSY
     view.taker_gap = half_vector_gap(taker.normal, view.way, taker.outgoing);
     bool met = is_met(view.taker_gap, turn, taker.region.lobe_width);
-    excess = max(excess, met ? view.width / (LOBE_STEP * push.pair_size * taker.region.lobe_width) : 0.0);
+    excess = max(excess, met ? view.width / (lobe_limit * taker.region.lobe_width) : 0.0);
 #endif
     // Some of the cell may be before the receiver; the receiver is before all of it or none.
     bool before = dot(taker.normal, offset) > -pane.side * scale;

@@ -22,6 +22,16 @@ float visible(Pairing pairing, Veil veil, vec3 p, vec3 q, bool wanted) {
     return clear ? 1.0 : 0.0;
 }
 
+// Whether the rim of a shadow runs through the ball about q.
+bool is_torn(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
+    uint n = wanted ? veil.n : 0u;
+    bool torn = false;
+    for (uint k = 0u; k < n; ++k) {
+        torn = torn || tears(regions[occluder_of(pairing, veil, k)], p, q, radius);
+    }
+    return torn;
+}
+
 #if MARCH
 // e^{-(1-g) tau} between p and q through the density grid: equal steps over what lies in the grid's box, no longer than
 // the march's own and no more than the pair's greatest number, midpoint samples.

@@ -78,7 +78,8 @@ impl Relay {
                 i_first_block,
                 theta: self.theta as f32,
             };
-            let (lists, lights) = ([&x.blocks, &x.pairings, &x.occluders, &x.order], [&b.facets, &b.regions, &b.lights]);
+            let (lists, lights) =
+                ([&x.blocks, &x.pairings, &x.occluders, &x.order], [&b.facets, &b.regions, &b.lights]);
             let light = [&x.sources, &x.fluxes, &b.table, &b.density, &x.nodes, &b.lit];
             let [l0, l1, l2, l3] = lists;
             let [f, r, l] = lights;

@@ -198,7 +198,14 @@ impl Renderer {
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
                 let buffers = [&b.facets, &b.lights, &b.regions, &b.density, &b.transmittance, &b.shares];
-                transmit.record(rec, buffers, &packet.grid, [s.n_facets, s.n_lights, s.n_surfaces], s.step_cells, s.forward)
+                transmit.record(
+                    rec,
+                    buffers,
+                    &packet.grid,
+                    [s.n_facets, s.n_lights, s.n_surfaces],
+                    s.step_cells,
+                    s.forward,
+                )
             })?;
             pass(rec, plan, Pass::First, |rec| {
                 let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &b.lit];

@@ -52,8 +52,8 @@ impl Second {
     pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool) -> Result<Second> {
         let width = device.limits().subgroup_size.clamp(8, 64);
         let gather = |glossy: u32| {
-            let macros = [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy),
-                ("TREE", u32::from(tree))];
+            let macros =
+                [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy), ("TREE", u32::from(tree))];
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
         };
         Ok(Second {

@@ -1,0 +1,115 @@
+//! The march through the density grid (shaders/transmit.comp), evaluated in f32: a running bound of its optical depth.
+
+use glam::{DVec3, IVec3};
+use nimbus::model::grid::GridSpec;
+use nimbus::model::light::Light;
+use nimbus::reference::transmit;
+
+use crate::bounded::{self, Bounded};
+use crate::lights::{arrival, double};
+
+/// Numbers of the grid are f32 numbers.
+pub struct March<'a> {
+    pub spec: &'a GridSpec,
+    pub cells: &'a [f64],
+}
+
+impl March<'_> {
+    /// Where the way enters the box and leaves it or ends: high = low + cell·n, then a difference and a quotient, and the
+    /// greatest of those that enter, the least of those that leave.
+    fn crossing(&self, p: [f32; 3], d: [Bounded; 3], distance: Bounded) -> [Bounded; 2] {
+        let exact = Bounded::exact;
+        let (mut enter, mut leave) = (vec![exact(0.0)], vec![distance]);
+        for i in (0..3).filter(|&i| d[i].value != 0.0) {
+            let n = f64::from(self.spec.n_cells[i]);
+            let low = exact(self.spec.low[i]);
+            let high = low.plus(exact(self.spec.cell).times(exact(n)));
+            let [a, b] = [low, high].map(|side| side.minus(exact(f64::from(p[i]))).over(d[i]));
+            let (first, second) = if a.value < b.value { (a, b) } else { (b, a) };
+            enter.push(first);
+            leave.push(second);
+        }
+        let extreme = |of: &[Bounded], pick: fn(f64, f64) -> f64| {
+            let by = |f: &dyn Fn(&Bounded) -> f64| of.iter().map(f).reduce(pick).expect("one at least");
+            let (value, low, high) = (by(&|b| b.value), by(&|b| b.value - b.error), by(&|b| b.value + b.error));
+            Bounded { value, error: (value - low).max(high - value) }
+        };
+        [extreme(&enter, f64::max), extreme(&leave, f64::min)]
+    }
+
+    /// τ of a march, term by term.
+    pub fn depth(&self, p: [f32; 3], light: &Light, step: f64) -> Bounded {
+        let way = light.arrival(double(p));
+        // A way that passes the box by less than the rounding would pass through its outermost cells, which are empty.
+        if transmit::crossing(self.spec, double(p), way.toward, way.distance).is_none() {
+            return Bounded::exact(0.0);
+        }
+        let way = arrival(light, p);
+        let distance = if way.distance.value.is_finite() { way.distance } else { Bounded::exact(f64::from(f32::MAX)) };
+        let [enter, leave] = self.crossing(p, way.toward, distance);
+        let length = leave.minus(enter);
+        let s = Bounded::once(step * self.spec.cell);
+        let n = transmit::n_steps(self.spec, length.value, step);
+        let mut tau = Bounded::exact(0.0);
+        let mut last_error = 0.0;
+        for k in 0..n {
+            let start = s.times(Bounded::exact(f64::from(k)));
+            let rest = length.minus(start);
+            let ds = if s.value <= rest.value { s } else { rest };
+            // The lesser of two errs no more than they.
+            let ds = Bounded { error: s.error.max(rest.error), ..ds };
+            let at = enter.plus(start.plus(ds.scaled(0.5)));
+            let x = [0, 1, 2].map(|i| Bounded::exact(f64::from(p[i])).plus(at.times(way.toward[i])));
+            let rho = self.density_at(x);
+            tau = tau.plus(rho.times(ds));
+            last_error = rho.value * (rest.error + s.error) + rho.error * s.value;
+        }
+        // A length beside a multiple of the step: one step more or less, no longer than the error of the rest. A last
+        // step that the f64 side has and the other lacks is in `last_error` when it is that short; one that only
+        // the other has is as short, in no more density than there is anywhere.
+        let steps = length.value / s.value;
+        let short = length.error + s.error * (steps + 1.0);
+        let densest = self.cells.iter().cloned().fold(0.0, f64::max);
+        let beside = (steps - steps.round()).abs() * s.value <= short;
+        let more = if way.distance.value.is_finite() { densest * short } else { 0.0 };
+        Bounded { error: tau.error + if beside { last_error + more } else { 0.0 }, ..tau }
+    }
+
+    /// Trilinear density: what the position's error makes of it, by the steepest slope among the cells around; and the
+    /// rounding of three levels of (1 − f) a + f b, three operations each, of numbers that are not negative.
+    fn density_at(&self, x: [Bounded; 3]) -> Bounded {
+        let value = nimbus::reference::grid::sample(self.spec, self.cells, DVec3::from(x.map(|x| x.value)));
+        let exact = Bounded::exact;
+        let g = [0, 1, 2].map(|i| {
+            let offset = x[i].minus(exact(self.spec.low[i]));
+            offset.times(Bounded::once(1.0 / self.spec.cell)).minus(exact(0.5))
+        });
+        let base = IVec3::from(g.map(|g| g.value.floor() as i32));
+        let (slopes, any) = self.slopes(base);
+        let moved: f64 = (0..3).map(|i| slopes[i] * g[i].error).sum();
+        let rounding = if any { 9.0 * bounded::U * (value + moved) * (1.0 + 1e-5) + 1e-37 } else { 0.0 };
+        Bounded { value, error: moved + rounding }
+    }
+
+    /// Greatest difference of neighbours along each axis among the 4³ cells around, and whether any holds something.
+    fn slopes(&self, base: IVec3) -> ([f64; 3], bool) {
+        let n = self.spec.n_cells.as_ivec3();
+        let cell = |at: IVec3| {
+            let inside = at.cmpge(IVec3::ZERO).all() && at.cmplt(n).all();
+            if inside { self.cells[(at.x + n.x * (at.y + n.y * at.z)) as usize] } else { 0.0 }
+        };
+        let mut slopes = [0f64; 3];
+        let mut any = false;
+        for k in 0..64 {
+            let at = base + IVec3::new(k % 4, k / 4 % 4, k / 16) - 1;
+            let here = cell(at);
+            any |= here > 0.0;
+            for (axis, slope) in slopes.iter_mut().enumerate() {
+                if at[axis] < base[axis] + 2 {
+                    *slope = slope.max((cell(at + IVec3::AXES[axis]) - here).abs());
+                }
+            }
+        }
+        (slopes, any)
+    }
+}

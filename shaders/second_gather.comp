@@ -84,15 +84,16 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         uint i = pairing.i_source + walk.s;
         uint n_nodes = nodes_of(i);
         View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
-#if TREE
-        if (veiled) {
-            bool whole = n_nodes > 1u && !view.split && view.share > 0.0;
-            view.split = view.split || is_torn(pairing, veil, taker.position, view.position, sources[i].radius, whole);
-        }
-#endif
         float share = view.split ? 0.0 : view.share;
         if (veiled) {
+#if TREE
+            float radius = n_nodes > 1u && view.width > push.theta * TORN ? sources[i].radius : 0.0;
+            bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
+            view.split = view.split || (n_nodes > 1u && veiling.y);
+            share = view.split || veiling.x ? 0.0 : share;
+#else
             share *= visible(pairing, veil, taker.position, view.position, share > 0.0);
+#endif
         }
 #if MARCH
         share *= attenuation(taker.position, view.position, share > 0.0);

@@ -39,12 +39,16 @@ void main() {
         float inverse = whole > 0.0 ? 1.0 / whole : 0.0;
         vec3 position = whole > 0.0 ? (shines ? by_flux : by_area) * inverse : sources[i + 1u].position;
         vec3 normal = whole > 0.0 ? (shines ? normal_by_flux : normal_by_area) * inverse : sources[i + 1u].normal;
-        float radius = 0.0;
+        float radius = 0.0, spread = 0.0;
         for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
-            radius = max(radius, distance(sources[c].position, position) + sources[c].radius);
+            Source child = sources[c];
+            float apart = distance(child.position, position);
+            radius = max(radius, apart + child.radius);
+            float w = shines ? child.flux.x + child.flux.y + child.flux.z : child.total_area;
+            spread += w * inverse * (child.spread + apart * apart);
         }
         float area = total_area > 0.0 ? square_area / total_area : 0.0;
-        sources[i] = Source(position, radius, normal, area, flux, total_area);
+        sources[i] = Source(position, radius, normal, area, flux, total_area, spread, 0.0, 0.0, 0.0);
         for (uint l = 0u; l < push.n_lights; ++l) {
             vec4 sum = vec4(0.0);
             for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {

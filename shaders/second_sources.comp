@@ -42,6 +42,6 @@ void main() {
         // A particle's facet is a disc.
         float radius = region.kind == REGION_SURFACE ? length(half_diagonal) : sqrt(facet.area * INV_PI);
         vec3 flux = facet.area * INV_PI * region.kd * facet.color * irradiance;
-        sources[i] = Source(facet.position, radius, facet.normal, facet.area, flux, facet.area);
+        sources[i] = Source(facet.position, radius, facet.normal, facet.area, flux, facet.area, 0.0, 0.0, 0.0, 0.0);
     }
 }

@@ -9,6 +9,8 @@ const float LOBE_STEP = 3.0;
 // The half vector turns by at most this share of a cell's width over its distance between its centre and its corner: half
 // the direction's turn, of half a diagonal of sqrt 2; twice that where the light is as near as the receiver.
 const float TURN = 0.75;
+// A cluster that a shadow's rim runs through is opened down to this share of the opening angle's diameter.
+const float TORN = 0.5;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
 // Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
@@ -68,6 +70,21 @@ struct View {
     bool split;
 };
 
+#if TREE
+// The mean of cos cos/d^2 over a cluster whose mean square distance from its middle is `extent` d^2: the middle's value and
+// the second derivatives' share. A surface's cluster lies in its plane (half of the spread an axis), a cloud's is as deep
+// as it is wide (a third an axis).
+float cluster_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float extent, uint kind) {
+    float at_source = -dot(source_normal, way), at_receiver = dot(receiver_normal, way);
+    float turned = dot(receiver_normal, source_normal);
+    float bent = kind == REGION_SURFACE
+        ? 2.0 * extent * at_source * (at_receiver - turned * at_source - 3.0 * at_receiver * at_source * at_source)
+        : -extent * (turned + 2.0 * at_source * at_receiver) / 3.0;
+    bool faces = at_source > 0.0 && at_receiver > 0.0;
+    return faces ? max(at_source * at_receiver + bent, 0.0) / d2 : 0.0;
+}
+#endif
+
 bool is_met(float gap, float turn, float lobe_width) { return sqrt(2.0 * gap) < turn + LOBE_REACH * lobe_width; }
 
 View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emitter, Taker taker) {
@@ -95,9 +112,22 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     view.way = offset * inverse;
     float part = scale * scale;
     view.share = part * form(taker.normal, source.normal, view.way, d2, part * source.area);
+#if TREE
+    float extent = source.spread / max(d2, 1e-30);
+    view.share = is_cluster ? cluster_form(taker.normal, source.normal, view.way, d2, extent, emitter.kind) : view.share;
+#endif
     view.width = pane.side * scale * inverse;
     view.leaving = source.flux;
     float excess = view.width / limit;
+#if TREE
+    // What a cluster's extent may change of its form factor: in the square of radius over distance, and the cosines.
+    float tilt = 0.5 * view.width;
+    float at_taker = max(dot(taker.normal, view.way) + tilt, 0.0);
+    float at_source = max(-dot(source.normal, view.way), 0.0) + 1.0 - length(source.normal);
+    float wrong = tilt * tilt * min(at_taker, 1.0) * at_source * source.total_area * inverse * inverse;
+    float allowed = push.theta * push.theta;
+    excess = is_cluster ? (tilt > 1.0 ? 2.0 : wrong / (allowed * allowed)) : excess;
+#endif
     float turn = TURN * view.width;
     view.emitter_gap = 2.0;
     uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;

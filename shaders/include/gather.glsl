@@ -22,14 +22,15 @@ float visible(Pairing pairing, Veil veil, vec3 p, vec3 q, bool wanted) {
     return clear ? 1.0 : 0.0;
 }
 
-// Whether the rim of a shadow runs through the ball about q.
-bool is_torn(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
+// The same of a ball about q: x, whether its middle is hidden; y, whether the rim of a shadow runs through it.
+bvec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
     uint n = wanted ? veil.n : 0u;
-    bool torn = false;
+    bvec2 found = bvec2(false);
     for (uint k = 0u; k < n; ++k) {
-        torn = torn || tears(regions[occluder_of(pairing, veil, k)], p, q, radius);
+        bvec2 by = hides_ball(regions[occluder_of(pairing, veil, k)], p, q, radius);
+        found = bvec2(found.x || by.x, found.y || by.y);
     }
-    return torn;
+    return found;
 }
 
 #if MARCH

@@ -23,24 +23,23 @@ bool hides(Region r, vec3 p, vec3 q) {
     return apart && holds(r, p + (q - p) * (a / (a - b)));
 }
 
-// Whether the rim of what r hides from p runs through the ball about q: some of it is hidden and some is not. The ball's
-// size where the way crosses the plane is its own, shortened by the crossing's share of the way and lengthened by the
-// way's slant.
-bool tears(Region r, vec3 p, vec3 q, float radius) {
-    float a = dot(r.normal, p - r.center), b = dot(r.normal, q - r.center);
-    float near_q = abs(b) - radius;
-    if (a * b > 0.0 && near_q > 0.0) {
-        return false;
-    }
+// How much of the ball about q is hidden from p: x, whether its middle is; y, whether the rim of the shadow runs through
+// it. The ball's size where the way crosses the plane is its own, shortened by the crossing's share of the way and
+// lengthened by the way's slant.
+bvec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
+    float a = side_of(r, p), b = side_of(r, q);
     vec3 d = q - p;
-    float part = abs(a) / max(abs(a - b), 1e-30);
-    float slant = length(d) / max(abs(a - b), 1e-30);
-    float reach = radius * min(part, 1.0) * max(slant, 1.0);
-    vec3 o = p + d * min(part, 1.0) - r.center;
-    float lu = length(r.u), lv = length(r.v);
-    vec2 out_by = abs(vec2(dot(o, r.u) / lu, dot(o, r.v) / lv)) - vec2(lu, lv);
-    float most = max(out_by.x, out_by.y);
-    return abs(most) < reach || (near_q < 0.0 && most < reach);
+    float across = 1.0 / max(abs(a - b), 1e-30);
+    float part = a / (a - b);
+    vec3 o = p + d * part - r.center;
+    float uu = dot(r.u, r.u), vv = dot(r.v, r.v);
+    vec2 beside = abs(vec2(dot(o, r.u), dot(o, r.v)));
+    bool apart = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
+    vec2 outside = (beside - vec2(uu, vv)) * inversesqrt(vec2(uu, vv));
+    float most = max(outside.x, outside.y);
+    float reach = radius * abs(part) * max(length(d) * across, 1.0);
+    bool torn = abs(b) < radius ? most < reach : apart && abs(most) < reach;
+    return bvec2(apart && most <= 0.0, a != 0.0 && torn);
 }
 
 // From p along d without end.

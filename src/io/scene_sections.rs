@@ -112,7 +112,7 @@ pub fn read_lighting(root: &mut Section, exponents: &[f64]) -> Result<Lighting> 
         sampling: s.choice("sampling", "log", &Sampling::NAMES, &[])?,
         exponents: read_exponents(&mut s, exponents)?,
         gather: s.choice("gather", "auto", &Gather::NAMES, &[])?,
-        theta: s.f64("theta", 0.5, Bounds::Within(0.0, 2.0))?,
+        theta: s.f64("theta", 0.4, Bounds::Within(0.0, 2.0))?,
         facets_per_cloud: match s.u32("facets_per_cloud", 0, 0, u32::MAX)? {
             0 => None,
             n => Some(n),

@@ -17,6 +17,11 @@ record! {
         flux: [f32; 3],
         /// Σ A_i.
         total_area: f32,
+        /// Mean square distance of its facets' centres from the position, by flux.
+        spread: f32,
+        unused_1: f32,
+        unused_2: f32,
+        unused_3: f32,
     }
 }
 

@@ -146,6 +146,11 @@ impl<'a> Scenery<'a> {
         Receiver { position, normal, brdf: Brdf { kd, ks: DVec3::ZERO, ns: 0.0 }, i_disc: Some(i) }
     }
 
+    /// V of `light` at `p`.
+    pub fn in_light(&self, p: DVec3, light: &Light) -> f64 {
+        visibility::in_light(&self.rects, self.blobs, self.forward, p, light)
+    }
+
     fn transmittance(&self, p: DVec3, source: Source) -> f64 {
         visibility::transmittance(self.blobs, self.forward, p, source)
     }
@@ -156,8 +161,7 @@ impl<'a> Scenery<'a> {
             return DVec3::ZERO;
         }
         let reflected = |light: &Light| {
-            let v = visibility::in_light(&self.rects, self.blobs, self.forward, at.position, light);
-            reflected(&at.brdf, at.normal, at.position, light, v, toward).0
+            reflected(&at.brdf, at.normal, at.position, light, self.in_light(at.position, light), toward).0
         };
         self.lights.iter().map(reflected).sum()
     }
@@ -165,7 +169,7 @@ impl<'a> Scenery<'a> {
     /// I_d.
     pub fn irradiance(&self, at: &Receiver) -> DVec3 {
         let of = |light: &Light| {
-            let v = visibility::in_light(&self.rects, self.blobs, self.forward, at.position, light);
+            let v = self.in_light(at.position, light);
             light.energy() * light.share(at.normal, &light.arrival(at.position), v)
         };
         self.lights.iter().map(of).sum()
@@ -207,14 +211,14 @@ impl<'a> Scenery<'a> {
             }
         }
         let seen = Seen { scenery: self, at, toward, pieces, relative: accuracy.relative };
-        adaptive::integrate(&seen, cells.into_iter(), self.from_discs(at, toward), accuracy)
+        adaptive::integrate(&seen, cells.into_iter(), self.of_discs(at, toward), accuracy)
     }
 
     /// What the discs send, by the law of pairs: L cos θ_i cos θ_j A/(d² + A/π).
-    fn from_discs(&self, at: &Receiver, toward: DVec3) -> Sample {
+    fn of_discs(&self, at: &Receiver, toward: DVec3) -> Sample {
         let mut sum = NOTHING;
         for i in (0..self.discs.len()).filter(|&i| at.i_disc != Some(i)) {
-            let (e, direction) = self.from_disc(i, at, self.disc_radiance[i]);
+            let (e, direction) = self.of_disc(i, at, self.disc_radiance[i]);
             sum[0] += e * reflectance(&at.brdf, at.normal, direction, toward);
             sum[1] += e;
         }
@@ -222,7 +226,7 @@ impl<'a> Scenery<'a> {
     }
 
     /// Irradiance that disc `i` brings if its radiance is `radiance`, and from where.
-    fn from_disc(&self, i: usize, at: &Receiver, radiance: DVec3) -> (DVec3, DVec3) {
+    fn of_disc(&self, i: usize, at: &Receiver, radiance: DVec3) -> (DVec3, DVec3) {
         let disc = &self.discs[i];
         let offset = disc.position - at.position;
         let direction = offset.normalize_or_zero();

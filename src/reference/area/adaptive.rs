@@ -161,9 +161,13 @@ fn measure(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> Measured {
     let (mut high, mut low) = (NOTHING, NOTHING);
     for &([x, y, z], w_high, w_low) in nodes {
         let value = f.at(cell.i_piece, x * a + y * b + z * c);
-        for k in 0..3 {
+        for k in 0..2 {
             high[k] += w_high * value[k];
             low[k] += w_low * value[k];
+        }
+        // An error may be infinite, and the lesser rule's nodes have no weight in the value.
+        if w_high > 0.0 {
+            high[2] += w_high * value[2];
         }
     }
     let area = cell.area();
@@ -225,7 +229,7 @@ pub fn integrate(f: &dyn Integrand, cells: impl Iterator<Item = Cell>, known: Sa
     let met = |v: &Sample, e: &[DVec3; 2]| accuracy.is_met(v[0], e[0]) && accuracy.is_met(v[1], e[1]);
     while all_resolved && n_evaluations + 2 * nodes.len() <= accuracy.max_evaluations && !met(&value, &error) {
         let Some(worst) = heap.pop() else { break };
-        if !(worst.key > LEAST_KEY) {
+        if worst.key.is_nan() || worst.key <= LEAST_KEY {
             heap.push(worst);
             break;
         }

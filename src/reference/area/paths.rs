@@ -92,7 +92,7 @@ impl Scenery<'_> {
             if at.i_disc == Some(i) {
                 return None;
             }
-            let (e, direction) = self.from_disc(i, at, DVec3::splat(self.discs.len() as f64 * choices));
+            let (e, direction) = self.of_disc(i, at, DVec3::splat(self.discs.len() as f64 * choices));
             let w = e * reflectance(&at.brdf, at.normal, direction, toward);
             return (w != DVec3::ZERO).then(|| (self.on_disc(i), direction, w));
         }

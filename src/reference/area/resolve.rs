@@ -15,10 +15,18 @@ use crate::reference::Blob;
 /// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no feature narrower than d,
 /// and no node of the rules is further than 0.5 radii from the next.
 const NEAREST: f64 = 0.7;
-/// Greatest spread of the half vector over a cell, in widths 1/√n_s of a lobe: neighbouring nodes lie within a width.
-const LOBE_WIDTHS: f64 = 1.5;
-/// Widths from the lobe's peak beyond which it is nothing: e^{−8²/2} = 1.3e-14 of it.
-const LOBE_REACH: f64 = 8.0;
+/// How closely a lobe is looked at, in widths 1/√n_s.
+struct Detail {
+    /// Greatest spread of the half vector over a cell.
+    widths: f64,
+    /// Distance from the peak beyond which there is nothing.
+    reach: f64,
+}
+
+/// Neighbouring nodes lie within a width; e^{−8²/2} = 1.3e-14 of the peak.
+const LOBE: Detail = Detail { widths: 1.5, reach: 8.0 };
+/// In a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it is of no weight in a mean.
+const MIRROR: Detail = Detail { widths: 3.0, reach: 4.0 };
 /// The same of a blob, in σ: radius of a cell, and e^{−4²/2} = 3e-4 of its depth, that varies over σ.
 const BLOB_WIDTHS: f64 = 1.5;
 const BLOB_REACH: f64 = 4.0;
@@ -54,7 +62,7 @@ pub(super) fn seen_is_resolved(seen: &Seen, cell: &Cell) -> bool {
         return true;
     }
     let gloss = &at.brdf;
-    (gloss.ks == DVec3::ZERO || lobe_is_resolved(gloss.ns, at.normal, seen.toward, from, spread))
+    (gloss.ks == DVec3::ZERO || lobe_is_resolved(gloss.ns, at.normal, seen.toward, from, spread, LOBE))
         && first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), seen.relative)
         && blobs_are_resolved(scenery, &ball, Source::At(at.position), seen.relative)
 }
@@ -90,7 +98,8 @@ pub(super) fn mirror_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3
         let ns = brdf.ns.min((reach / narrow).powi(2));
         let spread = (ball.radius / reach).asin() + turn;
         let dark = scenery.pieces[i].is_empty();
-        !glossy || dark || way == DVec3::ZERO || lobe_is_resolved(ns, rect.normal, way.normalize(), toward, spread)
+        let mirrors = |from: DVec3| lobe_is_resolved(ns, rect.normal, from, toward, spread, MIRROR);
+        !glossy || dark || way.try_normalize().is_none_or(mirrors)
     })
 }
 
@@ -112,7 +121,7 @@ fn first_is_resolved(
         let light = &scenery.lights[i_light];
         let Some((toward, spread)) = light_cone(light, ball, relative) else { return false };
         let no_lobe = light.is_sky() || brdf.ks == DVec3::ZERO;
-        (no_lobe || lobe_is_resolved(brdf.ns, normal, toward, view.0, spread + view.1))
+        (no_lobe || lobe_is_resolved(brdf.ns, normal, toward, view.0, spread + view.1, LOBE))
             && blobs_are_resolved(scenery, ball, source_of(light), relative)
     })
 }
@@ -159,7 +168,7 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
 
 /// Whether over directions within `spread` of `a` and `b` together the half vector of both turns little against the lobe's
 /// width, or stays where the lobe is nothing.
-fn lobe_is_resolved(ns: f64, normal: DVec3, a: DVec3, b: DVec3, spread: f64) -> bool {
+fn lobe_is_resolved(ns: f64, normal: DVec3, a: DVec3, b: DVec3, spread: f64, detail: Detail) -> bool {
     let width = 1.0 / ns.max(1.0).sqrt();
     let sum = a + b;
     // The half vector turns by ½ of what one direction does along the arc between both, and across it by
@@ -169,11 +178,11 @@ fn lobe_is_resolved(ns: f64, normal: DVec3, a: DVec3, b: DVec3, spread: f64) -> 
         return spread <= LEAST_ANGLE;
     }
     let turn = 0.5 * spread / half_angle.cos();
-    if turn <= LOBE_WIDTHS * width {
+    if turn <= detail.widths * width {
         return true;
     }
     let gamma = normal.angle_between(sum);
-    gamma - turn > LOBE_REACH * width
+    gamma - turn > detail.reach * width
 }
 
 /// Whether every blob that casts a shadow between the ball and `end` is wide against the rays from the ball there.

@@ -1,0 +1,151 @@
+//! Means over a surface or one of its facets, and work spread over the processor's threads.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use glam::{DVec2, DVec3};
+
+use super::adaptive::{self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles};
+use super::clip::{self, Line, Polygon, WHOLE};
+use super::{Scenery, resolve};
+use crate::model::surface::Surface;
+
+/// Of the error asked for, the inner integral's share: it adds to the outer one's.
+const INNER_SHARE: f64 = 0.1;
+
+/// Of L2 over a surface: it bends wherever a corner appears behind an edge, and there the two rules' errors are numbers of
+/// one size and no fixed sign, of whose difference one is seldom more than three times.
+const DOUBT: f64 = 3.0;
+
+/// A rectangle within a surface's (s, t).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Window {
+    pub low: DVec2,
+    pub high: DVec2,
+}
+
+impl Window {
+    pub const WHOLE: Window = Window { low: DVec2::NEG_ONE, high: DVec2::ONE };
+
+    /// Facet `i` of a surface.
+    pub fn facet(surface: &Surface, i: u32) -> Window {
+        let [n_u, n_v] = surface.subdivide;
+        let at = |k: u32, n: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
+        let corner = |k: u32| DVec2::new(at(i % n_u + k, n_u), at(i / n_u + k, n_v));
+        Window { low: corner(0), high: corner(1) }
+    }
+
+    fn area(&self) -> f64 {
+        (self.high - self.low).element_product()
+    }
+
+    fn cut(&self, polygon: &Polygon) -> Polygon {
+        let lines = [
+            Line([-self.low.x, 1.0, 0.0]),
+            Line([self.high.x, -1.0, 0.0]),
+            Line([-self.low.y, 0.0, 1.0]),
+            Line([self.high.y, 0.0, -1.0]),
+        ];
+        lines.iter().fold(polygon.clone(), |p, line| clip::cut(&p, line, 1.0))
+    }
+}
+
+impl Scenery<'_> {
+    /// Mean of L1 toward the eye at `eye`, and of I_d.
+    pub fn mean_first(&self, i_surface: usize, window: &Window, eye: DVec3, accuracy: &Accuracy) -> Estimate {
+        let pieces = &self.pieces[i_surface];
+        let mean = Mean { scenery: self, i_surface, eye, window, of: Of::First, accuracy };
+        let cells = pieces
+            .iter()
+            .enumerate()
+            .flat_map(|(i, piece)| triangles(&window.cut(&piece.polygon), i).collect::<Vec<_>>());
+        adaptive::integrate(&mean, cells, NOTHING, accuracy)
+    }
+
+    /// Mean of L2 toward the eye at `eye`, and of I_i.
+    pub fn mean_second(&self, i_surface: usize, window: &Window, eye: DVec3, accuracy: &Accuracy) -> Estimate {
+        let inner = Accuracy {
+            relative: INNER_SHARE * accuracy.relative,
+            absolute: INNER_SHARE * accuracy.absolute,
+            max_evaluations: accuracy.max_evaluations,
+        };
+        let mean = Mean { scenery: self, i_surface, eye, window, of: Of::Second, accuracy: &inner };
+        adaptive::integrate(&mean, triangles(&window.cut(&WHOLE.to_vec()), 0), NOTHING, accuracy)
+    }
+}
+
+enum Of {
+    First,
+    Second,
+}
+
+struct Mean<'s, 'a> {
+    scenery: &'s Scenery<'a>,
+    i_surface: usize,
+    eye: DVec3,
+    window: &'s Window,
+    of: Of,
+    /// Of what is integrated at every point.
+    accuracy: &'s Accuracy,
+}
+
+impl Integrand for Mean<'_, '_> {
+    fn at(&self, i_piece: usize, x: DVec2) -> Sample {
+        let rect = &self.scenery.rects[self.i_surface];
+        let p = rect.point(x.x, x.y);
+        let toward = (self.eye - p).normalize_or_zero();
+        let [radiance, irradiance, error] = match self.of {
+            Of::First => {
+                let lit = &self.scenery.pieces[self.i_surface][i_piece].lit;
+                self.scenery.first_on_piece(self.i_surface, lit, p, toward)
+            }
+            Of::Second => {
+                let e = self.scenery.second(&self.scenery.on_surface(self.i_surface, p), toward, self.accuracy);
+                [e.radiance, e.irradiance, DVec3::new(e.error, e.irradiance_error, 0.0)]
+            }
+        };
+        [radiance, irradiance, error].map(|v| v / self.window.area())
+    }
+
+    fn is_resolved(&self, cell: &Cell) -> bool {
+        match self.of {
+            Of::First => {
+                resolve::mean_is_resolved(self.scenery, self.i_surface, self.eye, cell, self.accuracy.relative)
+            }
+            Of::Second => resolve::mirror_is_resolved(self.scenery, self.i_surface, self.eye, cell),
+        }
+    }
+
+    fn length_squared(&self, _: usize, d: DVec2) -> f64 {
+        self.scenery.rects[self.i_surface].length_squared(d)
+    }
+
+    fn doubt(&self) -> f64 {
+        match self.of {
+            Of::First => 1.0,
+            Of::Second => DOUBT,
+        }
+    }
+}
+
+/// `f` of 0…n−1, on as many threads as the machine has.
+pub fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    let n_threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(n.max(1));
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut done = Vec::new();
+        loop {
+            let i = next.fetch_add(1, Ordering::Relaxed);
+            if i >= n {
+                return done;
+            }
+            done.push((i, f(i)));
+        }
+    };
+    let mut all: Vec<(usize, T)> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..n_threads).map(|_| scope.spawn(work)).collect();
+        let joined = threads.into_iter().map(|t| t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        joined.flatten().collect()
+    });
+    all.sort_by_key(|&(i, _)| i);
+    all.into_iter().map(|(_, value)| value).collect()
+}

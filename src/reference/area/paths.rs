@@ -1,0 +1,156 @@
+//! Any number of reflections by random paths: an estimate with a standard error, and of the second reflection one that
+//! shares no quadrature with `Scenery::second`. Each path starts at the receiver, goes where its BRDF sends it (or to one
+//! of the discs) and collects L1 at every vertex; V is tested point by point.
+
+use std::f64::consts::{FRAC_1_PI, TAU};
+
+use glam::DVec3;
+
+use super::visibility::{Rect, Source};
+use super::{Receiver, Scenery, mean, reflectance};
+use crate::model::material::Brdf;
+use crate::model::philox::{philox4x32_10, uniform};
+
+/// Second word of the key, so that paths share no numbers with particles.
+const KEY: u32 = 0x7061_7468;
+/// Paths a job, one after another; jobs run on all threads.
+const PATHS_A_JOB: u32 = 1024;
+
+/// Radiance of one number of reflections, toward the eye.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reflected {
+    pub radiance: DVec3,
+    /// One standard error of the mean, every channel. 0 for the first reflection, which needs no chance.
+    pub error: DVec3,
+}
+
+/// How many paths, and which.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Chance {
+    pub n_paths: u32,
+    pub seed: u32,
+}
+
+/// Sums of one job: of every reflection beyond the first, and of all of them together (last).
+type Sums = Vec<(DVec3, DVec3)>;
+
+impl Scenery<'_> {
+    /// Radiance toward the unit vector `toward` after exactly 1, 2, … `k` reflections, and last of all together.
+    pub fn reflections(&self, at: &Receiver, toward: DVec3, k: usize, chance: Chance) -> Vec<Reflected> {
+        let first = Reflected { radiance: self.first(at, toward), error: DVec3::ZERO };
+        let n_more = k.saturating_sub(1);
+        let n_jobs = chance.n_paths.div_ceil(PATHS_A_JOB);
+        let job = |i: usize| {
+            let i = i as u32;
+            let paths = i * PATHS_A_JOB..chance.n_paths.min((i + 1) * PATHS_A_JOB);
+            let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); n_more + 1];
+            for i_path in paths {
+                let mut all = DVec3::ZERO;
+                let found = self.path(at, toward, n_more, [chance.seed, i_path]);
+                for (sum, l) in sums.iter_mut().zip(found) {
+                    *sum = (sum.0 + l, sum.1 + l * l);
+                    all += l;
+                }
+                sums[n_more] = (sums[n_more].0 + all, sums[n_more].1 + all * all);
+            }
+            sums
+        };
+        let sums = mean::each(n_jobs as usize, job).into_iter().reduce(add).unwrap_or_default();
+        let n = f64::from(chance.n_paths);
+        let of = |(sum, squares): (DVec3, DVec3)| {
+            let radiance = sum / n;
+            let variance = (squares / n - radiance * radiance).max(DVec3::ZERO) / (n - 1.0).max(1.0);
+            Reflected { radiance, error: variance.powf(0.5) }
+        };
+        let mut all: Vec<Reflected> = std::iter::once(first).chain(sums.into_iter().map(of)).collect();
+        // The last sum is that of all beyond the first; without paths there is none.
+        all.resize(k.max(1) + 1, Reflected { radiance: DVec3::ZERO, error: DVec3::ZERO });
+        all[k.max(1)].radiance += first.radiance;
+        all
+    }
+
+    /// What one path finds at its vertices: the second reflection, the third, …
+    fn path(&self, at: &Receiver, toward: DVec3, n_more: usize, [seed, i_path]: [u32; 2]) -> Vec<DVec3> {
+        let (mut at, mut toward, mut weight) = (*at, toward, DVec3::ONE);
+        let mut found = vec![DVec3::ZERO; n_more];
+        for (i, l) in found.iter_mut().enumerate() {
+            let draw = |turn: u32| philox4x32_10([seed, KEY], [i_path, i as u32, turn, 0]).map(uniform);
+            let Some((next, direction, w)) = self.step(&at, toward, draw(0), draw(1)) else { break };
+            weight *= w;
+            *l = weight * self.first(&next, -direction);
+            (at, toward) = (next, -direction);
+        }
+        found
+    }
+
+    /// The next vertex, the direction there, and f cos θ V over the probability.
+    fn step(&self, at: &Receiver, toward: DVec3, u: [f64; 4], more: [f64; 4]) -> Option<(Receiver, DVec3, DVec3)> {
+        let discs = !self.discs.is_empty();
+        let choices = if discs { 2.0 } else { 1.0 };
+        if discs && more[0] < 0.5 {
+            let i = ((more[1] * self.discs.len() as f64) as usize).min(self.discs.len() - 1);
+            if at.i_disc == Some(i) {
+                return None;
+            }
+            let (e, direction) = self.of_disc(i, at, DVec3::splat(self.discs.len() as f64 * choices));
+            let w = e * reflectance(&at.brdf, at.normal, direction, toward);
+            return (w != DVec3::ZERO).then(|| (self.on_disc(i), direction, w));
+        }
+        let direction = direction(&at.brdf, at.normal, toward, u);
+        let cosine = at.normal.dot(direction);
+        if cosine <= 0.0 {
+            return None;
+        }
+        let (i, t) = nearest(&self.rects, at.position, direction)?;
+        if self.rects[i].normal.dot(direction) >= 0.0 {
+            return None;
+        }
+        let position = at.position + t * direction;
+        let v = self.transmittance(at.position, Source::At(position)) * choices;
+        let density = density(&at.brdf, at.normal, toward, direction);
+        let w = reflectance(&at.brdf, at.normal, direction, toward) * (v * cosine / density);
+        Some((self.on_surface(i, position), direction, w))
+    }
+}
+
+fn add(a: Sums, b: Sums) -> Sums {
+    a.into_iter().zip(b).map(|((s, q), (t, r))| (s + t, q + r)).collect()
+}
+
+fn nearest(rects: &[Rect], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
+    let met = |(i, r): (usize, &Rect)| r.met(p, Source::Toward(direction)).map(|t| (i, t));
+    rects.iter().enumerate().filter_map(met).min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Share of directions drawn from the lobe.
+fn lobe_share(brdf: &Brdf) -> f64 {
+    let (d, s) = (brdf.kd.max_element(), brdf.ks.max_element());
+    if s > 0.0 { s / (d + s) } else { 0.0 }
+}
+
+/// About the normal by cos θ/π, or about the mirror direction by a half vector of density (n_s+1)/2π cos^{n_s} γ.
+fn direction(brdf: &Brdf, normal: DVec3, toward: DVec3, u: [f64; 4]) -> DVec3 {
+    // 1 − u is never 0.
+    let (x, phi) = (1.0 - u[0], TAU * u[1]);
+    let glossy = u[2] < lobe_share(brdf);
+    let power = if glossy { 1.0 / (brdf.ns + 1.0) } else { 0.5 };
+    let log = power * x.ln();
+    // cos γ = x^power; sin²γ = 1 − x^{2 power} without cancellation.
+    let (cosine, sine) = (log.exp(), (-(2.0 * log).exp_m1()).max(0.0).sqrt());
+    let (a, b) = normal.any_orthonormal_pair();
+    let h = cosine * normal + sine * (phi.cos() * a + phi.sin() * b);
+    if glossy { (2.0 * toward.dot(h) * h - toward).normalize_or_zero() } else { h }
+}
+
+/// Per solid angle.
+fn density(brdf: &Brdf, normal: DVec3, toward: DVec3, direction: DVec3) -> f64 {
+    let share = lobe_share(brdf);
+    let diffuse = (1.0 - share) * normal.dot(direction) * FRAC_1_PI;
+    if share == 0.0 {
+        return diffuse;
+    }
+    let h = (direction + toward).normalize_or_zero();
+    let w = 0.5 * (normal - h).length_squared();
+    let half = Brdf::lobe(brdf.ns, w) * (brdf.ns + 1.0) / (brdf.ns + 2.0);
+    diffuse + share * half / (4.0 * toward.dot(h))
+}

@@ -1,0 +1,208 @@
+//! Which cells are too large for their cubature to see all that there is in them. A rule of 22 points takes a cell that a
+//! lobe, a near light or a small blob falls between for an empty one, and reports no error; such cells are halved before
+//! any is measured.
+
+use glam::DVec3;
+
+use super::adaptive::Cell;
+use super::clip::WHOLE;
+use super::visibility::{Rect, Source, source_of};
+use super::{Reach, Scenery, Seen};
+use crate::model::cloud::SQRT_TAU;
+use crate::model::light::{LEAST_PENUMBRA, Light};
+use crate::reference::Blob;
+
+/// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no feature narrower than d,
+/// and no node of the rules is further than 0.5 radii from the next.
+const NEAREST: f64 = 0.7;
+/// How closely a lobe is looked at, in widths 1/√n_s.
+struct Detail {
+    /// Greatest spread of the half vector over a cell.
+    widths: f64,
+    /// Distance from the peak beyond which there is nothing.
+    reach: f64,
+}
+
+/// Neighbouring nodes lie within a width; e^{−8²/2} = 1.3e-14 of the peak.
+const LOBE: Detail = Detail { widths: 1.5, reach: 8.0 };
+/// In a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it is of no weight in a mean.
+const MIRROR: Detail = Detail { widths: 3.0, reach: 4.0 };
+/// The same of a blob, in σ: radius of a cell, and e^{−4²/2} = 3e-4 of its depth, that varies over σ.
+const BLOB_WIDTHS: f64 = 1.5;
+const BLOB_REACH: f64 = 4.0;
+/// Greatest angular radius of a cell in a spot's penumbra, in widths of that: no node is further than a third of the
+/// penumbra from the next. What lies between nodes unseen along an edge of it falls with the square (inner edge) and the
+/// cube (outer) of that radius; at this radius it was measured as 6e-6 of a cone's flux.
+const PENUMBRA_WIDTHS: f64 = 0.7;
+const PENUMBRA_TOLERANCE: f64 = 1e-4;
+/// Cells that look smaller than this are as small as they need be: a lobe at grazing angles can ask for no end.
+const LEAST_ANGLE: f64 = 1e-9;
+
+/// The ball about a cell's centroid, of which the rest is cones.
+struct Ball {
+    center: DVec3,
+    radius: f64,
+}
+
+impl Ball {
+    fn of(rect: &Rect, cell: &Cell) -> Ball {
+        let corners = cell.corners.map(|x| rect.point(x.x, x.y));
+        let center = (corners[0] + corners[1] + corners[2]) / 3.0;
+        Ball { center, radius: corners.iter().map(|c| c.distance(center)).fold(0.0, f64::max) }
+    }
+}
+
+/// Whether a cell of what a receiver sees is small enough.
+pub(super) fn seen_is_resolved(seen: &Seen, cell: &Cell) -> bool {
+    let (i_surface, lit) = seen.pieces[cell.i_piece];
+    let (scenery, at) = (seen.scenery, seen.at);
+    let ball = Ball::of(&scenery.rects[i_surface], cell);
+    let Some((from, spread)) = cone(&ball, at.position) else { return false };
+    if spread < LEAST_ANGLE {
+        return true;
+    }
+    let gloss = &at.brdf;
+    (gloss.ks == DVec3::ZERO || lobe_is_resolved(gloss.ns, at.normal, seen.toward, from, spread, LOBE))
+        && first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), seen.relative)
+        && blobs_are_resolved(scenery, &ball, Source::At(at.position), seen.relative)
+}
+
+/// Whether a cell of a mean of L1 toward `eye` is small enough.
+pub(super) fn mean_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3, cell: &Cell, relative: f64) -> bool {
+    let ball = Ball::of(&scenery.rects[i_surface], cell);
+    let lit = &scenery.pieces[i_surface][cell.i_piece].lit;
+    let Some((from, spread)) = cone(&ball, eye) else { return false };
+    spread < LEAST_ANGLE || first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), relative)
+}
+
+/// Whether a cell of a mean of L2 toward `eye` is small enough: against its distance from every other surface, or that
+/// one's size, and for the lobe in which it mirrors what lights it.
+pub(super) fn mirror_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3, cell: &Cell) -> bool {
+    let (rect, brdf) = (&scenery.rects[i_surface], &scenery.brdfs[i_surface]);
+    let ball = Ball::of(rect, cell);
+    let view = ball.center.distance(eye);
+    let glossy = brdf.ks != DVec3::ZERO;
+    if glossy && ball.radius > NEAREST * view {
+        return false;
+    }
+    let (toward, turn) = ((eye - ball.center).normalize_or_zero(), (ball.radius / view).min(1.0).asin());
+    let others = scenery.rects.iter().enumerate().filter(|(_, other)| !lies_behind(rect, other));
+    others.into_iter().all(|(i, other)| {
+        let way = other.nearest(ball.center) - ball.center;
+        let narrow = other.u.length().min(other.v.length());
+        let reach = way.length().max(narrow);
+        if ball.radius > NEAREST * reach {
+            return false;
+        }
+        // The lobe and what it mirrors blur each other: their features are as wide as the wider of both.
+        let ns = brdf.ns.min((reach / narrow).powi(2));
+        let spread = (ball.radius / reach).asin() + turn;
+        let dark = scenery.pieces[i].is_empty();
+        let mirrors = |from: DVec3| lobe_is_resolved(ns, rect.normal, from, toward, spread, MIRROR);
+        !glossy || dark || way.try_normalize().is_none_or(mirrors)
+    })
+}
+
+fn lies_behind(rect: &Rect, other: &Rect) -> bool {
+    WHOLE.iter().all(|x| rect.side_of(other.point(x.x, x.y)) <= 0.0)
+}
+
+/// The first reflection from the ball toward whoever sees it along `view`, a direction and how far it turns.
+fn first_is_resolved(
+    scenery: &Scenery,
+    i_surface: usize,
+    lit: &[(usize, Reach)],
+    ball: &Ball,
+    view: (DVec3, f64),
+    relative: f64,
+) -> bool {
+    let (brdf, normal) = (&scenery.brdfs[i_surface], scenery.rects[i_surface].normal);
+    lit.iter().filter(|(_, reach)| *reach == Reach::Open).all(|&(i_light, _)| {
+        let light = &scenery.lights[i_light];
+        let Some((toward, spread)) = light_cone(light, ball, relative) else { return false };
+        let no_lobe = light.is_sky() || brdf.ks == DVec3::ZERO;
+        (no_lobe || lobe_is_resolved(brdf.ns, normal, toward, view.0, spread + view.1, LOBE))
+            && blobs_are_resolved(scenery, ball, source_of(light), relative)
+    })
+}
+
+/// Direction of a ball's centre from `p` and half angle of the cone about the ball; nothing where it is too near.
+fn cone(ball: &Ball, p: DVec3) -> Option<(DVec3, f64)> {
+    let way = ball.center - p;
+    let distance = way.length();
+    (ball.radius <= NEAREST * distance).then(|| (way / distance, (ball.radius / distance).asin()))
+}
+
+/// Direction toward a light from the ball's centre and how far it turns within the ball; nothing where the ball is too
+/// large for the light's distance or cone.
+fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)> {
+    let arrival = light.arrival(ball.center);
+    if arrival.distance.is_infinite() {
+        return Some((arrival.toward, 0.0));
+    }
+    let (toward, spread) = (arrival.toward, (ball.radius / arrival.distance).min(1.0).asin());
+    if let Light::Spot { direction, cos_inner, cos_outer, .. } = *light {
+        let outer = cos_outer.clamp(-1.0, 1.0).acos();
+        let inner = cos_inner.min(1.0).max(cos_outer + LEAST_PENUMBRA).min(1.0).acos();
+        let off_axis = (-toward).angle_between(direction);
+        if off_axis - spread > outer {
+            return Some((toward, spread));
+        }
+        // Light ends within the penumbra, and what a cell there has of it may lie between its nodes: a strip as wide as
+        // the cell along the outer edge, where light sets in with the square, along the inner one, where it bends.
+        let strict = (relative / PENUMBRA_TOLERANCE).min(1.0);
+        let crosses = |edge: f64| (off_axis - edge).abs() < spread;
+        let finer = if crosses(inner) {
+            strict.sqrt()
+        } else if crosses(outer) {
+            strict.cbrt()
+        } else {
+            1.0
+        };
+        if off_axis + spread > inner && spread > PENUMBRA_WIDTHS * finer * (outer - inner) {
+            return None;
+        }
+    }
+    (ball.radius <= NEAREST * arrival.distance).then_some((toward, spread))
+}
+
+/// Whether over directions within `spread` of `a` and `b` together the half vector of both turns little against the lobe's
+/// width, or stays where the lobe is nothing.
+fn lobe_is_resolved(ns: f64, normal: DVec3, a: DVec3, b: DVec3, spread: f64, detail: Detail) -> bool {
+    let width = 1.0 / ns.max(1.0).sqrt();
+    let sum = a + b;
+    // The half vector turns by ½ of what one direction does along the arc between both, and across it by
+    // 1/(2 cos(θ/2)), θ the angle between them.
+    let half_angle = (0.5 * sum.length()).min(1.0).acos() + 0.5 * spread;
+    if half_angle >= std::f64::consts::FRAC_PI_2 {
+        return spread <= LEAST_ANGLE;
+    }
+    let turn = 0.5 * spread / half_angle.cos();
+    if turn <= detail.widths * width {
+        return true;
+    }
+    let gamma = normal.angle_between(sum);
+    gamma - turn > detail.reach * width
+}
+
+/// Whether every blob that casts a shadow between the ball and `end` is wide against the rays from the ball there.
+fn blobs_are_resolved(scenery: &Scenery, ball: &Ball, end: Source, relative: f64) -> bool {
+    let (way, length) = match end {
+        Source::At(q) => ((q - ball.center).normalize_or_zero(), ball.center.distance(q)),
+        Source::Toward(d) => (d, f64::INFINITY),
+    };
+    let matters = |blob: &&Blob| {
+        let depth = (1.0 - scenery.forward) * SQRT_TAU * blob.kappa * blob.sigma;
+        blob.sigma > 0.0 && depth > relative
+    };
+    scenery.blobs.iter().filter(matters).all(|blob| {
+        let offset = blob.position - ball.center;
+        let along = offset.dot(way);
+        // Rays from the ball to a point close in on it; those to a direction stay as wide as the ball.
+        let radius = ball.radius * (1.0 - along.clamp(0.0, length) / length);
+        let before = along > -BLOB_REACH * blob.sigma - ball.radius;
+        let before_end = along < length + BLOB_REACH * blob.sigma;
+        let near = (offset - along * way).length() < BLOB_REACH * blob.sigma + radius;
+        !(before && before_end && near) || radius <= BLOB_WIDTHS * blob.sigma
+    })
+}

@@ -1,0 +1,348 @@
+//! Numbers worked by hand and published ones, then agreement with paths that share no quadrature.
+
+use super::mean::{Window, each};
+use super::paths::Chance;
+use super::visibility::visible;
+use super::*;
+use crate::model::philox::{philox4x32_10, uniform};
+
+const UP: DVec3 = DVec3::Y;
+const FINE: Accuracy = Accuracy::relative(1e-9);
+
+fn rect(center: DVec3, u: DVec3, v: DVec3) -> Surface {
+    Surface { center, u, v, i_material: 0, subdivide: [2, 3] }
+}
+
+fn at(x: f64, y: f64, z: f64) -> DVec3 {
+    DVec3::new(x, y, z)
+}
+
+/// A unit square at height `y` that faces down: under a sky it is lit by the constant share alone.
+fn ceiling(y: f64) -> Surface {
+    rect(at(0.0, y, 0.0), 0.5 * DVec3::X, 0.5 * DVec3::Z)
+}
+
+fn matte(kd: f64) -> Brdf {
+    Brdf { kd: DVec3::splat(kd), ks: DVec3::ZERO, ns: 1.0 }
+}
+
+fn glossy(kd: f64, ks: f64, ns: f64) -> Brdf {
+    Brdf { kd: DVec3::splat(kd), ks: DVec3::splat(ks), ns }
+}
+
+/// A white surface that no other light reaches has L1 = 1 under it.
+const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
+
+fn close(e: &Estimate, irradiance: f64, relative: f64) {
+    let off = (e.irradiance.x - irradiance).abs();
+    // The true value's own digits are beyond the tolerance; 1e-13 for the sums' roundings.
+    assert!(off <= e.irradiance_error + 1e-13 * irradiance, "{e:?} is not {irradiance}");
+    assert!(e.irradiance_error <= relative * irradiance, "{e:?}");
+}
+
+#[test]
+fn form_factors_from_an_element() {
+    // To a unit square at unit distance, opposite its centre: 4/π · A/√(1+A²) atan(A/√(1+A²)), A = ½ (Howell, B-3).
+    let (f, error) = form_factor(&ceiling(1.0), DVec3::ZERO, UP, &FINE);
+    assert!((f - 0.239_456).abs() < 5e-7 && error < 1e-9);
+    let h = 0.2f64.sqrt();
+    assert!((f - 4.0 / PI * h * h.atan()).abs() <= error, "{f} {error}");
+    // To a unit square standing across the element's plane, half a unit away, opposite the middle of its lower edge:
+    // twice Howell's B-4 with X = 2, Y = 1. These are the floor's centre and a wall of a unit cube.
+    let wall = rect(at(-0.5, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
+    let (w, error) = form_factor(&wall, DVec3::ZERO, UP, &FINE);
+    assert!((w - 0.190_136).abs() < 5e-7 && (w - (PI / 4.0 - h * h.atan()) / PI).abs() <= error);
+    assert!((f + 4.0 * w - 1.0).abs() < 2e-9);
+    // From behind, and behind it.
+    assert_eq!(form_factor(&ceiling(1.0), DVec3::ZERO, -UP, &FINE).0, 0.0);
+    assert_eq!(form_factor(&ceiling(-1.0), DVec3::ZERO, -UP, &FINE).0, 0.0);
+}
+
+#[test]
+fn a_receiver_that_touches_what_it_sees_converges() {
+    // B-4 as the element nears the wall's foot: F = ½ − Y/2 …, by its closed form with X = 2, Y = 2c.
+    let wall = rect(at(0.0, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
+    for c in [1e-2f64, 1e-4, 1e-5] {
+        let (y, r) = (2.0 * c, (4.0 + 4.0 * c * c).sqrt());
+        let truth = ((1.0 / y).atan() - y / r * (1.0 / r).atan()) / PI;
+        let (f, error) = form_factor(&wall, at(c, 0.0, 0.0), UP, &Accuracy::relative(1e-7));
+        assert!((f - truth).abs() <= error + 1e-15 && error <= 1e-7 * f, "{c}: {f} {truth} {error}");
+    }
+    // In the wall's plane nothing of it is seen.
+    assert_eq!(form_factor(&wall, DVec3::ZERO, UP, &FINE).0, 0.0);
+    // Parallel plates a hair apart see only each other.
+    let (f, error) = form_factor(&ceiling(1e-5), at(0.1, 0.0, 0.2), UP, &Accuracy::relative(1e-7));
+    assert!((f - 1.0).abs() < 1e-8 + error && error < 1e-7);
+}
+
+#[test]
+fn form_factors_between_squares() {
+    let accuracy = Accuracy::relative(1e-6);
+    // Howell's C-11, directly opposed at unit distance, and C-14, across an edge that both share: 7 digits.
+    let floor = rect(DVec3::ZERO, 0.5 * DVec3::Z, 0.5 * DVec3::X);
+    let wall = rect(at(-0.5, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
+    assert_eq!((floor.normal(), wall.normal(), ceiling(1.0).normal()), (UP, DVec3::X, -UP));
+    for (receiver, published) in [(floor, 0.199_824_9), (wall, 0.200_043_8)] {
+        let s = Scenery::new(&[receiver, ceiling(1.0)], &[matte(0.5), matte(1.0)], &[GLOW], &[], 0.0, &[]);
+        let e = s.mean_second(0, &Window::WHOLE, at(9.0, 9.0, 9.0), &accuracy);
+        let f = e.irradiance.x / PI;
+        assert!((f - published).abs() < 5.1e-8 + e.irradiance_error, "{f} {e:?}");
+        assert!(e.irradiance_error <= 1.2e-6 * e.irradiance.x && (e.radiance.x - 0.5 * f).abs() < 1e-14);
+    }
+}
+
+fn cube(albedo: Brdf) -> (Vec<Surface>, Vec<Brdf>) {
+    let axes = [(DVec3::X, DVec3::Y, DVec3::Z), (DVec3::Y, DVec3::Z, DVec3::X), (DVec3::Z, DVec3::X, DVec3::Y)];
+    let faces = axes.iter().flat_map(|&(n, u, v)| [rect(-n, u, v), rect(n, v, u)]);
+    (faces.collect(), vec![albedo; 6])
+}
+
+#[test]
+fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
+    let (faces, brdfs) = cube(matte(0.7));
+    let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
+    let s = Scenery::new(&faces, &brdfs, &sky, &[], 0.0, &[]);
+    for (i, face) in faces.iter().enumerate() {
+        for (a, b) in [(0.0, 0.0), (0.31, -0.77), (0.999, 0.2), (-0.999_99, 0.999_99)] {
+            let receiver = s.on_surface(i, face.center + a * face.u + b * face.v);
+            let toward = (-receiver.position).normalize();
+            assert!((s.first(&receiver, toward) - 0.7).length() < 1e-15);
+            let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
+            assert!((e.radiance.x - 0.49).abs() <= e.error && e.error <= 1e-7 * 0.49, "{e:?}");
+            close(&e, PI * 0.7, 1e-7);
+        }
+    }
+    // Paths drawn by the cosine carry the albedo itself: no chance is left.
+    let receiver = s.on_surface(2, faces[2].center + 0.3 * faces[2].u);
+    let found = s.reflections(&receiver, receiver.normal, 5, Chance { n_paths: 2000, seed: 1 });
+    for (k, l) in found[..5].iter().enumerate() {
+        assert!((l.radiance.x - 0.7f64.powi(k as i32 + 1)).abs() < 1e-12, "{k} {l:?}");
+    }
+    assert!((found[5].radiance.x - (1..=5).map(|k| 0.7f64.powi(k)).sum::<f64>()).abs() < 1e-12);
+}
+
+#[test]
+fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
+    let lamp = ceiling(2.0);
+    let receiver = Receiver::new(DVec3::ZERO, UP, matte(0.5));
+    let second = |surfaces: &[Surface], blobs: &[Blob]| {
+        let brdfs = vec![matte(1.0); surfaces.len()];
+        Scenery::new(surfaces, &brdfs, &[GLOW], blobs, 0.0, &[]).second(&receiver, UP, &FINE)
+    };
+    let free = second(&[lamp], &[]);
+    // A black one with its edge through the axis, level and leaning.
+    for lean in [0.0, 0.7] {
+        let along = DVec3::X.rotate_z(lean);
+        let blocker = rect(at(0.0, 1.0, 0.0) + 3.0 * along, 3.0 * along, 9.0 * DVec3::Z);
+        let s = Scenery::new(&[lamp, blocker], &[matte(1.0), matte(0.0)], &[GLOW], &[], 0.0, &[]);
+        close(&s.second(&receiver, UP, &FINE), 0.5 * free.irradiance.x, 1e-9);
+        assert!(!visible(&[lamp, blocker], DVec3::ZERO, lamp.center + 0.2 * DVec3::X));
+    }
+    // A wide blob, seen through its centre by every ray within a small lamp: e^{−τ}, τ hardly varying with direction.
+    let small = rect(at(0.0, 200.0, 0.0), 0.1 * DVec3::X, 0.1 * DVec3::Z);
+    let blob = Blob { position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
+    let ratio = second(&[small], &[blob]).irradiance.x / second(&[small], &[]).irradiance.x;
+    // b ≤ 0.07 at the blob: b²/2σ² < 1e-4.
+    assert!((ratio / (-2.506_628_274_631f64).exp() - 1.0).abs() < 2.6e-4, "{ratio}");
+}
+
+#[test]
+fn a_lobe_of_any_width_is_found() {
+    // Eye along the normal, a lamp that fills the lobe: ∫ K_s (n+2)/2π cos^n γ cos 2γ · 4 cos γ dω_h
+    // = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1); below cos 22.5° there is nothing left.
+    let lamp = rect(UP, DVec3::X, DVec3::Z);
+    let sun = [Light::Directional { direction: UP, irradiance: DVec3::ONE }];
+    let nothing = matte(0.0);
+    for ns in [1e3, 1e4, 1e6] {
+        let albedo = 4.0 * 0.3 * (2.0 * (ns + 2.0) / (ns + 4.0) - 1.0);
+        let mirror = Receiver::new(DVec3::ZERO, UP, glossy(0.0, 0.3, ns));
+        let s = Scenery::new(&[lamp], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
+        let e = s.second(&mirror, UP, &Accuracy::relative(1e-8));
+        assert!((e.radiance.x - albedo).abs() <= e.error + 1e-12 && e.error <= 1e-8 * albedo, "{ns} {e:?}");
+        // The same lobe on the lamp's side: a sun from below, straight up, and a receiver that looks at it.
+        let s = Scenery::new(&[lamp], &[glossy(0.0, 0.3, ns)], &sun, &[], 0.0, &[]);
+        let e = s.second(&Receiver::new(DVec3::ZERO, UP, nothing), UP, &Accuracy::relative(1e-8));
+        close(&e, albedo, 1e-8);
+    }
+}
+
+#[test]
+fn means_of_the_first_reflection_hold_the_lights_flux() {
+    let floor = rect(DVec3::ZERO, DVec3::Z, DVec3::X);
+    let check = |light: Light, truth: f64, relative: f64| {
+        let lights = [light];
+        let s = Scenery::new(&[floor], &[matte(0.5)], &lights, &[], 0.0, &[]);
+        let e = s.mean_first(0, &Window::WHOLE, at(0.0, 5.0, 0.0), &Accuracy::relative(relative));
+        assert!((e.radiance.x * PI / (0.5 * e.irradiance.x) - 1.0).abs() < 1e-12);
+        close(&e, truth / 4.0, relative);
+    };
+    // A square of half edge 1 seen from height h above its centre: solid angle 4 asin(1/(1 + h²)).
+    for h in [1.0, 0.1, 1e-3] {
+        let light = Light::Point { position: at(0.0, h, 0.0), intensity: DVec3::ONE, radius: 0.0 };
+        check(light, 4.0 * (1.0 / (1.0 + h * h)).asin(), 1e-6);
+    }
+    // A cone's: 2π(1 − cos θ_i + (cos θ_i − cos θ_o)/3).
+    for (inner, outer) in [(5.0f64, 7.0f64), (0.5, 3.0), (10.0, 10.5)] {
+        let (cos_inner, cos_outer) = (inner.to_radians().cos(), outer.to_radians().cos());
+        let position = at(0.3, 0.5, -0.6);
+        let (direction, intensity) = (-UP, DVec3::ONE);
+        let light = Light::Spot { position, direction, intensity, radius: 0.0, cos_inner, cos_outer };
+        let truth = 2.0 * PI * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0);
+        for relative in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
+            check(light, truth, relative);
+        }
+    }
+}
+
+/// Twelve rectangles at random in a box of half edge 2, four of them glossy, and lights.
+fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {
+    let mut n = 0;
+    let mut next = || {
+        n += 1;
+        uniform(philox4x32_10([seed, 77], [n, 0, 0, 0])[0])
+    };
+    let (mut surfaces, mut brdfs) = (Vec::new(), Vec::new());
+    for i in 0..12 {
+        let mut v = || at(next(), next(), next()) * 2.0 - 1.0;
+        let (center, u, w) = (2.0 * v(), v(), v());
+        let u = u.normalize();
+        let v = (w - w.dot(u) * u).normalize();
+        surfaces.push(Surface {
+            center,
+            u: u * (0.3 + next()),
+            v: v * (0.3 + next()),
+            i_material: i,
+            subdivide: [8, 8],
+        });
+        let kd = at(next(), next(), next()) * 0.6;
+        let (ks, ns) = if i % 3 == 0 { (0.1, 10f64.powf(1.0 + 2.0 * next())) } else { (0.0, 1.0) };
+        brdfs.push(Brdf { kd, ks: DVec3::splat(ks), ns });
+    }
+    let direction = at(0.3, -0.8, 0.5).normalize();
+    let lights = vec![
+        Light::Directional { direction, irradiance: at(3.0, 2.9, 2.7) },
+        Light::Point { position: at(0.5, 2.5, -1.0), intensity: DVec3::splat(4.0), radius: 0.01 },
+        Light::Sky { irradiance: at(0.3, 0.4, 0.6), constant: 0.1 },
+    ];
+    (surfaces, brdfs, lights)
+}
+
+#[test]
+fn quadrature_and_paths_agree_in_random_scenes() {
+    let blobs = [
+        Blob { position: at(0.2, 0.3, -0.4), sigma: 0.4, kappa: 1.5 },
+        Blob { position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
+    ];
+    let discs = [
+        Disc { position: at(0.1, 1.9, 0.2), normal: at(0.6, -0.8, 0.0), area: 0.4, kd: at(0.9, 0.8, 0.7) },
+        Disc { position: at(-1.4, 0.1, 0.9), normal: at(0.0, 0.0, -1.0), area: 0.2, kd: at(0.5, 0.8, 0.7) },
+    ];
+    let (mut n, mut chi2) = (0.0, 0.0);
+    for seed in 0..3 {
+        let (surfaces, brdfs, lights) = random_scene(seed);
+        let s = Scenery::new(&surfaces, &brdfs, &lights, &blobs, 0.2, &discs);
+        let mut receivers: Vec<Receiver> = (0..12).map(|i| s.on_surface(i, surfaces[i].facet_center(19))).collect();
+        receivers.extend((0..2).map(|i| s.on_disc(i)));
+        for receiver in receivers {
+            let toward = (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
+            let e = s.second(&receiver, toward, &Accuracy::relative(1e-4));
+            let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 20_000, seed })[1];
+            for c in 0..3 {
+                // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the sample's variance.
+                let (off, sigma) = ((e.radiance[c] - found.radiance[c]).abs(), found.error[c].hypot(e.error) + 5e-5);
+                if e.radiance[c] > 0.0 {
+                    // 126 normal numbers: beyond 5 of them one in 2e-5 such tests.
+                    assert!(off < 5.0 * sigma, "{seed} {receiver:?} {e:?} {found:?}");
+                    (n, chi2) = (n + 1.0, chi2 + (off / sigma).powi(2));
+                }
+            }
+        }
+    }
+    // The channels of one receiver are nearly one number, so the sum has a third of the freedom: 5 √(2/(n/3)).
+    let expected: f64 = 1.0;
+    assert!(n > 60.0 && chi2 / n < expected + 5.0 * (6.0 / n).sqrt(), "{chi2} of {n}");
+}
+
+#[test]
+fn the_error_bounds_what_a_finer_integral_finds() {
+    let (surfaces, brdfs, lights) = random_scene(7);
+    let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
+    let off_by = |i: usize| {
+        let receiver = s.on_surface(i % 12, surfaces[i % 12].facet_center(i as u32));
+        let toward = receiver.normal;
+        let truth = s.second(&receiver, toward, &Accuracy::relative(1e-9));
+        for relative in [1e-1, 1e-2, 1e-4, 1e-6] {
+            let e = s.second(&receiver, toward, &Accuracy::relative(relative));
+            let off = (e.radiance - truth.radiance).abs().max_element();
+            let off_e = (e.irradiance - truth.irradiance).abs().max_element();
+            assert!(off <= e.error + truth.error && off_e <= e.irradiance_error + truth.irradiance_error, "{i} {e:?}");
+            assert!(e.error <= relative * e.radiance.max_element());
+        }
+        truth.irradiance.x
+    };
+    assert!(each(48, off_by).iter().filter(|&&e| e > 0.0).count() > 30);
+}
+
+#[test]
+fn a_mean_is_that_of_its_facets() {
+    let (surfaces, brdfs, lights) = random_scene(3);
+    let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
+    let (eye, accuracy) = (at(3.0, 4.0, 5.0), Accuracy::relative(1e-3));
+    let surface = Surface { subdivide: [2, 2], ..surfaces[1] };
+    let mean = |w: &Window| [s.mean_first(1, w, eye, &accuracy), s.mean_second(1, w, eye, &accuracy)];
+    let facets = each(4, |i| mean(&Window::facet(&surface, i as u32)));
+    for (k, whole) in mean(&Window::WHOLE).iter().enumerate() {
+        let of_facets = facets.iter().map(|f| f[k].irradiance).sum::<DVec3>() / 4.0;
+        let error = whole.irradiance_error + facets.iter().map(|f| f[k].irradiance_error).sum::<f64>() / 4.0;
+        assert!(whole.irradiance.x > 0.0 && (whole.irradiance - of_facets).abs().max_element() <= error, "{k}");
+    }
+}
+
+#[test]
+fn a_pair_of_discs_by_hand() {
+    // Sun straight down with E = π on a white disc of area π facing up at the origin; a receiver one above it, facing
+    // down: E = L A/(d² + A/π) = π/2.
+    let disc = Disc { position: DVec3::ZERO, normal: UP, area: PI, kd: DVec3::ONE };
+    let sun = [Light::Directional { direction: at(0.0, -1.0, 0.0), irradiance: DVec3::splat(PI) }];
+    let discs = [disc, Disc { position: UP, normal: -UP, ..disc }];
+    let s = Scenery::new(&[], &[], &sun, &[], 0.0, &discs);
+    let e = s.second(&s.on_disc(1), -UP, &FINE);
+    assert!((e.irradiance.x - PI / 2.0).abs() < 1e-15 && (e.radiance.x - 0.5).abs() < 1e-15 && e.error == 0.0);
+    // Its own light does not fall on itself.
+    assert_eq!(s.second(&s.on_disc(0), UP, &FINE).irradiance, DVec3::ZERO);
+    assert_eq!(s.irradiance(&s.on_disc(0)), DVec3::splat(PI));
+}
+
+#[test]
+fn where_evaluations_run_out_the_error_has_no_end() {
+    let s = Scenery::new(&[ceiling(1e-5)], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
+    let few = Accuracy { relative: 1e-6, absolute: 0.0, max_evaluations: 200 };
+    let e = s.second(&Receiver::new(DVec3::ZERO, UP, matte(1.0)), UP, &few);
+    assert!(e.error.is_infinite() && e.n_evaluations <= 220);
+}
+
+#[test]
+fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
+    let eye = at(3.0, 4.0, 5.0);
+    let check = |s: &Scenery, i: usize, window: &Window| {
+        let truth = s.mean_second(i, window, eye, &Accuracy::relative(1e-3));
+        for relative in [1e-1, 1e-2] {
+            let e = s.mean_second(i, window, eye, &Accuracy::relative(relative));
+            let off = (e.radiance - truth.radiance).abs().max_element();
+            assert!(off <= e.error + truth.error, "{i} {window:?} {off} {e:?} {truth:?}");
+            let off = (e.irradiance - truth.irradiance).abs().max_element();
+            assert!(off <= e.irradiance_error + truth.irradiance_error, "{i} {window:?} {off} {e:?} {truth:?}");
+        }
+    };
+    let (surfaces, brdfs, lights) = random_scene(0);
+    let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
+    each(6, |i| check(&s, i, &Window::facet(&surfaces[i], 5 + 3 * i as u32)));
+    // A polished floor under a small lamp that faces it, and a small lamp a hair above it.
+    let floor = rect(DVec3::ZERO, 2.0 * DVec3::Z, 2.0 * DVec3::X);
+    let lamp = |x: f64, y: f64, half: f64| rect(at(x, y, 0.37), half * DVec3::X, half * DVec3::Z);
+    let surfaces = [floor, lamp(0.5, 1.0, 0.01), lamp(-1.2, 0.02, 0.05)];
+    for ns in [1.0, 1e3] {
+        let s = Scenery::new(&surfaces, &[glossy(0.1, 0.3, ns), matte(1.0), matte(1.0)], &[GLOW], &[], 0.0, &[]);
+        check(&s, 0, &Window::WHOLE);
+    }
+}

@@ -13,7 +13,7 @@ use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_S
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, transmit};
+use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, surfaces, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -33,7 +33,7 @@ const RECORDS: [Record; 10] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 15] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
@@ -46,6 +46,8 @@ const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
+    ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
+    ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), B(4), B(4)]),
 ];
 

@@ -5,6 +5,8 @@ mod bounded;
 mod harness;
 #[path = "harness/picture.rs"]
 mod picture;
+#[path = "harness/scenery.rs"]
+mod scenery;
 
 use std::path::Path;
 
@@ -32,8 +34,9 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     let mut random = Random(77);
     let lit = |_: &PlacedRecord| {
-        let radiance = [random.within(0.0, 4.0), random.within(0.0, 1.0), random.within(0.0, 0.01), 0.0];
-        LitRecord { irradiance: [9.0; 4], radiance }
+        let first = [random.within(0.0, 4.0), random.within(0.0, 1.0), random.within(0.0, 0.01)];
+        let second = [random.within(0.0, 1.0), 0.0, random.within(0.0, 0.01)];
+        LitRecord { first, second, direct: [9.0; 3], indirect: [9.0; 3], ..LitRecord::default() }
     };
     let lit = Some(picture.placed.iter().map(lit).collect());
     for picture in [picture.clone(), Picture { lit, ..picture.clone() }] {

@@ -8,6 +8,7 @@ pub mod grid;
 pub mod place;
 pub mod sort;
 pub mod sprites;
+pub mod surfaces;
 pub mod transmit;
 
 use crate::gpu::Sources;
@@ -38,6 +39,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "sort_scatter.comp",
     "sprites.frag",
     "sprites.vert",
+    "surfaces.frag",
+    "surfaces.vert",
     "transmit.comp",
 ];
 

@@ -6,8 +6,10 @@
 
 // 0: particle colours as given; 1: the radiance of the particle's facet.
 layout(constant_id = 0) const uint LIT = 1;
+// 1: the quad has its centre's depth, near/z, and surfaces hide it.
+layout(constant_id = 1) const uint BEHIND = 0;
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float unused; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
@@ -46,7 +48,8 @@ void main() {
     vec3 v = vec3(dot(push.camera.right, c), dot(push.camera.up, c), dot(push.camera.forward, c));
     float tau = SQRT_TAU * particles[i].kappa * sigma;
     out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
-    out_radiance = LIT != 0 ? lit[i].first + lit[i].second : particles[i].color;
+    uint i_facet = push.i_first_facet + i;
+    out_radiance = LIT != 0 ? lit[i_facet].first + lit[i_facet].second : particles[i].color;
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
         // Nothing to draw: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
@@ -59,5 +62,7 @@ void main() {
     x = clamp(x, -1.0, 1.0);
     y = clamp(y, -1.0, 1.0);
     bool right = (gl_VertexIndex & 1) != 0, top = (gl_VertexIndex & 2) != 0;
-    gl_Position = vec4(right ? x.y : x.x, -(top ? y.y : y.x), 0.0, 1.0);
+    // At most 1: rounded up, near/near would be clipped.
+    float depth = BEHIND != 0 ? min(push.camera.near / v.z, 1.0) : 0.0;
+    gl_Position = vec4(right ? x.y : x.x, -(top ? y.y : y.x), depth, 1.0);
 }

@@ -15,7 +15,8 @@ use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, second, sort, sprites, transmit};
+use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, second, sort, sprites, surfaces};
+use nimbus::passes::transmit;
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -41,7 +42,7 @@ const RECORDS: [Record; 16] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 19] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 21] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), R("Lit")]),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, &[R("Region"), B(4), R("Facet")]),
@@ -82,6 +83,8 @@ const INTERFACES: [(&str, &[Field], &[Element]); 19] = [
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
+    ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
+    ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(4)]),
 ];
 

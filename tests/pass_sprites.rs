@@ -5,6 +5,8 @@ mod bounded;
 mod harness;
 #[path = "harness/picture.rs"]
 mod picture;
+#[path = "harness/scenery.rs"]
+mod scenery;
 
 use std::path::Path;
 

@@ -9,7 +9,7 @@ use super::relay::Relay;
 use super::{limits, ms};
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Place, Recorder, ScopeTime};
+use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Place, Recorder, ScopeTime, Target};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
@@ -93,7 +93,7 @@ impl Renderer {
             first: First::new(device, compiler)?,
             second,
             sort: Sort::new(device, compiler, n_particles)?,
-            sprites: Sprites::new(device, compiler, format, lit)?,
+            sprites: Sprites::new(device, compiler, format, lit, false)?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
             readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
@@ -222,7 +222,7 @@ impl Renderer {
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
                 let from = [&b.entries, &b.placed, &b.particles, &b.lit];
-                sprites.record(rec, from, target, &packet.camera, s.cutoff, n)
+                sprites.record(rec, from, Target::color(target), &packet.camera, s.cutoff, [n, 0])
             })
         })
     }

@@ -268,6 +268,7 @@ fn unusable(
         (v12.timeline_semaphore, "timelineSemaphore"),
         (v13.synchronization2, "synchronization2"),
         (v13.dynamic_rendering, "dynamicRendering"),
+        (v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
     ];
     needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
 }
@@ -277,7 +278,11 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
     let queues =
         [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default().synchronization2(true).dynamic_rendering(true);
+    // Demotion is what `discard` compiles to.
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .dynamic_rendering(true)
+        .shader_demote_to_helper_invocation(true);
     let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut v12).push_next(&mut v13);
     unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
 }

@@ -1,4 +1,5 @@
-//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers; premultiplied "over".
+//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers; premultiplied "over", or
+//! opaque with depth.
 
 use std::sync::Arc;
 
@@ -6,7 +7,7 @@ use ash::vk;
 
 use super::device::{Device, Shared};
 use super::kernel::{Field, Interface, Module, check_push, specialization};
-use super::memory::TargetFormat;
+use super::memory::{TargetFormat, depth_format};
 use super::reflect::reflect;
 use super::shader::{Compiler, Optimize};
 use crate::error::{Error, Result};
@@ -15,11 +16,25 @@ pub struct DrawPipeline {
     pub(super) raw: vk::Pipeline,
     pub(super) interface: Interface,
     pub(super) name: String,
+    /// Whether it draws into a target with depth.
+    pub(super) has_depth: bool,
     shared: Arc<Shared>,
 }
 
+/// How a fragment meets what the target holds. Depth is reversed: the greater one is nearer.
+#[derive(Clone, Copy, PartialEq)]
+enum Meet {
+    /// Blended over it.
+    Over,
+    /// Blended over it where it is as near as what wrote depth, which it does not.
+    OverNearer,
+    /// In its place, with its depth, where it is as near.
+    Replace,
+}
+
 impl DrawPipeline {
-    /// `name.vert` and `name.frag`, drawn as triangle strips, blended premultiplied over a target of `format`.
+    /// `name.vert` and `name.frag`, drawn as triangle strips, blended premultiplied over a target of `format`; `tested`:
+    /// only where they are as near as the target's depth.
     pub fn over(
         device: &Device,
         compiler: &Compiler,
@@ -27,6 +42,31 @@ impl DrawPipeline {
         push: &[Field],
         constants: &[(u32, u32)],
         format: TargetFormat,
+        tested: bool,
+    ) -> Result<DrawPipeline> {
+        let meet = if tested { Meet::OverNearer } else { Meet::Over };
+        Self::new(device, compiler, name, push, constants, (format, meet))
+    }
+
+    /// The same, opaque: the nearest stays, and of equally near ones the last.
+    pub fn opaque(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        format: TargetFormat,
+    ) -> Result<DrawPipeline> {
+        Self::new(device, compiler, name, push, constants, (format, Meet::Replace))
+    }
+
+    fn new(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        (format, meet): (TargetFormat, Meet),
     ) -> Result<DrawPipeline> {
         let (vert_file, frag_file) = (format!("{name}.vert"), format!("{name}.frag"));
         let vert = compiler.compile(&vert_file, Optimize::Yes)?;
@@ -39,11 +79,11 @@ impl DrawPipeline {
         let stages = [(&in_vert, vk::ShaderStageFlags::VERTEX), (&in_frag, vk::ShaderStageFlags::FRAGMENT)];
         let interface = Interface::new(device, name, &stages, push)?;
         let shared = device.shared().clone();
-        let vert = Module::new(&shared, &vert_file, &vert)?;
-        let frag = Module::new(&shared, &frag_file, &frag)?;
-        let raw = create(&shared, name, &vert, &frag, &interface, constants, format)?;
+        let modules = [Module::new(&shared, &vert_file, &vert)?, Module::new(&shared, &frag_file, &frag)?];
+        let formats = (format.raw(), depth_format(device));
+        let raw = create(&interface, name, &modules, constants, formats, meet)?;
         shared.name(raw, name);
-        Ok(DrawPipeline { raw, interface, name: name.to_owned(), shared })
+        Ok(DrawPipeline { raw, interface, name: name.to_owned(), has_depth: meet != Meet::Over, shared })
     }
 }
 
@@ -55,13 +95,12 @@ impl Drop for DrawPipeline {
 }
 
 fn create(
-    shared: &Shared,
-    name: &str,
-    vert: &Module,
-    frag: &Module,
     interface: &Interface,
+    name: &str,
+    [vert, frag]: &[Module; 2],
     constants: &[(u32, u32)],
-    format: TargetFormat,
+    (color_format, depth_format): (vk::Format, vk::Format),
+    meet: Meet,
 ) -> Result<vk::Pipeline> {
     let (entries, data) = specialization(constants);
     let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
@@ -75,22 +114,16 @@ fn create(
     let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
     let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-    let over = vk::PipelineColorBlendAttachmentState {
-        blend_enable: vk::TRUE,
-        src_color_blend_factor: vk::BlendFactor::ONE,
-        dst_color_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-        color_blend_op: vk::BlendOp::ADD,
-        src_alpha_blend_factor: vk::BlendFactor::ONE,
-        dst_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-        alpha_blend_op: vk::BlendOp::ADD,
-        color_write_mask: vk::ColorComponentFlags::RGBA,
-    };
-    let attachments = [over];
+    let attachments = [blending(meet)];
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+    let depth = depth_test(meet);
     let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
-    let formats = [format.raw()];
+    let formats = [color_format];
     let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    if meet != Meet::Over {
+        rendering = rendering.depth_attachment_format(depth_format);
+    }
     let info = vk::GraphicsPipelineCreateInfo::default()
         .stages(&stages)
         .vertex_input_state(&vertex_input)
@@ -98,10 +131,31 @@ fn create(
         .viewport_state(&viewport)
         .rasterization_state(&raster)
         .multisample_state(&samples)
+        .depth_stencil_state(&depth)
         .color_blend_state(&blend)
         .dynamic_state(&dynamic)
         .layout(interface.layout)
         .push_next(&mut rendering);
-    let made = unsafe { shared.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+    let made = unsafe { interface.shared.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
     Ok(made.map_err(|(_, e)| Error::vulkan(format!("vkCreateGraphicsPipelines {name}"), e))?[0])
+}
+
+fn blending(meet: Meet) -> vk::PipelineColorBlendAttachmentState {
+    vk::PipelineColorBlendAttachmentState {
+        blend_enable: vk::Bool32::from(meet != Meet::Replace),
+        src_color_blend_factor: vk::BlendFactor::ONE,
+        dst_color_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        color_blend_op: vk::BlendOp::ADD,
+        src_alpha_blend_factor: vk::BlendFactor::ONE,
+        dst_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        alpha_blend_op: vk::BlendOp::ADD,
+        color_write_mask: vk::ColorComponentFlags::RGBA,
+    }
+}
+
+fn depth_test(meet: Meet) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
+    vk::PipelineDepthStencilStateCreateInfo::default()
+        .depth_test_enable(meet != Meet::Over)
+        .depth_write_enable(meet == Meet::Replace)
+        .depth_compare_op(vk::CompareOp::GREATER_OR_EQUAL)
 }

@@ -26,7 +26,7 @@ pub(super) struct Interface {
     pub access: Vec<Access>,
     pub push_bytes: usize,
     pub stages: vk::ShaderStageFlags,
-    shared: Arc<Shared>,
+    pub shared: Arc<Shared>,
 }
 
 pub struct Kernel {

@@ -121,12 +121,13 @@ pub fn storage_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> 
     }
 }
 
-/// A colour target.
+/// A colour target, or depth beside one.
 pub struct Image {
     pub(super) raw: vk::Image,
     pub(super) view: vk::ImageView,
     pub(super) layout: vk::ImageLayout,
     pub(super) extent: vk::Extent2D,
+    pub(super) range: vk::ImageSubresourceRange,
     allocation: Option<Allocation>,
     shared: Arc<Shared>,
 }
@@ -156,37 +157,44 @@ impl TargetFormat {
 
 impl Image {
     pub fn color_target(device: &Device, name: &str, width: u32, height: u32, format: TargetFormat) -> Result<Image> {
-        let most = device.limits().max_image_extent;
-        if width.max(height) > most {
-            return Err(Error::limit(format!(
-                "{name}: {width}×{height} pixels are wanted, this device takes {most} along a side"
-            )));
-        }
-        let bytes = u64::from(width) * u64::from(height) * format.bytes_per_pixel();
-        if bytes > device.limits().device_memory_bytes {
-            return Err(Error::limit(format!(
-                "{name}: {bytes} bytes are wanted, this device has {}",
-                device.limits().device_memory_bytes
-            )));
-        }
-        let shared = device.shared().clone();
+        let extent = check_extent(device, name, width, height, format.bytes_per_pixel())?;
         check_blendable(device, format)?;
-        let extent = vk::Extent2D { width, height };
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
+        Image::new(device, name, extent, format.raw(), usage, vk::ImageAspectFlags::COLOR)
+    }
+
+    /// Depth in the best format that the device has.
+    pub fn depth(device: &Device, name: &str, width: u32, height: u32) -> Result<Image> {
+        let extent = check_extent(device, name, width, height, DEPTH_BYTES_PER_PIXEL)?;
+        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+        Image::new(device, name, extent, depth_format(device), usage, vk::ImageAspectFlags::DEPTH)
+    }
+
+    fn new(
+        device: &Device,
+        name: &str,
+        extent: vk::Extent2D,
+        format: vk::Format,
+        usage: vk::ImageUsageFlags,
+        aspect: vk::ImageAspectFlags,
+    ) -> Result<Image> {
+        let shared = device.shared().clone();
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
-            .format(format.raw())
+            .format(format)
             .extent(extent.into())
             .mip_levels(1)
             .array_layers(1)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC);
+            .usage(usage);
         let raw = unsafe { shared.raw.create_image(&info, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateImage {name}"), e))?;
         shared.name(raw, name);
         let requirements = unsafe { shared.raw.get_image_memory_requirements(raw) };
-        let layout = vk::ImageLayout::UNDEFINED;
-        let mut image = Image { raw, view: vk::ImageView::null(), layout, extent, allocation: None, shared };
+        let (layout, view) = (vk::ImageLayout::UNDEFINED, vk::ImageView::null());
+        let range = vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1);
+        let mut image = Image { raw, view, layout, extent, range, allocation: None, shared };
         let allocation = allocate(&image.shared, name, requirements, MemoryLocation::GpuOnly, false)?;
         let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
         image.allocation = Some(allocation);
@@ -195,8 +203,8 @@ impl Image {
         let view = vk::ImageViewCreateInfo::default()
             .image(raw)
             .view_type(vk::ImageViewType::TYPE_2D)
-            .format(format.raw())
-            .subresource_range(COLOR_RANGE);
+            .format(format)
+            .subresource_range(range);
         image.view = unsafe { image.shared.raw.create_image_view(&view, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateImageView {name}"), e))?;
         image.shared.name(image.view, name);
@@ -224,13 +232,34 @@ impl Drop for Image {
     }
 }
 
-pub(super) const COLOR_RANGE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
-    aspect_mask: vk::ImageAspectFlags::COLOR,
-    base_mip_level: 0,
-    level_count: 1,
-    base_array_layer: 0,
-    layer_count: 1,
-};
+/// The extent, if the device takes an image of it.
+fn check_extent(device: &Device, name: &str, width: u32, height: u32, bytes_per_pixel: u64) -> Result<vk::Extent2D> {
+    let limits = device.limits();
+    let most = limits.max_image_extent;
+    if width.max(height) > most {
+        return Err(Error::limit(format!(
+            "{name}: {width}×{height} pixels are wanted, this device takes {most} along a side"
+        )));
+    }
+    let bytes = u64::from(width) * u64::from(height) * bytes_per_pixel;
+    if bytes > limits.device_memory_bytes {
+        let has = limits.device_memory_bytes;
+        return Err(Error::limit(format!("{name}: {bytes} bytes are wanted, this device has {has}")));
+    }
+    Ok(vk::Extent2D { width, height })
+}
+
+/// Of both formats that [`depth_format`] chooses from.
+pub const DEPTH_BYTES_PER_PIXEL: u64 = 4;
+
+/// Reversed depth wants a float, whose steps shrink with the distance. Vulkan promises that one of the two can be drawn to.
+pub(super) fn depth_format(device: &Device) -> vk::Format {
+    let features = device.format_features(vk::Format::D32_SFLOAT);
+    match features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
+        true => vk::Format::D32_SFLOAT,
+        false => vk::Format::X8_D24_UNORM_PACK32,
+    }
+}
 
 /// Blending is guaranteed for rgba16f; rgba32f is probed.
 fn check_blendable(device: &Device, format: TargetFormat) -> Result<()> {

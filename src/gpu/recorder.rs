@@ -8,9 +8,8 @@ use ash::vk;
 use bytemuck::Pod;
 
 use super::device::{Device, Shared};
-use super::draw::DrawPipeline;
 use super::kernel::{Interface, Kernel};
-use super::memory::{Buffer, COLOR_RANGE, Image};
+use super::memory::Buffer;
 use super::timer::{ScopeTime, Timer};
 use crate::error::{Error, Result};
 
@@ -30,13 +29,13 @@ pub enum Barriers {
 /// One command buffer with all that a submission needs: descriptors, timestamps, a timeline semaphore.
 pub struct Commands {
     pool: vk::CommandPool,
-    buffer: vk::CommandBuffer,
+    pub(super) buffer: vk::CommandBuffer,
     semaphore: vk::Semaphore,
     submitted: u64,
     descriptors: Vec<vk::DescriptorPool>,
     timer: Timer,
     name: String,
-    shared: Arc<Shared>,
+    pub(super) shared: Arc<Shared>,
 }
 
 impl Commands {
@@ -174,7 +173,7 @@ const READS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
 );
 
 pub struct Recorder<'a> {
-    commands: &'a mut Commands,
+    pub(super) commands: &'a mut Commands,
     uses: HashMap<vk::Buffer, Use>,
     i_pool: usize,
     barriers: Barriers,
@@ -212,38 +211,6 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    /// Clears `target` and draws `n_instances` strips of four vertices into it.
-    pub fn draw<P: Pod>(
-        &mut self,
-        pipeline: &DrawPipeline,
-        target: &mut Image,
-        buffers: &[&Buffer],
-        push: &P,
-        n_instances: u32,
-    ) -> Result<()> {
-        self.transition(target, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
-        self.bind(vk::PipelineBindPoint::GRAPHICS, pipeline.raw, &pipeline.interface, &pipeline.name, buffers, push)?;
-        let attachment = vk::RenderingAttachmentInfo::default()
-            .image_view(target.view)
-            .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
-            .store_op(vk::AttachmentStoreOp::STORE);
-        let attachments = [attachment];
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: target.extent };
-        let info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&attachments);
-        let (width, height) = (target.extent.width as f32, target.extent.height as f32);
-        let viewport = vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
-        let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
-        unsafe {
-            raw.cmd_begin_rendering(commands, &info);
-            raw.cmd_set_viewport(commands, 0, &[viewport]);
-            raw.cmd_set_scissor(commands, 0, &[area]);
-            raw.cmd_draw(commands, 4, n_instances, 0, 0);
-            raw.cmd_end_rendering(commands);
-        }
-        Ok(())
-    }
-
     /// Sets every 32-bit word of `buffer`.
     pub fn fill(&mut self, buffer: &Buffer, word: u32) {
         self.depend(&[(buffer.raw, false, true)]);
@@ -257,24 +224,7 @@ impl Recorder<'_> {
         unsafe { self.commands.shared.raw.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &region) };
     }
 
-    /// Copies the whole image, rows from the top, tightly packed.
-    pub fn copy_image(&mut self, from: &mut Image, to: &Buffer) {
-        self.transition(from, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
-        self.depend(&[(to.raw, false, true)]);
-        let layers = vk::ImageSubresourceLayers {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            mip_level: 0,
-            base_array_layer: 0,
-            layer_count: 1,
-        };
-        let region = [vk::BufferImageCopy::default().image_subresource(layers).image_extent(from.extent.into())];
-        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-        unsafe {
-            self.commands.shared.raw.cmd_copy_image_to_buffer(self.commands.buffer, from.raw, layout, to.raw, &region)
-        };
-    }
-
-    fn bind<P: Pod>(
+    pub(super) fn bind<P: Pod>(
         &mut self,
         point: vk::PipelineBindPoint,
         pipeline: vk::Pipeline,
@@ -341,7 +291,7 @@ impl Recorder<'_> {
     }
 
     /// Makes the coming use of (buffer, reads, writes) wait for what it depends on.
-    fn depend(&mut self, coming: &[(vk::Buffer, bool, bool)]) {
+    pub(super) fn depend(&mut self, coming: &[(vk::Buffer, bool, bool)]) {
         let hazard = coming.iter().any(|(b, reads, writes)| {
             let before = self.uses.get(b).copied().unwrap_or_default();
             (before.written && (*reads || *writes)) || (before.read && *writes)
@@ -368,33 +318,5 @@ impl Recorder<'_> {
 
     fn make_visible_to_host(&self) {
         self.barrier(WRITES, vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ);
-    }
-
-    fn transition(&self, image: &mut Image, to: vk::ImageLayout) {
-        let side = |layout| match layout {
-            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => (
-                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
-                vk::AccessFlags2::COLOR_ATTACHMENT_READ | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
-            ),
-            vk::ImageLayout::TRANSFER_SRC_OPTIMAL => {
-                (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_READ)
-            }
-            _ => (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE),
-        };
-        let (src_stage, src_access) = side(image.layout);
-        let (dst_stage, dst_access) = side(to);
-        let barrier = vk::ImageMemoryBarrier2::default()
-            .src_stage_mask(src_stage)
-            .src_access_mask(src_access)
-            .dst_stage_mask(dst_stage)
-            .dst_access_mask(dst_access)
-            .old_layout(image.layout)
-            .new_layout(to)
-            .image(image.raw)
-            .subresource_range(COLOR_RANGE);
-        let barriers = [barrier];
-        let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
-        unsafe { self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
-        image.layout = to;
     }
 }

@@ -10,6 +10,7 @@ pub mod place;
 pub mod second;
 pub mod sort;
 pub mod sprites;
+pub mod surfaces;
 pub mod transmit;
 
 use crate::gpu::Sources;
@@ -50,6 +51,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "sort_scatter.comp",
     "sprites.frag",
     "sprites.vert",
+    "surfaces.frag",
+    "surfaces.vert",
     "transmit.comp",
 ];
 

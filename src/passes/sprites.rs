@@ -1,17 +1,17 @@
 //! sprites: the particles as thin Gaussian sprites, blended far to near.
 //!
-//! In: sorted entries, placed particles, particles (κ, colour), lit facets. Out: premultiplied linear RGBA in the film's
-//! format. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
+//! In: sorted entries, placed particles, particles (κ, colour), lit facets, the depth of surfaces drawn before. Out:
+//! premultiplied linear RGBA in the film's format. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
 //! §9, §11. Error: α to a few 1e-6 relative, and the target's rounding at each layer.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Image, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
-    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, unused: f32 }
+    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, i_first_facet: u32 }
 }
 
 pub struct Sprites {
@@ -19,25 +19,29 @@ pub struct Sprites {
 }
 
 impl Sprites {
-    /// `lit`: colours come from the facets' radiance; else from the particles.
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, lit: bool) -> Result<Sprites> {
-        let constants = [(0, u32::from(lit))];
-        Ok(Sprites { pipeline: DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format)? })
+    /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
+    /// depth; else the target is cleared.
+    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, lit: bool, behind: bool) -> Result<Sprites> {
+        let constants = [(0, u32::from(lit)), (1, u32::from(behind))];
+        let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
+        Ok(Sprites { pipeline })
     }
 
-    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord.
+    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
+    /// from `i_first_facet` on. `target` has depth where surfaces have been drawn.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 4],
-        target: &mut Image,
+        target: Target<'_>,
         camera: &CameraRecord,
         cutoff: f64,
-        n_particles: u32,
+        [n_particles, i_first_facet]: [u32; 2],
     ) -> Result<()> {
-        let (width, height) = target.size();
+        let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
-        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, unused: 0.0 };
-        rec.draw(&self.pipeline, target, &buffers, &push, n_particles)
+        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet };
+        let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
+        rec.draw(&self.pipeline, target, start, &buffers, &push, n_particles)
     }
 }

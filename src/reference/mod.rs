@@ -14,6 +14,7 @@ pub mod place;
 pub mod rounding;
 pub mod sort;
 pub mod sprites;
+pub mod surfaces;
 pub mod transmit;
 
 use glam::DVec3;

@@ -35,6 +35,22 @@ pub struct Rounding {
     pub edge: f64,
 }
 
+/// What stands behind the sprites in a pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Behind {
+    pub color: [f64; 4],
+    /// Per channel, what the target may differ from it.
+    pub bound: [f64; 4],
+    /// View depth: of particles whose centre lies beyond it nothing is drawn.
+    pub depth: f64,
+    /// A particle within this of `depth` may be drawn or not.
+    pub depth_bound: f64,
+}
+
+impl Behind {
+    pub const NOTHING: Behind = Behind { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
+}
+
 impl Rounding {
     pub fn of(format: FilmFormat, alpha: f64, edge: f64) -> Rounding {
         let least_normal = match format {
@@ -44,7 +60,7 @@ impl Rounding {
         Rounding { unit: format.unit_roundoff(), least_normal, alpha, edge }
     }
 
-    const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, alpha: 0.0, edge: 0.0 };
+    pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, alpha: 0.0, edge: 0.0 };
 }
 
 impl View {
@@ -95,10 +111,18 @@ fn slopes(side: f64, depth: f64, reach: f64) -> (f64, f64) {
 }
 
 /// One pixel while it is composed.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Layered {
     value: [f64; 4],
     bound: [f64; 4],
+    /// View depth of what stands behind, and how far that may be off.
+    behind: (f64, f64),
+}
+
+impl From<&Behind> for Layered {
+    fn from(b: &Behind) -> Layered {
+        Layered { value: b.color, bound: b.bound, behind: (b.depth, b.depth_bound) }
+    }
 }
 
 impl Layered {
@@ -117,7 +141,7 @@ impl Layered {
 
 /// Picture of `blobs` in the order given (far to near), blob j of radiance `radiance[j]`.
 pub fn render(view: &View, blobs: &[Blob], radiance: &[DVec3], order: &[u32]) -> Vec<[f64; 4]> {
-    compose(view, blobs, radiance, order, &Rounding::NONE).iter().map(|p| p.value).collect()
+    render_with_bound(view, blobs, radiance, order, &Rounding::NONE).0
 }
 
 /// The picture, and per channel a bound on what a target that rounds as `rounding` says may differ from it.
@@ -128,12 +152,21 @@ pub fn render_with_bound(
     order: &[u32],
     rounding: &Rounding,
 ) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    compose(view, blobs, radiance, order, rounding).iter().map(|p| (p.value, p.bound)).unzip()
+    let nothing = vec![Behind::NOTHING; view.width as usize * view.height as usize];
+    render_over(view, &nothing, blobs, radiance, order, rounding)
 }
 
-fn compose(view: &View, blobs: &[Blob], radiance: &[DVec3], order: &[u32], rounding: &Rounding) -> Vec<Layered> {
+/// The same over `behind`, a pixel each.
+pub fn render_over(
+    view: &View,
+    behind: &[Behind],
+    blobs: &[Blob],
+    radiance: &[DVec3],
+    order: &[u32],
+    rounding: &Rounding,
+) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+    let mut pixels: Vec<Layered> = behind.iter().map(Layered::from).collect();
     let width = view.width as usize;
-    let mut pixels = vec![Layered::default(); width * view.height as usize];
     let n_rows = view.height.div_ceil(N_THREADS).max(1);
     std::thread::scope(|scope| {
         for (band, i) in pixels.chunks_mut((width * n_rows as usize).max(1)).zip(0u32..) {
@@ -145,7 +178,7 @@ fn compose(view: &View, blobs: &[Blob], radiance: &[DVec3], order: &[u32], round
             });
         }
     });
-    pixels
+    pixels.iter().map(|p| (p.value, p.bound)).unzip()
 }
 
 /// Bands of rows that are drawn side by side; the result does not depend on it.
@@ -154,7 +187,8 @@ const N_THREADS: u32 = 2;
 /// One blob over the rows from `first_row` that `band` holds.
 fn draw(view: &View, blob: &Blob, radiance: DVec3, band: &mut [Layered], first_row: u32, r: &Rounding) {
     let c = blob.position - view.pose.position;
-    if !(c.dot(view.pose.forward) >= view.near && blob.sigma > 0.0) {
+    let depth = c.dot(view.pose.forward);
+    if !(depth >= view.near && blob.sigma > 0.0) {
         return;
     }
     let cut = view.cutoff * blob.sigma;
@@ -166,13 +200,15 @@ fn draw(view: &View, blob: &Blob, radiance: DVec3, band: &mut [Layered], first_r
             let d = view.ray(column, row);
             let b = c.cross(d).length() / d.length();
             let alpha = alpha(blob, b);
-            // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies.
-            let on_edge = (b - cut).abs() <= r.edge * cut;
-            if b <= cut {
-                pixel.over(alpha, if on_edge { alpha } else { r.alpha * alpha }, radiance, r);
-            } else if on_edge {
-                pixel.over(0.0, alpha, radiance, r);
+            let (behind, behind_bound) = pixel.behind;
+            // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
+            // stands behind decides likewise.
+            let (on_edge, at_behind) = ((b - cut).abs() <= r.edge * cut, (depth - behind).abs() < behind_bound);
+            if (b > cut && !on_edge) || (depth > behind && !at_behind) {
+                continue;
             }
+            let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+            pixel.over(if b <= cut && depth <= behind { alpha } else { 0.0 }, off, radiance, r);
         }
     }
 }
@@ -181,4 +217,41 @@ fn draw(view: &View, blob: &Blob, radiance: DVec3, band: &mut [Layered], first_r
 pub fn alpha(blob: &Blob, b: f64) -> f64 {
     let x = b / blob.sigma;
     -libm::expm1(-SQRT_TAU * blob.kappa * blob.sigma * (-0.5 * x * x).exp())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Eye at the origin, looking along −z, one pixel.
+    const VIEW: View = View {
+        width: 1,
+        height: 1,
+        pose: Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z },
+        fov_y_rad: 1.0,
+        near: 0.5,
+        cutoff: 3.0,
+    };
+
+    #[test]
+    fn what_stands_behind_shows_through_and_hides() {
+        // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at depth 4.
+        let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
+        let at = |z: f64| Blob { position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
+        let (blobs, colors) = ([at(2.0), at(4.0)], [DVec3::X, DVec3::Y]);
+        let over = |depth: f64, depth_bound: f64| {
+            let behind = Behind { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..Behind::NOTHING };
+            let (value, bound) = render_over(&VIEW, &[behind], &blobs, &colors, &[1, 0], &Rounding::NONE);
+            (value[0], bound[0])
+        };
+        let is = |a: [f64; 4], b: [f64; 4]| (0..4).all(|k| (a[k] - b[k]).abs() < 1e-15);
+        assert!(is(over(5.0, 0.0).0, [0.5, 0.25, 0.25, 1.0]));
+        assert!(is(over(3.0, 0.0).0, [0.5, 0.0, 0.5, 1.0]));
+        assert!(is(over(1.0, 0.0).0, [0.0, 0.0, 1.0, 1.0]));
+        // Equal depth is drawn; where that is uncertain, the bound covers both: (0.5, 0.25, 0.25) and (0.5, 0, 0.5).
+        assert!(is(over(4.0, 0.0).0, [0.5, 0.25, 0.25, 1.0]) && is(over(4.0, 0.0).1, [0.0; 4]));
+        assert!(is(over(4.0, 1e-9).1, [0.0, 0.25, 0.25, 0.0]));
+        let (value, bound) = over(4.0 - 1e-10, 1e-9);
+        assert!(is(value, [0.5, 0.0, 0.5, 1.0]) && is(bound, [0.0, 0.25, 0.25, 0.0]));
+    }
 }

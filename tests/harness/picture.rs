@@ -1,11 +1,11 @@
-//! A picture of sprites, its inputs in f32 for the GPU and in f64 for the reference, and the bound between the two.
+//! A picture of sprites, over rectangles or not, its inputs in f32 for the GPU and in f64 for the reference, and the bound between the two.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use glam::DVec3;
 use half::f16;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Buffer, Compiler, Image, Place};
+use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
@@ -13,12 +13,14 @@ use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::passes::sprites::Sprites;
+use nimbus::passes::surfaces::Surfaces;
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{Rounding, View, alpha, render_with_bound};
+use nimbus::reference::sprites::{Behind, Rounding, View, alpha, render_over, render_with_bound};
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::harness::Gpu;
+use crate::scenery::{Candidates, Scenery};
 
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
@@ -34,6 +36,8 @@ pub struct Picture {
     pub particles: Vec<ParticleRecord>,
     /// Radiance of the particles' facets; without it they are drawn in their own colours.
     pub lit: Option<Vec<LitRecord>>,
+    /// Rectangles under the sprites.
+    pub scenery: Option<Scenery>,
 }
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -46,7 +50,7 @@ impl Picture {
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
         let view = View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0 };
-        Picture { camera, view, placed: vec![], particles: vec![], lit: None }
+        Picture { camera, view, placed: vec![], particles: vec![], lit: None, scenery: None }
     }
 
     /// A blob whose τ through the centre is `tau`.
@@ -88,19 +92,23 @@ impl Picture {
         order(&keys.collect::<Vec<_>>())
     }
 
-    /// Four numbers a pixel from the GPU.
+    /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
-        let lit = self.lit.is_some();
-        let pass = Sprites::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, lit).expect("sprites");
+        let compiler = compiler.unwrap_or(&gpu.compiler);
+        let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
+        let pass = Sprites::new(&gpu.device, compiler, format, lit, behind).expect("sprites");
+        let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
+        let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
-        let buffers = [
-            gpu.upload(&entries),
-            gpu.upload(&self.placed),
-            gpu.upload(&self.particles),
-            gpu.upload(self.lit.as_deref().unwrap_or(&[])),
-        ];
+        // Facets of surfaces come before those of particles.
+        let facets = [&scenery.lit, self.lit.as_deref().unwrap_or(&[])].concat();
+        let lit = gpu.upload(&facets);
+        let [by_order, placed, particles] =
+            [gpu.upload(&entries), gpu.upload(&self.placed), gpu.upload(&self.particles)];
+        let regions = gpu.upload(&scenery.regions);
         let (width, height) = (self.view.width, self.view.height);
         let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
+        let mut depth = behind.then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
         let film = Film {
             width,
             height,
@@ -114,8 +122,15 @@ impl Picture {
         let bytes = target.n_pixels() * format.bytes_per_pixel();
         let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback).expect("readback");
         gpu.run(|rec| {
-            let n = entries.len() as u32;
-            pass.record(rec, buffers.each_ref(), &mut target, &camera, self.view.cutoff, n)?;
+            if let Some(under) = &under {
+                let target = Target { color: &mut target, depth: depth.as_mut() };
+                under.record(rec, [&regions, &lit], target, &camera, scenery.regions.len() as u32)?;
+            }
+            if under.is_none() || !entries.is_empty() {
+                let target = Target { color: &mut target, depth: depth.as_mut() };
+                let n = [entries.len() as u32, scenery.lit.len() as u32];
+                pass.record(rec, [&by_order, &placed, &particles, &lit], target, &camera, self.view.cutoff, n)?;
+            }
             rec.copy_image(&mut target, &readback);
             Ok(())
         });
@@ -132,8 +147,39 @@ impl Picture {
     /// The reference's picture and its bound for `format`.
     pub fn truth(&self, format: FilmFormat) -> (Vec<f64>, Vec<f64>) {
         let rounding = self.rounding(format);
-        let (value, bound) = render_with_bound(&self.view, &self.blobs(), &self.radiance(), &self.order(), &rounding);
+        let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
+        let (value, bound) = match &self.scenery {
+            None => render_with_bound(&self.view, &blobs, &radiance, &order, &rounding),
+            Some(_) => {
+                let behind: Vec<Behind> = self.behind(format).iter().map(|c| self.widened(c)).collect();
+                render_over(&self.view, &behind, &blobs, &radiance, &order, &rounding)
+            }
+        };
         (value.concat(), bound.concat())
+    }
+
+    /// What each pixel may show of the rectangles.
+    pub fn behind(&self, format: FilmFormat) -> Vec<Candidates> {
+        let scenery = self.scenery.as_ref().expect("rectangles");
+        scenery.candidates(&self.view, |i, j| self.ray(i, j), &Rounding::of(format, 0.0, 0.0))
+    }
+
+    /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any bound where it is not the
+    /// only candidate.
+    fn widened(&self, candidates: &Candidates) -> Behind {
+        let truth = candidates[0];
+        if candidates.len() > 1 {
+            return Behind { bound: [f64::INFINITY; 4], ..truth };
+        }
+        let near = Bounded::once(self.view.near);
+        let of_sprites = self.placed.iter().filter(|p| p.sigma > 0.0).map(|p| {
+            let depth = near.over(self.view_depth(p));
+            depth.error / depth.value.abs()
+        });
+        // The rasteriser interpolates between four equal depths: a product, a sum, a shift and a scaling of at most 1.
+        let of_sprites = of_sprites.fold(0.0, f64::max) + 4.0 * U;
+        // |near/z − near/z'| ≤ near (r/z + r'/z') for z' within a few r of z.
+        Behind { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
     }
 
     /// How the shaders' α and edges may be off: the worst of all pixels in all blobs, each by a running bound.
@@ -167,8 +213,8 @@ impl Picture {
             }
         }
         let mut rounding = Rounding::of(format, off_alpha, edge);
-        // Beside the store into the target there are three f32 roundings: α·L, (1 − α)·C and their sum.
-        rounding.unit += 1.5 * U;
+        // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C and their sum.
+        rounding.unit += 2.0 * U;
         rounding
     }
 
@@ -187,12 +233,19 @@ impl Picture {
         [along(i, x, self.view.width).minus(x), y.minus(along(j, y, self.view.height))]
     }
 
+    fn offset(&self, placed: &PlacedRecord) -> [Bounded; 3] {
+        let (eye, p) = (self.view.pose.position.to_array(), exact3(placed.position));
+        [0, 1, 2].map(|i| p[i].minus(Bounded::once(eye[i])))
+    }
+
+    fn view_depth(&self, placed: &PlacedRecord) -> Bounded {
+        dot(self.view.pose.forward.to_array().map(Bounded::once), self.offset(placed))
+    }
+
     fn sprite(&self, placed: &PlacedRecord, blob: &Blob) -> Sprite {
         let pose = &self.view.pose;
         let once = |v: DVec3| v.to_array().map(Bounded::once);
-        let (eye, p) = (once(pose.position), exact3(placed.position));
-        let c = [0, 1, 2].map(|i| p[i].minus(eye[i]));
-        let z = dot(once(pose.forward), c);
+        let (c, z) = (self.offset(placed), self.view_depth(placed));
         let slope = |axis: DVec3| dot(once(axis), c).over(z);
         let z_sigmas = z.over(Bounded::exact(blob.sigma));
         Sprite {

@@ -1,0 +1,155 @@
+//! Recording of draws into images, and of copies from them: attachments, layouts, image barriers.
+
+use ash::vk;
+use bytemuck::Pod;
+
+use super::draw::DrawPipeline;
+use super::memory::{Buffer, Image};
+use super::recorder::Recorder;
+use crate::error::{Error, Result};
+
+/// What is drawn into.
+pub struct Target<'a> {
+    pub color: &'a mut Image,
+    /// Of the colour's extent. Reversed: near/z, so 0 is infinitely far.
+    pub depth: Option<&'a mut Image>,
+}
+
+/// What a target holds when drawing starts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Start {
+    /// Zeros: black, infinitely far.
+    Clear,
+    /// What was drawn before.
+    Load,
+}
+
+impl<'a> Target<'a> {
+    pub fn color(color: &'a mut Image) -> Target<'a> {
+        Target { color, depth: None }
+    }
+}
+
+/// Fragment tests, where depth is read and written.
+const DEPTH_STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
+    vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS.as_raw() | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS.as_raw(),
+);
+
+impl Recorder<'_> {
+    /// Draws `n_instances` strips of four vertices into `target`.
+    pub fn draw<P: Pod>(
+        &mut self,
+        pipeline: &DrawPipeline,
+        target: Target<'_>,
+        start: Start,
+        buffers: &[&Buffer],
+        push: &P,
+        n_instances: u32,
+    ) -> Result<()> {
+        let Target { color, depth } = target;
+        check(pipeline, color, depth.as_deref())?;
+        self.transition(color, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        let on_color = [attachment(color, start)];
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: color.extent };
+        let info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&on_color);
+        let on_depth;
+        let info = match depth {
+            Some(depth) => {
+                self.transition(depth, vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL);
+                on_depth = attachment(depth, start);
+                info.depth_attachment(&on_depth)
+            }
+            None => info,
+        };
+        self.bind(vk::PipelineBindPoint::GRAPHICS, pipeline.raw, &pipeline.interface, &pipeline.name, buffers, push)?;
+        let (width, height) = (color.extent.width as f32, color.extent.height as f32);
+        let viewport = vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
+        let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
+        unsafe {
+            raw.cmd_begin_rendering(commands, &info);
+            raw.cmd_set_viewport(commands, 0, &[viewport]);
+            raw.cmd_set_scissor(commands, 0, &[area]);
+            raw.cmd_draw(commands, 4, n_instances, 0, 0);
+            raw.cmd_end_rendering(commands);
+        }
+        Ok(())
+    }
+
+    /// Copies the whole image, rows from the top, tightly packed.
+    pub fn copy_image(&mut self, from: &mut Image, to: &Buffer) {
+        self.transition(from, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+        self.depend(&[(to.raw, false, true)]);
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: from.range.aspect_mask,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = [vk::BufferImageCopy::default().image_subresource(layers).image_extent(from.extent.into())];
+        let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+        unsafe {
+            self.commands.shared.raw.cmd_copy_image_to_buffer(self.commands.buffer, from.raw, layout, to.raw, &region)
+        };
+    }
+
+    /// Orders the coming use of `image` after the last one, also where the layout stays: two draws into one target.
+    /// Synchronization validation of 1.3.239 does not look at what dynamic rendering draws into, so no test would notice
+    /// if those stood without.
+    fn transition(&self, image: &mut Image, to: vk::ImageLayout) {
+        let side = |layout| match layout {
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => (
+                vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT,
+                vk::AccessFlags2::COLOR_ATTACHMENT_READ | vk::AccessFlags2::COLOR_ATTACHMENT_WRITE,
+            ),
+            vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL => (
+                DEPTH_STAGES,
+                vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            ),
+            vk::ImageLayout::TRANSFER_SRC_OPTIMAL => {
+                (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_READ)
+            }
+            _ => (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE),
+        };
+        let (src_stage, src_access) = side(image.layout);
+        let (dst_stage, dst_access) = side(to);
+        let barrier = vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(src_stage)
+            .src_access_mask(src_access)
+            .dst_stage_mask(dst_stage)
+            .dst_access_mask(dst_access)
+            .old_layout(image.layout)
+            .new_layout(to)
+            .image(image.raw)
+            .subresource_range(image.range);
+        let barriers = [barrier];
+        let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        unsafe { self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+        image.layout = to;
+    }
+}
+
+/// Clears to zeros, which is what a clear value defaults to.
+fn attachment(image: &Image, start: Start) -> vk::RenderingAttachmentInfo<'static> {
+    let load = match start {
+        Start::Clear => vk::AttachmentLoadOp::CLEAR,
+        Start::Load => vk::AttachmentLoadOp::LOAD,
+    };
+    vk::RenderingAttachmentInfo::default()
+        .image_view(image.view)
+        .image_layout(image.layout)
+        .load_op(load)
+        .store_op(vk::AttachmentStoreOp::STORE)
+}
+
+fn check(pipeline: &DrawPipeline, color: &Image, depth: Option<&Image>) -> Result<()> {
+    let mismatch = |what| Err(Error::Shader { name: pipeline.name.clone(), what });
+    match depth {
+        Some(_) if !pipeline.has_depth => mismatch("is not made for a target with depth".to_owned()),
+        None if pipeline.has_depth => mismatch("is made for a target with depth, the host gives none".to_owned()),
+        Some(depth) if depth.extent != color.extent => {
+            let ((w, h), (x, y)) = (color.size(), depth.size());
+            mismatch(format!("draws {w}×{h} pixels, the host gives depth for {x}×{y}"))
+        }
+        _ => Ok(()),
+    }
+}

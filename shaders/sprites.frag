@@ -5,7 +5,7 @@
 
 // Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md §9).
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float unused; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
 
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;

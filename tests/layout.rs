@@ -8,7 +8,7 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
-use nimbus::layout::facet::{FacetRecord, LitRecord, RegionBoundsRecord};
+use nimbus::layout::facet::{FacetRecord, LitRecord, RegionBoundsRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
@@ -18,7 +18,7 @@ use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 11] = [
+const RECORDS: [Record; 12] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
@@ -26,6 +26,7 @@ const RECORDS: [Record; 11] = [
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
     ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
+    ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
@@ -34,8 +35,13 @@ const RECORDS: [Record; 11] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 15] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 16] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
+    (
+        "facets_groups.comp",
+        facets::GroupsPush::FIELDS,
+        &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), B(4), R("Run"), R("Facet"), B(4)],
+    ),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
@@ -48,7 +54,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 15] = [
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
-    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
+    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4)]),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), B(4), B(4)]),
 ];
 
@@ -192,10 +198,10 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "LIGHT_SKY", f64::from(LIGHT_SKY)),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
-        ("facets.comp", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
-        ("facets.comp", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
-        ("facets.comp", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
-        ("facets.comp", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
+        ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
+        ("include/shell.glsl", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
+        ("include/shell.glsl", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
+        ("include/shell.glsl", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
     ];
     for (file, name, host) in shared {
         assert_eq!(constant(text_of(file), name), Some(host), "{file}: {name}");

@@ -24,6 +24,8 @@ const U: f64 = U_F32;
 const SIGMA_MEANS: [f32; 2] = [0.15, 0.25];
 /// Two clouds, numbers 3 and 1.
 const REGIONS: [u32; 2] = [3, 1];
+/// The clouds' facets come after those of the surfaces.
+const N_SURFACE_FACETS: usize = 5;
 /// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
 const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
 /// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the root, which Vulkan
@@ -36,6 +38,11 @@ struct Scene {
     blobs: Vec<Blob>,
     groups: [GroupRecord; 2],
     i_group: Vec<u32>,
+}
+
+/// A colour that no two blobs share.
+fn color(b: &Blob) -> [f32; 3] {
+    b.position.as_vec3().to_array()
 }
 
 fn f32_of(v: DVec3) -> DVec3 {
@@ -78,19 +85,21 @@ impl Scene {
         let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
         let pass = Facets::new(&gpu.device, compiler).unwrap();
         let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
-        let particle = |b: &Blob| ParticleRecord { kappa: b.kappa as f32, ..ParticleRecord::default() };
+        let particle =
+            |b: &Blob| ParticleRecord { kappa: b.kappa as f32, color: color(b), ..ParticleRecord::default() };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
         let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
         let (i_group, groups) = (gpu.upload(&self.i_group), gpu.upload(&self.groups));
-        let (density, made) = (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(n));
+        let (density, made) = (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(N_SURFACE_FACETS + n));
         let heaviest = self.blobs.iter().map(mass).fold(0.0, f64::max);
         gpu.run(|rec| {
             grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
             let buffers = [&placed, &particles, &i_group, &groups, &density, &made];
-            pass.record(rec, buffers, &self.record, n as u32)
+            pass.record(rec, buffers, &self.record, n as u32, N_SURFACE_FACETS as u32)
         });
         let density = gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect();
-        (density, gpu.download(&made, n))
+        // What lies before is the surfaces'.
+        (density, gpu.download(&made, N_SURFACE_FACETS + n).split_off(N_SURFACE_FACETS))
     }
 
     fn centers(&self) -> Vec<DVec3> {
@@ -183,7 +192,8 @@ struct Compared {
     values: Vec<Vec<f64>>,
     truths: Vec<Vec<f64>>,
     bounds: Vec<Vec<f64>>,
-    regions_right: bool,
+    /// Regions and colours, which are handed on as they are.
+    labels_right: bool,
 }
 
 const QUANTITIES: [&str; 4] = ["normal", "position", "area", "length of the normal"];
@@ -194,7 +204,7 @@ fn compare(scene: &Scene, cells: &[f64], made: &[FacetRecord]) -> Compared {
         values: vec![vec![]; 4],
         truths: vec![vec![]; 4],
         bounds: vec![vec![]; 4],
-        regions_right: made.len() == truth.len(),
+        labels_right: made.len() == truth.len(),
     };
     for (i, (facet, made)) in truth.iter().zip(made).enumerate() {
         let (normal, position, area) = scene.bound(cells, i, facet);
@@ -212,15 +222,14 @@ fn compare(scene: &Scene, cells: &[f64], made: &[FacetRecord]) -> Compared {
         c.values[3].push(n.length());
         c.truths[3].push(1.0);
         c.bounds[3].push(U * (LENGTH_ERROR + DIVISION_ERROR + 1.0));
-        c.regions_right &= made.i_region == facet.region;
+        c.labels_right &= made.i_region == facet.region && made.color == color(&scene.blobs[i]);
     }
     c
 }
 
 impl Compared {
     fn is_right(&self) -> bool {
-        self.regions_right
-            && (0..4).all(|k| check_within("", &self.values[k], &self.truths[k], &self.bounds[k]).is_ok())
+        self.labels_right && (0..4).all(|k| check_within("", &self.values[k], &self.truths[k], &self.bounds[k]).is_ok())
     }
 }
 
@@ -231,7 +240,7 @@ fn facets_are_within_bounds_that_grow_as_the_gradient_vanishes() {
     let scene = Scene::new();
     let (cells, made) = scene.run(&mut gpu, &compiler);
     let compared = compare(&scene, &cells, &made);
-    assert!(compared.regions_right);
+    assert!(compared.labels_right);
     for (k, what) in QUANTITIES.into_iter().enumerate() {
         assert_within_and_say(what, &compared.values[k], &compared.truths[k], &compared.bounds[k]);
     }
@@ -254,13 +263,15 @@ fn a_wrong_shader_is_noticed() {
     let scene = Scene::new();
     let mutations = [
         ("facets.comp", "max(sigma, group.sigma_mean)", "sigma"),
-        ("facets.comp", "SHELL_SIGMA = 1.5", "SHELL_SIGMA = 1.501"),
-        ("facets.comp", "SMOOTH_SIGMA = 4.47213595499958", "SMOOTH_SIGMA = 4.49"),
-        ("facets.comp", "CONDITION_LOW = 0.02", "CONDITION_LOW = 0.03"),
-        ("facets.comp", "w = 3.0 / 40.0", "w = 3.1 / 40.0"),
-        ("facets.comp", "-gradient / slope", "gradient / slope"),
-        ("facets.comp", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
-        ("facets.comp", "group.i_region)", "i_group[i])"),
+        ("include/shell.glsl", "SHELL_SIGMA = 1.5", "SHELL_SIGMA = 1.501"),
+        ("include/shell.glsl", "SMOOTH_SIGMA = 4.47213595499958", "SMOOTH_SIGMA = 4.49"),
+        ("include/shell.glsl", "CONDITION_LOW = 0.02", "CONDITION_LOW = 0.03"),
+        ("include/shell.glsl", "w = 3.0 / 40.0", "w = 3.1 / 40.0"),
+        ("include/shell.glsl", "-gradient / slope", "gradient / slope"),
+        ("include/shell.glsl", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
+        ("facets.comp", "group.i_region,", "i_group[i],"),
+        ("facets.comp", "particles[i].color", "particles[0].color"),
+        ("facets.comp", "push.i_first_facet + i]", "push.i_first_facet + (i + 1) % push.n_particles]"),
         ("include/density.glsl", "mix(low, high, f.x)", "mix(low, high, f.y)"),
     ];
     for (file, from, to) in mutations {

@@ -10,6 +10,7 @@ use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::Scene;
 
+use super::grouping::is_grouped;
 use super::limits::n_cells_max;
 
 /// Named by content; record types as in [`crate::layout`].
@@ -41,6 +42,8 @@ pub struct Buffers {
     pub table: Buffer,
     pub sources: Buffer,
     pub fluxes: Buffer,
+    /// Facet of each particle, where facets stand for several.
+    pub i_facet: Buffer,
     /// [key, particle].
     pub entries: Buffer,
 }
@@ -52,6 +55,7 @@ impl Buffers {
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
+        let n_named = if is_grouped(scene) { n } else { 0 };
         let placed_upload = match host_places {
             true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
             false => None,
@@ -75,6 +79,7 @@ impl Buffers {
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_facets, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_facets * n_lights, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
+            i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
         })
     }

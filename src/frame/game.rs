@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Place, Result};
-use crate::layout::facet::{NO_LOBE, RegionRecord};
+use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::camera::Pose;
@@ -97,12 +97,20 @@ impl Game {
             modes,
             placed,
             table: self.table.clone(),
+            bounds: self.bounds(&setting),
             regions: self.regions(time_s, setting.light_origin),
             lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
             grid: GridRecord::from(&setting.grid),
             radius: setting.radius,
             game_ms: super::ms(begin, Instant::now()),
         })
+    }
+
+    /// Where each region's Morton cells lie.
+    fn bounds(&self, setting: &Setting) -> Vec<RegionBoundsRecord> {
+        let bits = KeyBits::of(self.scene.n_regions() as u32);
+        let of = |b| RegionBoundsRecord::new(b, setting.light_origin, bits);
+        self.scene.region_bounds(&self.groups, setting.time_s, DEPOSIT_CUT_SIGMA).into_iter().map(of).collect()
     }
 
     /// The regions and their materials, surfaces before clouds.

@@ -13,6 +13,7 @@ use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::gust::N_MODES;
 use crate::model::scene::{LightingMode, Scene};
 
+use super::grouping::is_grouped;
 use super::render::target_format;
 
 /// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
@@ -35,6 +36,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
         ("the facets' light", n, size(size_of::<LitRecord>())),
         ("the transmittances", n * scene.lights.len() as u64, 4),
         ("the sort's entries", 2 * n, 8),
+        ("the Morton order's entries", if is_grouped(scene) { 2 * n } else { 0 }, 8),
+        ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),
         ("the gusts", (scene.clouds.len() * N_MODES) as u64, size(size_of::<ModeRecord>())),

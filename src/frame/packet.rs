@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use crate::layout::facet::RegionRecord;
+use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, PlacedRecord};
 
@@ -21,6 +21,8 @@ pub struct Packet {
     pub modes: Vec<ModeRecord>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
+    /// Where each region's Morton cells lie.
+    pub bounds: Vec<RegionBoundsRecord>,
     /// Surfaces, then clouds, with their materials at this time.
     pub regions: Vec<RegionRecord>,
     /// The lobe of every glossy material at this time, N_NODES numbers each.

@@ -2,6 +2,8 @@
 //! is left out only where all that it reads is what it read the last time, to the bit.
 
 use super::packet::Packet;
+use crate::layout::facet::RegionRecord;
+use crate::layout::frame::LightRecord;
 
 /// The passes in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,6 +11,7 @@ pub enum Pass {
     Generate,
     Place,
     Grid,
+    Morton,
     Facets,
     Transmit,
     First,
@@ -18,10 +21,11 @@ pub enum Pass {
 }
 
 impl Pass {
-    pub const ALL: [Pass; 9] = [
+    pub const ALL: [Pass; 10] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
+        Pass::Morton,
         Pass::Facets,
         Pass::Transmit,
         Pass::First,
@@ -32,7 +36,8 @@ impl Pass {
 
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
-        ["generate", "place", "grid", "facets", "transmit", "first", "second", "sort", "sprites"][self as usize]
+        ["generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "sort", "sprites"]
+            [self as usize]
     }
 }
 
@@ -66,6 +71,8 @@ pub struct Traits {
     pub lit: bool,
     /// `lighting.mode` is "two-reflection".
     pub two_reflections: bool,
+    /// Facets stand for several particles.
+    pub grouped: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
 }
@@ -77,9 +84,9 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let still =
         same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
     let same_grid = still && same(&|a, b| a.grid == b.grid);
-    let same_facets = same_grid && same(&|a, b| a.groups == b.groups);
-    let same_rays =
-        same_facets && same(&|a, b| a.lights.iter().map(|l| l.toward).eq(b.lights.iter().map(|l| l.toward)));
+    let same_places = still && same(&|a, b| a.bounds == b.bounds);
+    let same_facets = same_grid && same(&|a, b| a.groups == b.groups) && (same_places || !traits.grouped);
+    let same_rays = same_facets && same(&|a, b| has_same_rays(a, b));
     let same_light = same_facets && same(&|a, b| a.lights == b.lights && a.regions == b.regions);
     let same_order = still && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
@@ -92,6 +99,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         if traits.has_boxes { unless(last.is_some(), "the boxes are the same") } else { skip("no boxes to fill") },
         unless(still, "nothing moved"),
         lighting(same_grid, "nothing moved"),
+        if traits.grouped { unless(same_places, "nothing moved") } else { skip("a facet a particle") },
         lighting(same_facets, "nothing moved"),
         lighting(same_rays, "facets and lights stand still"),
         lighting(same_light, "facets and lights are the same"),
@@ -104,7 +112,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         unless(same_picture, "the picture is the same"),
     ];
     if traits.n_particles == 0 {
-        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Sort] {
+        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort] {
             decisions[pass as usize] = skip("no particles");
         }
     }
@@ -116,6 +124,14 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     Plan(decisions)
 }
 
+/// Whether the ways from the facets to the lights, and what hides them, are the same; a light without energy has none.
+fn has_same_rays(a: &Packet, b: &Packet) -> bool {
+    let way = |l: &LightRecord| (l.toward, l.position, l.kind, l.energy != [0.0; 3]);
+    let rectangle = |r: &RegionRecord| (r.kind, r.center, r.u, r.v, r.normal, r.n_u, r.n_v);
+    a.lights.iter().map(way).eq(b.lights.iter().map(way))
+        && a.regions.iter().map(rectangle).eq(b.regions.iter().map(rectangle))
+}
+
 const RUN: Decision = Decision { run: true, reason: "needed" };
 
 fn skip(reason: &'static str) -> Decision {
@@ -125,12 +141,21 @@ fn skip(reason: &'static str) -> Decision {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::layout::facet::RegionRecord;
-    use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
+    use crate::layout::frame::{CameraRecord, GridRecord};
     use crate::layout::particle::{GroupRecord, ModeRecord};
     use std::time::Instant;
 
-    const TRAITS: Traits = Traits { has_boxes: true, n_particles: 7, lit: true, skip: true };
+    const TRAITS: Traits = Traits {
+        has_boxes: true,
+        n_particles: 7,
+        n_facets: 7,
+        lit: true,
+        two_reflections: false,
+        grouped: false,
+        skip: true,
+    };
+    /// With every pass.
+    const ALL_TRAITS: Traits = Traits { two_reflections: true, grouped: true, ..TRAITS };
 
     fn packet() -> Packet {
         Packet {
@@ -142,8 +167,10 @@ mod tests {
             groups: vec![GroupRecord::default()],
             modes: vec![],
             placed: None,
+            bounds: vec![Default::default()],
+            table: Default::default(),
             regions: vec![RegionRecord::default()],
-            lights: vec![LightRecord::default()],
+            lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
             grid: GridRecord::default(),
             radius: 1.0,
         }
@@ -157,9 +184,9 @@ mod tests {
     #[test]
     fn the_first_frame_runs_everything_and_a_still_one_nothing() {
         let p = packet();
-        assert_eq!(running(&TRAITS, None, &p).len(), Pass::ALL.len());
-        assert!(running(&TRAITS, Some(&p), &p).is_empty());
-        assert_eq!(running(&Traits { skip: false, ..TRAITS }, Some(&p), &p).len(), Pass::ALL.len());
+        assert_eq!(running(&ALL_TRAITS, None, &p).len(), Pass::ALL.len());
+        assert!(running(&ALL_TRAITS, Some(&p), &p).is_empty());
+        assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), Pass::ALL.len());
     }
 
     #[test]
@@ -173,7 +200,17 @@ mod tests {
         assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
         assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
         assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
-        assert_eq!(after(&|p| p.lights[0].toward[1] = 1.0), ["transmit", "first", "sprites"]);
+        assert_eq!(after(&|p| p.regions[0].kd[1] = 0.5), ["first", "sprites"]);
+        let of_rays: [&dyn Fn(&mut Packet); 5] = [
+            &|p| p.lights[0].toward[1] = 1.0,
+            &|p| p.lights[0].position[1] = 1.0,
+            &|p| p.lights[0].energy = [0.0; 3],
+            &|p| p.regions[0].center[0] = 1.0,
+            &|p| p.regions[0].u[2] = 1.0,
+        ];
+        for change in of_rays {
+            assert_eq!(after(change), ["transmit", "first", "sprites"]);
+        }
         let all_but_generate = ["place", "grid", "facets", "transmit", "first", "sort", "sprites"];
         assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
         let gust = |p: &mut Packet| p.modes.push(ModeRecord::default());
@@ -182,10 +219,25 @@ mod tests {
     }
 
     #[test]
+    fn facets_of_several_particles_follow_their_order() {
+        let last = packet();
+        let grouped = Traits { grouped: true, ..TRAITS };
+        let after = |change: &dyn Fn(&mut Packet)| {
+            let mut next = packet();
+            change(&mut next);
+            running(&grouped, Some(&last), &next)
+        };
+        let all_but_generate = ["place", "grid", "morton", "facets", "transmit", "first", "sort", "sprites"];
+        assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
+        assert_eq!(after(&|p| p.bounds[0].low[0] = 0.5), ["morton", "facets", "transmit", "first", "sprites"]);
+        assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
+    }
+
+    #[test]
     fn unlit_empty_and_cpu_scenes_leave_out_what_they_do_not_need() {
         let p = packet();
         assert_eq!(running(&Traits { lit: false, ..TRAITS }, None, &p), ["generate", "place", "sort", "sprites"]);
-        assert_eq!(running(&Traits { n_particles: 0, ..TRAITS }, None, &p), ["sprites"]);
+        assert_eq!(running(&Traits { n_particles: 0, n_facets: 0, ..TRAITS }, None, &p), ["sprites"]);
         // Where the game thread places the particles, its places decide and not the groups' offsets.
         let (mut last, mut next) = (packet(), packet());
         (last.placed, next.placed) = (Some(vec![]), Some(vec![]));

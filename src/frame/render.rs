@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use super::buffers::{Buffers, download};
 use super::exchange::Exchange;
+use super::grouping::{Grouping, is_grouped};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::{limits, ms};
@@ -31,6 +32,7 @@ pub struct Renderer {
     place: PlacePass,
     grid: Grid,
     facets: Facets,
+    grouping: Option<Grouping>,
     transmit: Transmit,
     first: First,
     second: Option<SecondStage>,
@@ -86,16 +88,22 @@ impl Renderer {
             true => Some(SecondStage::new(device, compiler, &mut commands, scene)?),
             false => None,
         };
+        let grouped = is_grouped(scene);
+        let grouping = match grouped {
+            true => Some(Grouping::new(device, compiler, &mut commands, scene)?),
+            false => None,
+        };
         let mut renderer = Renderer {
             generate: Generate::new(device, compiler)?,
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler)?,
+            grouping,
             transmit: Transmit::new(device, compiler)?,
             first: First::new(device, compiler)?,
             second,
             sort: Sort::new(device, compiler, n_particles)?,
-            sprites: Sprites::new(device, compiler, format, lit)?,
+            sprites: Sprites::new(device, compiler, format, lit, grouped)?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
             readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
@@ -120,6 +128,7 @@ impl Renderer {
                 n_facets: scene.n_facets() as u32,
                 lit,
                 two_reflections,
+                grouped,
                 skip,
             },
             last: None,
@@ -149,6 +158,9 @@ impl Renderer {
     fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
         self.buffers.modes.write(&packet.modes)?;
+        if let Some(grouping) = &mut self.grouping {
+            grouping.upload(packet)?;
+        }
         self.buffers.table.write(&packet.table)?;
         self.buffers.regions.write(&packet.regions)?;
         self.buffers.lights.write(&packet.lights)?;
@@ -165,6 +177,7 @@ impl Renderer {
             place,
             grid,
             facets,
+            grouping,
             transmit,
             first,
             second,
@@ -190,9 +203,15 @@ impl Renderer {
             pass(rec, plan, Pass::Grid, |rec| {
                 grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
             })?;
+            pass(rec, plan, Pass::Morton, |rec| grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b)))?;
             pass(rec, plan, Pass::Facets, |rec| {
-                let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
-                facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
+                match grouping {
+                    Some(grouping) => grouping.record_facets(rec, facets, b, packet)?,
+                    None => {
+                        let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
+                        facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
+                    }
+                }
                 facets.record_surfaces(rec, [&b.regions, &b.i_region, &b.facets], s.n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
@@ -213,8 +232,8 @@ impl Renderer {
                 sort.record(rec, &b.entries, n, s.sort_bits)
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, &b.placed, &b.particles, &b.lit];
-                sprites.record(rec, from, target, &packet.camera, s.cutoff, n)
+                let from = [&b.entries, &b.placed, &b.particles, &b.lit, &b.i_facet];
+                sprites.record(rec, from, target, &packet.camera, s.cutoff, n, s.n_surface_facets)
             })
         })
     }

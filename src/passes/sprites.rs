@@ -11,7 +11,7 @@ use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
-    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, unused: f32 }
+    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, i_first_facet: u32 }
 }
 
 pub struct Sprites {
@@ -19,25 +19,34 @@ pub struct Sprites {
 }
 
 impl Sprites {
-    /// `lit`: colours come from the facets' radiance; else from the particles.
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, lit: bool) -> Result<Sprites> {
-        let constants = [(0, u32::from(lit))];
+    /// `lit`: colours come from the facets' radiance; else from the particles. `grouped`: facets stand for several
+    /// particles.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        lit: bool,
+        grouped: bool,
+    ) -> Result<Sprites> {
+        let constants = [(0, u32::from(lit)), (1, u32::from(grouped))];
         Ok(Sprites { pipeline: DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format)? })
     }
 
-    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord.
+    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord;
+    /// `i_facet`: u32 by particle, read where facets are grouped; else particle i has facet `i_first_facet` + i.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 4],
+        buffers: [&Buffer; 5],
         target: &mut Image,
         camera: &CameraRecord,
         cutoff: f64,
         n_particles: u32,
+        i_first_facet: u32,
     ) -> Result<()> {
         let (width, height) = target.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
-        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, unused: 0.0 };
+        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet };
         rec.draw(&self.pipeline, target, &buffers, &push, n_particles)
     }
 }

@@ -34,6 +34,9 @@ pub struct Picture {
     pub particles: Vec<ParticleRecord>,
     /// Radiance of the particles' facets; without it they are drawn in their own colours.
     pub lit: Option<Vec<LitRecord>>,
+    /// Facet of each particle, where they do not follow `i_first_facet` in the particles' order.
+    pub i_facet: Option<Vec<u32>>,
+    pub i_first_facet: u32,
 }
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -46,7 +49,7 @@ impl Picture {
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
         let view = View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0 };
-        Picture { camera, view, placed: vec![], particles: vec![], lit: None }
+        Picture { camera, view, placed: vec![], particles: vec![], lit: None, i_facet: None, i_first_facet: 0 }
     }
 
     /// A blob whose τ through the centre is `tau`.
@@ -76,10 +79,13 @@ impl Picture {
 
     fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
-            Some(lit) => lit
-                .iter()
-                .map(|l| DVec3::new(l.radiance[0].into(), l.radiance[1].into(), l.radiance[2].into()))
-                .collect(),
+            // Their f32 sum is rounded alike on both sides.
+            Some(lit) => {
+                let plain = || (self.i_first_facet..).take(self.placed.len()).collect();
+                let facets: Vec<u32> = self.i_facet.clone().unwrap_or_else(plain);
+                let of = |l: &LitRecord| double([0, 1, 2].map(|i| l.first[i] + l.second[i]));
+                facets.iter().map(|i| of(&lit[*i as usize])).collect()
+            }
             None => self.particles.iter().map(|p| double(p.color)).collect(),
         }
     }
@@ -93,13 +99,15 @@ impl Picture {
     /// Four numbers a pixel from the GPU.
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
         let lit = self.lit.is_some();
-        let pass = Sprites::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, lit).expect("sprites");
+        let pass = Sprites::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, lit, self.i_facet.is_some())
+            .expect("sprites");
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
         let buffers = [
             gpu.upload(&entries),
             gpu.upload(&self.placed),
             gpu.upload(&self.particles),
             gpu.upload(self.lit.as_deref().unwrap_or(&[])),
+            gpu.upload(self.i_facet.as_deref().unwrap_or(&[])),
         ];
         let (width, height) = (self.view.width, self.view.height);
         let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
@@ -117,7 +125,7 @@ impl Picture {
         let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback).expect("readback");
         gpu.run(|rec| {
             let n = entries.len() as u32;
-            pass.record(rec, buffers.each_ref(), &mut target, &camera, self.view.cutoff, n)?;
+            pass.record(rec, buffers.each_ref(), &mut target, &camera, self.view.cutoff, n, self.i_first_facet)?;
             rec.copy_image(&mut target, &readback);
             Ok(())
         });

@@ -16,7 +16,7 @@ layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
 layout(std430, binding = 3) readonly buffer Regions { Region regions[]; };
 layout(std430, binding = 4) readonly buffer Table { float table[]; };
-layout(std430, binding = 5) writeonly buffer LitFacets { Lit lit[]; };
+layout(std430, binding = 5) buffer LitFacets { Lit lit[]; };
 
 #include "lobe.glsl"
 
@@ -41,6 +41,7 @@ void main() {
             }
         }
         vec3 first = region.kd * facet.color * irradiance * INV_PI + region.ks * glossy;
-        lit[j] = Lit(irradiance, 0.0, vec3(0.0), 0.0, first, 0.0, vec3(0.0), 0.0);
+        lit[j].direct = irradiance;
+        lit[j].first = first;
     }
 }

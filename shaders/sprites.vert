@@ -8,12 +8,15 @@
 layout(constant_id = 0) const uint LIT = 1;
 // 1: the quad has its centre's depth, near/z, and surfaces hide it.
 layout(constant_id = 1) const uint BEHIND = 0;
+// 0: a facet a particle; 1: i_facet names it.
+layout(constant_id = 2) const uint GROUPED = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
 layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
+layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
 
 const float SQRT_TAU = 2.50662827463;
 // The quad is this much larger than the silhouette, so that rounding never cuts a pixel that the fragment shader would
@@ -48,8 +51,8 @@ void main() {
     vec3 v = vec3(dot(push.camera.right, c), dot(push.camera.up, c), dot(push.camera.forward, c));
     float tau = SQRT_TAU * particles[i].kappa * sigma;
     out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
-    uint i_facet = push.i_first_facet + i;
-    out_radiance = LIT != 0 ? lit[i_facet].first + lit[i_facet].second : particles[i].color;
+    uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
+    out_radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
         // Nothing to draw: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);

@@ -9,19 +9,19 @@ use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_SURFACE};
-use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord};
+use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, second, sort, sprites, surfaces};
 use nimbus::passes::transmit;
+use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, second, sort, sprites, surfaces};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 16] = [
+const RECORDS: [Record; 17] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
@@ -29,6 +29,8 @@ const RECORDS: [Record; 16] = [
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
     ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
+    ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
+    ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
     ("Region", RegionRecord::FIELDS, size_of::<RegionRecord>()),
     ("Source", SourceRecord::FIELDS, size_of::<SourceRecord>()),
@@ -42,9 +44,14 @@ const RECORDS: [Record; 16] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 21] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 22] = [
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), R("Lit")]),
+    (
+        "facets_groups.comp",
+        facets::GroupsPush::FIELDS,
+        &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), B(4), R("Run"), R("Facet"), B(4)],
+    ),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, &[R("Region"), B(4), R("Facet")]),
     (
         "second_sources.comp",
@@ -82,7 +89,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 21] = [
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
-    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit")]),
+    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4)]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(4)]),
@@ -236,10 +243,10 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
-        ("facets.comp", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
-        ("facets.comp", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
-        ("facets.comp", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
-        ("facets.comp", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
+        ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
+        ("include/shell.glsl", "SMOOTH_SIGMA", nimbus::reference::facets::GRADIENT_RADIUS_SIGMA),
+        ("include/shell.glsl", "CONDITION_LOW", nimbus::reference::facets::CONDITIONING.0),
+        ("include/shell.glsl", "CONDITION_HIGH", nimbus::reference::facets::CONDITIONING.1),
     ];
     for (file, name, host) in shared {
         assert_eq!(constant(text_of(file), name), Some(host), "{file}: {name}");

@@ -263,12 +263,12 @@ fn a_wrong_shader_is_noticed() {
     let scene = Scene::new();
     let mutations = [
         ("facets.comp", "max(sigma, group.sigma_mean)", "sigma"),
-        ("facets.comp", "SHELL_SIGMA = 1.5", "SHELL_SIGMA = 1.501"),
-        ("facets.comp", "SMOOTH_SIGMA = 4.47213595499958", "SMOOTH_SIGMA = 4.49"),
-        ("facets.comp", "CONDITION_LOW = 0.02", "CONDITION_LOW = 0.03"),
-        ("facets.comp", "w = 3.0 / 40.0", "w = 3.1 / 40.0"),
-        ("facets.comp", "-gradient / slope", "gradient / slope"),
-        ("facets.comp", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
+        ("include/shell.glsl", "SHELL_SIGMA = 1.5", "SHELL_SIGMA = 1.501"),
+        ("include/shell.glsl", "SMOOTH_SIGMA = 4.47213595499958", "SMOOTH_SIGMA = 4.49"),
+        ("include/shell.glsl", "CONDITION_LOW = 0.02", "CONDITION_LOW = 0.03"),
+        ("include/shell.glsl", "w = 3.0 / 40.0", "w = 3.1 / 40.0"),
+        ("include/shell.glsl", "-gradient / slope", "gradient / slope"),
+        ("include/shell.glsl", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
         ("facets.comp", "group.i_region,", "i_group[i],"),
         ("facets.comp", "particles[i].color", "particles[0].color"),
         ("facets.comp", "push.i_first_facet + i]", "push.i_first_facet + (i + 1) % push.n_particles]"),

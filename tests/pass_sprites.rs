@@ -17,7 +17,7 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::io::scene_file;
 use nimbus::layout::facet::LitRecord;
-use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::ParticleRecord;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::{generate, place};
@@ -33,13 +33,19 @@ fn front() -> Picture {
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     let mut random = Random(77);
-    let lit = |_: &PlacedRecord| {
+    let mut lit = || {
         let first = [random.within(0.0, 4.0), random.within(0.0, 1.0), random.within(0.0, 0.01)];
         let second = [random.within(0.0, 0.5), 0.0, random.within(-0.001, 0.1)];
         LitRecord { direct: [9.0; 3], indirect: [9.0; 3], first, second, ..LitRecord::default() }
     };
-    let lit = Some(picture.placed.iter().map(lit).collect());
-    for picture in [picture.clone(), Picture { lit, ..picture.clone() }] {
+    // A facet a particle; and facets that several particles share.
+    let n = picture.placed.len() as u32;
+    let singly = Some((0..n).map(|_| lit()).collect());
+    let shared = Some((0..n / 2 + 1).map(|_| lit()).collect());
+    let i_facet = Some((0..n).map(|i| (7 * i) % (n / 2 + 1)).collect());
+    let singly = Picture { lit: singly, ..picture.clone() };
+    let shared = Picture { lit: shared, i_facet, ..picture.clone() };
+    for picture in [picture.clone(), singly, shared] {
         for (target, format) in FORMATS {
             let what = format!("{what}, {format:?}, {}", if picture.lit.is_some() { "lit" } else { "unlit" });
             let values = picture.draw(gpu, None, target);

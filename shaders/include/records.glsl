@@ -6,6 +6,7 @@ struct Placed { vec3 position; float sigma; };
 struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 center; uint i_mode; uint n_modes; uint unused; uvec2 unused_too; };
 struct Mode { vec3 k; float phase; vec3 a; uint unused; };
 struct Facet { vec3 position; float area; vec3 normal; uint i_region; vec3 color; uint unused; };
+struct Run { uint i_first; uint n_particles; };
 struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float unused; vec3 second; float unused_too; };
 struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float unused_1; float unused_2; float unused_3; };
 struct RegionBounds { vec3 low; uint unused; vec3 scale; uint unused_too; };

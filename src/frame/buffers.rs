@@ -8,7 +8,9 @@ use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, Partic
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
+use crate::model::surface::Surface;
 
+use super::grouping::is_grouped;
 use super::limits::n_cells_max;
 
 /// Named by content; record types as in [`crate::layout`].
@@ -40,6 +42,8 @@ pub struct Buffers {
     pub i_region: Buffer,
     /// Lobes, N_NODES numbers each; written by the host every frame.
     pub table: Buffer,
+    /// Facet of each particle, where facets stand for several.
+    pub i_facet: Buffer,
     /// [key, particle].
     pub entries: Buffer,
 }
@@ -51,6 +55,7 @@ impl Buffers {
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
+        let n_named = if is_grouped(scene) { n } else { 0 };
         let n_shares = if has_shares(scene) { n_facets * n_lights } else { 0 };
         let placed_upload = match host_places {
             true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
@@ -74,6 +79,7 @@ impl Buffers {
             table: Buffer::new::<f32>(device, "first.table", (scene.materials.len() * N_NODES) as u64, Place::Upload)?,
             shares: Buffer::new::<f32>(device, "transmit.shares", n_shares, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
+            i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
         })
     }
@@ -89,8 +95,13 @@ impl Buffers {
         upload(device, commands, &i_group, &self.i_group)?;
         commands.run(|rec| {
             rec.fill(&self.status, 0);
+            // What no pass of this scene writes is zero: L2 where there is a first reflection alone.
+            rec.fill(&self.lit, 0);
             Ok(())
         })?;
+        if scene.lighting.mode == LightingMode::None {
+            upload(device, commands, &unlit(scene), &self.lit)?;
+        }
         upload(device, commands, &given_particles(scene, groups), &self.particles)
     }
 }
@@ -98,6 +109,15 @@ impl Buffers {
 /// Whether the transmittance's area means are wanted: the second reflection's emitters are areas.
 pub fn has_shares(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::TwoReflection
+}
+
+/// Surfaces that nothing lights show their materials' K_d, as particles show their colours.
+fn unlit(scene: &Scene) -> Vec<LitRecord> {
+    let of = |s: &Surface| {
+        let first = scene.materials[s.i_material].at(scene.time.start_s).kd.as_vec3().to_array();
+        std::iter::repeat_n(LitRecord { first, ..LitRecord::default() }, s.n_facets() as usize)
+    };
+    scene.surfaces.iter().flat_map(of).collect()
 }
 
 /// A record a group, in order.

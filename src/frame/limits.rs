@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
-use crate::gpu::memory::storage_bytes;
+use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, storage_bytes};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
@@ -13,6 +13,7 @@ use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::gust::N_MODES;
 use crate::model::scene::{LightingMode, Scene};
 
+use super::grouping::is_grouped;
 use super::render::target_format;
 
 /// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
@@ -25,6 +26,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
     let pixel = target_format(scene.film.format).bytes_per_pixel();
     let size = |record: usize| record as u64;
+    let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
@@ -37,13 +39,16 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
         ("the transmittances' means", scene.n_facets() * scene.lights.len() as u64, 4),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
+        ("the Morton order's entries", if is_grouped(scene) { 2 * n } else { 0 }, 8),
+        ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),
         ("the gusts", (scene.clouds.len() * N_MODES) as u64, size(size_of::<ModeRecord>())),
         ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
         ("the density grid's sums", n_cells_max(scene), 8),
         ("the density grid", n_cells_max(scene), 4),
-        ("the film, read back", u64::from(scene.film.width) * u64::from(scene.film.height), pixel),
+        ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
+        ("the film, read back", n_pixels, pixel),
     ];
     let mut total = 0;
     for (name, n, bytes) in wishes {

@@ -4,6 +4,7 @@
 pub mod buffers;
 pub mod exchange;
 pub mod game;
+pub mod grouping;
 pub mod limits;
 pub mod packet;
 pub mod parallel;

@@ -59,12 +59,19 @@ impl Relay {
 
     pub fn record(&self, rec: &mut Recorder<'_>, plan: &Plan, b: &Buffers, packet: &Packet) -> Result<()> {
         let x = &self.exchange;
+        let gathered: &[Receivers] = match plan.view_only() {
+            true => &[Receivers::Glossy],
+            false => &[Receivers::Diffuse, Receivers::Glossy],
+        };
         // The order follows from the facets alone.
         if let Some(order) = self.order.as_ref().filter(|_| plan.runs(Pass::Facets)) {
             order.record(rec, b, &x.order, self.n_facets)?;
         }
-        self.record_sources(rec, b)?;
-        for receivers in [Receivers::Diffuse, Receivers::Glossy] {
+        // Sources send the same wherever they are seen from.
+        if !plan.view_only() {
+            self.record_sources(rec, b)?;
+        }
+        for &receivers in gathered {
             let (i_first_block, n_blocks) = x.blocks_of(receivers);
             let push = GatherPush {
                 grid: packet.grid,

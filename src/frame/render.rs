@@ -3,6 +3,8 @@
 use std::time::Instant;
 
 use super::buffers::{Buffers, download, has_shares};
+use super::exchange::is_glossy;
+use super::grouping::{Grouping, is_grouped};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::relay::Relay;
@@ -23,6 +25,7 @@ use crate::passes::grid::Grid;
 use crate::passes::place::Place as PlacePass;
 use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
+use crate::passes::surfaces::Surfaces;
 use crate::passes::transmit::Transmit;
 
 pub struct Renderer {
@@ -30,6 +33,7 @@ pub struct Renderer {
     place: PlacePass,
     grid: Grid,
     facets: Facets,
+    grouping: Option<Grouping>,
     transmit: Transmit,
     first: First,
     second: Option<Relay>,
@@ -37,6 +41,8 @@ pub struct Renderer {
     sprites: Sprites,
     buffers: Buffers,
     target: Image,
+    /// What draws the surfaces, and their depth; none where there are none.
+    scenery: Option<(Surfaces, Image)>,
     readback: Buffer,
     commands: Commands,
     settings: Settings,
@@ -84,18 +90,32 @@ impl Renderer {
             true => Some(Relay::new(device, compiler, &mut commands, scene)?),
             false => None,
         };
+        let scenery = match scene.surfaces.is_empty() {
+            true => None,
+            false => {
+                let depth = Image::depth(device, "surfaces.depth", scene.film.width, scene.film.height)?;
+                Some((Surfaces::new(device, compiler, format)?, depth))
+            }
+        };
+        let grouped = is_grouped(scene);
+        let grouping = match grouped {
+            true => Some(Grouping::new(device, compiler, &mut commands, scene)?),
+            false => None,
+        };
         let mut renderer = Renderer {
             generate: Generate::new(device, compiler)?,
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler)?,
+            grouping,
             transmit: Transmit::new(device, compiler, has_shares(scene))?,
             first: First::new(device, compiler)?,
             second,
             sort: Sort::new(device, compiler, n_particles)?,
-            sprites: Sprites::new(device, compiler, format, lit, false)?,
+            sprites: Sprites::new(device, compiler, format, lit, [scenery.is_some(), grouped])?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
+            scenery,
             readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
             commands,
             settings: Settings {
@@ -118,6 +138,9 @@ impl Renderer {
                 n_facets: scene.n_facets() as u32,
                 lit,
                 two_reflections,
+                grouped,
+                glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
+                n_surfaces: scene.surfaces.len() as u32,
                 skip,
             },
             last: None,
@@ -147,6 +170,9 @@ impl Renderer {
     fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
         self.buffers.groups.write(&packet.groups)?;
         self.buffers.modes.write(&packet.modes)?;
+        if let Some(grouping) = &mut self.grouping {
+            grouping.upload(packet)?;
+        }
         if let Some(second) = &mut self.second {
             second.upload(packet)?;
         }
@@ -166,11 +192,13 @@ impl Renderer {
             place,
             grid,
             facets,
+            grouping,
             transmit,
             first,
             second,
             sort,
             sprites,
+            scenery,
             buffers: b,
             target,
             settings: s,
@@ -191,9 +219,15 @@ impl Renderer {
             pass(rec, plan, Pass::Grid, |rec| {
                 grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
             })?;
+            pass(rec, plan, Pass::Morton, |rec| grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b)))?;
             pass(rec, plan, Pass::Facets, |rec| {
-                let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
-                facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
+                match grouping {
+                    Some(grouping) => grouping.record_facets(rec, facets, b, packet)?,
+                    None => {
+                        let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
+                        facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
+                    }
+                }
                 facets.record_surfaces(rec, [&b.regions, &b.i_region, &b.facets], s.n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
@@ -220,9 +254,18 @@ impl Renderer {
                 sort.record_keys(rec, [&b.placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
                 sort.record(rec, &b.entries, n, s.sort_bits)
             })?;
+            let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
+            pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
+                Some(surfaces) => {
+                    let target = Target { color: &mut *target, depth: depth.as_deref_mut() };
+                    surfaces.record(rec, [&b.regions, &b.lit], target, &packet.camera, s.n_surfaces)
+                }
+                None => Ok(()),
+            })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, &b.placed, &b.particles, &b.lit];
-                sprites.record(rec, from, Target::color(target), &packet.camera, s.cutoff, [n, 0])
+                let from = [&b.entries, &b.placed, &b.particles, &b.lit, &b.i_facet];
+                let counts = [n, s.n_surface_facets];
+                sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
             })
         })
     }

@@ -20,6 +20,11 @@ record! {
 }
 
 record! {
+    /// Places in the particles' Morton order that one facet stands for.
+    pub struct RunRecord { i_first: u32, n_particles: u32 }
+}
+
+record! {
     /// What a facet receives and sends toward the camera, linear RGB.
     pub struct LitRecord {
         /// I_d.

@@ -130,6 +130,13 @@ pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64
     if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
+/// The `n_runs` (at most `n`) runs [first, end) that n places are divided into: [⌊g n/G⌋, ⌊(g+1) n/G⌋).
+pub fn runs(n: u64, n_runs: u64) -> impl Iterator<Item = (u64, u64)> {
+    // Both counts fit u32.
+    let bound = move |g: u64| g * n / n_runs;
+    (0..n_runs).map(move |g| (bound(g), bound(g + 1)))
+}
+
 /// Integral of a blob's extinction, κ (2π)^{3/2} σ³.
 pub fn mass(kappa: f64, sigma: f64) -> f64 {
     kappa * (SQRT_TAU * sigma).powi(3)
@@ -167,6 +174,14 @@ mod tests {
         let sigma = mean_radius(Form::Centred, 2.2) * 0.6 / 3.0;
         assert!((SQRT_TAU * kappa * sigma - 1.5).abs() < 1e-14);
         assert_eq!(box_kappa(&CloudBox { radius_max: 0.0, ..b }, Form::Centred, 1.5, 0.6), 0.0);
+    }
+
+    #[test]
+    fn runs_share_the_places_out() {
+        assert_eq!(runs(10, 3).collect::<Vec<_>>(), [(0, 3), (3, 6), (6, 10)]);
+        assert_eq!((runs(2, 2).collect::<Vec<_>>(), runs(0, 0).count()), (vec![(0, 1), (1, 2)], 0));
+        let last = runs(u64::from(u32::MAX), 1 << 20).last();
+        assert_eq!(last, Some((4_294_963_199, 4_294_967_295)));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::basis::Sampling;
 use super::camera::Camera;
-use super::cloud::{Cloud, Group};
+use super::cloud::{Cloud, Group, runs};
 use super::film::Film;
 use super::light::Light;
 use super::material::Material;
@@ -169,7 +169,25 @@ impl Scene {
     /// Facets of one cloud.
     pub fn n_cloud_facets(&self, cloud: &Cloud) -> u64 {
         let n = cloud.n_particles();
-        self.lighting.facets_per_cloud.map_or(n, |most| n.min(u64::from(most)))
+        self.lighting.facets_per_cloud.map_or(n, |most| n.min(u64::from(most.max(1))))
+    }
+
+    /// Whether some facet stands for several particles.
+    pub fn groups_facets(&self) -> bool {
+        self.clouds.iter().any(|c| self.n_cloud_facets(c) < c.n_particles())
+    }
+
+    /// Of each of the clouds' facets the run (first, end) of its particles' places in Morton order, all clouds' places
+    /// numbered through as their particles are.
+    pub fn facet_runs(&self) -> Vec<(u64, u64)> {
+        let mut i_first = 0;
+        let of_cloud = |c: &Cloud| {
+            let n = c.n_particles();
+            let first = i_first;
+            i_first += n;
+            runs(n, self.n_cloud_facets(c)).map(move |(a, b)| (first + a, first + b))
+        };
+        self.clouds.iter().flat_map(of_cloud).collect()
     }
 
     pub fn n_facets(&self) -> u64 {

@@ -1,6 +1,7 @@
-//! facets: what light falls on: the grids of the surfaces, and one facet a particle.
+//! facets: what light falls on: the grids of the surfaces, and one facet a particle, or a run of particles in Morton order.
 //!
-//! In: regions (rectangles), placed particles, κ, groups, density grid. Out: position, unit normal, area, region, colour.
+//! In: regions (rectangles), placed particles, κ, groups, density grid, order and runs. Out: position, unit normal, area,
+//! region, colour; of runs each particle's facet.
 //! Law: rectangles' grids row by row; a particle's normal against the
 //! gradient of the density smoothed to 2σ, blended to "away from the cloud's centre" where that is ill conditioned; position on
 //! the shell p + 1.5 σ n. Source: C §2.4, docs/model.md §5, §11. Error: the normal's grows as 1/(t·conditioning).
@@ -15,11 +16,16 @@ record! {
 }
 
 record! {
+    pub struct GroupsPush { grid: GridRecord, n_facets: u32, i_first_facet: u32 }
+}
+
+record! {
     pub struct SurfacesPush { n_facets: u32 }
 }
 
 pub struct Facets {
     kernel: Kernel,
+    groups: Kernel,
     surfaces: Kernel,
 }
 
@@ -27,6 +33,7 @@ impl Facets {
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Facets> {
         Ok(Facets {
             kernel: Kernel::new(device, compiler, "facets", Push::FIELDS, &[])?,
+            groups: Kernel::new(device, compiler, "facets.groups", GroupsPush::FIELDS, &[])?,
             surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
         })
     }
@@ -48,5 +55,18 @@ impl Facets {
     ) -> Result<()> {
         let push = Push { grid: *grid, n_particles, i_first_facet };
         rec.dispatch(&self.kernel, &[placed, particles, i_group, groups, density, facets], &push, n_particles)
+    }
+
+    /// `placed`, `particles`, `i_group`, `groups`, `density` as above; `order`: u32, the particle of each place; `runs`:
+    /// RunRecord by facet; `facets`: FacetRecord; `i_facet`: u32 by particle.
+    pub fn record_groups(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 9],
+        grid: &GridRecord,
+        n_facets: u32,
+        i_first_facet: u32,
+    ) -> Result<()> {
+        rec.dispatch(&self.groups, &buffers, &GroupsPush { grid: *grid, n_facets, i_first_facet }, n_facets)
     }
 }

@@ -22,6 +22,7 @@ macro_rules! shader_texts {
 /// Every shader and include, as built into the binary.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
     "facets.comp",
+    "facets_groups.comp",
     "facets_surfaces.comp",
     "first.comp",
     "generate.comp",
@@ -37,6 +38,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/occlude.glsl",
     "include/philox.glsl",
     "include/records.glsl",
+    "include/shell.glsl",
     "include/sort.glsl",
     "include/veil.glsl",
     "morton_key.comp",

@@ -20,19 +20,25 @@ pub struct Sprites {
 
 impl Sprites {
     /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
-    /// depth; else the target is cleared.
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, lit: bool, behind: bool) -> Result<Sprites> {
-        let constants = [(0, u32::from(lit)), (1, u32::from(behind))];
+    /// depth; else the target is cleared. `grouped`: facets stand for several particles.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        lit: bool,
+        [behind, grouped]: [bool; 2],
+    ) -> Result<Sprites> {
+        let constants = [(0, u32::from(lit)), (1, u32::from(behind)), (2, u32::from(grouped))];
         let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
         Ok(Sprites { pipeline })
     }
 
     /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
-    /// from `i_first_facet` on. `target` has depth where surfaces have been drawn.
+    /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped. `target` has depth where surfaces have been drawn.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 4],
+        buffers: [&Buffer; 5],
         target: Target<'_>,
         camera: &CameraRecord,
         cutoff: f64,

@@ -1,5 +1,5 @@
-//! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, on the blob's shell, its normal from
-//! the density around it where that has a direction, else away from the cloud's centre.
+//! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, or one a run of particles in Morton order taken as
+//! one blob; on the blob's shell, its normal from the density around it where that has a direction, else away from the cloud's centre.
 //! In: the density grid and the placed blobs. Out: positions relative to O, unit normals, areas in scene units².
 
 use std::f64::consts::PI;
@@ -96,6 +96,74 @@ pub fn facets(
     blobs.iter().zip(regions).zip(sigma_means).map(facet).collect()
 }
 
+/// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for [`facets`].
+#[derive(Debug, Clone, Copy)]
+pub struct Members<'a> {
+    pub blobs: &'a [Blob],
+    pub sigma_means: &'a [f64],
+    pub regions: &'a [u32],
+    pub colors: &'a [DVec3],
+}
+
+/// What a run of particles is as one blob.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bunch {
+    /// p̄ = Σ m p/Σ m, m = κσ³.
+    pub position: DVec3,
+    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m).
+    pub sigma: f64,
+    /// Mean σ̄ of the members' groups, by mass.
+    pub sigma_mean: f64,
+    pub area: f64,
+    /// Mean by area.
+    pub color: DVec3,
+}
+
+/// Weights that are all 0 count alike.
+fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
+    let weights: Vec<f64> = of.collect();
+    let sum: f64 = weights.iter().sum();
+    let equal = 1.0 / weights.len() as f64;
+    weights.into_iter().map(|w| if sum > 0.0 { w / sum } else { equal }).collect()
+}
+
+/// The particles `run` as one.
+pub fn bunch(m: &Members<'_>, run: &[u32]) -> Bunch {
+    let at = |i: &u32| m.blobs[*i as usize];
+    let by_mass = weights(run.iter().map(|i| at(i).kappa * at(i).sigma.powi(3)));
+    let areas: Vec<f64> = run.iter().map(|i| area(at(i).sigma, at(i).kappa)).collect();
+    let by_area = weights(areas.iter().copied());
+    let position: DVec3 = run.iter().zip(&by_mass).map(|(i, w)| *w * at(i).position).sum();
+    let spread = |(i, w): (&u32, &f64)| w * (at(i).sigma.powi(2) + (at(i).position - position).length_squared() / 3.0);
+    Bunch {
+        position,
+        sigma: run.iter().zip(&by_mass).map(spread).sum::<f64>().sqrt(),
+        sigma_mean: run.iter().zip(&by_mass).map(|(i, w)| w * m.sigma_means[*i as usize]).sum(),
+        area: areas.iter().sum(),
+        color: run.iter().zip(&by_area).map(|(i, w)| *w * m.colors[*i as usize]).sum(),
+    }
+}
+
+/// One facet a run of `order`, and its colour. A run is [first, end), of one cloud's particles.
+pub fn grouped(
+    spec: &GridSpec,
+    cells: &[f64],
+    members: &Members<'_>,
+    cloud_centers: &[DVec3],
+    order: &[u32],
+    runs: &[(u64, u64)],
+) -> Vec<(Facet, DVec3)> {
+    let of = |&(first, end): &(u64, u64)| {
+        let run = &order[first as usize..end as usize];
+        let b = bunch(members, run);
+        let (scale, region) = (b.sigma.max(b.sigma_mean), members.regions[run[0] as usize]);
+        let (normal, conditioning) = normal(spec, cells, b.position, scale, cloud_centers[region as usize]);
+        let position = b.position + SHELL_SIGMA * scale * normal;
+        (Facet { position, normal, area: b.area, region, conditioning }, b.color)
+    };
+    runs.iter().map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -174,5 +242,43 @@ mod tests {
         assert_eq!((facets[1].normal, facets[1].position.z), (DVec3::NEG_Z, 0.25));
         // τ₀ = √(2π); π·1.5²·(1 − e^{−2.5066…}) = 6.49216….
         assert!((facets[0].area - 2.25 * PI * (1.0 - (-2.506_628_274_631f64).exp())).abs() < 1e-11);
+    }
+
+    #[test]
+    fn a_run_is_one_blob_of_its_members() {
+        let blob = |x: f64, sigma, kappa| Blob { position: DVec3::X * x, sigma, kappa };
+        // Masses 2·1³ and 1·2³, 1 to 4: p̄ = 4, σ_g² = ((1 + 16/3) + 4 (4 + 1/3))/5 = 71/15.
+        let blobs = [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
+        let colors = [DVec3::X, DVec3::Y, DVec3::ZERO, DVec3::ONE];
+        let members = Members { blobs: &blobs, sigma_means: &[1.0, 6.0, 2.0, 4.0], regions: &[0; 4], colors: &colors };
+        let b = bunch(&members, &[0, 1]);
+        assert!((b.position - DVec3::X * 4.0).length() < 1e-14 && (b.sigma_mean - 5.0).abs() < 1e-14);
+        assert!((b.sigma.powi(2) - 71.0 / 15.0).abs() < 1e-14);
+        let (a0, a1) = (area(1.0, 2.0), area(2.0, 1.0));
+        assert!((b.area - a0 - a1).abs() < 1e-13);
+        assert!((b.color - DVec3::new(a0, a1, 0.0) / (a0 + a1)).length() < 1e-15);
+        // Neither of the last two has mass or area: they count alike.
+        let b = bunch(&members, &[2, 3]);
+        assert_eq!((b.position, b.sigma_mean, b.area, b.color), (DVec3::X * 2.0, 3.0, 0.0, DVec3::splat(0.5)));
+        // (0 + 1)/2 + 1/3.
+        assert!((b.sigma.powi(2) - 5.0 / 6.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn runs_of_one_are_the_particles_facets() {
+        let cells = ball();
+        let blob = |x: f64| Blob { position: DVec3::new(x, 0.4, -0.3), sigma: 0.3 + 0.1 * x, kappa: 1.0 };
+        let (blobs, means, regions) = ([blob(0.5), blob(-1.0), blob(2.0)], [0.1, 0.4, 0.2], [0, 1, 1]);
+        let centers = [DVec3::Y, DVec3::Z];
+        let colors = [DVec3::X; 3];
+        let members = Members { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
+        let single = facets(&SPEC, &cells, &blobs, &means, &regions, &centers);
+        let of_runs = grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);
+        for ((facet, color), i) in of_runs.into_iter().zip([0, 2, 1]) {
+            // √σ² is σ to an ulp.
+            assert!((facet.position - single[i].position).length() < 1e-14 && color == DVec3::X);
+            assert!((facet.normal - single[i].normal).length() < 1e-13 && facet.area == single[i].area);
+            assert_eq!(facet.region, single[i].region);
+        }
     }
 }

@@ -5,12 +5,14 @@ use glam::DVec3;
 use crate::error::Result;
 use crate::frame::game::Setting;
 use crate::model::cloud::{CloudSource, Group};
+use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::light::Light;
 use crate::model::scene::{LightingMode, Scene};
+use crate::reference::facets::{Facet, Members};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
 use crate::reference::transmit::{Obstacles, Receiver};
-use crate::reference::{self, Blob, facets::Facet};
+use crate::reference::{self, Blob};
 
 /// All stages of one frame up to the light on the facets. Positions relative to the lighting origin.
 pub struct Truth {
@@ -21,6 +23,7 @@ pub struct Truth {
     pub blobs: Vec<Blob>,
     /// Empty where lighting.mode is "none".
     pub facets: Vec<Facet>,
+    pub facet_colors: Vec<DVec3>,
     pub irradiance: Vec<DVec3>,
     pub radiance: Vec<DVec3>,
 }
@@ -36,8 +39,17 @@ impl Truth {
         reference::place::add_gusts(&mut placed, &positions, &groups, &scene.clouds, time_s);
         let blobs = reference::place::blobs(&generated, &placed);
         let colors = colors(scene);
-        let mut truth =
-            Truth { setting, groups, generated, colors, blobs, facets: vec![], irradiance: vec![], radiance: vec![] };
+        let mut truth = Truth {
+            setting,
+            groups,
+            generated,
+            colors,
+            blobs,
+            facets: vec![],
+            facet_colors: vec![],
+            irradiance: vec![],
+            radiance: vec![],
+        };
         if scene.lighting.mode != LightingMode::None {
             truth.light(scene);
         }
@@ -51,7 +63,15 @@ impl Truth {
         let regions = reference::place::regions(&self.groups);
         let scales: Vec<f64> =
             self.groups.iter().flat_map(|g| std::iter::repeat_n(g.sigma_mean, g.n_particles as usize)).collect();
-        self.facets = reference::facets::facets(grid, &cells, &self.blobs, &scales, &regions, &centers);
+        let members = Members { blobs: &self.blobs, sigma_means: &scales, regions: &regions, colors: &self.colors };
+        (self.facets, self.facet_colors) = if scene.groups_facets() {
+            let order = self.order(scene, &regions);
+            reference::facets::grouped(grid, &cells, &members, &centers, &order, &scene.facet_runs())
+                .into_iter()
+                .unzip()
+        } else {
+            (reference::facets::facets(grid, &cells, &self.blobs, &scales, &regions, &centers), self.colors.clone())
+        };
         let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
         let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
         let lighting = &scene.lighting;
@@ -76,7 +96,17 @@ impl Truth {
         let kd: Vec<DVec3> =
             (0..scene.n_regions()).map(|i| scene.region_material(i).at(self.setting.time_s).kd).collect();
         let regions: Vec<u32> = self.facets.iter().map(|f| f.region).collect();
-        self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.colors);
+        self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.facet_colors);
+    }
+
+    /// The particles in Morton order, cloud by cloud.
+    fn order(&self, scene: &Scene, i_cloud: &[u32]) -> Vec<u32> {
+        let (n_surfaces, origin) = (scene.surfaces.len() as u32, self.setting.light_origin);
+        let bounds = scene.region_bounds(&self.groups, self.setting.time_s, DEPOSIT_CUT_SIGMA);
+        let bounds: Vec<_> = bounds.into_iter().map(|(low, high)| (low - origin, high - origin)).collect();
+        let positions: Vec<DVec3> = self.blobs.iter().map(|b| b.position).collect();
+        let regions: Vec<u32> = i_cloud.iter().map(|i| n_surfaces + i).collect();
+        reference::morton::order(&positions, &regions, &bounds)
     }
 }
 

@@ -36,6 +36,8 @@ pub struct Picture {
     pub particles: Vec<ParticleRecord>,
     /// Radiance of the particles' facets; without it they are drawn in their own colours.
     pub lit: Option<Vec<LitRecord>>,
+    /// Facet of each particle, where they are not in the particles' order.
+    pub i_facet: Option<Vec<u32>>,
     /// Rectangles under the sprites.
     pub scenery: Option<Scenery>,
 }
@@ -50,7 +52,7 @@ impl Picture {
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
         let view = View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0 };
-        Picture { camera, view, placed: vec![], particles: vec![], lit: None, scenery: None }
+        Picture { camera, view, placed: vec![], particles: vec![], lit: None, i_facet: None, scenery: None }
     }
 
     /// A blob whose τ through the centre is `tau`.
@@ -81,7 +83,11 @@ impl Picture {
     fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
             // Their f32 sum is rounded alike on both sides.
-            Some(lit) => lit.iter().map(|l| double([0, 1, 2].map(|i| l.first[i] + l.second[i]))).collect(),
+            Some(lit) => {
+                let facets = self.i_facet.clone().unwrap_or_else(|| (0..self.placed.len() as u32).collect());
+                let of = |l: &LitRecord| double([0, 1, 2].map(|i| l.first[i] + l.second[i]));
+                facets.iter().map(|i| of(&lit[*i as usize])).collect()
+            }
             None => self.particles.iter().map(|p| double(p.color)).collect(),
         }
     }
@@ -96,7 +102,7 @@ impl Picture {
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let pass = Sprites::new(&gpu.device, compiler, format, lit, behind).expect("sprites");
+        let pass = Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some()]).expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
@@ -105,6 +111,10 @@ impl Picture {
         let lit = gpu.upload(&facets);
         let [by_order, placed, particles] =
             [gpu.upload(&entries), gpu.upload(&self.placed), gpu.upload(&self.particles)];
+        // What names a facet counts the surfaces' too.
+        let n_before = scenery.lit.len() as u32;
+        let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
+        let i_facet = gpu.upload(&named);
         let regions = gpu.upload(&scenery.regions);
         let (width, height) = (self.view.width, self.view.height);
         let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
@@ -129,7 +139,8 @@ impl Picture {
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
                 let n = [entries.len() as u32, scenery.lit.len() as u32];
-                pass.record(rec, [&by_order, &placed, &particles, &lit], target, &camera, self.view.cutoff, n)?;
+                let from = [&by_order, &placed, &particles, &lit, &i_facet];
+                pass.record(rec, from, target, &camera, self.view.cutoff, n)?;
             }
             rec.copy_image(&mut target, &readback);
             Ok(())

@@ -1,0 +1,49 @@
+// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, the push constants' grid and `density`.
+
+#include "density.glsl"
+
+const float SHELL_SIGMA = 1.5;
+// Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard deviation s, here 2 sigma, to
+// degree 5.
+const float SMOOTH_SIGMA = 4.47213595499958;
+const float CONDITION_LOW = 0.02;
+const float CONDITION_HIGH = 0.10;
+const float SQRT_TAU = 2.50662827463;
+
+vec3 unit_or(vec3 v, vec3 otherwise) {
+    float l = length(v);
+    return l > 1e-30 ? v / l : otherwise;
+}
+
+// Against the gradient of the density smoothed to 2 scale where that is well conditioned, else away from the centre.
+vec3 normal_at(vec3 p, float scale, vec3 cloud_center) {
+    vec3 gradient = vec3(0.0);
+    float sum = 0.0;
+    // A quadrature of degree 5 on the sphere: 6 axes and 8 diagonals.
+    for (int k = 0; k < 14; ++k) {
+        vec3 d;
+        float w;
+        if (k < 6) {
+            d = vec3(0.0);
+            d[k >> 1] = (k & 1) == 0 ? 1.0 : -1.0;
+            w = 1.0 / 15.0;
+        } else {
+            d = vec3((k & 1) == 0 ? 1.0 : -1.0, (k & 2) == 0 ? 1.0 : -1.0, k < 10 ? 1.0 : -1.0) * 0.57735026919;
+            w = 3.0 / 40.0;
+        }
+        float rho = w * density_at(p + SMOOTH_SIGMA * scale * d);
+        gradient += rho * d;
+        sum += rho;
+    }
+    float slope = length(gradient);
+    float condition = sum > 0.0 ? slope / sum : 0.0;
+    vec3 outward = unit_or(p - cloud_center, vec3(0.0, 1.0, 0.0));
+    float t = smoothstep(CONDITION_LOW, CONDITION_HIGH, condition);
+    return t > 0.0 ? unit_or(t * (-gradient / slope) + (1.0 - t) * outward, outward) : outward;
+}
+
+// pi R^2 (1 - e^-tau) of a blob, R = 3 sigma.
+float area_of(float sigma, float kappa) {
+    float radius = 3.0 * sigma;
+    return PI * radius * radius * one_minus_exp(SQRT_TAU * kappa * sigma);
+}

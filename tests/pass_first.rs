@@ -8,14 +8,15 @@ mod lights;
 
 use std::f64::consts::PI;
 
-use bounded::{Bounded, Random, dot, exact3, greatest_ratio};
+use bounded::{Bounded, Random, U, dot, exact3, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within};
 use lights::{arrival, double, near_light};
 use nimbus::gpu::Compiler;
-use nimbus::layout::facet::{FacetRecord, LitRecord, RegionRecord};
+use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, RegionRecord};
+use nimbus::model::basis::{self, Basis, Sampling};
 use nimbus::model::light::Light;
-use nimbus::passes::first::First;
+use nimbus::passes::first::{First, Push};
 use nimbus::reference::first::{irradiance, radiance};
 
 const N_FACETS: usize = 10_000;
@@ -29,6 +30,7 @@ struct Case {
     lights: Vec<Light>,
     transmittance: Vec<f32>,
     regions: Vec<RegionRecord>,
+    table: Vec<f32>,
 }
 
 /// `n_near` point lights and as many spots among the facets.
@@ -62,10 +64,14 @@ fn case(n_suns: usize, n_near: usize, sky: bool) -> Case {
     for (i, v) in transmittance.iter_mut().take(40).enumerate() {
         *v = (i % 2) as f32;
     }
-    let mut region = || RegionRecord { kd: [0; 3].map(|_| r.within(0.0, 1.0)), ..RegionRecord::default() };
+    let mut region =
+        || RegionRecord { kd: [0; 3].map(|_| r.within(0.0, 1.0)), i_lobe: NO_LOBE, ..RegionRecord::default() };
     let regions = (0..N_REGIONS).map(|_| region()).collect();
-    Case { facets, lights, transmittance, regions }
+    Case { facets, lights, transmittance, regions, table: vec![] }
 }
+
+/// Where the facets are seen from.
+const EYE: [f32; 3] = [0.5, 3.0, 1.25];
 
 impl Case {
     fn run(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Vec<LitRecord> {
@@ -75,11 +81,12 @@ impl Case {
             gpu.upload(&lights::records(&self.lights)),
             gpu.upload(&self.transmittance),
             gpu.upload(&self.regions),
-            gpu.buffer::<LitRecord>(N_FACETS),
+            gpu.upload(&self.table),
+            gpu.upload(&[LitRecord::default(); N_FACETS]),
         ];
-        let (n, n_lights) = (N_FACETS as u32, self.lights.len() as u32);
-        gpu.run(|rec| first.record(rec, buffers.each_ref(), n, n_lights));
-        gpu.download(&buffers[4], N_FACETS)
+        let push = Push { eye: EYE, n_facets: N_FACETS as u32, n_lights: self.lights.len() as u32 };
+        gpu.run(|rec| first.record(rec, buffers.each_ref(), &push));
+        gpu.download(&buffers[5], N_FACETS)
     }
 
     /// Irradiance and radiance in the order of the records' floats.
@@ -189,5 +196,84 @@ fn wrong_light_is_noticed() {
     ] {
         let values = numbers(&case.run(&mut gpu, Some(&Gpu::wrong_compiler(file, from, to))));
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+/// Suns and the sky on facets of three lobes, from the narrowest that the basis is made for on.
+fn shiny_case() -> Case {
+    let mut case = case(2, 0, true);
+    let basis = Basis::new([1.0, 1000.0], 12, Sampling::Log);
+    case.table = [3.0, 60.0, 1000.0].iter().flat_map(|ns| basis.lobe(*ns)).map(|v| v as f32).collect();
+    for (region, i) in case.regions.iter_mut().zip(0u32..) {
+        region.ks = [0.25, 0.5, 0.125 * i as f32];
+        region.i_lobe = if i < 3 { i } else { NO_LOBE };
+    }
+    case
+}
+
+/// L1 of the lobes alone, and a bound on what f32 may make of it.
+fn shine(case: &Case, j: usize) -> [(f64, f64); 3] {
+    let facet = &case.facets[j];
+    let region = &case.regions[facet.i_region as usize];
+    let (n, p) = (double(facet.normal), double(facet.position));
+    let out = (double(EYE) - p).normalize();
+    let mut sums = [(0.0, 0.0); 3];
+    if region.i_lobe == NO_LOBE || n.dot(out) <= 0.0 {
+        return sums;
+    }
+    let table: Vec<f64> =
+        case.table[region.i_lobe as usize * basis::N_NODES..][..basis::N_NODES].iter().map(|v| f64::from(*v)).collect();
+    for (l, light) in case.lights.iter().enumerate().filter(|(_, light)| !light.is_sky()) {
+        let a = light.arrival(p);
+        let v = f64::from(case.transmittance[j * case.lights.len() + l]);
+        let share = light.share(n, &a, v);
+        let sum = a.toward + out;
+        let chord = (n - sum.normalize()).length();
+        // Directions err by 4 roundings and what their sum cancels; the chord by that and its own 4; the place in the table
+        // by 4 of t, which is at most 1, a thousand cells wide.
+        let off = U * (16.0 / sum.length() + 8.0);
+        let at = |chord: f64| basis::evaluate(&table, 0.5 * chord * chord);
+        let lobe = at(chord);
+        let cell = |c: f64| (at(c * (1.0 + 16.0 * U)) - at(c * (1.0 - 16.0 * U))).abs();
+        let turned = (at(chord + off) - lobe).abs().max((at((chord - off).max(0.0)) - lobe).abs());
+        let lobe_off = turned + cell(chord) + 8.0 * U * lobe.abs();
+        // A cosine errs by 6 roundings of 1; then come V, E, K_s and the sums.
+        let share_off = U * (6.0 * v + 12.0 * share);
+        for (c, (value, bound)) in sums.iter_mut().enumerate() {
+            let e = f64::from(region.ks[c]) * light.energy()[c];
+            *value += e * share * lobe;
+            *bound += e * (share_off * (lobe.abs() + lobe_off) + share * lobe_off);
+        }
+    }
+    sums
+}
+
+#[test]
+fn lobes_shine_toward_the_eye_from_the_front_side() {
+    let mut gpu = Gpu::new();
+    let case = shiny_case();
+    let (plain, bounds) = (case.truth(), case.bounds());
+    let expect = |j: usize, c: usize| {
+        let (value, bound) = shine(&case, j)[c];
+        let i = N_NUMBERS * j + 8 + c;
+        (plain[i] + value, bounds[i] + bound + 4.0 * U * (plain[i] + value.abs()))
+    };
+    let (truths, limits): (Vec<f64>, Vec<f64>) = (0..3 * N_FACETS).map(|i| expect(i / 3, i % 3)).unzip();
+    let first = |lit: &[LitRecord]| lit.iter().flat_map(|l| l.first.map(f64::from)).collect::<Vec<f64>>();
+    let values = first(&case.run(&mut gpu, None));
+    println!("greatest error/bound {:.3}", greatest_ratio(&values, &truths, &limits));
+    assert_within("L1 with lobes", &values, &truths, &limits);
+    let lit_up = (0..N_FACETS).filter(|j| shine(&case, *j)[1].0 > 0.0).count();
+    assert!(lit_up > N_FACETS / 20, "{lit_up} facets shine");
+    for (file, from, to) in [
+        ("first.comp", "dot(outgoing, facet.normal) > 0.0", "true"),
+        ("first.comp", "a.toward, outgoing", "outgoing, outgoing"),
+        ("first.comp", "light.kind == LIGHT_SKY ? 0u : n_shiny", "n_shiny"),
+        ("include/lobe.glsl", "t - float(i)", "0.0"),
+        ("include/lobe.glsl", "0.5 * dot(chord, chord)", "0.501 * dot(chord, chord)"),
+    ] {
+        let compiler = Gpu::wrong_compiler(file, from, to);
+        let values = first(&case.run(&mut gpu, Some(&compiler)));
+        assert!(greatest_ratio(&values, &truths, &limits) > 1.0, "{from} as {to}");
     }
 }

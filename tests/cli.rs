@@ -1,5 +1,6 @@
 //! The program as a user runs it: what it prints, what it writes, and its exit codes.
 
+use nimbus::frame::plan::Pass;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -239,7 +240,7 @@ fn render_says_what_it_drew() {
     let bytes: Vec<u8> = pixels.as_raw().iter().flat_map(|v| v.to_le_bytes()).collect();
     assert_eq!(json["image_hash"], format!("{:x}", Sha256::digest(bytes)));
     let passes = json["passes"].as_array().expect("a list");
-    assert_eq!(passes.len(), 8);
+    assert_eq!(passes.len(), Pass::ALL.len());
     assert!(passes.iter().all(|p| p["name"].is_string() && p["reason"].is_string() && p["run"].is_boolean()));
     assert!(passes.iter().all(|p| p["ms"].is_null() || p["run"] == true));
 

@@ -187,7 +187,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "time": { "start_s": 0.0, "step_s": 0.0333, "frames": 300 },
             "lighting": {
                 "mode": "two-reflection", "grid": 64, "step": 1.0, "forward": 0.85, "bases": 8, "sampling": "log",
-                "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.5, "facets_per_cloud": 0,
+                "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": 0,
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16,
             },
             "draw": { "path": "sprites", "cutoff": 3.0, "sort_bits": 32, "resolution": 1.0 },

@@ -114,7 +114,7 @@ fn the_second_reflection_has_its_keys() {
     let lighting = |text: &str| good(text).scene.lighting;
     let l = lighting(CLOUD);
     assert_eq!((l.mode, l.bases, l.sampling, l.gather), (LightingMode::TwoReflection, 8, Sampling::Log, Gather::Auto));
-    assert_eq!((l.theta, l.facets_per_cloud), (0.5, None));
+    assert_eq!((l.theta, l.facets_per_cloud), (0.4, None));
     assert_eq!(l.pairs, Pairs { size: 0.5, levels: 6, steps: 16 });
     for (name, mode) in LightingMode::NAMES {
         assert_eq!(lighting(&format!("[lighting]\nmode = '{name}'")).mode, mode);

@@ -55,9 +55,14 @@ fn images(frames: Vec<(Vec<u8>, FrameTimes)>) -> Vec<Vec<u8>> {
 
 #[test]
 fn two_runs_serial_parallel_and_no_skip_give_the_same_bytes_for_every_frame() {
-    for simulate in ["threads.simulate=gpu", "threads.simulate=cpu"] {
+    let ways = [
+        &["threads.simulate=gpu"][..],
+        &["threads.simulate=cpu"],
+        &["threads.simulate=gpu", "lighting.facets_per_cloud=7"],
+    ];
+    for way in ways {
         for motion in [&[][..], &["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"]] {
-            let overrides = [&[simulate], motion].concat();
+            let overrides = [way, motion].concat();
             let first = images(run(scene(&overrides), Threading::Serial, true));
             assert_eq!(first, images(run(scene(&overrides), Threading::Serial, true)), "{overrides:?}: twice");
             assert_eq!(first, images(run(scene(&overrides), Threading::Parallel, true)), "{overrides:?}: parallel");
@@ -70,15 +75,27 @@ fn two_runs_serial_parallel_and_no_skip_give_the_same_bytes_for_every_frame() {
 
 #[test]
 fn a_still_scene_skips_and_a_moving_one_does_not() {
-    let still = ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
+    let grouped = "lighting.facets_per_cloud=7";
+    let still = [grouped, "cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
     let frames = run(scene(&still), Threading::Serial, true);
     let plan = frames[2].1.plan;
-    for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Facets, Pass::Transmit, Pass::First] {
+    for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Facets, Pass::Transmit, Pass::First] {
         assert!(!plan.runs(pass), "{}", pass.name());
     }
     assert!(plan.runs(Pass::Sprites));
-    let frames = run(scene(&[]), Threading::Serial, true);
+    let frames = run(scene(&[grouped]), Threading::Serial, true);
     assert!(Pass::ALL[1..].iter().all(|p| frames[2].1.plan.runs(*p)));
+}
+
+#[test]
+fn enough_facets_are_one_a_particle() {
+    // Clouds of different sizes: between them one has a facet a particle among others that have not.
+    let of = |n: u64| images(run(scene(&[&format!("lighting.facets_per_cloud={n}")]), Threading::Serial, true));
+    let sizes: Vec<u64> = scene(&[]).clouds.iter().map(|c| c.n_particles()).collect();
+    let most = sizes.iter().copied().max().unwrap_or(0);
+    let singly = of(0);
+    assert!(singly == of(most), "{sizes:?}");
+    assert!(singly != of(most - 1) && sizes.iter().any(|n| *n < most), "{sizes:?}");
 }
 
 #[test]

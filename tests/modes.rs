@@ -86,6 +86,17 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
 }
 
 #[test]
+fn enough_facets_are_one_a_particle() {
+    // Clouds of different sizes: between them one has a facet a particle among others that have not.
+    let of = |n: u64| images(run(scene(&[&format!("lighting.facets_per_cloud={n}")]), Threading::Serial, true));
+    let sizes: Vec<u64> = scene(&[]).clouds.iter().map(|c| c.n_particles()).collect();
+    let most = sizes.iter().copied().max().unwrap_or(0);
+    let singly = of(0);
+    assert!(singly == of(most), "{sizes:?}");
+    assert!(singly != of(most - 1) && sizes.iter().any(|n| *n < most), "{sizes:?}");
+}
+
+#[test]
 fn a_frame_made_alone_is_the_frame_of_the_run() {
     let in_run = images(run(scene(&[]), Threading::Serial, true));
     let gpu = Gpu::new();

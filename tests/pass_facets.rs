@@ -1,192 +1,18 @@
 //! The pass facets against its f64 reference, fed with the GPU's own density, so that this stage is measured alone.
 
 mod harness;
+#[path = "harness/shells.rs"]
+mod shells;
 
-use glam::{DVec3, UVec3, Vec3};
+use glam::{DVec3, Vec3};
 use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::FacetRecord;
-use nimbus::layout::frame::GridRecord;
-use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
-use nimbus::model::grid::GridSpec;
-use nimbus::passes::facets::Facets;
-use nimbus::passes::grid::Grid;
-use nimbus::reference::Blob;
-use nimbus::reference::facets::{
-    CONDITIONING, Facet, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets, gradient, smoothstep,
-};
-use nimbus::reference::generate::uniforms;
-use nimbus::reference::grid::mass;
-use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
-
-const U: f64 = U_F32;
-/// Mean σ of the two groups' particles: some are smaller, some larger.
-const SIGMA_MEANS: [f32; 2] = [0.15, 0.25];
-/// Two clouds, numbers 3 and 1.
-const REGIONS: [u32; 2] = [3, 1];
-/// The clouds' facets come after those of the surfaces.
-const N_SURFACE_FACETS: usize = 5;
-/// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
-const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
-/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the root, which Vulkan
-/// derives from inversesqrt (2 ulp = 4 u) and a division (5 u).
-const LENGTH_ERROR: f64 = 2.5 + 4.0 + DIVISION_ERROR;
-
-struct Scene {
-    spec: GridSpec,
-    record: GridRecord,
-    blobs: Vec<Blob>,
-    groups: [GroupRecord; 2],
-    i_group: Vec<u32>,
-}
-
-/// A colour that no two blobs share.
-fn color(b: &Blob) -> [f32; 3] {
-    b.position.as_vec3().to_array()
-}
-
-fn f32_of(v: DVec3) -> DVec3 {
-    v.as_vec3().as_dvec3()
-}
-
-impl Scene {
-    /// Two balls of blobs, one fine and one coarse, and a few blobs in the empty space around.
-    fn new() -> Scene {
-        let spec = GridSpec { n_cells: UVec3::new(60, 40, 44), cell: 0.25, low: DVec3::new(-7.0, -5.0, -5.5) };
-        let record = GridRecord::from(&spec);
-        let spec = GridSpec { low: Vec3::from_array(record.low).as_dvec3(), cell: f64::from(record.cell), ..spec };
-        let centers = [DVec3::new(-3.0, 0.1, 0.0), DVec3::new(3.2, -0.3, 0.2)];
-        let blob = |i: u32| {
-            let [a, b, c, d] = uniforms(0xface, 0, i, 0);
-            let spread = if i.is_multiple_of(50) { 4.5 } else { 2.0 };
-            let position = centers[(i / 1500) as usize] + spread * (DVec3::new(a, b, c) * 2.0 - 1.0);
-            let sigma = f64::from((0.05 + 0.5 * d * d) as f32);
-            Blob { position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }
-        };
-        let mut blobs: Vec<Blob> = (0..3000).map(blob).collect();
-        // In the middle of their cloud, without size, without extinction, far outside.
-        blobs[10].position = f32_of(centers[0]);
-        blobs[11].sigma = 0.0;
-        blobs[12].kappa = 0.0;
-        blobs[13].position = DVec3::splat(90.0);
-        let group = |k: usize| GroupRecord {
-            cloud_center: centers[k].as_vec3().to_array(),
-            i_region: REGIONS[k],
-            sigma_mean: SIGMA_MEANS[k],
-            ..GroupRecord::default()
-        };
-        let i_group = (0..3000).map(|i| i / 1500).collect();
-        Scene { spec, record, blobs, groups: [group(0), group(1)], i_group }
-    }
-
-    /// The GPU's density and facets.
-    fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> (Vec<f64>, Vec<FacetRecord>) {
-        let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
-        let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
-        let pass = Facets::new(&gpu.device, compiler).unwrap();
-        let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
-        let particle =
-            |b: &Blob| ParticleRecord { kappa: b.kappa as f32, color: color(b), ..ParticleRecord::default() };
-        let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
-        let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
-        let (i_group, groups) = (gpu.upload(&self.i_group), gpu.upload(&self.groups));
-        let (density, made) = (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(N_SURFACE_FACETS + n));
-        let heaviest = self.blobs.iter().map(mass).fold(0.0, f64::max);
-        gpu.run(|rec| {
-            grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
-            let buffers = [&placed, &particles, &i_group, &groups, &density, &made];
-            pass.record(rec, buffers, &self.record, n as u32, N_SURFACE_FACETS as u32)
-        });
-        let density = gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect();
-        // What lies before is the surfaces'.
-        (density, gpu.download(&made, N_SURFACE_FACETS + n).split_off(N_SURFACE_FACETS))
-    }
-
-    fn centers(&self) -> Vec<DVec3> {
-        // By region; regions without a group stay unused.
-        let mut centers = vec![DVec3::NAN; 4];
-        for g in &self.groups {
-            centers[g.i_region as usize] = Vec3::from_array(g.cloud_center).as_dvec3();
-        }
-        centers
-    }
-
-    fn reference(&self, cells: &[f64]) -> Vec<Facet> {
-        let regions: Vec<u32> = self.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
-        let means: Vec<f64> = self.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
-        facets(&self.spec, cells, &self.blobs, &means, &regions, &self.centers())
-    }
-
-    /// Bound on the sampled density at `p`, where the sample's own position is rounded: its f32 evaluation meets a cell
-    /// coordinate off by `e`, and ρ changes by at most the difference of neighbouring cells times that; the three
-    /// interpolations then round numbers below the greatest cell around, twice each, and a difference three times.
-    fn sample_error(&self, cells: &[f64], p: DVec3, sigma: f64) -> f64 {
-        let n = self.spec.n_cells.as_ivec3();
-        let g = (p - self.spec.low) / self.spec.cell - 0.5;
-        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded; less ½.
-        let reach = p.abs() + 3.0 * GRADIENT_RADIUS_SIGMA * sigma;
-        let e = (U * (reach + (p - self.spec.low).abs() * 3.0) / self.spec.cell + U * g.abs()) * (1.0 + 8.0 * U);
-        // All cells that the sample or one beside it can meet.
-        let (from, to) = ((g - e).floor().as_ivec3(), (g + e).floor().as_ivec3() + 1);
-        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
-        for z in from.z..=to.z {
-            for y in from.y..=to.y {
-                for x in from.x..=to.x {
-                    let inside = x >= 0 && y >= 0 && z >= 0 && x < n.x && y < n.y && z < n.z;
-                    // Beyond the last centres there is nothing.
-                    let v = if inside { cells[(x + n.x * (y + n.y * z)) as usize] } else { 0.0 };
-                    (low, high) = (low.min(v), high.max(v));
-                }
-            }
-        }
-        (high - low) * e.element_sum() + 15.0 * U * high
-    }
-
-    /// Bounds on normal, position and area of blob `i`.
-    fn bound(&self, cells: &[f64], i: usize, facet: &Facet) -> (f64, DVec3, f64) {
-        let (blob, center) = (&self.blobs[i], self.centers()[facet.region as usize]);
-        let scale = blob.sigma.max(f64::from(SIGMA_MEANS[self.i_group[i] as usize]));
-        let (g, s) = gradient(&self.spec, cells, blob.position, scale);
-        // Σ w δρ over the directions, and 14 sums and a product each of the running total.
-        let sampled = |(d, w): &(DVec3, f64)| {
-            let p = blob.position + GRADIENT_RADIUS_SIGMA * scale * *d;
-            w * self.sample_error(cells, p, scale)
-        };
-        let dg = directions().iter().map(sampled).sum::<f64>() + 18.0 * U * s;
-        let to_center = (blob.position - center).length();
-        // p − c rounds once; length and quotient follow. The very centre has no direction, in both.
-        let d_away = U * (1.0 + LENGTH_ERROR + DIVISION_ERROR) * 2.0;
-        let away = if to_center > 0.0 { (blob.position - center) / to_center } else { DVec3::Y };
-        let q = facet.conditioning;
-        let normal = if s == 0.0 {
-            d_away
-        } else {
-            // |G| errs by √3 dg, S by dg.
-            let dq = (3f64.sqrt() * dg + q * dg) / s + U * q * (LENGTH_ERROR + DIVISION_ERROR);
-            let width = CONDITIONING.1 - CONDITIONING.0;
-            let dt = if q + dq < CONDITIONING.0 || q - dq > CONDITIONING.1 { 0.0 } else { 1.5 * dq / width + 8.0 * U };
-            let t = smoothstep(CONDITIONING, q);
-            if t + dt == 0.0 {
-                d_away
-            } else {
-                // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the blend
-                // v = t·down + (1−t)·away, whose own length divides.
-                let d_down = 2.0 * 3f64.sqrt() * dg / g.length() + U * (LENGTH_ERROR + DIVISION_ERROR);
-                let blend = t * -g.normalize_or_zero() + (1.0 - t) * away;
-                let dv = (t + dt) * d_down + dt * 2.0 + (1.0 - t + dt) * d_away + 4.0 * U;
-                2.0 * dv / (blend.length() - dv).max(1e-9) + U * (LENGTH_ERROR + DIVISION_ERROR)
-            }
-        };
-        // No two unit vectors are farther apart than 2.
-        let normal = normal.min(2.0 + 1e-6);
-        let shell = SHELL_SIGMA * scale;
-        // 1.5σ, its product with n, and the sum.
-        let position = shell * normal * DVec3::ONE + U * (3.0 * shell + facet.position.abs() + blob.position.abs());
-        // π, 3σ twice, three products, and the argument's four roundings, which 1 − e^−τ passes on at most once.
-        let area = facet.area * (ONE_MINUS_EXP_ERROR + (6.0 + 5.0) * U);
-        (normal, position, area)
-    }
-}
+use nimbus::model::cloud::runs;
+use nimbus::reference::facets::{CONDITIONING, Facet, Members, bunch, grouped};
+use nimbus::reference::morton;
+use nimbus::reference::rounding::DIVISION_ERROR;
+use shells::{AREA_ERROR, Around, LENGTH_ERROR, N_PER_CLOUD, N_SURFACE_FACETS, REGIONS, SIGMA_MEANS, Scene, U, color};
 
 struct Compared {
     values: Vec<Vec<f64>>,
@@ -283,4 +109,158 @@ fn a_wrong_shader_is_noticed() {
     let (cells, mut made) = scene.run(&mut gpu, &compiler);
     made[2000].i_region ^= 1;
     assert!(!compare(&scene, &cells, &made).is_right());
+}
+
+/// The blobs in Morton order cloud by cloud, and the runs of places that facets stand for.
+struct Runs {
+    order: Vec<u32>,
+    runs: Vec<(u64, u64)>,
+}
+
+impl Runs {
+    /// `counts`: facets of each cloud.
+    fn new(scene: &Scene, counts: [u64; 2]) -> Runs {
+        let n = u64::from(N_PER_CLOUD);
+        let (mut order, mut all) = (vec![], vec![]);
+        for (first, count) in [(0, counts[0]), (n, counts[1])] {
+            let blobs = &scene.blobs[first as usize..(first + n) as usize];
+            let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
+            let bounds = [(DVec3::splat(-8.0), DVec3::splat(8.0))];
+            order.extend(morton::order(&positions, &vec![0; blobs.len()], &bounds).iter().map(|i| i + first as u32));
+            all.extend(runs(n, count).map(|(a, b)| (first + a, first + b)));
+        }
+        Runs { order, runs: all }
+    }
+
+    fn members(&self, g: usize) -> &[u32] {
+        &self.order[self.runs[g].0 as usize..self.runs[g].1 as usize]
+    }
+
+    /// The reference's facets and colours, and the bounds: normal, position, area, colour.
+    fn truth(&self, scene: &Scene, cells: &[f64]) -> Vec<(Facet, DVec3, [f64; 4])> {
+        let means: Vec<f64> = scene.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
+        let regions: Vec<u32> = scene.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
+        let colors: Vec<DVec3> = scene.blobs.iter().map(|b| Vec3::from(color(b)).as_dvec3()).collect();
+        let members = Members { blobs: &scene.blobs, sigma_means: &means, regions: &regions, colors: &colors };
+        let facets = grouped(&scene.spec, cells, &members, &scene.centers(), &self.order, &self.runs);
+        let bounded = |(g, (facet, color)): (usize, (Facet, DVec3))| {
+            (facet, color, run_bounds(scene, cells, &members, self.members(g), &facet))
+        };
+        facets.into_iter().enumerate().map(bounded).collect()
+    }
+}
+
+/// Bounds on normal, position (the greatest axis), area and colour of the facet of `run`. A mean about the first member,
+/// of n numbers at most D from it by weights of relative error w: the weights' errors enter above and below, each sum
+/// rounds n times, and difference, product and quotient follow; what it is added to rounds once.
+fn run_bounds(scene: &Scene, cells: &[f64], m: &Members<'_>, run: &[u32], facet: &Facet) -> [f64; 4] {
+    let n = run.len() as f64;
+    let mean = |weight: f64, reach: f64, value: f64| {
+        (2.0 * weight + (2.0 * n + 3.0 + DIVISION_ERROR) * U) * reach + U * (value + reach)
+    };
+    let greatest = |of: &dyn Fn(usize) -> f64| run.iter().map(|i| of(*i as usize)).fold(0.0, f64::max);
+    let (b, first) = (bunch(m, run), run[0] as usize);
+    // κσ³: three products.
+    let by_mass = 3.0 * U;
+    let reach = greatest(&|i| (m.blobs[i].position - m.blobs[first].position).length());
+    let p_error = if run.len() == 1 { 0.0 } else { mean(by_mass, reach, b.position.length()) };
+    // σ² + |p − p̄|²/3: p̄'s error and the difference's rounding enter the square, whose five operations and the sum round;
+    // then weights and sums as above, the quotient, and the root, derived from inversesqrt and a division.
+    let far = greatest(&|i| (m.blobs[i].position - b.position).length());
+    let d = p_error + U * far;
+    let square =
+        (2.0 * by_mass + (2.0 * n + 8.0 + DIVISION_ERROR) * U) * b.sigma.powi(2) + (2.0 * far * d + d * d) / 3.0;
+    // |√a − √b| ≤ |a − b|/√a, and ≤ √|a − b|.
+    let spread = (square / b.sigma).min(square.sqrt()) + (4.0 + DIVISION_ERROR) * U * b.sigma;
+    let means = greatest(&|i| (m.sigma_means[i] - m.sigma_means[first]).abs());
+    let scale_error = if run.len() == 1 { 0.0 } else { spread.max(mean(by_mass, means, b.sigma_mean)) };
+    let around = Around { p: b.position, p_error, scale: b.sigma.max(b.sigma_mean), scale_error };
+    let normal = scene.normal_bound(cells, &around, facet);
+    let position = around.shell_bound(normal, facet).max_element();
+    let colors = greatest(&|i| (m.colors[i] - m.colors[first]).length());
+    let color = if run.len() == 1 { 0.0 } else { mean(AREA_ERROR, colors, b.color.length()) };
+    [normal, position, facet.area * (AREA_ERROR + n * U), color]
+}
+
+/// Greatest error/bound of normal, position, area and colour, or what is wrong.
+fn compare_runs(truth: &[(Facet, DVec3, [f64; 4])], made: &[FacetRecord]) -> Result<[f64; 4], String> {
+    if !truth.iter().zip(made).all(|((facet, _, _), made)| made.i_region == facet.region) {
+        return Err("a region".into());
+    }
+    let mut ratios = [0.0; 4];
+    for (k, ratio) in ratios.iter_mut().enumerate() {
+        let of_made = |f: &FacetRecord| match k {
+            0 => f.normal.map(f64::from).to_vec(),
+            1 => f.position.map(f64::from).to_vec(),
+            2 => vec![f64::from(f.area)],
+            _ => f.color.map(f64::from).to_vec(),
+        };
+        let of_truth = |(f, color, _): &(Facet, DVec3, [f64; 4])| match k {
+            0 => f.normal.to_array().to_vec(),
+            1 => f.position.to_array().to_vec(),
+            2 => vec![f.area],
+            _ => color.to_array().to_vec(),
+        };
+        let values: Vec<f64> = made.iter().flat_map(of_made).collect();
+        let truths: Vec<f64> = truth.iter().flat_map(of_truth).collect();
+        let n = if k == 2 { 1 } else { 3 };
+        let bounds: Vec<f64> = truth.iter().flat_map(|t| vec![t.2[k]; n]).collect();
+        *ratio = check_within(["normal", "position", "area", "color"][k], &values, &truths, &bounds)?;
+    }
+    Ok(ratios)
+}
+
+#[test]
+fn facets_of_runs_are_within_their_bounds() {
+    let mut gpu = Gpu::new();
+    let compiler = Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap();
+    let scene = Scene::new();
+    for counts in [[100, 400], [1, 1499]] {
+        let runs = Runs::new(&scene, counts);
+        let (cells, made, i_facet) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
+        let truth = runs.truth(&scene, &cells);
+        let ratios = compare_runs(&truth, &made).unwrap();
+        let mut bounds: Vec<f64> = truth.iter().map(|t| t.2[0]).collect();
+        bounds.sort_by(f64::total_cmp);
+        let (median, greatest) = (bounds[bounds.len() / 2], bounds[bounds.len() - 1]);
+        println!("{counts:?}: error/bound {ratios:.3?}; normals' bounds: median {median:e}, greatest {greatest:e}");
+        assert!(median < 1e-2);
+        for g in 0..runs.runs.len() {
+            assert!(runs.members(g).iter().all(|i| i_facet[*i as usize] as usize == N_SURFACE_FACETS + g));
+        }
+    }
+}
+
+#[test]
+fn runs_of_one_are_the_particles_facets_to_the_bit() {
+    let mut gpu = Gpu::new();
+    let compiler = Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap();
+    let scene = Scene::new();
+    let runs = Runs::new(&scene, [u64::from(N_PER_CLOUD); 2]);
+    let (_, singly) = scene.run(&mut gpu, &compiler);
+    let (_, made, i_facet) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
+    let by_particle: Vec<FacetRecord> = i_facet.iter().map(|f| made[*f as usize - N_SURFACE_FACETS]).collect();
+    assert!(by_particle == singly && made != singly);
+}
+
+#[test]
+fn wrong_facets_of_runs_are_noticed() {
+    let mut gpu = Gpu::new();
+    let scene = Scene::new();
+    let runs = Runs::new(&scene, [100, 400]);
+    let mutations = [
+        ("particles[i].kappa * sigma * sigma * sigma", "particles[i].kappa * sigma * sigma"),
+        ("dot(d, d) * (1.0 / 3.0)", "dot(d, d) * (1.0 / 2.9)"),
+        ("s.area += a;", "s.area = a;"),
+        ("s.color += a * c;", "s.color += m * c;"),
+        ("max(sigma, sigma_mean)", "max(sigma, group.sigma_mean)"),
+        ("max(sigma, sigma_mean)", "sigma"),
+        ("(by_mass ? s.position / s.mass : s.plain_position * n_inverse)", "s.plain_position * n_inverse"),
+        ("k < run.i_first + run.n_particles", "k < run.i_first + run.n_particles - 1u"),
+    ];
+    for (from, to) in mutations {
+        let compiler = Gpu::wrong_compiler("facets_groups.comp", from, to);
+        let (cells, made, _) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
+        assert!(compare_runs(&runs.truth(&scene, &cells), &made).is_err(), "{to} was not noticed");
+    }
 }

@@ -141,6 +141,9 @@ pub struct InspectArgs {
     /// Every lighting facet: place, normal, area, irradiance, radiance
     #[arg(long)]
     pub facets: bool,
+    /// With --facets: the area means of every surface in place of its facets, and no clouds
+    #[arg(long, requires = "facets")]
+    pub per_surface: bool,
     /// What the first frames run and skip, and why
     #[arg(long)]
     pub plan: bool,

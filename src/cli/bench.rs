@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::args::{BenchArgs, ThreadingArg};
-use super::{device_choice, load, output, say_sizes};
+use super::{device_choice, load, output, say_notes, say_sizes};
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
 use crate::measure::stats::Summary;
@@ -114,6 +114,7 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
     if !args.json {
         output::text(&report(path, &run, &info, &outcome, args))?;
     }
+    say_notes(&mut stage, &args.options)?;
     stage.close()?;
     Ok(run)
 }

@@ -1,8 +1,9 @@
 //! `nimbus inspect SCENE`.
 
 use super::args::{BasisArg, InspectArgs};
-use super::{check_time, device_choice, load, output, say_sizes};
+use super::{check_time, device_choice, load, output, say_notes, say_sizes};
 use crate::error::Result;
+use crate::model::scene::Scene;
 use crate::study::stage::Stage;
 use crate::study::{basis, inspect};
 
@@ -22,7 +23,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         let scene = &loaded.scene;
         let found = match (args.particles, args.facets) {
             (true, _) => Found::Particles(inspect::particles_reference(scene, i_frame)?),
-            (_, true) => Found::Facets(inspect::facets_reference(scene, i_frame)?),
+            (_, true) => Found::Facets(of_surfaces(args, scene, inspect::facets_reference(scene, i_frame)?)),
             _ => Found::Boxes(inspect::boxes_reference(scene)),
         };
         drop(spinner);
@@ -34,7 +35,11 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
     let found = match (args.particles, args.facets, args.plan) {
         (true, _, _) => Found::Particles(inspect::particles(&mut stage, i_frame)?),
-        (_, true, _) => Found::Facets(inspect::facets(&mut stage, i_frame)?),
+        (_, true, _) => {
+            let rows = inspect::facets(&mut stage, i_frame)?;
+            say_notes(&mut stage, &args.options)?;
+            Found::Facets(of_surfaces(args, &stage.scene, rows))
+        }
         (_, _, true) => Found::Plan(inspect::plans(&mut stage, args.frame.unwrap_or(PLAN_FRAMES))?),
         _ => Found::Boxes(inspect::boxes(&mut stage)?),
     };
@@ -44,6 +49,11 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     }
     print(&found, args.json)?;
     stage.close()
+}
+
+/// The rows, or the surfaces' means of them.
+fn of_surfaces(args: &InspectArgs, scene: &Scene, rows: Vec<inspect::FacetRow>) -> Vec<inspect::FacetRow> {
+    if args.per_surface { inspect::per_surface(scene, &rows) } else { rows }
 }
 
 /// What was asked for, complete before the first line of it is printed.

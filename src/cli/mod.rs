@@ -19,6 +19,8 @@ use crate::io::atomic;
 use crate::io::magnitude::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
+use crate::study::basis::basis_warnings;
+use crate::study::inspect::light_notes;
 use crate::study::stage::{DeviceChoice, Stage};
 use args::{Args, Command, SceneArgs};
 
@@ -74,7 +76,8 @@ fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
     }
     let loaded = scene_file::load(path, &overrides, args.seed)?;
     if !args.quiet {
-        for warning in loaded.warnings.iter().chain(&advice(&loaded.scene)) {
+        let basis = basis_warnings(&loaded.scene);
+        for warning in loaded.warnings.iter().chain(&basis).chain(&advice(&loaded.scene)) {
             eprintln!("warning: {warning}");
         }
     }
@@ -98,6 +101,16 @@ fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
     } else {
         format!("time {} s: expected a finite number from -{greatest} to {greatest}", shortest(time_s))
     }))
+}
+
+/// What is odd about the last frame's light, on stderr.
+fn say_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
+    if !args.quiet {
+        for note in light_notes(stage)? {
+            eprintln!("warning: {note}");
+        }
+    }
+    Ok(())
 }
 
 /// Device and sizes on stderr, for `-v`.

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::args::RenderArgs;
-use super::{check_time, device_choice, load, output, refuse_existing, say_sizes};
+use super::{check_time, device_choice, load, output, refuse_existing, say_notes, say_sizes};
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
@@ -29,6 +29,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let rendered = stage.renderer.step(packet)?;
     let rgba = stage.renderer.image()?;
     drop(spinner);
+    say_notes(&mut stage, &args.options)?;
 
     let device = device_record(stage.info());
     if args.options.verbose {

@@ -10,6 +10,7 @@ use crate::frame::game::Setting;
 use crate::frame::plan::Pass;
 use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
 use crate::model::scene::{LightingMode, Scene};
+use crate::model::surface::Surface;
 use crate::passes::generate::FOLDED;
 use crate::reference::generate::Generated;
 
@@ -133,10 +134,66 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     let truth = Truth::of(scene, scene.time.at(i_frame))?;
     let rows = truth.facets.iter().enumerate().map(|(i, f)| {
         let place = f.position + truth.setting.light_origin;
-        let lit = [truth.irradiance[i], DVec3::ZERO, truth.radiance[i], DVec3::ZERO];
+        let or_dark = |of: &[DVec3]| of.get(i).copied().unwrap_or(DVec3::ZERO);
+        let lit = [truth.irradiance[i], or_dark(&truth.indirect), truth.radiance[i], or_dark(&truth.second)];
+        let lit = toward_camera(scene, f.region, truth.setting.pose.position - place, f.normal, lit);
         facet_row(i, f.region, [place, f.normal], f.area, lit)
     });
     Ok(rows.collect())
+}
+
+/// The area means of each surface's facets, a row a surface; its index, region, centre, normal and whole area.
+pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
+    let mean = |(i, surface): (usize, &Surface)| {
+        let own: Vec<&FacetRow> = rows.iter().filter(|r| r.region as usize == i).collect();
+        let area: f64 = own.iter().map(|r| r.area).sum();
+        let of = |value: fn(&FacetRow) -> f64| own.iter().map(|r| r.area * value(r)).sum::<f64>() / area;
+        let rgb =
+            |r: fn(&FacetRow) -> f64, g: fn(&FacetRow) -> f64, b: fn(&FacetRow) -> f64| DVec3::new(of(r), of(g), of(b));
+        let lit = [
+            rgb(|r| r.id_r, |r| r.id_g, |r| r.id_b),
+            rgb(|r| r.ii_r, |r| r.ii_g, |r| r.ii_b),
+            rgb(|r| r.l1_r, |r| r.l1_g, |r| r.l1_b),
+            rgb(|r| r.l2_r, |r| r.l2_g, |r| r.l2_b),
+        ];
+        facet_row(i, i as u32, [surface.center, surface.normal()], area, lit)
+    };
+    scene.surfaces.iter().enumerate().map(mean).collect()
+}
+
+/// What the last frame's light has that a reader should know: radiances that are negative or no numbers, and pairs that
+/// stayed too wide. Nothing for most scenes.
+pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
+    if stage.scene.lighting.mode == LightingMode::None {
+        return Ok(vec![]);
+    }
+    let lit = stage.renderer.facets(&stage.device)?.1;
+    let count =
+        |what: &dyn Fn(f32) -> bool| lit.iter().filter(|l| l.first.iter().chain(&l.second).any(|v| what(*v))).count();
+    let (n_negative, n_odd) = (count(&|v| v < 0.0), count(&|v| !v.is_finite()));
+    let mut notes = Vec::new();
+    if n_odd > 0 {
+        notes.push(format!("the radiance of {n_odd} facets is not a finite number"));
+    }
+    if n_negative > 0 {
+        let least = lit.iter().flat_map(|l| l.first.iter().chain(&l.second)).copied().fold(0.0, f32::min);
+        notes.push(format!(
+            "the radiance of {n_negative} facets is negative, {least:.3e} at the least: the lobes' basis is cut off; more \
+             lighting.bases bring it nearer to 0"
+        ));
+    }
+    let unresolved: Vec<_> = lit.iter().filter(|l| l.n_unresolved > 0.0).collect();
+    if !unresolved.is_empty() {
+        let n_pairs: f64 = unresolved.iter().map(|l| f64::from(l.n_unresolved)).sum();
+        let most = unresolved.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max);
+        let brightest = lit.iter().flat_map(|l| l.second).map(f64::from).fold(0.0, f64::max);
+        notes.push(format!(
+            "{n_pairs} pairs of {} facets stayed wider than lighting.pair_size asks for: L2 may be off by up to {most:.3e} \
+             there (the greatest L2 is {brightest:.3e}); finer `subdivide` or more lighting.pair_levels resolve them",
+            unresolved.len()
+        ));
+    }
+    Ok(notes)
 }
 
 /// Attempts and folded particles of every box, from the device.

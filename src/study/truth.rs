@@ -7,11 +7,16 @@ use crate::frame::game::Setting;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::light::Light;
+use crate::model::material::Brdf;
 use crate::model::scene::{LightingMode, Scene};
+use crate::model::surface::Surface;
+use crate::reference::area::adaptive::Accuracy;
+use crate::reference::area::mean::each;
+use crate::reference::area::{Disc, Receiver, Scenery};
 use crate::reference::facets::{Facet, Members};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
-use crate::reference::transmit::{Obstacles, Receiver};
+use crate::reference::transmit::{self, Obstacles};
 use crate::reference::{self, Blob};
 
 /// All stages of one frame up to the light on the facets. Positions relative to the lighting origin.
@@ -24,8 +29,12 @@ pub struct Truth {
     /// Empty where lighting.mode is "none".
     pub facets: Vec<Facet>,
     pub facet_colors: Vec<DVec3>,
+    /// I_d, and L1 toward the eye.
     pub irradiance: Vec<DVec3>,
     pub radiance: Vec<DVec3>,
+    /// I_i, and L2 toward the eye; empty but for lighting.mode "two-reflection".
+    pub indirect: Vec<DVec3>,
+    pub second: Vec<DVec3>,
 }
 
 impl Truth {
@@ -49,6 +58,8 @@ impl Truth {
             facet_colors: vec![],
             irradiance: vec![],
             radiance: vec![],
+            indirect: vec![],
+            second: vec![],
         };
         if scene.lighting.mode != LightingMode::None {
             truth.light(scene);
@@ -89,14 +100,51 @@ impl Truth {
         for facet in &mut self.facets {
             facet.region += scene.surfaces.len() as u32;
         }
-        let receivers: Vec<Receiver> =
-            self.facets.iter().map(|f| Receiver { position: f.position, i_region: f.region }).collect();
+        let receivers: Vec<transmit::Receiver> =
+            self.facets.iter().map(|f| transmit::Receiver { position: f.position, i_region: f.region }).collect();
         let transmittance = obstacles.transmittance(&receivers, &lights);
         self.irradiance = reference::first::irradiance(&positions, &normals, &transmittance, &lights);
         let kd: Vec<DVec3> =
             (0..scene.n_regions()).map(|i| scene.region_material(i).at(self.setting.time_s).kd).collect();
         let regions: Vec<u32> = self.facets.iter().map(|f| f.region).collect();
         self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.facet_colors);
+        self.light_surfaces(scene, &lights, &kd);
+    }
+
+    /// Puts the surfaces' facets before the clouds', lit by the area reference, and adds the second reflection to both.
+    fn light_surfaces(&mut self, scene: &Scene, lights: &[Light], kd: &[DVec3]) {
+        let origin = self.setting.light_origin;
+        let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
+        let surfaces: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
+        let brdfs: Vec<Brdf> = (0..surfaces.len()).map(|i| scene.region_material(i).at(self.setting.time_s)).collect();
+        let disc = |(f, c): (&Facet, &DVec3)| Disc {
+            position: f.position,
+            normal: f.normal,
+            area: f.area,
+            kd: kd[f.region as usize] * c,
+        };
+        let discs: Vec<Disc> = self.facets.iter().zip(&self.facet_colors).map(disc).collect();
+        let forward = scene.lighting.forward;
+        let scenery = Scenery::new(&surfaces, &brdfs, lights, &self.blobs, forward, &discs);
+        let flat: Vec<Facet> = surfaces.iter().zip(0u32..).flat_map(|(s, i)| facets_of(s, i)).collect();
+        let eye = self.setting.pose.position - origin;
+        let on_surfaces = flat.iter().map(|f| scenery.on_surface(f.region as usize, f.position));
+        let receivers: Vec<(Receiver, DVec3)> = on_surfaces
+            .chain((0..discs.len()).map(|i| scenery.on_disc(i)))
+            .map(|r| (r, (eye - r.position).normalize_or(r.normal)))
+            .collect();
+        let of_surfaces = &receivers[..flat.len()];
+        let first = of_surfaces.iter().map(|(r, toward)| scenery.first(r, *toward));
+        self.radiance.splice(0..0, first);
+        self.irradiance.splice(0..0, of_surfaces.iter().map(|(r, _)| scenery.irradiance(r)));
+        self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, flat.len()));
+        self.facets.splice(0..0, flat);
+        if scene.lighting.mode == LightingMode::TwoReflection {
+            let accuracy = Accuracy::relative(SECOND_ACCURACY);
+            let found = each(receivers.len(), |i| scenery.second(&receivers[i].0, receivers[i].1, &accuracy));
+            self.indirect = found.iter().map(|e| e.irradiance).collect();
+            self.second = found.iter().map(|e| e.radiance).collect();
+        }
     }
 
     /// The particles in Morton order, cloud by cloud.
@@ -108,6 +156,17 @@ impl Truth {
         let regions: Vec<u32> = i_cloud.iter().map(|i| n_surfaces + i).collect();
         reference::morton::order(&positions, &regions, &bounds)
     }
+}
+
+/// How exactly the second reflection is integrated: a hundredth of the percent that it is compared to.
+const SECOND_ACCURACY: f64 = 1e-4;
+
+/// Facets of a surface, whose region is its number.
+fn facets_of(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_ {
+    let n = surface.subdivide[0] * surface.subdivide[1];
+    let area = surface.area() / f64::from(n);
+    let normal = surface.normal();
+    (0..n).map(move |i| Facet { position: surface.facet_center(i), normal, area, region, conditioning: 1.0 })
 }
 
 /// Every particle's own colour.

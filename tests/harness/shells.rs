@@ -1,0 +1,242 @@
+//! Blobs in two clouds with all that their facets are made of, and the bounds on those.
+
+use glam::{DVec3, UVec3, Vec3};
+use nimbus::gpu::Compiler;
+use nimbus::layout::facet::{FacetRecord, RunRecord};
+use nimbus::layout::frame::GridRecord;
+use nimbus::layout::particle::{GroupRecord, ParticleRecord, PlacedRecord};
+use nimbus::model::grid::GridSpec;
+use nimbus::passes::facets::Facets;
+use nimbus::passes::grid::Grid;
+use nimbus::reference::Blob;
+use nimbus::reference::facets::{
+    CONDITIONING, Facet, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets, gradient, smoothstep,
+};
+use nimbus::reference::generate::uniforms;
+use nimbus::reference::grid::mass;
+use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
+
+use crate::harness::Gpu;
+
+pub const U: f64 = U_F32;
+/// Mean σ of the groups' particles: some are smaller, some larger.
+pub const SIGMA_MEANS: [f32; 4] = [0.15, 0.17, 0.25, 0.29];
+/// Two clouds of two groups each, numbers 3 and 1.
+pub const REGIONS: [u32; 4] = [3, 3, 1, 1];
+pub const N_PER_CLOUD: u32 = 1500;
+/// The clouds' facets come after those of the surfaces.
+pub const N_SURFACE_FACETS: usize = 5;
+/// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
+const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
+/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the root, which Vulkan
+/// derives from inversesqrt (2 ulp = 4 u) and a division (5 u).
+pub const LENGTH_ERROR: f64 = 2.5 + 4.0 + DIVISION_ERROR;
+
+/// Relative error of an area: π, 3σ twice, three products, and the argument's four roundings, which 1 − e^−τ passes on at
+/// most once.
+pub const AREA_ERROR: f64 = ONE_MINUS_EXP_ERROR + (6.0 + 5.0) * U;
+
+pub struct Scene {
+    pub spec: GridSpec,
+    record: GridRecord,
+    pub blobs: Vec<Blob>,
+    groups: [GroupRecord; 4],
+    pub i_group: Vec<u32>,
+}
+
+/// A colour that no two blobs share.
+pub fn color(b: &Blob) -> [f32; 3] {
+    b.position.as_vec3().to_array()
+}
+
+fn f32_of(v: DVec3) -> DVec3 {
+    v.as_vec3().as_dvec3()
+}
+
+impl Scene {
+    /// Two balls of blobs, one fine and one coarse, and a few blobs in the empty space around.
+    pub fn new() -> Scene {
+        let spec = GridSpec { n_cells: UVec3::new(60, 40, 44), cell: 0.25, low: DVec3::new(-7.0, -5.0, -5.5) };
+        let record = GridRecord::from(&spec);
+        let spec = GridSpec { low: Vec3::from_array(record.low).as_dvec3(), cell: f64::from(record.cell), ..spec };
+        let centers = [DVec3::new(-3.0, 0.1, 0.0), DVec3::new(3.2, -0.3, 0.2)];
+        let blob = |i: u32| {
+            let [a, b, c, d] = uniforms(0xface, 0, i, 0);
+            let spread = if i.is_multiple_of(50) { 4.5 } else { 2.0 };
+            let position = centers[(i / N_PER_CLOUD) as usize] + spread * (DVec3::new(a, b, c) * 2.0 - 1.0);
+            let sigma = f64::from((0.05 + 0.5 * d * d) as f32);
+            Blob { position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }
+        };
+        let mut blobs: Vec<Blob> = (0..3000).map(blob).collect();
+        // In the middle of their cloud, without size, without extinction, far outside.
+        blobs[10].position = f32_of(centers[0]);
+        blobs[11].sigma = 0.0;
+        blobs[12].kappa = 0.0;
+        for (blob, k) in blobs[13..20].iter_mut().zip(0..) {
+            blob.position = DVec3::splat(90.0 + f64::from(k));
+        }
+        let group = |k: usize| GroupRecord {
+            cloud_center: centers[k / 2].as_vec3().to_array(),
+            i_region: REGIONS[k],
+            sigma_mean: SIGMA_MEANS[k],
+            ..GroupRecord::default()
+        };
+        let i_group = (0..3000).map(|i| 2 * i / N_PER_CLOUD).collect();
+        Scene { spec, record, blobs, groups: [0, 1, 2, 3].map(group), i_group }
+    }
+
+    /// The GPU's density and facets.
+    pub fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> (Vec<f64>, Vec<FacetRecord>) {
+        let (density, made, _) = self.run_groups(gpu, compiler, &[], &[]);
+        (density, made)
+    }
+
+    /// Facets of the particles, or of `runs` of them if there are any, and then each particle's facet.
+    pub fn run_groups(
+        &self,
+        gpu: &mut Gpu,
+        compiler: &Compiler,
+        order: &[u32],
+        runs: &[(u64, u64)],
+    ) -> (Vec<f64>, Vec<FacetRecord>, Vec<u32>) {
+        let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
+        let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
+        let pass = Facets::new(&gpu.device, compiler).unwrap();
+        let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
+        let particle =
+            |b: &Blob| ParticleRecord { kappa: b.kappa as f32, color: color(b), ..ParticleRecord::default() };
+        let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
+        let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
+        let (i_group, groups) = (gpu.upload(&self.i_group), gpu.upload(&self.groups));
+        let (density, made) = (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(N_SURFACE_FACETS + n));
+        let heaviest = self.blobs.iter().map(mass).fold(0.0, f64::max);
+        let run = |r: &(u64, u64)| RunRecord { i_first: r.0 as u32, n_particles: (r.1 - r.0) as u32 };
+        let records: Vec<RunRecord> = runs.iter().map(run).collect();
+        let (order, records, i_facet) = (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
+        gpu.run(|rec| {
+            grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
+            if runs.is_empty() {
+                let buffers = [&placed, &particles, &i_group, &groups, &density, &made];
+                return pass.record(rec, buffers, &self.record, n as u32, N_SURFACE_FACETS as u32);
+            }
+            let buffers = [&placed, &particles, &i_group, &groups, &density, &order, &records, &made, &i_facet];
+            pass.record_groups(rec, buffers, &self.record, runs.len() as u32, N_SURFACE_FACETS as u32)
+        });
+        let n = if runs.is_empty() { n } else { runs.len() };
+        let density = gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect();
+        // What lies before is the surfaces'.
+        let made = gpu.download(&made, N_SURFACE_FACETS + n).split_off(N_SURFACE_FACETS);
+        (density, made, gpu.download(&i_facet, self.blobs.len()))
+    }
+
+    pub fn centers(&self) -> Vec<DVec3> {
+        // By region; regions without a group stay unused.
+        let mut centers = vec![DVec3::NAN; 4];
+        for g in &self.groups {
+            centers[g.i_region as usize] = Vec3::from_array(g.cloud_center).as_dvec3();
+        }
+        centers
+    }
+
+    pub fn reference(&self, cells: &[f64]) -> Vec<Facet> {
+        let regions: Vec<u32> = self.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
+        let means: Vec<f64> = self.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
+        facets(&self.spec, cells, &self.blobs, &means, &regions, &self.centers())
+    }
+
+    /// Bound on the sampled density at `p`, where the sample's own position is rounded: its f32 evaluation meets a cell
+    /// coordinate off by `e`, and ρ changes by at most the difference of neighbouring cells times that; the three
+    /// interpolations then round numbers below the greatest cell around, twice each, and a difference three times.
+    fn sample_error(&self, cells: &[f64], p: DVec3, sigma: f64, astray: f64) -> f64 {
+        let n = self.spec.n_cells.as_ivec3();
+        let g = (p - self.spec.low) / self.spec.cell - 0.5;
+        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded; less ½.
+        let reach = p.abs() + 3.0 * GRADIENT_RADIUS_SIGMA * sigma;
+        let e =
+            (U * (reach + (p - self.spec.low).abs() * 3.0) / self.spec.cell + U * g.abs() + astray / self.spec.cell)
+                * (1.0 + 8.0 * U);
+        // All cells that the sample or one beside it can meet.
+        let (from, to) = ((g - e).floor().as_ivec3(), (g + e).floor().as_ivec3() + 1);
+        let (mut low, mut high) = (f64::INFINITY, 0.0f64);
+        for z in from.z..=to.z {
+            for y in from.y..=to.y {
+                for x in from.x..=to.x {
+                    let inside = x >= 0 && y >= 0 && z >= 0 && x < n.x && y < n.y && z < n.z;
+                    // Beyond the last centres there is nothing.
+                    let v = if inside { cells[(x + n.x * (y + n.y * z)) as usize] } else { 0.0 };
+                    (low, high) = (low.min(v), high.max(v));
+                }
+            }
+        }
+        (high - low) * e.element_sum() + 15.0 * U * high
+    }
+
+    /// Bounds on normal, position and area of blob `i`.
+    pub fn bound(&self, cells: &[f64], i: usize, facet: &Facet) -> (f64, DVec3, f64) {
+        let blob = &self.blobs[i];
+        let scale = blob.sigma.max(f64::from(SIGMA_MEANS[self.i_group[i] as usize]));
+        let around = Around { p: blob.position, p_error: 0.0, scale, scale_error: 0.0 };
+        let normal = self.normal_bound(cells, &around, facet);
+        (normal, around.shell_bound(normal, facet), facet.area * AREA_ERROR)
+    }
+
+    /// Bound on the normal that `facet` has around a point.
+    pub fn normal_bound(&self, cells: &[f64], at: &Around, facet: &Facet) -> f64 {
+        let center = self.centers()[facet.region as usize];
+        let (g, s) = gradient(&self.spec, cells, at.p, at.scale);
+        // Where a sample is taken off its place.
+        let astray = at.p_error + GRADIENT_RADIUS_SIGMA * at.scale_error;
+        // Σ w δρ over the directions, and 14 sums and a product each of the running total.
+        let sampled = |(d, w): &(DVec3, f64)| {
+            let p = at.p + GRADIENT_RADIUS_SIGMA * at.scale * *d;
+            w * self.sample_error(cells, p, at.scale, astray)
+        };
+        let dg = directions().iter().map(sampled).sum::<f64>() + 18.0 * U * s;
+        let to_center = (at.p - center).length();
+        // p − c rounds once; length and quotient follow. The very centre has no direction, in both.
+        let turned = if to_center > 0.0 { 2.0 * at.p_error / to_center } else { 0.0 };
+        let d_away = U * (1.0 + LENGTH_ERROR + DIVISION_ERROR) * 2.0 + turned;
+        let away = if to_center > 0.0 { (at.p - center) / to_center } else { DVec3::Y };
+        let q = facet.conditioning;
+        let normal = if s == 0.0 {
+            // Nothing around, and nothing that a sample off its place would meet.
+            if dg > 0.0 { 2.0 } else { d_away }
+        } else {
+            // |G| errs by √3 dg, S by dg.
+            let dq = (3f64.sqrt() * dg + q * dg) / s + U * q * (LENGTH_ERROR + DIVISION_ERROR);
+            let width = CONDITIONING.1 - CONDITIONING.0;
+            let dt = if q + dq < CONDITIONING.0 || q - dq > CONDITIONING.1 { 0.0 } else { 1.5 * dq / width + 8.0 * U };
+            let t = smoothstep(CONDITIONING, q);
+            if t + dt == 0.0 {
+                d_away
+            } else {
+                // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the blend
+                // v = t·down + (1−t)·away, whose own length divides.
+                let d_down = 2.0 * 3f64.sqrt() * dg / g.length() + U * (LENGTH_ERROR + DIVISION_ERROR);
+                let blend = t * -g.normalize_or_zero() + (1.0 - t) * away;
+                let dv = (t + dt) * d_down + dt * 2.0 + (1.0 - t + dt) * d_away + 4.0 * U;
+                2.0 * dv / (blend.length() - dv).max(1e-9) + U * (LENGTH_ERROR + DIVISION_ERROR)
+            }
+        };
+        // No two unit vectors are farther apart than 2.
+        normal.min(2.0 + 1e-6)
+    }
+}
+
+/// What a facet is computed from, as far as the GPU has it.
+pub struct Around {
+    pub p: DVec3,
+    pub p_error: f64,
+    pub scale: f64,
+    pub scale_error: f64,
+}
+
+impl Around {
+    pub fn shell_bound(&self, normal: f64, facet: &Facet) -> DVec3 {
+        let shell = SHELL_SIGMA * (self.scale + self.scale_error);
+        // 1.5σ, its product with n, and the sum.
+        let inherited = self.p_error + SHELL_SIGMA * self.scale_error + shell * normal;
+        let rounded = 3.0 * shell + facet.position.abs() + self.p.abs() + 2.0 * inherited;
+        inherited * DVec3::ONE + U * rounded
+    }
+}

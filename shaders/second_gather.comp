@@ -21,14 +21,6 @@
 
 layout(local_size_x = WORKGROUP) in;
 
-// A lobe is met within this many of its widths (e^-18 of its peak beyond).
-const float LOBE_REACH = 6.0;
-// Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
-// width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
-const float LOBE_STEP = 3.0;
-// Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
-const uint MAX_STEPS = 65536u;
-
 layout(push_constant) uniform Push {
     Grid grid;
     vec3 eye;
@@ -101,13 +93,11 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         for (uint g = 0u; g < n_shiny; ++g) {
             float gap;
             leaving += lobe_flux(i, emitter, q, source.normal, -way, gap);
-            bool met = sqrt(2.0 * gap) < turn + LOBE_REACH * emitter.lobe_width;
-            excess = max(excess, met ? width / (LOBE_STEP * push.pair_size * emitter.lobe_width) : 0.0);
+            excess = max(excess, lobe_excess(emitter, gap, turn, width));
         }
 #if GLOSSY
         float gap = half_vector_gap(taker.normal, way, taker.outgoing);
-        bool met = sqrt(2.0 * gap) < turn + LOBE_REACH * taker.region.lobe_width;
-        excess = max(excess, met ? width / (LOBE_STEP * push.pair_size * taker.region.lobe_width) : 0.0);
+        excess = max(excess, lobe_excess(taker.region, gap, turn, width));
 #endif
         // Some of the cell may be before the receiver, and the receiver is before all of it or none.
         bool faces = dot(source.normal, offset) < 0.0 && dot(taker.normal, offset) > -side * scale;

@@ -1,6 +1,24 @@
-// What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of second_gather.comp.
+// What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of second_gather.comp
+// or of second_tensor.comp.
 
 const float PI_INVERSE = 0.318309886183791;
+// A lobe is met within this many of its widths (e^-18 of its peak beyond).
+const float LOBE_REACH = 6.0;
+// Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
+// width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
+const float LOBE_STEP = 3.0;
+// Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
+const uint MAX_STEPS = 65536u;
+
+// By how much a cell of this width over its distance is too wide for the region's lobes, its half vector being `gap` from
+// the normal and turning by `turn` within the cell: for the narrowest that can be met of all that its material has over
+// time, so that the cells are the same at any time.
+float lobe_excess(Region region, float gap, float turn, float width) {
+    float beyond = sqrt(2.0 * gap) - turn;
+    bool met = beyond < LOBE_REACH * region.lobe_width_most;
+    float narrowest = max(region.lobe_width, beyond / LOBE_REACH);
+    return met ? width / (LOBE_STEP * push.pair_size * narrowest) : 0.0;
+}
 
 // cos cos / (d^2 + A/pi) of unit `way` from receiver to source; 0 where either turns its back.
 float form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float area) {
@@ -56,6 +74,18 @@ vec3 lobe_flux(uint i_source, Region emitter, vec3 p, vec3 normal, vec3 outgoing
         sum += light.energy * (g * lobe_at(emitter.i_lobe, w));
     }
     return emitter.ks * sum;
+}
+
+// The least 1 - cos gamma that a cell of a source has between `outgoing` and any light that reaches it, as lobe_flux has it.
+float lobe_gap(uint i_source, vec3 p, vec3 normal, vec3 outgoing) {
+    float gap = 2.0;
+    for (uint l = 0u; l < push.n_lights; ++l) {
+        Light light = lights[l];
+        float g = light.kind == LIGHT_SKY ? 0.0 : fluxes[i_source * push.n_lights + l].w;
+        float w = half_vector_gap(normal, arrival_at(light, p).toward, outgoing);
+        gap = g > 0.0 ? min(gap, w) : gap;
+    }
+    return gap;
 }
 
 // A cell of a facet: 4^level of them, row by row in Z order. Clouds' facets have no axes and are one cell.

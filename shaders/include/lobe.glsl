@@ -1,13 +1,24 @@
 // Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector (docs/model.md §6). Needs
 // `float table[]`, a lobe a row.
 
-const uint N_NODES = 1024;
+const uint N_NODES = 1025;
 
-float lobe_at(uint i_row, float w) {
+// Between which nodes w lies: the same in every row.
+struct Node { uint i; float part; };
+
+Node node_at(float w) {
     float t = sqrt(sqrt(clamp(w, 0.0, 1.0))) * float(N_NODES - 1u);
     uint i = min(uint(t), N_NODES - 2u);
-    uint k = i_row * N_NODES + i;
-    return mix(table[k], table[k + 1u], t - float(i));
+    return Node(i, t - float(i));
+}
+
+float value_at(uint i_row, Node node) {
+    uint k = i_row * N_NODES + node.i;
+    return mix(table[k], table[k + 1u], node.part);
+}
+
+float lobe_at(uint i_row, float w) {
+    return value_at(i_row, node_at(w));
 }
 
 // 1 - cos gamma of the half vector of unit a and b, without the cancellation: half the square of the chord from n to it.

@@ -7,7 +7,7 @@ struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; 
 struct Mode { vec3 k; float phase; vec3 a; uint unused; };
 struct Facet { vec3 position; float area; vec3 normal; uint i_region; vec3 color; uint unused; };
 struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float unused; vec3 second; float unused_too; };
-struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float unused_1; float unused_2; float unused_3; };
+struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float lobe_width_most; uint i_column; uint i_row; };
 struct Source { vec3 position; float radius; vec3 normal; float area; vec3 flux; float total_area; };
 struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
 struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; };
@@ -25,4 +25,5 @@ const uint LIGHT_POINT = 2;
 
 const uint REGION_SURFACE = 0;
 const uint REGION_CLOUD = 1;
+const uint REGION_COLORED = 2;
 const uint NO_LOBE = 0xFFFFFFFFu;

@@ -10,6 +10,7 @@ pub mod parallel;
 pub mod plan;
 pub mod render;
 pub mod serial;
+pub mod tensor;
 
 use std::time::Instant;
 

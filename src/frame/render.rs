@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use super::buffers::{Buffers, download};
-use super::exchange::Exchange;
+use super::exchange::{Exchange, is_glossy};
 use super::packet::Packet;
-use super::plan::{Pass, Plan, Traits, plan};
+use super::plan::{Pass, Plan, Tensors, Traits, plan};
+use super::tensor::{Shape, TensorStage, basis_of, is_edited};
 use super::{limits, ms};
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
@@ -34,6 +35,7 @@ pub struct Renderer {
     transmit: Transmit,
     first: First,
     second: Option<SecondStage>,
+    tensor: Option<TensorStage>,
     sort: Sort,
     sprites: Sprites,
     buffers: Buffers,
@@ -46,16 +48,16 @@ pub struct Renderer {
 }
 
 /// What of the scene the passes are told and that is constant over a run.
-struct Settings {
+pub(super) struct Settings {
     n_particles: u32,
     n_surface_facets: u32,
-    n_facets: u32,
-    n_lights: u32,
-    pairs: Pairs,
+    pub n_facets: u32,
+    pub n_lights: u32,
+    pub pairs: Pairs,
     theta: f64,
     heaviest: f64,
-    step_cells: f64,
-    forward: f64,
+    pub step_cells: f64,
+    pub forward: f64,
     sort_bits: u32,
     cutoff: f64,
     format: TargetFormat,
@@ -73,7 +75,8 @@ impl Renderer {
     /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs. `skip`: leave out
     /// what a frame does not need.
     pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, skip: bool) -> Result<Renderer> {
-        limits::check(scene, device.limits())?;
+        let free = device.limits().device_memory_bytes - limits::check(scene, device.limits())?;
+        let (tensors, tensor) = tensor_stage(device, compiler, scene, free)?;
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
@@ -94,6 +97,7 @@ impl Renderer {
             transmit: Transmit::new(device, compiler)?,
             first: First::new(device, compiler)?,
             second,
+            tensor,
             sort: Sort::new(device, compiler, n_particles)?,
             sprites: Sprites::new(device, compiler, format, lit)?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
@@ -120,6 +124,8 @@ impl Renderer {
                 n_facets: scene.n_facets() as u32,
                 lit,
                 two_reflections,
+                glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
+                tensors,
                 skip,
             },
             last: None,
@@ -152,6 +158,9 @@ impl Renderer {
         self.buffers.table.write(&packet.table)?;
         self.buffers.regions.write(&packet.regions)?;
         self.buffers.lights.write(&packet.lights)?;
+        if let Some(tensor) = &mut self.tensor {
+            tensor.upload(packet)?;
+        }
         match (&mut self.buffers.placed_upload, &packet.placed) {
             (Some(upload), Some(placed)) if plan.runs(Pass::Place) => upload.write(placed),
             _ => Ok(()),
@@ -168,6 +177,7 @@ impl Renderer {
             transmit,
             first,
             second,
+            tensor,
             sort,
             sprites,
             buffers: b,
@@ -200,12 +210,19 @@ impl Renderer {
                 transmit.record(rec, buffers, &packet.grid, [s.n_facets, s.n_lights], s.step_cells, s.forward)
             })?;
             pass(rec, plan, Pass::First, |rec| {
+                if let Some(tensor) = tensor {
+                    return tensor.record_first(rec, b, packet, s);
+                }
                 let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &b.lit];
                 let push = FirstPush { eye: packet.camera.eye, n_facets: s.n_facets, n_lights: s.n_lights };
                 first.record(rec, from, &push)
             })?;
             pass(rec, plan, Pass::Second, |rec| match second {
-                Some(second) => second.record(rec, b, packet, s),
+                Some(second) => second.record(rec, b, tensor.as_ref(), packet, s),
+                None => Ok(()),
+            })?;
+            pass(rec, plan, Pass::Contract, |rec| match tensor {
+                Some(tensor) => tensor.record_contract(rec, b, s),
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {
@@ -279,11 +296,21 @@ impl SecondStage {
         Ok(SecondStage { second, exchange })
     }
 
-    fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
+    fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        b: &Buffers,
+        tensor: Option<&TensorStage>,
+        packet: &Packet,
+        s: &Settings,
+    ) -> Result<()> {
         let x = &self.exchange;
         let push = SourcesPush { n_facets: s.n_facets, n_lights: s.n_lights };
         let buffers = [&b.facets, &b.lights, &b.transmittance, &b.regions, &x.order, &x.leaves, &b.sources, &b.fluxes];
         self.second.record_sources(rec, buffers, &push)?;
+        if let Some(tensor) = tensor {
+            return tensor.record_second(rec, b, x, packet, s);
+        }
         for receivers in [Receivers::Diffuse, Receivers::Glossy] {
             let (i_first_block, n_blocks) = x.blocks_of(receivers);
             let push = GatherPush {
@@ -315,6 +342,23 @@ impl SecondStage {
             self.second.record(rec, buffers, &push, receivers, n_blocks)?;
         }
         Ok(())
+    }
+}
+
+/// The stage of the tensors where materials are edited and the tensors fit into `free` bytes.
+fn tensor_stage(
+    device: &Device,
+    compiler: &Compiler,
+    scene: &Scene,
+    free: u64,
+) -> Result<(Tensors, Option<TensorStage>)> {
+    if !is_edited(scene) {
+        return Ok((Tensors::Needless, None));
+    }
+    let shape = Shape::of(scene, basis_of(scene).map_or(1, |b| b.n_bases()));
+    match limits::tensors(&shape, device.limits(), free) {
+        Tensors::Kept => Ok((Tensors::Kept, Some(TensorStage::new(device, compiler, scene, shape)?))),
+        other => Ok((other, None)),
     }
 }
 

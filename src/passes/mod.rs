@@ -1,6 +1,7 @@
 //! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label and its column in the
 //! results share one name. `new` allocates and can fail; `record` only records. No pass knows another.
 
+pub mod contract;
 pub mod facets;
 pub mod first;
 pub mod generate;
@@ -19,9 +20,11 @@ macro_rules! shader_texts {
 
 /// Every shader and include, as built into the binary.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
+    "contract.comp",
     "facets.comp",
     "facets_surfaces.comp",
     "first.comp",
+    "first_tensor.comp",
     "generate.comp",
     "grid_deposit.comp",
     "grid_resolve.comp",
@@ -39,6 +42,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "place.comp",
     "second_gather.comp",
     "second_sources.comp",
+    "second_tensor.comp",
     "sort_count.comp",
     "sort_key.comp",
     "sort_scan.comp",

@@ -3,6 +3,7 @@
 //! Each room is plain functions over slices and takes its stage's inputs as arguments, so that a test can feed
 //! it exactly what the GPU had and so measure one stage alone.
 
+pub mod contract;
 pub mod facets;
 pub mod first;
 pub mod generate;

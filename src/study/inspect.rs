@@ -74,7 +74,7 @@ pub struct PlanRow {
     pub frame: u32,
     pub pass: &'static str,
     pub run: bool,
-    pub reason: &'static str,
+    pub reason: String,
 }
 
 /// Particles of `i_frame` as the device has them.
@@ -184,7 +184,7 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
     let on_frame = &mut |times: crate::frame::FrameTimes, _: &mut _| {
         rows.extend(Pass::ALL.iter().map(|pass| {
             let decision = times.plan.decision(*pass);
-            PlanRow { frame: times.i_frame, pass: pass.name(), run: decision.run, reason: decision.reason }
+            PlanRow { frame: times.i_frame, pass: pass.name(), run: decision.run, reason: decision.reason.to_string() }
         }));
         Ok(true)
     };

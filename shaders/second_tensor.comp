@@ -1,0 +1,220 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "light.glsl"
+#include "occlude.glsl"
+
+// T2 of one light: the second reflection by basis of the receiver and column of the emitters, without energies and
+// materials (docs/model.md §7, §11 "contract"). Blocks, pairings and cells are those of second_gather.comp.
+
+#ifndef WORKGROUP
+#define WORKGROUP 8
+#endif
+// 1: the scene has clouds that attenuate.
+#ifndef MARCH
+#define MARCH 1
+#endif
+// 1: the receivers have a lobe.
+#ifndef GLOSSY
+#define GLOSSY 1
+#endif
+// N_b.
+#ifndef N_BASES
+#define N_BASES 8
+#endif
+
+layout(local_size_x = WORKGROUP) in;
+
+layout(push_constant) uniform Push {
+    Grid grid;
+    vec3 eye;
+    uint n_lights;
+    float pair_size;
+    uint pair_levels;
+    float step_length;
+    float backward;
+    uint pair_steps;
+    uint i_first_block;
+    uint i_light;
+    uint i_vectors;
+    uint n_rows;
+    uint n_columns;
+} push;
+layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
+layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
+layout(std430, binding = 2) readonly buffer Occluders { uint occluders[]; };
+layout(std430, binding = 3) readonly buffer Order { uint order[]; };
+layout(std430, binding = 4) readonly buffer Facets { Facet facets[]; };
+layout(std430, binding = 5) readonly buffer Regions { Region regions[]; };
+layout(std430, binding = 6) readonly buffer Lights { Light lights[]; };
+layout(std430, binding = 7) readonly buffer Sources { Source sources[]; };
+layout(std430, binding = 8) readonly buffer Fluxes { vec4 fluxes[]; };
+layout(std430, binding = 9) readonly buffer Table { float table[]; };
+layout(std430, binding = 10) readonly buffer Density { float density[]; };
+layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
+// [light][column][row]
+layout(std430, binding = 12) writeonly buffer Second { float t2[]; };
+
+#include "lobe.glsl"
+#if MARCH
+#include "density.glsl"
+#endif
+#include "veil.glsl"
+#include "gather.glsl"
+
+#if GLOSSY
+const uint N_RESPONSES = N_BASES;
+#else
+const uint N_RESPONSES = 1u;
+#endif
+const uint N_VECTORS = N_BASES - 1u;
+
+struct Taker { vec3 position; vec3 normal; vec3 outgoing; Region region; };
+
+// Sums of one receiver and pairing, by basis of the receiver: of the emitter's diffuse basis (by channel where it has
+// colours, else in x) and of its lobe's bases.
+vec3 plain[N_RESPONSES];
+#if N_BASES > 1
+float shiny[N_RESPONSES * N_VECTORS];
+#endif
+float n_unresolved;
+
+void clear() {
+    for (uint r = 0u; r < N_RESPONSES; ++r) {
+        plain[r] = vec3(0.0);
+    }
+#if N_BASES > 1
+    for (uint k = 0u; k < N_RESPONSES * N_VECTORS; ++k) {
+        shiny[k] = 0.0;
+    }
+#endif
+}
+
+// Adds what a cell at q sends: `share` of the flux of its source, toward the receiver's lobe at `gap`.
+void add(uint i_source, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float share, float gap) {
+    Light light = lights[push.i_light];
+    vec4 flux = fluxes[i_source * push.n_lights + push.i_light];
+    float response[N_RESPONSES];
+    response[0] = share * PI_INVERSE;
+#if GLOSSY && N_BASES > 1
+    Node node = node_at(gap);
+    for (uint b = 0u; b < N_VECTORS; ++b) {
+        response[b + 1u] = share * value_at(push.i_vectors + b, node);
+    }
+#endif
+    vec3 diffuse = PI_INVERSE * (emitter.kind == REGION_COLORED ? flux.rgb : vec3(flux.w, 0.0, 0.0));
+    for (uint r = 0u; r < N_RESPONSES; ++r) {
+        plain[r] += response[r] * diffuse;
+    }
+#if N_BASES > 1
+    bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY;
+    uint n_vectors = shines ? N_VECTORS : 0u;
+    Node from = node_at(half_vector_gap(normal, arrival_at(light, q).toward, outgoing));
+    for (uint b = 0u; b < n_vectors; ++b) {
+        float e = flux.w * value_at(push.i_vectors + b, from);
+        for (uint r = 0u; r < N_RESPONSES; ++r) {
+            shiny[b * N_RESPONSES + r] += response[r] * e;
+        }
+    }
+#endif
+}
+
+// As `gather` of second_gather.comp, cell by cell.
+void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uint n) {
+    bool flat_emitter = emitter.kind == REGION_SURFACE;
+    vec3 half_u = flat_emitter ? emitter.u / float(emitter.n_u) : vec3(0.0);
+    vec3 half_v = flat_emitter ? emitter.v / float(emitter.n_v) : vec3(0.0);
+    float side = 2.0 * sqrt(max(dot(half_u, half_u), dot(half_v, half_v)));
+    uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
+    Cell cell = Cell(0u, uvec2(0u));
+    uint n_steps = 0u;
+    for (uint s = 0u; s < n;) {
+        uint i = pairing.i_source + s;
+        Source source = sources[i];
+        float scale = cell_scale(cell);
+        vec2 at = (2.0 * vec2(cell.at) + 1.0) * scale - 1.0;
+        vec3 q = source.position + at.x * half_u + at.y * half_v;
+        vec3 offset = q - taker.position;
+        float d2 = dot(offset, offset);
+        float inverse = inversesqrt(max(d2, 1e-30));
+        vec3 way = offset * inverse;
+        float part = scale * scale;
+        float share = part * form(taker.normal, source.normal, way, d2, part * source.area);
+        float width = side * scale * inverse;
+        float excess = width / push.pair_size;
+        float turn = 0.75 * width;
+        for (uint g = 0u; g < n_shiny; ++g) {
+            excess = max(excess, lobe_excess(emitter, lobe_gap(i, q, source.normal, -way), turn, width));
+        }
+        float gap = 0.0;
+#if GLOSSY
+        gap = half_vector_gap(taker.normal, way, taker.outgoing);
+        excess = max(excess, lobe_excess(taker.region, gap, turn, width));
+#endif
+        bool faces = dot(source.normal, offset) < 0.0 && dot(taker.normal, offset) > -side * scale;
+        bool wide = faces && excess > 1.0;
+        bool split = wide && cell.level < push.pair_levels && n_steps < MAX_STEPS;
+        share = split ? 0.0 : share;
+        if (veiled) {
+            share *= visible(pairing, veil, taker.position, q, share > 0.0);
+        }
+#if MARCH
+        share *= attenuation(taker.position, q, share > 0.0);
+#endif
+        // A loop and not a condition: a device that runs both sides of a condition then leaves it out.
+        uint n_arriving = share > 0.0 ? 1u : 0u;
+        for (uint k = 0u; k < n_arriving; ++k) {
+            add(i, emitter, q, source.normal, -way, share, gap);
+        }
+        bool open = wide && !split;
+        n_unresolved += open ? 1.0 : 0.0;
+        Cell next = next_cell(cell);
+        s += !split && next.level == 0u ? 1u : 0u;
+        n_steps = next.level == 0u ? 0u : n_steps + 1u;
+        cell = split ? Cell(cell.level + 1u, cell.at * 2u) : next;
+    }
+}
+
+// The sums of receiver j as columns of its rows.
+void store(uint j, Region own, Region emitter) {
+    uint n_plain = emitter.kind == REGION_COLORED ? 3u : 1u;
+    uint n_vectors = emitter.i_lobe == NO_LOBE ? 0u : N_VECTORS;
+    uint column = push.i_light * push.n_columns + emitter.i_column;
+    for (uint r = 0u; r < N_RESPONSES; ++r) {
+        uint row = own.i_row + r * own.n_facets + j - own.i_first_facet;
+        for (uint c = 0u; c < n_plain; ++c) {
+            t2[(column + c) * push.n_rows + row] = plain[r][c];
+        }
+#if N_BASES > 1
+        for (uint b = 0u; b < n_vectors; ++b) {
+            t2[(column + n_plain + b) * push.n_rows + row] = shiny[b * N_RESPONSES + r];
+        }
+#endif
+    }
+}
+
+void main() {
+    Block block = blocks[push.i_first_block + gl_WorkGroupID.x];
+    uint place = block.i_first + min(gl_LocalInvocationID.x, block.n_facets - 1u);
+    uint j = order[place];
+    Facet facet = facets[j];
+    Region own = regions[facet.i_region];
+    Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), own);
+    n_unresolved = 0.0;
+    for (uint k = 0u; k < block.n_pairings; ++k) {
+        Pairing pairing = pairings[block.i_pairing + k];
+        Region emitter = regions[pairing.i_region];
+        Veil veil = veil_of(pairing, emitter, facet.position);
+        uint n_clear = veil.n == 0u ? emitter.n_facets : 0u;
+        uint n_veiled = veil.n > 0u && !veil.closed ? emitter.n_facets : 0u;
+        clear();
+        gather(pairing, emitter, taker, veil, false, n_clear);
+        gather(pairing, emitter, taker, veil, true, n_veiled);
+        if (gl_LocalInvocationID.x < block.n_facets) {
+            store(j, own, emitter);
+        }
+    }
+    if (gl_LocalInvocationID.x < block.n_facets) {
+        lit[j].n_unresolved = n_unresolved;
+    }
+}

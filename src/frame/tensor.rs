@@ -79,7 +79,7 @@ impl Shape {
     }
 
     pub fn n_first(&self) -> u64 {
-        u64::from(self.n_lights) * self.n_rows
+        u64::from(self.n_lights).saturating_mul(self.n_rows)
     }
 
     /// `None`: beyond 64 bits.

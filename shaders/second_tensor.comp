@@ -1,8 +1,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "light.glsl"
 #include "occlude.glsl"
+#include "tensor.glsl"
 
 // T2 of one light: the second reflection by basis of the receiver and column of the emitters, without energies and
 // materials (docs/model.md §7, §11 "contract"). Blocks, pairings and cells are those of second_gather.comp.
@@ -52,7 +54,7 @@ layout(std430, binding = 8) readonly buffer Fluxes { vec4 fluxes[]; };
 layout(std430, binding = 9) readonly buffer Table { float table[]; };
 layout(std430, binding = 10) readonly buffer Density { float density[]; };
 layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
-// [light][column][row]
+// As tensor.glsl has it.
 layout(std430, binding = 12) writeonly buffer Second { float t2[]; };
 
 #include "lobe.glsl"
@@ -80,11 +82,11 @@ float shiny[N_RESPONSES * N_VECTORS];
 float n_unresolved;
 
 void clear() {
-    for (uint r = 0u; r < N_RESPONSES; ++r) {
+    [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
         plain[r] = vec3(0.0);
     }
 #if N_BASES > 1
-    for (uint k = 0u; k < N_RESPONSES * N_VECTORS; ++k) {
+    [[unroll]] for (uint k = 0u; k < N_RESPONSES * N_VECTORS; ++k) {
         shiny[k] = 0.0;
     }
 #endif
@@ -98,22 +100,23 @@ void add(uint i_source, Region emitter, vec3 q, vec3 normal, vec3 outgoing, floa
     response[0] = share * PI_INVERSE;
 #if GLOSSY && N_BASES > 1
     Node node = node_at(gap);
-    for (uint b = 0u; b < N_VECTORS; ++b) {
+    [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
         response[b + 1u] = share * value_at(push.i_vectors + b, node);
     }
 #endif
     vec3 diffuse = PI_INVERSE * (emitter.kind == REGION_COLORED ? flux.rgb : vec3(flux.w, 0.0, 0.0));
-    for (uint r = 0u; r < N_RESPONSES; ++r) {
+    [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
         plain[r] += response[r] * diffuse;
     }
 #if N_BASES > 1
-    bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY;
-    uint n_vectors = shines ? N_VECTORS : 0u;
-    Node from = node_at(half_vector_gap(normal, arrival_at(light, q).toward, outgoing));
-    for (uint b = 0u; b < n_vectors; ++b) {
-        float e = flux.w * value_at(push.i_vectors + b, from);
-        for (uint r = 0u; r < N_RESPONSES; ++r) {
-            shiny[b * N_RESPONSES + r] += response[r] * e;
+    uint n_shiny = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY ? 1u : 0u;
+    for (uint k = 0u; k < n_shiny; ++k) {
+        Node from = node_at(half_vector_gap(normal, arrival_at(light, q).toward, outgoing));
+        [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
+            float e = flux.w * value_at(push.i_vectors + b, from);
+            [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
+                shiny[b * N_RESPONSES + r] += response[r] * e;
+            }
         }
     }
 #endif
@@ -179,15 +182,19 @@ void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool 
 void store(uint j, Region own, Region emitter) {
     uint n_plain = emitter.kind == REGION_COLORED ? 3u : 1u;
     uint n_vectors = emitter.i_lobe == NO_LOBE ? 0u : N_VECTORS;
-    uint column = push.i_light * push.n_columns + emitter.i_column;
-    for (uint r = 0u; r < N_RESPONSES; ++r) {
+    [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
         uint row = own.i_row + r * own.n_facets + j - own.i_first_facet;
-        for (uint c = 0u; c < n_plain; ++c) {
-            t2[(column + c) * push.n_rows + row] = plain[r][c];
+        uint k = second_at(push.i_light, row, push.n_rows, push.n_columns) + emitter.i_column * TILE;
+        t2[k] = plain[r].x;
+        if (n_plain == 3u) {
+            t2[k + TILE] = plain[r].y;
+            t2[k + 2u * TILE] = plain[r].z;
         }
 #if N_BASES > 1
-        for (uint b = 0u; b < n_vectors; ++b) {
-            t2[(column + n_plain + b) * push.n_rows + row] = shiny[b * N_RESPONSES + r];
+        [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
+            if (b < n_vectors) {
+                t2[k + (n_plain + b) * TILE] = shiny[b * N_RESPONSES + r];
+            }
         }
 #endif
     }

@@ -13,7 +13,7 @@ use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_S
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, place, sort, sprites, transmit};
+use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, place, second, sort, sprites, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -33,13 +33,42 @@ const RECORDS: [Record; 10] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 13] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 16] = [
+    (
+        "contract.comp",
+        contract::Push::FIELDS,
+        &[R("Facet"), R("Light"), R("Region"), B(16), B(4), B(4), B(8), R("Lit")],
+    ),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Particle"), B(4), R("Group"), R("Lit")]),
+    (
+        "first_tensor.comp",
+        first::TensorPush::FIELDS,
+        &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Lit")],
+    ),
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
+    (
+        "second_tensor.comp",
+        second::TensorPush::FIELDS,
+        &[
+            R("Block"),
+            R("Pairing"),
+            B(4),
+            B(4),
+            R("Facet"),
+            R("Region"),
+            R("Light"),
+            R("Source"),
+            B(16),
+            B(4),
+            B(4),
+            R("Lit"),
+            B(4),
+        ],
+    ),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),

@@ -11,10 +11,12 @@ use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use nimbus::layout::facet::{RegionRecord, lobe_width};
 use nimbus::layout::frame::LightRecord;
-use nimbus::passes::contract::{Contract, Push};
+use nimbus::passes::contract::{Contract, Push, TILE};
 use nimbus::reference::contract::{Receiver, Reflected, Tensors, contract};
 
 const N_BASES: u32 = 5;
+/// Columns that each region can receive light from, of 16: (first, number).
+const SPANS: [&[[u32; 2]]; 4] = [&[[0, 16]], &[[1, 3], [7, 6]], &[], &[[15, 1]]];
 
 /// Regions without and with a lobe, with and without colours, whose facets' number is no multiple of a workgroup's.
 struct Case {
@@ -23,7 +25,9 @@ struct Case {
     lights: Vec<LightRecord>,
     coefficients: Vec<[f32; 4]>,
     t1: Vec<f32>,
+    /// [light][column][row]; 0 where no span lies.
     t2: Vec<f32>,
+    spans: Vec<[u32; 2]>,
     n_rows: u32,
     n_columns: u32,
 }
@@ -65,17 +69,31 @@ fn case(n_lights: usize, two_reflections: bool) -> Case {
     if n_lights > 2 {
         lights[1].energy = [0.0; 3];
     }
-    let n_columns = if two_reflections { i_column } else { 0 };
+    let i_row = i_row.next_multiple_of(TILE);
+    let n_columns = i_column;
     let mut signed = |n: usize| (0..n).map(|_| r.within(-1.0, 1.0)).collect::<Vec<f32>>();
     let t1 = signed(n_lights * i_row as usize);
-    let t2 = signed(n_lights * (i_row * n_columns) as usize);
+    let mut t2 = signed(n_lights * (i_row * n_columns) as usize);
+    let mut spans = vec![[0, 0]; regions.len()];
+    for (i, own) in SPANS.iter().enumerate().filter(|_| two_reflections) {
+        spans[i] = [spans.len() as u32, own.len() as u32];
+        spans.extend(*own);
+    }
+    // Row by row, and the rest rows of no facet.
+    let of_row = |row: u32| regions.iter().rposition(|r: &RegionRecord| r.i_row <= row).unwrap_or(0);
+    for (k, value) in t2.iter_mut().enumerate() {
+        let (row, column) = (k as u32 % i_row, k as u32 / i_row % n_columns);
+        if !two_reflections || !SPANS[of_row(row)].iter().any(|s| (s[0]..s[0] + s[1]).contains(&column)) {
+            *value = 0.0;
+        }
+    }
     let coefficients = (0..i_column).map(|_| [0; 4].map(|_| signed(1)[0])).collect();
-    Case { facets, regions, lights, coefficients, t1, t2, n_rows: i_row, n_columns }
+    Case { facets, regions, lights, coefficients, t1, t2, spans, n_rows: i_row, n_columns }
 }
 
 impl Case {
     fn run(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Vec<f64> {
-        let pass = Contract::new(&gpu.device, compiler.unwrap_or(&gpu.compiler)).expect("contract");
+        let pass = Contract::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), N_BASES).expect("contract");
         // What second counted must stay.
         let lit: Vec<_> = (0..self.facets.len())
             .map(|j| LitRecord { n_unresolved: j as f32, unresolved: 0.5, ..LitRecord::default() })
@@ -86,20 +104,33 @@ impl Case {
             gpu.upload(&self.regions),
             gpu.upload(&self.coefficients),
             gpu.upload(&self.t1),
-            gpu.upload(&self.t2),
+            gpu.upload(&self.tiled()),
+            gpu.upload(&self.spans),
             gpu.upload(&lit),
         ];
         let push = Push {
             n_facets: self.facets.len() as u32,
             n_lights: self.lights.len() as u32,
-            n_bases: N_BASES,
             n_rows: self.n_rows,
             n_columns: self.n_columns,
         };
         gpu.run(|rec| pass.record(rec, buffers.each_ref(), &push));
-        let lit: Vec<LitRecord> = gpu.download(&buffers[6], self.facets.len());
+        let lit: Vec<LitRecord> = gpu.download(&buffers[7], self.facets.len());
         assert!((0..).zip(&lit).all(|(j, l)| (l.n_unresolved, l.unresolved) == (j as f32, 0.5)));
         lit.iter().flat_map(|l| [l.direct, l.indirect, l.first, l.second].concat()).map(f64::from).collect()
+    }
+
+    /// T2 as the GPU has it: [light][row / TILE][column][row % TILE].
+    fn tiled(&self) -> Vec<f32> {
+        let (n_rows, n_columns, tile) = (self.n_rows as usize, self.n_columns as usize, TILE as usize);
+        let at = |k: usize| {
+            let (lane, column, tile_of_all) = (k % tile, k / tile % n_columns, k / tile / n_columns);
+            let (l, row) = (tile_of_all * tile / n_rows, tile_of_all * tile % n_rows + lane);
+            let value = self.t2[(l * n_columns + column) * n_rows + row];
+            // What lies in no span is not read.
+            if value == 0.0 { f32::NAN } else { value }
+        };
+        (0..self.t2.len()).map(at).collect()
     }
 
     /// The reference's sums, of the numbers as they are or (`magnitudes`) of their absolute values.
@@ -145,7 +176,7 @@ fn every_facet_is_the_sum_that_the_reference_says() {
         let case = case(n_lights, two_reflections);
         let (values, truths, bounds) = (case.run(&mut gpu, None), case.truth(false), case.bounds());
         assert_within_and_say(&format!("{n_lights} lights, T2 {two_reflections}"), &values, &truths, &bounds);
-        // The bound itself says something: of sums of up to 4 · 22 · 5 numbers below 1, 46 roundings of 2⁻²⁴.
+        // The bound itself says something: of sums of up to 4 · 16 · 5 numbers below 1, 31 roundings of 2⁻²⁴.
         assert!(bounds.iter().all(|b| *b < 3e-4), "{:?}", bounds.iter().cloned().fold(0.0, f64::max));
         if !two_reflections {
             let second = values.chunks(12).flat_map(|c| [&c[3..6], &c[9..12]].concat());
@@ -165,16 +196,16 @@ fn a_wrong_sum_is_noticed() {
     let case = case(3, true);
     let (truths, bounds) = (case.truth(false), case.bounds());
     for (from, to) in [
-        ("k += push.n_rows;", "k += 1u;"),
-        ("l * push.n_columns * push.n_rows + row", "l * push.n_rows + row"),
-        ("t1[l * push.n_rows + row]", "t1[row]"),
+        ("t2[at[0] + c * TILE]", "t2[at[0] + c]"),
+        ("second_at(l, rows", "second_at(0u, rows"),
+        ("t1[l * push.n_rows + rows[b]]", "t1[rows[b]]"),
         ("region.kind == REGION_COLORED ? 3u : 1u", "1u"),
         ("region.kd * facet.color", "region.kd"),
-        ("push.n_bases - 1u", "push.n_bases - 2u"),
-        ("row += region.n_facets;", "row += 1u;"),
+        ("glossy ? 1u : 0u", "0u"),
+        ("rows[b - 1u] + region.n_facets", "rows[b - 1u] + 1u"),
         ("j - region.i_first_facet", "j"),
         ("3.14159265358979", "3.1415"),
-        ("second += coefficient * glossy.second", "second += glossy.second"),
+        ("sum.second += column * second", "sum.second += column * indirect"),
     ] {
         let compiler = Gpu::wrong_compiler("contract.comp", from, to);
         let values = case.run(&mut gpu, Some(&compiler));

@@ -120,7 +120,7 @@ fn contracted_light_is_light_gathered_at_once() {
             "shiny[b * N_RESPONSES + r] += response[r] * e",
             "shiny[b * N_RESPONSES + r] += response[0] * e",
         ),
-        ("second_tensor.comp", "(column + n_plain + b)", "(column + b)"),
+        ("second_tensor.comp", "(n_plain + b) * TILE", "b * TILE"),
         (
             "second_tensor.comp",
             "emitter.kind == REGION_COLORED ? flux.rgb",
@@ -188,9 +188,19 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     let shape = Shape::of(&scene, basis_of(&scene).expect("a basis").n_bases());
     // Floor 25, ceiling 16, wall 16 (a lobe), shelf 4 facets, 40 particles with colours and a lobe, 5 vectors; the floor too
     // has a lobe.
-    assert_eq!(shape.n_rows, 6 * 25 + 16 + 6 * 16 + 4 + 6 * 40);
+    let n_rows: u64 = 6 * 25 + 16 + 6 * 16 + 4 + 6 * 40;
+    assert_eq!(shape.n_rows, n_rows.next_multiple_of(64));
     assert_eq!(shape.n_columns, 6 + 1 + 6 + 1 + 8);
     let bytes = 4 * 3 * shape.n_rows * 22;
+    // Floor, ceiling, wall, shelf and cloud begin at columns 0, 6, 7, 13 and 14. Floor and shelf face up and don't see each
+    // other; nothing sees itself but the cloud.
+    let spans = shape.spans(&scene);
+    let of = |i: usize| spans[spans[i][0] as usize..][..spans[i][1] as usize].to_vec();
+    assert_eq!(of(0), [[6, 7], [14, 8]]);
+    assert_eq!(of(1), [[0, 6], [7, 15]]);
+    assert_eq!(of(2), [[0, 7], [13, 9]]);
+    assert_eq!(of(3), [[6, 7], [14, 8]]);
+    assert_eq!(of(4), [[0, 22]]);
     let mut limits = gpu.device.limits().clone();
     assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::Kept);
     let first = 4 * 3 * shape.n_rows;
@@ -201,4 +211,49 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     // Sizes beyond 64 bits are only large.
     let huge = Shape { n_rows: u64::MAX / 4, ..shape };
     assert!(matches!(limits::tensors(&huge, &limits, u64::MAX), Tensors::TooLarge { bytes: u64::MAX, .. }));
+}
+
+#[test]
+fn a_scene_too_large_for_tensors_is_gathered_at_once() {
+    let gpu = Gpu::new();
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("s.toml");
+    // Two large rectangles back to back: nothing to gather, and 2 · 90 000 · 8 rows of 16 columns by one light, 92 MB each
+    // a light; two lights make 184 MB.
+    let text = r#"
+        camera = { path = [{ time_s = 0, position = [0, 1, 9], target = [0, 0, 0] }] }
+        film = { width = 8, height = 8 }
+        light = [
+            { kind = "directional", direction = [0, -1, 0], irradiance = [1, 1, 1] },
+            { kind = "directional", direction = [0, 1, 0], irradiance = [1, 1, 1] },
+        ]
+        [[material]]
+        name = "m"
+        path = [{ time_s = 0, kd = [0.5, 0.5, 0.5], ks = [0.1, 0.1, 0.1] }, { time_s = 1, kd = [0.1, 0.1, 0.1] }]
+        [[surface]]
+        center = [0, 0, 0]
+        u = [0, 0, 1]
+        v = [1, 0, 0]
+        material = "m"
+        subdivide = [300, 300]
+        [[surface]]
+        center = [0, -1, 0]
+        u = [1, 0, 0]
+        v = [0, 0, 1]
+        material = "m"
+        subdivide = [300, 300]
+    "#;
+    std::fs::write(&path, text).expect("written");
+    let scene = scene_file::load(&path, &[], None).expect("the scene loads").scene;
+    let frames = run(&gpu, None, &scene, &[0, 1], true);
+    let bytes: u64 = 4 * 2 * (2u64 * 90_000 * 8).next_multiple_of(64) * 16;
+    let most = gpu.device.limits().max_storage_buffer_bytes;
+    let reason = frames.plans[1].decision(Pass::Contract).reason.to_string();
+    if bytes > most {
+        assert_eq!(running(&frames.plans[1]), ["first", "second", "sprites"]);
+        assert!(reason.contains(&bytes.to_string()) && reason.contains(&most.to_string()), "{reason}");
+    } else {
+        assert_eq!(running(&frames.plans[1]), ["contract", "sprites"]);
+    }
+    assert!(frames.lit[0] != frames.lit[1]);
 }

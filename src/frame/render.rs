@@ -76,7 +76,6 @@ impl Renderer {
     /// what a frame does not need.
     pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, skip: bool) -> Result<Renderer> {
         let free = device.limits().device_memory_bytes - limits::check(scene, device.limits())?;
-        let (tensors, tensor) = tensor_stage(device, compiler, scene, free)?;
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
@@ -84,6 +83,7 @@ impl Renderer {
         let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut commands = Commands::new(device, "frame")?;
+        let (tensors, tensor) = tensor_stage(device, compiler, &mut commands, scene, free)?;
         let two_reflections = scene.lighting.mode == LightingMode::TwoReflection;
         let second = match two_reflections {
             true => Some(SecondStage::new(device, compiler, &mut commands, scene)?),
@@ -349,6 +349,7 @@ impl SecondStage {
 fn tensor_stage(
     device: &Device,
     compiler: &Compiler,
+    commands: &mut Commands,
     scene: &Scene,
     free: u64,
 ) -> Result<(Tensors, Option<TensorStage>)> {
@@ -357,7 +358,7 @@ fn tensor_stage(
     }
     let shape = Shape::of(scene, basis_of(scene).map_or(1, |b| b.n_bases()));
     match limits::tensors(&shape, device.limits(), free) {
-        Tensors::Kept => Ok((Tensors::Kept, Some(TensorStage::new(device, compiler, scene, shape)?))),
+        Tensors::Kept => Ok((Tensors::Kept, Some(TensorStage::new(device, compiler, commands, scene, shape)?))),
         other => Ok((other, None)),
     }
 }

@@ -1,18 +1,19 @@
 //! The tensors T1 and T2 of a scene whose materials are edited: how they are laid out, and the stage that fills and sums
 //! them (docs/model.md §11 "contract").
 
-use super::buffers::Buffers;
+use super::buffers::{Buffers, upload};
 use super::exchange::{Exchange, is_glossy, region_sizes};
 use super::packet::Packet;
 use super::render::Settings;
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Place, Recorder};
+use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
 use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use crate::model::basis::Basis;
 use crate::model::cloud::CloudSource;
 use crate::model::material::Brdf;
+use crate::model::pairings::pairings;
 use crate::model::scene::{LightingMode, Scene};
-use crate::passes::contract::{Contract, Push as ContractPush};
+use crate::passes::contract::{Contract, Push as ContractPush, TILE};
 use crate::passes::first::{FirstTensor, TensorPush as FirstPush};
 use crate::passes::second::{Receivers, SecondTensor, TensorPush as SecondPush};
 
@@ -50,12 +51,13 @@ pub struct Block {
     pub n_vectors: u32,
 }
 
-/// T1 is [light][row], T2 [light][column][row]. Numbers, not bytes.
+/// T1 is [light][row], T2 [light][row / TILE][column][row % TILE]. Numbers, not bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shape {
     pub blocks: Vec<Block>,
     pub n_bases: u32,
     pub n_lights: u32,
+    /// A multiple of TILE: the last ones may be no facet's.
     pub n_rows: u64,
     pub n_columns: u32,
     /// Without the second reflection there is no T2.
@@ -74,6 +76,7 @@ impl Shape {
             n_rows += u64::from(n_facets) * u64::from(1 + n_vectors);
             n_columns += n_plain + n_vectors;
         }
+        let n_rows = n_rows.next_multiple_of(u64::from(TILE));
         let has_second = scene.lighting.mode == LightingMode::TwoReflection;
         Shape { blocks, n_bases, n_lights: scene.lights.len() as u32, n_rows, n_columns, has_second }
     }
@@ -106,6 +109,32 @@ impl Shape {
     }
 }
 
+impl Shape {
+    /// By region (first, number) of its spans, then the spans: (first, number) of the columns of regions whose light can
+    /// reach it. T2 holds nothing elsewhere.
+    pub fn spans(&self, scene: &Scene) -> Vec<[u32; 2]> {
+        let sizes = region_sizes(scene);
+        let mut spans = vec![[0, 0]; sizes.len()];
+        if !self.has_second {
+            return spans;
+        }
+        for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
+            let first = spans.len();
+            // Nothing is written for an emitter without facets.
+            for block in from.iter().filter(|p| sizes[p.i_emitter] > 0).map(|p| self.blocks[p.i_emitter]) {
+                let n = block.n_plain + block.n_vectors;
+                match spans[first..].last_mut() {
+                    // Neighbours make one.
+                    Some(last) if last[0] + last[1] == block.i_column => last[1] += n,
+                    _ => spans.push([block.i_column, n]),
+                }
+            }
+            spans[i] = [first as u32, (spans.len() - first) as u32];
+        }
+        spans
+    }
+}
+
 /// The tensors' passes and buffers.
 pub struct TensorStage {
     first: FirstTensor,
@@ -114,6 +143,7 @@ pub struct TensorStage {
     shape: Shape,
     t1: Buffer,
     t2: Buffer,
+    spans: Buffer,
     /// Written by the host every frame.
     coefficients: Buffer,
     /// First row of the basis' vectors in the table.
@@ -121,17 +151,27 @@ pub struct TensorStage {
 }
 
 impl TensorStage {
-    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, shape: Shape) -> Result<TensorStage> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        commands: &mut Commands,
+        scene: &Scene,
+        shape: Shape,
+    ) -> Result<TensorStage> {
         let second = match shape.has_second {
             true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases)?),
             false => None,
         };
         // One that has no number does not fit either; the limits have been asked before.
         let n_second = shape.n_second().unwrap_or(u64::MAX);
+        let from_whom = shape.spans(scene);
+        let spans = Buffer::new::<[u32; 2]>(device, "contract.spans", from_whom.len() as u64, Place::Device)?;
+        upload(device, commands, &from_whom, &spans)?;
         Ok(TensorStage {
+            spans,
             first: FirstTensor::new(device, compiler)?,
             second,
-            contract: Contract::new(device, compiler)?,
+            contract: Contract::new(device, compiler, shape.n_bases)?,
             t1: Buffer::new::<f32>(device, "first.t1", shape.n_first(), Place::Device)?,
             t2: Buffer::new::<f32>(device, "second.t2", n_second, Place::Device)?,
             coefficients: Buffer::new::<[f32; 4]>(
@@ -178,8 +218,6 @@ impl TensorStage {
         s: &Settings,
     ) -> Result<()> {
         let Some(second) = &self.second else { return Ok(()) };
-        // Regions that cannot see each other are never visited.
-        rec.fill(&self.t2, 0);
         let lit = (0..).zip(&packet.lights).filter(|(_, light)| light.energy != [0.0; 3]);
         for (i_light, _) in lit {
             for receivers in [Receivers::Diffuse, Receivers::Glossy] {
@@ -224,11 +262,10 @@ impl TensorStage {
         let push = ContractPush {
             n_facets: s.n_facets,
             n_lights: s.n_lights,
-            n_bases: self.shape.n_bases,
             n_rows: self.shape.n_rows as u32,
-            n_columns: if self.shape.has_second { self.shape.n_columns } else { 0 },
+            n_columns: self.shape.n_columns,
         };
-        let buffers = [&b.facets, &b.lights, &b.regions, &self.coefficients, &self.t1, &self.t2, &b.lit];
+        let buffers = [&b.facets, &b.lights, &b.regions, &self.coefficients, &self.t1, &self.t2, &self.spans, &b.lit];
         self.contract.record(rec, buffers, &push)
     }
 }

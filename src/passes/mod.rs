@@ -38,6 +38,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/philox.glsl",
     "include/records.glsl",
     "include/sort.glsl",
+    "include/tensor.glsl",
     "include/veil.glsl",
     "place.comp",
     "second_gather.comp",

@@ -121,7 +121,7 @@ impl SecondTensor {
     }
 
     /// Buffers as [`Second::record`] has them; `table` with the vectors of the basis from row `i_vectors` on; `t2`: f32
-    /// [light][column][row], zeros before.
+    /// [light][row / 64][column][row % 64] (contract's TILE).
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

@@ -36,6 +36,9 @@ layout(push_constant) uniform Push {
     uint pair_steps;
     uint i_first_block;
     float theta;
+    // Sources of this dispatch: a driver may end a loop after 65535 turns without a word, so none has more.
+    uint i_first_source;
+    uint i_end_source;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
 layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
@@ -73,14 +76,16 @@ struct Sum {
     // Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest channel.
     float n_unresolved;
     float unresolved;
+    // Sources that were not looked at.
+    float n_lost;
 };
 
 // Adds what the first `n` sources of a pairing send to the receiver. One step is one cell: a whole facet, or a quarter of
 // a cell that was too wide for its distance, so that neighbouring invocations need not wait for each other's near facets.
-void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uint n) {
+void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uvec2 part) {
     Pane pane = pane_of(emitter);
-    Walk walk = start_walk();
-    while (walk.s < n) {
+    Walk walk = start_walk(part);
+    while (walk.s < part.y) {
         uint i = pairing.i_source + walk.s;
         uint n_nodes = nodes_of(i);
         View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
@@ -106,6 +111,7 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
         walk = advance(walk, view.split, n_nodes);
     }
+    sum.n_lost += float(part.y - min(walk.s, part.y));
 }
 
 // The lobe's gap where it is nearest to its peak in a cell that turns the half vector by `turn`.
@@ -115,11 +121,11 @@ float nearest_gap(float gap, float turn) {
 }
 
 // A bound on what the cells that stayed too wide may change (docs/model.md §11 "unresolved").
-float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint n) {
+float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uvec2 part) {
     Pane pane = pane_of(emitter);
-    Walk walk = start_walk();
+    Walk walk = start_walk(part);
     float bound = 0.0;
-    while (walk.s < n) {
+    while (walk.s < part.y) {
         uint i = pairing.i_source + walk.s;
         Source source = sources[i];
         uint n_nodes = nodes_of(i);
@@ -161,26 +167,28 @@ void main() {
     vec3 to_eye = push.eye - facet.position;
     Taker taker = Taker(facet.position, facet.normal, normalize(to_eye), own);
     vec3 albedo = own.kd * facet.color * PI_INVERSE;
-    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0);
+    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0);
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];
         Veil veil = veil_of(pairing, emitter, facet.position);
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
-        uint n_clear = veil.n == 0u ? pairing.n_sources : 0u;
-        uint n_veiled = veil.n > 0u && !veil.closed ? pairing.n_sources : 0u;
+        uvec2 part = part_of(pairing);
+        uvec2 none = part.xx;
         float n_before = sum.n_unresolved;
-        gather(sum, pairing, emitter, taker, veil, false, n_clear);
-        gather(sum, pairing, emitter, taker, veil, true, n_veiled);
-        uint n_audit = sum.n_unresolved > n_before ? pairing.n_sources : 0u;
-        sum.unresolved += audit(pairing, emitter, taker, albedo, n_audit);
+        gather(sum, pairing, emitter, taker, veil, false, veil.n == 0u ? part : none);
+        gather(sum, pairing, emitter, taker, veil, true, veil.n > 0u && !veil.closed ? part : none);
+        sum.unresolved += audit(pairing, emitter, taker, albedo, sum.n_unresolved > n_before ? part : none);
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
-        lit[j].indirect = sum.indirect;
         // The lobe is the front side's.
         float front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
-        lit[j].second = albedo * sum.indirect + front * own.ks * sum.glossy;
-        lit[j].n_unresolved = sum.n_unresolved;
-        lit[j].unresolved = sum.unresolved;
+        Lit before = lit[j];
+        bool begins = push.i_first_source == 0u;
+        lit[j].indirect = (begins ? vec3(0.0) : before.indirect) + sum.indirect;
+        lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * sum.indirect + front * own.ks * sum.glossy;
+        lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + sum.n_unresolved;
+        lit[j].unresolved = (begins ? 0.0 : before.unresolved) + sum.unresolved;
+        lit[j].n_lost = (begins ? 0.0 : before.n_lost) + sum.n_lost;
     }
 }

@@ -15,8 +15,8 @@ use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::transmit;
-use nimbus::passes::{self, SHADERS, facets, first, generate, grid, morton, place, second, sort, sprites, surfaces};
+use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
+use nimbus::passes::{surfaces, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -29,7 +29,6 @@ const RECORDS: [Record; 18] = [
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
     ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
-    ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
     ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
     ("Region", RegionRecord::FIELDS, size_of::<RegionRecord>()),
@@ -44,9 +43,19 @@ const RECORDS: [Record; 18] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 22] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
+    (
+        "contract.comp",
+        contract::Push::FIELDS,
+        &[R("Facet"), R("Light"), R("Region"), B(16), B(4), B(4), B(8), R("Lit")],
+    ),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), B(4), R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), R("Region"), B(4), R("Lit")]),
+    (
+        "first_tensor.comp",
+        first::TensorPush::FIELDS,
+        &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Lit")],
+    ),
     (
         "facets_groups.comp",
         facets::GroupsPush::FIELDS,
@@ -84,6 +93,25 @@ const INTERFACES: [(&str, &[Field], &[Element]); 22] = [
     ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
     ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
+    (
+        "second_tensor.comp",
+        second::TensorPush::FIELDS,
+        &[
+            R("Block"),
+            R("Pairing"),
+            B(4),
+            B(4),
+            R("Facet"),
+            R("Region"),
+            R("Light"),
+            R("Source"),
+            B(16),
+            B(4),
+            B(4),
+            R("Lit"),
+            B(4),
+        ],
+    ),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),

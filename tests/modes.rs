@@ -69,6 +69,18 @@ fn two_runs_serial_parallel_and_no_skip_give_the_same_bytes_for_every_frame() {
 }
 
 #[test]
+fn edited_materials_give_the_same_bytes_in_every_mode() {
+    let edited = || scene_file::load(Path::new("tests/data/edited.toml"), &[], None).expect("the scene loads").scene;
+    let frames = run(edited(), Threading::Serial, true);
+    assert!(frames[1..].iter().all(|f| f.1.plan.runs(Pass::Contract) && !f.1.plan.runs(Pass::Second)));
+    let first = images(frames);
+    assert_eq!(first, images(run(edited(), Threading::Parallel, true)), "parallel");
+    assert_eq!(first, images(run(edited(), Threading::Serial, false)), "no skip");
+    // The comparison can fail: every frame is edited.
+    assert!(first.windows(2).all(|w| w[0] != w[1]));
+}
+
+#[test]
 fn a_still_scene_skips_and_a_moving_one_does_not() {
     let still = ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
     let runs = |overrides: &[&str]| {

@@ -29,7 +29,14 @@ Pane pane_of(Region emitter) {
 // Source s of the region, and cell `at` of the 4^level it is divided into, in Z order.
 struct Walk { uint s; uint level; uvec2 at; uint n_steps; };
 
-Walk start_walk() { return Walk(0u, 0u, uvec2(0u), 0u); }
+// The part of a pairing's sources that lies in the dispatch's window: its first, and the one past its last.
+uvec2 part_of(Pairing pairing) {
+    uint end = pairing.i_source + pairing.n_sources;
+    uint first = clamp(push.i_first_source, pairing.i_source, end);
+    return uvec2(first, clamp(push.i_end_source, first, end)) - pairing.i_source;
+}
+
+Walk start_walk(uvec2 part) { return Walk(part.x, 0u, uvec2(0u), 0u); }
 
 // 2^-level.
 float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
@@ -85,7 +92,15 @@ float cluster_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2,
 }
 #endif
 
-bool is_met(float gap, float turn, float lobe_width) { return sqrt(2.0 * gap) < turn + LOBE_REACH * lobe_width; }
+// By how much a cell of this width over its distance is wider than `limit` widths of the region's lobes, its half vector
+// being `gap` from the normal and turning by `turn` within the cell: for the narrowest that can be met of all that its
+// material has over time, so that the cells are the same at any time.
+float lobe_excess(Region region, float gap, float turn, float width, float limit) {
+    float beyond = sqrt(2.0 * gap) - turn;
+    bool met = beyond < LOBE_REACH * region.lobe_width_most;
+    float narrowest = max(region.lobe_width, beyond / LOBE_REACH);
+    return met ? width / (limit * narrowest) : 0.0;
+}
 
 View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emitter, Taker taker) {
     View view;
@@ -133,14 +148,12 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
     for (uint g = 0u; g < n_shiny; ++g) {
         view.leaving += lobe_flux(i, emitter, view.position, face, -view.way, view.emitter_gap);
-        bool met = is_met(view.emitter_gap, turn, emitter.lobe_width);
-        excess = max(excess, met ? view.width / (lobe_limit * emitter.lobe_width) : 0.0);
+        excess = max(excess, lobe_excess(emitter, view.emitter_gap, turn, view.width, lobe_limit));
     }
     view.taker_gap = 2.0;
 #if GLOSSY
     view.taker_gap = half_vector_gap(taker.normal, view.way, taker.outgoing);
-    bool met = is_met(view.taker_gap, turn, taker.region.lobe_width);
-    excess = max(excess, met ? view.width / (lobe_limit * taker.region.lobe_width) : 0.0);
+    excess = max(excess, lobe_excess(taker.region, view.taker_gap, turn, view.width, lobe_limit));
 #endif
     // Some of the cell may be before the receiver; the receiver is before all of it or none.
     bool before = dot(taker.normal, offset) > -pane.side * scale;

@@ -3,11 +3,22 @@
 
 const uint N_NODES = 1025;
 
-float lobe_at(uint i_row, float w) {
+// Between which nodes w lies: the same in every row.
+struct Knot { uint i; float part; };
+
+Knot knot_at(float w) {
     float t = sqrt(sqrt(clamp(w, 0.0, 1.0))) * float(N_NODES - 1u);
     uint i = min(uint(t), N_NODES - 2u);
-    uint k = i_row * N_NODES + i;
-    return mix(table[k], table[k + 1u], t - float(i));
+    return Knot(i, t - float(i));
+}
+
+float value_at(uint i_row, Knot knot) {
+    uint k = i_row * N_NODES + knot.i;
+    return mix(table[k], table[k + 1u], knot.part);
+}
+
+float lobe_at(uint i_row, float w) {
+    return value_at(i_row, knot_at(w));
 }
 
 // 1 - cos gamma of the half vector of unit a and b, without the cancellation: half the square of the chord from n to it.

@@ -7,8 +7,8 @@ struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; 
 struct Mode { vec3 k; float phase; vec3 a; uint unused; };
 struct Facet { vec3 position; float area; vec3 normal; uint i_region; vec3 color; uint unused; };
 struct Run { uint i_first; uint n_particles; };
-struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float unused; vec3 second; float unused_too; };
-struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float unused_1; float unused_2; float unused_3; };
+struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float n_lost; vec3 second; float unused; };
+struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float lobe_width_most; uint i_column; uint i_row; };
 struct RegionBounds { vec3 low; uint unused; vec3 scale; uint unused_too; };
 struct Source { vec3 position; float radius; vec3 normal; float area; vec3 flux; float total_area; float spread; float unused_1; float unused_2; float unused_3; };
 struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
@@ -28,4 +28,5 @@ const uint LIGHT_POINT = 2;
 
 const uint REGION_SURFACE = 0;
 const uint REGION_CLOUD = 1;
+const uint REGION_COLORED = 2;
 const uint NO_LOBE = 0xFFFFFFFFu;

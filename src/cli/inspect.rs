@@ -119,7 +119,7 @@ fn plan(rows: &[inspect::PlanRow], json: bool) -> Result<()> {
     let mut table = vec![["frame", "pass", "", "reason"].map(str::to_owned).to_vec()];
     for r in rows {
         let done = if r.run { "run" } else { "skip" };
-        table.push(vec![r.frame.to_string(), r.pass.into(), done.into(), r.reason.into()]);
+        table.push(vec![r.frame.to_string(), r.pass.into(), done.into(), r.reason.clone()]);
     }
     output::text(&output::table(&table))
 }

@@ -72,7 +72,7 @@ fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
 fn pass_json(rendered: &Rendered, pass: Pass) -> Value {
     let decision = rendered.plan.decision(pass);
     json!({
-        "name": pass.name(), "run": decision.run, "reason": decision.reason, "ms": pass_ms(rendered, pass),
+        "name": pass.name(), "run": decision.run, "reason": decision.reason.to_string(), "ms": pass_ms(rendered, pass),
     })
 }
 

@@ -40,7 +40,7 @@ pub struct Buffers {
     pub lit: Buffer,
     /// Region of each facet of a surface.
     pub i_region: Buffer,
-    /// Lobes, N_NODES numbers each; written by the host every frame.
+    /// Lobes by material, then the basis' vectors, N_NODES numbers each; written by the host every frame.
     pub table: Buffer,
     /// Facet of each particle, where facets stand for several.
     pub i_facet: Buffer,
@@ -57,6 +57,8 @@ impl Buffers {
         let n_lights = scene.lights.len() as u64;
         let n_named = if is_grouped(scene) { n } else { 0 };
         let n_shares = if has_shares(scene) { n_facets * n_lights } else { 0 };
+        // No more vectors than were asked for.
+        let n_table_rows = scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1;
         let placed_upload = match host_places {
             true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
             false => None,
@@ -76,7 +78,7 @@ impl Buffers {
             lights: Buffer::new::<LightRecord>(device, "transmit.lights", n_lights, Place::Upload)?,
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
             i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
-            table: Buffer::new::<f32>(device, "first.table", (scene.materials.len() * N_NODES) as u64, Place::Upload)?,
+            table: Buffer::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64, Place::Upload)?,
             shares: Buffer::new::<f32>(device, "transmit.shares", n_shares, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,

@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3};
 
 use crate::error::{Error, Place, Result};
-use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord};
+use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord, lobe_width};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::camera::Pose;
@@ -23,7 +23,11 @@ pub struct Game {
     /// Waves of each cloud's gusts, and how many those before it have.
     modes: Vec<Vec<Mode>>,
     i_modes: Vec<u32>,
+    basis: Option<Basis>,
+    /// At no particular time where no lobe is edited.
     table: Arc<Vec<f32>>,
+    /// Where materials are edited.
+    shape: Option<Shape>,
     /// Every particle relative to its group, where this thread moves them.
     rest: Option<Vec<ParticleRecord>>,
 }
@@ -70,8 +74,11 @@ impl Game {
         let modes: Vec<Vec<Mode>> = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
         let count = |n: &mut u32, waves: &Vec<Mode>| Some(std::mem::replace(n, *n + waves.len() as u32));
         let i_modes = modes.iter().scan(0, count).collect();
-        let table = Arc::new(lobes(&scene));
-        Game { scene, groups, cloud_centers, modes, i_modes, table, rest }
+        let basis = basis_of(&scene);
+        let table = Arc::new(table(&scene, basis.as_ref(), scene.time.start_s));
+        let n_bases = basis.as_ref().map_or(1, Basis::n_bases);
+        let shape = is_edited(&scene).then(|| Shape::of(&scene, n_bases));
+        Game { scene, groups, cloud_centers, modes, i_modes, basis, table, shape, rest }
     }
 
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
@@ -96,7 +103,8 @@ impl Game {
             groups,
             modes,
             placed,
-            table: self.table.clone(),
+            table: self.table_at(time_s),
+            coefficients: self.coefficients(time_s),
             bounds: self.bounds(&setting),
             regions: self.regions(time_s, setting.light_origin),
             lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
@@ -122,8 +130,9 @@ impl Game {
             false => NO_LOBE,
         };
         let of = |i: usize| {
-            let brdf = scene.region_material(i).at(time_s);
-            let record = match scene.surfaces.get(i) {
+            let material = scene.region_material(i);
+            let brdf = material.at(time_s);
+            let mut record = match scene.surfaces.get(i) {
                 Some(surface) => RegionRecord::surface(surface, light_origin, &brdf, i_lobe(i), i_facet),
                 None => {
                     let n_facets = scene.n_cloud_facets(&scene.clouds[i - scene.surfaces.len()]) as u32;
@@ -131,9 +140,34 @@ impl Game {
                 }
             };
             i_facet += record.n_facets;
+            record.kind = kind_of(scene, i);
+            let [widest, narrowest] = material.exponents().map(lobe_width);
+            (record.lobe_width, record.lobe_width_most) = (narrowest, widest);
+            if let Some(block) = self.shape.as_ref().map(|s| s.blocks[i]) {
+                (record.i_column, record.i_row) = (block.i_column, block.i_row);
+            }
             record
         };
         (0..scene.n_regions()).map(of).collect()
+    }
+
+    fn table_at(&self, time_s: f64) -> Arc<Vec<f32>> {
+        let edited = self.scene.materials.iter().any(|m| m.is_edited() && m.is_glossy());
+        match &self.basis {
+            Some(basis) if edited => Arc::new(table(&self.scene, Some(basis), time_s)),
+            _ => self.table.clone(),
+        }
+    }
+
+    /// C of every column of the tensors.
+    fn coefficients(&self, time_s: f64) -> Vec<[f32; 4]> {
+        let (Some(shape), scene) = (&self.shape, &self.scene) else { return vec![] };
+        let brdfs: Vec<Brdf> = (0..scene.n_regions()).map(|i| scene.region_material(i).at(time_s)).collect();
+        let of = |ns: f64| self.basis.as_ref().map_or(vec![], |b| b.coefficients(ns));
+        // Regions share materials.
+        let of_materials: Vec<Vec<f64>> =
+            scene.materials.iter().map(|m| if m.is_glossy() { of(m.at(time_s).ns) } else { vec![] }).collect();
+        shape.coefficients(&brdfs, |i| of_materials[scene.region_i_material(i)].clone())
     }
 
     fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
@@ -162,21 +196,16 @@ impl Game {
     }
 }
 
-/// The lobe of every material as the basis represents it, a row a material; zeros where there is none.
-fn lobes(scene: &Scene) -> Vec<f32> {
-    if !(0..scene.n_regions()).any(|i| is_glossy(scene, i)) {
-        return vec![];
-    }
-    let lighting = &scene.lighting;
-    let basis = Basis::new(lighting.exponents, lighting.bases, lighting.sampling);
-    let row = |m: &Material| match m.is_glossy() {
-        true => basis.lobe(m.at(0.0).ns),
-        false => vec![0.0; N_NODES],
-    };
-    scene.materials.iter().flat_map(row).map(|v| v as f32).collect()
+/// A row a material: its lobe as the basis has it; zeros where it has none. Then a row a vector.
+fn table(scene: &Scene, basis: Option<&Basis>, time_s: f64) -> Vec<f32> {
+    let Some(basis) = basis else { return vec![] };
+    let lobe = |m: &Material| if m.is_glossy() { basis.lobe(m.at(time_s).ns) } else { vec![0.0; N_NODES] };
+    let rows = scene.materials.iter().map(lobe).chain(basis.vectors().iter().cloned());
+    rows.flatten().map(|v| v as f32).collect()
 }
 
 use super::exchange::is_glossy;
 use super::packet::Packet;
+use super::tensor::{Shape, basis_of, is_edited, kind_of};
 use crate::model::basis::{Basis, N_NODES};
-use crate::model::material::Material;
+use crate::model::material::{Brdf, Material};

@@ -14,11 +14,13 @@ use crate::model::gust::N_MODES;
 use crate::model::scene::{LightingMode, Scene};
 
 use super::grouping::is_grouped;
+use super::plan::Tensors;
 use super::render::target_format;
+use super::tensor::Shape;
 
 /// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
-/// target) each checks for itself when it is made.
-pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
+/// target) each checks for itself when it is made. The bytes of that sum.
+pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let n = scene.n_particles();
     if u32::try_from(n).is_err() {
         return Err(Error::limit(format!("the scene's {n} particles; nimbus numbers them with 32 bits")));
@@ -60,7 +62,19 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<()> {
             limits.device_memory_bytes
         )));
     }
-    Ok(())
+    Ok(total)
+}
+
+/// Whether T1 and T2 fit into `free` bytes, and T2, the greater by far, into one binding.
+pub fn tensors(shape: &Shape, limits: &Limits, free: u64) -> Tensors {
+    let bytes_of = |n: u64| n.max(1).saturating_mul(4);
+    let (first, second) = (bytes_of(shape.n_first()), shape.n_second().map_or(u64::MAX, bytes_of));
+    let most = free.saturating_sub(first).min(limits.max_storage_buffer_bytes);
+    if second <= most && first <= limits.max_storage_buffer_bytes {
+        Tensors::Kept
+    } else {
+        Tensors::TooLarge { bytes: second, most }
+    }
 }
 
 /// Most cells the grid can have at any time. Clouds that drift apart change its proportions, so a scene that moves needs

@@ -12,6 +12,7 @@ pub mod plan;
 pub mod relay;
 pub mod render;
 pub mod serial;
+pub mod tensor;
 
 use std::time::Instant;
 

@@ -25,8 +25,10 @@ pub struct Packet {
     pub bounds: Vec<RegionBoundsRecord>,
     /// Surfaces, then clouds, with their materials at this time.
     pub regions: Vec<RegionRecord>,
-    /// The lobe of every glossy material at this time, N_NODES numbers each.
+    /// The lobe of every material at this time as the basis has it, then the basis' vectors; N_NODES numbers each.
     pub table: Arc<Vec<f32>>,
+    /// C of every column of the tensors at this time; empty where no material is edited.
+    pub coefficients: Vec<[f32; 4]>,
     pub lights: Vec<LightRecord>,
     pub grid: GridRecord,
     /// Bounds |view depth| relative to the lighting origin.

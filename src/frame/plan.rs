@@ -1,6 +1,8 @@
 //! What a frame can leave out: a pure function of the last packet and the next. Skipping never changes a pixel: a pass
 //! is left out only where all that it reads is what it read the last time, to the bit.
 
+use std::fmt;
+
 use super::packet::Packet;
 use crate::layout::facet::RegionRecord;
 use crate::layout::frame::LightRecord;
@@ -16,13 +18,14 @@ pub enum Pass {
     Transmit,
     First,
     Second,
+    Contract,
     Sort,
     Surfaces,
     Sprites,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 11] = [
+    pub const ALL: [Pass; 12] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -31,6 +34,7 @@ impl Pass {
         Pass::Transmit,
         Pass::First,
         Pass::Second,
+        Pass::Contract,
         Pass::Sort,
         Pass::Surfaces,
         Pass::Sprites,
@@ -38,15 +42,53 @@ impl Pass {
 
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
-        ["generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "sort", "surfaces", "sprites"]
-            [self as usize]
+        let names = [
+            "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "sort",
+            "surfaces", "sprites",
+        ];
+        names[self as usize]
     }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Decision {
     pub run: bool,
-    pub reason: &'static str,
+    pub reason: Reason,
+}
+
+/// Why a pass runs or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reason {
+    Of(&'static str),
+    /// T2 would take `bytes`, and the device has `most` for it.
+    TooLarge {
+        bytes: u64,
+        most: u64,
+    },
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::Of(text) => f.write_str(text),
+            Reason::TooLarge { bytes, most } => write!(
+                f,
+                "T2 would take {bytes} bytes and this device has {most} for it: light is gathered at once, anew at every edit"
+            ),
+        }
+    }
+}
+
+/// Whether the tensors are kept that let a material's edit do with `contract`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tensors {
+    Kept,
+    /// No material is edited.
+    Needless,
+    TooLarge {
+        bytes: u64,
+        most: u64,
+    },
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -83,10 +125,11 @@ pub struct Traits {
     pub two_reflections: bool,
     /// Facets stand for several particles.
     pub grouped: bool,
-    /// Some facets have a lobe, and look different from elsewhere.
-    pub glossy: bool,
     /// Surfaces to draw.
     pub n_surfaces: u32,
+    /// Some region has a lobe, and so what is seen of it depends on the eye.
+    pub glossy: bool,
+    pub tensors: Tensors,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
 }
@@ -99,13 +142,22 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
     let same_grid = still && same(&|a, b| a.grid == b.grid);
     let same_places = still && same(&|a, b| a.bounds == b.bounds);
-    let same_facets = same_grid && same(&|a, b| a.groups == b.groups) && (same_places || !traits.grouped);
+    let same_geometry =
+        same(&|a, b| a.regions.iter().map(RegionRecord::geometry).eq(b.regions.iter().map(RegionRecord::geometry)));
+    let same_facets =
+        same_grid && same_geometry && same(&|a, b| a.groups == b.groups) && (same_places || !traits.grouped);
     let same_rays = same_facets && same(&|a, b| has_same_rays(a, b));
-    let same_light = same_facets && same(&|a, b| a.lights == b.lights && a.regions == b.regions);
+    // What has no lobe looks the same from everywhere.
+    let same_eye = !traits.glossy || same(&|a, b| a.camera.eye == b.camera.eye);
+    let same_tensors = same_rays && same(&|a, b| shine_alike(&a.lights, &b.lights));
+    let same_materials = same(&|a, b| a.regions == b.regions && a.table == b.table && a.coefficients == b.coefficients);
+    let same_light = same_facets && same_materials && same(&|a, b| a.lights == b.lights);
+    // With tensors the first two reflections know neither energies nor materials.
+    let kept = traits.tensors == Tensors::Kept;
+    let same_response = if kept { same_tensors } else { same_light };
+    let unchanged = if kept { "facets and lights stand still" } else { "facets and lights are the same" };
     let same_order = still && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
-    // What has no lobe looks the same from everywhere.
-    let same_shine = same_light && (!traits.glossy || same(&|a, b| a.camera.eye == b.camera.eye));
     let same_picture = same_order && same_view && (same_light || !traits.lit);
 
     let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
@@ -118,11 +170,16 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         if traits.grouped { unless(same_places, "nothing moved") } else { skip("a facet a particle") },
         lighting(same_facets, "nothing moved"),
         lighting(same_rays, "facets and lights stand still"),
-        lighting(same_shine, "facets and lights are the same"),
+        lighting(same_response && same_eye, unchanged),
         if traits.two_reflections {
-            unless(same_shine, "facets and lights are the same")
+            unless(same_response && same_eye, unchanged)
         } else {
             skip("lighting.mode is not \"two-reflection\"")
+        },
+        match traits.tensors {
+            Tensors::Kept => lighting(same_light, "light and materials are the same"),
+            Tensors::Needless => skip("no material is edited: light is gathered at once"),
+            Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
         unless(same_order, "the order cannot have changed"),
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
@@ -134,11 +191,11 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         }
     }
     if traits.n_facets == 0 {
-        for pass in [Pass::Facets, Pass::Transmit, Pass::First, Pass::Second] {
+        for pass in [Pass::Facets, Pass::Transmit, Pass::First, Pass::Second, Pass::Contract] {
             decisions[pass as usize] = skip("no facets");
         }
     }
-    Plan { decisions, view_only: same_light }
+    Plan { decisions, view_only: same_response }
 }
 
 /// Whether the ways from the facets to the lights, and what hides them, are the same; a light without energy has none.
@@ -149,10 +206,18 @@ fn has_same_rays(a: &Packet, b: &Packet) -> bool {
         && a.regions.iter().map(rectangle).eq(b.regions.iter().map(rectangle))
 }
 
-const RUN: Decision = Decision { run: true, reason: "needed" };
+/// Whether `next` reaches facets as `last` did but for its lights' energies. A light without energy may have left no
+/// tensor behind, so none may be lit anew.
+fn shine_alike(last: &[LightRecord], next: &[LightRecord]) -> bool {
+    let geometry = |l: &LightRecord| LightRecord { energy: [0.0; 3], ..*l };
+    let dark = |l: &LightRecord| l.energy == [0.0; 3];
+    last.iter().map(geometry).eq(next.iter().map(geometry)) && last.iter().zip(next).all(|(a, b)| !dark(a) || dark(b))
+}
+
+const RUN: Decision = Decision { run: true, reason: Reason::Of("needed") };
 
 fn skip(reason: &'static str) -> Decision {
-    Decision { run: false, reason }
+    Decision { run: false, reason: Reason::Of(reason) }
 }
 
 #[cfg(test)]
@@ -160,6 +225,7 @@ mod tests {
     use super::*;
     use crate::layout::frame::{CameraRecord, GridRecord};
     use crate::layout::particle::{GroupRecord, ModeRecord};
+    use std::sync::Arc;
     use std::time::Instant;
 
     const TRAITS: Traits = Traits {
@@ -169,12 +235,14 @@ mod tests {
         lit: true,
         two_reflections: false,
         grouped: false,
+        n_surfaces: 0,
         glossy: false,
-        n_surfaces: 1,
+        tensors: Tensors::Needless,
         skip: true,
     };
+    const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
     /// With every pass.
-    const ALL_TRAITS: Traits = Traits { two_reflections: true, grouped: true, ..TRAITS };
+    const ALL_TRAITS: Traits = Traits { grouped: true, n_surfaces: 1, ..KEPT };
 
     fn packet() -> Packet {
         Packet {
@@ -189,6 +257,8 @@ mod tests {
             bounds: vec![Default::default()],
             table: Default::default(),
             regions: vec![RegionRecord::default()],
+            table: Arc::new(vec![0.5]),
+            coefficients: vec![[0.5; 4]],
             lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
             grid: GridRecord::default(),
             radius: 1.0,
@@ -204,8 +274,13 @@ mod tests {
     fn the_first_frame_runs_everything_and_a_still_one_nothing() {
         let p = packet();
         assert_eq!(running(&ALL_TRAITS, None, &p).len(), Pass::ALL.len());
-        assert!(running(&ALL_TRAITS, Some(&p), &p).is_empty());
+        for traits in [TRAITS, KEPT, ALL_TRAITS] {
+            assert!(running(&traits, Some(&p), &p).is_empty());
+        }
         assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), Pass::ALL.len());
+        // Without tensors it is all but `contract`.
+        let without = Traits { tensors: Tensors::Needless, ..ALL_TRAITS };
+        assert_eq!(running(&without, None, &p).len(), Pass::ALL.len() - 1);
     }
 
     #[test]
@@ -220,21 +295,61 @@ mod tests {
         assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
         assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
         assert_eq!(after(&|p| p.regions[0].kd[1] = 0.5), ["first", "sprites"]);
-        let of_rays: [&dyn Fn(&mut Packet); 5] = [
-            &|p| p.lights[0].toward[1] = 1.0,
-            &|p| p.lights[0].position[1] = 1.0,
-            &|p| p.lights[0].energy = [0.0; 3],
-            &|p| p.regions[0].center[0] = 1.0,
-            &|p| p.regions[0].u[2] = 1.0,
-        ];
+        let of_rays: [&dyn Fn(&mut Packet); 3] =
+            [&|p| p.lights[0].toward[1] = 1.0, &|p| p.lights[0].position[1] = 1.0, &|p| p.lights[0].energy = [0.0; 3]];
         for change in of_rays {
             assert_eq!(after(change), ["transmit", "first", "sprites"]);
+        }
+        let of_facets: [&dyn Fn(&mut Packet); 2] = [&|p| p.regions[0].center[0] = 1.0, &|p| p.regions[0].u[2] = 1.0];
+        for change in of_facets {
+            assert_eq!(after(change), ["facets", "transmit", "first", "sprites"]);
         }
         let all_but_generate = ["place", "grid", "facets", "transmit", "first", "sort", "sprites"];
         assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
         let gust = |p: &mut Packet| p.modes.push(ModeRecord::default());
-        assert_eq!(after(&gust), ["place", "grid", "facets", "transmit", "first", "sort", "sprites"]);
-        assert_eq!(after(&|p| p.grid.cell = 0.5), ["grid", "facets", "transmit", "first", "sprites"]);
+        assert_eq!(after(&gust), all_but_generate);
+        assert_eq!(after(&|p| p.grid.cell = 0.5), ["grid", "facets", "transmit", "first", "second", "sprites"]);
+    }
+
+    #[test]
+    fn with_tensors_an_edit_or_an_energy_is_a_contraction_and_nothing_else() {
+        let last = packet();
+        let after = |traits: &Traits, change: &dyn Fn(&mut Packet)| {
+            let mut next = packet();
+            change(&mut next);
+            running(traits, Some(&last), &next)
+        };
+        let contracted = ["contract", "sprites"];
+        let edits: [&dyn Fn(&mut Packet); 5] = [
+            &|p| p.regions[0].kd[0] = 0.7,
+            &|p| p.regions[0].ks[2] = 0.7,
+            &|p| p.coefficients[0][1] = 0.7,
+            &|p| p.lights[0].energy[1] = 2.0,
+            &|p| p.lights[0].energy = [0.0; 3],
+        ];
+        for edit in edits {
+            assert_eq!(after(&KEPT, edit), contracted);
+        }
+        let too_large = Traits { tensors: Tensors::TooLarge { bytes: 9, most: 8 }, ..TRAITS };
+        for traits in [TRAITS, too_large] {
+            assert_eq!(after(&traits, edits[0]), ["first", "second", "sprites"]);
+        }
+        assert_eq!(
+            plan(&too_large, Some(&last), &last).decision(Pass::Contract).reason.to_string(),
+            "T2 would take 9 bytes and this device has 8 for it: light is gathered at once, anew at every edit"
+        );
+        let anew = ["first", "second", "contract", "sprites"];
+        assert_eq!(after(&KEPT, &|p| p.lights[0].radius = 2.0), anew);
+        let facets_too = ["facets", "transmit", "first", "second", "contract", "sprites"];
+        assert_eq!(after(&KEPT, &|p| p.regions[0].u[0] = 2.0), facets_too);
+        // A light that was dark has left no tensor behind.
+        let mut dark = packet();
+        dark.lights[0].energy = [0.0; 3];
+        assert_eq!(running(&KEPT, Some(&dark), &last), anew);
+        // The eye matters to lobes alone.
+        let eye = |p: &mut Packet| p.camera.eye[0] = 1.0;
+        assert_eq!(after(&KEPT, &eye), ["sprites"]);
+        assert_eq!(after(&Traits { glossy: true, ..KEPT }, &eye), anew);
     }
 
     #[test]

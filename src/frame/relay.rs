@@ -1,9 +1,10 @@
 //! The second reflection and what it is gathered with.
 
 use super::buffers::Buffers;
-use super::exchange::{Exchange, gathers_from_tree};
+use super::exchange::Exchange;
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
+use super::tensor::TensorStage;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
 use crate::layout::facet::RegionBoundsRecord;
@@ -35,8 +36,14 @@ struct Order {
 }
 
 impl Relay {
-    pub fn new(device: &Device, compiler: &Compiler, commands: &mut Commands, scene: &Scene) -> Result<Relay> {
-        let tree = gathers_from_tree(scene);
+    /// `tree`: gather from clusters.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        commands: &mut Commands,
+        scene: &Scene,
+        tree: bool,
+    ) -> Result<Relay> {
         let second = Second::new(device, compiler, scene.n_particles() > 0, tree)?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
@@ -57,7 +64,15 @@ impl Relay {
         self.order.as_mut().map_or(Ok(()), |order| order.bounds.write(&packet.bounds))
     }
 
-    pub fn record(&self, rec: &mut Recorder<'_>, plan: &Plan, b: &Buffers, packet: &Packet) -> Result<()> {
+    /// Gathers at once, or into `tensor` where there is one.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        plan: &Plan,
+        b: &Buffers,
+        packet: &Packet,
+        tensor: Option<&TensorStage>,
+    ) -> Result<()> {
         let x = &self.exchange;
         let gathered: &[Receivers] = match plan.view_only() {
             true => &[Receivers::Glossy],
@@ -71,7 +86,7 @@ impl Relay {
         if !plan.view_only() {
             self.record_sources(rec, b)?;
         }
-        for &receivers in gathered {
+        for (receivers, window) in x.dispatches(gathered) {
             let (i_first_block, n_blocks) = x.blocks_of(receivers);
             let push = GatherPush {
                 grid: packet.grid,
@@ -84,15 +99,13 @@ impl Relay {
                 pair_steps: self.pairs.steps,
                 i_first_block,
                 theta: self.theta as f32,
+                i_first_source: window[0],
+                i_end_source: window[1],
             };
-            let (lists, lights) =
-                ([&x.blocks, &x.pairings, &x.occluders, &x.order], [&b.facets, &b.regions, &b.lights]);
-            let light = [&x.sources, &x.fluxes, &b.table, &b.density, &x.nodes, &b.lit];
-            let [l0, l1, l2, l3] = lists;
-            let [f, r, l] = lights;
-            let [s0, s1, s2, s3, s4, s5] = light;
-            let buffers = [l0, l1, l2, l3, f, r, l, s0, s1, s2, s3, s4, s5];
-            self.second.record(rec, buffers, &push, receivers, n_blocks)?;
+            match tensor {
+                Some(tensor) => tensor.record_second(rec, b, x, packet, &push, receivers, n_blocks)?,
+                None => self.second.record(rec, x.bindings(b, &x.nodes, &b.lit), &push, receivers, n_blocks)?,
+            }
         }
         Ok(())
     }

@@ -3,11 +3,12 @@
 use std::time::Instant;
 
 use super::buffers::{Buffers, download, has_shares};
-use super::exchange::is_glossy;
+use super::exchange::{gathers_from_tree, is_glossy};
 use super::grouping::{Grouping, is_grouped};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::relay::Relay;
+use super::tensor::{TensorStage, tensor_stage};
 use super::{limits, ms};
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
@@ -37,6 +38,7 @@ pub struct Renderer {
     transmit: Transmit,
     first: First,
     second: Option<Relay>,
+    tensor: Option<TensorStage>,
     sort: Sort,
     sprites: Sprites,
     buffers: Buffers,
@@ -51,15 +53,15 @@ pub struct Renderer {
 }
 
 /// What of the scene the passes are told and that is constant over a run.
-struct Settings {
+pub(super) struct Settings {
     n_particles: u32,
     n_surface_facets: u32,
-    n_facets: u32,
-    n_lights: u32,
+    pub n_facets: u32,
+    pub n_lights: u32,
     n_surfaces: u32,
     heaviest: f64,
-    step_cells: f64,
-    forward: f64,
+    pub step_cells: f64,
+    pub forward: f64,
     sort_bits: u32,
     cutoff: f64,
     format: TargetFormat,
@@ -77,7 +79,7 @@ impl Renderer {
     /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs. `skip`: leave out
     /// what a frame does not need.
     pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, skip: bool) -> Result<Renderer> {
-        limits::check(scene, device.limits())?;
+        let free = device.limits().device_memory_bytes - limits::check(scene, device.limits())?;
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
@@ -85,9 +87,12 @@ impl Renderer {
         let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut commands = Commands::new(device, "frame")?;
+        let (tensors, tensor) = tensor_stage(device, compiler, &mut commands, scene, free)?;
         let two_reflections = scene.lighting.mode == LightingMode::TwoReflection;
+        // Tensors hold every pair.
+        let tree = tensor.is_none() && gathers_from_tree(scene);
         let second = match two_reflections {
-            true => Some(Relay::new(device, compiler, &mut commands, scene)?),
+            true => Some(Relay::new(device, compiler, &mut commands, scene, tree)?),
             false => None,
         };
         let scenery = match scene.surfaces.is_empty() {
@@ -111,6 +116,7 @@ impl Renderer {
             transmit: Transmit::new(device, compiler, has_shares(scene))?,
             first: First::new(device, compiler)?,
             second,
+            tensor,
             sort: Sort::new(device, compiler, n_particles)?,
             sprites: Sprites::new(device, compiler, format, lit, [scenery.is_some(), grouped])?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
@@ -139,8 +145,9 @@ impl Renderer {
                 lit,
                 two_reflections,
                 grouped,
-                glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 n_surfaces: scene.surfaces.len() as u32,
+                glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
+                tensors,
                 skip,
             },
             last: None,
@@ -179,6 +186,9 @@ impl Renderer {
         self.buffers.table.write(&packet.table)?;
         self.buffers.regions.write(&packet.regions)?;
         self.buffers.lights.write(&packet.lights)?;
+        if let Some(tensor) = &mut self.tensor {
+            tensor.upload(packet)?;
+        }
         match (&mut self.buffers.placed_upload, &packet.placed) {
             (Some(upload), Some(placed)) if plan.runs(Pass::Place) => upload.write(placed),
             _ => Ok(()),
@@ -196,6 +206,7 @@ impl Renderer {
             transmit,
             first,
             second,
+            tensor,
             sort,
             sprites,
             scenery,
@@ -242,12 +253,19 @@ impl Renderer {
                 )
             })?;
             pass(rec, plan, Pass::First, |rec| {
+                if let Some(tensor) = tensor {
+                    return tensor.record_first(rec, b, packet, s);
+                }
                 let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &b.lit];
                 let push = FirstPush { eye: packet.camera.eye, n_facets: s.n_facets, n_lights: s.n_lights };
                 first.record(rec, from, &push)
             })?;
             pass(rec, plan, Pass::Second, |rec| match second {
-                Some(second) => second.record(rec, plan, b, packet),
+                Some(second) => second.record(rec, plan, b, packet, tensor.as_ref()),
+                None => Ok(()),
+            })?;
+            pass(rec, plan, Pass::Contract, |rec| match tensor {
+                Some(tensor) => tensor.record_contract(rec, b, s),
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {

@@ -36,15 +36,18 @@ record! {
         /// Bound on what those pairs may change of L2's greatest channel.
         unresolved: f32,
         first: [f32; 3],
-        unused: f32,
+        /// Sources that the driver's loops ended before; 0 in a result that can be trusted.
+        n_lost: f32,
         second: [f32; 3],
-        unused_too: f32,
+        unused: f32,
     }
 }
 
 /// Kinds of [`RegionRecord`]; the shaders' `REGION_*`.
 pub const REGION_SURFACE: u32 = 0;
 pub const REGION_CLOUD: u32 = 1;
+/// A cloud whose facets have colours of their own.
+pub const REGION_COLORED: u32 = 2;
 
 /// `i_lobe` of a region without a lobe.
 pub const NO_LOBE: u32 = u32::MAX;
@@ -69,11 +72,13 @@ record! {
         normal: [f32; 3],
         /// Facets along v.
         n_v: u32,
-        /// 1/√n_s: half the width of its lobe in radians of γ.
+        /// 1/√n_s: half the width of its lobe in radians of γ, where it is narrowest over time.
         lobe_width: f32,
-        unused_1: f32,
-        unused_2: f32,
-        unused_3: f32,
+        /// Where it is widest.
+        lobe_width_most: f32,
+        /// Its first column of the tensors, and first row (docs/model.md §11 "contract").
+        i_column: u32,
+        i_row: u32,
     }
 }
 
@@ -87,9 +92,15 @@ impl RegionRecord {
             i_lobe,
             i_first_facet,
             n_facets,
-            lobe_width: brdf.ns.max(1.0).powf(-0.5) as f32,
+            lobe_width: lobe_width(brdf.ns),
+            lobe_width_most: lobe_width(brdf.ns),
             ..RegionRecord::default()
         }
+    }
+
+    /// The record without what a material's edit changes.
+    pub fn geometry(&self) -> Self {
+        RegionRecord { kd: [0.0; 3], ks: [0.0; 3], ..*self }
     }
 
     /// A surface; `origin` is the lighting origin.
@@ -150,4 +161,9 @@ impl KeyBits {
         let region = u32::BITS - n_regions.saturating_sub(1).leading_zeros();
         KeyBits { region, axis: ((u32::BITS - region) / 3).min(10) }
     }
+}
+
+/// 1/√n_s: half the width of a lobe in radians of γ.
+pub fn lobe_width(ns: f64) -> f32 {
+    ns.max(1.0).powf(-0.5) as f32
 }

@@ -49,6 +49,12 @@ impl Material {
         self.keys.iter().any(|k| k.brdf.ks != DVec3::ZERO)
     }
 
+    /// Least and greatest n_s over time.
+    pub fn exponents(&self) -> [f64; 2] {
+        let of = |pick: fn(f64, f64) -> f64| self.keys.iter().map(|k| k.brdf.ns).fold(self.keys[0].brdf.ns, pick);
+        [of(f64::min), of(f64::max)]
+    }
+
     /// The greatest K_d + 4 K_s over channels and time: above 1 the material can reflect more than it receives
     /// (model.md §5: with γ from the half vector the lobe's albedo tends to 4 K_s cos²θ).
     pub fn greatest_albedo(&self) -> f64 {

@@ -26,3 +26,24 @@ impl First {
         rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
     }
 }
+
+record! {
+    pub struct TensorPush { eye: [f32; 3], n_facets: u32, n_lights: u32, n_bases: u32, n_rows: u32, i_vectors: u32 }
+}
+
+/// T1: the first reflection by light and basis, for `contract` to sum (docs/model.md §11 "contract").
+pub struct FirstTensor {
+    kernel: Kernel,
+}
+
+impl FirstTensor {
+    pub fn new(device: &Device, compiler: &Compiler) -> Result<FirstTensor> {
+        Ok(FirstTensor { kernel: Kernel::new(device, compiler, "first.tensor", TensorPush::FIELDS, &[])? })
+    }
+
+    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance`: f32 [facet][light]; `regions`: RegionRecord; `table`:
+    /// f32, the vectors of the basis from row `i_vectors` on; `t1`: f32 [light][row]; `lit`: LitRecord, cleared.
+    pub fn record(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 7], push: &TensorPush) -> Result<()> {
+        rec.dispatch(&self.kernel, &buffers, push, push.n_facets)
+    }
+}

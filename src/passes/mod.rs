@@ -1,6 +1,7 @@
 //! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label and its column in the
 //! results share one name. `new` allocates and can fail; `record` only records. No pass knows another.
 
+pub mod contract;
 pub mod facets;
 pub mod first;
 pub mod generate;
@@ -21,10 +22,12 @@ macro_rules! shader_texts {
 
 /// Every shader and include, as built into the binary.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
+    "contract.comp",
     "facets.comp",
     "facets_groups.comp",
     "facets_surfaces.comp",
     "first.comp",
+    "first_tensor.comp",
     "generate.comp",
     "grid_deposit.comp",
     "grid_resolve.comp",
@@ -40,6 +43,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/records.glsl",
     "include/shell.glsl",
     "include/sort.glsl",
+    "include/tensor.glsl",
     "include/veil.glsl",
     "morton_key.comp",
     "morton_order.comp",
@@ -47,6 +51,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "second_gather.comp",
     "second_merge.comp",
     "second_sources.comp",
+    "second_tensor.comp",
     "sort_count.comp",
     "sort_key.comp",
     "sort_scan.comp",

@@ -28,6 +28,8 @@ record! {
         pair_steps: u32,
         i_first_block: u32,
         theta: f32,
+        i_first_source: u32,
+        i_end_source: u32,
     }
 }
 
@@ -50,7 +52,7 @@ pub enum Receivers {
 impl Second {
     /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree.
     pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool) -> Result<Second> {
-        let width = device.limits().subgroup_size.clamp(8, 64);
+        let width = block_len(device);
         let gather = |glossy: u32| {
             let macros =
                 [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy), ("TREE", u32::from(tree))];
@@ -94,4 +96,63 @@ impl Second {
     ) -> Result<()> {
         rec.dispatch_groups(&self.gather[receivers as usize], &buffers, push, n_blocks)
     }
+}
+
+record! {
+    pub struct TensorPush {
+        grid: GridRecord,
+        eye: [f32; 3],
+        n_lights: u32,
+        pair_size: f32,
+        pair_levels: u32,
+        step_length: f32,
+        backward: f32,
+        pair_steps: u32,
+        i_first_block: u32,
+        i_light: u32,
+        i_vectors: u32,
+        n_rows: u32,
+        n_columns: u32,
+        i_first_source: u32,
+        i_end_source: u32,
+        is_first_light: u32,
+    }
+}
+
+/// T2: the second reflection by light, basis of the receiver and column of the emitters, for `contract` to sum
+/// (docs/model.md §11 "contract").
+pub struct SecondTensor {
+    /// For receivers without a lobe, and with.
+    gather: [Kernel; 2],
+}
+
+impl SecondTensor {
+    /// `has_clouds`: light between facets is attenuated by the density grid. `n_bases`: N_b.
+    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, n_bases: u32) -> Result<SecondTensor> {
+        let width = block_len(device);
+        let gather = |glossy: u32| {
+            let march = u32::from(has_clouds);
+            let macros = [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases)];
+            Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
+        };
+        Ok(SecondTensor { gather: [gather(0)?, gather(1)?] })
+    }
+
+    /// Buffers as [`Second::record`] has them; `table` with the vectors of the basis from row `i_vectors` on; `t2`: f32
+    /// [light][row / 64][column][row % 64] (contract's TILE).
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 13],
+        push: &TensorPush,
+        receivers: Receivers,
+        n_blocks: u32,
+    ) -> Result<()> {
+        rec.dispatch_groups(&self.gather[receivers as usize], &buffers, push, n_blocks)
+    }
+}
+
+/// Most receivers of a block: a subgroup's width.
+fn block_len(device: &Device) -> u32 {
+    device.limits().subgroup_size.clamp(8, 64)
 }

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 
 use glam::DVec3;
 
+use crate::model::basis;
 use crate::model::light::Light;
 
 /// I_d,j = Σ_l E_l f_l(n_j, V(j, l)).
@@ -20,6 +21,24 @@ pub fn irradiance(positions: &[DVec3], normals: &[DVec3], transmittance: &[f64],
 pub fn radiance(irradiance: &[DVec3], regions: &[u32], kd: &[DVec3], colors: &[DVec3]) -> Vec<DVec3> {
     let of = |((&e, &region), &color): ((&DVec3, &u32), &DVec3)| kd[region as usize] * color * e / PI;
     irradiance.iter().zip(regions).zip(colors).map(of).collect()
+}
+
+/// One row after the other of T1 for a facet: g/π, then g v_b(γ) for every vector of the basis ([`basis::evaluate`]'s
+/// tables), γ between the normal and the half vector of `toward` the light and `outgoing`; 0 for the sky, and where the
+/// eye is behind the facet (model.md §11 "contract").
+pub fn responses(
+    light: &Light,
+    g: f64,
+    normal: DVec3,
+    toward: DVec3,
+    outgoing: DVec3,
+    vectors: &[Vec<f64>],
+) -> Vec<f64> {
+    let half = (toward + outgoing).normalize();
+    let gap = 0.5 * (normal - half).length_squared();
+    let shines = !light.is_sky() && normal.dot(outgoing) > 0.0;
+    let glossy = |v: &Vec<f64>| if shines { g * basis::evaluate(v, gap) } else { 0.0 };
+    std::iter::once(g / PI).chain(vectors.iter().map(glossy)).collect()
 }
 
 #[cfg(test)]
@@ -69,5 +88,21 @@ mod tests {
         assert!((e[1] - DVec3::splat(PI / 25.0 * 0.6)).length() < 1e-15);
         let apart = light.relative_to(DVec3::Y);
         assert_eq!(irradiance(&[DVec3::ZERO], &[DVec3::Y], &[0.5], &[apart])[0], e[0]);
+    }
+
+    #[test]
+    fn responses_are_the_bases_at_their_angle_and_nothing_from_the_sky_or_to_behind() {
+        // v_1 = t over its nodes. Light straight above, eye at 60° from it: the half vector lies at γ = 30°.
+        let ramp: Vec<f64> = (0..basis::N_NODES).map(basis::node_t).collect();
+        let sin60 = 3f64.sqrt() / 2.0;
+        let normal = DVec3::Y;
+        let toward_eye = |cos: f64, sin: f64| DVec3::new(sin, cos, 0.0);
+        let of = |light: &Light, outgoing| responses(light, 0.5, normal, DVec3::Y, outgoing, &[ramp.clone()]);
+        let before = of(&SUN, toward_eye(0.5, sin60));
+        let gap = 1.0 - sin60;
+        assert!((before[0] - 0.5 / PI).abs() < 1e-15 && (before[1] - 0.5 * gap.powf(0.25)).abs() < 1e-15);
+        assert_eq!(of(&SUN, toward_eye(-0.5, sin60)), [0.5 / PI, 0.0]);
+        let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
+        assert_eq!(of(&sky, toward_eye(0.5, sin60)), [0.5 / PI, 0.0]);
     }
 }

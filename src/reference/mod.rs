@@ -4,6 +4,7 @@
 //! it exactly what the GPU had and so measure one stage alone.
 
 pub mod area;
+pub mod contract;
 pub mod facets;
 pub mod first;
 pub mod generate;

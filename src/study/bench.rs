@@ -201,7 +201,7 @@ fn pass_records(timed: &[&FrameTimes]) -> Vec<PassRecord> {
             share: (total > 0.0).then(|| ms.iter().sum::<f64>() / total),
             n_run: timed.len() - skipped.len(),
             n_skipped: skipped.len(),
-            reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_owned()),
+            reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_string()),
             saved_ms: None,
         }
     };

@@ -75,7 +75,7 @@ pub struct PlanRow {
     pub frame: u32,
     pub pass: &'static str,
     pub run: bool,
-    pub reason: &'static str,
+    pub reason: String,
 }
 
 /// Particles of `i_frame` as the device has them.
@@ -182,6 +182,13 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
              lighting.bases bring it nearer to 0"
         ));
     }
+    let n_lost: f64 = lit.iter().map(|l| f64::from(l.n_lost)).sum();
+    if n_lost > 0.0 {
+        notes.push(format!(
+            "the driver ended loops early: {n_lost:.0} sources were not looked at and their light is missing from L2; fewer \
+             facets a surface or cloud, or a greater lighting.theta, make the loops shorter"
+        ));
+    }
     let unresolved: Vec<_> = lit.iter().filter(|l| l.n_unresolved > 0.0).collect();
     if !unresolved.is_empty() {
         let n_pairs: f64 = unresolved.iter().map(|l| f64::from(l.n_unresolved)).sum();
@@ -245,7 +252,7 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
     let on_frame = &mut |times: crate::frame::FrameTimes, _: &mut _| {
         rows.extend(Pass::ALL.iter().map(|pass| {
             let decision = times.plan.decision(*pass);
-            PlanRow { frame: times.i_frame, pass: pass.name(), run: decision.run, reason: decision.reason }
+            PlanRow { frame: times.i_frame, pass: pass.name(), run: decision.run, reason: decision.reason.to_string() }
         }));
         Ok(true)
     };

@@ -1,0 +1,98 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+#include "each.glsl"
+#include "tensor.glsl"
+
+// Radiance and irradiance of every facet from the tensors T1 and T2, the lights' energies and the materials' coefficients,
+// C (13)-(16) (docs/model.md §7, §11 "contract").
+
+// N_b.
+#ifndef N_BASES
+#define N_BASES 8
+#endif
+
+layout(local_size_x = 64) in;
+
+const float PI = 3.14159265358979;
+
+layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_rows; uint n_columns; } push;
+layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
+layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
+layout(std430, binding = 2) readonly buffer Regions { Region regions[]; };
+// By column.
+layout(std430, binding = 3) readonly buffer Coefficients { vec4 coefficients[]; };
+// [light][row]
+layout(std430, binding = 4) readonly buffer First { float t1[]; };
+// As tensor.glsl has it.
+layout(std430, binding = 5) readonly buffer Second { float t2[]; };
+// By region (first, number) of its spans; then the spans, (first, number) of columns that it can receive light from.
+layout(std430, binding = 6) readonly buffer Spans { uvec2 spans[]; };
+layout(std430, binding = 7) writeonly buffer LitFacets { Lit lit[]; };
+
+struct Sum { vec3 direct; vec3 indirect; vec3 first; vec3 second; };
+
+// A facet as a receiver: c_b of its bases, and the row of each.
+vec3 own[N_BASES];
+uint rows[N_BASES];
+
+// What one light of energy 1 brings. A column's coefficient is loaded once for all bases.
+Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
+    uint at[N_BASES];
+    float direct = t1[l * push.n_rows + rows[0]];
+    Sum sum = Sum(vec3(direct), vec3(0.0), own[0] * direct, vec3(0.0));
+    for (uint k = 0u; k < n_shiny; ++k) {
+        [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+            sum.first += own[b] * t1[l * push.n_rows + rows[b]];
+        }
+    }
+    [[unroll]] for (uint b = 0u; b < N_BASES; ++b) {
+        at[b] = second_at(l, rows[b], push.n_rows, push.n_columns);
+    }
+    for (uint i = 0u; i < own_spans.y; ++i) {
+        uvec2 span = spans[own_spans.x + i];
+        for (uint c = span.x; c < span.x + span.y; ++c) {
+            vec3 column = coefficients[c].rgb;
+            float indirect = t2[at[0] + c * TILE];
+            vec3 second = own[0] * indirect;
+            for (uint k = 0u; k < n_shiny; ++k) {
+                [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+                    second += own[b] * t2[at[b] + c * TILE];
+                }
+            }
+            sum.indirect += column * indirect;
+            sum.second += column * second;
+        }
+    }
+    return sum;
+}
+
+void main() {
+    FOR_EACH(j, push.n_facets) {
+        Facet facet = facets[j];
+        Region region = regions[facet.i_region];
+        bool glossy = region.i_lobe != NO_LOBE;
+        uint i_vector = region.i_column + (region.kind == REGION_COLORED ? 3u : 1u);
+        own[0] = region.kd * facet.color;
+        rows[0] = region.i_row + j - region.i_first_facet;
+        [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+            own[b] = glossy ? coefficients[i_vector + b - 1u].rgb : vec3(0.0);
+            rows[b] = glossy ? rows[b - 1u] + region.n_facets : rows[0];
+        }
+        Sum sum = Sum(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+        for (uint l = 0u; l < push.n_lights; ++l) {
+            vec3 energy = lights[l].energy;
+            Sum light = of_light(l, energy == vec3(0.0) ? uvec2(0u) : spans[facet.i_region], glossy ? 1u : 0u);
+            sum.direct += energy * light.direct;
+            sum.indirect += energy * light.indirect;
+            sum.first += energy * light.first;
+            sum.second += energy * light.second;
+        }
+        // n_unresolved stays as second counted it.
+        lit[j].direct = PI * sum.direct;
+        lit[j].indirect = PI * sum.indirect;
+        lit[j].first = sum.first;
+        lit[j].second = sum.second;
+    }
+}

@@ -3,6 +3,7 @@
 #include "records.glsl"
 #include "light.glsl"
 #include "occlude.glsl"
+#include "functions.glsl"
 
 // The second reflection, C (16), gathered fused: radiance at once, no tensor (docs/model.md §7, §11 "second"). A
 // workgroup takes a block of receivers of one region, and goes through the regions that it can receive light from.
@@ -23,6 +24,11 @@
 #define GLOSSY 1
 #endif
 
+// Steps of one invocation in one dispatch.
+#ifndef STEPS
+#define STEPS 1024
+#endif
+
 layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push {
@@ -36,9 +42,9 @@ layout(push_constant) uniform Push {
     uint pair_steps;
     uint i_first_block;
     float theta;
-    // Sources of this dispatch: a driver may end a loop after 65535 turns without a word, so none has more.
-    uint i_first_source;
-    uint i_end_source;
+    // 1 in the first of the dispatches that make up a gather, and in the last.
+    uint begins;
+    uint ends;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
 layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
@@ -53,6 +59,8 @@ layout(std430, binding = 9) readonly buffer Table { float table[]; };
 layout(std430, binding = 10) readonly buffer Density { float density[]; };
 layout(std430, binding = 11) readonly buffer Nodes { Node nodes[]; };
 layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
+// By facet: the first source that is still to be looked at.
+layout(std430, binding = 13) buffer Reached { uint reached[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -76,16 +84,14 @@ struct Sum {
     // Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest channel.
     float n_unresolved;
     float unresolved;
-    // Sources that were not looked at.
-    float n_lost;
 };
 
 // Adds what the first `n` sources of a pairing send to the receiver. One step is one cell: a whole facet, or a quarter of
 // a cell that was too wide for its distance, so that neighbouring invocations need not wait for each other's near facets.
-void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uvec2 part) {
+void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
     Pane pane = pane_of(emitter);
-    Walk walk = start_walk(part);
-    while (walk.s < part.y) {
+    Walk walk = start_walk(s);
+    while (goes_on(walk, end)) {
         uint i = pairing.i_source + walk.s;
         uint n_nodes = nodes_of(i);
         View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
@@ -111,7 +117,7 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
         walk = advance(walk, view.split, n_nodes);
     }
-    sum.n_lost += float(part.y - min(walk.s, part.y));
+    s = max(walk.s, s);
 }
 
 // The lobe's gap where it is nearest to its peak in a cell that turns the half vector by `turn`.
@@ -121,11 +127,11 @@ float nearest_gap(float gap, float turn) {
 }
 
 // A bound on what the cells that stayed too wide may change (docs/model.md §11 "unresolved").
-float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uvec2 part) {
+float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, uint end) {
     Pane pane = pane_of(emitter);
-    Walk walk = start_walk(part);
+    Walk walk = start_walk(s);
     float bound = 0.0;
-    while (walk.s < part.y) {
+    while (walk.s < end) {
         uint i = pairing.i_source + walk.s;
         Source source = sources[i];
         uint n_nodes = nodes_of(i);
@@ -167,28 +173,35 @@ void main() {
     vec3 to_eye = push.eye - facet.position;
     Taker taker = Taker(facet.position, facet.normal, normalize(to_eye), own);
     vec3 albedo = own.kd * facet.color * PI_INVERSE;
-    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0, 0.0);
+    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0);
+    uint next = push.begins != 0u ? 0u : reached[j];
+    uint last = 0u;
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];
+        last = pairing.i_source + pairing.n_sources;
+        uint s = begin_of(pairing, next);
+        uint n = n_left > 0u ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position);
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
-        uvec2 part = part_of(pairing);
-        uvec2 none = part.xx;
-        float n_before = sum.n_unresolved;
-        gather(sum, pairing, emitter, taker, veil, false, veil.n == 0u ? part : none);
-        gather(sum, pairing, emitter, taker, veil, true, veil.n > 0u && !veil.closed ? part : none);
-        sum.unresolved += audit(pairing, emitter, taker, albedo, sum.n_unresolved > n_before ? part : none);
+        uint n_before = s;
+        float n_open = sum.n_unresolved;
+        gather(sum, pairing, emitter, taker, veil, false, s, veil.n == 0u ? n : 0u);
+        gather(sum, pairing, emitter, taker, veil, true, s, veil.n > 0u && !veil.closed ? n : 0u);
+        sum.unresolved += audit(pairing, emitter, taker, albedo, n_before, sum.n_unresolved > n_open ? s : 0u);
+        s = veil.closed && n > 0u ? pairing.n_sources : s;
+        next = n > 0u ? max(next, pairing.i_source + s) : next;
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
         // The lobe is the front side's.
         float front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
         Lit before = lit[j];
-        bool begins = push.i_first_source == 0u;
+        bool begins = push.begins != 0u;
         lit[j].indirect = (begins ? vec3(0.0) : before.indirect) + sum.indirect;
         lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * sum.indirect + front * own.ks * sum.glossy;
         lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + sum.n_unresolved;
         lit[j].unresolved = (begins ? 0.0 : before.unresolved) + sum.unresolved;
-        lit[j].n_lost = (begins ? 0.0 : before.n_lost) + sum.n_lost;
+        lit[j].n_lost = push.ends != 0u ? float(last - min(next, last)) : 0.0;
+        reached[j] = next;
     }
 }

@@ -4,6 +4,7 @@
 #include "records.glsl"
 #include "light.glsl"
 #include "occlude.glsl"
+#include "functions.glsl"
 #include "tensor.glsl"
 
 // T2 of one light: the second reflection by basis of the receiver and column of the emitters, without energies and
@@ -25,6 +26,11 @@
 #define N_BASES 8
 #endif
 
+// Steps of one invocation in one dispatch.
+#ifndef STEPS
+#define STEPS 1024
+#endif
+
 layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push {
@@ -41,9 +47,9 @@ layout(push_constant) uniform Push {
     uint i_vectors;
     uint n_rows;
     uint n_columns;
-    // As second_gather.comp has them.
-    uint i_first_source;
-    uint i_end_source;
+    // As second_gather.comp has them; and 1 for the first light that has energy.
+    uint begins;
+    uint ends;
     uint is_first_light;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
@@ -60,6 +66,7 @@ layout(std430, binding = 10) readonly buffer Density { float density[]; };
 layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 // As tensor.glsl has it.
 layout(std430, binding = 12) buffer Second { float t2[]; };
+layout(std430, binding = 13) buffer Reached { uint reached[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -83,7 +90,6 @@ vec3 plain[N_RESPONSES];
 float shiny[N_RESPONSES * N_VECTORS];
 #endif
 float n_unresolved;
-float n_lost;
 
 void clear() {
     [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
@@ -127,10 +133,10 @@ void add(uint i_source, Region emitter, vec3 q, vec3 normal, vec3 outgoing, floa
 }
 
 // As `gather` of second_gather.comp, cell by cell.
-void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uvec2 part) {
+void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
     Pane pane = pane_of(emitter);
-    Walk walk = start_walk(part);
-    while (walk.s < part.y) {
+    Walk walk = start_walk(s);
+    while (goes_on(walk, end)) {
         uint i = pairing.i_source + walk.s;
         View view = look(sources[i], i, 1u, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
@@ -148,13 +154,13 @@ void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool 
         n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
         walk = advance(walk, view.split, 1u);
     }
-    n_lost += float(part.y - min(walk.s, part.y));
+    s = max(walk.s, s);
 }
 
 // The sums of receiver j as columns of its rows.
 void store(uint j, Region own, Region emitter) {
-    // Later windows add to what the first has left.
-    float keep = push.i_first_source == 0u ? 0.0 : 1.0;
+    // Later dispatches add to what the first has left.
+    float keep = push.begins != 0u ? 0.0 : 1.0;
     uint n_plain = emitter.kind == REGION_COLORED ? 3u : 1u;
     uint n_vectors = emitter.i_lobe == NO_LOBE ? 0u : N_VECTORS;
     [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
@@ -183,23 +189,30 @@ void main() {
     Region own = regions[facet.i_region];
     Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), own);
     n_unresolved = 0.0;
-    n_lost = 0.0;
+    uint next = push.begins != 0u ? 0u : reached[j];
+    uint last = 0u;
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];
+        last = pairing.i_source + pairing.n_sources;
+        uint s = begin_of(pairing, next);
+        uint n = n_left > 0u ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position);
-        uvec2 part = part_of(pairing);
-        uvec2 none = part.xx;
         clear();
-        gather(pairing, emitter, taker, veil, false, veil.n == 0u ? part : none);
-        gather(pairing, emitter, taker, veil, true, veil.n > 0u && !veil.closed ? part : none);
+        gather(pairing, emitter, taker, veil, false, s, veil.n == 0u ? n : 0u);
+        gather(pairing, emitter, taker, veil, true, s, veil.n > 0u && !veil.closed ? n : 0u);
+        s = veil.closed && n > 0u ? pairing.n_sources : s;
+        next = n > 0u ? max(next, pairing.i_source + s) : next;
         if (gl_LocalInvocationID.x < block.n_facets) {
             store(j, own, emitter);
         }
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
-        bool begins = push.i_first_source == 0u && push.is_first_light != 0u;
-        lit[j].n_unresolved = begins ? n_unresolved : max(lit[j].n_unresolved, n_unresolved);
-        lit[j].n_lost = (begins ? 0.0 : lit[j].n_lost) + n_lost;
+        // Pairs are the same for every light.
+        if (push.is_first_light != 0u) {
+            lit[j].n_unresolved = (push.begins != 0u ? 0.0 : lit[j].n_unresolved) + n_unresolved;
+        }
+        lit[j].n_lost = push.ends != 0u ? float(last - min(next, last)) : 0.0;
+        reached[j] = next;
     }
 }

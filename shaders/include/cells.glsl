@@ -11,10 +11,16 @@ const float LOBE_STEP = 3.0;
 const float TURN = 0.75;
 // A cluster that a shadow's rim runs through is opened down to this share of the opening angle's diameter.
 const float TORN = 0.5;
+// The opening angle of clouds' clusters over that of surfaces': their facets overlap and look every way, so that they need
+// it this much smaller for the same error, 1 % of L2 at theta = 0.4.
+const float CLOUD_THETA = 0.4;
+// Where a cluster's normals differ, those nearer to the receiver may be those that face it: an error of the first order,
+// of this share of radius over distance times the normals' spread.
+const float MIXED = 0.5;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
-// Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
-const uint MAX_STEPS = 65536u;
+// Cells of one facet that are looked at, at most.
+const uint MAX_STEPS = STEPS / 2u;
 
 // What the cells of a region's facets have in common. A cloud's facets have no axes and are one cell.
 struct Pane { vec3 half_u; vec3 half_v; float side; };
@@ -29,14 +35,18 @@ Pane pane_of(Region emitter) {
 // Source s of the region, and cell `at` of the 4^level it is divided into, in Z order.
 struct Walk { uint s; uint level; uvec2 at; uint n_steps; };
 
-// The part of a pairing's sources that lies in the dispatch's window: its first, and the one past its last.
-uvec2 part_of(Pairing pairing) {
-    uint end = pairing.i_source + pairing.n_sources;
-    uint first = clamp(push.i_first_source, pairing.i_source, end);
-    return uvec2(first, clamp(push.i_end_source, first, end)) - pairing.i_source;
-}
+Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u), 0u); }
 
-Walk start_walk(uvec2 part) { return Walk(part.x, 0u, uvec2(0u), 0u); }
+// Steps that this dispatch may still take: a driver may end a loop after some ten thousand turns without a word, so the
+// walk goes on in another where it ended in this one.
+uint n_left = STEPS;
+
+bool goes_on(Walk walk, uint end) { return walk.s < end && (n_left > 0u || walk.level > 0u); }
+
+// Where the walk through a pairing's sources begins, `reached` being the first source that is still to be looked at.
+uint begin_of(Pairing pairing, uint reached) {
+    return clamp(reached, pairing.i_source, pairing.i_source + pairing.n_sources) - pairing.i_source;
+}
 
 // 2^-level.
 float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
@@ -44,6 +54,7 @@ float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
 // Into the cell's first quarter or the cluster's first child, or on to the next cell, or, after a facet's last, to the next
 // source: past the `n_nodes` of this one's subtree, 1 for a facet.
 Walk advance(Walk walk, bool split, uint n_nodes) {
+    n_left -= min(n_left, 1u);
     // Last quarters of last quarters are done together.
     uint up = min(uint(findLSB(~(walk.at.x & walk.at.y))), walk.level);
     uint level = walk.level - up;
@@ -78,17 +89,28 @@ struct View {
 };
 
 #if TREE
+// The mean of max(x, 0) over a normal distribution: what of a cluster's cosines is positive.
+float positive_part(float mean, float variance) {
+    float deviation = sqrt(max(variance, 1e-12));
+    float z = clamp(mean / deviation, -6.0, 6.0);
+    float below = 0.5 + 0.5 * erf_approx(0.70710678 * z);
+    return max(z > 5.9 ? mean : deviation * (z * below + 0.39894228 * exp(-0.5 * z * z)), 0.0);
+}
+
 // The mean of cos cos/d^2 over a cluster whose mean square distance from its middle is `extent` d^2: the middle's value and
-// the second derivatives' share. A surface's cluster lies in its plane (half of the spread an axis), a cloud's is as deep
-// as it is wide (a third an axis).
+// the second derivatives' share. A surface's cluster lies in its plane (half of the spread an axis) and has one normal; a
+// cloud's is as deep as it is wide (a third an axis) and its normals spread about their mean.
 float cluster_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float extent, uint kind) {
     float at_source = -dot(source_normal, way), at_receiver = dot(receiver_normal, way);
     float turned = dot(receiver_normal, source_normal);
-    float bent = kind == REGION_SURFACE
-        ? 2.0 * extent * at_source * (at_receiver - turned * at_source - 3.0 * at_receiver * at_source * at_source)
-        : -extent * (turned + 2.0 * at_source * at_receiver) / 3.0;
-    bool faces = at_source > 0.0 && at_receiver > 0.0;
-    return faces ? max(at_source * at_receiver + bent, 0.0) / d2 : 0.0;
+    if (kind == REGION_SURFACE) {
+        float bent = 2.0 * extent * at_source * (at_receiver - turned * at_source - 3.0 * at_receiver * at_source * at_source);
+        return at_source > 0.0 && at_receiver > 0.0 ? max(at_source * at_receiver + bent, 0.0) / d2 : 0.0;
+    }
+    float bent = -extent * (turned + 2.0 * at_source * at_receiver) / 3.0;
+    float apart = max(1.0 - dot(source_normal, source_normal), 0.0) / 3.0;
+    float both = positive_part(at_source, apart) * positive_part(at_receiver, extent / 3.0);
+    return max(both + (at_source > 0.0 && at_receiver > 0.0 ? bent : 0.0), 0.0) / d2;
 }
 #endif
 
@@ -111,8 +133,9 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     pane.side = is_cluster ? 2.0 * source.radius : pane.side;
     vec3 face = is_cluster ? source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30)) : source.normal;
     // A cluster is opened by its radius, and where its facets look different ways.
-    float limit = is_cluster ? 2.0 * push.theta : push.pair_size;
-    float lobe_limit = is_cluster ? LOBE_STEP * push.theta : LOBE_STEP * push.pair_size;
+    float theta = emitter.kind == REGION_SURFACE ? push.theta : CLOUD_THETA * push.theta;
+    float limit = is_cluster ? 2.0 * theta : push.pair_size;
+    float lobe_limit = is_cluster ? LOBE_STEP * theta : LOBE_STEP * push.pair_size;
 #else
     vec3 face = source.normal;
     float limit = push.pair_size;
@@ -135,12 +158,13 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     view.leaving = source.flux;
     float excess = view.width / limit;
 #if TREE
-    // What a cluster's extent may change of its form factor: in the square of radius over distance, and the cosines.
+    // What a cluster's extent may change of its form factor: in radius over distance, and the cosines.
     float tilt = 0.5 * view.width;
     float at_taker = max(dot(taker.normal, view.way) + tilt, 0.0);
     float at_source = max(-dot(source.normal, view.way), 0.0) + 1.0 - length(source.normal);
-    float wrong = tilt * tilt * min(at_taker, 1.0) * at_source * source.total_area * inverse * inverse;
-    float allowed = push.theta * push.theta;
+    float mixed = sqrt(max(1.0 - dot(source.normal, source.normal), 0.0));
+    float wrong = tilt * (tilt + MIXED * mixed) * min(at_taker, 1.0) * at_source * source.total_area * inverse * inverse;
+    float allowed = theta * theta;
     excess = is_cluster ? (tilt > 1.0 ? 2.0 : wrong / (allowed * allowed)) : excess;
 #endif
     float turn = TURN * view.width;

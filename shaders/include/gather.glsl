@@ -1,7 +1,6 @@
 // What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of second_gather.comp
 // or of second_tensor.comp.
 
-const float PI = 3.14159265358979;
 const float PI_INVERSE = 0.318309886183791;
 
 // The receiver: where it is, and whither it reflects.

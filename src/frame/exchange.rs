@@ -26,8 +26,10 @@ pub struct Exchange {
     pub heights: Vec<(u32, u32)>,
     pub sources: Buffer,
     pub fluxes: Buffer,
-    /// Ranges of sources that one dispatch goes through.
-    windows: Vec<[u32; 2]>,
+    /// By facet: the source that its gather has reached.
+    pub reached: Buffer,
+    /// Dispatches of a gather.
+    n_dispatches: u32,
     n_diffuse_blocks: u32,
     n_glossy_blocks: u32,
 }
@@ -39,8 +41,6 @@ struct Lists {
     glossy: Vec<BlockRecord>,
     pairings: Vec<PairingRecord>,
     occluders: Vec<u32>,
-    /// First source of each region that has any, and the one past its last.
-    regions: Vec<[u32; 2]>,
     /// Without clusters where every pair is gathered.
     tree: Tree,
 }
@@ -78,20 +78,22 @@ impl Exchange {
             heights,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
-            windows: windows(scene, &lists, tree),
+            reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
+            n_dispatches: (n_sources * CELLS_PER_SOURCE).div_ceil(u64::from(steps(scene))) as u32,
             n_diffuse_blocks: lists.diffuse.len() as u32,
             n_glossy_blocks: lists.glossy.len() as u32,
         })
     }
 
-    /// What to dispatch: every window for every kind of receivers there is, window by window in growing order.
-    pub fn dispatches<'a>(&'a self, gathered: &'a [Receivers]) -> impl Iterator<Item = (Receivers, [u32; 2])> + 'a {
-        let of = move |receivers: Receivers| self.windows.iter().map(move |window| (receivers, *window));
+    /// What to dispatch: for every kind of receivers that there is, (whether it begins, whether it ends) a gather.
+    pub fn dispatches<'a>(&'a self, gathered: &'a [Receivers]) -> impl Iterator<Item = (Receivers, [bool; 2])> + 'a {
+        let last = self.n_dispatches.max(1) - 1;
+        let of = move |receivers: Receivers| (0..=last).map(move |k| (receivers, [k == 0, k == last]));
         gathered.iter().filter(|r| self.blocks_of(**r).1 > 0).flat_map(move |r| of(*r))
     }
 
-    /// The gathering kernels' buffers, of which the last two differ.
-    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 13] {
+    /// The gathering kernels' buffers, of which two differ.
+    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 14] {
         [
             &self.blocks,
             &self.pairings,
@@ -106,6 +108,7 @@ impl Exchange {
             &b.density,
             last,
             out,
+            &self.reached,
         ]
     }
 
@@ -121,30 +124,22 @@ impl Exchange {
 /// Turns that an invocation's loops may take together, nested ones counted each: llvmpipe ends every loop without a word
 /// when they are used up (LP_MAX_TGSI_LOOP_ITERATIONS), and a watchdog may be as strict.
 const LOOP_TURNS: u32 = 65_535;
-/// Cells that a facet is divided into, on the average of a window; and some room.
-const CELLS_PER_SOURCE: u32 = 4;
+/// Steps of a gather a source, on the average of a receiver: cells, or none where a cluster is taken as a whole. Where it
+/// is not enough, what is left is counted.
+const CELLS_PER_SOURCE: u64 = 2;
 
-/// Windows small enough for the loops of one invocation. A tree's walk cannot begin in the middle of a region: its windows
-/// hold whole ones, of which a walk visits few nodes.
-fn windows(scene: &Scene, lists: &Lists, tree: bool) -> Vec<[u32; 2]> {
-    let n_occluders = lists.pairings.iter().map(|p| p.n_occluders).max().unwrap_or(0);
+/// Steps that one invocation takes in one dispatch.
+pub fn steps(scene: &Scene) -> u32 {
+    let from = pairings(&scene.surfaces, scene.clouds.len());
+    let n_occluders = from.iter().flatten().map(|p| p.occluders.len() as u32).max().unwrap_or(0);
     // A step itself, and each loop within it, which turns once more to find that it is done.
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps + 1 } else { 0 };
     let lobes = if (0..scene.n_regions()).any(|i| is_glossy(scene, i)) { scene.lights.len() as u32 + 3 } else { 1 };
     let turns = 1 + (n_occluders + 1) + march + lobes;
-    let most = (LOOP_TURNS / (turns * CELLS_PER_SOURCE)).max(1);
-    let n_sources = lists.tree.n_nodes.len() as u32;
-    if !tree {
-        return (0..n_sources).step_by(most as usize).map(|i| [i, n_sources.min(i.saturating_add(most))]).collect();
-    }
-    let mut windows: Vec<[u32; 2]> = Vec::new();
-    for [first, end] in &lists.regions {
-        match windows.last_mut() {
-            Some(last) if end - last[0] <= most => last[1] = *end,
-            _ => windows.push([*first, *end]),
-        }
-    }
-    windows
+    // Before the walk each pairing's veil looks at every occluder, corner by corner.
+    let veils = from.iter().map(|p| p.iter().map(|p| 21 * p.occluders.len() as u32 + 5).sum()).max().unwrap_or(0);
+    // The last facet's cells may be half as many again; an audit takes the steps once more.
+    (LOOP_TURNS.saturating_sub(veils) / (turns * 5 / 2 + 1)).max(2)
 }
 
 /// From this many facets on the tree is the faster (docs/measured.md).
@@ -179,7 +174,6 @@ impl Lists {
         let roots: Vec<u32> = sizes.iter().map(|n| tree_of(&mut lists.tree, *n)).collect();
         let ends = roots.iter().skip(1).copied().chain([lists.tree.n_nodes.len() as u32]);
         let sources: Vec<(u32, u32)> = roots.iter().zip(ends).map(|(root, end)| (*root, end - root)).collect();
-        lists.regions = sources.iter().filter(|s| s.1 > 0).map(|(i, n)| [*i, i + n]).collect();
         for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
             let i_pairing = lists.pairings.len() as u32;
             for pairing in from.iter().filter(|p| sizes[p.i_emitter] > 0) {

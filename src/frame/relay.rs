@@ -1,7 +1,7 @@
 //! The second reflection and what it is gathered with.
 
 use super::buffers::Buffers;
-use super::exchange::Exchange;
+use super::exchange::{Exchange, steps};
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::tensor::TensorStage;
@@ -44,7 +44,7 @@ impl Relay {
         scene: &Scene,
         tree: bool,
     ) -> Result<Relay> {
-        let second = Second::new(device, compiler, scene.n_particles() > 0, tree)?;
+        let second = Second::new(device, compiler, scene.n_particles() > 0, tree, steps(scene))?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
         Ok(Relay {
@@ -86,7 +86,7 @@ impl Relay {
         if !plan.view_only() {
             self.record_sources(rec, b)?;
         }
-        for (receivers, window) in x.dispatches(gathered) {
+        for (receivers, [begins, ends]) in x.dispatches(gathered) {
             let (i_first_block, n_blocks) = x.blocks_of(receivers);
             let push = GatherPush {
                 grid: packet.grid,
@@ -99,8 +99,8 @@ impl Relay {
                 pair_steps: self.pairs.steps,
                 i_first_block,
                 theta: self.theta as f32,
-                i_first_source: window[0],
-                i_end_source: window[1],
+                begins: u32::from(begins),
+                ends: u32::from(ends),
             };
             match tensor {
                 Some(tensor) => tensor.record_second(rec, b, x, packet, &push, receivers, n_blocks)?,

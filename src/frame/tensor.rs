@@ -2,7 +2,7 @@
 //! them (docs/model.md §11 "contract").
 
 use super::buffers::{Buffers, upload};
-use super::exchange::{Exchange, is_glossy, region_sizes};
+use super::exchange::{Exchange, is_glossy, region_sizes, steps};
 use super::limits;
 use super::packet::Packet;
 use super::plan::Tensors;
@@ -179,7 +179,7 @@ impl TensorStage {
         shape: Shape,
     ) -> Result<TensorStage> {
         let second = match shape.has_second {
-            true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases)?),
+            true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases, steps(scene))?),
             false => None,
         };
         // One that has no number does not fit either; the limits have been asked before.
@@ -257,8 +257,8 @@ impl TensorStage {
                 i_vectors: self.i_vectors,
                 n_rows: self.shape.n_rows as u32,
                 n_columns: self.shape.n_columns,
-                i_first_source: of.i_first_source,
-                i_end_source: of.i_end_source,
+                begins: of.begins,
+                ends: of.ends,
                 is_first_light: u32::from(k == 0),
             };
             second.record(rec, x.bindings(b, &b.lit, &self.t2), &push, receivers, n_blocks)?;

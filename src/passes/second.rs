@@ -28,8 +28,8 @@ record! {
         pair_steps: u32,
         i_first_block: u32,
         theta: f32,
-        i_first_source: u32,
-        i_end_source: u32,
+        begins: u32,
+        ends: u32,
     }
 }
 
@@ -51,11 +51,17 @@ pub enum Receivers {
 
 impl Second {
     /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree.
-    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool) -> Result<Second> {
+    /// `steps`: of an invocation in a dispatch.
+    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool, steps: u32) -> Result<Second> {
         let width = block_len(device);
         let gather = |glossy: u32| {
-            let macros =
-                [("WORKGROUP", width), ("MARCH", u32::from(has_clouds)), ("GLOSSY", glossy), ("TREE", u32::from(tree))];
+            let macros = [
+                ("WORKGROUP", width),
+                ("MARCH", u32::from(has_clouds)),
+                ("GLOSSY", glossy),
+                ("TREE", u32::from(tree)),
+                ("STEPS", steps),
+            ];
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
         };
         Ok(Second {
@@ -85,11 +91,12 @@ impl Second {
 
     /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
     /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `nodes`: NodeRecord;
-    /// `lit`: LitRecord.
+    /// `lit`: LitRecord; `reached`: u32 by facet. A gather takes several dispatches, the first of which `begins` and the
+    /// last `ends`.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 13],
+        buffers: [&Buffer; 14],
         push: &GatherPush,
         receivers: Receivers,
         n_blocks: u32,
@@ -113,8 +120,8 @@ record! {
         i_vectors: u32,
         n_rows: u32,
         n_columns: u32,
-        i_first_source: u32,
-        i_end_source: u32,
+        begins: u32,
+        ends: u32,
         is_first_light: u32,
     }
 }
@@ -128,11 +135,18 @@ pub struct SecondTensor {
 
 impl SecondTensor {
     /// `has_clouds`: light between facets is attenuated by the density grid. `n_bases`: N_b.
-    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, n_bases: u32) -> Result<SecondTensor> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        has_clouds: bool,
+        n_bases: u32,
+        steps: u32,
+    ) -> Result<SecondTensor> {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let march = u32::from(has_clouds);
-            let macros = [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases)];
+            let macros =
+                [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases), ("STEPS", steps)];
             Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
         };
         Ok(SecondTensor { gather: [gather(0)?, gather(1)?] })
@@ -143,7 +157,7 @@ impl SecondTensor {
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 13],
+        buffers: [&Buffer; 14],
         push: &TensorPush,
         receivers: Receivers,
         n_blocks: u32,

@@ -36,6 +36,8 @@ layout(push_constant) uniform Push {
     uint pair_steps;
     uint i_first_block;
     float theta;
+    uint n_surfaces;
+    uint adds;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
 layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
@@ -56,6 +58,7 @@ layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
 #include "density.glsl"
 #endif
 #include "veil.glsl"
+#include "reach.glsl"
 #include "gather.glsl"
 #include "cells.glsl"
 
@@ -75,6 +78,17 @@ struct Sum {
     float unresolved;
 };
 
+// Of the ball about a cluster or cell that is opened where the rim of a shadow runs through it; 0 where it is small enough.
+float torn_radius(Source source, Walk walk, View view, uint n_nodes) {
+#if TREE
+    if (n_nodes > 1u) {
+        return view.width > push.theta * TORN ? source.radius : 0.0;
+    }
+#endif
+    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+    return wide ? source.radius * cell_scale(walk.level) : 0.0;
+}
+
 // Adds what the first `n` sources of a pairing send to the receiver. One step is one cell: a whole facet, or a quarter of
 // a cell that was too wide for its distance, so that neighbouring invocations need not wait for each other's near facets.
 void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, uint n) {
@@ -86,19 +100,24 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
         if (veiled) {
-#if TREE
-            float radius = n_nodes > 1u && view.width > push.theta * TORN ? sources[i].radius : 0.0;
+            float radius = torn_radius(sources[i], walk, view, n_nodes);
             bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
-            view.split = view.split || (n_nodes > 1u && veiling.y);
+            view.split = view.split || (radius > 0.0 && veiling.y);
             share = view.split || veiling.x ? 0.0 : share;
-#else
-            share *= visible(pairing, veil, taker.position, view.position, share > 0.0);
-#endif
         }
+        float lit_radius = n_nodes == 1u && emitter.kind == REGION_SURFACE ? torn_radius(sources[i], walk, view, n_nodes) : 0.0;
+        bool in_part = is_lit_in_part(i, pairing.i_region, view.position, lit_radius, share > 0.0 && lit_radius > 0.0);
+        view.split = view.split || in_part;
+        share = view.split ? 0.0 : share;
 #if MARCH
         share *= attenuation(taker.position, view.position, share > 0.0);
 #endif
-        vec3 e = view.leaving * share;
+        uint n_own = share > 0.0 && walk.level > 0u ? push.n_lights : 0u;
+        vec3 leaving = n_own > 0u ? vec3(0.0) : view.leaving;
+        for (uint l = 0u; l < n_own; ++l) {
+            leaving += cell_flux(i, sources[i], pairing.i_region, emitter, view.position, -view.way, l);
+        }
+        vec3 e = leaving * share;
         sum.indirect += e;
 #if GLOSSY
         sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
@@ -175,12 +194,22 @@ void main() {
         uint n_audit = sum.n_unresolved > n_before ? pairing.n_sources : 0u;
         sum.unresolved += audit(pairing, emitter, taker, albedo, n_audit);
     }
+    // A device that ends long loops early (src/frame/exchange.rs) ends this one, too.
+    uint n_turns = 0u;
+    for (uint turn = 0u; turn < 2u + (push.adds >> 1); ++turn) {
+        n_turns += 1u + (push.adds >> 1);
+    }
+    sum.unresolved = n_turns < 2u ? uintBitsToFloat(0x7F800000u) : sum.unresolved;
     if (gl_LocalInvocationID.x < block.n_facets) {
-        lit[j].indirect = sum.indirect;
+        Lit before = lit[j];
+        if (push.adds == 0u) {
+            before = Lit(before.direct, 0.0, vec3(0.0), 0.0, before.first, 0.0, vec3(0.0), 0.0);
+        }
+        lit[j].indirect = before.indirect + sum.indirect;
         // The lobe is the front side's.
         float front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
-        lit[j].second = albedo * sum.indirect + front * own.ks * sum.glossy;
-        lit[j].n_unresolved = sum.n_unresolved;
-        lit[j].unresolved = sum.unresolved;
+        lit[j].second = before.second + albedo * sum.indirect + front * own.ks * sum.glossy;
+        lit[j].n_unresolved = before.n_unresolved + sum.n_unresolved;
+        lit[j].unresolved = before.unresolved + sum.unresolved;
     }
 }

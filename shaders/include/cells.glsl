@@ -11,6 +11,10 @@ const float LOBE_STEP = 3.0;
 const float TURN = 0.75;
 // A cluster that a shadow's rim runs through is opened down to this share of the opening angle's diameter.
 const float TORN = 0.5;
+// Cells wider than this share of their distance are discs to their receiver.
+const float NEAR = 1.0;
+// A cell that a shadow's rim runs through is quartered down to this share of pair_size.
+const float RIM = 0.25;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
 // Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.
@@ -111,12 +115,15 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     float inverse = inversesqrt(max(d2, 1e-30));
     view.way = offset * inverse;
     float part = scale * scale;
-    view.share = part * form(taker.normal, source.normal, view.way, d2, part * source.area);
+    view.width = pane.side * scale * inverse;
+    // The disc's factor where the derivatives' series would not do; a cloud's facet is a disc.
+    view.share = part * (view.width > 0.0 && view.width <= NEAR
+        ? rectangle_form(taker.normal, source.normal, view.way, d2, scale * pane.half_u, scale * pane.half_v)
+        : form(taker.normal, source.normal, view.way, d2, part * source.area));
 #if TREE
     float extent = source.spread / max(d2, 1e-30);
     view.share = is_cluster ? cluster_form(taker.normal, source.normal, view.way, d2, extent, emitter.kind) : view.share;
 #endif
-    view.width = pane.side * scale * inverse;
     view.leaving = source.flux;
     float excess = view.width / limit;
 #if TREE

@@ -10,6 +10,16 @@ use crate::passes::second::Receivers;
 
 use super::buffers::upload;
 
+/// Facets of a region that are gathered from at once, at most, and sources of one dispatch where every pair is gathered:
+/// llvmpipe ends all loops of an invocation after 65 535 turns in all (Mesa's LP_MAX_TGSI_LOOP_ITERATIONS), and a source
+/// costs up to 16 steps of march, a look at some surfaces and lights, and its cells. Where that is not enough, the gather
+/// says so: `unresolved` is infinite. Other devices' watchdogs like short dispatches, too.
+const EXACT_RUN: u32 = 64;
+const EXACT_SLICE: u32 = 64;
+/// The same of a tree, most of whose nodes no receiver meets. A power of FAN, so that runs are whole clusters.
+const TREE_RUN: u32 = 256;
+const TREE_SLICE: u32 = 1024;
+
 /// Buffers of the exchange, and how many blocks of receivers there are without and with a lobe.
 pub struct Exchange {
     pub blocks: Buffer,
@@ -26,15 +36,15 @@ pub struct Exchange {
     pub heights: Vec<(u32, u32)>,
     pub sources: Buffer,
     pub fluxes: Buffer,
-    n_diffuse_blocks: u32,
-    n_glossy_blocks: u32,
+    /// First block and number of blocks of each slice of the sources, of receivers without and with a lobe.
+    slices: [Vec<(u32, u32)>; 2],
 }
 
 /// The records behind the buffers.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct Lists {
-    diffuse: Vec<BlockRecord>,
-    glossy: Vec<BlockRecord>,
+    /// By slice of the sources, of receivers without and with a lobe.
+    blocks: [Vec<Vec<BlockRecord>>; 2],
     pairings: Vec<PairingRecord>,
     occluders: Vec<u32>,
     /// Without clusters where every pair is gathered.
@@ -56,7 +66,7 @@ impl Exchange {
         let counts = lists.tree.merges.iter().map(|m| m.len() as u32);
         let heights = counts.scan(0, |first, n| Some((std::mem::replace(first, *first + n), n))).collect();
         let places: Vec<u32> = (0..scene.n_facets() as u32).collect();
-        let blocks = [&lists.diffuse[..], &lists.glossy[..]].concat();
+        let blocks = lists.blocks.concat().concat();
         let mut made = |name: &str, data: &[u32], words: usize| -> Result<Buffer> {
             let n = (data.len() as u64).max(words as u64);
             let buffer = Buffer::new::<u32>(device, name, n, Place::Device)?;
@@ -74,17 +84,13 @@ impl Exchange {
             heights,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
-            n_diffuse_blocks: lists.diffuse.len() as u32,
-            n_glossy_blocks: lists.glossy.len() as u32,
+            slices: lists.slices(),
         })
     }
 
-    /// First block and number of blocks.
-    pub fn blocks_of(&self, receivers: Receivers) -> (u32, u32) {
-        match receivers {
-            Receivers::Diffuse => (0, self.n_diffuse_blocks),
-            Receivers::Glossy => (self.n_diffuse_blocks, self.n_glossy_blocks),
-        }
+    /// First block and number of blocks of each slice of the sources; the first slice has every receiver.
+    pub fn slices_of(&self, receivers: Receivers) -> &[(u32, u32)] {
+        &self.slices[receivers as usize]
     }
 }
 
@@ -115,31 +121,82 @@ impl Lists {
     fn of(scene: &Scene, block_len: u32, tree: bool) -> Lists {
         let sizes = region_sizes(scene);
         let firsts: Vec<u32> = sizes.iter().scan(0, |first, n| Some(std::mem::replace(first, *first + n))).collect();
-        let tree_of = if tree { Tree::push } else { Tree::push_flat };
         let mut lists = Lists::default();
-        let roots: Vec<u32> = sizes.iter().map(|n| tree_of(&mut lists.tree, *n)).collect();
-        let ends = roots.iter().skip(1).copied().chain([lists.tree.n_nodes.len() as u32]);
-        let sources: Vec<(u32, u32)> = roots.iter().zip(ends).map(|(root, end)| (*root, end - root)).collect();
+        let runs: Vec<Vec<(u32, u32)>> = sizes.iter().map(|n| lists.push_sources(*n, slice_len(scene, tree), tree)).collect();
+        let most = slice_len(scene, tree);
         for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
-            let i_pairing = lists.pairings.len() as u32;
-            for pairing in from.iter().filter(|p| sizes[p.i_emitter] > 0) {
-                lists.push_pairing(pairing, sources[pairing.i_emitter]);
+            let first_pairing = lists.pairings.len();
+            for pairing in from {
+                lists.push_pairings(pairing, &runs[pairing.i_emitter]);
             }
-            let n_pairings = lists.pairings.len() as u32 - i_pairing;
-            let blocks = if is_glossy(scene, i) { &mut lists.glossy } else { &mut lists.diffuse };
-            for first in (0..sizes[i]).step_by(block_len as usize) {
-                let n_facets = block_len.min(sizes[i] - first);
-                blocks.push(BlockRecord { i_first: firsts[i] + first, n_facets, i_pairing, n_pairings });
+            let slices = slices(&lists.pairings[first_pairing..], first_pairing as u32, most);
+            for (i_slice, (i_pairing, n_pairings)) in slices.into_iter().enumerate() {
+                let blocks = &mut lists.blocks[usize::from(is_glossy(scene, i))];
+                blocks.resize(blocks.len().max(i_slice + 1), vec![]);
+                for first in (0..sizes[i]).step_by(block_len as usize) {
+                    let n_facets = block_len.min(sizes[i] - first);
+                    let i_first = firsts[i] + first;
+                    let block = BlockRecord { i_first, n_facets, i_pairing, n_pairings };
+                    blocks[i_slice].push(block);
+                }
             }
         }
         lists
     }
 
-    fn push_pairing(&mut self, pairing: &Pairing, (i_source, n_sources): (u32, u32)) {
+    /// Sources of a region's `n` facets, run by run: the first, and how many there are.
+    fn push_sources(&mut self, n: u32, most: u32, tree: bool) -> Vec<(u32, u32)> {
+        let (run, push): (u32, fn(&mut Tree, u32) -> u32) =
+            if tree { (TREE_RUN, Tree::push) } else { (EXACT_RUN.min(most), Tree::push_flat) };
+        let mut push_run = |first: u32| {
+            let root = push(&mut self.tree, run.min(n - first));
+            (root, self.tree.n_nodes.len() as u32 - root)
+        };
+        (0..n).step_by(run as usize).map(&mut push_run).collect()
+    }
+
+    fn push_pairings(&mut self, pairing: &Pairing, runs: &[(u32, u32)]) {
         let i_occluder = self.occluders.len() as u32;
         self.occluders.extend(pairing.occluders.iter().map(|i| *i as u32));
         let n_occluders = pairing.occluders.len() as u32;
         let i_region = pairing.i_emitter as u32;
-        self.pairings.push(PairingRecord { i_region, i_occluder, n_occluders, i_source, n_sources });
+        let of = |&(i_source, n_sources)| PairingRecord { i_region, i_occluder, n_occluders, i_source, n_sources };
+        self.pairings.extend(runs.iter().map(of));
     }
+
+    fn slices(&self) -> [Vec<(u32, u32)>; 2] {
+        let mut first = 0;
+        let mut next = |n: usize| {
+            first += n as u32;
+            (first - n as u32, n as u32)
+        };
+        let [diffuse, glossy] = &self.blocks;
+        let [diffuse, glossy] = [diffuse, glossy].map(|slices| slices.iter().map(|b| next(b.len())).collect());
+        [diffuse, glossy]
+    }
+}
+
+/// Most sources of a slice.
+fn slice_len(scene: &Scene, tree: bool) -> u32 {
+    // Finer pairs have more cells.
+    let finer = (scene.lighting.pairs.size / 0.5).min(1.0).powi(3);
+    let most = if tree { TREE_SLICE } else { EXACT_SLICE };
+    (f64::from(most) * finer).max(16.0) as u32
+}
+
+/// First and number of pairings of each slice of at most `most` sources, or of one pairing that has more; at least one
+/// slice.
+fn slices(pairings: &[PairingRecord], first: u32, most: u32) -> Vec<(u32, u32)> {
+    let mut slices = Vec::new();
+    let [mut i_first, mut n, mut n_sources] = [first, 0, 0];
+    for pairing in pairings {
+        if n > 0 && n_sources + pairing.n_sources > most {
+            slices.push((i_first, n));
+            [i_first, n, n_sources] = [i_first + n, 0, 0];
+        }
+        n += 1;
+        n_sources += pairing.n_sources;
+    }
+    slices.push((i_first, n));
+    slices
 }

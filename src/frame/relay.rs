@@ -18,6 +18,7 @@ pub struct Relay {
     order: Option<Order>,
     n_facets: u32,
     n_lights: u32,
+    n_surfaces: u32,
     step_cells: f64,
     backward: f64,
     pairs: Pairs,
@@ -46,6 +47,7 @@ impl Relay {
             order: if tree { Some(Order::new(device, compiler, scene)?) } else { None },
             n_facets: scene.n_facets() as u32,
             n_lights: scene.lights.len() as u32,
+            n_surfaces: scene.surfaces.len() as u32,
             step_cells: lighting.step,
             backward: 1.0 - lighting.forward,
             pairs: lighting.pairs,
@@ -65,7 +67,6 @@ impl Relay {
         }
         self.record_sources(rec, b)?;
         for receivers in [Receivers::Diffuse, Receivers::Glossy] {
-            let (i_first_block, n_blocks) = x.blocks_of(receivers);
             let push = GatherPush {
                 grid: packet.grid,
                 eye: packet.camera.eye,
@@ -75,8 +76,10 @@ impl Relay {
                 step_length: self.step_cells as f32 * packet.grid.cell,
                 backward: self.backward as f32,
                 pair_steps: self.pairs.steps,
-                i_first_block,
+                i_first_block: 0,
                 theta: self.theta as f32,
+                n_surfaces: self.n_surfaces,
+                adds: 0,
             };
             let (lists, lights) =
                 ([&x.blocks, &x.pairings, &x.occluders, &x.order], [&b.facets, &b.regions, &b.lights]);
@@ -85,7 +88,10 @@ impl Relay {
             let [f, r, l] = lights;
             let [s0, s1, s2, s3, s4, s5] = light;
             let buffers = [l0, l1, l2, l3, f, r, l, s0, s1, s2, s3, s4, s5];
-            self.second.record(rec, buffers, &push, receivers, n_blocks)?;
+            for (&(i_first_block, n_blocks), i_slice) in x.slices_of(receivers).iter().zip(0u32..) {
+                let push = GatherPush { i_first_block, adds: u32::from(i_slice > 0), ..push };
+                self.second.record(rec, buffers, &push, receivers, n_blocks)?;
+            }
         }
         Ok(())
     }

@@ -35,6 +35,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/lobe.glsl",
     "include/occlude.glsl",
     "include/philox.glsl",
+    "include/reach.glsl",
     "include/records.glsl",
     "include/sort.glsl",
     "include/veil.glsl",

@@ -28,6 +28,9 @@ record! {
         pair_steps: u32,
         i_first_block: u32,
         theta: f32,
+        n_surfaces: u32,
+        /// 1: to what the receivers have already.
+        adds: u32,
     }
 }
 
@@ -69,7 +72,7 @@ impl Second {
         self.block
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: f32 [facet][light]; `regions`: RegionRecord; `order`: u32,
+    /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: [f32; 2] [facet][light]; `regions`: RegionRecord; `order`: u32,
     /// the facet of each place; `leaves`: u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4]
     /// [source][light].
     pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 8], push: &SourcesPush) -> Result<()> {

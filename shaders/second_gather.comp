@@ -42,6 +42,7 @@ layout(push_constant) uniform Push {
     uint pair_steps;
     uint i_first_block;
     float theta;
+    uint n_surfaces;
     // 1 in the first of the dispatches that make up a gather, and in the last.
     uint begins;
     uint ends;
@@ -67,6 +68,7 @@ layout(std430, binding = 13) buffer Reached { uint reached[]; };
 #include "density.glsl"
 #endif
 #include "veil.glsl"
+#include "reach.glsl"
 #include "gather.glsl"
 #include "cells.glsl"
 
@@ -97,19 +99,26 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
         if (veiled) {
-#if TREE
-            float radius = n_nodes > 1u && view.width > push.theta * TORN ? sources[i].radius : 0.0;
+            float radius = torn_radius(sources[i], walk, view, n_nodes);
             bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
-            view.split = view.split || (n_nodes > 1u && veiling.y);
+            view.split = view.split || (radius > 0.0 && veiling.y);
             share = view.split || veiling.x ? 0.0 : share;
-#else
-            share *= visible(pairing, veil, taker.position, view.position, share > 0.0);
-#endif
         }
+        float lit_radius = n_nodes == 1u && emitter.kind == REGION_SURFACE ? torn_radius(sources[i], walk, view, n_nodes) : 0.0;
+        bool in_part = is_lit_in_part(i, pairing.i_region, view.position, lit_radius, share > 0.0 && lit_radius > 0.0);
+        view.split = view.split || in_part;
+        share = view.split ? 0.0 : share;
 #if MARCH
         share *= attenuation(taker.position, view.position, share > 0.0);
 #endif
-        vec3 e = view.leaving * share;
+        // A part of a facet has light of its own.
+        uint n_own = share > 0.0 && walk.level > 0u ? push.n_lights : 0u;
+        vec3 leaving = n_own > 0u ? vec3(0.0) : view.leaving;
+        for (uint l = 0u; l < n_own; ++l) {
+            float g = cell_share(i, sources[i], pairing.i_region, view.position, l);
+            leaving += cell_flux(g, sources[i], emitter, view.position, -view.way, l);
+        }
+        vec3 e = leaving * share;
         sum.indirect += e;
 #if GLOSSY
         sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);

@@ -47,6 +47,7 @@ layout(push_constant) uniform Push {
     uint i_vectors;
     uint n_rows;
     uint n_columns;
+    uint n_surfaces;
     // As second_gather.comp has them; and 1 for the first light that has energy.
     uint begins;
     uint ends;
@@ -73,6 +74,7 @@ layout(std430, binding = 13) buffer Reached { uint reached[]; };
 #include "density.glsl"
 #endif
 #include "veil.glsl"
+#include "reach.glsl"
 #include "gather.glsl"
 #include "cells.glsl"
 
@@ -102,10 +104,9 @@ void clear() {
 #endif
 }
 
-// Adds what a cell at q sends: `share` of the flux of its source, toward the receiver's lobe at `gap`.
-void add(uint i_source, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float share, float gap) {
+// Adds what a cell at q sends: `share` of `flux`, its source's as if all of it were as the cell is, toward the receiver's lobe at `gap`.
+void add(vec4 flux, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float share, float gap) {
     Light light = lights[push.i_light];
-    vec4 flux = fluxes[i_source * push.n_lights + push.i_light];
     float response[N_RESPONSES];
     response[0] = share * PI_INVERSE;
 #if GLOSSY && N_BASES > 1
@@ -140,16 +141,26 @@ void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool 
         uint i = pairing.i_source + walk.s;
         View view = look(sources[i], i, 1u, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
+        float radius = torn_radius(sources[i], walk, view, 1u);
         if (veiled) {
-            share *= visible(pairing, veil, taker.position, view.position, share > 0.0);
+            bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
+            view.split = view.split || (radius > 0.0 && veiling.y);
+            share = view.split || veiling.x ? 0.0 : share;
         }
+        float lit_radius = emitter.kind == REGION_SURFACE ? radius : 0.0;
+        bool in_part = is_lit_in_part(i, pairing.i_region, view.position, lit_radius, share > 0.0 && lit_radius > 0.0);
+        view.split = view.split || in_part;
+        share = view.split ? 0.0 : share;
 #if MARCH
         share *= attenuation(taker.position, view.position, share > 0.0);
 #endif
         // A loop and not a condition: a device that runs both sides of a condition then leaves it out.
         uint n_arriving = share > 0.0 ? 1u : 0u;
         for (uint k = 0u; k < n_arriving; ++k) {
-            add(i, emitter, view.position, sources[i].normal, -view.way, share, view.taker_gap);
+            vec4 flux = fluxes[i * push.n_lights + push.i_light];
+            // A part of a facet has light of its own.
+            flux.w = walk.level > 0u ? cell_share(i, sources[i], pairing.i_region, view.position, push.i_light) : flux.w;
+            add(flux, emitter, view.position, sources[i].normal, -view.way, share, view.taker_gap);
         }
         n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
         walk = advance(walk, view.split, 1u);

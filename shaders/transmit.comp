@@ -21,9 +21,10 @@ layout(std430, binding = 2) readonly buffer Regions { Region regions[]; };
 layout(std430, binding = 3) readonly buffer Density { float density[]; };
 // [facet][light]
 layout(std430, binding = 4) writeonly buffer Transmittance { float transmittance[]; };
-layout(std430, binding = 5) writeonly buffer Shares { float shares[]; };
+layout(std430, binding = 5) writeonly buffer Shares { vec2 shares[]; };
 
 #include "density.glsl"
+#include "reach.glsl"
 
 // From where to where the way from p along d, so far, leads through the grid's box; the end before the begin where it
 // misses the box.
@@ -43,17 +44,6 @@ vec2 crossing(vec3 p, vec3 d, float distance) {
     return vec2(enter, leave);
 }
 
-// Whether no surface but the facet's own hides the light from p.
-bool is_clear(vec3 p, Light light, uint i_own) {
-    for (uint i = 0; i < push.n_surfaces; ++i) {
-        Region r = regions[i];
-        if (i != i_own && (light.kind == LIGHT_POINT ? hides(r, p, light.position) : shades(r, p, light.toward))) {
-            return false;
-        }
-    }
-    return true;
-}
-
 // The share of the facet's 4 x 4 parts whose middles the light reaches; of a cloud's facet all or nothing.
 float clear_share(Facet facet, Light light, bool is_center_clear) {
     if (facet.i_region >= push.n_surfaces) {
@@ -64,7 +54,7 @@ float clear_share(Facet facet, Light light, bool is_center_clear) {
     uint n_clear = 0;
     for (uint i = 0; i < SHARE_SIDE * SHARE_SIDE; ++i) {
         vec2 at = (vec2(i % SHARE_SIDE, i / SHARE_SIDE) + 0.5) * (2.0 / float(SHARE_SIDE)) - 1.0;
-        n_clear += is_clear(facet.position + at.x * u + at.y * v, light, facet.i_region) ? 1u : 0u;
+        n_clear += is_clear(facet.position + at.x * u + at.y * v, light, facet.i_region, push.n_surfaces) ? 1u : 0u;
     }
     return float(n_clear) * (1.0 / float(SHARE_SIDE * SHARE_SIDE));
 }
@@ -94,7 +84,7 @@ void main() {
         Light light = lights[k % push.n_lights];
         // What a light without energy brings is multiplied by 0 anyway.
         bool is_on = any(notEqual(light.energy, vec3(0.0)));
-        bool is_center_clear = is_on && is_clear(facet.position, light, facet.i_region);
+        bool is_center_clear = is_on && is_clear(facet.position, light, facet.i_region, push.n_surfaces);
         float share = SHARES != 0 && is_on ? clear_share(facet, light, is_center_clear) : 0.0;
         float through = 0.0;
         if (is_center_clear || share > 0.0) {
@@ -102,7 +92,7 @@ void main() {
         }
         transmittance[k] = is_center_clear ? through : 0.0;
         if (SHARES != 0) {
-            shares[k] = share * through;
+            shares[k] = vec2(share, through);
         }
     }
 }

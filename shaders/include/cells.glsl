@@ -17,6 +17,10 @@ const float CLOUD_THETA = 0.4;
 // Where a cluster's normals differ, those nearer to the receiver may be those that face it: an error of the first order,
 // of this share of radius over distance times the normals' spread.
 const float MIXED = 0.5;
+// Cells wider than this share of their distance are discs to their receiver.
+const float NEAR = 1.0;
+// A cell that a shadow's rim runs through is quartered down to this share of pair_size.
+const float RIM = 0.25;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
 // Cells of one facet that are looked at, at most.
@@ -149,12 +153,15 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     float inverse = inversesqrt(max(d2, 1e-30));
     view.way = offset * inverse;
     float part = scale * scale;
-    view.share = part * form(taker.normal, source.normal, view.way, d2, part * source.area);
+    view.width = pane.side * scale * inverse;
+    // The disc's factor where the derivatives' series would not do; a cloud's facet is a disc.
+    view.share = part * (view.width > 0.0 && view.width <= NEAR
+        ? rectangle_form(taker.normal, source.normal, view.way, d2, scale * pane.half_u, scale * pane.half_v)
+        : form(taker.normal, source.normal, view.way, d2, part * source.area));
 #if TREE
     float extent = source.spread / max(d2, 1e-30);
     view.share = is_cluster ? cluster_form(taker.normal, source.normal, view.way, d2, extent, emitter.kind) : view.share;
 #endif
-    view.width = pane.side * scale * inverse;
     view.leaving = source.flux;
     float excess = view.width / limit;
 #if TREE
@@ -192,4 +199,15 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
     view.split = view.wide && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
 #endif
     return view;
+}
+
+// Of the ball about a cluster or cell that is opened where the rim of a shadow runs through it; 0 where it is small enough.
+float torn_radius(Source source, Walk walk, View view, uint n_nodes) {
+#if TREE
+    if (n_nodes > 1u) {
+        return view.width > push.theta * TORN ? source.radius : 0.0;
+    }
+#endif
+    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+    return wide ? source.radius * cell_scale(walk.level) : 0.0;
 }

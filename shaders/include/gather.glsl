@@ -12,23 +12,27 @@ float form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float a
     return max(at_source, 0.0) * max(at_receiver, 0.0) / (d2 + area * PI_INVERSE);
 }
 
-// 1 where no surface of the veil hides q from p. Nothing is looked at where nothing would come.
-float visible(Pairing pairing, Veil veil, vec3 p, vec3 q, bool wanted) {
-    uint n = wanted ? veil.n : 0u;
-    bool clear = true;
-    for (uint k = 0u; k < n; ++k) {
-        clear = clear && !hides(regions[occluder_of(pairing, veil, k)], p, q);
-    }
-    return clear ? 1.0 : 0.0;
+// The mean of cos cos/d^2 over a rectangle of half axes u and v about the end of unit `way`, to the second derivatives: of
+// (n_r x)(-n_s x)/|x|^4 along u it is 4 (-n_s w)[(n_r w)(6 (u w)^2 - u u) - 2 (n_r u)(u w)]/d^4, w the way, and the mean a
+// sixth of it.
+float rectangle_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, vec3 u, vec3 v) {
+    float at_source = -dot(source_normal, way), at_receiver = dot(receiver_normal, way);
+    vec2 along = vec2(dot(u, way), dot(v, way));
+    vec2 leaning = vec2(dot(receiver_normal, u), dot(receiver_normal, v));
+    float bent = at_receiver * (6.0 * dot(along, along) - dot(u, u) - dot(v, v)) - 2.0 * dot(leaning, along);
+    bool faces = at_source > 0.0 && at_receiver > 0.0;
+    return faces ? at_source * max(at_receiver + bent * 2.0 / (3.0 * d2), 0.0) / d2 : 0.0;
 }
 
-// The same of a ball about q: x, whether its middle is hidden; y, whether the rim of a shadow runs through it.
+// What the veil hides of a ball about q: x, whether its middle is hidden; y, whether the rim of a shadow runs through it.
+// Nothing is looked at where nothing would come. Two a turn: turns are counted (src/frame/exchange.rs).
 bvec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
     uint n = wanted ? veil.n : 0u;
     bvec2 found = bvec2(false);
-    for (uint k = 0u; k < n; ++k) {
-        bvec2 by = hides_ball(regions[occluder_of(pairing, veil, k)], p, q, radius);
-        found = bvec2(found.x || by.x, found.y || by.y);
+    for (uint k = 0u; k < n; k += 2u) {
+        bvec2 a = hides_ball(regions[occluder_of(pairing, veil, k)], p, q, radius);
+        bvec2 b = hides_ball(regions[occluder_of(pairing, veil, min(k + 1u, n - 1u))], p, q, radius);
+        found = bvec2(found.x || a.x || b.x, found.y || a.y || b.y);
     }
     return found;
 }
@@ -57,6 +61,34 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
     return depth > 0.0 ? exp(-depth) : 1.0;
 }
 #endif
+
+// A g of a part of a surface's facet for light l, as if the whole facet were lit as the part's middle p is: the facet's own
+// mean would carry its shadows' rims to where a receiver touches it.
+float cell_share(uint i_source, Source source, uint i_region, vec3 p, uint l) {
+    Light light = lights[l];
+    vec2 share = fluxes[i_source * push.n_lights + l].xy;
+    bool hidden = shadows_on(p, 0.0, light, i_region, share.x > 0.0 ? push.n_surfaces : 0u).x;
+    return source.area * share_of(light, arrival_at(light, p), source.normal, hidden ? 0.0 : share.y);
+}
+
+// What it sends toward `outgoing` of light l: radiance times the facet's area.
+vec3 cell_flux(float g, Source source, Region emitter, vec3 p, vec3 outgoing, uint l) {
+    Light light = lights[l];
+    bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY && g > 0.0;
+    float lobe = shines ? lobe_between(emitter.i_lobe, source.normal, arrival_at(light, p).toward, outgoing) : 0.0;
+    return light.energy * g * (emitter.kd * PI_INVERSE + emitter.ks * lobe);
+}
+
+// Whether the rim of a shadow runs through the ball about p, part of a facet on which some light falls.
+bool is_lit_in_part(uint i_source, uint i_region, vec3 p, float radius, bool wanted) {
+    uint n = wanted ? push.n_lights : 0u;
+    bool torn = false;
+    for (uint l = 0u; l < n; ++l) {
+        uint n_surfaces = fluxes[i_source * push.n_lights + l].x > 0.0 ? push.n_surfaces : 0u;
+        torn = torn || shadows_on(p, radius, lights[l], i_region, n_surfaces).y;
+    }
+    return torn;
+}
 
 // The lobe of a cell of a source toward `outgoing`, by light: radiance per area of the source times its whole area.
 // `gap`: the least 1 - cos gamma of any light.

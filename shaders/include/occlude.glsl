@@ -48,3 +48,15 @@ bool shades(Region r, vec3 p, vec3 d) {
     bool toward = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
     return toward && holds(r, p - d * (a / b));
 }
+
+// How much of the ball about p its shadow along -d without end covers, as hides_ball has it.
+bvec2 shades_ball(Region r, vec3 p, vec3 d, float radius) {
+    float a = side_of(r, p), b = dot(r.normal, d);
+    vec3 o = p - d * (a / b) - r.center;
+    float uu = dot(r.u, r.u), vv = dot(r.v, r.v);
+    vec2 outside = (abs(vec2(dot(o, r.u), dot(o, r.v))) - vec2(uu, vv)) * inversesqrt(vec2(uu, vv));
+    float most = max(outside.x, outside.y);
+    float reach = radius / max(abs(b), 1e-30);
+    bool toward = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
+    return bvec2(toward && most <= 0.0, abs(a) < radius ? most < reach : toward && abs(most) < reach);
+}

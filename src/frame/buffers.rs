@@ -79,7 +79,7 @@ impl Buffers {
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
             i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
             table: Buffer::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64, Place::Upload)?,
-            shares: Buffer::new::<f32>(device, "transmit.shares", n_shares, Place::Device)?,
+            shares: Buffer::new::<[f32; 2]>(device, "transmit.shares", n_shares, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,

@@ -135,7 +135,9 @@ pub fn steps(scene: &Scene) -> u32 {
     // A step itself, and each loop within it, which turns once more to find that it is done.
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps + 1 } else { 0 };
     let lobes = if (0..scene.n_regions()).any(|i| is_glossy(scene, i)) { scene.lights.len() as u32 + 3 } else { 1 };
-    let turns = 1 + (n_occluders + 1) + march + lobes;
+    // Whether each light reaches a cell: four surfaces a turn, for the rim of a shadow and for the cell's own light.
+    let own_light = 2 * (scene.lights.len() as u32 * (scene.surfaces.len() as u32 / 4 + 2) + 1);
+    let turns = 1 + (n_occluders / 2 + 2) + march + lobes + own_light;
     // Before the walk each pairing's veil looks at every occluder, corner by corner.
     let veils = from.iter().map(|p| p.iter().map(|p| 21 * p.occluders.len() as u32 + 5).sum()).max().unwrap_or(0);
     // The last facet's cells may be half as many again; an audit takes the steps once more.

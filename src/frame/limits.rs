@@ -38,7 +38,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the facets", scene.n_facets(), size(size_of::<FacetRecord>())),
         ("the facets' light", scene.n_facets(), size(size_of::<LitRecord>())),
         ("the transmittances", scene.n_facets() * scene.lights.len() as u64, 4),
-        ("the transmittances' means", scene.n_facets() * scene.lights.len() as u64, 4),
+        ("the transmittances' means", scene.n_facets() * scene.lights.len() as u64, 8),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
         ("the Morton order's entries", if is_grouped(scene) { 2 * n } else { 0 }, 8),

@@ -19,6 +19,7 @@ pub struct Relay {
     order: Option<Order>,
     n_facets: u32,
     n_lights: u32,
+    n_surfaces: u32,
     step_cells: f64,
     backward: f64,
     pairs: Pairs,
@@ -53,6 +54,7 @@ impl Relay {
             order: if tree { Some(Order::new(device, compiler, scene)?) } else { None },
             n_facets: scene.n_facets() as u32,
             n_lights: scene.lights.len() as u32,
+            n_surfaces: scene.surfaces.len() as u32,
             step_cells: lighting.step,
             backward: 1.0 - lighting.forward,
             pairs: lighting.pairs,
@@ -99,6 +101,7 @@ impl Relay {
                 pair_steps: self.pairs.steps,
                 i_first_block,
                 theta: self.theta as f32,
+                n_surfaces: self.n_surfaces,
                 begins: u32::from(begins),
                 ends: u32::from(ends),
             };

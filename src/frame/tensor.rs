@@ -257,6 +257,7 @@ impl TensorStage {
                 i_vectors: self.i_vectors,
                 n_rows: self.shape.n_rows as u32,
                 n_columns: self.shape.n_columns,
+                n_surfaces: of.n_surfaces,
                 begins: of.begins,
                 ends: of.ends,
                 is_first_light: u32::from(k == 0),

@@ -40,6 +40,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/lobe.glsl",
     "include/occlude.glsl",
     "include/philox.glsl",
+    "include/reach.glsl",
     "include/records.glsl",
     "include/shell.glsl",
     "include/sort.glsl",

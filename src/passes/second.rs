@@ -28,6 +28,7 @@ record! {
         pair_steps: u32,
         i_first_block: u32,
         theta: f32,
+        n_surfaces: u32,
         begins: u32,
         ends: u32,
     }
@@ -77,7 +78,7 @@ impl Second {
         self.block
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: f32 [facet][light]; `regions`: RegionRecord; `order`: u32,
+    /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: [f32; 2] [facet][light]; `regions`: RegionRecord; `order`: u32,
     /// the facet of each place; `leaves`: u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4]
     /// [source][light].
     pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 8], push: &SourcesPush) -> Result<()> {
@@ -120,6 +121,7 @@ record! {
         i_vectors: u32,
         n_rows: u32,
         n_columns: u32,
+        n_surfaces: u32,
         begins: u32,
         ends: u32,
         is_first_light: u32,

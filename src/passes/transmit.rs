@@ -1,7 +1,7 @@
 //! transmit: how much of each light arrives at each facet.
 //!
 //! In: facets, lights, regions (rectangles), density grid. Out: transmittance [facet][light], and where it is asked for
-//! its area mean (shares). Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
+//! its area mean (shares), as two factors. Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
 //! docs/model.md §8, §11. Error: against the same march in f64, (1−g)τ times the samples' relative rounding plus
 //! 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few ulp may be hidden
 //! or not.
@@ -39,7 +39,8 @@ impl Transmit {
     }
 
     /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord, the surfaces' first; `density`: f32;
-    /// `transmittance` and `shares`: f32, the latter empty where it was not asked for. `step_cells` is the step in
+    /// `transmittance`: f32; `shares`: [f32; 2], what surfaces leave of it and what clouds do, empty where it was not asked
+    /// for. `step_cells` is the step in
     /// cells, `forward` is g: where it is 1, nothing is marched.
     pub fn record(
         &self,

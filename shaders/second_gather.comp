@@ -24,9 +24,12 @@
 #define GLOSSY 1
 #endif
 
-// Steps of one invocation in one dispatch.
+// Sources, and cells of them, of one invocation in one dispatch.
 #ifndef STEPS
 #define STEPS 1024
+#endif
+#ifndef CELLS
+#define CELLS 1024
 #endif
 
 layout(local_size_x = WORKGROUP) in;
@@ -88,25 +91,32 @@ struct Sum {
     float unresolved;
 };
 
-// Adds what the first `n` sources of a pairing send to the receiver. One step is one cell: a whole facet, or a quarter of
-// a cell that was too wide for its distance, so that neighbouring invocations need not wait for each other's near facets.
-void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
-    Pane pane = pane_of(emitter);
-    Walk walk = start_walk(s);
-    while (goes_on(walk, end)) {
-        uint i = pairing.i_source + walk.s;
-        uint n_nodes = nodes_of(i);
-        View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
+// Adds what a cell sends along its way.
+void take(inout Sum sum, View view, vec3 e, Taker taker) {
+    sum.indirect += e;
+#if GLOSSY
+    sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
+#endif
+}
+
+// The facets that were set aside, cell by cell: one step is one cell, so that neighbouring invocations need not wait for
+// each other's facets.
+void gather_cells(
+    inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, Pane pane,
+    uint aside[MAX_ASIDE], uint n_aside) {
+    Walk walk = start_walk(0u);
+    while (walk.s < n_aside) {
+        uint i = aside[walk.s];
+        Source source = sources[i];
+        View view = look(source, i, 1u, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
+        float radius = torn_radius(source, walk, view, 1u);
         if (veiled) {
-            float radius = torn_radius(sources[i], walk, view, n_nodes);
             bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
             view.split = view.split || (radius > 0.0 && veiling.y);
             share = view.split || veiling.x ? 0.0 : share;
         }
-        float lit_radius = n_nodes == 1u && emitter.kind == REGION_SURFACE ? torn_radius(sources[i], walk, view, n_nodes) : 0.0;
-        bool in_part = is_lit_in_part(i, pairing.i_region, view.position, lit_radius, share > 0.0 && lit_radius > 0.0);
-        view.split = view.split || in_part;
+        view.split = view.split || is_lit_in_part(i, pairing.i_region, view.position, radius, share > 0.0 && source.in_part > 0.0);
         share = view.split ? 0.0 : share;
 #if MARCH
         share *= attenuation(taker.position, view.position, share > 0.0);
@@ -115,18 +125,54 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         uint n_own = share > 0.0 && walk.level > 0u ? push.n_lights : 0u;
         vec3 leaving = n_own > 0u ? vec3(0.0) : view.leaving;
         for (uint l = 0u; l < n_own; ++l) {
-            float g = cell_share(i, sources[i], pairing.i_region, view.position, l);
-            leaving += cell_flux(g, sources[i], emitter, view.position, -view.way, l);
+            float g = cell_share(i, source, pairing.i_region, view.position, l);
+            leaving += cell_flux(g, source, emitter, view.position, -view.way, l);
         }
-        vec3 e = leaving * share;
-        sum.indirect += e;
-#if GLOSSY
-        sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
-#endif
+        take(sum, view, leaving * share, taker);
         sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
-        walk = advance(walk, view.split, n_nodes);
+        n_cells_left -= min(n_cells_left, 1u);
+        walk = advance(walk, view.split, 1u);
     }
-    s = max(walk.s, s);
+    n_cut += float(n_aside - walk.s);
+}
+
+// Adds what the sources of a pairing from `s` on send to the receiver, and moves `s`. A step is a facet or cluster as a
+// whole; facets too wide for their distance, or with a shadow's rim on them, follow cell by cell.
+void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
+    Pane pane = pane_of(emitter);
+    uint aside[MAX_ASIDE];
+    while (s < end && n_sources_left > 0u) {
+        uint n_aside = 0u;
+        while (s < end && n_sources_left > 0u && n_aside < MAX_ASIDE) {
+            uint i = pairing.i_source + s;
+            uint n_nodes = nodes_of(i);
+            Source source = sources[i];
+            Walk walk = start_walk(s);
+            View view = look(source, i, n_nodes, walk, pane, emitter, taker);
+            float share = view.split ? 0.0 : view.share;
+            float radius = torn_radius(source, walk, view, n_nodes);
+            if (veiled) {
+                bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
+                view.split = view.split || (radius > 0.0 && veiling.y);
+                share = view.split || veiling.x ? 0.0 : share;
+            }
+            bool is_facet = n_nodes == 1u;
+            view.split = view.split || (is_facet && source.in_part > 0.0 && radius > 0.0 && share > 0.0);
+            share = view.split ? 0.0 : share;
+#if MARCH
+            share *= attenuation(taker.position, view.position, share > 0.0);
+#endif
+            take(sum, view, view.leaving * share, taker);
+            sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+            aside[n_aside] = i;
+            n_aside += is_facet && view.split ? 1u : 0u;
+            s += view.split && !is_facet ? 1u : n_nodes;
+            n_sources_left -= 1u;
+        }
+        gather_cells(sum, pairing, emitter, taker, veil, veiled, pane, aside, n_aside);
+        // Without cells to spend the next facet would be looked at as a whole only: it waits for the next dispatch.
+        n_sources_left = n_cells_left < CELLS / 4u ? 0u : n_sources_left;
+    }
 }
 
 // The lobe's gap where it is nearest to its peak in a cell that turns the half vector by `turn`.
@@ -140,6 +186,9 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, u
     Pane pane = pane_of(emitter);
     Walk walk = start_walk(s);
     float bound = 0.0;
+    // Cells of its own.
+    uint n_kept = n_cells_left;
+    n_cells_left = CELLS;
     while (walk.s < end) {
         uint i = pairing.i_source + walk.s;
         Source source = sources[i];
@@ -168,8 +217,10 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, u
         vec3 lobes = max(sent * taken - met, vec3(0.0)) * (view.width > 1.0 ? most : view.share);
         vec3 e = geometry + lobes;
         bound += view.wide && !view.split ? max(e.x, max(e.y, e.z)) : 0.0;
+        n_cells_left -= min(n_cells_left, view.split ? 1u : 0u);
         walk = advance(walk, view.split, n_nodes);
     }
+    n_cells_left = n_kept;
     return bound;
 }
 
@@ -190,7 +241,7 @@ void main() {
         Region emitter = regions[pairing.i_region];
         last = pairing.i_source + pairing.n_sources;
         uint s = begin_of(pairing, next);
-        uint n = n_left > 0u ? pairing.n_sources : 0u;
+        uint n = n_sources_left > 0u ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position);
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
         uint n_before = s;
@@ -210,7 +261,7 @@ void main() {
         lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * sum.indirect + front * own.ks * sum.glossy;
         lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + sum.n_unresolved;
         lit[j].unresolved = (begins ? 0.0 : before.unresolved) + sum.unresolved;
-        lit[j].n_lost = push.ends != 0u ? float(last - min(next, last)) : 0.0;
+        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
         reached[j] = next;
     }
 }

@@ -26,9 +26,12 @@
 #define N_BASES 8
 #endif
 
-// Steps of one invocation in one dispatch.
+// Sources, and cells of them, of one invocation in one dispatch.
 #ifndef STEPS
 #define STEPS 1024
+#endif
+#ifndef CELLS
+#define CELLS 1024
 #endif
 
 layout(local_size_x = WORKGROUP) in;
@@ -133,23 +136,25 @@ void add(vec4 flux, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float sh
 #endif
 }
 
-// As `gather` of second_gather.comp, cell by cell.
-void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
-    Pane pane = pane_of(emitter);
-    Walk walk = start_walk(s);
-    while (goes_on(walk, end)) {
-        uint i = pairing.i_source + walk.s;
-        View view = look(sources[i], i, 1u, walk, pane, emitter, taker);
+// As second_gather.comp has it.
+// The facets that were set aside, cell by cell: one step is one cell, so that neighbouring invocations need not wait for
+// each other's facets.
+void gather_cells(
+    Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, Pane pane,
+    uint aside[MAX_ASIDE], uint n_aside) {
+    Walk walk = start_walk(0u);
+    while (walk.s < n_aside) {
+        uint i = aside[walk.s];
+        Source source = sources[i];
+        View view = look(source, i, 1u, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
-        float radius = torn_radius(sources[i], walk, view, 1u);
+        float radius = torn_radius(source, walk, view, 1u);
         if (veiled) {
             bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
             view.split = view.split || (radius > 0.0 && veiling.y);
             share = view.split || veiling.x ? 0.0 : share;
         }
-        float lit_radius = emitter.kind == REGION_SURFACE ? radius : 0.0;
-        bool in_part = is_lit_in_part(i, pairing.i_region, view.position, lit_radius, share > 0.0 && lit_radius > 0.0);
-        view.split = view.split || in_part;
+        view.split = view.split || is_lit_in_part(i, pairing.i_region, view.position, radius, share > 0.0 && source.in_part > 0.0);
         share = view.split ? 0.0 : share;
 #if MARCH
         share *= attenuation(taker.position, view.position, share > 0.0);
@@ -159,13 +164,57 @@ void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool 
         for (uint k = 0u; k < n_arriving; ++k) {
             vec4 flux = fluxes[i * push.n_lights + push.i_light];
             // A part of a facet has light of its own.
-            flux.w = walk.level > 0u ? cell_share(i, sources[i], pairing.i_region, view.position, push.i_light) : flux.w;
-            add(flux, emitter, view.position, sources[i].normal, -view.way, share, view.taker_gap);
+            flux.w = walk.level > 0u ? cell_share(i, source, pairing.i_region, view.position, push.i_light) : flux.w;
+            add(flux, emitter, view.position, source.normal, -view.way, share, view.taker_gap);
         }
         n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+        n_cells_left -= min(n_cells_left, 1u);
         walk = advance(walk, view.split, 1u);
     }
-    s = max(walk.s, s);
+    n_cut += float(n_aside - walk.s);
+}
+
+// Adds what the sources of a pairing from `s` on send to the receiver, and moves `s`. A step is a facet or cluster as a
+// whole; facets too wide for their distance, or with a shadow's rim on them, follow cell by cell.
+void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
+    Pane pane = pane_of(emitter);
+    uint aside[MAX_ASIDE];
+    while (s < end && n_sources_left > 0u) {
+        uint n_aside = 0u;
+        while (s < end && n_sources_left > 0u && n_aside < MAX_ASIDE) {
+            uint i = pairing.i_source + s;
+            uint n_nodes = 1u;
+            Source source = sources[i];
+            Walk walk = start_walk(s);
+            View view = look(source, i, n_nodes, walk, pane, emitter, taker);
+            float share = view.split ? 0.0 : view.share;
+            float radius = torn_radius(source, walk, view, n_nodes);
+            if (veiled) {
+                bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
+                view.split = view.split || (radius > 0.0 && veiling.y);
+                share = view.split || veiling.x ? 0.0 : share;
+            }
+            bool is_facet = n_nodes == 1u;
+            view.split = view.split || (is_facet && source.in_part > 0.0 && radius > 0.0 && share > 0.0);
+            share = view.split ? 0.0 : share;
+#if MARCH
+            share *= attenuation(taker.position, view.position, share > 0.0);
+#endif
+            uint n_arriving = share > 0.0 ? 1u : 0u;
+            for (uint k = 0u; k < n_arriving; ++k) {
+                vec4 flux = fluxes[i * push.n_lights + push.i_light];
+                add(flux, emitter, view.position, source.normal, -view.way, share, view.taker_gap);
+            }
+            n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+            aside[n_aside] = i;
+            n_aside += is_facet && view.split ? 1u : 0u;
+            s += view.split && !is_facet ? 1u : n_nodes;
+            n_sources_left -= 1u;
+        }
+        gather_cells(pairing, emitter, taker, veil, veiled, pane, aside, n_aside);
+        // Without cells to spend the next facet would be looked at as a whole only: it waits for the next dispatch.
+        n_sources_left = n_cells_left < CELLS / 4u ? 0u : n_sources_left;
+    }
 }
 
 // The sums of receiver j as columns of its rows.
@@ -207,7 +256,7 @@ void main() {
         Region emitter = regions[pairing.i_region];
         last = pairing.i_source + pairing.n_sources;
         uint s = begin_of(pairing, next);
-        uint n = n_left > 0u ? pairing.n_sources : 0u;
+        uint n = n_sources_left > 0u ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position);
         clear();
         gather(pairing, emitter, taker, veil, false, s, veil.n == 0u ? n : 0u);
@@ -223,7 +272,7 @@ void main() {
         if (push.is_first_light != 0u) {
             lit[j].n_unresolved = (push.begins != 0u ? 0.0 : lit[j].n_unresolved) + n_unresolved;
         }
-        lit[j].n_lost = push.ends != 0u ? float(last - min(next, last)) : 0.0;
+        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
         reached[j] = next;
     }
 }

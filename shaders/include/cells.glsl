@@ -20,11 +20,9 @@ const float MIXED = 0.5;
 // Cells wider than this share of their distance are discs to their receiver.
 const float NEAR = 1.0;
 // A cell that a shadow's rim runs through is quartered down to this share of pair_size.
-const float RIM = 0.25;
+const float RIM = 0.5;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
-// Cells of one facet that are looked at, at most.
-const uint MAX_STEPS = STEPS / 2u;
 
 // What the cells of a region's facets have in common. A cloud's facets have no axes and are one cell.
 struct Pane { vec3 half_u; vec3 half_v; float side; };
@@ -37,15 +35,20 @@ Pane pane_of(Region emitter) {
 }
 
 // Source s of the region, and cell `at` of the 4^level it is divided into, in Z order.
-struct Walk { uint s; uint level; uvec2 at; uint n_steps; };
+struct Walk { uint s; uint level; uvec2 at; };
 
-Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u), 0u); }
+Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u)); }
 
-// Steps that this dispatch may still take: a driver may end a loop after some ten thousand turns without a word, so the
-// walk goes on in another where it ended in this one.
-uint n_left = STEPS;
+// Sources and cells that this dispatch may still look at: a driver may end a loop after some ten thousand turns without a
+// word, so the walk goes on in another where it ended in this one.
+uint n_sources_left = STEPS;
+uint n_cells_left = CELLS;
+// Facets whose cells a driver cut short all the same.
+float n_cut = 0.0;
 
-bool goes_on(Walk walk, uint end) { return walk.s < end && (n_left > 0u || walk.level > 0u); }
+// Facets set aside for a closer look, so that what they take is not gone through for every facet: a device that runs both
+// sides of a condition runs an empty loop at least once.
+const uint MAX_ASIDE = 8u;
 
 // Where the walk through a pairing's sources begins, `reached` being the first source that is still to be looked at.
 uint begin_of(Pairing pairing, uint reached) {
@@ -58,7 +61,6 @@ float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
 // Into the cell's first quarter or the cluster's first child, or on to the next cell, or, after a facet's last, to the next
 // source: past the `n_nodes` of this one's subtree, 1 for a facet.
 Walk advance(Walk walk, bool split, uint n_nodes) {
-    n_left -= min(n_left, 1u);
     // Last quarters of last quarters are done together.
     uint up = min(uint(findLSB(~(walk.at.x & walk.at.y))), walk.level);
     uint level = walk.level - up;
@@ -70,8 +72,7 @@ Walk advance(Walk walk, bool split, uint n_nodes) {
     next = done ? uvec2(0u) : next;
     bool quarters = split && !enters;
     return Walk(
-        walk.s + (done ? (enters ? 1u : n_nodes) : 0u), quarters ? walk.level + 1u : level, quarters ? walk.at * 2u : next,
-        done ? 0u : walk.n_steps + 1u);
+        walk.s + (done ? (enters ? 1u : n_nodes) : 0u), quarters ? walk.level + 1u : level, quarters ? walk.at * 2u : next);
 }
 
 // A cell as the receiver sees it.
@@ -192,11 +193,11 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
 #if TREE
     // A cluster with normals of its own each may send what its mean does not say.
     faces = faces || (is_cluster && dot(source.normal, source.normal) < EVEN * EVEN);
-    view.split = before && faces && excess > 1.0 && (is_cluster || (walk.level < push.pair_levels && walk.n_steps < MAX_STEPS));
+    view.split = before && faces && excess > 1.0 && (is_cluster || (walk.level < push.pair_levels && n_cells_left > 0u));
     view.wide = before && faces && excess > 1.0 && !is_cluster;
 #else
     view.wide = before && faces && excess > 1.0;
-    view.split = view.wide && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+    view.split = view.wide && walk.level < push.pair_levels && n_cells_left > 0u;
 #endif
     return view;
 }
@@ -208,6 +209,6 @@ float torn_radius(Source source, Walk walk, View view, uint n_nodes) {
         return view.width > push.theta * TORN ? source.radius : 0.0;
     }
 #endif
-    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && n_cells_left > 0u;
     return wide ? source.radius * cell_scale(walk.level) : 0.0;
 }

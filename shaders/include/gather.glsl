@@ -66,8 +66,8 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
 // mean would carry its shadows' rims to where a receiver touches it.
 float cell_share(uint i_source, Source source, uint i_region, vec3 p, uint l) {
     Light light = lights[l];
-    vec2 share = fluxes[i_source * push.n_lights + l].xy;
-    bool hidden = shadows_on(p, 0.0, light, i_region, share.x > 0.0 ? push.n_surfaces : 0u).x;
+    vec3 share = fluxes[i_source * push.n_lights + l].xyz;
+    bool hidden = shadows_of(uint(share.z), p, 0.0, light, i_region, share.x > 0.0 ? push.n_surfaces : 0u).x;
     return source.area * share_of(light, arrival_at(light, p), source.normal, hidden ? 0.0 : share.y);
 }
 
@@ -84,8 +84,9 @@ bool is_lit_in_part(uint i_source, uint i_region, vec3 p, float radius, bool wan
     uint n = wanted ? push.n_lights : 0u;
     bool torn = false;
     for (uint l = 0u; l < n; ++l) {
-        uint n_surfaces = fluxes[i_source * push.n_lights + l].x > 0.0 ? push.n_surfaces : 0u;
-        torn = torn || shadows_on(p, radius, lights[l], i_region, n_surfaces).y;
+        vec3 share = fluxes[i_source * push.n_lights + l].xyz;
+        uint n_surfaces = share.x > 0.0 ? push.n_surfaces : 0u;
+        torn = torn || shadows_of(uint(share.z), p, radius, lights[l], i_region, n_surfaces).y;
     }
     return torn;
 }

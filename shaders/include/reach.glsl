@@ -14,22 +14,37 @@ bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
 
 // The light's way to the ball about p past one surface: x, whether its middle is hidden; y, whether the shadow's rim runs
 // through it.
-bvec2 shadow_of(uint i, vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
-    Region r = regions[min(i, n_surfaces - 1u)];
+bvec2 shadow_of(uint i, vec3 p, float radius, Light light, uint i_own) {
+    Region r = regions[i];
     bvec2 by = light.kind == LIGHT_POINT ? hides_ball(r, light.position, p, radius) : shades_ball(r, p, light.toward, radius);
-    bool counts = i < n_surfaces && i != i_own;
-    return bvec2(counts && by.x, counts && by.y);
+    return bvec2(i != i_own && by.x, i != i_own && by.y);
 }
 
-// The same of all surfaces but the ball's own. Four a turn: turns are counted (src/frame/exchange.rs).
-bvec2 shadows_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
+// Surfaces are remembered by number modulo this: as many bits as a float's whole numbers have.
+const uint N_MASK = 24u;
+
+// The surfaces whose shadow reaches into the ball, and in `torn` whether the rim of one does.
+uint shadows_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces, inout bool torn) {
+    uint mask = 0u;
+    for (uint i = 0u; i < n_surfaces; ++i) {
+        bvec2 by = shadow_of(i, p, radius, light, i_own);
+        mask |= by.x || by.y ? 1u << (i % N_MASK) : 0u;
+        torn = torn || by.y;
+    }
+    return mask;
+}
+
+// As shadow_of, past all surfaces of the mask.
+bvec2 shadows_of(uint mask, vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
     bvec2 found = bvec2(false);
-    for (uint i = 0u; i < n_surfaces; i += 4u) {
-        bvec2 a = shadow_of(i, p, radius, light, i_own, n_surfaces);
-        bvec2 b = shadow_of(i + 1u, p, radius, light, i_own, n_surfaces);
-        bvec2 c = shadow_of(i + 2u, p, radius, light, i_own, n_surfaces);
-        bvec2 d = shadow_of(i + 3u, p, radius, light, i_own, n_surfaces);
-        found = bvec2(found.x || a.x || b.x || c.x || d.x, found.y || a.y || b.y || c.y || d.y);
+    uint i = mask != 0u ? uint(findLSB(mask)) : n_surfaces;
+    while (i < n_surfaces) {
+        bvec2 by = shadow_of(i, p, radius, light, i_own);
+        found = bvec2(found.x || by.x, found.y || by.y);
+        i += N_MASK;
+        bool done = i >= n_surfaces;
+        mask &= done ? mask - 1u : mask;
+        i = done ? (mask != 0u ? uint(findLSB(mask)) : n_surfaces) : i;
     }
     return found;
 }

@@ -6,7 +6,7 @@ use crate::layout::second::{BlockRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
 use crate::model::scene::{Gather, Scene};
 use crate::model::tree::Tree;
-use crate::passes::second::Receivers;
+use crate::passes::second::{Receivers, Steps};
 
 use super::buffers::{Buffers, upload};
 
@@ -79,7 +79,7 @@ impl Exchange {
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
             reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
-            n_dispatches: (n_sources * CELLS_PER_SOURCE).div_ceil(u64::from(steps(scene))) as u32,
+            n_dispatches: n_dispatches(scene, n_sources),
             n_diffuse_blocks: lists.diffuse.len() as u32,
             n_glossy_blocks: lists.glossy.len() as u32,
         })
@@ -124,24 +124,35 @@ impl Exchange {
 /// Turns that an invocation's loops may take together, nested ones counted each: llvmpipe ends every loop without a word
 /// when they are used up (LP_MAX_TGSI_LOOP_ITERATIONS), and a watchdog may be as strict.
 const LOOP_TURNS: u32 = 65_535;
-/// Steps of a gather a source, on the average of a receiver: cells, or none where a cluster is taken as a whole. Where it
-/// is not enough, what is left is counted.
-const CELLS_PER_SOURCE: u64 = 2;
+/// Surfaces that shade a facet from a light, on the average of a walk.
+const SHADOWS: u32 = 4;
+/// Cells of a gather for every source, on the average of a receiver. Where that is not enough, what is left is counted.
+const CELLS_PER_SOURCE: f64 = 0.5;
 
-/// Steps that one invocation takes in one dispatch.
-pub fn steps(scene: &Scene) -> u32 {
+/// Dispatches of a gather of `n_sources`; a receiver that has done all it had to takes no step in the rest.
+fn n_dispatches(scene: &Scene, n_sources: u64) -> u32 {
+    let Steps { sources, cells } = steps(scene);
+    let n = n_sources as f64;
+    (n / f64::from(sources) + CELLS_PER_SOURCE * n / f64::from(cells)).ceil() as u32 + 1
+}
+
+/// What one invocation may look at in one dispatch. A step is a turn, and so is each of the loops within it, once more to
+/// find that it is done.
+pub fn steps(scene: &Scene) -> Steps {
     let from = pairings(&scene.surfaces, scene.clouds.len());
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len() as u32).max().unwrap_or(0);
-    // A step itself, and each loop within it, which turns once more to find that it is done.
+    let n_lights = scene.lights.len() as u32;
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps + 1 } else { 0 };
-    let lobes = if (0..scene.n_regions()).any(|i| is_glossy(scene, i)) { scene.lights.len() as u32 + 3 } else { 1 };
-    // Whether each light reaches a cell: four surfaces a turn, for the rim of a shadow and for the cell's own light.
-    let own_light = 2 * (scene.lights.len() as u32 * (scene.surfaces.len() as u32 / 4 + 2) + 1);
-    let turns = 1 + (n_occluders / 2 + 2) + march + lobes + own_light;
+    let lobes = if (0..scene.n_regions()).any(|i| is_glossy(scene, i)) { n_lights + 3 } else { 1 };
+    let of_source = 1 + (n_occluders / 2 + 2) + march + lobes;
+    // Whether each light reaches a cell: for the rim of a shadow and for the cell's own light, past what may shade it.
+    let of_cell = of_source + 2 * (n_lights * (SHADOWS + 2) + 1);
     // Before the walk each pairing's veil looks at every occluder, corner by corner.
-    let veils = from.iter().map(|p| p.iter().map(|p| 21 * p.occluders.len() as u32 + 5).sum()).max().unwrap_or(0);
-    // The last facet's cells may be half as many again; an audit takes the steps once more.
-    (LOOP_TURNS.saturating_sub(veils) / (turns * 5 / 2 + 1)).max(2)
+    let veils = from.iter().map(|p| p.iter().map(|p| 21 * p.occluders.len() as u32 + 8).sum()).max().unwrap_or(0);
+    // An eighth for sources, half for cells, a quarter for an audit of both, and the rest is room: cells that were begun
+    // are finished.
+    let eighth = LOOP_TURNS.saturating_sub(veils) / 8;
+    Steps { sources: (eighth / of_source).max(1), cells: (4 * eighth / of_cell).max(4) }
 }
 
 /// From this many facets on the tree is the faster (docs/measured.md).

@@ -19,9 +19,10 @@ record! {
         total_area: f32,
         /// Mean square distance of its facets' centres from the position, by flux.
         spread: f32,
+        /// 1: a facet that the rim of a shadow runs through.
+        in_part: f32,
         unused_1: f32,
         unused_2: f32,
-        unused_3: f32,
     }
 }
 

@@ -9,7 +9,7 @@ use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
 record! {
-    pub struct SourcesPush { n_facets: u32, n_lights: u32 }
+    pub struct SourcesPush { n_facets: u32, n_lights: u32, n_surfaces: u32 }
 }
 
 record! {
@@ -43,6 +43,13 @@ pub struct Second {
     block: u32,
 }
 
+/// What one invocation looks at in one dispatch, at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Steps {
+    pub sources: u32,
+    pub cells: u32,
+}
+
 /// Blocks of receivers, by whether they have a lobe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Receivers {
@@ -53,7 +60,7 @@ pub enum Receivers {
 impl Second {
     /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree.
     /// `steps`: of an invocation in a dispatch.
-    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool, steps: u32) -> Result<Second> {
+    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool, steps: Steps) -> Result<Second> {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let macros = [
@@ -61,7 +68,8 @@ impl Second {
                 ("MARCH", u32::from(has_clouds)),
                 ("GLOSSY", glossy),
                 ("TREE", u32::from(tree)),
-                ("STEPS", steps),
+                ("STEPS", steps.sources),
+                ("CELLS", steps.cells),
             ];
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
         };
@@ -142,13 +150,19 @@ impl SecondTensor {
         compiler: &Compiler,
         has_clouds: bool,
         n_bases: u32,
-        steps: u32,
+        steps: Steps,
     ) -> Result<SecondTensor> {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let march = u32::from(has_clouds);
-            let macros =
-                [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases), ("STEPS", steps)];
+            let macros = [
+                ("WORKGROUP", width),
+                ("MARCH", march),
+                ("GLOSSY", glossy),
+                ("N_BASES", n_bases),
+                ("STEPS", steps.sources),
+                ("CELLS", steps.cells),
+            ];
             Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
         };
         Ok(SecondTensor { gather: [gather(0)?, gather(1)?] })

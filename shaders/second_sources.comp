@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 const uint SHARE_SIDE = 4;
 const float INV_PI = 0.318309886183791;
 
-layout(push_constant) uniform Push { uint n_facets; uint n_lights; } push;
+layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_surfaces; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 layout(std430, binding = 2) readonly buffer Shares { vec2 shares[]; };
@@ -24,7 +24,8 @@ layout(std430, binding = 4) readonly buffer Order { uint order[]; };
 layout(std430, binding = 5) readonly buffer Leaves { uint leaves[]; };
 layout(std430, binding = 6) writeonly buffer Sources { Source sources[]; };
 // [source][light], w: sum of A g, g the facet's share of the light's energy; xyz: of a cloud sum of A g c, c the facet's own
-// colour; of a surface's facet the share of it that the light reaches, and what of it the clouds let through.
+// colour; of a surface's facet the share of it that the light reaches, what of it the clouds let through, and whose shadows
+// have a rim on it.
 layout(std430, binding = 7) writeonly buffer Fluxes { vec4 fluxes[]; };
 
 // A lamp's mean over the middles of the facet's 4 x 4 parts, as the shares are.
@@ -39,12 +40,18 @@ float mean_falloff(Light light, Facet facet, Region region) {
     return sum * (1.0 / float(SHARE_SIDE * SHARE_SIDE));
 }
 
+#include "occlude.glsl"
+#include "reach.glsl"
+
 void main() {
     FOR_EACH(place, push.n_facets) {
         uint j = order[place];
         uint i = leaves[place];
         Facet facet = facets[j];
         Region region = regions[facet.i_region];
+        vec3 half_diagonal = region.u / float(max(region.n_u, 1u)) + region.v / float(max(region.n_v, 1u));
+        // A particle's facet is a disc.
+        float radius = region.kind == REGION_SURFACE ? length(half_diagonal) : sqrt(facet.area * INV_PI);
         vec3 irradiance = vec3(0.0);
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
@@ -54,12 +61,11 @@ void main() {
                 ? share.x * share.y * mean_falloff(light, facet, region)
                 : share_of(light, a, facet.normal, share.x * share.y);
             irradiance += light.energy * g;
-            vec3 rest = region.kind == REGION_SURFACE ? vec3(share, 0.0) : facet.area * g * facet.color;
+            vec3 rest = region.kind == REGION_SURFACE
+                ? vec3(share, share.x > 0.0 ? rims_on(facet.position, radius, light, facet.i_region, push.n_surfaces) : 0.0)
+                : facet.area * g * facet.color;
             fluxes[i * push.n_lights + l] = vec4(rest, facet.area * g);
         }
-        vec3 half_diagonal = region.u / float(max(region.n_u, 1u)) + region.v / float(max(region.n_v, 1u));
-        // A particle's facet is a disc.
-        float radius = region.kind == REGION_SURFACE ? length(half_diagonal) : sqrt(facet.area * INV_PI);
         vec3 flux = facet.area * INV_PI * region.kd * facet.color * irradiance;
         sources[i] = Source(facet.position, radius, facet.normal, facet.area, flux, facet.area, 0.0, 0.0, 0.0, 0.0);
     }

@@ -14,7 +14,7 @@ const float TORN = 0.5;
 // Cells wider than this share of their distance are discs to their receiver.
 const float NEAR = 1.0;
 // A cell that a shadow's rim runs through is quartered down to this share of pair_size.
-const float RIM = 0.25;
+const float RIM = 0.125;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
 // Cells of one facet that are looked at, at most: no scene holds a device longer than its watchdog waits.

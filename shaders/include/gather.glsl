@@ -67,8 +67,8 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
 vec3 cell_flux(uint i_source, Source source, uint i_region, Region emitter, vec3 p, vec3 outgoing, uint l) {
     Light light = lights[l];
     Arrival a = arrival_at(light, p);
-    vec2 share = fluxes[i_source * push.n_lights + l].xy;
-    bool hidden = shadows_on(p, 0.0, light, i_region, share.x > 0.0 ? push.n_surfaces : 0u).x;
+    vec3 share = fluxes[i_source * push.n_lights + l].xyz;
+    bool hidden = share.x == 0.0 || shadows_on(p, 0.0, light, i_region, push.n_surfaces, share.z).x;
     float g = source.area * share_of(light, a, source.normal, hidden ? 0.0 : share.y);
     bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY && g > 0.0;
     float lobe = shines ? lobe_between(emitter.i_lobe, source.normal, a.toward, outgoing) : 0.0;
@@ -80,8 +80,8 @@ bool is_lit_in_part(uint i_source, uint i_region, vec3 p, float radius, bool wan
     uint n = wanted ? push.n_lights : 0u;
     bool torn = false;
     for (uint l = 0u; l < n; ++l) {
-        uint n_surfaces = fluxes[i_source * push.n_lights + l].x > 0.0 ? push.n_surfaces : 0u;
-        torn = torn || shadows_on(p, radius, lights[l], i_region, n_surfaces).y;
+        vec4 flux = fluxes[i_source * push.n_lights + l];
+        torn = shadows_on(p, radius, lights[l], i_region, push.n_surfaces, flux.x > 0.0 ? flux.z : 0.0).y || torn;
     }
     return torn;
 }

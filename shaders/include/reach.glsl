@@ -12,24 +12,38 @@ bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
     return true;
 }
 
-// The light's way to the ball about p past one surface: x, whether its middle is hidden; y, whether the shadow's rim runs
-// through it.
-bvec2 shadow_of(uint i, vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
-    Region r = regions[min(i, n_surfaces - 1u)];
-    bvec2 by = light.kind == LIGHT_POINT ? hides_ball(r, light.position, p, radius) : shades_ball(r, p, light.toward, radius);
-    bool counts = i < n_surfaces && i != i_own;
-    return bvec2(counts && by.x, counts && by.y);
+// Sets of surfaces, kept in a float: surface i is in set i mod 24.
+const uint N_SETS = 24u;
+
+// How the light's way to the ball about p passes surface i: x, whether its middle is hidden; y, whether the shadow's rim
+// runs through it.
+bvec2 shadow_of(uint i, vec3 p, float radius, Light light) {
+    Region r = regions[i];
+    return light.kind == LIGHT_POINT ? hides_ball(r, light.position, p, radius) : shades_ball(r, p, light.toward, radius);
 }
 
-// The same of all surfaces but the ball's own. Four a turn: turns are counted (src/frame/exchange.rs).
-bvec2 shadows_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
+// Sets of the surfaces whose shadows' rims run through the ball, and none of its own.
+float rims_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
+    uint sets = 0u;
+    for (uint i = 0u; i < n_surfaces; ++i) {
+        bool torn = i != i_own && shadow_of(i, p, radius, light).y;
+        sets |= torn ? 1u << (i % N_SETS) : 0u;
+    }
+    return float(sets);
+}
+
+// What surfaces of the sets hide of the ball: x, its middle; y, part of it.
+bvec2 shadows_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces, float sets) {
     bvec2 found = bvec2(false);
-    for (uint i = 0u; i < n_surfaces; i += 4u) {
-        bvec2 a = shadow_of(i, p, radius, light, i_own, n_surfaces);
-        bvec2 b = shadow_of(i + 1u, p, radius, light, i_own, n_surfaces);
-        bvec2 c = shadow_of(i + 2u, p, radius, light, i_own, n_surfaces);
-        bvec2 d = shadow_of(i + 3u, p, radius, light, i_own, n_surfaces);
-        found = bvec2(found.x || a.x || b.x || c.x || d.x, found.y || a.y || b.y || c.y || d.y);
+    uint left = uint(sets);
+    uint i = findLSB(left);
+    while (left != 0u) {
+        bvec2 by = shadow_of(i, p, radius, light);
+        bool counts = i != i_own;
+        found = bvec2(found.x || (counts && by.x), found.y || (counts && by.y));
+        i += N_SETS;
+        left = i < n_surfaces ? left : left & (left - 1u);
+        i = i < n_surfaces ? i : findLSB(left);
     }
     return found;
 }

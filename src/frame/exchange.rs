@@ -10,15 +10,19 @@ use crate::passes::second::Receivers;
 
 use super::buffers::upload;
 
-/// Facets of a region that are gathered from at once, at most, and sources of one dispatch where every pair is gathered:
-/// llvmpipe ends all loops of an invocation after 65 535 turns in all (Mesa's LP_MAX_TGSI_LOOP_ITERATIONS), and a source
-/// costs up to 16 steps of march, a look at some surfaces and lights, and its cells. Where that is not enough, the gather
-/// says so: `unresolved` is infinite. Other devices' watchdogs like short dispatches, too.
-const EXACT_RUN: u32 = 64;
-const EXACT_SLICE: u32 = 64;
-/// The same of a tree, most of whose nodes no receiver meets. A power of FAN, so that runs are whole clusters.
-const TREE_RUN: u32 = 256;
-const TREE_SLICE: u32 = 1024;
+/// What the sources of one dispatch may cost on a processor: llvmpipe ends all loops of an invocation after 65 535 turns
+/// in all (Mesa's LP_MAX_TGSI_LOOP_ITERATIONS). A cloud's facet costs 1, up to 16 turns of march and a look at some
+/// surfaces; a surface's may be seen as some hundred cells, each of which asks surfaces and lights. Where that is not
+/// enough the gather says so: `unresolved` is infinite.
+const SLICE: u32 = 1024;
+/// And on devices without such an end, whose watchdogs like dispatches short nevertheless.
+const LONG_SLICE: u32 = 64 * SLICE;
+/// Of a surface's facet where every pair is gathered, and of one in a tree, few of whose nodes a receiver meets.
+const SURFACE_COST: u32 = 128;
+const TREE_COST: u32 = 48;
+/// Facets of one tree, at most, where a dispatch has short slices, and long ones: powers of FAN, whole clusters.
+const TREE_RUN: u32 = 16;
+const LONG_TREE_RUN: u32 = 4096;
 
 /// Buffers of the exchange, and how many blocks of receivers there are without and with a lobe.
 pub struct Exchange {
@@ -60,7 +64,8 @@ impl Exchange {
         block_len: u32,
         tree: bool,
     ) -> Result<Exchange> {
-        let lists = Lists::of(scene, block_len, tree);
+        let slice = if device.info().kind == "cpu" { SLICE } else { LONG_SLICE };
+        let lists = Lists::of(scene, block_len, tree, slice);
         let n_sources = lists.tree.n_nodes.len() as u64;
         let n_fluxes = n_sources * scene.lights.len() as u64;
         let counts = lists.tree.merges.iter().map(|m| m.len() as u32);
@@ -118,18 +123,19 @@ pub fn is_glossy(scene: &Scene, i_region: usize) -> bool {
 }
 
 impl Lists {
-    fn of(scene: &Scene, block_len: u32, tree: bool) -> Lists {
+    fn of(scene: &Scene, block_len: u32, tree: bool, slice: u32) -> Lists {
         let sizes = region_sizes(scene);
         let firsts: Vec<u32> = sizes.iter().scan(0, |first, n| Some(std::mem::replace(first, *first + n))).collect();
+        let costs: Vec<u32> = (0..sizes.len()).map(|i| cost(scene, i, tree).min(slice)).collect();
         let mut lists = Lists::default();
-        let runs: Vec<Vec<(u32, u32)>> = sizes.iter().map(|n| lists.push_sources(*n, slice_len(scene, tree), tree)).collect();
-        let most = slice_len(scene, tree);
+        let runs: Vec<Vec<(u32, u32)>> =
+            sizes.iter().zip(&costs).map(|(n, cost)| lists.push_sources(*n, slice / cost, tree)).collect();
         for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
             let first_pairing = lists.pairings.len();
             for pairing in from {
                 lists.push_pairings(pairing, &runs[pairing.i_emitter]);
             }
-            let slices = slices(&lists.pairings[first_pairing..], first_pairing as u32, most);
+            let slices = slices(&lists.pairings[first_pairing..], first_pairing as u32, &costs, slice);
             for (i_slice, (i_pairing, n_pairings)) in slices.into_iter().enumerate() {
                 let blocks = &mut lists.blocks[usize::from(is_glossy(scene, i))];
                 blocks.resize(blocks.len().max(i_slice + 1), vec![]);
@@ -146,8 +152,11 @@ impl Lists {
 
     /// Sources of a region's `n` facets, run by run: the first, and how many there are.
     fn push_sources(&mut self, n: u32, most: u32, tree: bool) -> Vec<(u32, u32)> {
-        let (run, push): (u32, fn(&mut Tree, u32) -> u32) =
-            if tree { (TREE_RUN, Tree::push) } else { (EXACT_RUN.min(most), Tree::push_flat) };
+        let (run, push): (u32, fn(&mut Tree, u32) -> u32) = match tree {
+            true if most > SLICE => (LONG_TREE_RUN, Tree::push),
+            true => (TREE_RUN, Tree::push),
+            false => (most, Tree::push_flat),
+        };
         let mut push_run = |first: u32| {
             let root = push(&mut self.tree, run.min(n - first));
             (root, self.tree.n_nodes.len() as u32 - root)
@@ -176,26 +185,29 @@ impl Lists {
     }
 }
 
-/// Most sources of a slice.
-fn slice_len(scene: &Scene, tree: bool) -> u32 {
+/// Of one source of a region.
+fn cost(scene: &Scene, i_region: usize, tree: bool) -> u32 {
     // Finer pairs have more cells.
-    let finer = (scene.lighting.pairs.size / 0.5).min(1.0).powi(3);
-    let most = if tree { TREE_SLICE } else { EXACT_SLICE };
-    (f64::from(most) * finer).max(16.0) as u32
+    let finer = (0.5 / scene.lighting.pairs.size).max(1.0).powi(2);
+    let of_facet = match i_region < scene.surfaces.len() {
+        true if tree => TREE_COST,
+        true => SURFACE_COST,
+        false => return 1,
+    };
+    (f64::from(of_facet) * finer).min(f64::from(SLICE)) as u32
 }
 
-/// First and number of pairings of each slice of at most `most` sources, or of one pairing that has more; at least one
-/// slice.
-fn slices(pairings: &[PairingRecord], first: u32, most: u32) -> Vec<(u32, u32)> {
+/// First and number of pairings of each slice of a cost of at most `most`, or of one pairing that costs more; at least one slice.
+fn slices(pairings: &[PairingRecord], first: u32, costs: &[u32], most: u32) -> Vec<(u32, u32)> {
     let mut slices = Vec::new();
-    let [mut i_first, mut n, mut n_sources] = [first, 0, 0];
+    let [mut i_first, mut n, mut spent] = [first, 0, 0];
     for pairing in pairings {
-        if n > 0 && n_sources + pairing.n_sources > most {
+        let cost = pairing.n_sources * costs[pairing.i_region as usize];
+        if n > 0 && spent + cost > most {
             slices.push((i_first, n));
-            [i_first, n, n_sources] = [i_first + n, 0, 0];
+            [i_first, n, spent] = [i_first + n, 0, 0];
         }
-        n += 1;
-        n_sources += pairing.n_sources;
+        [n, spent] = [n + 1, spent + cost];
     }
     slices.push((i_first, n));
     slices

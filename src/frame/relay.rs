@@ -99,7 +99,7 @@ impl Relay {
     /// Facets as sources, then cluster by cluster.
     fn record_sources(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
         let x = &self.exchange;
-        let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights };
+        let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights, n_surfaces: self.n_surfaces };
         let buffers = [&b.facets, &b.lights, &b.shares, &b.regions, &x.order, &x.leaves, &x.sources, &x.fluxes];
         self.second.record_sources(rec, buffers, &push)?;
         for (i_first, n_merges) in x.heights.iter().copied() {

@@ -9,7 +9,7 @@ use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
 record! {
-    pub struct SourcesPush { n_facets: u32, n_lights: u32 }
+    pub struct SourcesPush { n_facets: u32, n_lights: u32, n_surfaces: u32 }
 }
 
 record! {

@@ -62,7 +62,7 @@ void main() {
                 : share_of(light, a, facet.normal, share.x * share.y);
             irradiance += light.energy * g;
             vec3 rest = region.kind == REGION_SURFACE
-                ? vec3(share, share.x > 0.0 ? rims_on(facet.position, radius, light, facet.i_region, push.n_surfaces) : 0.0)
+                ? vec3(share, rims_on(facet.position, radius, light, facet.i_region, push.n_surfaces))
                 : facet.area * g * facet.color;
             fluxes[i * push.n_lights + l] = vec4(rest, facet.area * g);
         }

@@ -59,10 +59,7 @@ fn truths(scene: &Scene, eye: DVec3, stride: usize, relative: f64) -> Vec<(usize
         let (s, i) = places[k * stride];
         let receiver = scenery.on_surface(s, scene.surfaces[s].facet_center(i));
         let toward = (eye - receiver.position).normalize();
-        (
-            k * stride,
-            scenery.second(&receiver, toward, &Accuracy { max_evaluations: 400_000, ..Accuracy::relative(relative) }),
-        )
+        (k * stride, scenery.second(&receiver, toward, &Accuracy::relative(relative)))
     })
 }
 
@@ -106,8 +103,8 @@ const PROMISED: f64 = 0.01;
 #[test]
 fn random_rooms_are_within_one_percent() {
     let gpu = Gpu::new();
-    // The truth's own error is a hundredth of what is promised.
-    let of_truth = 1e-4;
+    // The truth's own error is a tenth of what is promised.
+    let of_truth = 1e-3;
     for lighting in ["gather = 'exact'", "gather = 'tree'"] {
         let mut sum = Squares::default();
         for seed in 0..8 {
@@ -118,6 +115,7 @@ fn random_rooms_are_within_one_percent() {
             // Light that the device left out would be told.
             let n_endless = f.lit.iter().filter(|l| l.unresolved.is_infinite()).count();
             println!("{lighting}, room {seed}: L2 and I_i {:?}, {n_endless} cut short", own.relative());
+
             assert_eq!(n_endless, 0);
             sum = sum.plus(own);
         }

@@ -68,7 +68,7 @@ vec3 cell_flux(uint i_source, Source source, uint i_region, Region emitter, vec3
     Light light = lights[l];
     Arrival a = arrival_at(light, p);
     vec3 share = fluxes[i_source * push.n_lights + l].xyz;
-    bool hidden = share.x == 0.0 || shadows_on(p, 0.0, light, i_region, push.n_surfaces, share.z).x;
+    bool hidden = (share.x == 0.0 && share.z == 0.0) || shadows_on(p, 0.0, light, i_region, push.n_surfaces, share.z).x;
     float g = source.area * share_of(light, a, source.normal, hidden ? 0.0 : share.y);
     bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY && g > 0.0;
     float lobe = shines ? lobe_between(emitter.i_lobe, source.normal, a.toward, outgoing) : 0.0;
@@ -81,7 +81,7 @@ bool is_lit_in_part(uint i_source, uint i_region, vec3 p, float radius, bool wan
     bool torn = false;
     for (uint l = 0u; l < n; ++l) {
         vec4 flux = fluxes[i_source * push.n_lights + l];
-        torn = shadows_on(p, radius, lights[l], i_region, push.n_surfaces, flux.x > 0.0 ? flux.z : 0.0).y || torn;
+        torn = shadows_on(p, radius, lights[l], i_region, push.n_surfaces, flux.z).y || torn;
     }
     return torn;
 }

@@ -22,14 +22,16 @@ bvec2 shadow_of(uint i, vec3 p, float radius, Light light) {
     return light.kind == LIGHT_POINT ? hides_ball(r, light.position, p, radius) : shades_ball(r, p, light.toward, radius);
 }
 
-// Sets of the surfaces whose shadows' rims run through the ball, and none of its own.
+// Sets of the surfaces whose shadows' rims run through the ball; none where one surface hides all of it.
 float rims_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
     uint sets = 0u;
+    bool hidden = false;
     for (uint i = 0u; i < n_surfaces; ++i) {
-        bool torn = i != i_own && shadow_of(i, p, radius, light).y;
-        sets |= torn ? 1u << (i % N_SETS) : 0u;
+        bvec2 by = shadow_of(i, p, radius, light);
+        hidden = hidden || (i != i_own && by.x && !by.y);
+        sets |= i != i_own && by.y ? 1u << (i % N_SETS) : 0u;
     }
-    return float(sets);
+    return hidden ? 0.0 : float(sets);
 }
 
 // What surfaces of the sets hide of the ball: x, its middle; y, part of it.

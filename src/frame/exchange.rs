@@ -18,7 +18,7 @@ const SLICE: u32 = 1024;
 /// And on devices without such an end, whose watchdogs like dispatches short nevertheless.
 const LONG_SLICE: u32 = 64 * SLICE;
 /// Of a surface's facet where every pair is gathered, and of one in a tree, few of whose nodes a receiver meets.
-const SURFACE_COST: u32 = 128;
+const SURFACE_COST: u32 = 512;
 const TREE_COST: u32 = 48;
 /// Facets of one tree, at most, where a dispatch has short slices, and long ones: powers of FAN, whole clusters.
 const TREE_RUN: u32 = 16;

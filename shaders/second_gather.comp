@@ -38,6 +38,7 @@ layout(push_constant) uniform Push {
     float theta;
     uint n_surfaces;
     uint adds;
+    uint rim_cells;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
 layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
@@ -76,16 +77,18 @@ struct Sum {
     // Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest channel.
     float n_unresolved;
     float unresolved;
+    // Steps of the walks.
+    uint n_cells;
 };
 
 // Of the ball about a cluster or cell that is opened where the rim of a shadow runs through it; 0 where it is small enough.
-float torn_radius(Source source, Walk walk, View view, uint n_nodes) {
+float torn_radius(Source source, Walk walk, View view, uint n_nodes, uint n_cells) {
 #if TREE
     if (n_nodes > 1u) {
         return view.width > push.theta * TORN ? source.radius : 0.0;
     }
 #endif
-    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
+    bool wide = n_cells < push.rim_cells && view.width > push.pair_size * RIM && walk.level < push.pair_levels && walk.n_steps < MAX_STEPS;
     return wide ? source.radius * cell_scale(walk.level) : 0.0;
 }
 
@@ -100,12 +103,12 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         View view = look(sources[i], i, n_nodes, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
         if (veiled) {
-            float radius = torn_radius(sources[i], walk, view, n_nodes);
+            float radius = torn_radius(sources[i], walk, view, n_nodes, sum.n_cells);
             bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
             view.split = view.split || (radius > 0.0 && veiling.y);
             share = view.split || veiling.x ? 0.0 : share;
         }
-        float lit_radius = n_nodes == 1u && emitter.kind == REGION_SURFACE ? torn_radius(sources[i], walk, view, n_nodes) : 0.0;
+        float lit_radius = n_nodes == 1u && emitter.kind == REGION_SURFACE ? torn_radius(sources[i], walk, view, n_nodes, sum.n_cells) : 0.0;
         bool in_part = is_lit_in_part(i, pairing.i_region, view.position, lit_radius, share > 0.0 && lit_radius > 0.0);
         view.split = view.split || in_part;
         share = view.split ? 0.0 : share;
@@ -123,6 +126,7 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
         sum.glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
 #endif
         sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+        sum.n_cells += 1u;
         walk = advance(walk, view.split, n_nodes);
     }
 }
@@ -180,7 +184,7 @@ void main() {
     vec3 to_eye = push.eye - facet.position;
     Taker taker = Taker(facet.position, facet.normal, normalize(to_eye), own);
     vec3 albedo = own.kd * facet.color * PI_INVERSE;
-    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0);
+    Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0, 0u);
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];

@@ -18,11 +18,14 @@ const SLICE: u32 = 1024;
 /// And on devices without such an end, whose watchdogs like dispatches short nevertheless.
 const LONG_SLICE: u32 = 64 * SLICE;
 /// Of a surface's facet where every pair is gathered, and of one in a tree, few of whose nodes a receiver meets.
-const SURFACE_COST: u32 = 512;
+const SURFACE_COST: u32 = 128;
 const TREE_COST: u32 = 48;
 /// Facets of one tree, at most, where a dispatch has short slices, and long ones: powers of FAN, whole clusters.
 const TREE_RUN: u32 = 16;
 const LONG_TREE_RUN: u32 = 4096;
+
+/// Cells of one receiver and slice after which shadows' rims are not looked for any more: each up to some 30 turns, and what stays unresolved is gone through twice.
+const RIM_CELLS: u32 = 1024;
 
 /// Buffers of the exchange, and how many blocks of receivers there are without and with a lobe.
 pub struct Exchange {
@@ -40,6 +43,8 @@ pub struct Exchange {
     pub heights: Vec<(u32, u32)>,
     pub sources: Buffer,
     pub fluxes: Buffer,
+    /// Cells after which rims are not looked for any more.
+    pub rim_cells: u32,
     /// First block and number of blocks of each slice of the sources, of receivers without and with a lobe.
     slices: [Vec<(u32, u32)>; 2],
 }
@@ -64,7 +69,7 @@ impl Exchange {
         block_len: u32,
         tree: bool,
     ) -> Result<Exchange> {
-        let slice = if device.info().kind == "cpu" { SLICE } else { LONG_SLICE };
+        let (slice, rim_cells) = if device.info().kind == "cpu" { (SLICE, RIM_CELLS) } else { (LONG_SLICE, u32::MAX) };
         let lists = Lists::of(scene, block_len, tree, slice);
         let n_sources = lists.tree.n_nodes.len() as u64;
         let n_fluxes = n_sources * scene.lights.len() as u64;
@@ -89,6 +94,7 @@ impl Exchange {
             heights,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
+            rim_cells,
             slices: lists.slices(),
         })
     }

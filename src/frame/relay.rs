@@ -80,6 +80,7 @@ impl Relay {
                 theta: self.theta as f32,
                 n_surfaces: self.n_surfaces,
                 adds: 0,
+                rim_cells: x.rim_cells,
             };
             let (lists, lights) =
                 ([&x.blocks, &x.pairings, &x.occluders, &x.order], [&b.facets, &b.regions, &b.lights]);

@@ -31,6 +31,8 @@ record! {
         n_surfaces: u32,
         /// 1: to what the receivers have already.
         adds: u32,
+        /// After so many cells rims of shadows are not looked for any more.
+        rim_cells: u32,
     }
 }
 

@@ -62,7 +62,7 @@ void main() {
                 ? share.x * share.y * mean_falloff(light, facet, region)
                 : share_of(light, a, facet.normal, share.x * share.y);
             irradiance += light.energy * g;
-            uint n_surfaces = region.kind == REGION_SURFACE && share.x > 0.0 ? push.n_surfaces : 0u;
+            uint n_surfaces = region.kind == REGION_SURFACE ? push.n_surfaces : 0u;
             uint shadows = shadows_on(facet.position, radius, light, facet.i_region, n_surfaces, in_part);
             vec3 rest = region.kind == REGION_SURFACE ? vec3(share, float(shadows)) : facet.area * g * facet.color;
             fluxes[i * push.n_lights + l] = vec4(rest, facet.area * g);

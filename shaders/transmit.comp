@@ -87,7 +87,8 @@ void main() {
         bool is_center_clear = is_on && is_clear(facet.position, light, facet.i_region, push.n_surfaces);
         float share = SHARES != 0 && is_on ? clear_share(facet, light, is_center_clear) : 0.0;
         float through = 0.0;
-        if (is_center_clear || share > 0.0) {
+        // Part of a surface's facet may be lit where no sample is.
+        if (is_center_clear || share > 0.0 || (SHARES != 0 && is_on && facet.i_region < push.n_surfaces)) {
             through = through_the_cloud(facet.position, arrival_at(light, facet.position));
         }
         transmittance[k] = is_center_clear ? through : 0.0;

@@ -67,7 +67,7 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
 float cell_share(uint i_source, Source source, uint i_region, vec3 p, uint l) {
     Light light = lights[l];
     vec3 share = fluxes[i_source * push.n_lights + l].xyz;
-    bool hidden = shadows_of(uint(share.z), p, 0.0, light, i_region, share.x > 0.0 ? push.n_surfaces : 0u).x;
+    bool hidden = shadows_of(uint(share.z), p, 0.0, light, i_region, push.n_surfaces).x;
     return source.area * share_of(light, arrival_at(light, p), source.normal, hidden ? 0.0 : share.y);
 }
 
@@ -85,8 +85,7 @@ bool is_lit_in_part(uint i_source, uint i_region, vec3 p, float radius, bool wan
     bool torn = false;
     for (uint l = 0u; l < n; ++l) {
         vec3 share = fluxes[i_source * push.n_lights + l].xyz;
-        uint n_surfaces = share.x > 0.0 ? push.n_surfaces : 0u;
-        torn = torn || shadows_of(uint(share.z), p, radius, lights[l], i_region, n_surfaces).y;
+        torn = torn || shadows_of(uint(share.z), p, radius, lights[l], i_region, push.n_surfaces).y;
     }
     return torn;
 }

@@ -255,7 +255,6 @@ mod tests {
             modes: vec![],
             placed: None,
             bounds: vec![Default::default()],
-            table: Default::default(),
             regions: vec![RegionRecord::default()],
             table: Arc::new(vec![0.5]),
             coefficients: vec![[0.5; 4]],

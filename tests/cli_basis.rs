@@ -36,7 +36,7 @@ fn numbers(line: &str) -> Vec<f64> {
 #[test]
 fn the_table_is_a_row_for_every_node() {
     let (_dir, scene) = scene("bases = 5");
-    let (code, table, stderr) = run(&["inspect", &scene, "--basis"]);
+    let (code, table, stderr) = run(&["inspect", &scene, "--basis", "-q"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!((lines[0], lines.len()), ("t,gamma_deg,b0,b1,b2,b3,b4", 1 + 1025));

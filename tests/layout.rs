@@ -8,7 +8,7 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
-use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_SURFACE};
+use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
@@ -65,7 +65,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
     (
         "second_sources.comp",
         second::SourcesPush::FIELDS,
-        &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Source"), B(16)],
+        &[R("Facet"), R("Light"), B(8), R("Region"), B(4), B(4), R("Source"), B(16)],
     ),
     ("second_merge.comp", second::MergePush::FIELDS, &[B(4), R("Node"), R("Source"), B(16)]),
     (
@@ -122,7 +122,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4)]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
-    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(4)]),
+    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(8)]),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -270,6 +270,7 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "LIGHT_POINT", f64::from(LIGHT_POINT)),
         ("include/records.glsl", "REGION_SURFACE", f64::from(REGION_SURFACE)),
         ("include/records.glsl", "REGION_CLOUD", f64::from(REGION_CLOUD)),
+        ("include/records.glsl", "REGION_COLORED", f64::from(REGION_COLORED)),
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),

@@ -65,7 +65,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
     (
         "second_sources.comp",
         second::SourcesPush::FIELDS,
-        &[R("Facet"), R("Light"), B(4), R("Region"), B(4), B(4), R("Source"), B(16)],
+        &[R("Facet"), R("Light"), B(8), R("Region"), B(4), B(4), R("Source"), B(16)],
     ),
     ("second_merge.comp", second::MergePush::FIELDS, &[B(4), R("Node"), R("Source"), B(16)]),
     (

@@ -129,7 +129,9 @@ void gather_cells(
             leaving += cell_flux(g, source, emitter, view.position, -view.way, l);
         }
         take(sum, view, leaving * share, taker);
-        sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+        // Without cells to spend nobody looks for rims: what may have one stays open, too.
+        bool blind = n_cells_left == 0u && share > 0.0 && walk.level < push.pair_levels && view.width > push.pair_size * RIM;
+        sum.n_unresolved += (view.wide && !view.split) || blind ? 1.0 : 0.0;
         n_cells_left -= min(n_cells_left, 1u);
         walk = advance(walk, view.split, 1u);
     }

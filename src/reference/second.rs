@@ -10,7 +10,7 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::{DVec2, DVec3};
 
-use shapes::{Shadow, disc_form, half_gap, lobe_and_slope, rectangle_form, shadow, width};
+use shapes::{Shadow, disc_form, half_gap, lobe_and_slope, meets, rectangle_form, shadow, width};
 
 use super::grid::sample;
 use super::occlude::Rectangle;
@@ -18,6 +18,7 @@ use super::transmit::{SHARE_SIDE, crossing, share_points};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
+use crate::model::pairings::Pairing;
 use crate::model::scene::Pairs;
 
 /// Lobes are met within this many of their widths.
@@ -27,13 +28,17 @@ const LOBE_STEP: f64 = 3.0;
 /// Of a cell's width over its distance, what the half vector turns from centre to corner.
 const TURN: f64 = 0.75;
 /// Down to this share of pair_size cells that a shadow's rim runs through are quartered.
-const RIM: f64 = 0.125;
+const RIM: f64 = 0.5;
 /// Wider cells are discs.
 const NEAR: f64 = 1.0;
 /// f32's unit round-off.
 const U: f64 = 1.0 / 16_777_216.0;
-/// Roundings of a position relative to what is near it, and of a product of some thirty factors and sums.
-const ROUNDINGS: f64 = 64.0;
+/// Roundings of a product of some ten factors, each a sum of a few.
+const ROUNDINGS: f64 = 16.0;
+
+/// Of an optical depth: samples of a density that may double within a cell, at places off by their rounding in cells, and
+/// deposited in f32's rounding by some hundreds of blobs.
+const MARCH: f64 = 256.0;
 
 /// Facets of one material: a surface with its rectangle, or a cloud.
 pub struct Region {
@@ -65,6 +70,8 @@ pub struct Exchange<'a> {
     pub step: f64,
     pub pairs: Pairs,
     pub eye: DVec3,
+    /// Which surfaces may stand between two regions: others tear no cells.
+    pub pairings: &'a [Vec<Pairing>],
     /// The greatest coordinate, whose rounding positions have.
     pub reach: f64,
 }
@@ -176,9 +183,8 @@ impl Exchange<'_> {
         };
         let rim_doubt = rim.unsure_torn || (b / (self.pairs.size * RIM) - 1.0).abs() <= 64.0 * turn;
         let torn = rim.torn && b > self.pairs.size * RIM;
-        let c_j = receiver.normal.dot(way);
         // What sends nothing is not looked at.
-        let sends = c_j > 0.0 && behind < 0.0;
+        let sends = self.form(j, i, &cell, q, b) > 0.0;
         if torn && sends {
             let value = quarters();
             return if rim_doubt || doubt { value.or(&whole()) } else { value };
@@ -226,9 +232,9 @@ impl Exchange<'_> {
     }
 
     /// Rectangles but those of two regions.
-    fn others(&self, a: usize, b: usize) -> impl Iterator<Item = &Rectangle> {
+    fn others(&self, a: usize, b: usize) -> impl Iterator<Item = (usize, &Rectangle)> {
         let all = self.regions.iter().enumerate();
-        all.filter(move |(k, _)| *k != a && *k != b).filter_map(|(_, r)| r.rectangle.as_ref())
+        all.filter(move |(k, _)| *k != a && *k != b).filter_map(|(k, r)| Some((k, r.rectangle.as_ref()?)))
     }
 
     fn slack(&self) -> f64 {
@@ -240,14 +246,28 @@ impl Exchange<'_> {
             Light::Point { position, .. } | Light::Spot { position, .. } => Ok(*position),
             _ => Err(light.arrival(q).toward),
         };
-        let shadows = self.others(i_region, i_region).map(|r| shadow(r, from, q, radius, self.slack()));
+        let shadows = self.others(i_region, i_region).map(|(_, r)| shadow(r, from, q, radius, self.slack()));
         shadows.fold(Shadow::default(), Shadow::over)
     }
 
     fn before_receiver(&self, j: usize, i: usize, q: DVec3, radius: f64) -> Shadow {
         let (a, b) = (&self.facets[j], &self.facets[i]);
-        let shadows = self.others(a.i_region, b.i_region).map(|r| shadow(r, Ok(a.position), q, radius, self.slack()));
-        shadows.fold(Shadow::default(), Shadow::over)
+        let emitter = self.regions[b.i_region].rectangle.as_ref();
+        let pairing = self.pairings[a.i_region].iter().find(|p| p.i_emitter == b.i_region);
+        let of = |(k, r): (usize, &Rectangle)| {
+            let found = shadow(r, Ok(a.position), q, radius, self.slack());
+            match emitter {
+                // What hides no point of the surface tears none of its cells, however far their balls reach.
+                Some(e)
+                    if found.torn
+                        && !(pairing.is_some_and(|p| p.occluders.contains(&k)) && meets(r, e, a.position)) =>
+                {
+                    Shadow { torn: false, ..found }
+                }
+                _ => found,
+            }
+        };
+        self.others(a.i_region, b.i_region).map(of).fold(Shadow::default(), Shadow::over)
     }
 
     /// Rims through the cell, of what is before the receiver and before the lights.
@@ -262,48 +282,45 @@ impl Exchange<'_> {
             return found;
         }
         for light in self.lights {
-            // A facet that one rectangle hides whole has no rims.
-            let whole = self.others(source.i_region, source.i_region).any(|o| {
-                let from = match light {
-                    Light::Point { position, .. } | Light::Spot { position, .. } => Ok(*position),
-                    _ => Err(light.arrival(q).toward),
-                };
-                let s = shadow(o, from, source.position, diagonal, self.slack());
-                s.hidden && !s.torn
-            });
-            if !whole {
-                found = found.over(Shadow {
-                    hidden: false,
-                    unsure_hidden: false,
-                    ..self.before_light(source.i_region, light, q, radius)
-                });
-            }
+            let of_light = self.before_light(source.i_region, light, q, radius);
+            found = found.over(Shadow { hidden: false, unsure_hidden: false, ..of_light });
         }
         found
     }
 
-    /// The cell as one.
-    fn whole(&self, j: usize, i: usize, cell: &Cell, q: DVec3, b: f64, is_wide: bool) -> Gathered {
+    /// cos cos/d² of a cell, b wide over its distance.
+    fn form(&self, j: usize, i: usize, cell: &Cell, q: DVec3, b: f64) -> f64 {
         let (receiver, source) = (&self.facets[j], &self.facets[i]);
         let offset = q - receiver.position;
         let (d2, way) = (offset.length_squared(), offset.normalize_or_zero());
-        let part = 0.25f64.powi(cell.level as i32);
-        let scale = part.sqrt();
-        let form = match &self.regions[source.i_region].rectangle {
+        let scale = 0.5f64.powi(cell.level as i32);
+        match &self.regions[source.i_region].rectangle {
             Some(r) if b <= NEAR => {
                 rectangle_form(receiver.normal, source.normal, way, d2, scale * r.facet.0, scale * r.facet.1)
             }
-            _ => disc_form(receiver.normal, source.normal, way, d2, part * source.area),
-        };
+            _ => disc_form(receiver.normal, source.normal, way, d2, scale * scale * source.area),
+        }
+    }
+
+    /// The cell as one.
+    fn whole(&self, j: usize, i: usize, cell: &Cell, q: DVec3, b: f64, is_wide: bool) -> Gathered {
+        let receiver = &self.facets[j];
+        let offset = q - receiver.position;
+        let (d2, way) = (offset.length_squared(), offset.normalize_or_zero());
+        let part = 0.25f64.powi(cell.level as i32);
+        let form = self.form(j, i, cell, q, b);
         let unresolved = f64::from(u8::from(is_wide));
         let turn = 4.0 * U * (1.0 + self.reach / d2.sqrt());
         let shadow = self.before_receiver(j, i, q, 0.0);
-        let v = if shadow.hidden { 0.0 } else { self.through(receiver.position, q) };
+        let depth = self.depth(receiver.position, q);
+        let v = if shadow.hidden { 0.0 } else { (-depth).exp() };
         let (leaving, leaving_error) = self.leaving(i, cell, q, way, turn);
         let (e, taken) = (leaving * (part * form * v), self.taken(j, way, turn));
         // The form's own error: of each cosine a turn, of their product and of 1/d² the roundings.
         let form_error = part * (2.0 * turn / d2 + ROUNDINGS * turn * form);
-        let error = leaving.abs() * form_error * v + leaving_error * (part * form) * v + e.abs() * ROUNDINGS * U;
+        let error = leaving.abs() * form_error * v
+            + leaving_error * (part * form) * v
+            + e.abs() * (ROUNDINGS * U + depth * MARCH * turn);
         let doubt = if shadow.unsure_hidden { leaving.abs() * (part * form) } else { DVec3::ZERO };
         Gathered {
             indirect: e,
@@ -353,17 +370,17 @@ impl Exchange<'_> {
         (sum, error)
     }
 
-    /// e^{−(1−g)τ} between two points: equal steps over what lies in the grid's box.
-    fn through(&self, p: DVec3, q: DVec3) -> f64 {
+    /// (1 − g) τ between two points: equal steps over what lies in the grid's box.
+    fn depth(&self, p: DVec3, q: DVec3) -> f64 {
         let d = q - p;
         if self.forward >= 1.0 {
-            return 1.0;
+            return 0.0;
         }
-        let Some((enter, leave)) = crossing(self.spec, p, d, 1.0) else { return 1.0 };
+        let Some((enter, leave)) = crossing(self.spec, p, d, 1.0) else { return 0.0 };
         let length = (leave - enter) * d.length();
         let n = ((length / (self.step * self.spec.cell)).ceil() as u32).clamp(1, self.pairs.steps);
         let at = |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
         let sum: f64 = (0..n).map(|k| sample(self.spec, self.cells, at(k))).sum();
-        (-(1.0 - self.forward) * sum * length / f64::from(n)).exp()
+        (1.0 - self.forward) * sum * length / f64::from(n)
     }
 }

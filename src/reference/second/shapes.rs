@@ -90,3 +90,20 @@ pub fn lobe_and_slope(table: &[f64], gap: f64, turn: f64) -> (f64, f64) {
     let (value, low, high) = (at(angle), at((angle - turn).max(0.0)), at(angle + turn));
     (value, (value - low).abs().max((value - high).abs()))
 }
+
+fn corners(r: &Rectangle) -> [DVec3; 4] {
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| r.center + x * r.u + y * r.v)
+}
+
+/// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor `r`'s plane, has all of
+/// `e`'s corners outside.
+pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3) -> bool {
+    let (rim, far) = (corners(r), corners(e));
+    let outside = |k: usize| {
+        let plane = (rim[k] - p).cross(rim[(k + 1) % 4] - p);
+        let inward = plane * plane.dot(r.center - p).signum();
+        far.iter().all(|c| inward.dot(*c - p) < 0.0)
+    };
+    let side = r.side(p);
+    side != 0.0 && !(0..4).any(outside) && far.iter().any(|c| r.normal.dot(*c - r.center) * side < 0.0)
+}

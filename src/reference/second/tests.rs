@@ -7,6 +7,7 @@ use crate::model::surface::Surface;
 use crate::reference::area::{Accuracy, Receiver, Scenery};
 
 const SPEC: GridSpec = GridSpec { n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
+static NO_PAIRINGS: [Vec<Pairing>; 3] = [vec![], vec![], vec![]];
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };
 const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
 
@@ -31,6 +32,7 @@ fn exchange<'a>(
         step: 1.0,
         pairs: PAIRS,
         eye: 5.0 * DVec3::Y,
+        pairings: &NO_PAIRINGS,
         reach: 4.0,
     }
 }
@@ -88,7 +90,8 @@ fn a_ceiling_has_its_form_factor_and_a_blocker_takes_half() {
     let (mut facets, regions) = of_surfaces(&[floor, ceiling, blocker], matte(1.0));
     facets.truncate(65);
     let shares = vec![[0.0, 1.0]; facets.len()];
-    let half = exchange(&facets, &regions, &[GLOW], &shares).gather(0);
+    let between = [vec![Pairing { i_emitter: 1, occluders: vec![2] }], vec![], vec![]];
+    let half = Exchange { pairings: &between, ..exchange(&facets, &regions, &[GLOW], &shares) }.gather(0);
     assert!((half.indirect.x / found.indirect.x - 0.5).abs() < 1e-3, "{half:?}");
 }
 

@@ -128,7 +128,9 @@ void gather_cells(
             leaving += cell_flux(g, source, emitter, view.position, -view.way, l);
         }
         take(sum, view, leaving * share, taker);
-        sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
+        // Without cells to spend nobody looks for rims: what may have one stays open, too.
+        bool blind = n_cells_left == 0u && share > 0.0 && walk.level < push.pair_levels && view.width > push.pair_size * RIM;
+        sum.n_unresolved += (view.wide && !view.split) || blind ? 1.0 : 0.0;
         n_cells_left -= min(n_cells_left, 1u);
         walk = advance(walk, view.split, 1u);
     }
@@ -199,11 +201,15 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, u
         // Nothing is nearer than the centre less half a diagonal, and no cell fills more than the hemisphere.
         float nearest = max(1.0 - 0.70710678 * view.width, 0.0) * pane.side * scale / max(view.width, 1e-30);
         float most = min(PI / source.area, scale * scale / max(nearest * nearest, 1e-30));
-        vec3 sent = source.flux;
+        // As if nothing shaded the cell: its facet's mean may be mostly shadow. Only surfaces' facets have cells.
+        vec3 sent = vec3(0.0);
         for (uint l = 0u; l < push.n_lights; ++l) {
-            float g = lights[l].kind == LIGHT_SKY || emitter.i_lobe == NO_LOBE ? 0.0 : fluxes[i * push.n_lights + l].w;
-            float peak = g > 0.0 ? lobe_at(emitter.i_lobe, nearest_gap(view.emitter_gap, turn)) : 0.0;
-            sent += emitter.ks * lights[l].energy * (g * peak);
+            Light light = lights[l];
+            vec4 flux = fluxes[i * push.n_lights + l];
+            float g = source.area * share_of(light, arrival_at(light, view.position), source.normal, flux.y);
+            bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY && g > 0.0;
+            float peak = shines ? lobe_at(emitter.i_lobe, nearest_gap(view.emitter_gap, turn)) : 0.0;
+            sent += light.energy * g * (emitter.kd * PI_INVERSE + emitter.ks * peak);
         }
         vec3 received = albedo, taken = albedo;
 #if GLOSSY
@@ -212,7 +218,7 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, u
 #endif
         // Of geometry: all that it may be where the cell is wider than far, else the midpoint rule's error. Of lobes: their
         // greatest values in place of those met.
-        vec3 met = abs(view.leaving * received);
+        vec3 met = max(abs(view.leaving), sent) * abs(received);
         vec3 geometry = met * (view.width > 1.0 ? most : view.share * view.width * view.width);
         vec3 lobes = max(sent * taken - met, vec3(0.0)) * (view.width > 1.0 ? most : view.share);
         vec3 e = geometry + lobes;

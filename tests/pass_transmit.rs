@@ -118,9 +118,12 @@ impl Case {
     fn run(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, step: f64, forward: f64) -> [Vec<f64>; 2] {
         let pass = Transmit::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), true).expect("transmit");
         let n_total = self.facets.len() * self.lights.len();
-        let shares = gpu.buffer::<f32>(n_total);
+        let shares = gpu.buffer::<[f32; 2]>(n_total);
         let transmittance = self.dispatch(gpu, &pass, &shares, [step, forward]);
-        [transmittance, gpu.download::<f32>(&shares, n_total).into_iter().map(f64::from).collect()]
+        [
+            transmittance,
+            gpu.download::<[f32; 2]>(&shares, n_total).into_iter().map(|s| f64::from(s[0]) * f64::from(s[1])).collect(),
+        ]
     }
 
     fn dispatch(&self, gpu: &mut Gpu, pass: &Transmit, shares: &Buffer, [step, forward]: [f64; 2]) -> Vec<f64> {
@@ -244,7 +247,7 @@ fn without_shares_the_transmittance_is_the_same() {
     let mut gpu = Gpu::new();
     let case = room();
     let pass = Transmit::new(&gpu.device, &gpu.compiler, false).expect("transmit");
-    let none = gpu.buffer::<f32>(0);
+    let none = gpu.buffer::<[f32; 2]>(0);
     let alone = case.dispatch(&mut gpu, &pass, &none, [1.0, 0.5]);
     assert_eq!(alone, case.run(&mut gpu, None, 1.0, 0.5)[0]);
 }
@@ -311,13 +314,13 @@ fn wrong_transmittance_is_noticed() {
         (0, "transmit.comp", "k / push.n_lights", "k % push.n_facets"),
         (0, "transmit.comp", "leave = distance", "leave = 3.4e38"),
         (0, "transmit.comp", "enter = max(enter, min(a, b))", "enter = enter"),
-        (0, "transmit.comp", "i != i_own && ", ""),
-        (0, "transmit.comp", "light.kind == LIGHT_POINT ?", "light.kind == 77 ?"),
-        (0, "transmit.comp", "i = 0; i < push.n_surfaces", "i = 1; i < push.n_surfaces"),
+        (0, "include/reach.glsl", "i != i_own && ", ""),
+        (0, "include/reach.glsl", "light.kind == LIGHT_POINT ?", "light.kind == 77 ?"),
+        (0, "include/reach.glsl", "i = 0; i < n_surfaces", "i = 1; i < n_surfaces"),
         (0, "transmit.comp", "bool is_on = any", "bool is_on = true || any"),
         (1, "transmit.comp", "/ float(r.n_u)", "/ float(r.n_v)"),
         (1, "transmit.comp", "+ 0.5) * (2.0", "+ 0.6) * (2.0"),
-        (1, "transmit.comp", "share * through", "share"),
+        (1, "transmit.comp", "vec2(share, through)", "vec2(share, 1.0)"),
         (0, "include/occlude.glsl", "<= dot(r.v, r.v)", "<= dot(r.u, r.u)"),
         (0, "include/occlude.glsl", "(a / (a - b))", "(a / (a + b))"),
         (0, "include/occlude.glsl", "p - d * (a / b)", "p + d * (a / b)"),

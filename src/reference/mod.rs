@@ -13,6 +13,7 @@ pub mod morton;
 pub mod occlude;
 pub mod place;
 pub mod rounding;
+pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;

@@ -96,9 +96,14 @@ impl Obstacles<'_> {
     /// The area mean of V: a surface's facet by 4 × 4 points that may be hidden, each behind as much cloud as the centre;
     /// of cloud facets V itself.
     pub fn shares(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
+        self.share_factors(receivers, lights).into_iter().map(|[clear, through]| clear * through).collect()
+    }
+
+    /// Its two factors: what surfaces leave, and what clouds do.
+    pub fn share_factors(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<[f64; 2]> {
         let one = |r: &Receiver, light: &Light| {
             if light.energy() == DVec3::ZERO {
-                return 0.0;
+                return [0.0; 2];
             }
             let clear = match self.rectangles.get(r.i_region as usize) {
                 Some(rectangle) => {
@@ -108,7 +113,7 @@ impl Obstacles<'_> {
                 }
                 None => f64::from(u8::from(self.is_clear(r, r.position, light))),
             };
-            clear * self.through_the_cloud(r.position, light)
+            [clear, self.through_the_cloud(r.position, light)]
         };
         receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
     }

@@ -1,0 +1,221 @@
+//! second: the light that every facet gathers from all others, as a frame has it, against the same in f64.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+#[path = "harness/rooms.rs"]
+mod rooms;
+#[path = "harness/scene_text.rs"]
+mod scene_text;
+
+use bounded::Random;
+use glam::DVec3;
+use harness::{Gpu, assert_within_and_say, check_within};
+use nimbus::frame::game::Setting;
+use nimbus::gpu::Compiler;
+use nimbus::model::basis::Basis;
+use nimbus::model::light::Light;
+use nimbus::model::pairings::pairings;
+use nimbus::model::scene::Scene;
+use nimbus::reference::area::mean::each;
+use nimbus::reference::occlude::Rectangle;
+use nimbus::reference::second::{Exchange, Facet, Gathered, Region};
+use nimbus::reference::transmit::{Obstacles, Receiver};
+use nimbus::reference::{grid, place};
+use rooms::{Frame, HEAD, frame, frame_by, plates_text, random_plates, sun_and_lamp};
+use scene_text::load_with;
+
+const SKY: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.3, 0.4, 0.6]\nconstant = 0.2\n";
+
+/// Six plates that shade each other, about a place far from the origin.
+fn room(seed: u64, lighting: &str) -> Scene {
+    let mut r = Random(seed);
+    let mut plates = random_plates(&mut r, 6, 0.9, 0.1);
+    let far = DVec3::new(300.0, -200.0, 100.0);
+    plates.iter_mut().zip(0u32..).for_each(|(p, i)| {
+        p.center += far;
+        p.subdivide = [3 + i % 2, 4];
+        // Half of them without lobe.
+        p.ks *= f64::from(i % 2);
+    });
+    let lights = sun_and_lamp(&mut r, 2.0).replace("position = [", "position = [300.0, -198.0, 100.0] # [") + SKY;
+    let eye = format!(
+        "[camera]\nposition = [302.0, -197.0, 105.0]\ntarget = [300.0, -200.0, 100.0]\n[lighting]\ngather = 'exact'\n{lighting}\n"
+    );
+    load_with(&(HEAD.to_owned() + &eye + &lights + &plates_text(&plates)), &[], None).unwrap().scene
+}
+
+/// A cloud between a ground and a plate.
+fn cloud(lighting: &str) -> Scene {
+    let plates = &mut random_plates(&mut Random(5), 2, 0.5, 0.1);
+    (plates[0].center, plates[0].u, plates[0].v) = (DVec3::new(0.0, -2.0, 0.0), 3.0 * DVec3::Z, 3.0 * DVec3::X);
+    (plates[1].center, plates[1].u, plates[1].v) = (DVec3::new(0.5, 2.0, 0.0), 0.7 * DVec3::X, 0.6 * DVec3::Z);
+    plates.iter_mut().for_each(|p| p.subdivide = [4, 4]);
+    let head = format!(
+        "{HEAD}[lighting]\ngather = 'exact'\n{lighting}\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\noptical_depth = 2\nradius_scale = 0.5\nmaterial = 'm0'\n"
+    );
+    let sun = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = [3.0, 2.9, 2.7]\n";
+    load_with(&(head + sun + SKY + &plates_text(plates)), &[], None).unwrap().scene
+}
+
+/// Every facet's light in f64: facets as the device has them, all else from the scene.
+fn reference(f: &Frame) -> Vec<Gathered> {
+    let scene = &*f.scene;
+    let setting = Setting::at(scene, &scene.groups(), 0.0).unwrap();
+    let origin = setting.light_origin;
+    let basis = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling);
+    let region = |i: usize| {
+        let brdf = scene.region_material(i).at(0.0);
+        let lobe = (brdf.ks != DVec3::ZERO).then(|| basis.lobe(brdf.ns));
+        Region { rectangle: scene.surfaces.get(i).map(|s| Rectangle::new(s, origin)), brdf, lobe }
+    };
+    let regions: Vec<Region> = (0..scene.n_regions()).map(region).collect();
+    let rectangles: Vec<Rectangle> = regions.iter().filter_map(|r| r.rectangle).collect();
+    let double = |v: [f32; 3]| DVec3::from(v.map(f64::from));
+    let facets: Vec<Facet> = f
+        .facets
+        .iter()
+        .map(|r| Facet {
+            position: double(r.position),
+            normal: double(r.normal),
+            area: f64::from(r.area),
+            i_region: r.i_region as usize,
+            color: double(r.color),
+        })
+        .collect();
+    let groups = scene.groups();
+    let generated: Vec<_> = scene.clouds.iter().flat_map(nimbus::reference::generate::cloud).collect();
+    let offsets = place::offsets(&groups, &scene.clouds, 0.0, origin);
+    let rest: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
+    let blobs = place::blobs(&generated, &place::place(&rest, &groups, &offsets));
+    let cells = grid::deposit(&setting.grid, &blobs);
+    let forward = if blobs.is_empty() { 1.0 } else { scene.lighting.forward };
+    let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(origin)).collect();
+    let step = scene.lighting.step;
+    let obstacles = Obstacles { spec: &setting.grid, cells: &cells, rectangles: &rectangles, step, forward };
+    let receivers: Vec<Receiver> =
+        facets.iter().map(|f| Receiver { position: f.position, i_region: f.i_region as u32 }).collect();
+    let shares = obstacles.share_factors(&receivers, &lights);
+    let pairings = pairings(&scene.surfaces, scene.clouds.len());
+    let exchange = Exchange {
+        facets: &facets,
+        regions: &regions,
+        lights: &lights,
+        shares: &shares,
+        spec: &setting.grid,
+        cells: &cells,
+        forward,
+        step,
+        pairs: scene.lighting.pairs,
+        eye: f.eye,
+        pairings: &pairings,
+        reach: setting.radius.max(2.0),
+    };
+    each(facets.len(), |j| exchange.gather(j))
+}
+
+/// I_i and L2, channel by channel.
+fn values(f: &Frame) -> [Vec<f64>; 2] {
+    let of = |k: usize| f.lit.iter().flat_map(|l| if k == 0 { l.indirect } else { l.second }).map(f64::from).collect();
+    [of(0), of(1)]
+}
+
+/// Truths and bounds of both.
+fn truths(found: &[Gathered]) -> ([Vec<f64>; 2], [Vec<f64>; 2]) {
+    let flat = |of: &dyn Fn(&Gathered) -> DVec3| found.iter().flat_map(|g| of(g).to_array()).collect::<Vec<f64>>();
+    ([flat(&|g| g.indirect), flat(&|g| g.second)], [flat(&|g| g.indirect_error), flat(&|g| g.second_error)])
+}
+
+fn assert_agrees(what: &str, f: &Frame) {
+    let found = reference(f);
+    let (values, (truths, bounds)) = (values(f), truths(&found));
+    for (k, quantity) in ["I_i", "L2"].into_iter().enumerate() {
+        assert_within_and_say(&format!("{what}, {quantity}"), &values[k], &truths[k], &bounds[k]);
+        // The bound says something: all but a few facets' light is known to a thousandth of the greatest.
+        let greatest = truths[k].iter().cloned().fold(0.0, f64::max);
+        let n_loose = bounds[k].iter().filter(|b| **b > 1e-3 * greatest).count();
+        println!("  greatest {greatest:.3e}, {n_loose} of {} loose", bounds[k].len());
+        assert!(greatest > 0.0 && n_loose * 20 <= bounds[k].len(), "{what}: {n_loose} loose bounds");
+    }
+    let mut n = 0.0;
+    for (j, (lit, truth)) in f.lit.iter().zip(&found).enumerate() {
+        let off = (f64::from(lit.n_unresolved) - truth.n_unresolved).abs();
+        assert!(off <= truth.n_doubted, "{what}: facet {j} counts {} for {truth:?}", lit.n_unresolved);
+        n += truth.n_unresolved;
+    }
+    println!("  {n} cells unresolved");
+}
+
+#[test]
+fn rooms_of_plates_agree_with_the_reference() {
+    let gpu = Gpu::new();
+    for seed in 0..4 {
+        assert_agrees(&format!("room {seed}"), &frame(&gpu, room(seed, "")));
+    }
+    for levels in [0, 2] {
+        assert_agrees(&format!("{levels} levels"), &frame(&gpu, room(1, &format!("pair_levels = {levels}"))));
+    }
+    assert_agrees("pair_size 2", &frame(&gpu, room(2, "pair_size = 2")));
+    assert_agrees("diffuse", &frame(&gpu, room(3, "bases = 1")));
+}
+
+#[test]
+fn a_cloud_between_plates_agrees_with_the_reference() {
+    let gpu = Gpu::new();
+    assert_agrees("cloud", &frame(&gpu, cloud("")));
+    assert_agrees("cloud, few steps", &frame(&gpu, cloud("forward = 0\npair_steps = 3")));
+}
+
+#[test]
+fn a_tree_that_is_opened_whole_is_every_pair_and_two_runs_are_the_same() {
+    let gpu = Gpu::new();
+    for scene in [room(0, ""), cloud("")] {
+        let exact = frame(&gpu, scene.clone());
+        assert_eq!(exact.lit, frame(&gpu, scene.clone()).lit);
+        let mut opened = scene;
+        opened.lighting.gather = nimbus::model::scene::Gather::Tree;
+        opened.lighting.theta = 0.0;
+        let tree = frame(&gpu, opened);
+        let (a, b) = (values(&exact), values(&tree));
+        for k in [0, 1] {
+            // The same terms in another order: a rounding a term, of which there are some hundreds, of their sum; terms
+            // of either sign (lobes) are a few percent of it.
+            // Where the tree's order spends a dispatch's cells sooner, cells stay open and are counted.
+            let open: Vec<bool> =
+                (0..a[k].len()).map(|i| tree.lit[i / 3].n_unresolved > exact.lit[i / 3].n_unresolved).collect();
+            assert!(open.iter().filter(|o| **o).count() * 20 <= open.len());
+            let bound =
+                |(v, open): (&f64, &bool)| if *open { 0.05 * v.abs() } else { 1000.0 * bounded::U * v.abs() + 1e-9 };
+            let bounds: Vec<f64> = a[k].iter().zip(&open).map(bound).collect();
+            assert_within_and_say("tree of theta 0", &b[k], &a[k], &bounds);
+        }
+    }
+}
+
+#[test]
+fn wrong_gathers_are_noticed() {
+    let gpu = Gpu::new();
+    let scenes = [room(1, ""), cloud("forward = 0")];
+    let references = scenes.clone().map(|s| truths(&reference(&frame(&gpu, s))));
+    let wrong = |compiler: &Compiler, scene: usize| {
+        let found = values(&frame_by(&gpu, compiler, scenes[scene].clone()));
+        let (truths, bounds) = &references[scene];
+        [0, 1].iter().any(|&k| check_within("wrong", &found[k], &truths[k], &bounds[k]).is_err())
+    };
+    assert!(!wrong(&gpu.compiler, 0) && !wrong(&gpu.compiler, 1));
+    for (scene, file, from, to) in [
+        (0, "include/gather.glsl", "2.0 / (3.0 * d2)", "1.0 / (3.0 * d2)"),
+        (0, "include/gather.glsl", "6.0 * dot(along, along)", "5.0 * dot(along, along)"),
+        (0, "include/gather.glsl", "hidden ? 0.0 : share.y", "share.y"),
+        (0, "include/cells.glsl", "const float RIM = 0.5", "const float RIM = 1.0"),
+        (0, "include/cells.glsl", "const float LOBE_STEP = 3.0", "const float LOBE_STEP = 4.0"),
+        (0, "include/cells.glsl", "walk.at * 2u", "walk.at"),
+        (0, "include/occlude.glsl", "most <= 0.0", "most <= 0.1"),
+        (0, "second_sources.comp", "* mean_falloff(light, facet, region)", "* share_of(light, a, facet.normal, 1.0)"),
+        (1, "include/gather.glsl", "float(k) + 0.5", "float(k)"),
+        (1, "include/gather.glsl", "push.pair_steps)", "3u)"),
+        (1, "include/gather.glsl", "area * PI_INVERSE)", "area)"),
+    ] {
+        assert!(wrong(&Gpu::wrong_compiler(file, from, to), scene), "{file}: {from} as {to}");
+    }
+}

@@ -64,7 +64,7 @@ layout(std430, binding = 10) readonly buffer Density { float density[]; };
 layout(std430, binding = 11) readonly buffer Nodes { Node nodes[]; };
 layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
 // By facet: the first source that is still to be looked at.
-layout(std430, binding = 13) buffer Reached { uvec4 reached[]; };
+layout(std430, binding = 13) buffer Reached { uint reached[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -99,13 +99,14 @@ void take(inout Sum sum, View view, vec3 e, Taker taker) {
 #endif
 }
 
-// The facet that was set aside, cell by cell, while there are cells to spend: one step is one cell.
+// The facets that were set aside, cell by cell: one step is one cell, so that neighbouring invocations need not wait for
+// each other's facets.
 void gather_cells(
     inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, Pane pane,
-    uint i) {
-    Walk walk = Walk(0u, aside_cell.x, aside_cell.yz);
-    uint n = is_aside ? 1u : 0u;
-    while (walk.s < n && n_cells_left > 0u) {
+    uint aside[MAX_ASIDE], uint n_aside) {
+    Walk walk = start_walk(0u);
+    while (walk.s < n_aside) {
+        uint i = aside[walk.s];
         Source source = sources[i];
         View view = look(source, i, 1u, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
@@ -134,22 +135,17 @@ void gather_cells(
         n_cells_left -= min(n_cells_left, 1u);
         walk = advance(walk, view.split, 1u);
     }
-    is_aside = walk.s < n;
-    aside_cell = uvec3(walk.level, walk.at);
-    n_sources_left = is_aside ? 0u : n_sources_left;
+    n_cut += float(n_aside - walk.s);
 }
 
 // Adds what the sources of a pairing from `s` on send to the receiver, and moves `s`. A step is a facet or cluster as a
 // whole; facets too wide for their distance, or with a shadow's rim on them, follow cell by cell.
 void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
     Pane pane = pane_of(emitter);
-    // A facet that an earlier dispatch left off in is the one before `s`.
-    if (end > 0u && s == i_left_off) {
-        gather_cells(sum, pairing, emitter, taker, veil, veiled, pane, pairing.i_source + max(s, 1u) - 1u);
-    }
+    uint aside[MAX_ASIDE];
     while (s < end && n_sources_left > 0u) {
-        uint i_aside = 0u;
-        while (s < end && n_sources_left > 0u && !is_aside) {
+        uint n_aside = 0u;
+        while (s < end && n_sources_left > 0u && n_aside < MAX_ASIDE) {
             uint i = pairing.i_source + s;
             uint n_nodes = nodes_of(i);
             Source source = sources[i];
@@ -170,13 +166,14 @@ void gather(inout Sum sum, Pairing pairing, Region emitter, Taker taker, Veil ve
 #endif
             take(sum, view, view.leaving * share, taker);
             sum.n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
-            is_aside = is_facet && view.split;
-            aside_cell = uvec3(0u);
-            i_aside = i;
+            aside[n_aside] = i;
+            n_aside += is_facet && view.split ? 1u : 0u;
             s += view.split && !is_facet ? 1u : n_nodes;
             n_sources_left -= 1u;
         }
-        gather_cells(sum, pairing, emitter, taker, veil, veiled, pane, i_aside);
+        gather_cells(sum, pairing, emitter, taker, veil, veiled, pane, aside, n_aside);
+        // Without cells to spend the next facet would be looked at as a whole only: it waits for the next dispatch.
+        n_sources_left = n_cells_left < CELLS / 4u ? 0u : n_sources_left;
     }
 }
 
@@ -191,6 +188,9 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, u
     Pane pane = pane_of(emitter);
     Walk walk = start_walk(s);
     float bound = 0.0;
+    // Cells of its own.
+    uint n_kept = n_cells_left;
+    n_cells_left = CELLS;
     while (walk.s < end) {
         uint i = pairing.i_source + walk.s;
         Source source = sources[i];
@@ -223,8 +223,10 @@ float audit(Pairing pairing, Region emitter, Taker taker, vec3 albedo, uint s, u
         vec3 lobes = max(sent * taken - met, vec3(0.0)) * (view.width > 1.0 ? most : view.share);
         vec3 e = geometry + lobes;
         bound += view.wide && !view.split ? max(e.x, max(e.y, e.z)) : 0.0;
+        n_cells_left -= min(n_cells_left, view.split ? 1u : 0u);
         walk = advance(walk, view.split, n_nodes);
     }
+    n_cells_left = n_kept;
     return bound;
 }
 
@@ -238,14 +240,13 @@ void main() {
     Taker taker = Taker(facet.position, facet.normal, normalize(to_eye), own);
     vec3 albedo = own.kd * facet.color * PI_INVERSE;
     Sum sum = Sum(vec3(0.0), vec3(0.0), 0.0, 0.0);
-    uint next = from_reached(push.begins != 0u ? uvec4(0u) : reached[j]);
+    uint next = push.begins != 0u ? 0u : reached[j];
     uint last = 0u;
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];
         last = pairing.i_source + pairing.n_sources;
         uint s = begin_of(pairing, next);
-        i_left_off = is_aside && pairing.i_source + s == next && s > 0u ? s : 0xFFFFFFFFu;
         uint n = n_sources_left > 0u ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position);
         // Two loops and not a condition inside of one: a device that runs both sides of a condition then runs one.
@@ -265,11 +266,8 @@ void main() {
         lit[j].indirect = (begins ? vec3(0.0) : before.indirect) + sum.indirect;
         lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * sum.indirect + front * own.ks * sum.glossy;
         lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + sum.n_unresolved;
-        // What was not looked at bounds nothing.
-        bool is_lost = push.ends != 0u && (next < last || is_aside);
-        float unresolved = is_lost ? uintBitsToFloat(0x7F800000u) : sum.unresolved;
-        lit[j].unresolved = (begins ? 0.0 : before.unresolved) + unresolved;
-        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + (push.ends != 0u ? float(last - min(next, last)) + (is_aside ? 1.0 : 0.0) : 0.0);
-        reached[j] = to_reached(next);
+        lit[j].unresolved = (begins ? 0.0 : before.unresolved) + sum.unresolved;
+        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
+        reached[j] = next;
     }
 }

@@ -70,7 +70,7 @@ layout(std430, binding = 10) readonly buffer Density { float density[]; };
 layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 // As tensor.glsl has it.
 layout(std430, binding = 12) buffer Second { float t2[]; };
-layout(std430, binding = 13) buffer Reached { uvec4 reached[]; };
+layout(std430, binding = 13) buffer Reached { uint reached[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -137,13 +137,14 @@ void add(vec4 flux, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float sh
 }
 
 // As second_gather.comp has it.
-// The facet that was set aside, cell by cell, while there are cells to spend: one step is one cell.
+// The facets that were set aside, cell by cell: one step is one cell, so that neighbouring invocations need not wait for
+// each other's facets.
 void gather_cells(
     Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, Pane pane,
-    uint i) {
-    Walk walk = Walk(0u, aside_cell.x, aside_cell.yz);
-    uint n = is_aside ? 1u : 0u;
-    while (walk.s < n && n_cells_left > 0u) {
+    uint aside[MAX_ASIDE], uint n_aside) {
+    Walk walk = start_walk(0u);
+    while (walk.s < n_aside) {
+        uint i = aside[walk.s];
         Source source = sources[i];
         View view = look(source, i, 1u, walk, pane, emitter, taker);
         float share = view.split ? 0.0 : view.share;
@@ -170,22 +171,17 @@ void gather_cells(
         n_cells_left -= min(n_cells_left, 1u);
         walk = advance(walk, view.split, 1u);
     }
-    is_aside = walk.s < n;
-    aside_cell = uvec3(walk.level, walk.at);
-    n_sources_left = is_aside ? 0u : n_sources_left;
+    n_cut += float(n_aside - walk.s);
 }
 
 // Adds what the sources of a pairing from `s` on send to the receiver, and moves `s`. A step is a facet or cluster as a
 // whole; facets too wide for their distance, or with a shadow's rim on them, follow cell by cell.
 void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
     Pane pane = pane_of(emitter);
-    // A facet that an earlier dispatch left off in is the one before `s`.
-    if (end > 0u && s == i_left_off) {
-        gather_cells(pairing, emitter, taker, veil, veiled, pane, pairing.i_source + max(s, 1u) - 1u);
-    }
+    uint aside[MAX_ASIDE];
     while (s < end && n_sources_left > 0u) {
-        uint i_aside = 0u;
-        while (s < end && n_sources_left > 0u && !is_aside) {
+        uint n_aside = 0u;
+        while (s < end && n_sources_left > 0u && n_aside < MAX_ASIDE) {
             uint i = pairing.i_source + s;
             uint n_nodes = 1u;
             Source source = sources[i];
@@ -210,13 +206,14 @@ void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool 
                 add(flux, emitter, view.position, source.normal, -view.way, share, view.taker_gap);
             }
             n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
-            is_aside = is_facet && view.split;
-            aside_cell = uvec3(0u);
-            i_aside = i;
+            aside[n_aside] = i;
+            n_aside += is_facet && view.split ? 1u : 0u;
             s += view.split && !is_facet ? 1u : n_nodes;
             n_sources_left -= 1u;
         }
-        gather_cells(pairing, emitter, taker, veil, veiled, pane, i_aside);
+        gather_cells(pairing, emitter, taker, veil, veiled, pane, aside, n_aside);
+        // Without cells to spend the next facet would be looked at as a whole only: it waits for the next dispatch.
+        n_sources_left = n_cells_left < CELLS / 4u ? 0u : n_sources_left;
     }
 }
 
@@ -252,14 +249,13 @@ void main() {
     Region own = regions[facet.i_region];
     Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), own);
     n_unresolved = 0.0;
-    uint next = from_reached(push.begins != 0u ? uvec4(0u) : reached[j]);
+    uint next = push.begins != 0u ? 0u : reached[j];
     uint last = 0u;
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
         Region emitter = regions[pairing.i_region];
         last = pairing.i_source + pairing.n_sources;
         uint s = begin_of(pairing, next);
-        i_left_off = is_aside && pairing.i_source + s == next && s > 0u ? s : 0xFFFFFFFFu;
         uint n = n_sources_left > 0u ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position);
         clear();
@@ -274,12 +270,9 @@ void main() {
     if (gl_LocalInvocationID.x < block.n_facets) {
         // Pairs are the same for every light.
         if (push.is_first_light != 0u) {
-            // Nothing bounds what they may change: it is the materials' of any time.
-            bool is_open = n_unresolved > 0.0;
-            lit[j].unresolved = (push.begins != 0u ? 0.0 : lit[j].unresolved) + (is_open ? uintBitsToFloat(0x7F800000u) : 0.0);
             lit[j].n_unresolved = (push.begins != 0u ? 0.0 : lit[j].n_unresolved) + n_unresolved;
         }
-        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + (push.ends != 0u ? float(last - min(next, last)) + (is_aside ? 1.0 : 0.0) : 0.0);
-        reached[j] = to_reached(next);
+        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
+        reached[j] = next;
     }
 }

@@ -43,13 +43,12 @@ Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u)); }
 // word, so the walk goes on in another where it ended in this one.
 uint n_sources_left = STEPS;
 uint n_cells_left = CELLS;
-// A facet is set aside for a closer look, so that what that takes is not gone through for every facet: a device that runs
-// both sides of a condition runs an empty loop at least once. Where cells are spent before it is done, the next dispatch
-// goes on from here.
-bool is_aside = false;
-uvec3 aside_cell = uvec3(0u);
-// The place in the pairing after the facet that an earlier dispatch left off in, if it is one of the pairing's.
-uint i_left_off = 0xFFFFFFFFu;
+// Facets whose cells a driver cut short all the same.
+float n_cut = 0.0;
+
+// Facets set aside for a closer look, so that what they take is not gone through for every facet: a device that runs both
+// sides of a condition runs an empty loop at least once.
+const uint MAX_ASIDE = 8u;
 
 // Where the walk through a pairing's sources begins, `reached` being the first source that is still to be looked at.
 uint begin_of(Pairing pairing, uint reached) {
@@ -194,11 +193,11 @@ View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emit
 #if TREE
     // A cluster with normals of its own each may send what its mean does not say.
     faces = faces || (is_cluster && dot(source.normal, source.normal) < EVEN * EVEN);
-    view.split = before && faces && excess > 1.0 && (is_cluster || (walk.level < push.pair_levels));
+    view.split = before && faces && excess > 1.0 && (is_cluster || (walk.level < push.pair_levels && n_cells_left > 0u));
     view.wide = before && faces && excess > 1.0 && !is_cluster;
 #else
     view.wide = before && faces && excess > 1.0;
-    view.split = view.wide && walk.level < push.pair_levels;
+    view.split = view.wide && walk.level < push.pair_levels && n_cells_left > 0u;
 #endif
     return view;
 }
@@ -210,16 +209,6 @@ float torn_radius(Source source, Walk walk, View view, uint n_nodes) {
         return view.width > push.theta * TORN ? source.radius : 0.0;
     }
 #endif
-    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels;
+    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && n_cells_left > 0u;
     return wide ? source.radius * cell_scale(walk.level) : 0.0;
-}
-
-// What the gather of a receiver has reached: the first source that it has not come to, and, behind the flag in the highest
-// bit, the cell of the one before it.
-uvec4 to_reached(uint next) { return uvec4(next, is_aside ? 0x80000000u | aside_cell.x : 0u, aside_cell.yz); }
-
-uint from_reached(uvec4 from) {
-    is_aside = (from.y & 0x80000000u) != 0u;
-    aside_cell = uvec3(from.y & 0x7FFFFFFFu, from.zw);
-    return from.x;
 }

@@ -6,7 +6,7 @@ use crate::layout::second::{BlockRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
 use crate::model::scene::{Gather, Scene};
 use crate::model::tree::Tree;
-use crate::passes::second::{Receivers, Steps, block_len};
+use crate::passes::second::{Receivers, Steps};
 
 use super::buffers::{Buffers, upload};
 
@@ -78,8 +78,8 @@ impl Exchange {
             heights,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
-            reached: Buffer::new::<[u32; 4]>(device, "second.reached", scene.n_facets(), Place::Device)?,
-            n_dispatches: n_dispatches(scene, device, n_sources),
+            reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
+            n_dispatches: n_dispatches(scene, n_sources),
             n_diffuse_blocks: lists.diffuse.len() as u32,
             n_glossy_blocks: lists.glossy.len() as u32,
         })
@@ -127,25 +127,18 @@ const LOOP_TURNS: u32 = 65_535;
 /// Surfaces that shade a facet from a light, on the average of a walk.
 const SHADOWS: u32 = 4;
 /// Cells of a gather for every source, on the average of a receiver. Where that is not enough, what is left is counted.
-const CELLS_PER_SOURCE: f64 = 1.0;
+const CELLS_PER_SOURCE: f64 = 0.5;
 
 /// Dispatches of a gather of `n_sources`; a receiver that has done all it had to takes no step in the rest.
-fn n_dispatches(scene: &Scene, device: &Device, n_sources: u64) -> u32 {
-    let Steps { sources, cells } = steps(scene, device);
+fn n_dispatches(scene: &Scene, n_sources: u64) -> u32 {
+    let Steps { sources, cells } = steps(scene);
     let n = n_sources as f64;
-    // A lobe's cells are as small as it is narrow.
-    let glossy = (0..scene.n_regions()).filter(|i| is_glossy(scene, *i));
-    let narrow = glossy.flat_map(|i| scene.region_material(i).exponents()).fold(1.0, f64::max).sqrt();
-    let of_cells = CELLS_PER_SOURCE * n * (1.0 + narrow / 10.0);
-    (n / f64::from(sources) + of_cells / f64::from(cells) + narrow / 10.0).ceil() as u32 + 1
+    (n / f64::from(sources) + CELLS_PER_SOURCE * n / f64::from(cells)).ceil() as u32 + 1
 }
 
 /// What one invocation may look at in one dispatch. A step is a turn, and so is each of the loops within it, once more to
 /// find that it is done.
-/// A processor's invocations share their loops, a subgroup of them, and each may keep the others turning while it turns
-/// alone; 1 elsewhere.
-pub fn steps(scene: &Scene, device: &Device) -> Steps {
-    let n_lanes = if device.info().kind == "cpu" { block_len(device) } else { 1 };
+pub fn steps(scene: &Scene) -> Steps {
     let from = pairings(&scene.surfaces, scene.clouds.len());
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len() as u32).max().unwrap_or(0);
     let n_lights = scene.lights.len() as u32;
@@ -158,7 +151,7 @@ pub fn steps(scene: &Scene, device: &Device) -> Steps {
     let veils = from.iter().map(|p| p.iter().map(|p| 21 * p.occluders.len() as u32 + 8).sum()).max().unwrap_or(0);
     // An eighth for sources, half for cells, a quarter for an audit of both, and the rest is room: cells that were begun
     // are finished.
-    let eighth = LOOP_TURNS.saturating_sub(veils) / 8 / n_lanes;
+    let eighth = LOOP_TURNS.saturating_sub(veils) / 8;
     Steps { sources: (eighth / of_source).max(1), cells: (4 * eighth / of_cell).max(4) }
 }
 

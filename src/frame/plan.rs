@@ -178,7 +178,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             skip("lighting.mode is not \"two-reflection\"")
         },
         match traits.tensors {
-            Tensors::Kept => lighting(same_light, "light and materials are the same"),
+            Tensors::Kept => lighting(same_light && same_eye, "light and materials are the same"),
             Tensors::Needless => skip("no material is edited: light is gathered at once"),
             Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
@@ -344,7 +344,7 @@ mod tests {
         // A light that was dark has left no tensor behind.
         let mut dark = packet();
         dark.lights[0].energy = [0.0; 3];
-        assert_eq!(running(&KEPT, Some(&dark), &last), anew);
+        assert_eq!(running(&KEPT, Some(&dark), &last), [&["transmit"], &anew[..]].concat());
         // The eye matters to lobes alone.
         let eye = |p: &mut Packet| p.camera.eye[0] = 1.0;
         assert_eq!(after(&KEPT, &eye), ["sprites"]);

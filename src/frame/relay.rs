@@ -45,7 +45,7 @@ impl Relay {
         scene: &Scene,
         tree: bool,
     ) -> Result<Relay> {
-        let second = Second::new(device, compiler, scene.n_particles() > 0, tree, steps(scene, device))?;
+        let second = Second::new(device, compiler, scene.n_particles() > 0, tree, steps(scene))?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
         Ok(Relay {

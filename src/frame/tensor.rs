@@ -179,9 +179,7 @@ impl TensorStage {
         shape: Shape,
     ) -> Result<TensorStage> {
         let second = match shape.has_second {
-            true => {
-                Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases, steps(scene, device))?)
-            }
+            true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases, steps(scene))?),
             false => None,
         };
         // One that has no number does not fit either; the limits have been asked before.

@@ -100,7 +100,7 @@ impl Second {
 
     /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
     /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `nodes`: NodeRecord;
-    /// `lit`: LitRecord; `reached`: [u32; 4] by facet. A gather takes several dispatches, the first of which `begins` and the
+    /// `lit`: LitRecord; `reached`: u32 by facet. A gather takes several dispatches, the first of which `begins` and the
     /// last `ends`.
     pub fn record(
         &self,
@@ -183,6 +183,6 @@ impl SecondTensor {
 }
 
 /// Most receivers of a block: a subgroup's width.
-pub fn block_len(device: &Device) -> u32 {
+fn block_len(device: &Device) -> u32 {
     device.limits().subgroup_size.clamp(8, 64)
 }

@@ -97,7 +97,8 @@ mod tests {
         let sin60 = 3f64.sqrt() / 2.0;
         let normal = DVec3::Y;
         let toward_eye = |cos: f64, sin: f64| DVec3::new(sin, cos, 0.0);
-        let of = |light: &Light, outgoing| responses(light, 0.5, normal, DVec3::Y, outgoing, &[ramp.clone()]);
+        let of =
+            |light: &Light, outgoing| responses(light, 0.5, normal, DVec3::Y, outgoing, std::slice::from_ref(&ramp));
         let before = of(&SUN, toward_eye(0.5, sin60));
         let gap = 1.0 - sin60;
         assert!((before[0] - 0.5 / PI).abs() < 1e-15 && (before[1] - 0.5 * gap.powf(0.25)).abs() < 1e-15);

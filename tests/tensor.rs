@@ -208,7 +208,7 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     assert_eq!(of(2), [[0, 7], [13, 9]]);
     assert_eq!(of(3), [[6, 7], [14, 8]]);
     assert_eq!(of(4), [[0, 22]]);
-    let mut limits = gpu.device.limits().clone();
+    let mut limits = *gpu.device.limits();
     assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::Kept);
     let first = 4 * 3 * shape.n_rows;
     assert_eq!(limits::tensors(&shape, &limits, bytes + first), Tensors::Kept);

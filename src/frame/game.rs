@@ -5,14 +5,19 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
+use super::exchange::is_glossy;
+use super::packet::Packet;
+use super::tensor::{Shape, basis_of, is_edited, kind_of};
 use crate::error::{Error, Place, Result};
 use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord, lobe_width};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
 use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::gust::{Mode, displacement};
+use crate::model::material::{Brdf, Material};
 use crate::model::scene::Scene;
 
 pub struct Game {
@@ -203,9 +208,3 @@ fn table(scene: &Scene, basis: Option<&Basis>, time_s: f64) -> Vec<f32> {
     let rows = scene.materials.iter().map(lobe).chain(basis.vectors().iter().cloned());
     rows.flatten().map(|v| v as f32).collect()
 }
-
-use super::exchange::is_glossy;
-use super::packet::Packet;
-use super::tensor::{Shape, basis_of, is_edited, kind_of};
-use crate::model::basis::{Basis, N_NODES};
-use crate::model::material::{Brdf, Material};

@@ -23,32 +23,33 @@ void main() {
         float weight = 0.0, total_area = 0.0, square_area = 0.0;
         for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
             Source child = sources[c];
-            float w = child.flux.x + child.flux.y + child.flux.z;
+            float w = child.sent.x + child.sent.y + child.sent.z, area = child.extent.x;
             weight += w;
-            by_flux += w * child.position;
-            normal_by_flux += w * child.normal;
-            by_area += child.total_area * child.position;
-            normal_by_area += child.total_area * child.normal;
-            flux += child.flux;
-            total_area += child.total_area;
-            square_area += child.total_area * child.area;
+            by_flux += w * child.place.xyz;
+            normal_by_flux += w * child.face.xyz;
+            by_area += area * child.place.xyz;
+            normal_by_area += area * child.face.xyz;
+            flux += child.sent.xyz;
+            total_area += area;
+            square_area += area * child.face.w;
         }
         // Where nothing shines the middle is as good, and facets without area lie where they lie.
         bool shines = weight > 0.0;
         float whole = shines ? weight : total_area;
         float inverse = whole > 0.0 ? 1.0 / whole : 0.0;
-        vec3 position = whole > 0.0 ? (shines ? by_flux : by_area) * inverse : sources[i + 1u].position;
-        vec3 normal = whole > 0.0 ? (shines ? normal_by_flux : normal_by_area) * inverse : sources[i + 1u].normal;
+        vec3 position = whole > 0.0 ? (shines ? by_flux : by_area) * inverse : sources[i + 1u].place.xyz;
+        vec3 normal = whole > 0.0 ? (shines ? normal_by_flux : normal_by_area) * inverse : sources[i + 1u].face.xyz;
         float radius = 0.0, spread = 0.0;
         for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
             Source child = sources[c];
-            float apart = distance(child.position, position);
-            radius = max(radius, apart + child.radius);
-            float w = shines ? child.flux.x + child.flux.y + child.flux.z : child.total_area;
-            spread += w * inverse * (child.spread + apart * apart);
+            float apart = distance(child.place.xyz, position);
+            radius = max(radius, apart + child.place.w);
+            float w = shines ? child.sent.x + child.sent.y + child.sent.z : child.extent.x;
+            spread += w * inverse * (child.extent.y + apart * apart);
         }
         float area = total_area > 0.0 ? square_area / total_area : 0.0;
-        sources[i] = Source(position, radius, normal, area, flux, total_area, spread, 0.0, 0.0, 0.0);
+        sources[i] = Source(
+            vec4(position, radius), vec4(flux, float(nodes[i].n_nodes)), vec4(normal, area), vec4(total_area, spread, 0.0, 0.0));
         for (uint l = 0u; l < push.n_lights; ++l) {
             vec4 sum = vec4(0.0);
             for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {

@@ -1,17 +1,18 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
 #include "occlude.glsl"
+#include "stencil.glsl"
+#include "turns.glsl"
 
 // Facets as sources of the second reflection (docs/model.md §7, §11 "second"): what each sends diffusely, and by light the
 // flux that its lobe reflects.
 
 layout(local_size_x = 64) in;
 
-// Points of a facet along each side, as transmit.comp has them.
-const uint SHARE_SIDE = 4;
 const float INV_PI = 0.318309886183791;
 
 layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_surfaces; } push;
@@ -25,22 +26,18 @@ layout(std430, binding = 4) readonly buffer Order { uint order[]; };
 layout(std430, binding = 5) readonly buffer Leaves { uint leaves[]; };
 layout(std430, binding = 6) writeonly buffer Sources { Source sources[]; };
 // [source][light], w: sum of A g, g the facet's share of the light's energy; xyz: of a cloud sum of A g c, c the facet's own
-// colour; of a surface's facet the share of it that the light reaches, what of it the clouds let through, and
-// the surfaces whose shadows reach it.
+// colour; xyz: of a surface's facet A times the greatest share at one of its points, what the clouds let through, and the
+// surfaces whose shadows reach it.
 layout(std430, binding = 7) writeonly buffer Fluxes { vec4 fluxes[]; };
+// [source][light], of surfaces' facets: the shares at the points by the greatest.
+layout(std430, binding = 8) writeonly buffer Stencils { Packed stencils[]; };
 
 #include "reach.glsl"
+#include "arriving.glsl"
 
-// A lamp's mean over the middles of the facet's 4 x 4 parts, as the shares are.
-float mean_falloff(Light light, Facet facet, Region region) {
-    vec3 u = region.u / float(region.n_u), v = region.v / float(region.n_v);
-    float sum = 0.0;
-    for (uint i = 0; i < SHARE_SIDE * SHARE_SIDE; ++i) {
-        vec2 at = (vec2(i % SHARE_SIDE, i / SHARE_SIDE) + 0.5) * (2.0 / float(SHARE_SIDE)) - 1.0;
-        Arrival a = arrival_at(light, facet.position + at.x * u + at.y * v);
-        sum += share_of(light, a, facet.normal, 1.0);
-    }
-    return sum * (1.0 / float(SHARE_SIDE * SHARE_SIDE));
+float greatest(Stencil s) {
+    vec4 m = max(max(s.a, s.b), max(s.c, s.d));
+    return max(max(m.x, m.y), max(m.z, m.w));
 }
 
 void main() {
@@ -49,25 +46,32 @@ void main() {
         uint i = leaves[place];
         Facet facet = facets[j];
         Region region = regions[facet.i_region];
-        vec3 half_diagonal = region.u / float(max(region.n_u, 1u)) + region.v / float(max(region.n_v, 1u));
+        bool is_surface = region.kind == REGION_SURFACE;
+        vec3 u = region.u / float(max(region.n_u, 1u)), v = region.v / float(max(region.n_v, 1u));
         // A particle's facet is a disc.
-        float radius = region.kind == REGION_SURFACE ? length(half_diagonal) : sqrt(facet.area * INV_PI);
+        float radius = is_surface ? length(u + v) : sqrt(facet.area * INV_PI);
         vec3 irradiance = vec3(0.0);
         bool in_part = false;
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
-            Arrival a = arrival_at(light, facet.position);
+            uint k = i * push.n_lights + l;
             vec2 share = shares[j * push.n_lights + l];
-            float g = light.kind == LIGHT_POINT && region.kind == REGION_SURFACE
-                ? share.x * share.y * mean_falloff(light, facet, region)
-                : share_of(light, a, facet.normal, share.x * share.y);
+            float g = 0.0;
+            if (is_surface) {
+                uint shadows = shadows_on(facet.position, radius, light, facet.i_region, push.n_surfaces, in_part);
+                Stencil s = arriving(light, Cell(facet.position, u, v), facet.normal, share.y, shadows, facet.i_region, push.n_surfaces);
+                float scale = greatest(s), inverse = scale > 0.0 ? 1.0 / scale : 0.0;
+                g = 0.0625 * total(s);
+                stencils[k] = packed(Stencil(s.a * inverse, s.b * inverse, s.c * inverse, s.d * inverse));
+                fluxes[k] = vec4(facet.area * scale, share.y, float(shadows), facet.area * g);
+            } else {
+                g = share_of(light, arrival_at(light, facet.position), facet.normal, share.x * share.y);
+                fluxes[k] = facet.area * g * vec4(facet.color, 1.0);
+            }
             irradiance += light.energy * g;
-            uint n_surfaces = region.kind == REGION_SURFACE ? push.n_surfaces : 0u;
-            uint shadows = shadows_on(facet.position, radius, light, facet.i_region, n_surfaces, in_part);
-            vec3 rest = region.kind == REGION_SURFACE ? vec3(share, float(shadows)) : facet.area * g * facet.color;
-            fluxes[i * push.n_lights + l] = vec4(rest, facet.area * g);
         }
         vec3 flux = facet.area * INV_PI * region.kd * facet.color * irradiance;
-        sources[i] = Source(facet.position, radius, facet.normal, facet.area, flux, facet.area, 0.0, in_part ? 1.0 : 0.0, 0.0, 0.0);
+        sources[i] = Source(
+            vec4(facet.position, radius), vec4(flux, in_part ? -1.0 : 1.0), vec4(facet.normal, facet.area), vec4(facet.area, 0.0, 0.0, 0.0));
     }
 }

@@ -1,10 +1,12 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 #include "records.glsl"
 #include "light.glsl"
 #include "occlude.glsl"
 #include "functions.glsl"
+#include "stencil.glsl"
 #include "tensor.glsl"
 
 // T2 of one light: the second reflection by basis of the receiver and column of the emitters, without energies and
@@ -26,14 +28,7 @@
 #define N_BASES 8
 #endif
 
-// Sources, and cells of them, of one invocation in one dispatch.
-#ifndef STEPS
-#define STEPS 1024
-#endif
-#ifndef CELLS
-#define CELLS 1024
-#endif
-
+#include "turns.glsl"
 layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push {
@@ -71,6 +66,8 @@ layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 // As tensor.glsl has it.
 layout(std430, binding = 12) buffer Second { float t2[]; };
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
+// As second_sources.comp leaves them.
+layout(std430, binding = 14) readonly buffer Stencils { Packed stencils[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -78,6 +75,7 @@ layout(std430, binding = 13) buffer Reached { uint reached[]; };
 #endif
 #include "veil.glsl"
 #include "reach.glsl"
+#include "arriving.glsl"
 #include "gather.glsl"
 #include "cells.glsl"
 
@@ -107,27 +105,28 @@ void clear() {
 #endif
 }
 
-// Adds what a cell at q sends: `share` of `flux`, its source's as if all of it were as the cell is, toward the receiver's lobe at `gap`.
-void add(vec4 flux, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float share, float gap) {
-    Light light = lights[push.i_light];
+// Adds what comes along the view's way: `share` of the light's energy that a source or cell is lit with, by channel where it
+// has colours.
+void add(vec4 share, Sender source, View view, Region emitter) {
+    Light light = LIGHT(push.i_light);
     float response[N_RESPONSES];
-    response[0] = share * PI_INVERSE;
+    response[0] = PI_INVERSE;
 #if GLOSSY && N_BASES > 1
-    Knot knot = knot_at(gap);
+    Knot knot = knot_at(view.taker_gap);
     [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
-        response[b + 1u] = share * value_at(push.i_vectors + b, knot);
+        response[b + 1u] = value_at(push.i_vectors + b, knot);
     }
 #endif
-    vec3 diffuse = PI_INVERSE * (emitter.kind == REGION_COLORED ? flux.rgb : vec3(flux.w, 0.0, 0.0));
+    vec3 diffuse = PI_INVERSE * (emitter.kind == REGION_COLORED ? share.rgb : vec3(share.w, 0.0, 0.0));
     [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
         plain[r] += response[r] * diffuse;
     }
 #if N_BASES > 1
     uint n_shiny = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY ? 1u : 0u;
     for (uint k = 0u; k < n_shiny; ++k) {
-        Knot from = knot_at(half_vector_gap(normal, arrival_at(light, q).toward, outgoing));
+        Knot from = knot_at(half_vector_gap(source.normal, arrival_at(light, view.position).toward, -view.way));
         [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
-            float e = flux.w * value_at(push.i_vectors + b, from);
+            float e = share.w * value_at(push.i_vectors + b, from);
             [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
                 shiny[b * N_RESPONSES + r] += response[r] * e;
             }
@@ -136,86 +135,26 @@ void add(vec4 flux, Region emitter, vec3 q, vec3 normal, vec3 outgoing, float sh
 #endif
 }
 
-// As second_gather.comp has it.
-// The facets that were set aside, cell by cell: one step is one cell, so that neighbouring invocations need not wait for
-// each other's facets.
-void gather_cells(
-    Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, Pane pane,
-    uint aside[MAX_ASIDE], uint n_aside) {
-    Walk walk = start_walk(0u);
-    while (walk.s < n_aside) {
-        uint i = aside[walk.s];
-        Source source = sources[i];
-        View view = look(source, i, 1u, walk, pane, emitter, taker);
-        float share = view.split ? 0.0 : view.share;
-        float radius = torn_radius(source, walk, view, 1u);
-        if (veiled) {
-            bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
-            view.split = view.split || (radius > 0.0 && veiling.y);
-            share = view.split || veiling.x ? 0.0 : share;
-        }
-        view.split = view.split || is_lit_in_part(i, pairing.i_region, view.position, radius, share > 0.0 && source.in_part > 0.0);
-        share = view.split ? 0.0 : share;
-#if MARCH
-        share *= attenuation(taker.position, view.position, share > 0.0);
-#endif
-        // A loop and not a condition: a device that runs both sides of a condition then leaves it out.
-        uint n_arriving = share > 0.0 ? 1u : 0u;
-        for (uint k = 0u; k < n_arriving; ++k) {
-            vec4 flux = fluxes[i * push.n_lights + push.i_light];
-            // A part of a facet has light of its own.
-            flux.w = walk.level > 0u ? cell_share(i, source, pairing.i_region, view.position, push.i_light) : flux.w;
-            add(flux, emitter, view.position, source.normal, -view.way, share, view.taker_gap);
-        }
-        n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
-        n_cells_left -= min(n_cells_left, 1u);
-        walk = advance(walk, view.split, 1u);
+void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, float share) {
+    // A loop and not a condition: a device that runs both sides of a condition then leaves it out.
+    for (uint k = 0u; k < (share > 0.0 ? 1u : 0u); ++k) {
+        add(share * fluxes[i * N_LIGHTS + push.i_light], source, view, emitter);
     }
-    n_cut += float(n_aside - walk.s);
 }
 
-// Adds what the sources of a pairing from `s` on send to the receiver, and moves `s`. A step is a facet or cluster as a
-// whole; facets too wide for their distance, or with a shadow's rim on them, follow cell by cell.
-void gather(Pairing pairing, Region emitter, Taker taker, Veil veil, const bool veiled, inout uint s, uint end) {
-    Pane pane = pane_of(emitter);
-    uint aside[MAX_ASIDE];
-    while (s < end && n_sources_left > 0u) {
-        uint n_aside = 0u;
-        while (s < end && n_sources_left > 0u && n_aside < MAX_ASIDE) {
-            uint i = pairing.i_source + s;
-            uint n_nodes = 1u;
-            Source source = sources[i];
-            Walk walk = start_walk(s);
-            View view = look(source, i, n_nodes, walk, pane, emitter, taker);
-            float share = view.split ? 0.0 : view.share;
-            float radius = torn_radius(source, walk, view, n_nodes);
-            if (veiled) {
-                bvec2 veiling = veils_ball(pairing, veil, taker.position, view.position, radius, share > 0.0);
-                view.split = view.split || (radius > 0.0 && veiling.y);
-                share = view.split || veiling.x ? 0.0 : share;
-            }
-            bool is_facet = n_nodes == 1u;
-            view.split = view.split || (is_facet && source.in_part > 0.0 && radius > 0.0 && share > 0.0);
-            share = view.split ? 0.0 : share;
-#if MARCH
-            share *= attenuation(taker.position, view.position, share > 0.0);
-#endif
-            uint n_arriving = share > 0.0 ? 1u : 0u;
-            for (uint k = 0u; k < n_arriving; ++k) {
-                vec4 flux = fluxes[i * push.n_lights + push.i_light];
-                add(flux, emitter, view.position, source.normal, -view.way, share, view.taker_gap);
-            }
-            n_unresolved += view.wide && !view.split ? 1.0 : 0.0;
-            aside[n_aside] = i;
-            n_aside += is_facet && view.split ? 1u : 0u;
-            s += view.split && !is_facet ? 1u : n_nodes;
-            n_sources_left -= 1u;
-        }
-        gather_cells(pairing, emitter, taker, veil, veiled, pane, aside, n_aside);
-        // Without cells to spend the next facet would be looked at as a whole only: it waits for the next dispatch.
-        n_sources_left = n_cells_left < CELLS / 4u ? 0u : n_sources_left;
+void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own, const bool own) {
+    for (uint k = 0u; k < (part > 0.0 ? 1u : 0u); ++k) {
+        float g = part * arriving_by(i, source, walk, cell, seen, i_own, own, push.i_light);
+        // Only surfaces' facets have cells, and these no colours of their own.
+        add(vec4(0.0, 0.0, 0.0, g), source, view, emitter);
     }
 }
+
+void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, float area) {
+    n_unresolved += 1.0;
+}
+
+#include "walk.glsl"
 
 // The sums of receiver j as columns of its rows.
 void store(uint j, Region own, Region emitter) {
@@ -245,34 +184,44 @@ void main() {
     Block block = blocks[push.i_first_block + gl_WorkGroupID.x];
     uint place = block.i_first + min(gl_LocalInvocationID.x, block.n_facets - 1u);
     uint j = order[place];
+    uint next = push.begins != 0u ? 0u : reached[j];
+    if (next == DONE) {
+        return;
+    }
+    KEEP_LIGHTS
     Facet facet = facets[j];
     Region own = regions[facet.i_region];
-    Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), own);
+    Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), vec3(0.0), own);
     n_unresolved = 0.0;
-    uint next = push.begins != 0u ? 0u : reached[j];
     uint last = 0u;
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];
-        Region emitter = regions[pairing.i_region];
         last = pairing.i_source + pairing.n_sources;
+        bool open = n_turns < BATCH_TURNS && n_torn < MAX_TORN && next < last;
+        Region emitter = regions[pairing.i_region];
         uint s = begin_of(pairing, next);
-        uint n = n_sources_left > 0u ? pairing.n_sources : 0u;
-        Veil veil = veil_of(pairing, emitter, facet.position);
+        uint n = open ? pairing.n_sources : 0u;
+        Veil veil = veil_of(pairing, emitter, facet.position, open);
         clear();
-        gather(pairing, emitter, taker, veil, false, s, veil.n == 0u ? n : 0u);
-        gather(pairing, emitter, taker, veil, true, s, veil.n > 0u && !veil.closed ? n : 0u);
-        s = veil.closed && n > 0u ? pairing.n_sources : s;
-        next = n > 0u ? max(next, pairing.i_source + s) : next;
+        gather(block.i_pairing + k, pairing, emitter, taker, veil, s, veil.closed ? 0u : n);
+        // Its sums are this pairing's.
+        gather_torn(taker);
+        s = veil.closed && open ? pairing.n_sources : s;
+        next = open ? pairing.i_source + s : next;
+        n_turns += 4u;
         if (gl_LocalInvocationID.x < block.n_facets) {
             store(j, own, emitter);
         }
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
+        bool begins = push.begins != 0u;
+        float n_lost = n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
         // Pairs are the same for every light.
         if (push.is_first_light != 0u) {
-            lit[j].n_unresolved = (push.begins != 0u ? 0.0 : lit[j].n_unresolved) + n_unresolved;
+            lit[j].n_unresolved = (begins ? 0.0 : lit[j].n_unresolved) + n_unresolved;
         }
-        lit[j].n_lost = (push.begins != 0u ? 0.0 : lit[j].n_lost) + n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
-        reached[j] = next;
+        bool fresh = begins && push.is_first_light != 0u;
+        lit[j].n_lost = (fresh ? 0.0 : lit[j].n_lost) + n_lost;
+        reached[j] = next >= last ? DONE : next;
     }
 }

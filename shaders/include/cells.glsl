@@ -17,80 +17,59 @@ const float CLOUD_THETA = 0.4;
 // Where a cluster's normals differ, those nearer to the receiver may be those that face it: an error of the first order,
 // of this share of radius over distance times the normals' spread.
 const float MIXED = 0.5;
-// Cells wider than this share of their distance are discs to their receiver.
+// Facets wider than this share of their distance are discs to their receiver.
 const float NEAR = 1.0;
-// A cell that a shadow's rim runs through is quartered down to this share of pair_size.
-const float RIM = 0.5;
+// A facet that a shadow's rim runs through is looked at closely down to this share of pair_size.
+const float RIM = 0.125;
+const float SINGLE = 0.25;
+// Cells that are looked at by their points may be this much wider: it is their points' parts that are to be small.
+const float BROAD = 3.0;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
 
-// What the cells of a region's facets have in common. A cloud's facets have no axes and are one cell.
-struct Pane { vec3 half_u; vec3 half_v; float side; };
-
-Pane pane_of(Region emitter) {
-    bool is_surface = emitter.kind == REGION_SURFACE;
-    vec3 u = is_surface ? emitter.u / float(emitter.n_u) : vec3(0.0);
-    vec3 v = is_surface ? emitter.v / float(emitter.n_v) : vec3(0.0);
-    return Pane(u, v, 2.0 * sqrt(max(dot(u, u), dot(v, v))));
-}
-
-// Source s of the region, and cell `at` of the 4^level it is divided into, in Z order.
+// Facet s of those set aside, and cell `at` of the 4^level it is divided into, in Z order.
 struct Walk { uint s; uint level; uvec2 at; };
 
 Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u)); }
 
-// Sources and cells that this dispatch may still look at: a driver may end a loop after some ten thousand turns without a
-// word, so the walk goes on in another where it ended in this one.
-uint n_sources_left = STEPS;
-uint n_cells_left = CELLS;
-// Facets whose cells a driver cut short all the same.
-float n_cut = 0.0;
-
 // Facets set aside for a closer look, so that what they take is not gone through for every facet: a device that runs both
 // sides of a condition runs an empty loop at least once.
-const uint MAX_ASIDE = 8u;
-
-// Where the walk through a pairing's sources begins, `reached` being the first source that is still to be looked at.
-uint begin_of(Pairing pairing, uint reached) {
-    return clamp(reached, pairing.i_source, pairing.i_source + pairing.n_sources) - pairing.i_source;
-}
+#ifndef MAX_ASIDE
+#define MAX_ASIDE 8
+#endif
+#ifndef MAX_TORN
+#define MAX_TORN 32
+#endif
 
 // 2^-level.
 float cell_scale(uint level) { return uintBitsToFloat((127u - level) << 23); }
 
-// Into the cell's first quarter or the cluster's first child, or on to the next cell, or, after a facet's last, to the next
-// source: past the `n_nodes` of this one's subtree, 1 for a facet.
-Walk advance(Walk walk, bool split, uint n_nodes) {
+// Into the cell's first quarter, on to the next cell, or, after a facet's last, to the next facet.
+Walk advance(Walk walk, bool quartered) {
     // Last quarters of last quarters are done together.
     uint up = min(uint(findLSB(~(walk.at.x & walk.at.y))), walk.level);
     uint level = walk.level - up;
     uvec2 at = walk.at >> up;
     bool odd = (at.x & 1u) != 0u;
+    bool done = !quartered && level == 0u;
     uvec2 next = odd ? uvec2(at.x - 1u, at.y + 1u) : uvec2(at.x + 1u, at.y);
-    bool enters = split && n_nodes > 1u;
-    bool done = enters || (!split && level == 0u);
     next = done ? uvec2(0u) : next;
-    bool quarters = split && !enters;
-    return Walk(
-        walk.s + (done ? (enters ? 1u : n_nodes) : 0u), quarters ? walk.level + 1u : level, quarters ? walk.at * 2u : next);
+    return Walk(walk.s + (done ? 1u : 0u), quartered ? walk.level + 1u : level, quartered ? walk.at * 2u : next);
 }
 
-// A cell as the receiver sees it.
+// A source or cell as the receiver sees it.
 struct View {
     vec3 position;
     vec3 way;
-    // Width over distance.
+    // Square of the distance, and width over distance.
+    float d2;
     float width;
-    // cos cos / (d^2 + A/pi), times the cell's part of its facet.
-    float share;
-    // Radiance toward the receiver times the facet's area.
-    vec3 leaving;
     // Least 1 - cos gamma at the emitter, and at the receiver.
     float emitter_gap;
     float taker_gap;
-    // Wider than asked for; and to be quartered.
+    // Wider than asked for; and, as a facet, wider than its cells may be.
     bool wide;
-    bool split;
+    bool quartered;
 };
 
 #if TREE
@@ -129,86 +108,102 @@ float lobe_excess(Region region, float gap, float turn, float width, float limit
     return met ? width / (limit * narrowest) : 0.0;
 }
 
-View look(Source source, uint i, uint n_nodes, Walk walk, Pane pane, Region emitter, Taker taker) {
-    View view;
+bool is_cluster(Sender source) {
 #if TREE
-    bool is_cluster = n_nodes > 1u;
-    pane.half_u = is_cluster ? vec3(0.0) : pane.half_u;
-    pane.half_v = is_cluster ? vec3(0.0) : pane.half_v;
-    pane.side = is_cluster ? 2.0 * source.radius : pane.side;
-    vec3 face = is_cluster ? source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30)) : source.normal;
+    return source.n_nodes > 1u;
+#else
+    return false;
+#endif
+}
+
+// cos cos/d^2 of a source as a whole, its mean.
+float form_of(Sender source, View view, Pane pane, Region emitter, Taker taker) {
+    float share = pane.side > 0.0 && view.width <= NEAR
+        ? rectangle_form(taker.normal, source.normal, view.way, view.d2, pane.half_u, pane.half_v)
+        : form(taker.normal, source.normal, view.way, view.d2, source.area);
+#if TREE
+    float extent = source.spread / max(view.d2, 1e-30);
+    share = is_cluster(source) ? cluster_form(taker.normal, source.normal, view.way, view.d2, extent, emitter.kind) : share;
+#endif
+    return share;
+}
+
+#if TREE
+// How much more a cluster's extent may change of its form factor than the opening angle allows: in radius over distance,
+// and the cosines.
+float cluster_excess(Sender source, View view, Region emitter, Taker taker) {
     // A cluster is opened by its radius, and where its facets look different ways.
     float theta = emitter.kind == REGION_SURFACE ? push.theta : CLOUD_THETA * push.theta;
-    float limit = is_cluster ? 2.0 * theta : push.pair_size;
-    float lobe_limit = is_cluster ? LOBE_STEP * theta : LOBE_STEP * push.pair_size;
-#else
-    vec3 face = source.normal;
-    float limit = push.pair_size;
-    float lobe_limit = LOBE_STEP * push.pair_size;
+    float tilt = 0.5 * view.width;
+    float even = dot(source.normal, source.normal);
+    float at_taker = max(dot(taker.normal, view.way) + tilt, 0.0);
+    float at_source = max(-dot(source.normal, view.way), 0.0) + 1.0 - sqrt(even);
+    float mixed = sqrt(max(1.0 - even, 0.0));
+    float wrong = tilt * (tilt + MIXED * mixed) * min(at_taker, 1.0) * at_source * source.total_area / max(view.d2, 1e-30);
+    float allowed = theta * theta;
+    return tilt > 1.0 ? 2.0 : wrong / (allowed * allowed);
+}
 #endif
+
+// A source, or cell of one. `broad`: how much wider than pair_size it may be.
+View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitter, Taker taker) {
+    View view;
+    bool cluster = is_cluster(source);
     float scale = cell_scale(walk.level);
     vec2 at = (2.0 * vec2(walk.at) + 1.0) * scale - 1.0;
+    at *= cluster ? 0.0 : 1.0;
     view.position = source.position + at.x * pane.half_u + at.y * pane.half_v;
     vec3 offset = view.position - taker.position;
-    float d2 = dot(offset, offset);
-    float inverse = inversesqrt(max(d2, 1e-30));
+    view.d2 = dot(offset, offset);
+    float inverse = inversesqrt(max(view.d2, 1e-30));
     view.way = offset * inverse;
-    float part = scale * scale;
-    view.width = pane.side * scale * inverse;
-    // The disc's factor where the derivatives' series would not do; a cloud's facet is a disc.
-    view.share = part * (view.width > 0.0 && view.width <= NEAR
-        ? rectangle_form(taker.normal, source.normal, view.way, d2, scale * pane.half_u, scale * pane.half_v)
-        : form(taker.normal, source.normal, view.way, d2, part * source.area));
+    float side = cluster ? 2.0 * source.radius : pane.side * scale;
+    view.width = side * inverse;
+    float excess = view.width / (broad * push.pair_size);
+    float by_lobes = 0.0;
+    float lobe_limit = LOBE_STEP * push.pair_size;
+    vec3 face = source.normal;
 #if TREE
-    float extent = source.spread / max(d2, 1e-30);
-    view.share = is_cluster ? cluster_form(taker.normal, source.normal, view.way, d2, extent, emitter.kind) : view.share;
-#endif
-    view.leaving = source.flux;
-    float excess = view.width / limit;
-#if TREE
-    // What a cluster's extent may change of its form factor: in radius over distance, and the cosines.
-    float tilt = 0.5 * view.width;
-    float at_taker = max(dot(taker.normal, view.way) + tilt, 0.0);
-    float at_source = max(-dot(source.normal, view.way), 0.0) + 1.0 - length(source.normal);
-    float mixed = sqrt(max(1.0 - dot(source.normal, source.normal), 0.0));
-    float wrong = tilt * (tilt + MIXED * mixed) * min(at_taker, 1.0) * at_source * source.total_area * inverse * inverse;
-    float allowed = theta * theta;
-    excess = is_cluster ? (tilt > 1.0 ? 2.0 : wrong / (allowed * allowed)) : excess;
+    float theta = emitter.kind == REGION_SURFACE ? push.theta : CLOUD_THETA * push.theta;
+    excess = cluster ? cluster_excess(source, view, emitter, taker) : excess;
+    lobe_limit = cluster ? LOBE_STEP * theta : lobe_limit;
+    face *= cluster ? inversesqrt(max(dot(face, face), 1e-30)) : 1.0;
 #endif
     float turn = TURN * view.width;
     view.emitter_gap = 2.0;
-    uint n_shiny = emitter.i_lobe == NO_LOBE ? 0u : 1u;
-    for (uint g = 0u; g < n_shiny; ++g) {
-        view.leaving += lobe_flux(i, emitter, view.position, face, -view.way, view.emitter_gap);
-        excess = max(excess, lobe_excess(emitter, view.emitter_gap, turn, view.width, lobe_limit));
+    for (uint k = 0u; k < (emitter.i_lobe == NO_LOBE ? 0u : 1u); ++k) {
+        view.emitter_gap = gap_at(i, view.position, face, -view.way);
+        by_lobes = max(by_lobes, lobe_excess(emitter, view.emitter_gap, turn, view.width, lobe_limit));
     }
     view.taker_gap = 2.0;
 #if GLOSSY
     view.taker_gap = half_vector_gap(taker.normal, view.way, taker.outgoing);
-    excess = max(excess, lobe_excess(taker.region, view.taker_gap, turn, view.width, lobe_limit));
+    by_lobes = max(by_lobes, lobe_excess(taker.region, view.taker_gap, turn, view.width, lobe_limit));
 #endif
     // Some of the cell may be before the receiver; the receiver is before all of it or none.
-    bool before = dot(taker.normal, offset) > -pane.side * scale;
+    bool before = dot(taker.normal, offset) > -side;
     bool faces = dot(source.normal, offset) < 0.0;
 #if TREE
     // A cluster with normals of its own each may send what its mean does not say.
-    faces = faces || (is_cluster && dot(source.normal, source.normal) < EVEN * EVEN);
-    view.split = before && faces && excess > 1.0 && (is_cluster || (walk.level < push.pair_levels && n_cells_left > 0u));
-    view.wide = before && faces && excess > 1.0 && !is_cluster;
-#else
-    view.wide = before && faces && excess > 1.0;
-    view.split = view.wide && walk.level < push.pair_levels && n_cells_left > 0u;
+    faces = faces || (cluster && dot(source.normal, source.normal) < EVEN * EVEN);
 #endif
+    view.wide = before && faces && max(excess, by_lobes) > 1.0;
+    view.quartered = before && faces && (view.width > BROAD * push.pair_size || by_lobes > 1.0);
     return view;
 }
 
-// Of the ball about a cluster or cell that is opened where the rim of a shadow runs through it; 0 where it is small enough.
-float torn_radius(Source source, Walk walk, View view, uint n_nodes) {
-#if TREE
-    if (n_nodes > 1u) {
-        return view.width > push.theta * TORN ? source.radius : 0.0;
+// Whether a source is wide enough for the rims of shadows to be looked for.
+bool may_be_torn(Sender source, View view) {
+    return view.width > (is_cluster(source) ? push.theta * TORN : push.pair_size * RIM);
+}
+
+// What of light l's energy a facet's cell sends on: A times the share at each of its points as they are seen; `own`: of the
+// cell itself, else of the parts of its facet that its points lie in.
+float arriving_by(uint i, Sender source, Walk walk, Cell cell, Stencil seen, uint i_own, const bool own, uint l) {
+    vec3 flux = fluxes[i * N_LIGHTS + l].xyz;
+    if (own) {
+        Stencil s = arriving(LIGHT(l), cell, source.normal, flux.y, uint(flux.z), i_own, push.n_surfaces);
+        return source.area * weighted(seen, s);
     }
-#endif
-    bool wide = view.width > push.pair_size * RIM && walk.level < push.pair_levels && n_cells_left > 0u;
-    return wide ? source.radius * cell_scale(walk.level) : 0.0;
+    return flux.x * weighted(seen, part_of(unpacked(stencils[i * N_LIGHTS + l]), walk.at, walk.level));
 }

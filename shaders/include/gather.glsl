@@ -3,8 +3,68 @@
 
 const float PI_INVERSE = 0.318309886183791;
 
-// The receiver: where it is, and whither it reflects.
-struct Taker { vec3 position; vec3 normal; vec3 outgoing; Region region; };
+// Lights that are few are kept at hand; loops over them are then unrolled.
+#ifndef N_KEPT
+#define N_KEPT 0
+#endif
+#if N_KEPT > 0
+Light kept[N_KEPT];
+#define N_LIGHTS uint(N_KEPT)
+#define LIGHT(l) kept[l]
+#define KEEP_LIGHTS [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) { kept[l] = lights[l]; }
+#else
+#define N_LIGHTS push.n_lights
+#define LIGHT(l) lights[l]
+#define KEEP_LIGHTS
+#endif
+
+// What the facets of a region have in common. A cloud's facets have no axes and are one cell.
+struct Pane { vec3 half_u; vec3 half_v; float side; float area; };
+
+Pane pane_of(Region emitter) {
+    bool is_surface = emitter.kind == REGION_SURFACE;
+    vec3 u = is_surface ? emitter.u / float(emitter.n_u) : vec3(0.0);
+    vec3 v = is_surface ? emitter.v / float(emitter.n_v) : vec3(0.0);
+    float uu = dot(u, u), vv = dot(v, v);
+    return Pane(u, v, 2.0 * sqrt(max(uu, vv)), 4.0 * sqrt(uu * vv));
+}
+
+// A source as it is needed.
+struct Sender {
+    vec3 position;
+    float radius;
+    vec3 flux;
+    uint n_nodes;
+    bool in_part;
+    vec3 normal;
+    float area;
+    float total_area;
+    float spread;
+};
+
+Sender sender_at(uint i, Region emitter, Pane pane) {
+    vec4 place = sources[i].place, sent = sources[i].sent;
+    Sender s = Sender(place.xyz, place.w, sent.xyz, 1u, sent.w < 0.0, emitter.normal, pane.area, pane.area, 0.0);
+    // Where it need not be loaded it is not.
+    if (emitter.kind != REGION_SURFACE) {
+        vec4 face = sources[i].face;
+        s.normal = face.xyz;
+        s.area = face.w;
+        s.total_area = face.w;
+    }
+#if TREE
+    s.n_nodes = uint(max(sent.w, 1.0));
+    if (s.n_nodes > 1u) {
+        vec2 extent = sources[i].extent.xy;
+        s.total_area = extent.x;
+        s.spread = extent.y;
+    }
+#endif
+    return s;
+}
+
+// The receiver: where it is, whither it reflects, and how much diffusely.
+struct Taker { vec3 position; vec3 normal; vec3 outgoing; vec3 albedo; Region region; };
 
 // cos cos / (d^2 + A/pi) of unit `way` from receiver to source; 0 where either turns its back.
 float form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float area) {
@@ -24,17 +84,39 @@ float rectangle_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d
     return faces ? at_source * max(at_receiver + bent * 2.0 / (3.0 * d2), 0.0) / d2 : 0.0;
 }
 
-// What the veil hides of a ball about q: x, whether its middle is hidden; y, whether the rim of a shadow runs through it.
-// Nothing is looked at where nothing would come. Two a turn: turns are counted (src/frame/exchange.rs).
-bvec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
+// Number k of a veil.
+Region veiling_at(Pairing pairing, Veil veil, uint k) {
+    Region r = veil.first;
+    if (k == 1u) {
+        r = veil.second;
+    }
+    // A loop and not a condition: what is seldom loaded then costs nothing where both sides of a condition are run.
+    uint n = veil.whole || k > 1u ? 1u : 0u;
+    for (uint m = 0u; m < n; ++m) {
+        r = regions[occluder_of(pairing, veil, k)];
+    }
+    return r;
+}
+
+// What the veil leaves of a ball about q: x, the share of it that is seen; y, whether the rim of a shadow runs through it.
+// Nothing is looked at where nothing would come.
+vec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
     uint n = wanted ? veil.n : 0u;
-    bvec2 found = bvec2(false);
-    for (uint k = 0u; k < n; k += 2u) {
-        bvec2 a = hides_ball(regions[occluder_of(pairing, veil, k)], p, q, radius);
-        bvec2 b = hides_ball(regions[occluder_of(pairing, veil, min(k + 1u, n - 1u))], p, q, radius);
-        found = bvec2(found.x || a.x || b.x, found.y || a.y || b.y);
+    vec2 found = vec2(1.0, 0.0);
+    for (uint k = 0u; k < n; ++k) {
+        vec2 by = hides_ball(veiling_at(pairing, veil, k), p, q, radius);
+        found = vec2(found.x * (1.0 - by.x), max(found.y, by.y));
+        n_turns += 2u;
     }
     return found;
+}
+
+// Takes from each point of a cell what the veil hides of its part.
+void shade_all(inout Stencil seen, Pairing pairing, Veil veil, vec3 p, Cell cell, uint n) {
+    for (uint k = 0u; k < n; ++k) {
+        shade(seen, veiling_at(pairing, veil, k), p, 1.0, cell);
+        n_turns += 2u;
+    }
 }
 
 #if MARCH
@@ -56,51 +138,22 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
     float sum = 0.0;
     for (uint k = 0; k < n; ++k) {
         sum += density_at(p + d * (enter + part * (float(k) + 0.5) / float(n)));
+        n_turns += 1u;
     }
     float depth = n > 0u ? push.backward * sum * distance / float(n) : 0.0;
     return depth > 0.0 ? exp(-depth) : 1.0;
 }
 #endif
 
-// A g of a part of a surface's facet for light l, as if the whole facet were lit as the part's middle p is: the facet's own
-// mean would carry its shadows' rims to where a receiver touches it.
-float cell_share(uint i_source, Source source, uint i_region, vec3 p, uint l) {
-    Light light = lights[l];
-    vec3 share = fluxes[i_source * push.n_lights + l].xyz;
-    bool hidden = shadows_of(uint(share.z), p, 0.0, light, i_region, push.n_surfaces).x;
-    return source.area * share_of(light, arrival_at(light, p), source.normal, hidden ? 0.0 : share.y);
-}
+// Whether a light of a source makes its region's lobe shine.
+bool shines(Light light, float g) { return light.kind != LIGHT_SKY && g > 0.0; }
 
-// What it sends toward `outgoing` of light l: radiance times the facet's area.
-vec3 cell_flux(float g, Source source, Region emitter, vec3 p, vec3 outgoing, uint l) {
-    Light light = lights[l];
-    bool shines = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY && g > 0.0;
-    float lobe = shines ? lobe_between(emitter.i_lobe, source.normal, arrival_at(light, p).toward, outgoing) : 0.0;
-    return light.energy * g * (emitter.kd * PI_INVERSE + emitter.ks * lobe);
-}
-
-// Whether the rim of a shadow runs through the ball about p, part of a facet on which some light falls.
-bool is_lit_in_part(uint i_source, uint i_region, vec3 p, float radius, bool wanted) {
-    uint n = wanted ? push.n_lights : 0u;
-    bool torn = false;
-    for (uint l = 0u; l < n; ++l) {
-        vec3 share = fluxes[i_source * push.n_lights + l].xyz;
-        torn = torn || shadows_of(uint(share.z), p, radius, lights[l], i_region, push.n_surfaces).y;
+// The least 1 - cos gamma at a part of a source about p, of any light that makes its lobe shine.
+float gap_at(uint i_source, vec3 p, vec3 normal, vec3 outgoing) {
+    float gap = 2.0;
+    [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
+        float w = half_vector_gap(normal, arrival_at(LIGHT(l), p).toward, outgoing);
+        gap = shines(LIGHT(l), fluxes[i_source * N_LIGHTS + l].w) ? min(gap, w) : gap;
     }
-    return torn;
-}
-
-// The lobe of a cell of a source toward `outgoing`, by light: radiance per area of the source times its whole area.
-// `gap`: the least 1 - cos gamma of any light.
-vec3 lobe_flux(uint i_source, Region emitter, vec3 p, vec3 normal, vec3 outgoing, out float gap) {
-    vec3 sum = vec3(0.0);
-    gap = 2.0;
-    for (uint l = 0u; l < push.n_lights; ++l) {
-        Light light = lights[l];
-        float g = light.kind == LIGHT_SKY ? 0.0 : fluxes[i_source * push.n_lights + l].w;
-        float w = half_vector_gap(normal, arrival_at(light, p).toward, outgoing);
-        gap = g > 0.0 ? min(gap, w) : gap;
-        sum += light.energy * (g * lobe_at(emitter.i_lobe, w));
-    }
-    return emitter.ks * sum;
+    return gap;
 }

@@ -4,6 +4,9 @@
 // of its coordinates (a few 2^-24), and what lies in it is not hidden by it.
 const float IN_PLANE = 9.5367431640625e-7;
 
+// A ball stands for a square: half its side over its diagonal, halved.
+const float SOFT = 0.70710678;
+
 // Signed distance from the rectangle's plane; 0 within it.
 float side_of(Region r, vec3 p) {
     vec3 o = p - r.center;
@@ -23,10 +26,10 @@ bool hides(Region r, vec3 p, vec3 q) {
     return apart && holds(r, p + (q - p) * (a / (a - b)));
 }
 
-// How much of the ball about q is hidden from p: x, whether its middle is; y, whether the rim of the shadow runs through
-// it. The ball's size where the way crosses the plane is its own, shortened by the crossing's share of the way and
-// lengthened by the way's slant.
-bvec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
+// How much of the ball about q is hidden from p: x, the share of it, as if the shadow's rim were straight; y, whether it
+// runs through the ball. The ball's size where the way crosses the plane is its own, shortened by the crossing's share of
+// the way and lengthened by the way's slant.
+vec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
     float a = side_of(r, p), b = side_of(r, q);
     vec3 d = q - p;
     float across = 1.0 / max(abs(a - b), 1e-30);
@@ -39,7 +42,8 @@ bvec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
     float most = max(outside.x, outside.y);
     float reach = radius * abs(part) * max(length(d) * across, 1.0);
     bool torn = abs(b) < radius ? most < reach : apart && abs(most) < reach;
-    return bvec2(apart && most <= 0.0, a != 0.0 && torn);
+    float soft = clamp(0.5 - SOFT * most / max(reach, 1e-30), 0.0, 1.0);
+    return vec2(apart ? soft : 0.0, a != 0.0 && torn ? 1.0 : 0.0);
 }
 
 // From p along d without end.

@@ -16,7 +16,8 @@ bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
 // through it.
 bvec2 shadow_of(uint i, vec3 p, float radius, Light light, uint i_own) {
     Region r = regions[i];
-    bvec2 by = light.kind == LIGHT_POINT ? hides_ball(r, light.position, p, radius) : shades_ball(r, p, light.toward, radius);
+    vec2 past = hides_ball(r, light.position, p, radius);
+    bvec2 by = light.kind == LIGHT_POINT ? bvec2(past.x > 0.0, past.y > 0.0) : shades_ball(r, p, light.toward, radius);
     return bvec2(i != i_own && by.x, i != i_own && by.y);
 }
 
@@ -32,19 +33,4 @@ uint shadows_on(vec3 p, float radius, Light light, uint i_own, uint n_surfaces, 
         torn = torn || by.y;
     }
     return mask;
-}
-
-// As shadow_of, past all surfaces of the mask.
-bvec2 shadows_of(uint mask, vec3 p, float radius, Light light, uint i_own, uint n_surfaces) {
-    bvec2 found = bvec2(false);
-    uint i = mask != 0u ? uint(findLSB(mask)) : n_surfaces;
-    while (i < n_surfaces) {
-        bvec2 by = shadow_of(i, p, radius, light, i_own);
-        found = bvec2(found.x || by.x, found.y || by.y);
-        i += N_MASK;
-        bool done = i >= n_surfaces;
-        mask &= done ? mask - 1u : mask;
-        i = done ? (mask != 0u ? uint(findLSB(mask)) : n_surfaces) : i;
-    }
-    return found;
 }

@@ -14,6 +14,9 @@ struct Veil {
     uvec2 list;
     // One surface alone hides all of the emitter.
     bool closed;
+    // The first two, at hand unless it is the whole list: most veils are no more.
+    Region first;
+    Region second;
 };
 
 vec3 corner(Region r, uint k) {
@@ -53,23 +56,44 @@ uint cover(Region occluder, Region emitter, vec3 p) {
     return outside ? 0u : (count == 4.0 && beyond == 4.0 ? 2u : 1u);
 }
 
-Veil veil_of(Pairing pairing, Region emitter, vec3 p) {
-    Veil veil = Veil(0u, false, uvec2(0u), false);
-    uint n = emitter.kind == REGION_SURFACE ? min(pairing.n_occluders, 256u) : 0u;
+uint occluder_of(Pairing pairing, Veil veil, uint k) {
+    uint word = k < 4u ? veil.list.x : veil.list.y;
+    uint i = veil.whole ? k : (word >> (8u * (k & 3u))) & 255u;
+    return occluders[pairing.i_occluder + i];
+}
+
+// Nothing is looked at where nothing is `wanted`.
+Veil veil_of(Pairing pairing, Region emitter, vec3 p, bool wanted) {
+    Veil veil;
+    veil.n = 0u;
+    veil.list = uvec2(0u);
+    veil.closed = false;
+    uint n = wanted && emitter.kind == REGION_SURFACE ? min(pairing.n_occluders, 256u) : 0u;
     for (uint k = 0u; k < n; ++k) {
         uint covers = cover(regions[occluders[pairing.i_occluder + k]], emitter, p);
         veil.closed = veil.closed || covers == 2u;
         uint entry = k << (8u * (veil.n & 3u));
         veil.list |= uvec2(covers == 0u || veil.n >= 4u ? 0u : entry, covers == 0u || veil.n < 4u ? 0u : entry);
         veil.n += covers == 0u ? 0u : 1u;
+        // Of `cover`'s own loops, too.
+        n_turns += 24u;
     }
     veil.whole = veil.n > MAX_VEIL || emitter.kind != REGION_SURFACE || pairing.n_occluders > 256u;
     veil.n = veil.whole ? pairing.n_occluders : veil.n;
+    uint last = max(veil.n, 1u) - 1u;
+    for (uint k = 0u; k < (veil.whole ? 0u : min(veil.n, 1u)); ++k) {
+        veil.first = regions[occluder_of(pairing, veil, 0u)];
+        veil.second = regions[occluder_of(pairing, veil, min(1u, last))];
+    }
     return veil;
 }
 
-uint occluder_of(Pairing pairing, Veil veil, uint k) {
-    uint word = k < 4u ? veil.list.x : veil.list.y;
-    uint i = veil.whole ? k : (word >> (8u * (k & 3u))) & 255u;
-    return occluders[pairing.i_occluder + i];
+// All of a pairing's surfaces, looked at one by one.
+Veil whole_veil(Pairing pairing) {
+    Veil veil;
+    veil.n = pairing.n_occluders;
+    veil.whole = true;
+    veil.list = uvec2(0u);
+    veil.closed = false;
+    return veil;
 }

@@ -2,11 +2,12 @@
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place};
+use crate::layout::facet::lobe_width;
 use crate::layout::second::{BlockRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
 use crate::model::scene::{Gather, Scene};
 use crate::model::tree::Tree;
-use crate::passes::second::{Receivers, Steps};
+use crate::passes::second::{Receivers, Turns};
 
 use super::buffers::{Buffers, upload};
 
@@ -26,6 +27,7 @@ pub struct Exchange {
     pub heights: Vec<(u32, u32)>,
     pub sources: Buffer,
     pub fluxes: Buffer,
+    pub stencils: Buffer,
     /// By facet: the source that its gather has reached.
     pub reached: Buffer,
     /// Dispatches of a gather.
@@ -78,6 +80,7 @@ impl Exchange {
             heights,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
+            stencils: Buffer::new::<[u32; 8]>(device, "second.stencils", n_fluxes, Place::Device)?,
             reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
             n_dispatches: n_dispatches(scene, n_sources),
             n_diffuse_blocks: lists.diffuse.len() as u32,
@@ -85,15 +88,23 @@ impl Exchange {
         })
     }
 
-    /// What to dispatch: for every kind of receivers that there is, (whether it begins, whether it ends) a gather.
-    pub fn dispatches<'a>(&'a self, gathered: &'a [Receivers]) -> impl Iterator<Item = (Receivers, [bool; 2])> + 'a {
+    /// Blocks of receivers: their kind, the first and how many, where there are any.
+    pub fn blocks<'a>(&'a self, gathered: &'a [Receivers]) -> impl Iterator<Item = (Receivers, u32, u32)> + 'a {
+        let of = |r: &Receivers| match r {
+            Receivers::Diffuse => (*r, 0, self.n_diffuse_blocks),
+            Receivers::Glossy => (*r, self.n_diffuse_blocks, self.n_glossy_blocks),
+        };
+        gathered.iter().map(of).filter(|(_, _, n)| *n > 0)
+    }
+
+    /// The dispatches of a gather: whether each begins it, and whether it ends it.
+    pub fn rounds(&self) -> impl Iterator<Item = [bool; 2]> {
         let last = self.n_dispatches.max(1) - 1;
-        let of = move |receivers: Receivers| (0..=last).map(move |k| (receivers, [k == 0, k == last]));
-        gathered.iter().filter(|r| self.blocks_of(**r).1 > 0).flat_map(move |r| of(*r))
+        (0..=last).map(move |k| [k == 0, k == last])
     }
 
     /// The gathering kernels' buffers, of which two differ.
-    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 14] {
+    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 15] {
         [
             &self.blocks,
             &self.pairings,
@@ -109,50 +120,48 @@ impl Exchange {
             last,
             out,
             &self.reached,
+            &self.stencils,
         ]
-    }
-
-    /// First block and number of blocks.
-    pub fn blocks_of(&self, receivers: Receivers) -> (u32, u32) {
-        match receivers {
-            Receivers::Diffuse => (0, self.n_diffuse_blocks),
-            Receivers::Glossy => (self.n_diffuse_blocks, self.n_glossy_blocks),
-        }
     }
 }
 
 /// Turns that an invocation's loops may take together, nested ones counted each: llvmpipe ends every loop without a word
 /// when they are used up (LP_MAX_TGSI_LOOP_ITERATIONS), and a watchdog may be as strict.
-const LOOP_TURNS: u32 = 65_535;
-/// Surfaces that shade a facet from a light, on the average of a walk.
-const SHADOWS: u32 = 4;
-/// Cells of a gather for every source, on the average of a receiver. Where that is not enough, what is left is counted.
-const CELLS_PER_SOURCE: f64 = 0.5;
+const LOOP_TURNS: u32 = 65_000;
+/// Lights that a gather keeps at hand, at most.
+const MOST_KEPT: usize = 4;
+/// Facets that a receiver sets aside before it looks at their cells: all at once, but where each may have thousands.
+const ASIDE: u32 = 8;
+/// A lobe narrower than this has as many.
+const NARROW: f64 = 0.03;
 
-/// Dispatches of a gather of `n_sources`; a receiver that has done all it had to takes no step in the rest.
-fn n_dispatches(scene: &Scene, n_sources: u64) -> u32 {
-    let Steps { sources, cells } = steps(scene);
-    let n = n_sources as f64;
-    (n / f64::from(sources) + CELLS_PER_SOURCE * n / f64::from(cells)).ceil() as u32 + 1
+/// How a gather of the scene shares out its loops' turns.
+pub fn turns(scene: &Scene) -> Turns {
+    let from = pairings(&scene.surfaces, scene.clouds.len());
+    let n_occluders = from.iter().flatten().map(|p| p.occluders.len()).max().unwrap_or(0);
+    let n_lights = scene.lights.len();
+    let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps } else { 0 };
+    // A cell at its longest: turns.glsl's count of its loops, all occluders, and before every light all surfaces.
+    let of_cell = 16 + 5 * n_lights + n_occluders + n_lights * scene.surfaces.len() + march as usize;
+    let aside = if is_narrow(scene) { 1 } else { ASIDE };
+    // When no cell is quartered any more these are left: three of each level, and the other facets that were set aside.
+    let left = (aside + 3 * scene.lighting.pairs.levels + 1) * of_cell.min(LOOP_TURNS as usize) as u32;
+    let quarter = LOOP_TURNS.saturating_sub(left).max(LOOP_TURNS / 2);
+    Turns { quarter, batch: quarter / 2, aside, kept: if n_lights <= MOST_KEPT { n_lights as u32 } else { 0 } }
 }
 
-/// What one invocation may look at in one dispatch. A step is a turn, and so is each of the loops within it, once more to
-/// find that it is done.
-pub fn steps(scene: &Scene) -> Steps {
-    let from = pairings(&scene.surfaces, scene.clouds.len());
-    let n_occluders = from.iter().flatten().map(|p| p.occluders.len() as u32).max().unwrap_or(0);
-    let n_lights = scene.lights.len() as u32;
-    let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps + 1 } else { 0 };
-    let lobes = if (0..scene.n_regions()).any(|i| is_glossy(scene, i)) { n_lights + 3 } else { 1 };
-    let of_source = 1 + (n_occluders / 2 + 2) + march + lobes;
-    // Whether each light reaches a cell: for the rim of a shadow and for the cell's own light, past what may shade it.
-    let of_cell = of_source + 2 * (n_lights * (SHADOWS + 2) + 1);
-    // Before the walk each pairing's veil looks at every occluder, corner by corner.
-    let veils = from.iter().map(|p| p.iter().map(|p| 21 * p.occluders.len() as u32 + 8).sum()).max().unwrap_or(0);
-    // An eighth for sources, half for cells, a quarter for an audit of both, and the rest is room: cells that were begun
-    // are finished.
-    let eighth = LOOP_TURNS.saturating_sub(veils) / 8;
-    Steps { sources: (eighth / of_source).max(1), cells: (4 * eighth / of_cell).max(4) }
+/// Whether some lobe is so narrow that a facet may have thousands of cells.
+fn is_narrow(scene: &Scene) -> bool {
+    let narrowest = |i: usize| f64::from(lobe_width(scene.region_material(i).exponents()[1]));
+    (0..scene.n_regions()).any(|i| is_glossy(scene, i) && narrowest(i) < NARROW)
+}
+
+/// Dispatches of a gather of `n_sources`; a receiver that is done costs nothing in the rest. A source takes some ten turns
+/// as a whole and some hundred by its cells, and where lobes are narrow a dispatch each.
+fn n_dispatches(scene: &Scene, n_sources: u64) -> u32 {
+    let of_sources = n_sources.saturating_mul(128).div_ceil(u64::from(turns(scene).batch));
+    let of_lobes = if is_narrow(scene) { n_sources.min(64) } else { 0 };
+    (of_sources + of_lobes).min(1 << 16) as u32 + 1
 }
 
 /// From this many facets on the tree is the faster (docs/measured.md).

@@ -1,7 +1,7 @@
 //! The second reflection and what it is gathered with.
 
 use super::buffers::Buffers;
-use super::exchange::{Exchange, steps};
+use super::exchange::{Exchange, turns};
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::tensor::TensorStage;
@@ -45,7 +45,7 @@ impl Relay {
         scene: &Scene,
         tree: bool,
     ) -> Result<Relay> {
-        let second = Second::new(device, compiler, scene.n_particles() > 0, tree, steps(scene))?;
+        let second = Second::new(device, compiler, scene.n_particles() > 0, tree, turns(scene))?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
         Ok(Relay {
@@ -88,36 +88,43 @@ impl Relay {
         if !plan.view_only() {
             self.record_sources(rec, b)?;
         }
-        for (receivers, [begins, ends]) in x.dispatches(gathered) {
-            let (i_first_block, n_blocks) = x.blocks_of(receivers);
-            let push = GatherPush {
-                grid: packet.grid,
-                eye: packet.camera.eye,
-                n_lights: self.n_lights,
-                pair_size: self.pairs.size as f32,
-                pair_levels: self.pairs.levels,
-                step_length: self.step_cells as f32 * packet.grid.cell,
-                backward: self.backward as f32,
-                pair_steps: self.pairs.steps,
-                i_first_block,
-                theta: self.theta as f32,
-                n_surfaces: self.n_surfaces,
-                begins: u32::from(begins),
-                ends: u32::from(ends),
-            };
-            match tensor {
-                Some(tensor) => tensor.record_second(rec, b, x, packet, &push, receivers, n_blocks)?,
-                None => self.second.record(rec, x.bindings(b, &x.nodes, &b.lit), &push, receivers, n_blocks)?,
+        for (receivers, i_first_block, n_blocks) in x.blocks(gathered) {
+            let rounds: Vec<GatherPush> = x.rounds().map(|of| self.push(packet, i_first_block, of)).collect();
+            if let Some(tensor) = tensor {
+                tensor.record_second(rec, b, x, packet, &rounds, receivers, n_blocks)?;
+                continue;
+            }
+            for push in &rounds {
+                self.second.record(rec, x.bindings(b, &x.nodes, &b.lit), push, receivers, n_blocks)?;
             }
         }
         Ok(())
+    }
+
+    fn push(&self, packet: &Packet, i_first_block: u32, [begins, ends]: [bool; 2]) -> GatherPush {
+        GatherPush {
+            grid: packet.grid,
+            eye: packet.camera.eye,
+            n_lights: self.n_lights,
+            pair_size: self.pairs.size as f32,
+            pair_levels: self.pairs.levels,
+            step_length: self.step_cells as f32 * packet.grid.cell,
+            backward: self.backward as f32,
+            pair_steps: self.pairs.steps,
+            i_first_block,
+            theta: self.theta as f32,
+            n_surfaces: self.n_surfaces,
+            begins: u32::from(begins),
+            ends: u32::from(ends),
+        }
     }
 
     /// Facets as sources, then cluster by cluster.
     fn record_sources(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
         let x = &self.exchange;
         let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights, n_surfaces: self.n_surfaces };
-        let buffers = [&b.facets, &b.lights, &b.shares, &b.regions, &x.order, &x.leaves, &x.sources, &x.fluxes];
+        let buffers =
+            [&b.facets, &b.lights, &b.shares, &b.regions, &x.order, &x.leaves, &x.sources, &x.fluxes, &x.stencils];
         self.second.record_sources(rec, buffers, &push)?;
         for (i_first, n_merges) in x.heights.iter().copied() {
             let push = MergePush { i_first, n_merges, n_lights: self.n_lights };

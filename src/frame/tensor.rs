@@ -2,7 +2,7 @@
 //! them (docs/model.md §11 "contract").
 
 use super::buffers::{Buffers, upload};
-use super::exchange::{Exchange, is_glossy, region_sizes, steps};
+use super::exchange::{Exchange, is_glossy, region_sizes, turns};
 use super::limits;
 use super::packet::Packet;
 use super::plan::Tensors;
@@ -179,7 +179,7 @@ impl TensorStage {
         shape: Shape,
     ) -> Result<TensorStage> {
         let second = match shape.has_second {
-            true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases, steps(scene))?),
+            true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases, turns(scene))?),
             false => None,
         };
         // One that has no number does not fit either; the limits have been asked before.
@@ -228,43 +228,49 @@ impl TensorStage {
         self.first.record(rec, buffers, &push)
     }
 
-    /// A dispatch a light: one without energy costs nothing. `of`: what the gather at once would be told.
-    #[allow(clippy::too_many_arguments, reason = "what one dispatch is made of")]
+    /// A gather a light: one without energy costs nothing. `rounds`: what the gathers at once would be told.
+    #[allow(clippy::too_many_arguments, reason = "what a gather is made of")]
     pub(super) fn record_second(
         &self,
         rec: &mut Recorder<'_>,
         b: &Buffers,
         x: &Exchange,
         packet: &Packet,
-        of: &GatherPush,
+        rounds: &[GatherPush],
         receivers: Receivers,
         n_blocks: u32,
     ) -> Result<()> {
         let Some(second) = &self.second else { return Ok(()) };
         let lit = (0..).zip(&packet.lights).filter(|(_, light)| light.energy != [0.0; 3]);
         for (k, (i_light, _)) in lit.enumerate() {
-            let push = SecondPush {
-                grid: of.grid,
-                eye: of.eye,
-                n_lights: of.n_lights,
-                pair_size: of.pair_size,
-                pair_levels: of.pair_levels,
-                step_length: of.step_length,
-                backward: of.backward,
-                pair_steps: of.pair_steps,
-                i_first_block: of.i_first_block,
-                i_light,
-                i_vectors: self.i_vectors,
-                n_rows: self.shape.n_rows as u32,
-                n_columns: self.shape.n_columns,
-                n_surfaces: of.n_surfaces,
-                begins: of.begins,
-                ends: of.ends,
-                is_first_light: u32::from(k == 0),
-            };
-            second.record(rec, x.bindings(b, &b.lit, &self.t2), &push, receivers, n_blocks)?;
+            for of in rounds {
+                let push = self.second_push(of, i_light, k == 0);
+                second.record(rec, x.bindings(b, &b.lit, &self.t2), &push, receivers, n_blocks)?;
+            }
         }
         Ok(())
+    }
+
+    fn second_push(&self, of: &GatherPush, i_light: u32, is_first_light: bool) -> SecondPush {
+        SecondPush {
+            grid: of.grid,
+            eye: of.eye,
+            n_lights: of.n_lights,
+            pair_size: of.pair_size,
+            pair_levels: of.pair_levels,
+            step_length: of.step_length,
+            backward: of.backward,
+            pair_steps: of.pair_steps,
+            i_first_block: of.i_first_block,
+            i_light,
+            i_vectors: self.i_vectors,
+            n_rows: self.shape.n_rows as u32,
+            n_columns: self.shape.n_columns,
+            n_surfaces: of.n_surfaces,
+            begins: of.begins,
+            ends: of.ends,
+            is_first_light: u32::from(is_first_light),
+        }
     }
 
     pub(super) fn record_contract(&self, rec: &mut Recorder<'_>, b: &Buffers, s: &Settings) -> Result<()> {

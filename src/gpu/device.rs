@@ -40,6 +40,8 @@ pub struct Limits {
     /// Size of the greatest device-local heap.
     pub device_memory_bytes: u64,
     pub subgroup_size: u32,
+    /// Whether compute shaders may sum and compare over a subgroup.
+    pub subgroup_arithmetic: bool,
     /// 0 where the queue has no timestamps.
     pub timestamp_valid_bits: u32,
     pub timestamp_period_ns: f64,
@@ -240,6 +242,8 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
                 .min(limits.max_framebuffer_height),
             device_memory_bytes: device_memory_bytes.unwrap_or(0),
             subgroup_size: subgroup.subgroup_size,
+            subgroup_arithmetic: subgroup.supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC)
+                && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
             timestamp_period_ns: f64::from(limits.timestamp_period),
         },
@@ -317,6 +321,7 @@ mod tests {
             max_image_extent: 0,
             device_memory_bytes: 0,
             subgroup_size: 0,
+            subgroup_arithmetic: false,
             timestamp_valid_bits: 0,
             timestamp_period_ns: 0.0,
         };

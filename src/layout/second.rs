@@ -3,26 +3,19 @@
 use crate::layout::record;
 
 record! {
-    /// Light on its way from a facet, or from a cluster of facets of one region.
+    /// Light on its way from a facet, or from a cluster of facets of one region. By fours, since a device that loads for
+    /// each invocation by itself pays by the load.
     pub struct SourceRecord {
-        /// A cluster's: mean of its facets' by their flux.
-        position: [f32; 3],
-        /// No point of it is farther from the position.
-        radius: f32,
-        /// Mean normal by flux; shorter than 1 where a cluster's normals differ.
-        normal: [f32; 3],
-        /// Mean area of its facets, by area: what bounds the form factor as the distance goes to 0.
-        area: f32,
-        /// Σ A_i L1_i of the diffuse basis, linear RGB.
-        flux: [f32; 3],
-        /// Σ A_i.
-        total_area: f32,
-        /// Mean square distance of its facets' centres from the position, by flux.
-        spread: f32,
-        /// 1: a facet that the rim of a shadow runs through.
-        in_part: f32,
-        unused_1: f32,
-        unused_2: f32,
+        /// Position, a cluster's the mean of its facets' by their flux; and the radius from it that no point is beyond.
+        place: [f32; 4],
+        /// Σ A_i L1_i of the diffuse basis, linear RGB; and the nodes of its subtree, itself included: 1 for a facet, -1
+        /// for one that the rim of a light's shadow runs through.
+        sent: [f32; 4],
+        /// Mean normal by flux, shorter than 1 where a cluster's normals differ; and the mean area of its facets, by area:
+        /// what bounds the form factor as the distance goes to 0.
+        face: [f32; 4],
+        /// Σ A_i; mean square distance of its facets' centres from the position, by flux; 0; 0.
+        extent: [f32; 4],
     }
 }
 

@@ -43,11 +43,29 @@ pub struct Second {
     block: u32,
 }
 
-/// What one invocation looks at in one dispatch, at most.
+/// How a gather shares out the turns that its loops may take in one dispatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Steps {
-    pub sources: u32,
-    pub cells: u32,
+pub struct Turns {
+    /// After these no cell is quartered any more.
+    pub quarter: u32,
+    /// After these no further source is looked at.
+    pub batch: u32,
+    /// Facets that are set aside together for a closer look.
+    pub aside: u32,
+    /// Lights that are kept at hand: all, or none.
+    pub kept: u32,
+}
+
+impl Turns {
+    fn macros(&self, device: &Device) -> [(&'static str, u32); 5] {
+        [
+            ("QUARTER_TURNS", self.quarter),
+            ("BATCH_TURNS", self.batch),
+            ("MAX_ASIDE", self.aside),
+            ("N_KEPT", self.kept),
+            ("TOGETHER", u32::from(device.limits().subgroup_arithmetic)),
+        ]
+    }
 }
 
 /// Blocks of receivers, by whether they have a lobe.
@@ -59,8 +77,8 @@ pub enum Receivers {
 
 impl Second {
     /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree.
-    /// `steps`: of an invocation in a dispatch.
-    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool, steps: Steps) -> Result<Second> {
+    /// `turns`: of a dispatch.
+    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool, turns: Turns) -> Result<Second> {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let macros = [
@@ -68,9 +86,8 @@ impl Second {
                 ("MARCH", u32::from(has_clouds)),
                 ("GLOSSY", glossy),
                 ("TREE", u32::from(tree)),
-                ("STEPS", steps.sources),
-                ("CELLS", steps.cells),
             ];
+            let macros = [&macros[..], &turns.macros(device)].concat();
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
         };
         Ok(Second {
@@ -89,7 +106,7 @@ impl Second {
     /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: [f32; 2] [facet][light]; `regions`: RegionRecord; `order`: u32,
     /// the facet of each place; `leaves`: u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4]
     /// [source][light].
-    pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 8], push: &SourcesPush) -> Result<()> {
+    pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 9], push: &SourcesPush) -> Result<()> {
         rec.dispatch(&self.sources, &buffers, push, push.n_facets)
     }
 
@@ -105,7 +122,7 @@ impl Second {
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 14],
+        buffers: [&Buffer; 15],
         push: &GatherPush,
         receivers: Receivers,
         n_blocks: u32,
@@ -150,7 +167,7 @@ impl SecondTensor {
         compiler: &Compiler,
         has_clouds: bool,
         n_bases: u32,
-        steps: Steps,
+        turns: Turns,
     ) -> Result<SecondTensor> {
         let width = block_len(device);
         let gather = |glossy: u32| {
@@ -160,9 +177,8 @@ impl SecondTensor {
                 ("MARCH", march),
                 ("GLOSSY", glossy),
                 ("N_BASES", n_bases),
-                ("STEPS", steps.sources),
-                ("CELLS", steps.cells),
             ];
+            let macros = [&macros[..], &turns.macros(device)].concat();
             Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
         };
         Ok(SecondTensor { gather: [gather(0)?, gather(1)?] })
@@ -173,7 +189,7 @@ impl SecondTensor {
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 14],
+        buffers: [&Buffer; 15],
         push: &TensorPush,
         receivers: Receivers,
         n_blocks: u32,

@@ -155,11 +155,8 @@ impl<'a> Scenery<'a> {
         visibility::transmittance(self.blobs, self.forward, p, source)
     }
 
-    /// L1 toward the unit vector `toward`.
+    /// L1 toward the unit vector `toward`; from behind its diffuse part.
     pub fn first(&self, at: &Receiver, toward: DVec3) -> DVec3 {
-        if at.normal.dot(toward) <= 0.0 {
-            return DVec3::ZERO;
-        }
         let reflected = |light: &Light| {
             reflected(&at.brdf, at.normal, at.position, light, self.in_light(at.position, light), toward).0
         };

@@ -122,6 +122,24 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
 }
 
 #[test]
+fn an_eye_behind_sees_the_diffuse_part_alone() {
+    let (faces, mut brdfs) = cube(matte(0.7));
+    brdfs[0] = glossy(0.5, 0.3, 2.0);
+    let s = Scenery::new(&faces, &brdfs, &[GLOW], &[], 0.0, &[]);
+    let receiver = s.on_surface(0, faces[0].center + 0.3 * faces[0].u);
+    for depth in [0.03, 0.3, 1.0] {
+        let toward = (receiver.normal.any_orthonormal_vector() - depth * receiver.normal).normalize();
+        let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
+        assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
+        // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
+        let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 2000, seed: 1 });
+        for (l, truth) in found.iter().zip([0.5, 0.35, 0.85]) {
+            assert!((l.radiance.x - truth).abs() < 1e-12, "{depth} {l:?}");
+        }
+    }
+}
+
+#[test]
 fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
     let lamp = ceiling(2.0);
     let receiver = Receiver::new(DVec3::ZERO, UP, matte(0.5));

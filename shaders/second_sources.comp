@@ -18,19 +18,21 @@ const float INV_PI = 0.318309886183791;
 layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_surfaces; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 2) readonly buffer Shares { vec2 shares[]; };
-layout(std430, binding = 3) readonly buffer Regions { Region regions[]; };
+// [facet][light], and what of it the clouds let through.
+layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
+layout(std430, binding = 3) readonly buffer Through { float through[]; };
+layout(std430, binding = 4) readonly buffer Regions { Region regions[]; };
 // Facet of each place in the order of facets.
-layout(std430, binding = 4) readonly buffer Order { uint order[]; };
+layout(std430, binding = 5) readonly buffer Order { uint order[]; };
 // Source of each place.
-layout(std430, binding = 5) readonly buffer Leaves { uint leaves[]; };
-layout(std430, binding = 6) writeonly buffer Sources { Source sources[]; };
+layout(std430, binding = 6) readonly buffer Leaves { uint leaves[]; };
+layout(std430, binding = 7) writeonly buffer Sources { Source sources[]; };
 // [source][light], w: sum of A g, g the facet's share of the light's energy; xyz: of a cloud sum of A g c, c the facet's own
 // colour; xyz: of a surface's facet A times the greatest share at one of its points, what the clouds let through, and the
 // surfaces whose shadows reach it.
-layout(std430, binding = 7) writeonly buffer Fluxes { vec4 fluxes[]; };
+layout(std430, binding = 8) writeonly buffer Fluxes { vec4 fluxes[]; };
 // [source][light], of surfaces' facets: the shares at the points by the greatest.
-layout(std430, binding = 8) writeonly buffer Stencils { Packed stencils[]; };
+layout(std430, binding = 9) writeonly buffer Stencils { Packed stencils[]; };
 
 #include "reach.glsl"
 #include "arriving.glsl"
@@ -55,17 +57,17 @@ void main() {
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             uint k = i * push.n_lights + l;
-            vec2 share = shares[j * push.n_lights + l];
+            uint from = j * push.n_lights + l;
             float g = 0.0;
             if (is_surface) {
                 uint shadows = shadows_on(facet.position, radius, light, facet.i_region, push.n_surfaces, in_part);
-                Stencil s = arriving(light, Cell(facet.position, u, v), facet.normal, share.y, shadows, facet.i_region, push.n_surfaces);
+                Stencil s = arriving(light, Cell(facet.position, u, v), facet.normal, through[from], shadows, facet.i_region, push.n_surfaces);
                 float scale = greatest(s), inverse = scale > 0.0 ? 1.0 / scale : 0.0;
                 g = 0.0625 * total(s);
                 stencils[k] = packed(Stencil(s.a * inverse, s.b * inverse, s.c * inverse, s.d * inverse));
-                fluxes[k] = vec4(facet.area * scale, share.y, float(shadows), facet.area * g);
+                fluxes[k] = vec4(facet.area * scale, through[from], float(shadows), facet.area * g);
             } else {
-                g = share_of(light, arrival_at(light, facet.position), facet.normal, share.x * share.y);
+                g = share_of(light, arrival_at(light, facet.position), facet.normal, transmittance[from]);
                 fluxes[k] = facet.area * g * vec4(facet.color, 1.0);
             }
             irradiance += light.energy * g;

@@ -9,10 +9,8 @@
 
 layout(local_size_x = 64) in;
 
-// Whether the area means are wanted, too.
-layout(constant_id = 0) const uint SHARES = 0;
-// Points of a facet along each side, of which its share is the mean.
-const uint SHARE_SIDE = 4;
+// Whether what the clouds let through is wanted by itself, too.
+layout(constant_id = 0) const uint APART = 0;
 
 layout(push_constant) uniform Push { Grid grid; uint n_facets; uint n_lights; uint n_surfaces; float step_length; float backward; uint max_steps; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
@@ -21,7 +19,7 @@ layout(std430, binding = 2) readonly buffer Regions { Region regions[]; };
 layout(std430, binding = 3) readonly buffer Density { float density[]; };
 // [facet][light]
 layout(std430, binding = 4) writeonly buffer Transmittance { float transmittance[]; };
-layout(std430, binding = 5) writeonly buffer Shares { vec2 shares[]; };
+layout(std430, binding = 5) writeonly buffer Through { float through[]; };
 
 #include "density.glsl"
 #include "reach.glsl"
@@ -42,21 +40,6 @@ vec2 crossing(vec3 p, vec3 d, float distance) {
         }
     }
     return vec2(enter, leave);
-}
-
-// The share of the facet's 4 x 4 parts whose middles the light reaches; of a cloud's facet all or nothing.
-float clear_share(Facet facet, Light light, bool is_center_clear) {
-    if (facet.i_region >= push.n_surfaces) {
-        return is_center_clear ? 1.0 : 0.0;
-    }
-    Region r = regions[facet.i_region];
-    vec3 u = r.u / float(r.n_u), v = r.v / float(r.n_v);
-    uint n_clear = 0;
-    for (uint i = 0; i < SHARE_SIDE * SHARE_SIDE; ++i) {
-        vec2 at = (vec2(i % SHARE_SIDE, i / SHARE_SIDE) + 0.5) * (2.0 / float(SHARE_SIDE)) - 1.0;
-        n_clear += is_clear(facet.position + at.x * u + at.y * v, light, facet.i_region, push.n_surfaces) ? 1u : 0u;
-    }
-    return float(n_clear) * (1.0 / float(SHARE_SIDE * SHARE_SIDE));
 }
 
 // e^-(1-g)tau from p to the light.
@@ -85,15 +68,11 @@ void main() {
         // What a light without energy brings is multiplied by 0 anyway.
         bool is_on = any(notEqual(light.energy, vec3(0.0)));
         bool is_center_clear = is_on && is_clear(facet.position, light, facet.i_region, push.n_surfaces);
-        float share = SHARES != 0 && is_on ? clear_share(facet, light, is_center_clear) : 0.0;
-        float through = 0.0;
-        // Part of a surface's facet may be lit where no sample is.
-        if (is_center_clear || share > 0.0 || (SHARES != 0 && is_on && facet.i_region < push.n_surfaces)) {
-            through = through_the_cloud(facet.position, arrival_at(light, facet.position));
-        }
-        transmittance[k] = is_center_clear ? through : 0.0;
-        if (SHARES != 0) {
-            shares[k] = vec2(share, through);
+        // Part of a surface's facet may be lit though its centre is hidden.
+        float dimmed = is_center_clear || (APART != 0 && is_on) ? through_the_cloud(facet.position, arrival_at(light, facet.position)) : 0.0;
+        transmittance[k] = is_center_clear ? dimmed : 0.0;
+        if (APART != 0) {
+            through[k] = dimmed;
         }
     }
 }

@@ -36,7 +36,7 @@ pub struct Buffers {
     pub lights: Buffer,
     pub transmittance: Buffer,
     /// Its mean over each facet; empty where nothing asks for it.
-    pub shares: Buffer,
+    pub through: Buffer,
     pub lit: Buffer,
     /// Region of each facet of a surface.
     pub i_region: Buffer,
@@ -56,7 +56,7 @@ impl Buffers {
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
         let n_named = if is_grouped(scene) { n } else { 0 };
-        let n_shares = if has_shares(scene) { n_facets * n_lights } else { 0 };
+        let n_through = if has_second(scene) { n_facets * n_lights } else { 0 };
         // No more vectors than were asked for.
         let n_table_rows = scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1;
         let placed_upload = match host_places {
@@ -79,7 +79,7 @@ impl Buffers {
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
             i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
             table: Buffer::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64, Place::Upload)?,
-            shares: Buffer::new::<[f32; 2]>(device, "transmit.shares", n_shares, Place::Device)?,
+            through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
@@ -108,8 +108,8 @@ impl Buffers {
     }
 }
 
-/// Whether the transmittance's area means are wanted: the second reflection's emitters are areas.
-pub fn has_shares(scene: &Scene) -> bool {
+/// Whether there is a second reflection: it asks for what clouds alone let through.
+pub fn has_second(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::TwoReflection
 }
 

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::buffers::{Buffers, download, has_shares};
+use super::buffers::{Buffers, download, has_second};
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::grouping::{Grouping, is_grouped};
 use super::packet::Packet;
@@ -113,7 +113,7 @@ impl Renderer {
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler)?,
             grouping,
-            transmit: Transmit::new(device, compiler, has_shares(scene))?,
+            transmit: Transmit::new(device, compiler, has_second(scene))?,
             first: First::new(device, compiler)?,
             second,
             tensor,
@@ -242,7 +242,7 @@ impl Renderer {
                 facets.record_surfaces(rec, [&b.regions, &b.i_region, &b.facets], s.n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
-                let buffers = [&b.facets, &b.lights, &b.regions, &b.density, &b.transmittance, &b.shares];
+                let buffers = [&b.facets, &b.lights, &b.regions, &b.density, &b.transmittance, &b.through];
                 transmit.record(
                     rec,
                     buffers,

@@ -103,10 +103,10 @@ impl Second {
         self.block
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `shares`: [f32; 2] [facet][light]; `regions`: RegionRecord; `order`: u32,
+    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance` and `through`: f32 [facet][light]; `regions`: RegionRecord; `order`: u32,
     /// the facet of each place; `leaves`: u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4]
     /// [source][light].
-    pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 9], push: &SourcesPush) -> Result<()> {
+    pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 10], push: &SourcesPush) -> Result<()> {
         rec.dispatch(&self.sources, &buffers, push, push.n_facets)
     }
 

@@ -1,7 +1,7 @@
 //! transmit: how much of each light arrives at each facet.
 //!
 //! In: facets, lights, regions (rectangles), density grid. Out: transmittance [facet][light], and where it is asked for
-//! its area mean (shares), as two factors. Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
+//! what clouds alone let through. Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
 //! docs/model.md §8, §11. Error: against the same march in f64, (1−g)τ times the samples' relative rounding plus
 //! 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few ulp may be hidden
 //! or not.
@@ -32,16 +32,15 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    /// `shares`: the area means are written, too.
-    pub fn new(device: &Device, compiler: &Compiler, shares: bool) -> Result<Transmit> {
-        let constants = [(0, u32::from(shares))];
+    /// `apart`: what the clouds let through is written by itself, too.
+    pub fn new(device: &Device, compiler: &Compiler, apart: bool) -> Result<Transmit> {
+        let constants = [(0, u32::from(apart))];
         Ok(Transmit { kernel: Kernel::new(device, compiler, "transmit", Push::FIELDS, &constants)? })
     }
 
     /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord, the surfaces' first; `density`: f32;
-    /// `transmittance`: f32; `shares`: [f32; 2], what surfaces leave of it and what clouds do, empty where it was not asked
-    /// for. `step_cells` is the step in
-    /// cells, `forward` is g: where it is 1, nothing is marched.
+    /// `transmittance`: f32; `through`: f32, e^{−(1−g)τ} whether or not a surface is in the way, empty where it was not asked
+    /// for. `step_cells` is the step in cells, `forward` is g: where it is 1, nothing is marched.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

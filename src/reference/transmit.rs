@@ -93,37 +93,13 @@ impl Obstacles<'_> {
         receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
     }
 
-    /// The area mean of V: a surface's facet by 4 × 4 points that may be hidden, each behind as much cloud as the centre;
-    /// of cloud facets V itself.
-    pub fn shares(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
-        self.share_factors(receivers, lights).into_iter().map(|[clear, through]| clear * through).collect()
-    }
-
-    /// Its two factors: what surfaces leave, and what clouds do.
-    pub fn share_factors(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<[f64; 2]> {
+    /// What clouds alone let through, [receiver × light]; 0 of a light without energy.
+    pub fn through(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
         let one = |r: &Receiver, light: &Light| {
-            if light.energy() == DVec3::ZERO {
-                return [0.0; 2];
-            }
-            let clear = match self.rectangles.get(r.i_region as usize) {
-                Some(rectangle) => {
-                    let points = share_points(r.position, rectangle.facet);
-                    let n = points.iter().filter(|p| self.is_clear(r, **p, light)).count();
-                    n as f64 / points.len() as f64
-                }
-                None => f64::from(u8::from(self.is_clear(r, r.position, light))),
-            };
-            [clear, self.through_the_cloud(r.position, light)]
+            if light.energy() == DVec3::ZERO { 0.0 } else { self.through_the_cloud(r.position, light) }
         };
         receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
     }
-}
-
-/// The middles of the 4 × 4 parts of the facet at `center` with half axes (u, v).
-pub fn share_points(center: DVec3, (u, v): (DVec3, DVec3)) -> Vec<DVec3> {
-    let n = SHARE_SIDE;
-    let at = |i: u32| f64::from(2 * i + 1) / f64::from(n) - 1.0;
-    (0..n * n).map(|i| center + at(i % n) * u + at(i / n) * v).collect()
 }
 
 #[cfg(test)]
@@ -182,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn rectangles_hide_and_shares_are_means() {
+    fn rectangles_hide_and_clouds_dim() {
         use crate::model::surface::Surface;
         let surface =
             |center, subdivide| Surface { center, u: 2.0 * DVec3::Z, v: 2.0 * DVec3::X, i_material: 0, subdivide };
@@ -198,11 +174,10 @@ mod tests {
         let receivers = [at(0.0, -1.0, 0), at(0.75, 1.0, 2), at(1.25, 1.0, 2), at(-1.0, 5.0, 1)];
         let through = (-0.5f64 * 0.75).exp();
         assert_eq!(all.transmittance(&receivers, &[sky]), [0.0, 0.0, through, 1.0]);
-        // The floor's points are at x ±0.5, ±1.5, z 1 ± 0.5, 1 ± 1.5: clear of the lid are the four with x = 1.5 and three
-        // with z = 2.5. The way from its centre passes the cloud's hull by.
-        assert_eq!(all.shares(&receivers, &[sky]), [7.0 / 16.0, 0.0, through, 1.0]);
+        // The way from the floor passes the cloud's hull by; the lid does not count.
+        assert_eq!(all.through(&receivers, &[sky]), [1.0, through, through, 1.0]);
         assert_eq!(all.transmittance(&receivers, &[dark]), [0.0; 4]);
-        assert_eq!(all.shares(&receivers, &[dark]), [0.0; 4]);
+        assert_eq!(all.through(&receivers, &[dark]), [0.0; 4]);
     }
 
     #[test]

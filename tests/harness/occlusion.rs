@@ -113,12 +113,3 @@ pub fn verdict(surfaces: &[Surface], i_own: u32, p: Point, light: &Light) -> Ver
         _ => Verdict::Clear,
     }
 }
-
-/// The middles of the 4 × 4 parts of a facet, as the shader finds them.
-pub fn share_points(s: &Surface, center: [f32; 3]) -> Vec<Point> {
-    let [u, v] = [(s.u, s.subdivide[0]), (s.v, s.subdivide[1])]
-        .map(|(axis, n)| exact(axis).map(|a| a.over(Bounded::exact(f64::from(n)))));
-    let at = |i: u32| Bounded::exact(f64::from(i) * 0.5 - 0.75);
-    let center = exact(DVec3::from(center.map(f64::from)));
-    (0..16).map(|i| plus(plus(center, times(u, at(i % 4))), times(v, at(i / 4)))).collect()
-}

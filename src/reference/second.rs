@@ -2,7 +2,12 @@
 //! their shares, the density grid, all relative to O. Out, a receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye,
 //! RGB, and what an f32 evaluation of the same may differ.
 
+mod closely;
+mod doubt;
+mod rims;
 mod shapes;
+mod source;
+mod stencil;
 #[cfg(test)]
 mod tests;
 
@@ -10,11 +15,16 @@ use std::f64::consts::{FRAC_1_PI, PI};
 
 use glam::{DVec2, DVec3};
 
-use shapes::{Shadow, disc_form, half_gap, lobe_and_slope, meets, rectangle_form, shadow, width};
+use closely::Cell;
+use doubt::{Decision, Known};
+use rims::{meets, shadow};
+use shapes::{Way, half_angle, lobe, width};
+use source::Shading;
 
+use super::area::visibility::{Source, source_of};
 use super::grid::sample;
 use super::occlude::Rectangle;
-use super::transmit::{SHARE_SIDE, crossing, share_points};
+use super::transmit::crossing;
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 use crate::model::material::Brdf;
@@ -23,18 +33,20 @@ use crate::model::scene::Pairs;
 
 /// Lobes are met within this many of their widths.
 const LOBE_REACH: f64 = 4.0;
-/// Widths of a lobe, times pair_size, that a cell may be wide.
+/// Widths of a lobe, times pair_size, that a facet or a cell may be wide.
 const LOBE_STEP: f64 = 3.0;
-/// Of a cell's width over its distance, what the half vector turns from centre to corner.
+/// Of a width over its distance, what the half vector turns from centre to corner.
 const TURN: f64 = 0.75;
-/// Down to this share of pair_size cells that a shadow's rim runs through are quartered.
-const RIM: f64 = 0.5;
-/// Wider cells are discs.
+/// Facets that a shadow's rim runs through are looked at closely where wider than this share of pair_size.
+const RIM: f64 = 0.125;
+/// Wider facets are discs.
 const NEAR: f64 = 1.0;
 /// f32's unit round-off.
 const U: f64 = 1.0 / 16_777_216.0;
 /// Roundings of a product of some ten factors, each a sum of a few.
 const ROUNDINGS: f64 = 16.0;
+/// Nearer a place's rounding turns the way anywhere.
+const LEAST_DISTANCE: f64 = 1e-12;
 
 /// Of an optical depth: samples of a density that may double within a cell, at places off by their rounding in cells, and
 /// deposited in f32's rounding by some hundreds of blobs.
@@ -70,7 +82,7 @@ pub struct Exchange<'a> {
     pub step: f64,
     pub pairs: Pairs,
     pub eye: DVec3,
-    /// Which surfaces may stand between two regions: others tear no cells.
+    /// Which surfaces send light to which, and which may stand between them: no others hide one from the other.
     pub pairings: &'a [Vec<Pairing>],
     /// The greatest coordinate, whose rounding positions have.
     pub reach: f64,
@@ -109,24 +121,34 @@ impl Gathered {
         self.n_doubted += (self.n_unresolved - b.n_unresolved).abs() + b.n_doubted;
         self
     }
+
+    /// `is` where `d`, else `other`; both where rounding may turn it.
+    fn by(d: Decision, is: impl Fn() -> Gathered, other: impl Fn() -> Gathered) -> Gathered {
+        match (d.taken, d.sure) {
+            (true, true) => is(),
+            (false, true) => other(),
+            (true, false) => is().or(&other()),
+            (false, false) => other().or(&is()),
+        }
+    }
 }
 
-/// A part of facet `i`: 4^level of them, this one at `at`.
-#[derive(Clone, Copy)]
-struct Cell {
-    level: u32,
-    at: DVec2,
+/// A receiver, and by emitting region the rectangles that count before it.
+struct View<'a> {
+    exchange: &'a Exchange<'a>,
+    receiver: &'a Facet,
+    before: Vec<Vec<(&'a Rectangle, Decision)>>,
 }
 
 impl Exchange<'_> {
     /// I_i and L2 of facet `j`.
     pub fn gather(&self, j: usize) -> Gathered {
         let (receiver, mut sum) = (&self.facets[j], Gathered::default());
-        for i in 0..self.facets.len() {
-            let own = self.facets[i].i_region == receiver.i_region;
-            if i != j && !(own && self.regions[receiver.i_region].rectangle.is_some()) {
-                sum.add(&self.cell(j, i, Cell { level: 0, at: DVec2::ZERO }));
-            }
+        let before = (0..self.regions.len()).map(|e| self.before(receiver, e)).collect();
+        let view = View { exchange: self, receiver, before };
+        for i in (0..self.facets.len()).filter(|&i| i != j && self.is_pair(receiver.i_region, self.facets[i].i_region))
+        {
+            sum.add(&view.of_facet(i));
         }
         let region = &self.regions[receiver.i_region];
         let albedo = region.brdf.kd * receiver.color * FRAC_1_PI;
@@ -139,96 +161,14 @@ impl Exchange<'_> {
         sum
     }
 
-    /// What a cell of facet `i` sends to facet `j`, whole or by its quarters.
-    fn cell(&self, j: usize, i: usize, cell: Cell) -> Gathered {
-        let (receiver, source) = (&self.facets[j], &self.facets[i]);
-        let region = &self.regions[source.i_region];
-        let scale = 0.5f64.powi(cell.level as i32);
-        let (u, v) = region.rectangle.map_or((DVec3::ZERO, DVec3::ZERO), |r| r.facet);
-        let side = 2.0 * u.length().max(v.length()) * scale;
-        let q = source.position + cell.at.x * u + cell.at.y * v;
-        let offset = q - receiver.position;
-        let (d2, way) = (offset.length_squared(), offset.normalize_or_zero());
-        let b = side / d2.sqrt();
-        // A position's rounding as an angle.
-        let turn = 4.0 * U * (1.0 + self.reach / d2.sqrt());
-        let excess = self.excess(j, i, q, way, b);
-        let (ahead, behind) = (receiver.normal.dot(offset) + side, source.normal.dot(offset));
-        let facing = ahead > 0.0 && behind < 0.0;
-        let may_split = cell.level < self.pairs.levels && region.rectangle.is_some();
-        let quarters = || {
-            let quarter = |k: u32| {
-                let to = DVec2::new(f64::from(k & 1), f64::from(k >> 1)) * 2.0 - 1.0;
-                Cell { level: cell.level + 1, at: cell.at + to * 0.5 * scale }
-            };
-            let mut sum = Gathered::default();
-            (0..4).for_each(|k| sum.add(&self.cell(j, i, quarter(k))));
-            sum
-        };
-        let slack = d2.sqrt() * 8.0 * turn;
-        let whole = || self.whole(j, i, &cell, q, b, facing && excess > 1.0);
-        // Where rounding may turn a decision both are found, and their difference is what it may change.
-        let excess_doubt = (excess - 1.0).abs() <= 64.0 * turn * (1.0 + excess) && facing;
-        let facing_doubt =
-            (ahead.abs() < slack || behind.abs() < slack) && excess > 1.0 && ahead > -slack && behind < slack;
-        let doubt = may_split && (excess_doubt || facing_doubt);
-        if may_split && facing && excess > 1.0 {
-            let value = quarters();
-            return if doubt { value.or(&whole()) } else { value };
-        }
-        let rim = if may_split && b > self.pairs.size * RIM * (1.0 - 64.0 * turn) {
-            self.rim(j, i, &cell, q)
-        } else {
-            Shadow::default()
-        };
-        let rim_doubt = rim.unsure_torn || (b / (self.pairs.size * RIM) - 1.0).abs() <= 64.0 * turn;
-        let torn = rim.torn && b > self.pairs.size * RIM;
-        // What sends nothing is not looked at.
-        let sends = self.form(j, i, &cell, q, b) > 0.0;
-        if torn && sends {
-            let value = quarters();
-            return if rim_doubt || doubt { value.or(&whole()) } else { value };
-        }
-        let value = whole();
-        let any_doubt = doubt || (may_split && rim_doubt && sends && (rim.torn || rim.unsure_torn));
-        if any_doubt { value.or(&quarters()) } else { value }
+    fn pairing(&self, i_receiver: usize, i_emitter: usize) -> Option<&Pairing> {
+        self.pairings[i_receiver].iter().find(|p| p.i_emitter == i_emitter)
     }
 
-    /// How much wider than asked for, by distance and by the lobes that are met.
-    fn excess(&self, j: usize, i: usize, q: DVec3, way: DVec3, b: f64) -> f64 {
-        let (receiver, source) = (&self.facets[j], &self.facets[i]);
-        let by_lobe = |ns: f64, gap: f64| {
-            let met = (2.0 * gap).sqrt() < TURN * b + LOBE_REACH * width(ns);
-            if met { b / (LOBE_STEP * self.pairs.size * width(ns)) } else { 0.0 }
-        };
-        let mut excess = b / self.pairs.size;
-        if self.regions[source.i_region].lobe.is_some() {
-            let gaps = self.lights.iter().zip(0..).filter(|(l, k)| !l.is_sky() && self.mean_share(i, *k) > 0.0);
-            let gaps = gaps.map(|(l, _)| half_gap(source.normal, l.arrival(q).toward, -way));
-            let least = gaps.fold(2.0, f64::min);
-            excess = excess.max(by_lobe(self.regions[source.i_region].brdf.ns, least));
-        }
-        if self.regions[receiver.i_region].lobe.is_some() {
-            let outgoing = (self.eye - receiver.position).normalize();
-            excess =
-                excess.max(by_lobe(self.regions[receiver.i_region].brdf.ns, half_gap(receiver.normal, way, outgoing)));
-        }
-        excess
-    }
-
-    /// g of a whole facet.
-    fn mean_share(&self, i: usize, i_light: usize) -> f64 {
-        let (source, light) = (&self.facets[i], &self.lights[i_light]);
-        let [clear, through] = self.shares[i * self.lights.len() + i_light];
-        let at = |p: DVec3, v: f64| light.share(source.normal, &light.arrival(p), v);
-        let lamp = matches!(light, Light::Point { .. } | Light::Spot { .. });
-        match &self.regions[source.i_region].rectangle {
-            Some(r) if lamp => {
-                let points = share_points(source.position, r.facet);
-                clear * through * points.iter().map(|p| at(*p, 1.0)).sum::<f64>() / f64::from(SHARE_SIDE * SHARE_SIDE)
-            }
-            _ => at(source.position, clear * through),
-        }
+    /// Surfaces of which none is before the other are no pair, and a plane does not see itself.
+    fn is_pair(&self, a: usize, b: usize) -> bool {
+        let is_surface = |i: usize| self.regions[i].rectangle.is_some();
+        !(is_surface(a) && is_surface(b)) || (a != b && self.pairing(a, b).is_some())
     }
 
     /// Rectangles but those of two regions.
@@ -237,150 +177,158 @@ impl Exchange<'_> {
         all.filter(move |(k, _)| *k != a && *k != b).filter_map(|(k, r)| Some((k, r.rectangle.as_ref()?)))
     }
 
+    /// The rectangles that may hide some of region `e` from `receiver`, of a cloud all.
+    fn before(&self, receiver: &Facet, e: usize) -> Vec<(&Rectangle, Decision)> {
+        let (emitter, pairing) = (&self.regions[e].rectangle, self.pairing(receiver.i_region, e));
+        let counts = |k: usize, r: &Rectangle| match emitter {
+            Some(_) if !pairing.is_some_and(|p| p.occluders.contains(&k)) => Decision::NO,
+            Some(e) => meets(r, e, receiver.position, self.slack()),
+            None => Decision::YES,
+        };
+        let all = self.others(receiver.i_region, e).map(|(k, r)| (r, counts(k, r)));
+        all.filter(|(_, counts)| counts.is_possible()).collect()
+    }
+
+    /// What the distance of a place from a plane is known to.
     fn slack(&self) -> f64 {
         8.0 * U * self.reach
     }
 
-    fn before_light(&self, i_region: usize, light: &Light, q: DVec3, radius: f64) -> Shadow {
-        let from = match light {
-            Light::Point { position, .. } | Light::Spot { position, .. } => Ok(*position),
-            _ => Err(light.arrival(q).toward),
-        };
-        let shadows = self.others(i_region, i_region).map(|(_, r)| shadow(r, from, q, radius, self.slack()));
-        shadows.fold(Shadow::default(), Shadow::over)
+    /// A place's rounding as an angle, `d` away.
+    fn turn(&self, d: f64) -> f64 {
+        (4.0 * U * (1.0 + self.reach / d.max(LEAST_DISTANCE))).min(1.0)
     }
 
-    fn before_receiver(&self, j: usize, i: usize, q: DVec3, radius: f64) -> Shadow {
-        let (a, b) = (&self.facets[j], &self.facets[i]);
-        let emitter = self.regions[b.i_region].rectangle.as_ref();
-        let pairing = self.pairings[a.i_region].iter().find(|p| p.i_emitter == b.i_region);
-        let of = |(k, r): (usize, &Rectangle)| {
-            let found = shadow(r, Ok(a.position), q, radius, self.slack());
-            match emitter {
-                // What hides no point of the surface tears none of its cells, however far their balls reach.
-                Some(e)
-                    if found.torn
-                        && !(pairing.is_some_and(|p| p.occluders.contains(&k)) && meets(r, e, a.position)) =>
-                {
-                    Shadow { torn: false, ..found }
-                }
-                _ => found,
-            }
-        };
-        self.others(a.i_region, b.i_region).map(of).fold(Shadow::default(), Shadow::over)
+    /// Half axes of facet `i`, none of a cloud's.
+    fn axes(&self, i: usize) -> Option<(DVec3, DVec3)> {
+        Some(self.regions[self.facets[i].i_region].rectangle?.facet)
     }
 
-    /// Rims through the cell, of what is before the receiver and before the lights.
-    fn rim(&self, j: usize, i: usize, cell: &Cell, q: DVec3) -> Shadow {
-        let source = &self.facets[i];
-        let Some(r) = &self.regions[source.i_region].rectangle else { return Shadow::default() };
-        let diagonal = (r.facet.0 + r.facet.1).length();
-        let radius = diagonal * 0.5f64.powi(cell.level as i32);
-        let mut found = self.before_receiver(j, i, q, radius);
-        // A hidden middle without rims sends nothing, whatever its light.
-        if found.torn || found.hidden {
-            return found;
-        }
-        for light in self.lights {
-            let of_light = self.before_light(source.i_region, light, q, radius);
-            found = found.over(Shadow { hidden: false, unsure_hidden: false, ..of_light });
-        }
-        found
+    /// Radius of the ball about facet `i`.
+    fn radius(&self, i: usize) -> f64 {
+        self.axes(i).map_or((self.facets[i].area * FRAC_1_PI).sqrt(), |(u, v)| (u + v).length())
     }
 
-    /// cos cos/d² of a cell, b wide over its distance.
-    fn form(&self, j: usize, i: usize, cell: &Cell, q: DVec3, b: f64) -> f64 {
-        let (receiver, source) = (&self.facets[j], &self.facets[i]);
-        let offset = q - receiver.position;
-        let (d2, way) = (offset.length_squared(), offset.normalize_or_zero());
-        let scale = 0.5f64.powi(cell.level as i32);
-        match &self.regions[source.i_region].rectangle {
-            Some(r) if b <= NEAR => {
-                rectangle_form(receiver.normal, source.normal, way, d2, scale * r.facet.0, scale * r.facet.1)
-            }
-            _ => disc_form(receiver.normal, source.normal, way, d2, scale * scale * source.area),
-        }
-    }
-
-    /// The cell as one.
-    fn whole(&self, j: usize, i: usize, cell: &Cell, q: DVec3, b: f64, is_wide: bool) -> Gathered {
-        let receiver = &self.facets[j];
-        let offset = q - receiver.position;
-        let (d2, way) = (offset.length_squared(), offset.normalize_or_zero());
-        let part = 0.25f64.powi(cell.level as i32);
-        let form = self.form(j, i, cell, q, b);
-        let unresolved = f64::from(u8::from(is_wide));
-        let turn = 4.0 * U * (1.0 + self.reach / d2.sqrt());
-        let shadow = self.before_receiver(j, i, q, 0.0);
-        let depth = self.depth(receiver.position, q);
-        let v = if shadow.hidden { 0.0 } else { (-depth).exp() };
-        let (leaving, leaving_error) = self.leaving(i, cell, q, way, turn);
-        let (e, taken) = (leaving * (part * form * v), self.taken(j, way, turn));
-        // The form's own error: of each cosine a turn, of their product and of 1/d² the roundings.
-        let form_error = part * (2.0 * turn / d2 + ROUNDINGS * turn * form);
-        let error = leaving.abs() * form_error * v
-            + leaving_error * (part * form) * v
-            + e.abs() * (ROUNDINGS * U + depth * MARCH * turn);
-        let doubt = if shadow.unsure_hidden { leaving.abs() * (part * form) } else { DVec3::ZERO };
-        Gathered {
-            indirect: e,
-            glossy: e * taken.0,
-            n_unresolved: unresolved,
-            error: [error + doubt, (error + doubt) * taken.0.abs() + e.abs() * taken.1],
-            ..Gathered::default()
-        }
-    }
-
-    /// The receiver's lobe, and its error.
-    fn taken(&self, j: usize, way: DVec3, turn: f64) -> (f64, f64) {
-        let receiver = &self.facets[j];
-        let Some(table) = &self.regions[receiver.i_region].lobe else { return (0.0, 0.0) };
-        let outgoing = (self.eye - receiver.position).normalize();
-        lobe_and_slope(table, half_gap(receiver.normal, way, outgoing), 4.0 * turn)
-    }
-
-    /// Λ of facet `i` from a cell at `q` against `way`, and its error.
-    fn leaving(&self, i: usize, cell: &Cell, q: DVec3, way: DVec3, turn: f64) -> (DVec3, DVec3) {
-        let source = &self.facets[i];
-        let region = &self.regions[source.i_region];
-        let (mut sum, mut error) = (DVec3::ZERO, DVec3::ZERO);
-        for (k, light) in self.lights.iter().enumerate() {
-            let arrival = light.arrival(q);
-            let [_, through] = self.shares[i * self.lights.len() + k];
-            let shadow =
-                if cell.level > 0 { self.before_light(source.i_region, light, q, 0.0) } else { Shadow::default() };
-            let own = |v: f64| light.share(source.normal, &arrival, v);
-            let g = match cell.level {
-                0 => self.mean_share(i, k),
-                _ => own(if shadow.hidden { 0.0 } else { through }),
-            };
-            let doubt = if shadow.unsure_hidden { own(through) } else { 0.0 };
-            let (lobe, slope) = match &region.lobe {
-                Some(table) if !light.is_sky() => {
-                    lobe_and_slope(table, half_gap(source.normal, arrival.toward, -way), 4.0 * turn)
-                }
-                _ => (0.0, 0.0),
-            };
-            let energy = light.energy() * source.area;
-            let f = region.brdf.kd * source.color / PI + region.brdf.ks * lobe;
-            sum += energy * f * g;
-            let g_error = doubt + ROUNDINGS * U * g + 2.0 * turn * arrival.falloff;
-            error += energy * (f.abs() * g_error + region.brdf.ks * slope * g);
-        }
-        (sum, error)
-    }
-
-    /// (1 − g) τ between two points: equal steps over what lies in the grid's box.
-    fn depth(&self, p: DVec3, q: DVec3) -> f64 {
+    /// e^{−(1−g)τ} between two points: equal steps over what lies in the grid's box.
+    fn through(&self, p: DVec3, q: DVec3) -> Known {
         let d = q - p;
-        if self.forward >= 1.0 {
-            return 0.0;
-        }
-        let Some((enter, leave)) = crossing(self.spec, p, d, 1.0) else { return 0.0 };
+        let Some((enter, leave)) = crossing(self.spec, p, d, 1.0).filter(|_| self.forward < 1.0) else {
+            return Known::ONE;
+        };
         let length = (leave - enter) * d.length();
         let n = ((length / (self.step * self.spec.cell)).ceil() as u32).clamp(1, self.pairs.steps);
         let at = |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
         let sum: f64 = (0..n).map(|k| sample(self.spec, self.cells, at(k))).sum();
-        (1.0 - self.forward) * sum * length / f64::from(n)
+        let depth = (1.0 - self.forward) * sum * length / f64::from(n);
+        Known { value: (-depth).exp(), error: (-depth).exp() * depth * MARCH * self.turn(d.length()) }
+    }
+}
+
+impl View<'_> {
+    /// The way to `q` on facet `i`.
+    fn way(&self, i: usize, q: DVec3) -> Way {
+        let o = q - self.receiver.position;
+        let n_i = self.exchange.facets[i].normal;
+        let turn = self.exchange.turn(o.length());
+        Way { n_j: self.receiver.normal, n_i, way: o.normalize_or_zero(), d2: o.length_squared(), turn }
+    }
+
+    /// What facet `i` sends, as a whole or by its cells.
+    fn of_facet(&self, i: usize) -> Gathered {
+        let (x, q) = (self.exchange, self.exchange.facets[i].position);
+        let way = self.way(i, q);
+        let Some((u, v)) = x.axes(i) else { return self.whole(i, &way, way.disc_form(x.facets[i].area)) };
+        let side = 2.0 * u.length().max(v.length());
+        let b = side / way.d2.sqrt();
+        let form = {
+            let near = Decision::above(b, NEAR, b * ROUNDINGS * way.turn);
+            way.disc_form(x.facets[i].area).where_or(near, way.rectangle_form(u, v))
+        };
+        let wide = self
+            .faces(&way, side)
+            .and(Decision::above(b, x.pairs.size, b * ROUNDINGS * way.turn).or(self.meets_lobe(i, &way, q, b)));
+        let sends = form.is_positive().and(Decision::above(b, RIM * x.pairs.size, b * ROUNDINGS * way.turn));
+        let shadings = if wide.is_possible() || sends.is_possible() { x.shadings(i) } else { Vec::new() };
+        let torn = if sends.is_possible() { self.is_torn(i).or(source::any_torn(&shadings)) } else { Decision::NO };
+        let closely = wide.or(sends.and(torn));
+        let cell = Cell { level: 0, at: DVec2::ZERO };
+        Gathered::by(closely, || self.cell(i, &cell, &shadings), || self.whole(i, &way, form))
+    }
+
+    /// Some of what is `side` wide may be before the receiver, and the receiver is before it.
+    fn faces(&self, way: &Way, side: f64) -> Decision {
+        let d = way.d2.sqrt();
+        let slack = ROUNDINGS * way.turn * d;
+        let ahead = Decision::above(d * way.n_j.dot(way.way), -side, slack);
+        ahead.and(Decision::above(-d * way.n_i.dot(way.way), 0.0, slack))
+    }
+
+    /// A lobe is met by what is `b` wide at `q`, and wider than it should be for that.
+    fn meets_lobe(&self, i: usize, way: &Way, q: DVec3, b: f64) -> Decision {
+        let x = self.exchange;
+        let source = &x.regions[x.facets[i].i_region];
+        let receiver = &x.regions[self.receiver.i_region];
+        let met = |ns: f64, angle: Known| {
+            let slack = angle.error + b * ROUNDINGS * way.turn;
+            let near = Decision::above(TURN * b + LOBE_REACH * width(ns), angle.value, slack);
+            near.and(Decision::above(b, LOBE_STEP * x.pairs.size * width(ns), b * ROUNDINGS * way.turn))
+        };
+        let mut found = Decision::NO;
+        if source.lobe.is_some() {
+            let angles = (0..x.lights.len()).filter(|k| x.mean_share(i, *k).value > 0.0);
+            let angles = angles.filter_map(|k| x.light_angle(i, k, q, way));
+            found = angles.map(|angle| met(source.brdf.ns, angle)).fold(found, Decision::or);
+        }
+        if receiver.lobe.is_some() {
+            found = found.or(met(receiver.brdf.ns, self.eye_angle(way)));
+        }
+        found
+    }
+
+    /// Of the receiver's half vector between `way` and the eye.
+    fn eye_angle(&self, way: &Way) -> Known {
+        let to_eye = self.exchange.eye - self.receiver.position;
+        let turn = way.turn + self.exchange.turn(to_eye.length());
+        half_angle(self.receiver.normal, way.way, to_eye.normalize_or_zero(), turn)
+    }
+
+    /// A rim runs through facet `i` as the receiver sees it.
+    fn is_torn(&self, i: usize) -> Decision {
+        let x = self.exchange;
+        let (q, radius, from) = (x.facets[i].position, x.radius(i), Source::At(self.receiver.position));
+        let torn = |(r, counts): &(&Rectangle, Decision)| counts.and(shadow(r, from, q, radius, x.slack()).torn);
+        self.before[x.facets[i].i_region].iter().map(torn).fold(Decision::NO, Decision::or)
+    }
+
+    /// Facet `i` as one.
+    fn whole(&self, i: usize, way: &Way, form: Known) -> Gathered {
+        let x = self.exchange;
+        if form.is_nothing() {
+            return Gathered::default();
+        }
+        let (q, radius, p) = (x.facets[i].position, x.radius(i), self.receiver.position);
+        let seen = |(r, counts): &(&Rectangle, Decision)| {
+            shadow(r, Source::At(p), q, radius, x.slack()).share.where_or(*counts, Known::NOTHING).rest()
+        };
+        let seen = self.before[x.facets[i].i_region].iter().map(seen).fold(Known::ONE, Known::times);
+        let g: Vec<Known> = (0..x.lights.len()).map(|k| x.mean_share(i, k)).collect();
+        self.sent(i, way, q, &g, form.times(seen).times(x.through(p, q)).scaled(x.facets[i].area))
+    }
+
+    /// What facet `i` sends from `q` under shares `g` of the lights, times `by`.
+    fn sent(&self, i: usize, way: &Way, q: DVec3, g: &[Known], by: Known) -> Gathered {
+        let (radiance, radiance_error) = self.exchange.radiance(i, way, q, g);
+        let e = radiance * by.value;
+        let error = radiance.abs() * by.error + radiance_error * (by.value + by.error) + e.abs() * (ROUNDINGS * U);
+        let taken = match &self.exchange.regions[self.receiver.i_region].lobe {
+            Some(table) => lobe(table, self.eye_angle(way)),
+            None => Known::NOTHING,
+        };
+        Gathered {
+            indirect: e,
+            glossy: e * taken.value,
+            error: [error, error * taken.value.abs() + (e.abs() + error) * taken.error],
+            ..Gathered::default()
+        }
     }
 }

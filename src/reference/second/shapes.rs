@@ -1,109 +1,74 @@
-//! Form factors, lobes and the shadows of rectangles on balls: model.md §11 "second".
+//! Form factors and lobes: model.md §11 "second", *Form*.
 
 use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
+use super::ROUNDINGS;
+use super::doubt::Known;
 use crate::model::basis::evaluate;
-use crate::reference::occlude::Rectangle;
 
-/// How something lies in the way to a ball: whether its middle is hidden, whether a rim runs through it, and whether
-/// rounding can turn either.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Shadow {
-    pub hidden: bool,
-    pub torn: bool,
-    pub unsure_hidden: bool,
-    pub unsure_torn: bool,
+/// Half vectors of opposite ways turn with any rounding.
+const OPPOSITE: f64 = 1e-6;
+/// What the mean's bracket {…}·2/(3d²) turns with its ways: of widths up to the distance (|u|, |v| ≤ d/2) at most
+/// 2/3 · 2 · (6 + 2 + 1)/4 · 2.
+const BENDING: f64 = 6.0;
+
+/// From receiver `n_j` to emitter `n_i` along the unit `way`, d long and known to `turn`.
+#[derive(Debug, Clone, Copy)]
+pub struct Way {
+    pub n_j: DVec3,
+    pub n_i: DVec3,
+    pub way: DVec3,
+    pub d2: f64,
+    pub turn: f64,
 }
 
-impl Shadow {
-    pub fn over(self, b: Shadow) -> Shadow {
-        Shadow {
-            hidden: self.hidden || b.hidden,
-            torn: self.torn || b.torn,
-            unsure_hidden: self.unsure_hidden || b.unsure_hidden,
-            unsure_torn: self.unsure_torn || b.unsure_torn,
+impl Way {
+    /// (c_i ⁺)(c_j ⁺), the second known to `bending` turns.
+    fn product(&self, c_j: f64, bending: f64) -> Known {
+        let c_i = -self.n_i.dot(self.way);
+        let value = c_i.max(0.0) * c_j.max(0.0);
+        let most = (c_i + self.turn).max(0.0) * (c_j + bending * self.turn).max(0.0);
+        Known { value, error: most - value + ROUNDINGS * self.turn * value }
+    }
+
+    /// cos cos/(d² + A/π).
+    pub fn disc_form(&self, area: f64) -> Known {
+        self.product(self.n_j.dot(self.way), 1.0).scaled(1.0 / (self.d2 + area * FRAC_1_PI))
+    }
+
+    /// The mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second derivatives.
+    pub fn rectangle_form(&self, u: DVec3, v: DVec3) -> Known {
+        let Way { n_j, way, d2, .. } = *self;
+        let c_j = n_j.dot(way);
+        if c_j <= -self.turn {
+            return Known::NOTHING;
+        }
+        let along = |a: DVec3| c_j * (6.0 * a.dot(way).powi(2) - a.length_squared()) - 2.0 * n_j.dot(a) * a.dot(way);
+        let form = self.product(c_j + 2.0 / (3.0 * d2) * (along(u) + along(v)), BENDING).scaled(1.0 / d2);
+        if c_j > 0.0 {
+            form.where_or(Known { value: c_j, error: self.turn }.is_positive(), Known::NOTHING)
+        } else {
+            Known::NOTHING.or(form)
         }
     }
 }
 
-/// The shadow of `r` on the ball about `q`; `from`: the point it is seen from, or the way to it without end.
-pub fn shadow(r: &Rectangle, from: Result<DVec3, DVec3>, q: DVec3, radius: f64, slack: f64) -> Shadow {
-    let b = r.side(q);
-    // Sides, foot of the way in the plane, size of the ball there.
-    let (apart, foot, stretch, a) = match from {
-        Ok(p) => {
-            let (a, d) = (r.side(p), q - p);
-            let across = (a - b).abs().max(1e-30);
-            (a * b < 0.0, p + d * (a / (a - b)), (a / (a - b)).abs() * (d.length() / across).max(1.0), a)
-        }
-        Err(d) => {
-            let slope = r.normal.dot(d);
-            (b * slope < 0.0, q - d * (b / slope), 1.0 / slope.abs().max(1e-30), slope)
-        }
-    };
-    let o = foot - r.center;
-    let (u, v) = (r.u.length(), r.v.length());
-    let most = (o.dot(r.u).abs() / u - u).max(o.dot(r.v).abs() / v - v);
-    let reach = radius * stretch;
-    let near = b.abs() < radius;
-    let torn = a != 0.0 && if near { most < reach } else { apart && most.abs() < reach };
-    // A side's rounding moves the foot by the way's slant.
-    let moved = slack * (1.0 + stretch + o.length() / b.abs().max(slack));
-    let edge = |x: f64| x.abs() <= moved;
-    let sides = b.abs() < 4.0 * slack || a.abs() < 4.0 * slack;
-    let unsure_hidden = (apart || sides) && (edge(most) || (sides && most < moved));
-    let unsure_torn = radius > 0.0
-        && ((b.abs() - radius).abs() < 4.0 * slack || edge(most.abs() - reach) || edge(most - reach) || sides);
-    Shadow { hidden: apart && most <= 0.0, torn, unsure_hidden, unsure_torn }
-}
-
-/// cos cos/(d² + A/π).
-pub fn disc_form(n_j: DVec3, n_i: DVec3, way: DVec3, d2: f64, area: f64) -> f64 {
-    (-n_i.dot(way)).max(0.0) * n_j.dot(way).max(0.0) / (d2 + area * FRAC_1_PI)
-}
-
-/// The mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second derivatives.
-pub fn rectangle_form(n_j: DVec3, n_i: DVec3, way: DVec3, d2: f64, u: DVec3, v: DVec3) -> f64 {
-    let (c_i, c_j) = (-n_i.dot(way), n_j.dot(way));
-    if c_i <= 0.0 || c_j <= 0.0 {
-        return 0.0;
-    }
-    let along = |a: DVec3| c_j * (6.0 * a.dot(way).powi(2) - a.length_squared()) - 2.0 * n_j.dot(a) * a.dot(way);
-    c_i * (c_j + 2.0 / (3.0 * d2) * (along(u) + along(v))).max(0.0) / d2
-}
-
-/// 1 − cos γ between `n` and the half vector of two unit vectors.
-pub fn half_gap(n: DVec3, a: DVec3, b: DVec3) -> f64 {
-    0.5 * (n - (a + b).normalize_or_zero()).length_squared()
+/// Angle |n − h| between `n` and the half vector of two unit vectors, which are off by `turn` together.
+pub fn half_angle(n: DVec3, a: DVec3, b: DVec3, turn: f64) -> Known {
+    let sum = a + b;
+    Known { value: (n - sum.normalize_or_zero()).length(), error: 2.0 * turn / sum.length().max(OPPOSITE) }
 }
 
 pub fn width(ns: f64) -> f64 {
     ns.max(1.0).powf(-0.5)
 }
 
-/// The lobe at `gap` and how far it turns within `turn` of its half vector.
-pub fn lobe_and_slope(table: &[f64], gap: f64, turn: f64) -> (f64, f64) {
-    let angle = (2.0 * gap).sqrt();
+/// The lobe at an angle.
+pub fn lobe(table: &[f64], angle: Known) -> Known {
     let at = |a: f64| evaluate(table, 0.5 * a * a);
-    let (value, low, high) = (at(angle), at((angle - turn).max(0.0)), at(angle + turn));
-    (value, (value - low).abs().max((value - high).abs()))
-}
-
-fn corners(r: &Rectangle) -> [DVec3; 4] {
-    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| r.center + x * r.u + y * r.v)
-}
-
-/// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor `r`'s plane, has all of
-/// `e`'s corners outside.
-pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3) -> bool {
-    let (rim, far) = (corners(r), corners(e));
-    let outside = |k: usize| {
-        let plane = (rim[k] - p).cross(rim[(k + 1) % 4] - p);
-        let inward = plane * plane.dot(r.center - p).signum();
-        far.iter().all(|c| inward.dot(*c - p) < 0.0)
-    };
-    let side = r.side(p);
-    side != 0.0 && !(0..4).any(outside) && far.iter().any(|c| r.normal.dot(*c - r.center) * side < 0.0)
+    let (value, low, high) =
+        (at(angle.value), at((angle.value - angle.error).max(0.0)), at((angle.value + angle.error).min(2.0)));
+    Known { value, error: (value - low).abs().max((value - high).abs()) }
 }

@@ -1,13 +1,17 @@
 //! Numbers worked by hand, and the integrals over the areas.
 
+mod edges;
+mod rooms;
+
 use glam::UVec3;
 
 use super::*;
+use crate::model::basis::N_NODES;
+use crate::model::pairings::pairings;
 use crate::model::surface::Surface;
 use crate::reference::area::{Accuracy, Receiver, Scenery};
 
 const SPEC: GridSpec = GridSpec { n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
-static NO_PAIRINGS: [Vec<Pairing>; 3] = [vec![], vec![], vec![]];
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };
 const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
 
@@ -15,25 +19,57 @@ fn matte(kd: f64) -> Brdf {
     Brdf { kd: DVec3::splat(kd), ks: DVec3::ZERO, ns: 1.0 }
 }
 
-fn exchange<'a>(
-    facets: &'a [Facet],
-    regions: &'a [Region],
-    lights: &'a [Light],
-    shares: &'a [[f64; 2]],
-) -> Exchange<'a> {
-    Exchange {
-        facets,
-        regions,
-        lights,
-        shares,
-        spec: &SPEC,
-        cells: &[0.0],
-        forward: 1.0,
-        step: 1.0,
-        pairs: PAIRS,
-        eye: 5.0 * DVec3::Y,
-        pairings: &NO_PAIRINGS,
-        reach: 4.0,
+/// What an exchange needs besides its lights.
+struct Scene {
+    facets: Vec<Facet>,
+    regions: Vec<Region>,
+    pairings: Vec<Vec<Pairing>>,
+}
+
+impl Scene {
+    fn of_surfaces(surfaces: &[Surface], brdf: Brdf) -> Scene {
+        let region = |s| Region { rectangle: Some(Rectangle::new(s, DVec3::ZERO)), brdf, lobe: None };
+        let facets = surfaces.iter().enumerate().flat_map(|(i_region, s)| {
+            let area = s.area() / s.n_facets() as f64;
+            (0..s.n_facets() as u32).map(move |i| disc(s.facet_center(i), s.normal(), area, i_region))
+        });
+        Scene {
+            facets: facets.collect(),
+            regions: surfaces.iter().map(region).collect(),
+            pairings: pairings(surfaces, 0),
+        }
+    }
+
+    /// Only the first `n` surfaces have facets: others stand in the way and send nothing.
+    fn with_facets_of(mut self, n: usize) -> Scene {
+        self.facets.retain(|f| f.i_region < n);
+        self
+    }
+
+    fn of_discs(facets: &[Facet]) -> Scene {
+        let regions = facets.iter().map(|_| Region { rectangle: None, brdf: matte(1.0), lobe: None }).collect();
+        Scene { facets: facets.to_vec(), regions, pairings: pairings(&[], facets.len()) }
+    }
+
+    fn exchange<'a>(&'a self, lights: &'a [Light], shares: &'a [[f64; 2]]) -> Exchange<'a> {
+        Exchange {
+            facets: &self.facets,
+            regions: &self.regions,
+            lights,
+            shares,
+            spec: &SPEC,
+            cells: &[0.0],
+            forward: 1.0,
+            step: 1.0,
+            pairs: PAIRS,
+            eye: 5.0 * DVec3::Y,
+            pairings: &self.pairings,
+            reach: 4.0,
+        }
+    }
+
+    fn gather(&self, lights: &[Light], share: [f64; 2], j: usize) -> Gathered {
+        self.exchange(lights, &vec![share; self.facets.len() * lights.len()]).gather(j)
     }
 }
 
@@ -41,58 +77,83 @@ fn disc(position: DVec3, normal: DVec3, area: f64, i_region: usize) -> Facet {
     Facet { position, normal, area, i_region, color: DVec3::ONE }
 }
 
-#[test]
-fn two_discs_face_to_face() {
-    // Area π one above the other: 1/(1 + 1), times L = 1 of a white one under irradiance π, times A = π.
-    let facets = [disc(DVec3::ZERO, DVec3::Y, PI, 0), disc(DVec3::Y, DVec3::NEG_Y, PI, 1)];
-    let region = || Region { rectangle: None, brdf: matte(1.0), lobe: None };
-    let sun = [Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) }];
-    let regions = [region(), region()];
-    let x = exchange(&facets, &regions, &sun, &[[1.0; 2]; 2]);
-    let up = x.gather(1);
-    assert!((up.indirect.x - PI / 2.0).abs() < 1e-15 && (up.second.x - 0.5).abs() < 1e-15);
-    // The other one is lit from behind.
-    assert_eq!(x.gather(0).indirect, DVec3::ZERO);
-    // Turned by 60° each about one axis the cosines are ½.
-    let tilted = DVec3::new(0.0, 0.5, 0.75f64.sqrt());
-    let facets = [disc(DVec3::ZERO, tilted, 1e-6, 0), disc(DVec3::Y, -tilted, 1e-6, 1)];
-    let x = exchange(&facets, &regions, &sun, &[[1.0; 2]; 2]);
-    assert!((x.gather(1).indirect.x / (0.5 * 1e-6 * 0.25) - 1.0).abs() < 1e-6);
-}
-
 fn plane(center: DVec3, u: DVec3, v: DVec3, n: u32) -> Surface {
     Surface { center, u, v, i_material: 0, subdivide: [n, n] }
 }
 
-fn of_surfaces(surfaces: &[Surface], brdf: Brdf) -> (Vec<Facet>, Vec<Region>) {
-    let regions = surfaces.iter().map(|s| Region { rectangle: Some(Rectangle::new(s, DVec3::ZERO)), brdf, lobe: None });
-    let facets = surfaces.iter().enumerate().flat_map(|(i_region, s)| {
-        let area = s.area() / s.n_facets() as f64;
-        (0..s.n_facets() as u32).map(move |i| disc(s.facet_center(i), s.normal(), area, i_region))
-    });
-    (facets.collect(), regions.collect())
+/// A facet that sees up from the origin.
+fn eye_on_the_floor() -> Surface {
+    plane(DVec3::ZERO, 1e-3 * DVec3::Z, 1e-3 * DVec3::X, 1)
 }
 
 #[test]
-fn a_ceiling_has_its_form_factor_and_a_blocker_takes_half() {
-    // Howell B-3: from an element to a unit square at unit distance opposite its centre 4/π·A/√(1+A²)·atan(A/√(1+A²)), A = ½.
-    let floor = plane(DVec3::ZERO, 1e-3 * DVec3::Z, 1e-3 * DVec3::X, 1);
-    let ceiling = plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 8);
+fn two_discs_face_to_face() {
+    // Area π one above the other: 1/(1 + 1), times L = 1 of a white one under irradiance π, times A = π.
+    let facets = [disc(DVec3::ZERO, DVec3::Y, PI, 0), disc(DVec3::Y, DVec3::NEG_Y, PI, 1)];
+    let sun = [Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) }];
+    let scene = Scene::of_discs(&facets);
+    let up = scene.gather(&sun, [1.0; 2], 1);
+    assert!((up.indirect.x - PI / 2.0).abs() < 1e-15 && (up.second.x - 0.5).abs() < 1e-15);
+    // The other one is lit from behind.
+    assert_eq!(scene.gather(&sun, [1.0; 2], 0).indirect, DVec3::ZERO);
+    // Turned by 60° each about one axis the cosines are ½.
+    let tilted = DVec3::new(0.0, 0.5, 0.75f64.sqrt());
+    let scene = Scene::of_discs(&[disc(DVec3::ZERO, tilted, 1e-6, 0), disc(DVec3::Y, -tilted, 1e-6, 1)]);
+    let turned = scene.gather(&sun, [1.0; 2], 1).indirect.x;
+    assert!((turned / (0.5 * 1e-6 * 0.25) - 1.0).abs() < 1e-6);
+}
+
+/// Howell B-3: from an element to a unit square at unit distance opposite its centre, A = ½.
+fn of_a_ceiling() -> f64 {
     let a = 0.5 / 1.25f64.sqrt();
-    let factor = 4.0 * FRAC_1_PI * a * a.atan();
-    let (facets, regions) = of_surfaces(&[floor, ceiling], matte(1.0));
-    let shares = vec![[0.0, 1.0]; facets.len()];
-    let found = exchange(&facets, &regions, &[GLOW], &shares).gather(0);
+    4.0 * FRAC_1_PI * a * a.atan()
+}
+
+#[test]
+fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
+    let ceiling = |n| plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, n);
+    let found = |surfaces: &[Surface]| {
+        Scene::of_surfaces(surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], [0.0, 1.0], 0).indirect.x
+    };
     // The ceiling faces down: half of nothing above, and the constant share: L = 1. Second derivatives leave (1/8)^4.
-    assert!((found.indirect.x / (PI * factor) - 1.0).abs() < 3e-4, "{found:?} {}", PI * factor);
-    // Its edge through the axis; cells at the rim are quartered to 1/16 of their distance.
-    let blocker = plane(DVec3::new(3.0, 0.5, 0.0), 3.0 * DVec3::X, 9.0 * DVec3::Z, 1);
-    let (mut facets, regions) = of_surfaces(&[floor, ceiling, blocker], matte(1.0));
-    facets.truncate(65);
-    let shares = vec![[0.0, 1.0]; facets.len()];
-    let between = [vec![Pairing { i_emitter: 1, occluders: vec![2] }], vec![], vec![]];
-    let half = Exchange { pairings: &between, ..exchange(&facets, &regions, &[GLOW], &shares) }.gather(0);
-    assert!((half.indirect.x / found.indirect.x - 0.5).abs() < 1e-3, "{half:?}");
+    let open = found(&[eye_on_the_floor(), ceiling(8)]);
+    assert!((open / (PI * of_a_ceiling()) - 1.0).abs() < 3e-4, "{open}");
+    // Of one facet, as wide as its distance, 4 × 4 points: of the second derivatives a disc leaves 4 (u·w)²/d² along each
+    // axis, u·w = 3/8·1/8 for parts at the edge.
+    let points = found(&[eye_on_the_floor(), ceiling(1)]);
+    assert!((points / open - 1.0).abs() < 1e-2, "{points} {open}");
+    // An edge through the axis, and one at x = 1/40, whose shadow at 1/20 runs through a part of a facet: it takes
+    // what the strip between has, by values in the middles of parts: cos⁴ is 1 − 2x² there, x = 1/8 of one facet.
+    for n in [1, 8] {
+        let all = found(&[eye_on_the_floor(), ceiling(n)]);
+        let with = |x: f64| {
+            let blocker = plane(DVec3::new(3.0 + x, 0.5, 0.0), 3.0 * DVec3::X, 9.0 * DVec3::Z, 1);
+            found(&[eye_on_the_floor(), ceiling(n), blocker])
+        };
+        // What is torn is looked at closely: by discs of 1/32² in place of the facet's mean.
+        assert!((with(0.0) / all - 0.5).abs() < 1e-5, "{n}: {}", with(0.0) / all);
+        let strip = plane(DVec3::new(0.025, 1.0, 0.0), 0.025 * DVec3::X, 0.5 * DVec3::Z, 16);
+        let strip = found(&[eye_on_the_floor(), strip]);
+        let off = (with(0.025) - with(0.0)) / strip - 1.0;
+        assert!(off.abs() < 2.5 * (0.125 / f64::from(n)).powi(2) + 1e-3, "{n}: {off}");
+    }
+}
+
+#[test]
+fn a_whole_is_seen_as_far_as_its_ball() {
+    // Half axes 1/100 at distance 2, seen past an edge half way: m = 1/500 in the blocker's plane, where the ball's radius is
+    // √2/200: hidden by ½ − m·100 = 0.3. As wide as 1/100 of the distance it is torn but not looked at closely.
+    let facet = plane(2.0 * DVec3::Y, 0.01 * DVec3::X, 0.01 * DVec3::Z, 1);
+    let found = |x: f64| {
+        let blocker = plane(DVec3::new(1.0 + x, 1.0, 0.0), DVec3::X, DVec3::Z, 1);
+        let scene = Scene::of_surfaces(&[eye_on_the_floor(), facet, blocker], matte(1.0)).with_facets_of(2);
+        scene.gather(&[GLOW], [0.0, 1.0], 0).indirect.x
+    };
+    let open = found(0.1);
+    assert!(open > 0.0);
+    for (x, seen) in [(0.002, 0.7), (0.0, 0.5), (-0.002, 0.3), (-0.0051, 0.0), (0.0051, 1.0)] {
+        assert!((found(x) / open - seen).abs() < 1e-9, "{x}: {}", found(x) / open);
+    }
 }
 
 #[test]
@@ -100,15 +161,79 @@ fn a_corner_is_that_of_the_areas() {
     let floor = plane(DVec3::ZERO, DVec3::Z, DVec3::X, 8);
     let wall = plane(DVec3::new(0.0, 1.0, -1.0), DVec3::X, DVec3::Y, 8);
     let sun = [Light::Directional { direction: DVec3::new(0.0, -0.8, -0.6), irradiance: DVec3::ONE }];
-    let (facets, regions) = of_surfaces(&[floor, wall], matte(0.5));
-    let shares = vec![[1.0; 2]; facets.len()];
-    let x = exchange(&facets, &regions, &sun, &shares);
+    let scene = Scene::of_surfaces(&[floor, wall], matte(0.5));
     let truth = Scenery::new(&[floor, wall], &[matte(0.5); 2], &sun, &[], 0.0, &[]);
     for j in [0, 7, 27, 63, 64, 91, 120] {
-        let at = Receiver::new(facets[j].position, facets[j].normal, matte(0.5));
+        let at = Receiver::new(scene.facets[j].position, scene.facets[j].normal, matte(0.5));
         let e = truth.second(&at, at.normal, &Accuracy::relative(1e-7));
-        // Nearest cells are at half their distance: fourth order of ½·½, some 3 parts in a thousand.
-        let off = (x.gather(j).indirect.x / e.irradiance.x - 1.0).abs();
-        assert!(off < 4e-3, "{j} {off}");
+        // Wholes are at most half as wide as their distance: fourth order of ½·½, some 3 parts in a thousand. Parts, at most
+        // 3/8 and some nearer a half, are discs: 4 (u·w)²/d² = 4/16² of them at their widest.
+        let off = (scene.gather(&sun, [1.0; 2], j).indirect.x / e.irradiance.x - 1.0).abs();
+        assert!(off < 1.5e-2, "{j} {off}");
+    }
+}
+
+#[test]
+fn what_lies_in_a_plane_hides_nothing() {
+    let ceiling = plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 2);
+    let found = |more: &[Surface]| {
+        let surfaces = [&[eye_on_the_floor(), ceiling], more].concat();
+        Scene::of_surfaces(&surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], [0.0, 1.0], 0)
+    };
+    let alone = found(&[]);
+    assert!(alone.indirect.x > 0.0);
+    // Over half of the ceiling, in its plane and within f32's rounding of it; and in the receiver's plane.
+    for off in [0.0, 1e-7, -1e-7] {
+        let lies = plane(DVec3::new(0.5, 1.0 + off, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
+        // It only has the ceiling looked at closely: by discs, A/16 (1/3 − 1/π) of it on the axis.
+        assert!((found(&[lies]).indirect.x / alone.indirect.x - 1.0).abs() < 1e-3, "{off}");
+        let wall = plane(DVec3::new(off, 0.5, 0.0), DVec3::Y, DVec3::Z, 1);
+        let clear = (found(&[wall]).indirect.x / alone.indirect.x - 1.0).abs();
+        // Through the receiver's own place there is no side from which it could hide.
+        assert!(clear < 1e-12, "{off}: {clear}");
+    }
+    // A thousandth before the ceiling it hides half, less what is seen past its edge: a hundredth of the half width.
+    let before = plane(DVec3::new(0.5, 0.999, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
+    assert!((found(&[before]).indirect.x / alone.indirect.x - 0.5).abs() < 1e-3);
+}
+
+#[test]
+fn what_is_too_wide_at_the_last_level_is_counted() {
+    // A receiver 1/50 below a ceiling of width 1: 50 times its distance; quartered it is 4 × 25.
+    let ceiling = plane(0.02 * DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 1);
+    let scene = Scene::of_surfaces(&[eye_on_the_floor(), ceiling], matte(1.0));
+    let found = |levels| {
+        let pairs = Pairs { levels, ..PAIRS };
+        Exchange { pairs, ..scene.exchange(&[GLOW], &[[0.0, 1.0]; 2]) }.gather(0)
+    };
+    // Quarters' centres are at 0.354: half a width over that is 1.41, no wider than 1.5 in all four.
+    assert_eq!([0, 1].map(|l| found(l).n_unresolved), [1.0, 0.0]);
+    assert_eq!(found(6).n_doubted, 0.0);
+    // At pair_size 1/8 quarters are cut again: of 16 the innermost four at 0.177 are 1.41 wide, those at the edges' middle
+    // (1/8, 3/8) 0.63 and the corners 0.47, all more than 3/8.
+    let pairs = Pairs { size: 0.125, levels: 2, ..PAIRS };
+    let fine = Exchange { pairs, ..scene.exchange(&[GLOW], &[[0.0, 1.0]; 2]) }.gather(0);
+    assert_eq!(fine.n_unresolved, 16.0);
+}
+
+#[test]
+fn lobes_are_met_within_their_reach_and_ask_for_narrow_cells() {
+    // 0.3 wide at distance 1, the receiver's half vector `alpha` off its normal; or the emitter's, by a sun.
+    let ceiling = plane(DVec3::Y, 0.15 * DVec3::X, 0.15 * DVec3::Z, 1);
+    let count = |i_glossy: usize, ns: f64, alpha: f64| {
+        let mut scene = Scene::of_surfaces(&[eye_on_the_floor(), ceiling], matte(1.0));
+        scene.regions[i_glossy].brdf = Brdf { kd: DVec3::ZERO, ks: DVec3::ONE, ns };
+        scene.regions[i_glossy].lobe = Some(vec![1.0; N_NODES]);
+        let toward = DVec3::new((2.0 * alpha).sin(), (2.0 * alpha).cos(), 0.0);
+        let direction = if i_glossy == 1 { DVec3::new(toward.x, toward.y, 0.0) } else { DVec3::Y };
+        let sun = [Light::Directional { direction, irradiance: DVec3::ONE }];
+        let (eye, pairs) = (9.0 * toward, Pairs { levels: 0, ..PAIRS });
+        Exchange { eye, pairs, ..scene.exchange(&sun, &[[1.0; 2]; 2]) }.gather(0).n_unresolved
+    };
+    for i in [0, 1] {
+        // 3·½/√25 is 0.3: more is asked for from there on. Met is what is nearer than 0.75·0.3 + 4/√100 =
+        // 0.625, a chord of 0.6357.
+        assert_eq!([24.9, 25.1].map(|ns| count(i, ns, 0.0)), [0.0, 1.0], "{i}");
+        assert_eq!([0.63, 0.64].map(|alpha| count(i, 100.0, alpha)), [1.0, 0.0], "{i}");
     }
 }

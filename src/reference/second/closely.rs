@@ -1,0 +1,83 @@
+//! Facets by their cells, cells by 4 × 4 points: model.md §11 "second", *Closely*.
+
+use super::stencil::{Edges, Patch};
+use super::*;
+
+/// Cells are quartered that are wider than this many pair_size.
+const COARSE: f64 = 3.0;
+/// Of a cell, a part.
+const PART: f64 = 1.0 / 16.0;
+
+/// A part of a facet: 4^level of them, this one's centre at `at` in the facet's half axes.
+#[derive(Debug, Clone, Copy)]
+pub struct Cell {
+    pub level: u32,
+    pub at: DVec2,
+}
+
+impl Cell {
+    fn scale(&self) -> f64 {
+        0.5f64.powi(self.level as i32)
+    }
+
+    fn quarter(&self, k: u32) -> Cell {
+        let to = DVec2::new(f64::from(k & 1), f64::from(k >> 1)) * 2.0 - 1.0;
+        Cell { level: self.level + 1, at: self.at + to * 0.5 * self.scale() }
+    }
+}
+
+impl View<'_> {
+    /// What a cell of facet `i`, a surface's, sends, by its quarters or by points.
+    pub fn cell(&self, i: usize, cell: &Cell, shadings: &[Shading]) -> Gathered {
+        let (x, scale) = (self.exchange, cell.scale());
+        let (u, v) = x.axes(i).unwrap_or_default();
+        let q = x.facets[i].position + cell.at.x * u + cell.at.y * v;
+        let patch = Patch { q, u: scale * u, v: scale * v };
+        let way = self.way(i, q);
+        let side = 2.0 * patch.u.length().max(patch.v.length());
+        let b = side / way.d2.sqrt();
+        let wide = Decision::above(b, COARSE * x.pairs.size, b * ROUNDINGS * way.turn);
+        let open = self.faces(&way, side).and(wide.or(self.meets_lobe(i, &way, q, b)));
+        if cell.level == x.pairs.levels {
+            let count = |is: bool| f64::from(u8::from(is));
+            let (n_unresolved, n_doubted) = (count(open.taken), count(!open.sure));
+            return Gathered { n_unresolved, n_doubted, ..self.by_points(i, &way, &patch, shadings) };
+        }
+        let quarters = || {
+            let mut sum = Gathered::default();
+            (0..4).for_each(|k| sum.add(&self.cell(i, &cell.quarter(k), shadings)));
+            sum
+        };
+        Gathered::by(open, quarters, || self.by_points(i, &way, &patch, shadings))
+    }
+
+    /// A cell by the middles of its parts.
+    fn by_points(&self, i: usize, way: &Way, patch: &Patch, shadings: &[Shading]) -> Gathered {
+        let (x, p) = (self.exchange, self.receiver.position);
+        let area = 4.0 * patch.u.length() * patch.v.length();
+        let edges = |(r, counts): &(&Rectangle, Decision)| {
+            let edges = Edges::new(r, Source::At(p), patch, x.slack());
+            (!edges.is_nothing()).then_some((edges, *counts))
+        };
+        let occluders: Vec<_> = self.before[x.facets[i].i_region].iter().filter_map(edges).collect();
+        let shades: Vec<Vec<Edges>> = shadings.iter().map(|s| s.edges(patch, x.slack())).collect();
+        let through: Vec<Known> = (0..x.lights.len()).map(|k| x.transmittance(i, k)).collect();
+        let mean: Vec<Known> = (0..x.lights.len()).map(|k| x.mean_transmittance(i, k)).collect();
+        let mut sums = vec![Known::NOTHING; x.lights.len()];
+        for at in Patch::middles() {
+            let place = patch.point(at);
+            let seen = occluders.iter().map(|(e, counts)| e.hidden(at).where_or(*counts, Known::NOTHING).rest());
+            let form = seen.fold(self.way(i, place).disc_form(PART * area), Known::times);
+            if form.is_nothing() {
+                continue;
+            }
+            for (k, sum) in sums.iter_mut().enumerate() {
+                let clear = shades[k].iter().map(|e| e.hidden(at).rest());
+                let v = clear.fold(through[k], Known::times).where_or(shadings[k].torn, mean[k]);
+                *sum = sum.plus(form.times(x.share_at(i, k, place, v)));
+            }
+        }
+        let g: Vec<Known> = sums.into_iter().map(|s| s.scaled(PART)).collect();
+        self.sent(i, way, patch.q, &g, x.through(p, patch.q).scaled(area))
+    }
+}

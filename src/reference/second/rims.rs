@@ -1,0 +1,123 @@
+//! The shadows of rectangles on balls, and which rectangles come into question: model.md §11 "second", *Rims*.
+
+use std::f64::consts::SQRT_2;
+
+use glam::DVec3;
+
+use super::doubt::{Decision, Known};
+use crate::reference::area::visibility::Source;
+use crate::reference::occlude::{IN_PLANE, Rectangle};
+
+/// What unit vectors, their products and quotients are known to.
+pub const OF_UNITS: f64 = 8.0 * super::U;
+/// No divisor is less: what it divides ends beyond all bounds, in either sense.
+const LEAST: f64 = 1e-30;
+
+/// How a rectangle lies in the way to a ball.
+#[derive(Debug, Clone, Copy)]
+pub struct Shadow {
+    /// The ball's middle is hidden.
+    pub hidden: Decision,
+    /// A rim runs through it.
+    pub torn: Decision,
+    /// h, the share of it that is hidden.
+    pub share: Known,
+}
+
+/// Signs of a plane's side that may be found where it is `raw`, known to `slack`; the law's first.
+pub fn signs(raw: f64, tolerance: f64, slack: f64) -> Vec<f64> {
+    let law = if raw.abs() > tolerance { raw.signum() } else { 0.0 };
+    let possible =
+        [(1.0, raw + slack > tolerance), (-1.0, raw - slack < -tolerance), (0.0, raw.abs() <= tolerance + slack)];
+    std::iter::once(law).chain(possible.into_iter().filter(|(s, is)| *is && *s != law).map(|(s, _)| s)).collect()
+}
+
+/// The plane's side of `p`, and its signs.
+pub fn sides(r: &Rectangle, p: DVec3, slack: f64) -> (f64, Vec<f64>) {
+    let o = p - r.center;
+    let raw = r.normal.dot(o);
+    (raw, signs(raw, IN_PLANE * o.abs().element_sum(), slack))
+}
+
+/// The same of where light or sight comes from.
+pub fn sides_of(r: &Rectangle, source: Source, slack: f64) -> (f64, Vec<f64>) {
+    match source {
+        Source::At(p) => sides(r, p, slack),
+        Source::Toward(w) => {
+            let slope = r.normal.dot(w);
+            (slope, signs(slope, 0.0, OF_UNITS))
+        }
+    }
+}
+
+/// Where the way to `q` meets the plane; known to what; and how much larger than the ball its image is there.
+fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Known) {
+    match source {
+        Source::At(p) => {
+            let (d, length) = (q - p, q.distance(p));
+            let apart = if (a - b).abs() < LEAST { LEAST } else { a - b };
+            let (t, slant) = (a / apart, length / apart.abs());
+            let t_error = slack * (a.abs() + b.abs()) / (apart * apart);
+            let slant_error = (2.0 * slant + 1.0) * slack / apart.abs();
+            let stretch = Known { value: slant.max(1.0), error: slant_error };
+            (p + d * t, slack + length * t_error, Known { value: t.abs(), error: t_error }.times(stretch))
+        }
+        Source::Toward(w) => {
+            let slope = if a.abs() < LEAST { LEAST } else { a };
+            let moved = slack + slack / slope.abs() + b.abs() * OF_UNITS / (slope * slope);
+            let stretch = Known { value: 1.0 / slope.abs(), error: OF_UNITS / (slope * slope) };
+            (q - w * (b / slope), moved, stretch)
+        }
+    }
+}
+
+/// The shadow of `r` on the ball about `q`; `slack`: what the distance of a point from a plane is known to.
+pub fn shadow(r: &Rectangle, source: Source, q: DVec3, radius: f64, slack: f64) -> Shadow {
+    let ((a, of_a), (b, of_b)) = (sides_of(r, source, slack), sides(r, q, slack));
+    let (foot, moved, stretch) = foot(source, q, a, b, slack);
+    let o = foot - r.center;
+    let beyond = |axis: DVec3| o.dot(axis).abs() / axis.length() - axis.length();
+    let m = Known { value: beyond(r.u).max(beyond(r.v)), error: moved };
+    let reach = stretch.scaled(radius);
+    let apart = Decision::of(of_a.iter().flat_map(|x| of_b.iter().map(move |y| x * y < 0.0)));
+    // From within its plane a rectangle hides nothing.
+    let parts = Decision::of(of_a.iter().map(|x| *x != 0.0));
+    let near = Decision::above(radius, b.abs(), slack);
+    let across = Known { value: m.value.abs(), ..m };
+    let torn = parts.and(apart.and(Decision::greater(reach, across)).or(near.and(Decision::greater(reach, m))));
+    let half = (SQRT_2 * reach.value).max(f64::MIN_POSITIVE);
+    let ramp = |m: f64| (0.5 - m / half).clamp(0.0, 1.0);
+    let off = m.error + reach.error / SQRT_2;
+    let share = Known::between(ramp(m.value + off), ramp(m.value), ramp(m.value - off));
+    Shadow {
+        hidden: apart.and(Decision::greater(m, Known::NOTHING).not()),
+        torn,
+        share: share.where_or(apart, Known::NOTHING),
+    }
+}
+
+fn corners(r: &Rectangle) -> [DVec3; 4] {
+    [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| r.center + x * r.u + y * r.v)
+}
+
+/// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor `r`'s plane, has all of
+/// `e`'s corners outside.
+pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
+    let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
+    // All of `far` below 0 of a plane through `p`, corners and normal known as their products are.
+    let outside = |k: usize| {
+        let (a, b) = (rim[k], rim[(k + 1) % 4]);
+        let plane = a.cross(b);
+        let inward = plane * plane.dot(r.center - p).signum();
+        let (a, b) = (a.length(), b.length());
+        let below = |c: &DVec3| Decision::above(0.0, inward.dot(*c), 2.0 * slack * (a * b + (a + b) * c.length()));
+        far.iter().map(below).fold(Decision::YES, Decision::and)
+    };
+    let (_, of_p) = sides(r, p, slack);
+    let behind = |c: &DVec3| {
+        let side = r.normal.dot(*c + p - r.center);
+        Decision::of(of_p.iter().flat_map(|s| [side, side + slack, side - slack].map(|x| x * s < 0.0)))
+    };
+    let out = (0..4).map(outside).fold(Decision::NO, Decision::or);
+    out.not().and(far.iter().map(behind).fold(Decision::NO, Decision::or))
+}

@@ -1,0 +1,118 @@
+//! What a rectangle hides of a cell's parts: model.md §11 "second", *Edges*. Functions that are positive behind it and
+//! within its edges, linear over the cell, as ramps along each part.
+
+use glam::{DVec2, DVec3};
+
+use super::doubt::Known;
+use super::rims::{OF_UNITS, sides_of};
+use crate::reference::area::visibility::Source;
+use crate::reference::occlude::{IN_PLANE, Rectangle};
+
+/// Of a cell's half axes, half a part's sides.
+const HALF_PART: f64 = 0.25;
+
+/// A cell: centre and half axes.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch {
+    pub q: DVec3,
+    pub u: DVec3,
+    pub v: DVec3,
+}
+
+impl Patch {
+    pub fn point(&self, at: DVec2) -> DVec3 {
+        self.q + at.x * self.u + at.y * self.v
+    }
+
+    /// (s, t) of the parts' middles.
+    pub fn middles() -> impl Iterator<Item = DVec2> {
+        let at = |i: u32| 0.5 * f64::from(i) - 0.75;
+        (0..16u32).map(move |i| DVec2::new(at(i % 4), at(i / 4)))
+    }
+}
+
+/// A function linear over a cell, and what it is known to.
+#[derive(Debug, Clone, Copy)]
+struct Linear {
+    at_q: f64,
+    gain: DVec2,
+    slack: f64,
+}
+
+impl Linear {
+    /// The share of the part about `at` where it is positive, with `off` more.
+    fn share(&self, at: DVec2, off: f64) -> f64 {
+        let (f, half) = (self.at_q + self.gain.dot(at) + off, HALF_PART * self.gain.length());
+        if half > 0.0 { (0.5 + f / (2.0 * half)).clamp(0.0, 1.0) } else { f64::from(u8::from(f > 0.0)) }
+    }
+}
+
+/// The plane, and two pairs of opposite edges.
+type Five = [Linear; 5];
+
+/// What a rectangle hides of a cell from where it is seen: by the law, and what rounding may make of it; none where the
+/// eye is in its plane.
+#[derive(Debug, Clone)]
+pub struct Edges(Vec<Option<Five>>);
+
+impl Edges {
+    /// `slack`: what the distance of a point from a plane is known to.
+    pub fn new(r: &Rectangle, source: Source, patch: &Patch, slack: f64) -> Edges {
+        let (side, signs) = sides_of(r, source, slack);
+        let of = |sign: &f64| (*sign != 0.0).then(|| five(r, source, patch, side.abs(), *sign, slack));
+        Edges(signs.iter().map(of).collect())
+    }
+
+    /// Whether it hides anything of any part.
+    pub fn is_nothing(&self) -> bool {
+        Patch::middles().all(|at| self.hidden(at).is_nothing())
+    }
+
+    /// h of the part about `at`.
+    pub fn hidden(&self, at: DVec2) -> Known {
+        let by = |five: &Option<Five>, off: f64| five.as_ref().map_or(0.0, |five| share(five, at, off));
+        let value = by(&self.0[0], 0.0);
+        let least = self.0.iter().map(|f| by(f, -1.0)).fold(value, f64::min);
+        let most = self.0.iter().map(|f| by(f, 1.0)).fold(value, f64::max);
+        Known::between(least, value, most)
+    }
+}
+
+/// With `off` slacks more.
+fn share(five: &Five, at: DVec2, off: f64) -> f64 {
+    let of = |k: usize| five[k].share(at, off * five[k].slack);
+    let pair = |k: usize| (of(k) + of(k + 1) - 1.0).max(0.0);
+    of(0) * pair(1) * pair(3)
+}
+
+/// `side` |a|, `sign` that of a.
+fn five(r: &Rectangle, source: Source, patch: &Patch, side: f64, sign: f64, slack: f64) -> Five {
+    let to_q = patch.q - r.center;
+    let (from, is_near) = match source {
+        Source::At(p) => (p - r.center, 1.0),
+        Source::Toward(w) => (w, 0.0),
+    };
+    let tolerance = IN_PLANE * to_q.abs().element_sum();
+    let depth = |x: DVec3| -sign * r.normal.dot(x);
+    // D |w|² ± X, D's constant |a| counted where `x` is a place and not a step.
+    let edge = |w: DVec3, turn: f64, x: DVec3, place: f64| {
+        let e = depth(x);
+        (place * side + is_near * e) * w.length_squared() + turn * (side * w.dot(x) + e * w.dot(from))
+    };
+    let linear = |f: &dyn Fn(DVec3, f64) -> f64, slack: f64| {
+        let gain = DVec2::new(f(patch.u, 0.0), f(patch.v, 0.0));
+        Linear { at_q: f(to_q, 1.0), gain, slack }
+    };
+    // Sides and lengths along w are known to `slack`, unit ways and their slopes to a few roundings; half of what the
+    // gains are known to is the ramp's.
+    let size = patch.u.length() + patch.v.length();
+    let reach = to_q.length() + 2.0 * size;
+    let of_edge = |w: DVec3| {
+        let (side_slack, of_source) = if is_near > 0.0 { (slack, slack) } else { (OF_UNITS, OF_UNITS) };
+        let of_depth = slack * (from.length() + is_near * w.length());
+        w.length() * (side_slack * (w.length() + reach) + side * slack + of_depth + reach * of_source)
+    };
+    let of = |w: DVec3, turn: f64| linear(&|x, place| edge(w, turn, x, place), of_edge(w));
+    let plane = linear(&|x, place| depth(x) - place * tolerance, slack + OF_UNITS * size);
+    [plane, of(r.u, 1.0), of(r.u, -1.0), of(r.v, 1.0), of(r.v, -1.0)]
+}

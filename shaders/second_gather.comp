@@ -26,6 +26,10 @@
 #ifndef GLOSSY
 #define GLOSSY 1
 #endif
+// 1: some region has a lobe.
+#ifndef SHINY
+#define SHINY 1
+#endif
 
 #include "turns.glsl"
 
@@ -86,25 +90,24 @@ float unresolved = 0.0;
 void add(View view, vec3 e, Taker taker) {
     indirect += e;
 #if GLOSSY
-    glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
+    if (e != vec3(0.0)) {
+        glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
+    }
 #endif
-}
-
-// The radiance of a region's lobe for light l, over the light's share of energy.
-float lobe_of(Region emitter, Sender source, View view, uint l) {
-    return lobe_between(emitter.i_lobe, source.normal, arrival_at(LIGHT(l), view.position).toward, -view.way);
 }
 
 void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, float share) {
     vec3 leaving = source.flux;
-    vec3 face = source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30));
-    source.normal = is_cluster(source) ? face : source.normal;
-    for (uint k = 0u; k < (emitter.i_lobe == NO_LOBE ? 0u : 1u); ++k) {
+#if SHINY
+    vec3 shining = vec3(0.0);
+    if (emitter.i_lobe != NO_LOBE && share > 0.0) {
         [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
-            float g = fluxes[i * N_LIGHTS + l].w;
-            leaving += LIGHT(l).energy * emitter.ks * (shines(LIGHT(l), g) ? g * lobe_of(emitter, source, view, l) : 0.0);
+            vec2 shine = shine_of(i, source, view, l);
+            shining += LIGHT(l).energy * (shine.x * lobe_at(emitter.i_lobe, shine.y));
         }
     }
+    leaving += emitter.ks * shining;
+#endif
     add(view, leaving * share, taker);
 }
 
@@ -112,9 +115,14 @@ void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, St
     vec3 e = vec3(0.0);
     [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
         float g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);
-        bool shiny = emitter.i_lobe != NO_LOBE && shines(LIGHT(l), g);
-        float lobe = shiny ? lobe_of(emitter, source, view, l) : 0.0;
-        e += LIGHT(l).energy * g * (emitter.kd * PI_INVERSE + emitter.ks * lobe);
+        vec3 f = emitter.kd * PI_INVERSE;
+#if SHINY
+        vec2 shine = shine_of(i, source, view, l);
+        if (emitter.i_lobe != NO_LOBE && shine.x > 0.0 && part > 0.0) {
+            f += emitter.ks * lobe_at(emitter.i_lobe, shine.y);
+        }
+#endif
+        e += LIGHT(l).energy * g * f;
     }
     add(view, e, taker);
 }
@@ -137,9 +145,14 @@ void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, f
     vec3 met = vec3(0.0), sent = vec3(0.0);
     for (uint l = 0u; l < N_LIGHTS; ++l) {
         float g = share_of(LIGHT(l), arrival_at(LIGHT(l), view.position), source.normal, 1.0);
-        bool shiny = emitter.i_lobe != NO_LOBE && shines(LIGHT(l), g);
-        float peak = shiny ? lobe_at(emitter.i_lobe, nearest_gap(view.emitter_gap, turn)) : 0.0;
-        float lobe = shiny ? abs(lobe_of(emitter, source, view, l)) : 0.0;
+        float peak = 0.0, lobe = 0.0;
+#if SHINY
+        vec2 shine = shine_of(i, source, view, l);
+        if (emitter.i_lobe != NO_LOBE && shine.x > 0.0) {
+            peak = lobe_at(emitter.i_lobe, nearest_gap(view.emitter_gap, turn));
+            lobe = abs(lobe_at(emitter.i_lobe, shine.y));
+        }
+#endif
         met += LIGHT(l).energy * g * (emitter.kd * PI_INVERSE + emitter.ks * lobe);
         sent += LIGHT(l).energy * g * (emitter.kd * PI_INVERSE + emitter.ks * max(peak, lobe));
     }

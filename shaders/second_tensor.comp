@@ -23,6 +23,8 @@
 #ifndef GLOSSY
 #define GLOSSY 1
 #endif
+// 1: some region has a lobe.
+#define SHINY 1
 // N_b.
 #ifndef N_BASES
 #define N_BASES 8

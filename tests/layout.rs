@@ -287,8 +287,6 @@ fn shared_constants_have_one_value() {
     assert_eq!(n, shared.iter().filter(|(file, _, _)| *file == "include/records.glsl").count());
     let in_plane = constant(text_of("include/occlude.glsl"), "IN_PLANE");
     assert_eq!(in_plane, Some(nimbus::reference::occlude::IN_PLANE));
-    let share_side = constant(text_of("transmit.comp"), "SHARE_SIDE");
-    assert_eq!(share_side, Some(f64::from(nimbus::reference::transmit::SHARE_SIDE)));
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
     assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
     // The host's TILE is private to its pass: both stand in the text.

@@ -95,13 +95,15 @@ fn reference(f: &Frame) -> Vec<Gathered> {
     let obstacles = Obstacles { spec: &setting.grid, cells: &cells, rectangles: &rectangles, step, forward };
     let receivers: Vec<Receiver> =
         facets.iter().map(|f| Receiver { position: f.position, i_region: f.i_region as u32 }).collect();
-    let shares = obstacles.share_factors(&receivers, &lights);
+    let transmittance = obstacles.transmittance(&receivers, &lights);
+    let through = obstacles.through(&receivers, &lights);
     let pairings = pairings(&scene.surfaces, scene.clouds.len());
     let exchange = Exchange {
         facets: &facets,
         regions: &regions,
         lights: &lights,
-        shares: &shares,
+        transmittance: &transmittance,
+        through: &through,
         spec: &setting.grid,
         cells: &cells,
         forward,
@@ -111,7 +113,8 @@ fn reference(f: &Frame) -> Vec<Gathered> {
         pairings: &pairings,
         reach: setting.radius.max(2.0),
     };
-    each(facets.len(), |j| exchange.gather(j))
+    let senders = exchange.senders();
+    each(facets.len(), |j| exchange.gather(j, &senders))
 }
 
 /// I_i and L2, channel by channel.

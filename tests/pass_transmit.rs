@@ -297,7 +297,7 @@ fn wrong_transmittance_is_noticed() {
         values[k][shaded] += 2.0 * bounds[k][shaded];
         assert!(ratio(&values, k) > 1.0, "one corrupted number");
     }
-    // What is wrong in the transmittance (0), and what in the shares alone (1).
+    // What is wrong in the transmittance (0), and what in the clouds' part alone (1).
     for (k, file, from, to) in [
         (0, "transmit.comp", "(t0 + 0.5 * ds)", "t0"),
         (0, "transmit.comp", "min(push.step_length, length_total - t0)", "push.step_length"),
@@ -311,7 +311,7 @@ fn wrong_transmittance_is_noticed() {
         (0, "transmit.comp", "bool is_on = any", "bool is_on = true || any"),
         (1, "transmit.comp", "/ float(r.n_u)", "/ float(r.n_v)"),
         (1, "transmit.comp", "+ 0.5) * (2.0", "+ 0.6) * (2.0"),
-        (1, "transmit.comp", "vec2(share, through)", "vec2(share, 1.0)"),
+        (1, "transmit.comp", "through[k] = dimmed", "through[k] = transmittance[k]"),
         (0, "include/occlude.glsl", "<= dot(r.v, r.v)", "<= dot(r.u, r.u)"),
         (0, "include/occlude.glsl", "(a / (a - b))", "(a / (a + b))"),
         (0, "include/occlude.glsl", "p - d * (a / b)", "p + d * (a / b)"),

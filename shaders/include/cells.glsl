@@ -64,7 +64,10 @@ struct View {
     // Square of the distance, and width over distance.
     float d2;
     float width;
-    // Least 1 - cos gamma at the emitter, and at the receiver.
+    // Of each light that is kept: what makes the emitter's lobe shine, and 1 - cos gamma there; the least of them; and that
+    // at the receiver.
+    vec4 shine;
+    vec4 gaps;
     float emitter_gap;
     float taker_gap;
     // Wider than asked for; and, as a facet, wider than its cells may be.
@@ -170,11 +173,23 @@ View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitt
     face *= cluster ? inversesqrt(max(dot(face, face), 1e-30)) : 1.0;
 #endif
     float turn = TURN * view.width;
+    view.shine = vec4(0.0);
+    view.gaps = vec4(2.0);
     view.emitter_gap = 2.0;
-    for (uint k = 0u; k < (emitter.i_lobe == NO_LOBE ? 0u : 1u); ++k) {
-        view.emitter_gap = gap_at(i, view.position, face, -view.way);
-        by_lobes = max(by_lobes, lobe_excess(emitter, view.emitter_gap, turn, view.width, lobe_limit));
+#if SHINY
+    if (emitter.i_lobe != NO_LOBE) {
+        [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
+            float g = LIGHT(l).kind != LIGHT_SKY ? fluxes[i * N_LIGHTS + l].w : 0.0;
+            float gap = gap_of(view.position, face, -view.way, l);
+            view.emitter_gap = g > 0.0 ? min(view.emitter_gap, gap) : view.emitter_gap;
+#if N_KEPT > 0
+            view.shine[l] = g;
+            view.gaps[l] = gap;
+#endif
+        }
+        by_lobes = lobe_excess(emitter, view.emitter_gap, turn, view.width, lobe_limit);
     }
+#endif
     view.taker_gap = 2.0;
 #if GLOSSY
     view.taker_gap = half_vector_gap(taker.normal, view.way, taker.outgoing);
@@ -206,4 +221,15 @@ float arriving_by(uint i, Sender source, Walk walk, Cell cell, Stencil seen, uin
         return source.area * weighted(seen, s);
     }
     return flux.x * weighted(seen, part_of(unpacked(stencils[i * N_LIGHTS + l]), walk.at, walk.level));
+}
+
+// Light l's share that makes the lobe of a source shine, and 1 - cos gamma there.
+vec2 shine_of(uint i, Sender source, View view, uint l) {
+#if N_KEPT > 0
+    return vec2(view.shine[l], view.gaps[l]);
+#else
+    float g = LIGHT(l).kind != LIGHT_SKY ? fluxes[i * N_LIGHTS + l].w : 0.0;
+    vec3 face = source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30));
+    return vec2(g, gap_of(view.position, face, -view.way, l));
+#endif
 }

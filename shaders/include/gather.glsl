@@ -145,15 +145,7 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
 }
 #endif
 
-// Whether a light of a source makes its region's lobe shine.
-bool shines(Light light, float g) { return light.kind != LIGHT_SKY && g > 0.0; }
-
-// The least 1 - cos gamma at a part of a source about p, of any light that makes its lobe shine.
-float gap_at(uint i_source, vec3 p, vec3 normal, vec3 outgoing) {
-    float gap = 2.0;
-    [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
-        float w = half_vector_gap(normal, arrival_at(LIGHT(l), p).toward, outgoing);
-        gap = shines(LIGHT(l), fluxes[i_source * N_LIGHTS + l].w) ? min(gap, w) : gap;
-    }
-    return gap;
+// 1 - cos gamma of light l at a part of a source about p.
+float gap_of(vec3 p, vec3 normal, vec3 outgoing, uint l) {
+    return half_vector_gap(normal, arrival_at(LIGHT(l), p).toward, outgoing);
 }

@@ -25,24 +25,35 @@ Plane ramp(Plane plane) {
 
 vec4 inside(Plane ramp, float along) { return clamp(on_row(ramp, along), 0.0, 1.0); }
 
-// cos cos/(d^2 + A/pi) over one row, but for the source's cosine times d; `o` the row's middle from the receiver. Axes are
-// perpendicular.
-vec4 row_of_forms(vec3 o, vec3 u, vec3 receiver_normal, float part) {
-    vec4 facing = max(dot(receiver_normal, o) + ALONG * dot(receiver_normal, u), 0.0);
-    vec4 d2 = dot(o, o) + ALONG * (2.0 * dot(o, u)) + ALONG * ALONG * dot(u, u);
-    return facing / max(d2 * (d2 + part), 1e-30);
+// cos cos/d^2 over one row of parts, but for the source's cosine times d: the means over the parts as rectangle_form has
+// them, of half axes u/4 and v/4; of parts wider than their distance a disc's. `o` the row's middle from the receiver.
+vec4 row_of_forms(vec3 o, vec3 u, vec3 v, vec3 receiver_normal, float part) {
+    float uu = 0.0625 * dot(u, u), vv = 0.0625 * dot(v, v);
+    float nu = dot(receiver_normal, u), nv = dot(receiver_normal, v);
+    vec4 facing = dot(receiver_normal, o) + ALONG * nu;
+    // Axes are perpendicular.
+    float ou = dot(o, u), ov = dot(o, v);
+    vec4 d2 = max(dot(o, o) + ALONG * (2.0 * ou) + ALONG * ALONG * (16.0 * uu), 1e-30);
+    vec4 inverse = 1.0 / d2;
+    vec4 along_u = 0.25 * (ou + ALONG * (16.0 * uu));
+    float along_v = 0.25 * ov;
+    vec4 bent = facing * (6.0 * inverse * (along_u * along_u + along_v * along_v) - (uu + vv)) - 0.5 * (nu * along_u + nv * along_v);
+    vec4 mean = max(facing + bent * inverse * (2.0 / 3.0), 0.0) * inverse * inverse;
+    vec4 disc = facing * inverse / (d2 + part);
+    bvec4 near = lessThan(d2, vec4(4.0 * max(uu, vv)));
+    return mix(mix(mean, disc, near), vec4(0.0), lessThanEqual(facing, vec4(0.0)));
 }
 
-// cos cos/(d^2 + A/pi) at each point of a cell of area A to a receiver at p.
+// cos cos/d^2 at each point of a cell of area A to a receiver at p.
 Stencil forms(Cell cell, vec3 normal, vec3 receiver_normal, vec3 p, float area) {
     vec3 o = cell.middle - p;
     float part = area * (0.0625 * 0.318309886183791);
     float height = max(-dot(normal, o), 0.0);
     return Stencil(
-        height * row_of_forms(o + ALONG.x * cell.v, cell.u, receiver_normal, part),
-        height * row_of_forms(o + ALONG.y * cell.v, cell.u, receiver_normal, part),
-        height * row_of_forms(o + ALONG.z * cell.v, cell.u, receiver_normal, part),
-        height * row_of_forms(o + ALONG.w * cell.v, cell.u, receiver_normal, part));
+        height * row_of_forms(o + ALONG.x * cell.v, cell.u, cell.v, receiver_normal, part),
+        height * row_of_forms(o + ALONG.y * cell.v, cell.u, cell.v, receiver_normal, part),
+        height * row_of_forms(o + ALONG.z * cell.v, cell.u, cell.v, receiver_normal, part),
+        height * row_of_forms(o + ALONG.w * cell.v, cell.u, cell.v, receiver_normal, part));
 }
 
 // A rectangle's shadow as four ramps, and one for what is beyond its plane.

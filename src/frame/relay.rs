@@ -1,7 +1,7 @@
 //! The second reflection and what it is gathered with.
 
 use super::buffers::Buffers;
-use super::exchange::{Exchange, turns};
+use super::exchange::{Exchange, is_glossy, turns};
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::tensor::TensorStage;
@@ -45,7 +45,8 @@ impl Relay {
         scene: &Scene,
         tree: bool,
     ) -> Result<Relay> {
-        let second = Second::new(device, compiler, scene.n_particles() > 0, tree, turns(scene))?;
+        let shiny = (0..scene.n_regions()).any(|i| is_glossy(scene, i));
+        let second = Second::new(device, compiler, [scene.n_particles() > 0, tree, shiny], turns(scene))?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
         Ok(Relay {

@@ -76,9 +76,15 @@ pub enum Receivers {
 }
 
 impl Second {
-    /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree.
+    /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree;
+    /// `shiny`: some region has a lobe.
     /// `turns`: of a dispatch.
-    pub fn new(device: &Device, compiler: &Compiler, has_clouds: bool, tree: bool, turns: Turns) -> Result<Second> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        [has_clouds, tree, shiny]: [bool; 3],
+        turns: Turns,
+    ) -> Result<Second> {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let macros = [
@@ -86,6 +92,7 @@ impl Second {
                 ("MARCH", u32::from(has_clouds)),
                 ("GLOSSY", glossy),
                 ("TREE", u32::from(tree)),
+                ("SHINY", u32::from(shiny)),
             ];
             let macros = [&macros[..], &turns.macros(device)].concat();
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)

@@ -1,5 +1,5 @@
 //! The second reflection, C (16), from every pair of facets: model.md §7 and §11 "second". In: facets, regions, lights and
-//! their shares, the density grid, all relative to O. Out, a receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye,
+//! their transmittances, the density grid, all relative to O. Out, a receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye,
 //! RGB, and what an f32 evaluation of the same may differ.
 
 mod closely;
@@ -19,7 +19,7 @@ use closely::Cell;
 use doubt::{Decision, Known};
 use rims::{meets, shadow};
 use shapes::{Way, half_angle, lobe, width};
-use source::Shading;
+use source::Sender;
 
 use super::area::visibility::{Source, source_of};
 use super::grid::sample;
@@ -37,8 +37,10 @@ const LOBE_REACH: f64 = 4.0;
 const LOBE_STEP: f64 = 3.0;
 /// Of a width over its distance, what the half vector turns from centre to corner.
 const TURN: f64 = 0.75;
-/// Facets that a shadow's rim runs through are looked at closely where wider than this share of pair_size.
-const RIM: f64 = 0.125;
+/// Facets that a shadow's rim runs through are looked at closely where wider than this share of pair_size; where both the
+/// receiver's view and a light's is torn, than this.
+const RIM: f64 = 0.25;
+const BOTH_RIMS: f64 = 0.125;
 /// Wider facets are discs.
 const NEAR: f64 = 1.0;
 /// f32's unit round-off.
@@ -69,12 +71,13 @@ pub struct Facet {
     pub color: DVec3,
 }
 
-/// All that a gather needs. `shares`: what surfaces leave and what clouds do, [facet × light].
+/// All that a gather needs. `transmittance`: of the lights, [facet × light]; `through`: what clouds alone leave.
 pub struct Exchange<'a> {
     pub facets: &'a [Facet],
     pub regions: &'a [Region],
     pub lights: &'a [Light],
-    pub shares: &'a [[f64; 2]],
+    pub transmittance: &'a [f64],
+    pub through: &'a [f64],
     pub spec: &'a GridSpec,
     pub cells: &'a [f64],
     /// g, and the march's step in cells; without particles g = 1.
@@ -138,14 +141,15 @@ struct View<'a> {
     exchange: &'a Exchange<'a>,
     receiver: &'a Facet,
     before: Vec<Vec<(&'a Rectangle, Decision)>>,
+    senders: &'a [Sender<'a>],
 }
 
 impl Exchange<'_> {
-    /// I_i and L2 of facet `j`.
-    pub fn gather(&self, j: usize) -> Gathered {
+    /// I_i and L2 of facet `j` from `senders`.
+    pub fn gather(&self, j: usize, senders: &[Sender]) -> Gathered {
         let (receiver, mut sum) = (&self.facets[j], Gathered::default());
         let before = (0..self.regions.len()).map(|e| self.before(receiver, e)).collect();
-        let view = View { exchange: self, receiver, before };
+        let view = View { exchange: self, receiver, before, senders };
         for i in (0..self.facets.len()).filter(|&i| i != j && self.is_pair(receiver.i_region, self.facets[i].i_region))
         {
             sum.add(&view.of_facet(i));
@@ -240,19 +244,18 @@ impl View<'_> {
         let Some((u, v)) = x.axes(i) else { return self.whole(i, &way, way.disc_form(x.facets[i].area)) };
         let side = 2.0 * u.length().max(v.length());
         let b = side / way.d2.sqrt();
-        let form = {
-            let near = Decision::above(b, NEAR, b * ROUNDINGS * way.turn);
-            way.disc_form(x.facets[i].area).where_or(near, way.rectangle_form(u, v))
-        };
+        let form = way.part_form(u, v);
         let wide = self
             .faces(&way, side)
             .and(Decision::above(b, x.pairs.size, b * ROUNDINGS * way.turn).or(self.meets_lobe(i, &way, q, b)));
-        let sends = form.is_positive().and(Decision::above(b, RIM * x.pairs.size, b * ROUNDINGS * way.turn));
-        let shadings = if wide.is_possible() || sends.is_possible() { x.shadings(i) } else { Vec::new() };
-        let torn = if sends.is_possible() { self.is_torn(i).or(source::any_torn(&shadings)) } else { Decision::NO };
-        let closely = wide.or(sends.and(torn));
+        let sends = |rim: f64| {
+            form.is_positive().and(Decision::above(b, rim * x.pairs.size, b * ROUNDINGS * way.turn))
+        };
+        let sender = &self.senders[i];
+        let torn = if sends(BOTH_RIMS).is_possible() { self.is_torn(i) } else { Decision::NO };
+        let by_rims = sends(RIM).and(torn.or(sender.torn)).or(sends(BOTH_RIMS).and(torn.and(sender.torn)));
         let cell = Cell { level: 0, at: DVec2::ZERO };
-        Gathered::by(closely, || self.cell(i, &cell, &shadings), || self.whole(i, &way, form))
+        Gathered::by(wide.or(by_rims), || self.cell(i, &cell, sender), || self.whole(i, &way, form))
     }
 
     /// Some of what is `side` wide may be before the receiver, and the receiver is before it.
@@ -275,7 +278,8 @@ impl View<'_> {
         };
         let mut found = Decision::NO;
         if source.lobe.is_some() {
-            let angles = (0..x.lights.len()).filter(|k| x.mean_share(i, *k).value > 0.0);
+            let lit = &self.senders[i].lights;
+            let angles = (0..x.lights.len()).filter(|k| lit[*k].mean.value > 0.0);
             let angles = angles.filter_map(|k| x.light_angle(i, k, q, way));
             found = angles.map(|angle| met(source.brdf.ns, angle)).fold(found, Decision::or);
         }
@@ -311,7 +315,7 @@ impl View<'_> {
             shadow(r, Source::At(p), q, radius, x.slack()).share.where_or(*counts, Known::NOTHING).rest()
         };
         let seen = self.before[x.facets[i].i_region].iter().map(seen).fold(Known::ONE, Known::times);
-        let g: Vec<Known> = (0..x.lights.len()).map(|k| x.mean_share(i, k)).collect();
+        let g: Vec<Known> = self.senders[i].lights.iter().map(|l| l.mean).collect();
         self.sent(i, way, q, &g, form.times(seen).times(x.through(p, q)).scaled(x.facets[i].area))
     }
 

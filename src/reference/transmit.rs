@@ -13,8 +13,6 @@ use crate::model::light::Light;
 /// A march that would need more ends after this many.
 pub const MAX_STEPS: u32 = 4096;
 
-/// Points of a facet along each side, of which its share is the mean.
-pub const SHARE_SIDE: u32 = 4;
 
 /// What light can meet on its way, and how it is marched through.
 #[derive(Debug, Clone, Copy)]

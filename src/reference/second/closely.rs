@@ -16,7 +16,7 @@ pub struct Cell {
 }
 
 impl Cell {
-    fn scale(&self) -> f64 {
+    pub fn scale(&self) -> f64 {
         0.5f64.powi(self.level as i32)
     }
 
@@ -28,7 +28,7 @@ impl Cell {
 
 impl View<'_> {
     /// What a cell of facet `i`, a surface's, sends, by its quarters or by points.
-    pub fn cell(&self, i: usize, cell: &Cell, shadings: &[Shading]) -> Gathered {
+    pub fn cell(&self, i: usize, cell: &Cell, sender: &Sender) -> Gathered {
         let (x, scale) = (self.exchange, cell.scale());
         let (u, v) = x.axes(i).unwrap_or_default();
         let q = x.facets[i].position + cell.at.x * u + cell.at.y * v;
@@ -41,18 +41,18 @@ impl View<'_> {
         if cell.level == x.pairs.levels {
             let count = |is: bool| f64::from(u8::from(is));
             let (n_unresolved, n_doubted) = (count(open.taken), count(!open.sure));
-            return Gathered { n_unresolved, n_doubted, ..self.by_points(i, &way, &patch, shadings) };
+            return Gathered { n_unresolved, n_doubted, ..self.by_points(i, &way, cell, &patch, sender) };
         }
         let quarters = || {
             let mut sum = Gathered::default();
-            (0..4).for_each(|k| sum.add(&self.cell(i, &cell.quarter(k), shadings)));
+            (0..4).for_each(|k| sum.add(&self.cell(i, &cell.quarter(k), sender)));
             sum
         };
-        Gathered::by(open, quarters, || self.by_points(i, &way, &patch, shadings))
+        Gathered::by(open, quarters, || self.by_points(i, &way, cell, &patch, sender))
     }
 
     /// A cell by the middles of its parts.
-    fn by_points(&self, i: usize, way: &Way, patch: &Patch, shadings: &[Shading]) -> Gathered {
+    fn by_points(&self, i: usize, way: &Way, cell: &Cell, patch: &Patch, sender: &Sender) -> Gathered {
         let (x, p) = (self.exchange, self.receiver.position);
         let area = 4.0 * patch.u.length() * patch.v.length();
         let edges = |(r, counts): &(&Rectangle, Decision)| {
@@ -60,21 +60,17 @@ impl View<'_> {
             (!edges.is_nothing()).then_some((edges, *counts))
         };
         let occluders: Vec<_> = self.before[x.facets[i].i_region].iter().filter_map(edges).collect();
-        let shades: Vec<Vec<Edges>> = shadings.iter().map(|s| s.edges(patch, x.slack())).collect();
-        let through: Vec<Known> = (0..x.lights.len()).map(|k| x.transmittance(i, k)).collect();
-        let mean: Vec<Known> = (0..x.lights.len()).map(|k| x.mean_transmittance(i, k)).collect();
+        let shares: Vec<_> = (0..x.lights.len()).map(|k| x.shares_of(i, k, sender, cell, patch)).collect();
         let mut sums = vec![Known::NOTHING; x.lights.len()];
-        for at in Patch::middles() {
+        for (n, at) in Patch::middles().enumerate() {
             let place = patch.point(at);
             let seen = occluders.iter().map(|(e, counts)| e.hidden(at).where_or(*counts, Known::NOTHING).rest());
-            let form = seen.fold(self.way(i, place).disc_form(PART * area), Known::times);
+            let form = seen.fold(self.way(i, place).part_form(0.25 * patch.u, 0.25 * patch.v), Known::times);
             if form.is_nothing() {
                 continue;
             }
             for (k, sum) in sums.iter_mut().enumerate() {
-                let clear = shades[k].iter().map(|e| e.hidden(at).rest());
-                let v = clear.fold(through[k], Known::times).where_or(shadings[k].torn, mean[k]);
-                *sum = sum.plus(form.times(x.share_at(i, k, place, v)));
+                *sum = sum.plus(form.times(shares[k][n]));
             }
         }
         let g: Vec<Known> = sums.into_iter().map(|s| s.scaled(PART)).collect();

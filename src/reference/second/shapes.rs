@@ -4,8 +4,8 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::ROUNDINGS;
-use super::doubt::Known;
+use super::doubt::{Decision, Known};
+use super::{NEAR, ROUNDINGS};
 use crate::model::basis::evaluate;
 
 /// Half vectors of opposite ways turn with any rounding.
@@ -36,6 +36,13 @@ impl Way {
     /// cos cos/(d² + A/π).
     pub fn disc_form(&self, area: f64) -> Known {
         self.product(self.n_j.dot(self.way), 1.0).scaled(1.0 / (self.d2 + area * FRAC_1_PI))
+    }
+
+    /// That of a surface's facet or part: of one wider than its distance a disc's.
+    pub fn part_form(&self, u: DVec3, v: DVec3) -> Known {
+        let b = 2.0 * u.length().max(v.length()) / self.d2.sqrt();
+        let wide = Decision::above(b, NEAR, b * ROUNDINGS * self.turn);
+        self.disc_form(4.0 * u.length() * v.length()).where_or(wide, self.rectangle_form(u, v))
     }
 
     /// The mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second derivatives.

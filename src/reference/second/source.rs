@@ -3,68 +3,90 @@
 use super::stencil::{Edges, Patch};
 use super::*;
 use crate::model::light::LEAST_PENUMBRA;
-use crate::reference::transmit::{SHARE_SIDE, share_points};
 
-/// A light's shadows on a facet: whether any tears it, and the rectangles whose shadow meets it.
-pub struct Shading<'a> {
+/// Rounding of a number from 0 to 1 to 16 bits, nearest; and f32's on the way.
+const SIXTEEN_BITS: f64 = 0.5 / 65_535.0 + 4.0 * U;
+
+/// What a facet has of one light.
+pub struct Lit<'a> {
+    /// Whether a shadow tears it.
     pub torn: Decision,
+    /// The rectangles whose shadow meets it, and from where.
     rectangles: Vec<&'a Rectangle>,
     source: Source,
+    /// g_l at its points, of a surface's facet, and as kept in 16 bits of their greatest.
+    points: Vec<Known>,
+    /// g.
+    pub mean: Known,
 }
 
-pub fn any_torn(shadings: &[Shading]) -> Decision {
-    shadings.iter().map(|s| s.torn).fold(Decision::NO, Decision::or)
-}
-
-impl Shading<'_> {
-    /// Edges of its rectangles over a cell.
-    pub fn edges(&self, patch: &Patch, slack: f64) -> Vec<Edges> {
-        if !self.torn.is_possible() {
-            return Vec::new();
-        }
-        let all = self.rectangles.iter().map(|r| Edges::new(r, self.source, patch, slack));
-        all.filter(|e| !e.is_nothing()).collect()
-    }
+/// What a facet has of all lights.
+pub struct Sender<'a> {
+    pub lights: Vec<Lit<'a>>,
+    pub torn: Decision,
 }
 
 impl Exchange<'_> {
-    /// The lights' shadows on facet `i`.
-    pub(super) fn shadings(&self, i: usize) -> Vec<Shading<'_>> {
-        let (facet, radius) = (&self.facets[i], self.radius(i));
-        let of = |light: &Light| {
-            let source = source_of(light);
-            let shadows = self.others(facet.i_region, facet.i_region);
-            let shadows = shadows.map(|(_, r)| (r, shadow(r, source, facet.position, radius, self.slack())));
-            let met: Vec<_> = shadows.filter(|(_, s)| s.torn.or(s.hidden).is_possible()).collect();
-            let torn = met.iter().map(|(_, s)| s.torn).fold(Decision::NO, Decision::or);
-            // One that only rounding may bring here hides nothing of the facet: it is within the ball.
-            Shading { torn, rectangles: met.into_iter().map(|(r, _)| r).collect(), source }
+    /// What every facet has of the lights.
+    pub fn senders(&self) -> Vec<Sender<'_>> {
+        let of = |i: usize| {
+            let lights: Vec<_> = (0..self.lights.len()).map(|k| self.lit(i, k)).collect();
+            Sender { torn: lights.iter().map(|l| l.torn).fold(Decision::NO, Decision::or), lights }
         };
-        self.lights.iter().map(of).collect()
+        (0..self.facets.len()).map(of).collect()
     }
 
-    /// g of what is seen as a whole.
-    pub(super) fn mean_share(&self, i: usize, i_light: usize) -> Known {
-        let (source, v) = (&self.facets[i], self.mean_transmittance(i, i_light));
-        match self.axes(i) {
-            Some(axes) if matches!(self.lights[i_light], Light::Point { .. } | Light::Spot { .. }) => {
-                let points = share_points(source.position, axes);
-                let all = points.iter().map(|p| self.share_at(i, i_light, *p, v));
-                all.fold(Known::NOTHING, Known::plus).scaled(1.0 / f64::from(SHARE_SIDE * SHARE_SIDE))
-            }
-            _ => self.share_at(i, i_light, source.position, v),
+    fn lit(&self, i: usize, i_light: usize) -> Lit<'_> {
+        let (facet, radius, source) = (&self.facets[i], self.radius(i), source_of(&self.lights[i_light]));
+        let Some((u, v)) = self.axes(i) else {
+            let mean = self.share_at(i, i_light, facet.position, self.known(self.transmittance, i, i_light));
+            return Lit { torn: Decision::NO, rectangles: vec![], source, points: vec![], mean };
+        };
+        let shadows = self.others(facet.i_region, facet.i_region);
+        let shadows = shadows.map(|(_, r)| (r, shadow(r, source, facet.position, radius, self.slack())));
+        // One that only rounding may bring here hides nothing of the facet: it is within the ball.
+        let met: Vec<_> = shadows.filter(|(_, s)| s.torn.or(s.hidden).is_possible()).collect();
+        let torn = met.iter().map(|(_, s)| s.torn).fold(Decision::NO, Decision::or);
+        let rectangles = met.into_iter().map(|(r, _)| r).collect();
+        let mut lit = Lit { torn, rectangles, source, points: vec![], mean: Known::NOTHING };
+        lit.points = self.shares_over(i, i_light, &lit, &Patch { q: facet.position, u, v });
+        lit.mean = lit.points.iter().copied().fold(Known::NOTHING, Known::plus).scaled(1.0 / 16.0);
+        let greatest = lit.points.iter().map(|p| p.value).fold(0.0, f64::max);
+        lit.points.iter_mut().for_each(|p| p.error += greatest * SIXTEEN_BITS);
+        lit
+    }
+
+    /// g_l at a cell's points.
+    fn shares_over(&self, i: usize, i_light: usize, lit: &Lit, patch: &Patch) -> Vec<Known> {
+        let edges = lit.rectangles.iter().map(|r| Edges::new(r, lit.source, patch, self.slack()));
+        let edges: Vec<_> = edges.filter(|e| !e.is_nothing()).collect();
+        let through = self.known(self.through, i, i_light);
+        let at = |at: DVec2| {
+            let v = edges.iter().map(|e| e.hidden(at).rest()).fold(through, Known::times);
+            self.share_at(i, i_light, patch.point(at), v)
+        };
+        Patch::middles().map(at).collect()
+    }
+
+    /// g_l at a cell's points: its own where a shadow tears its facet, else those of the facet's sixteenths.
+    pub(super) fn shares_of(&self, i: usize, i_light: usize, sender: &Sender, cell: &Cell, patch: &Patch) -> Vec<Known> {
+        let lit = &sender.lights[i_light];
+        let part = |at: DVec2| {
+            let on_facet = cell.at + at * cell.scale();
+            let index = ((on_facet + 1.0) * 2.0).floor().as_usizevec2();
+            lit.points[index.x + 4 * index.y]
+        };
+        let of_facet: Vec<_> = Patch::middles().map(part).collect();
+        if cell.level == 0 || !sender.torn.is_possible() {
+            return of_facet;
         }
+        let own = self.shares_over(i, i_light, lit, patch);
+        own.into_iter().zip(of_facet).map(|(own, other)| own.where_or(sender.torn, other)).collect()
     }
 
-    /// V̄.
-    pub(super) fn mean_transmittance(&self, i: usize, i_light: usize) -> Known {
-        let clear = self.shares[i * self.lights.len() + i_light][0];
-        self.transmittance(i, i_light).scaled(clear)
-    }
-
-    /// e^{−(1−g)τ_l} of facet `i`.
-    pub(super) fn transmittance(&self, i: usize, i_light: usize) -> Known {
-        let value = self.shares[i * self.lights.len() + i_light][1];
+    /// A transmittance of facet `i`.
+    fn known(&self, transmittances: &[f64], i: usize, i_light: usize) -> Known {
+        let value = transmittances[i * self.lights.len() + i_light];
         let depth = if value > 0.0 { -value.ln() } else { 0.0 };
         Known { value, error: value * depth * MARCH * 4.0 * U }
     }

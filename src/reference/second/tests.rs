@@ -51,12 +51,14 @@ impl Scene {
         Scene { facets: facets.to_vec(), regions, pairings: pairings(&[], facets.len()) }
     }
 
-    fn exchange<'a>(&'a self, lights: &'a [Light], shares: &'a [[f64; 2]]) -> Exchange<'a> {
+    /// `through`: of both transmittances.
+    fn exchange<'a>(&'a self, lights: &'a [Light], through: &'a [f64]) -> Exchange<'a> {
         Exchange {
             facets: &self.facets,
             regions: &self.regions,
             lights,
-            shares,
+            transmittance: through,
+            through,
             spec: &SPEC,
             cells: &[0.0],
             forward: 1.0,
@@ -68,9 +70,13 @@ impl Scene {
         }
     }
 
-    fn gather(&self, lights: &[Light], share: [f64; 2], j: usize) -> Gathered {
-        self.exchange(lights, &vec![share; self.facets.len() * lights.len()]).gather(j)
+    fn gather(&self, lights: &[Light], through: f64, j: usize) -> Gathered {
+        at(&self.exchange(lights, &vec![through; self.facets.len() * lights.len()]), j)
     }
+}
+
+fn at(exchange: &Exchange, j: usize) -> Gathered {
+    exchange.gather(j, &exchange.senders())
 }
 
 fn disc(position: DVec3, normal: DVec3, area: f64, i_region: usize) -> Facet {
@@ -92,14 +98,14 @@ fn two_discs_face_to_face() {
     let facets = [disc(DVec3::ZERO, DVec3::Y, PI, 0), disc(DVec3::Y, DVec3::NEG_Y, PI, 1)];
     let sun = [Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) }];
     let scene = Scene::of_discs(&facets);
-    let up = scene.gather(&sun, [1.0; 2], 1);
+    let up = scene.gather(&sun, 1.0, 1);
     assert!((up.indirect.x - PI / 2.0).abs() < 1e-15 && (up.second.x - 0.5).abs() < 1e-15);
     // The other one is lit from behind.
-    assert_eq!(scene.gather(&sun, [1.0; 2], 0).indirect, DVec3::ZERO);
+    assert_eq!(scene.gather(&sun, 1.0, 0).indirect, DVec3::ZERO);
     // Turned by 60° each about one axis the cosines are ½.
     let tilted = DVec3::new(0.0, 0.5, 0.75f64.sqrt());
     let scene = Scene::of_discs(&[disc(DVec3::ZERO, tilted, 1e-6, 0), disc(DVec3::Y, -tilted, 1e-6, 1)]);
-    let turned = scene.gather(&sun, [1.0; 2], 1).indirect.x;
+    let turned = scene.gather(&sun, 1.0, 1).indirect.x;
     assert!((turned / (0.5 * 1e-6 * 0.25) - 1.0).abs() < 1e-6);
 }
 
@@ -113,7 +119,7 @@ fn of_a_ceiling() -> f64 {
 fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
     let ceiling = |n| plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, n);
     let found = |surfaces: &[Surface]| {
-        Scene::of_surfaces(surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], [0.0, 1.0], 0).indirect.x
+        Scene::of_surfaces(surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], 0.0, 0).indirect.x
     };
     // The ceiling faces down: half of nothing above, and the constant share: L = 1. Second derivatives leave (1/8)^4.
     let open = found(&[eye_on_the_floor(), ceiling(8)]);
@@ -147,7 +153,7 @@ fn a_whole_is_seen_as_far_as_its_ball() {
     let found = |x: f64| {
         let blocker = plane(DVec3::new(1.0 + x, 1.0, 0.0), DVec3::X, DVec3::Z, 1);
         let scene = Scene::of_surfaces(&[eye_on_the_floor(), facet, blocker], matte(1.0)).with_facets_of(2);
-        scene.gather(&[GLOW], [0.0, 1.0], 0).indirect.x
+        scene.gather(&[GLOW], 0.0, 0).indirect.x
     };
     let open = found(0.1);
     assert!(open > 0.0);
@@ -168,7 +174,7 @@ fn a_corner_is_that_of_the_areas() {
         let e = truth.second(&at, at.normal, &Accuracy::relative(1e-7));
         // Wholes are at most half as wide as their distance: fourth order of ½·½, some 3 parts in a thousand. Parts, at most
         // 3/8 and some nearer a half, are discs: 4 (u·w)²/d² = 4/16² of them at their widest.
-        let off = (scene.gather(&sun, [1.0; 2], j).indirect.x / e.irradiance.x - 1.0).abs();
+        let off = (scene.gather(&sun, 1.0, j).indirect.x / e.irradiance.x - 1.0).abs();
         assert!(off < 1.5e-2, "{j} {off}");
     }
 }
@@ -178,7 +184,7 @@ fn what_lies_in_a_plane_hides_nothing() {
     let ceiling = plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 2);
     let found = |more: &[Surface]| {
         let surfaces = [&[eye_on_the_floor(), ceiling], more].concat();
-        Scene::of_surfaces(&surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], [0.0, 1.0], 0)
+        Scene::of_surfaces(&surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], 0.0, 0)
     };
     let alone = found(&[]);
     assert!(alone.indirect.x > 0.0);
@@ -204,7 +210,7 @@ fn what_is_too_wide_at_the_last_level_is_counted() {
     let scene = Scene::of_surfaces(&[eye_on_the_floor(), ceiling], matte(1.0));
     let found = |levels| {
         let pairs = Pairs { levels, ..PAIRS };
-        Exchange { pairs, ..scene.exchange(&[GLOW], &[[0.0, 1.0]; 2]) }.gather(0)
+        at(&Exchange { pairs, ..scene.exchange(&[GLOW], &[0.0; 2]) }, 0)
     };
     // Quarters' centres are at 0.354: half a width over that is 1.41, no wider than 1.5 in all four.
     assert_eq!([0, 1].map(|l| found(l).n_unresolved), [1.0, 0.0]);
@@ -212,7 +218,7 @@ fn what_is_too_wide_at_the_last_level_is_counted() {
     // At pair_size 1/8 quarters are cut again: of 16 the innermost four at 0.177 are 1.41 wide, those at the edges' middle
     // (1/8, 3/8) 0.63 and the corners 0.47, all more than 3/8.
     let pairs = Pairs { size: 0.125, levels: 2, ..PAIRS };
-    let fine = Exchange { pairs, ..scene.exchange(&[GLOW], &[[0.0, 1.0]; 2]) }.gather(0);
+    let fine = at(&Exchange { pairs, ..scene.exchange(&[GLOW], &[0.0; 2]) }, 0);
     assert_eq!(fine.n_unresolved, 16.0);
 }
 
@@ -228,7 +234,7 @@ fn lobes_are_met_within_their_reach_and_ask_for_narrow_cells() {
         let direction = if i_glossy == 1 { DVec3::new(toward.x, toward.y, 0.0) } else { DVec3::Y };
         let sun = [Light::Directional { direction, irradiance: DVec3::ONE }];
         let (eye, pairs) = (9.0 * toward, Pairs { levels: 0, ..PAIRS });
-        Exchange { eye, pairs, ..scene.exchange(&sun, &[[1.0; 2]; 2]) }.gather(0).n_unresolved
+        at(&Exchange { eye, pairs, ..scene.exchange(&sun, &[1.0; 2]) }, 0).n_unresolved
     };
     for i in [0, 1] {
         // 3·½/√25 is 0.3: more is asked for from there on. Met is what is nearer than 0.75·0.3 + 4/√100 =

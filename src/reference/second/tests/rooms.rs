@@ -59,7 +59,7 @@ impl Room {
         let rectangles: Vec<_> = scene.regions.iter().filter_map(|r| r.rectangle).collect();
         let obstacles = Obstacles { spec: &SPEC, cells: &[0.0], rectangles: &rectangles, step: 1.0, forward: 1.0 };
         let places = scene.facets.iter().map(|f| Place { position: f.position, i_region: f.i_region as u32 });
-        let shares = obstacles.share_factors(&places.collect::<Vec<_>>(), &self.lights);
+        let through = obstacles.through(&places.collect::<Vec<_>>(), &self.lights);
         for r in scene.regions.iter_mut().filter_map(|r| r.rectangle.as_mut()) {
             (r.center, r.u, r.v, r.normal) = (rounded(r.center), rounded(r.u), rounded(r.v), rounded(r.normal));
             r.facet = (rounded(r.facet.0), rounded(r.facet.1));
@@ -67,8 +67,9 @@ impl Room {
         for f in &mut scene.facets {
             (f.position, f.normal) = (rounded(f.position), rounded(f.normal));
         }
-        let exchange = Exchange { eye: self.eye, ..scene.exchange(&self.lights, &shares) };
-        each(scene.facets.len().div_ceil(stride), |k| (k * stride, exchange.gather(k * stride)))
+        let exchange = Exchange { eye: self.eye, ..scene.exchange(&self.lights, &through) };
+        let senders = exchange.senders();
+        each(scene.facets.len().div_ceil(stride), |k| (k * stride, exchange.gather(k * stride, &senders)))
     }
 
     fn gather(&self, stride: usize) -> Vec<(usize, Gathered)> {

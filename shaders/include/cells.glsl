@@ -21,6 +21,7 @@ const float MIXED = 0.5;
 const float NEAR = 1.0;
 // A facet that a shadow's rim runs through is looked at closely down to this share of pair_size.
 const float RIM = 0.125;
+// Where only the view of it or only a light on it is torn, this is near enough.
 const float SINGLE = 0.25;
 // Cells that are looked at by their points may be this much wider: it is their points' parts that are to be small.
 const float BROAD = 3.0;

@@ -124,8 +124,18 @@ impl Relay {
     fn record_sources(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
         let x = &self.exchange;
         let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights, n_surfaces: self.n_surfaces };
-        let buffers =
-            [&b.facets, &b.lights, &b.transmittance, &b.through, &b.regions, &x.order, &x.leaves, &x.sources, &x.fluxes, &x.stencils];
+        let buffers = [
+            &b.facets,
+            &b.lights,
+            &b.transmittance,
+            &b.through,
+            &b.regions,
+            &x.order,
+            &x.leaves,
+            &x.sources,
+            &x.fluxes,
+            &x.stencils,
+        ];
         self.second.record_sources(rec, buffers, &push)?;
         for (i_first, n_merges) in x.heights.iter().copied() {
             let push = MergePush { i_first, n_merges, n_lights: self.n_lights };

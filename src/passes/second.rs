@@ -179,12 +179,7 @@ impl SecondTensor {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let march = u32::from(has_clouds);
-            let macros = [
-                ("WORKGROUP", width),
-                ("MARCH", march),
-                ("GLOSSY", glossy),
-                ("N_BASES", n_bases),
-            ];
+            let macros = [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases)];
             let macros = [&macros[..], &turns.macros(device)].concat();
             Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
         };

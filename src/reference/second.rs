@@ -248,12 +248,16 @@ impl View<'_> {
         let wide = self
             .faces(&way, side)
             .and(Decision::above(b, x.pairs.size, b * ROUNDINGS * way.turn).or(self.meets_lobe(i, &way, q, b)));
-        let sends = |rim: f64| {
-            form.is_positive().and(Decision::above(b, rim * x.pairs.size, b * ROUNDINGS * way.turn))
-        };
+        let sends = |rim: f64| form.is_positive().and(Decision::above(b, rim * x.pairs.size, b * ROUNDINGS * way.turn));
         let sender = &self.senders[i];
         let torn = if sends(BOTH_RIMS).is_possible() { self.is_torn(i) } else { Decision::NO };
-        let by_rims = sends(RIM).and(torn.or(sender.torn)).or(sends(BOTH_RIMS).and(torn.and(sender.torn)));
+        // What of a light is torn matters where something of the facet is seen.
+        let light = if sender.torn.is_possible() && sends(RIM).is_possible() {
+            sender.torn.and(self.seen_of_ball(i).is_positive())
+        } else {
+            Decision::NO
+        };
+        let by_rims = sends(RIM).and(torn.or(light)).or(sends(BOTH_RIMS).and(torn.and(sender.torn)));
         let cell = Cell { level: 0, at: DVec2::ZERO };
         Gathered::by(wide.or(by_rims), || self.cell(i, &cell, sender), || self.whole(i, &way, form))
     }
@@ -304,17 +308,24 @@ impl View<'_> {
         self.before[x.facets[i].i_region].iter().map(torn).fold(Decision::NO, Decision::or)
     }
 
+    /// Π (1 − h_r) of the ball about facet `i`.
+    fn seen_of_ball(&self, i: usize) -> Known {
+        let x = self.exchange;
+        let (q, radius, from) = (x.facets[i].position, x.radius(i), Source::At(self.receiver.position));
+        let seen = |(r, counts): &(&Rectangle, Decision)| {
+            shadow(r, from, q, radius, x.slack()).share.where_or(*counts, Known::NOTHING).rest()
+        };
+        self.before[x.facets[i].i_region].iter().map(seen).fold(Known::ONE, Known::times)
+    }
+
     /// Facet `i` as one.
     fn whole(&self, i: usize, way: &Way, form: Known) -> Gathered {
         let x = self.exchange;
         if form.is_nothing() {
             return Gathered::default();
         }
-        let (q, radius, p) = (x.facets[i].position, x.radius(i), self.receiver.position);
-        let seen = |(r, counts): &(&Rectangle, Decision)| {
-            shadow(r, Source::At(p), q, radius, x.slack()).share.where_or(*counts, Known::NOTHING).rest()
-        };
-        let seen = self.before[x.facets[i].i_region].iter().map(seen).fold(Known::ONE, Known::times);
+        let (q, p) = (x.facets[i].position, self.receiver.position);
+        let seen = self.seen_of_ball(i);
         let g: Vec<Known> = self.senders[i].lights.iter().map(|l| l.mean).collect();
         self.sent(i, way, q, &g, form.times(seen).times(x.through(p, q)).scaled(x.facets[i].area))
     }

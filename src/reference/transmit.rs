@@ -13,7 +13,6 @@ use crate::model::light::Light;
 /// A march that would need more ends after this many.
 pub const MAX_STEPS: u32 = 4096;
 
-
 /// What light can meet on its way, and how it is marched through.
 #[derive(Debug, Clone, Copy)]
 pub struct Obstacles<'a> {

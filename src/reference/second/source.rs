@@ -69,7 +69,14 @@ impl Exchange<'_> {
     }
 
     /// g_l at a cell's points: its own where a shadow tears its facet, else those of the facet's sixteenths.
-    pub(super) fn shares_of(&self, i: usize, i_light: usize, sender: &Sender, cell: &Cell, patch: &Patch) -> Vec<Known> {
+    pub(super) fn shares_of(
+        &self,
+        i: usize,
+        i_light: usize,
+        sender: &Sender,
+        cell: &Cell,
+        patch: &Patch,
+    ) -> Vec<Known> {
         let lit = &sender.lights[i_light];
         let part = |at: DVec2| {
             let on_facet = cell.at + at * cell.scale();

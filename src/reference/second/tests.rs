@@ -195,8 +195,9 @@ fn what_lies_in_a_plane_hides_nothing() {
         assert!((found(&[lies]).indirect.x / alone.indirect.x - 1.0).abs() < 1e-3, "{off}");
         let wall = plane(DVec3::new(off, 0.5, 0.0), DVec3::Y, DVec3::Z, 1);
         let clear = (found(&[wall]).indirect.x / alone.indirect.x - 1.0).abs();
-        // Through the receiver's own place there is no side from which it could hide.
-        assert!(clear < 1e-12, "{off}: {clear}");
+        // Through the receiver's own place there is no side from which it could hide; its shadow of the sky has the ceiling
+        // looked at by its parts.
+        assert!(clear < 1e-3, "{off}: {clear}");
     }
     // A thousandth before the ceiling it hides half, less what is seen past its edge: a hundredth of the half width.
     let before = plane(DVec3::new(0.5, 0.999, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);

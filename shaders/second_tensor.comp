@@ -95,6 +95,8 @@ vec3 plain[N_RESPONSES];
 float shiny[N_RESPONSES * N_VECTORS];
 #endif
 float n_unresolved;
+// The lobe is the front side's: 0 where the eye is behind the receiver.
+float front;
 
 void clear() {
     [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
@@ -116,7 +118,7 @@ void add(vec4 share, Sender source, View view, Region emitter) {
 #if GLOSSY && N_BASES > 1
     Knot knot = knot_at(view.taker_gap);
     [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
-        response[b + 1u] = value_at(push.i_vectors + b, knot);
+        response[b + 1u] = front * value_at(push.i_vectors + b, knot);
     }
 #endif
     vec3 diffuse = PI_INVERSE * (emitter.kind == REGION_COLORED ? share.rgb : vec3(share.w, 0.0, 0.0));
@@ -195,6 +197,7 @@ void main() {
     Region own = regions[facet.i_region];
     Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), vec3(0.0), own);
     n_unresolved = 0.0;
+    front = dot(taker.outgoing, taker.normal) > 0.0 ? 1.0 : 0.0;
     uint last = 0u;
     for (uint k = 0u; k < block.n_pairings; ++k) {
         Pairing pairing = pairings[block.i_pairing + k];

@@ -210,7 +210,12 @@ View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitt
 
 // Whether a source is wide enough for the rims of shadows to be looked for.
 bool may_be_torn(Sender source, View view) {
-    return view.width > (is_cluster(source) ? push.theta * TORN : push.pair_size * RIM);
+#if TREE
+    if (is_cluster(source)) {
+        return view.width > push.theta * TORN;
+    }
+#endif
+    return view.width > push.pair_size * RIM;
 }
 
 // What of light l's energy a facet's cell sends on: A times the share at each of its points as they are seen; `own`: of the

@@ -191,13 +191,14 @@ fn what_lies_in_a_plane_hides_nothing() {
     // Over half of the ceiling, in its plane and within f32's rounding of it; and in the receiver's plane.
     for off in [0.0, 1e-7, -1e-7] {
         let lies = plane(DVec3::new(0.5, 1.0 + off, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
-        // It only has the ceiling looked at closely: by discs, A/16 (1/3 − 1/π) of it on the axis.
-        assert!((found(&[lies]).indirect.x / alone.indirect.x - 1.0).abs() < 1e-3, "{off}");
+        // It only has the ceiling looked at closely: wholes half as wide as their distance are right to some 3 parts in a
+        // thousand.
+        assert!((found(&[lies]).indirect.x / alone.indirect.x - 1.0).abs() < 3e-3, "{off}");
         let wall = plane(DVec3::new(off, 0.5, 0.0), DVec3::Y, DVec3::Z, 1);
         let clear = (found(&[wall]).indirect.x / alone.indirect.x - 1.0).abs();
         // Through the receiver's own place there is no side from which it could hide; its shadow of the sky has the ceiling
         // looked at by its parts.
-        assert!(clear < 1e-3, "{off}: {clear}");
+        assert!(clear < 3e-3, "{off}: {clear}");
     }
     // A thousandth before the ceiling it hides half, less what is seen past its edge: a hundredth of the half width.
     let before = plane(DVec3::new(0.5, 0.999, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);

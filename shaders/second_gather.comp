@@ -47,9 +47,9 @@ layout(push_constant) uniform Push {
     uint i_first_block;
     float theta;
     uint n_surfaces;
-    // 1 in the first of the dispatches that make up a gather, and in the last.
-    uint begins;
-    uint ends;
+    // Of the dispatches that make up a gather.
+    uint i_round;
+    uint n_rounds;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
 layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
@@ -68,6 +68,8 @@ layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
 // As second_sources.comp leaves them.
 layout(std430, binding = 14) readonly buffer Stencils { Packed stencils[]; };
+// Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
+layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -175,7 +177,7 @@ void main() {
     Block block = blocks[push.i_first_block + gl_WorkGroupID.x];
     uint place = block.i_first + min(gl_LocalInvocationID.x, block.n_facets - 1u);
     uint j = order[place];
-    uint next = push.begins != 0u ? 0u : reached[j];
+    uint next = push.i_round == 0u ? 0u : reached[j];
     if (next == DONE) {
         return;
     }
@@ -203,15 +205,18 @@ void main() {
     if (gl_LocalInvocationID.x < block.n_facets) {
         // The lobe is the front side's.
         float front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
-        bool begins = push.begins != 0u;
+        bool begins = push.i_round == 0u;
         Lit before = lit[j];
         // What none of the dispatches has come to is told, and has no bound.
-        float n_lost = n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
+        float n_lost = n_cut + (push.i_round + 1u == push.n_rounds ? float(last - min(next, last)) : 0.0);
         lit[j].indirect = (begins ? vec3(0.0) : before.indirect) + indirect;
         lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * indirect + front * own.ks * glossy;
         lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + n_unresolved;
         lit[j].unresolved = n_lost > 0.0 ? uintBitsToFloat(0x7f800000u) : (begins ? 0.0 : before.unresolved) + unresolved;
         lit[j].n_lost = (begins ? 0.0 : before.n_lost) + n_lost;
         reached[j] = next >= last ? DONE : next;
+        if (next < last) {
+            atomicMax(rounds[3u * (push.i_round + 1u)], gl_NumWorkGroups.x);
+        }
     }
 }

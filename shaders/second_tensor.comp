@@ -49,8 +49,8 @@ layout(push_constant) uniform Push {
     uint n_columns;
     uint n_surfaces;
     // As second_gather.comp has them; and 1 for the first light that has energy.
-    uint begins;
-    uint ends;
+    uint i_round;
+    uint n_rounds;
     uint is_first_light;
 } push;
 layout(std430, binding = 0) readonly buffer Blocks { Block blocks[]; };
@@ -70,6 +70,8 @@ layout(std430, binding = 12) buffer Second { float t2[]; };
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
 // As second_sources.comp leaves them.
 layout(std430, binding = 14) readonly buffer Stencils { Packed stencils[]; };
+// Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
+layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
 #include "lobe.glsl"
 #if MARCH
@@ -163,7 +165,7 @@ void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, f
 // The sums of receiver j as columns of its rows.
 void store(uint j, Region own, Region emitter) {
     // Later dispatches add to what the first has left.
-    float keep = push.begins != 0u ? 0.0 : 1.0;
+    float keep = push.i_round == 0u ? 0.0 : 1.0;
     uint n_plain = emitter.kind == REGION_COLORED ? 3u : 1u;
     uint n_vectors = emitter.i_lobe == NO_LOBE ? 0u : N_VECTORS;
     [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
@@ -188,7 +190,7 @@ void main() {
     Block block = blocks[push.i_first_block + gl_WorkGroupID.x];
     uint place = block.i_first + min(gl_LocalInvocationID.x, block.n_facets - 1u);
     uint j = order[place];
-    uint next = push.begins != 0u ? 0u : reached[j];
+    uint next = push.i_round == 0u ? 0u : reached[j];
     if (next == DONE) {
         return;
     }
@@ -219,14 +221,20 @@ void main() {
         }
     }
     if (gl_LocalInvocationID.x < block.n_facets) {
-        bool begins = push.begins != 0u;
-        float n_lost = n_cut + (push.ends != 0u ? float(last - min(next, last)) : 0.0);
+        bool begins = push.i_round == 0u;
+        float n_lost = n_cut + (push.i_round + 1u == push.n_rounds ? float(last - min(next, last)) : 0.0);
         // Pairs are the same for every light.
         if (push.is_first_light != 0u) {
             lit[j].n_unresolved = (begins ? 0.0 : lit[j].n_unresolved) + n_unresolved;
         }
         bool fresh = begins && push.is_first_light != 0u;
-        lit[j].n_lost = (fresh ? 0.0 : lit[j].n_lost) + n_lost;
+        n_lost += fresh ? 0.0 : lit[j].n_lost;
+        lit[j].n_lost = n_lost;
+        // What may be wrong hangs on materials and energies that tensors do not know: there is no bound.
+        lit[j].unresolved = n_lost > 0.0 || lit[j].n_unresolved > 0.0 ? uintBitsToFloat(0x7f800000u) : 0.0;
         reached[j] = next >= last ? DONE : next;
+        if (next < last) {
+            atomicMax(rounds[3u * (push.i_round + 1u)], gl_NumWorkGroups.x);
+        }
     }
 }

@@ -65,7 +65,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
     (
         "second_sources.comp",
         second::SourcesPush::FIELDS,
-        &[R("Facet"), R("Light"), B(8), R("Region"), B(4), B(4), R("Source"), B(16)],
+        &[R("Facet"), R("Light"), B(4), B(4), R("Region"), B(4), B(4), R("Source"), B(16), R("Packed")],
     ),
     ("second_merge.comp", second::MergePush::FIELDS, &[B(4), R("Node"), R("Source"), B(16)]),
     (
@@ -85,6 +85,8 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
             B(4),
             R("Node"),
             R("Lit"),
+            B(4),
+            R("Packed"),
             B(4),
         ],
     ),
@@ -112,6 +114,8 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
             R("Lit"),
             B(4),
             B(4),
+            R("Packed"),
+            B(4),
         ],
     ),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
@@ -122,7 +126,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4)]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
-    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(8)]),
+    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), R("Region"), B(4), B(4), B(4)]),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]

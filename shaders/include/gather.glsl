@@ -84,16 +84,17 @@ float rectangle_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d
     return faces ? at_source * max(at_receiver + bent * 2.0 / (3.0 * d2), 0.0) / d2 : 0.0;
 }
 
-// Number k of a veil.
-Region veiling_at(Pairing pairing, Veil veil, uint k) {
+// What is at hand of a veil; the rest is loaded, in loops of its own: where both sides of a condition are run, a loop that
+// nothing enters costs the loading of nothing, once.
+uint at_hand(Veil veil) { return veil.whole ? 0u : min(veil.n, N_AT_HAND); }
+
+Region veiling_at(Veil veil, uint k) {
     Region r = veil.first;
     if (k == 1u) {
         r = veil.second;
     }
-    // A loop and not a condition: what is seldom loaded then costs nothing where both sides of a condition are run.
-    uint n = veil.whole || k > 1u ? 1u : 0u;
-    for (uint m = 0u; m < n; ++m) {
-        r = regions[occluder_of(pairing, veil, k)];
+    if (k == 2u) {
+        r = veil.third;
     }
     return r;
 }
@@ -101,21 +102,31 @@ Region veiling_at(Pairing pairing, Veil veil, uint k) {
 // What the veil leaves of a ball about q: x, the share of it that is seen; y, whether the rim of a shadow runs through it.
 // Nothing is looked at where nothing would come.
 vec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
-    uint n = wanted ? veil.n : 0u;
+    uint n = wanted ? veil.n : 0u, n_near = min(n, at_hand(veil));
     vec2 found = vec2(1.0, 0.0);
-    for (uint k = 0u; k < n; ++k) {
-        vec2 by = hides_ball(veiling_at(pairing, veil, k), p, q, radius);
+    for (uint k = 0u; k < n_near; ++k) {
+        vec2 by = hides_ball(veiling_at(veil, k), p, q, radius);
         found = vec2(found.x * (1.0 - by.x), max(found.y, by.y));
-        n_turns += 2u;
+        n_turns += 1u;
+    }
+    for (uint k = n_near; k < n; ++k) {
+        vec2 by = hides_ball(regions[occluder_of(pairing, veil, k)], p, q, radius);
+        found = vec2(found.x * (1.0 - by.x), max(found.y, by.y));
+        n_turns += 1u;
     }
     return found;
 }
 
 // Takes from each point of a cell what the veil hides of its part.
 void shade_all(inout Stencil seen, Pairing pairing, Veil veil, vec3 p, Cell cell, uint n) {
-    for (uint k = 0u; k < n; ++k) {
-        shade(seen, veiling_at(pairing, veil, k), p, 1.0, cell);
-        n_turns += 2u;
+    uint n_near = min(n, at_hand(veil));
+    for (uint k = 0u; k < n_near; ++k) {
+        shade(seen, veiling_at(veil, k), p, 1.0, cell);
+        n_turns += 1u;
+    }
+    for (uint k = n_near; k < n; ++k) {
+        shade(seen, regions[occluder_of(pairing, veil, k)], p, 1.0, cell);
+        n_turns += 1u;
     }
 }
 

@@ -3,6 +3,8 @@
 
 // Most occluders that a veil remembers; where more remain it is the whole list.
 const uint MAX_VEIL = 8u;
+// Of these at hand.
+const uint N_AT_HAND = 3u;
 // Planes through p are trusted to this share of the lengths that make them up: some hundred units of round-off.
 const float PLANE_TRUST = 1e-5;
 
@@ -14,9 +16,10 @@ struct Veil {
     uvec2 list;
     // One surface alone hides all of the emitter.
     bool closed;
-    // The first two, at hand unless it is the whole list: most veils are no more.
+    // The first three, at hand unless it is the whole list: most veils are no more.
     Region first;
     Region second;
+    Region third;
 };
 
 vec3 corner(Region r, uint k) {
@@ -84,6 +87,7 @@ Veil veil_of(Pairing pairing, Region emitter, vec3 p, bool wanted) {
     for (uint k = 0u; k < (veil.whole ? 0u : min(veil.n, 1u)); ++k) {
         veil.first = regions[occluder_of(pairing, veil, 0u)];
         veil.second = regions[occluder_of(pairing, veil, min(1u, last))];
+        veil.third = regions[occluder_of(pairing, veil, min(2u, last))];
     }
     return veil;
 }

@@ -1,7 +1,7 @@
 //! Who receives light from whom: the constant part of the second reflection's gather, made once a scene.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Device, Place};
+use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
 use crate::layout::facet::lobe_width;
 use crate::layout::second::{BlockRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
@@ -30,8 +30,10 @@ pub struct Exchange {
     pub stencils: Buffer,
     /// By facet: the source that its gather has reached.
     pub reached: Buffer,
-    /// Dispatches of a gather.
-    n_dispatches: u32,
+    /// Workgroups of each round of a gather: none but of the first until a receiver is not done.
+    pub rounds: Buffer,
+    rounds_at_rest: Buffer,
+    n_rounds: u32,
     n_diffuse_blocks: u32,
     n_glossy_blocks: u32,
 }
@@ -63,6 +65,9 @@ impl Exchange {
         let heights = counts.scan(0, |first, n| Some((std::mem::replace(first, *first + n), n))).collect();
         let places: Vec<u32> = (0..scene.n_facets() as u32).collect();
         let blocks = [&lists.diffuse[..], &lists.glossy[..]].concat();
+        let n_rounds = n_rounds(scene, n_sources);
+        // One more, that the last would count for.
+        let at_rest = [0, 1, 1].repeat(n_rounds as usize + 1);
         let mut made = |name: &str, data: &[u32], words: usize| -> Result<Buffer> {
             let n = (data.len() as u64).max(words as u64);
             let buffer = Buffer::new::<u32>(device, name, n, Place::Device)?;
@@ -82,7 +87,9 @@ impl Exchange {
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
             stencils: Buffer::new::<[u32; 8]>(device, "second.stencils", n_fluxes, Place::Device)?,
             reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
-            n_dispatches: n_dispatches(scene, n_sources),
+            rounds: made("second.rounds", &at_rest, 3)?,
+            rounds_at_rest: made("second.rounds_at_rest", &at_rest, 3)?,
+            n_rounds,
             n_diffuse_blocks: lists.diffuse.len() as u32,
             n_glossy_blocks: lists.glossy.len() as u32,
         })
@@ -97,14 +104,19 @@ impl Exchange {
         gathered.iter().map(of).filter(|(_, _, n)| *n > 0)
     }
 
-    /// The dispatches of a gather: whether each begins it, and whether it ends it.
-    pub fn rounds(&self) -> impl Iterator<Item = [bool; 2]> {
-        let last = self.n_dispatches.max(1) - 1;
-        (0..=last).map(move |k| [k == 0, k == last])
+    /// The rounds of a gather: the number of each, and how many there are.
+    pub fn rounds(&self) -> impl Iterator<Item = [u32; 2]> {
+        let n = self.n_rounds;
+        (0..n).map(move |k| [k, n])
+    }
+
+    /// Before the first of them.
+    pub fn start_rounds(&self, rec: &mut Recorder<'_>) {
+        rec.copy(&self.rounds_at_rest, &self.rounds);
     }
 
     /// The gathering kernels' buffers, of which two differ.
-    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 15] {
+    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 16] {
         [
             &self.blocks,
             &self.pairings,
@@ -121,6 +133,7 @@ impl Exchange {
             out,
             &self.reached,
             &self.stencils,
+            &self.rounds,
         ]
     }
 }
@@ -156,9 +169,9 @@ fn is_narrow(scene: &Scene) -> bool {
     (0..scene.n_regions()).any(|i| is_glossy(scene, i) && narrowest(i) < NARROW)
 }
 
-/// Dispatches of a gather of `n_sources`; a receiver that is done costs nothing in the rest. A source takes some ten turns
+/// Most dispatches of a gather of `n_sources`: those in which no receiver has anything left to do have no workgroups. A source takes some ten turns
 /// as a whole and some hundred by its cells, and where lobes are narrow a dispatch each.
-fn n_dispatches(scene: &Scene, n_sources: u64) -> u32 {
+fn n_rounds(scene: &Scene, n_sources: u64) -> u32 {
     let of_sources = n_sources.saturating_mul(128).div_ceil(u64::from(turns(scene).batch));
     let of_lobes = if is_narrow(scene) { n_sources.min(64) } else { 0 };
     (of_sources + of_lobes).min(1 << 16) as u32 + 1

@@ -95,6 +95,7 @@ impl Relay {
                 tensor.record_second(rec, b, x, packet, &rounds, receivers, n_blocks)?;
                 continue;
             }
+            x.start_rounds(rec);
             for push in &rounds {
                 self.second.record(rec, x.bindings(b, &x.nodes, &b.lit), push, receivers, n_blocks)?;
             }
@@ -102,7 +103,7 @@ impl Relay {
         Ok(())
     }
 
-    fn push(&self, packet: &Packet, i_first_block: u32, [begins, ends]: [bool; 2]) -> GatherPush {
+    fn push(&self, packet: &Packet, i_first_block: u32, [i_round, n_rounds]: [u32; 2]) -> GatherPush {
         GatherPush {
             grid: packet.grid,
             eye: packet.camera.eye,
@@ -115,8 +116,8 @@ impl Relay {
             i_first_block,
             theta: self.theta as f32,
             n_surfaces: self.n_surfaces,
-            begins: u32::from(begins),
-            ends: u32::from(ends),
+            i_round,
+            n_rounds,
         }
     }
 

@@ -243,6 +243,7 @@ impl TensorStage {
         let Some(second) = &self.second else { return Ok(()) };
         let lit = (0..).zip(&packet.lights).filter(|(_, light)| light.energy != [0.0; 3]);
         for (k, (i_light, _)) in lit.enumerate() {
+            x.start_rounds(rec);
             for of in rounds {
                 let push = self.second_push(of, i_light, k == 0);
                 second.record(rec, x.bindings(b, &b.lit, &self.t2), &push, receivers, n_blocks)?;
@@ -267,8 +268,8 @@ impl TensorStage {
             n_rows: self.shape.n_rows as u32,
             n_columns: self.shape.n_columns,
             n_surfaces: of.n_surfaces,
-            begins: of.begins,
-            ends: of.ends,
+            i_round: of.i_round,
+            n_rounds: of.n_rounds,
             is_first_light: u32::from(is_first_light),
         }
     }

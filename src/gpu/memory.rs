@@ -37,7 +37,8 @@ impl Buffer {
         let shared = device.shared().clone();
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
-            | vk::BufferUsageFlags::TRANSFER_DST;
+            | vk::BufferUsageFlags::TRANSFER_DST
+            | vk::BufferUsageFlags::INDIRECT_BUFFER;
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         let raw = unsafe { shared.raw.create_buffer(&info, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateBuffer {name}"), e))?;

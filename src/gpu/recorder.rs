@@ -163,13 +163,16 @@ const STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
     vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw()
         | vk::PipelineStageFlags2::VERTEX_SHADER.as_raw()
         | vk::PipelineStageFlags2::FRAGMENT_SHADER.as_raw()
+        | vk::PipelineStageFlags2::DRAW_INDIRECT.as_raw()
         | vk::PipelineStageFlags2::ALL_TRANSFER.as_raw(),
 );
 const WRITES: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
     vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw() | vk::AccessFlags2::TRANSFER_WRITE.as_raw(),
 );
 const READS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
-    vk::AccessFlags2::SHADER_STORAGE_READ.as_raw() | vk::AccessFlags2::TRANSFER_READ.as_raw(),
+    vk::AccessFlags2::SHADER_STORAGE_READ.as_raw()
+        | vk::AccessFlags2::INDIRECT_COMMAND_READ.as_raw()
+        | vk::AccessFlags2::TRANSFER_READ.as_raw(),
 );
 
 pub struct Recorder<'a> {
@@ -208,6 +211,21 @@ impl Recorder<'_> {
         let n_groups = n_groups.min(self.commands.shared.limits.max_workgroups_x);
         self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
         unsafe { self.commands.shared.raw.cmd_dispatch(self.commands.buffer, n_groups, 1, 1) };
+        Ok(())
+    }
+
+    /// Runs `kernel` in as many workgroups as record `i` of `counts` says: [u32; 3], written on the device.
+    pub fn dispatch_counted<P: Pod>(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[&Buffer],
+        push: &P,
+        (counts, i): (&Buffer, u32),
+    ) -> Result<()> {
+        self.depend(&[(counts.raw, true, false)]);
+        self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
+        let offset = u64::from(i) * size_of::<[u32; 3]>() as u64;
+        unsafe { self.commands.shared.raw.cmd_dispatch_indirect(self.commands.buffer, counts.raw, offset) };
         Ok(())
     }
 

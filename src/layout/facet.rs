@@ -33,7 +33,7 @@ record! {
         n_unresolved: f32,
         /// I_i.
         indirect: [f32; 3],
-        /// Bound on what those pairs may change of L2's greatest channel.
+        /// Bound on what those pairs may change of L2's greatest channel; infinite where there is none: light lost, tensors.
         unresolved: f32,
         first: [f32; 3],
         /// Sources that the driver's loops ended before; 0 in a result that can be trusted.

@@ -3,6 +3,8 @@
 //! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid. Out: I_i and L2 in
 //! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11.
 
+use bytemuck::Pod;
+
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
@@ -29,8 +31,8 @@ record! {
         i_first_block: u32,
         theta: f32,
         n_surfaces: u32,
-        begins: u32,
-        ends: u32,
+        i_round: u32,
+        n_rounds: u32,
     }
 }
 
@@ -124,17 +126,17 @@ impl Second {
 
     /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
     /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `nodes`: NodeRecord;
-    /// `lit`: LitRecord; `reached`: u32 by facet. A gather takes several dispatches, the first of which `begins` and the
-    /// last `ends`.
+    /// `lit`: LitRecord; `reached`: u32 by facet; `stencils`: [u32; 8] [source][light]; `rounds`: [u32; 3], the
+    /// workgroups of each round. A gather takes several dispatches, its rounds.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 15],
+        buffers: [&Buffer; 16],
         push: &GatherPush,
         receivers: Receivers,
         n_blocks: u32,
     ) -> Result<()> {
-        rec.dispatch_groups(&self.gather[receivers as usize], &buffers, push, n_blocks)
+        of_round(rec, &self.gather[receivers as usize], &buffers, push, push.i_round, n_blocks)
     }
 }
 
@@ -154,8 +156,8 @@ record! {
         n_rows: u32,
         n_columns: u32,
         n_surfaces: u32,
-        begins: u32,
-        ends: u32,
+        i_round: u32,
+        n_rounds: u32,
         is_first_light: u32,
     }
 }
@@ -191,16 +193,31 @@ impl SecondTensor {
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 15],
+        buffers: [&Buffer; 16],
         push: &TensorPush,
         receivers: Receivers,
         n_blocks: u32,
     ) -> Result<()> {
-        rec.dispatch_groups(&self.gather[receivers as usize], &buffers, push, n_blocks)
+        of_round(rec, &self.gather[receivers as usize], &buffers, push, push.i_round, n_blocks)
     }
 }
 
 /// Most receivers of a block: a subgroup's width.
 fn block_len(device: &Device) -> u32 {
     device.limits().subgroup_size.clamp(8, 64)
+}
+
+/// The first round has a workgroup a block, and every other as many as the one before has counted.
+fn of_round<P: Pod>(
+    rec: &mut Recorder<'_>,
+    kernel: &Kernel,
+    buffers: &[&Buffer; 16],
+    push: &P,
+    i_round: u32,
+    n_blocks: u32,
+) -> Result<()> {
+    match i_round {
+        0 => rec.dispatch_groups(kernel, buffers, push, n_blocks),
+        _ => rec.dispatch_counted(kernel, buffers, push, (buffers[15], i_round)),
+    }
 }

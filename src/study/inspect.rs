@@ -185,17 +185,21 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
     let n_lost: f64 = lit.iter().map(|l| f64::from(l.n_lost)).sum();
     if n_lost > 0.0 {
         notes.push(format!(
-            "the driver ended loops early: {n_lost:.0} sources were not looked at and their light is missing from L2; fewer \
-             facets a surface or cloud, or a greater lighting.theta, make the loops shorter"
+            "{n_lost:.0} sources were not looked at in the turns that loops may take, and their light is missing from L2; fewer \
+             facets a surface or cloud, a greater lighting.theta or broader lobes need fewer"
         ));
     }
     let unresolved: Vec<_> = lit.iter().filter(|l| l.n_unresolved > 0.0).collect();
     if !unresolved.is_empty() {
         let n_pairs: f64 = unresolved.iter().map(|l| f64::from(l.n_unresolved)).sum();
         let most = unresolved.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max);
+        let most = match most.is_finite() {
+            true => format!("by up to {most:.3e}"),
+            false => "by no one knows how much, since tensors have no bound,".to_owned(),
+        };
         let brightest = lit.iter().flat_map(|l| l.second).map(f64::from).fold(0.0, f64::max);
         notes.push(format!(
-            "{n_pairs} pairs of {} facets stayed wider than lighting.pair_size asks for: L2 may be off by up to {most:.3e} \
+            "{n_pairs} pairs of {} facets stayed wider than lighting.pair_size asks for: L2 may be off {most} \
              there (the greatest L2 is {brightest:.3e}); finer `subdivide` or more lighting.pair_levels resolve them",
             unresolved.len()
         ));

@@ -178,7 +178,7 @@ fn n_rounds(scene: &Scene, n_sources: u64) -> u32 {
 }
 
 /// From this many facets on the tree is the faster (docs/measured.md).
-const TREE_PAYS: u64 = 2048;
+const TREE_PAYS: u64 = 1024;
 
 /// Whether the second reflection is gathered from a tree.
 pub fn gathers_from_tree(scene: &Scene) -> bool {

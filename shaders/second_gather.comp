@@ -113,7 +113,9 @@ void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, f
     add(view, leaving * share, taker);
 }
 
-void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own, const bool own) {
+void take_cell(
+    uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own,
+    const bool own) {
     vec3 e = vec3(0.0);
     [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
         float g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);

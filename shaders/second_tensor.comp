@@ -148,7 +148,9 @@ void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, f
     }
 }
 
-void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own, const bool own) {
+void take_cell(
+    uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own,
+    const bool own) {
     for (uint k = 0u; k < (part > 0.0 ? 1u : 0u); ++k) {
         float g = part * arriving_by(i, source, walk, cell, seen, i_own, own, push.i_light);
         // Only surfaces' facets have cells, and these no colours of their own.

@@ -13,7 +13,7 @@ use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{ModeRecord, PlacedRecord};
-use nimbus::layout::second::{BlockRecord, NodeRecord, PairingRecord, SourceRecord};
+use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
 use nimbus::passes::{surfaces, transmit};
@@ -21,7 +21,7 @@ use nimbus::passes::{surfaces, transmit};
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 17] = [
+const RECORDS: [Record; 18] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
@@ -33,6 +33,7 @@ const RECORDS: [Record; 17] = [
     ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
     ("Region", RegionRecord::FIELDS, size_of::<RegionRecord>()),
     ("Source", SourceRecord::FIELDS, size_of::<SourceRecord>()),
+    ("Packed", PackedRecord::FIELDS, size_of::<PackedRecord>()),
     ("Node", NodeRecord::FIELDS, size_of::<NodeRecord>()),
     ("Block", BlockRecord::FIELDS, size_of::<BlockRecord>()),
     ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),

@@ -309,7 +309,7 @@ fn wrong_transmittance_is_noticed() {
         (0, "include/reach.glsl", "light.kind == LIGHT_POINT ?", "light.kind == 77 ?"),
         (0, "include/reach.glsl", "i = 0; i < n_surfaces", "i = 1; i < n_surfaces"),
         (0, "transmit.comp", "bool is_on = any", "bool is_on = true || any"),
-        (1, "transmit.comp", "through[k] = dimmed", "through[k] = transmittance[k]"),
+        (1, "transmit.comp", "through[k] = dimmed", "through[k] = is_center_clear ? dimmed : 0.0"),
         (0, "include/occlude.glsl", "<= dot(r.v, r.v)", "<= dot(r.u, r.u)"),
         (0, "include/occlude.glsl", "(a / (a - b))", "(a / (a + b))"),
         (0, "include/occlude.glsl", "p - d * (a / b)", "p + d * (a / b)"),

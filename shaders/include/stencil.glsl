@@ -111,9 +111,7 @@ float weighted(Stencil s, Stencil by) {
     return (sum.x + sum.y) + (sum.z + sum.w);
 }
 
-// Stencils of numbers from 0 to 1 as sixteen bits each.
-struct Packed { uvec4 ab; uvec4 cd; };
-
+// Of numbers from 0 to 1, sixteen bits each.
 uvec2 packed_row(vec4 row) { return uvec2(packUnorm2x16(row.xy), packUnorm2x16(row.zw)); }
 
 Packed packed(Stencil s) { return Packed(uvec4(packed_row(s.a), packed_row(s.b)), uvec4(packed_row(s.c), packed_row(s.d))); }

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
 use crate::layout::facet::lobe_width;
-use crate::layout::second::{BlockRecord, PairingRecord, SourceRecord};
+use crate::layout::second::{BlockRecord, PackedRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
 use crate::model::scene::{Gather, Scene};
 use crate::model::tree::Tree;
@@ -85,7 +85,7 @@ impl Exchange {
             heights,
             sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
-            stencils: Buffer::new::<[u32; 8]>(device, "second.stencils", n_fluxes, Place::Device)?,
+            stencils: Buffer::new::<PackedRecord>(device, "second.stencils", n_fluxes, Place::Device)?,
             reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
             rounds: made("second.rounds", &at_rest, 3)?,
             rounds_at_rest: made("second.rounds_at_rest", &at_rest, 3)?,

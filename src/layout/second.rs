@@ -20,6 +20,14 @@ record! {
 }
 
 record! {
+    /// Of one light at the 4 × 4 points of a surface's facet: shares of the greatest, 16 bits each, rows along v.
+    pub struct PackedRecord {
+        ab: [u32; 4],
+        cd: [u32; 4],
+    }
+}
+
+record! {
     /// Receivers that are gathered for together: consecutive places in the order of facets, all of one region.
     pub struct BlockRecord {
         i_first: u32,

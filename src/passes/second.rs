@@ -126,7 +126,7 @@ impl Second {
 
     /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
     /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `nodes`: NodeRecord;
-    /// `lit`: LitRecord; `reached`: u32 by facet; `stencils`: [u32; 8] [source][light]; `rounds`: [u32; 3], the
+    /// `lit`: LitRecord; `reached`: u32 by facet; `stencils`: PackedRecord [source][light]; `rounds`: [u32; 3], the
     /// workgroups of each round. A gather takes several dispatches, its rounds.
     pub fn record(
         &self,

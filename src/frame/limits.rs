@@ -8,11 +8,14 @@ use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, storage_bytes};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::gust::N_MODES;
 use crate::model::scene::{LightingMode, Scene};
+use crate::passes::second::LEAST_BLOCK;
 
+use super::buffers::has_second;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
 use super::render::target_format;
@@ -25,6 +28,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     if u32::try_from(n).is_err() {
         return Err(Error::limit(format!("the scene's {n} particles; nimbus numbers them with 32 bits")));
     }
+    // A tree has at most a cluster for every three of its facets, and each region a root.
+    let n_sources = if has_second(scene) { scene.n_facets() * 4 / 3 + scene.n_regions() as u64 } else { 0 };
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
     let pixel = target_format(scene.film.format).bytes_per_pixel();
     let size = |record: usize| record as u64;
@@ -38,7 +43,10 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the facets", scene.n_facets(), size(size_of::<FacetRecord>())),
         ("the facets' light", scene.n_facets(), size(size_of::<LitRecord>())),
         ("the transmittances", scene.n_facets() * scene.lights.len() as u64, 4),
-        ("the transmittances' means", scene.n_facets() * scene.lights.len() as u64, 8),
+        ("what the clouds let through", n_sources * scene.lights.len() as u64, 4),
+        ("the second reflection's sources", n_sources, size(size_of::<SourceRecord>())),
+        ("their flux by light", n_sources * scene.lights.len() as u64, 16),
+        ("their light by points", n_sources * scene.lights.len() as u64, size(size_of::<PackedRecord>())),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
         ("the Morton order's entries", if is_grouped(scene) { 2 * n } else { 0 }, 8),
@@ -55,6 +63,15 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let mut total = 0;
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
+    }
+    // Receivers in blocks, and each region's last block need not be full.
+    let n_blocks = scene.n_facets() / u64::from(LEAST_BLOCK) + scene.n_regions() as u64;
+    if has_second(scene) && n_blocks > u64::from(limits.max_workgroups_x) {
+        return Err(Error::limit(format!(
+            "the second reflection of {} facets: {n_blocks} workgroups, this device takes {}",
+            scene.n_facets(),
+            limits.max_workgroups_x
+        )));
     }
     if total > limits.device_memory_bytes {
         return Err(Error::limit(format!(

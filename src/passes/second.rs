@@ -202,9 +202,12 @@ impl SecondTensor {
     }
 }
 
+/// A block has at least as many receivers, but for a region's last.
+pub const LEAST_BLOCK: u32 = 8;
+
 /// Most receivers of a block: a subgroup's width.
 fn block_len(device: &Device) -> u32 {
-    device.limits().subgroup_size.clamp(8, 64)
+    device.limits().subgroup_size.clamp(LEAST_BLOCK, 64)
 }
 
 /// The first round has a workgroup a block, and every other as many as the one before has counted.

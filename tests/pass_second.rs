@@ -225,3 +225,22 @@ fn wrong_gathers_are_noticed() {
         assert!(wrong(&Gpu::wrong_compiler(file, from, to), scene), "{file}: {from} as {to}");
     }
 }
+
+#[test]
+fn a_gather_that_does_not_come_to_its_end_says_so() {
+    let gpu = Gpu::new();
+    assert!(frame(&gpu, room(0, "")).lit.iter().all(|l| l.n_lost == 0.0 && l.unresolved.is_finite()));
+    // Receivers that never begin: all of their sources are told, and none of the light has a bound.
+    let idle = Gpu::wrong_compiler(
+        "include/walk.glsl",
+        "while (s < end && n_turns < BATCH_TURNS",
+        "while (s < end && n_turns < 1u",
+    );
+    let f = frame_by(&gpu, &idle, room(0, ""));
+    let lost = f.lit.iter().filter(|l| l.n_lost > 0.0);
+    assert!(lost.clone().count() * 2 > f.lit.len());
+    assert!(
+        lost.clone().all(|l| l.unresolved == f32::INFINITY)
+            && f.lit.iter().all(|l| l.second.iter().all(|v| v.is_finite()))
+    );
+}

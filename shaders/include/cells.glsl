@@ -71,7 +71,7 @@ struct View {
     vec4 gaps;
     float emitter_gap;
     float taker_gap;
-    // Wider than asked for; and, as a facet, wider than its cells may be.
+    // Wider than asked for; and wider than a cell may be.
     bool wide;
     bool quartered;
 };

@@ -73,8 +73,8 @@ void gather(uint i_pairing, Pairing pairing, Region emitter, Taker taker, Veil v
             Sender source = sender_at(i, emitter, pane);
             View view = look(source, i, start_walk(s), 1.0, pane, emitter, taker);
             bool cluster = is_cluster(source);
-            // Nothing but a surface's facet has cells; what is wide stays so.
-            bool closer = view.wide && (cluster || pane.side > 0.0);
+            // A cloud's facet has no width and so no cells.
+            bool closer = view.wide;
             float share = closer ? 0.0 : form_of(source, view, pane, emitter, taker);
             bool rims = share > 0.0 && may_be_torn(source, view);
             vec2 veiling = veils_ball(pairing, veil, taker.position, view.position, source.radius, share > 0.0);
@@ -88,7 +88,6 @@ void gather(uint i_pairing, Pairing pairing, Region emitter, Taker taker, Veil v
 #endif
             take_whole(i, source, view, emitter, taker, share);
             bool by_cells = closer && !cluster;
-            // What a cell may be wide of pair_size is asked of the facet itself.
             bool quartered = by_cells && source.in_part && view.quartered;
             torn[n_torn] = uvec2(i, i_pairing);
             n_torn += quartered ? 1u : 0u;

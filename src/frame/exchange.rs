@@ -169,8 +169,8 @@ fn is_narrow(scene: &Scene) -> bool {
     (0..scene.n_regions()).any(|i| is_glossy(scene, i) && narrowest(i) < NARROW)
 }
 
-/// Most dispatches of a gather of `n_sources`: those in which no receiver has anything left to do have no workgroups. A source takes some ten turns
-/// as a whole and some hundred by its cells, and where lobes are narrow a dispatch each.
+/// Most dispatches of a gather of `n_sources`: those in which no receiver has anything left to do have no workgroups. A
+/// source takes some ten turns as a whole and some hundred by its cells, and where lobes are narrow a dispatch each.
 fn n_rounds(scene: &Scene, n_sources: u64) -> u32 {
     let of_sources = n_sources.saturating_mul(128).div_ceil(u64::from(turns(scene).batch));
     let of_lobes = if is_narrow(scene) { n_sources.min(64) } else { 0 };

@@ -195,7 +195,8 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
         let most = unresolved.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max);
         let most = match most.is_finite() {
             true => format!("by up to {most:.3e}"),
-            false => "by no one knows how much, since tensors have no bound,".to_owned(),
+            false => "by an amount that is not known (there is no bound on light that was left out, or in tensors)"
+                .to_owned(),
         };
         let brightest = lit.iter().flat_map(|l| l.second).map(f64::from).fold(0.0, f64::max);
         notes.push(format!(

@@ -20,7 +20,8 @@ const float PI = 3.14159265358979;
 layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_rows; uint n_columns; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 2) readonly buffer Regions { Region regions[]; };
+layout(binding = 2) uniform usamplerBuffer regions;
+#include "regions.glsl"
 // By column.
 layout(std430, binding = 3) readonly buffer Coefficients { vec4 coefficients[]; };
 // [light][row]
@@ -71,7 +72,7 @@ Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
 void main() {
     FOR_EACH(j, push.n_facets) {
         Facet facet = facets[j];
-        Region region = regions[facet.i_region];
+        Region region = region_at(facet.i_region);
         bool glossy = region.i_lobe != NO_LOBE;
         uint i_vector = region.i_column + (region.kind == REGION_COLORED ? 3u : 1u);
         own[0] = region.kd * facet.color;

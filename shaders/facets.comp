@@ -14,7 +14,7 @@ layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; }
 layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
 layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 3) readonly buffer Groups { Group groups[]; };
-layout(std430, binding = 4) readonly buffer Density { float density[]; };
+layout(binding = 4) uniform samplerBuffer density;
 layout(std430, binding = 5) writeonly buffer Facets { Facet facets[]; };
 
 #include "shell.glsl"

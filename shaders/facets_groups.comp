@@ -14,7 +14,7 @@ layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; }
 layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
 layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 3) readonly buffer Groups { Group groups[]; };
-layout(std430, binding = 4) readonly buffer Density { float density[]; };
+layout(binding = 4) uniform samplerBuffer density;
 // Particle of each place.
 layout(std430, binding = 5) readonly buffer Order { uint order[]; };
 layout(std430, binding = 6) readonly buffer Runs { Run runs[]; };

@@ -8,14 +8,15 @@
 layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push { uint n_facets; } push;
-layout(std430, binding = 0) readonly buffer Regions { Region regions[]; };
+layout(binding = 0) uniform usamplerBuffer regions;
+#include "regions.glsl"
 // Region of each facet.
 layout(std430, binding = 1) readonly buffer RegionOf { uint i_region[]; };
 layout(std430, binding = 2) writeonly buffer Facets { Facet facets[]; };
 
 void main() {
     FOR_EACH(j, push.n_facets) {
-        Region region = regions[i_region[j]];
+        Region region = region_at(i_region[j]);
         uint i = j - region.i_first_facet;
         vec2 at = vec2(2u * uvec2(i % region.n_u, i / region.n_u) + 1u) / vec2(region.n_u, region.n_v) - 1.0;
         vec3 u = region.u / float(region.n_u), v = region.v / float(region.n_v);

@@ -14,8 +14,9 @@ layout(push_constant) uniform Push { vec3 eye; uint n_facets; uint n_lights; } p
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
-layout(std430, binding = 3) readonly buffer Regions { Region regions[]; };
-layout(std430, binding = 4) readonly buffer Table { float table[]; };
+layout(binding = 3) uniform usamplerBuffer regions;
+#include "regions.glsl"
+layout(binding = 4) uniform samplerBuffer table;
 layout(std430, binding = 5) buffer LitFacets { Lit lit[]; };
 
 #include "lobe.glsl"
@@ -23,7 +24,7 @@ layout(std430, binding = 5) buffer LitFacets { Lit lit[]; };
 void main() {
     FOR_EACH(j, push.n_facets) {
         Facet facet = facets[j];
-        Region region = regions[facet.i_region];
+        Region region = region_at(facet.i_region);
         vec3 outgoing = normalize(push.eye - facet.position);
         // The lobe is the front side's, and none costs no lookup.
         bool shines = region.i_lobe != NO_LOBE && dot(outgoing, facet.normal) > 0.0;

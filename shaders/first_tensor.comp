@@ -14,8 +14,9 @@ layout(push_constant) uniform Push { vec3 eye; uint n_facets; uint n_lights; uin
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
-layout(std430, binding = 3) readonly buffer Regions { Region regions[]; };
-layout(std430, binding = 4) readonly buffer Table { float table[]; };
+layout(binding = 3) uniform usamplerBuffer regions;
+#include "regions.glsl"
+layout(binding = 4) uniform samplerBuffer table;
 // [light][row]
 layout(std430, binding = 5) writeonly buffer First { float t1[]; };
 layout(std430, binding = 6) writeonly buffer LitFacets { Lit lit[]; };
@@ -25,7 +26,7 @@ layout(std430, binding = 6) writeonly buffer LitFacets { Lit lit[]; };
 void main() {
     FOR_EACH(j, push.n_facets) {
         Facet facet = facets[j];
-        Region region = regions[facet.i_region];
+        Region region = region_at(facet.i_region);
         vec3 outgoing = normalize(push.eye - facet.position);
         bool shines = dot(outgoing, facet.normal) > 0.0;
         uint n_vectors = region.i_lobe == NO_LOBE ? 0u : push.n_bases - 1u;

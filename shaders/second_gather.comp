@@ -56,18 +56,19 @@ layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
 layout(std430, binding = 2) readonly buffer Occluders { uint occluders[]; };
 layout(std430, binding = 3) readonly buffer Order { uint order[]; };
 layout(std430, binding = 4) readonly buffer Facets { Facet facets[]; };
-layout(std430, binding = 5) readonly buffer Regions { Region regions[]; };
+layout(binding = 5) uniform usamplerBuffer regions;
+#include "regions.glsl"
 layout(std430, binding = 6) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 7) readonly buffer Sources { Source sources[]; };
-layout(std430, binding = 8) readonly buffer Fluxes { vec4 fluxes[]; };
-layout(std430, binding = 9) readonly buffer Table { float table[]; };
-layout(std430, binding = 10) readonly buffer Density { float density[]; };
+layout(binding = 7) uniform usamplerBuffer sources;
+layout(binding = 8) uniform usamplerBuffer fluxes;
+layout(binding = 9) uniform samplerBuffer table;
+layout(binding = 10) uniform samplerBuffer density;
 layout(std430, binding = 11) readonly buffer Nodes { Node nodes[]; };
 layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
 // By facet: the first source that is still to be looked at, or DONE.
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
 // As second_sources.comp leaves them.
-layout(std430, binding = 14) readonly buffer Stencils { Packed stencils[]; };
+layout(binding = 14) uniform usamplerBuffer stencils;
 // Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
 layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
@@ -113,22 +114,53 @@ void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, f
     add(view, leaving * share, taker);
 }
 
+// The receiver's lobe toward each quarter of a cell, the emitter's by light l.
+#if GLOSSY
+vec4 taken_from(Cell cell, Taker taker) {
+    vec4 lobes;
+    [[unroll]] for (uint q = 0u; q < 4u; ++q) {
+        vec3 way = normalize(quarter_at(cell, q) - taker.position);
+        lobes[q] = lobe_at(taker.region.i_lobe, half_vector_gap(taker.normal, way, taker.outgoing));
+    }
+    return lobes;
+}
+#endif
+
+#if SHINY
+vec4 shining_from(Cell cell, Sender source, Region emitter, Taker taker, uint l) {
+    vec4 lobes;
+    [[unroll]] for (uint q = 0u; q < 4u; ++q) {
+        vec3 p = quarter_at(cell, q);
+        lobes[q] = lobe_at(emitter.i_lobe, gap_of(p, source.normal, normalize(taker.position - p), l));
+    }
+    return lobes;
+}
+#endif
+
 void take_cell(
     uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own,
     const bool own) {
-    vec3 e = vec3(0.0);
+#if GLOSSY
+    vec4 taken = taken_from(cell, taker);
+#endif
     [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
-        float g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);
-        vec3 f = emitter.kd * PI_INVERSE;
+        vec4 g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);
+        vec3 diffuse = LIGHT(l).energy * emitter.kd * PI_INVERSE;
+        indirect += diffuse * dot(g, vec4(1.0));
+#if GLOSSY
+        glossy += diffuse * dot(g, taken);
+#endif
 #if SHINY
-        vec2 shine = shine_of(i, source, view, l);
-        if (emitter.i_lobe != NO_LOBE && shine.x > 0.0 && part > 0.0) {
-            f += emitter.ks * lobe_at(emitter.i_lobe, shine.y);
+        if (emitter.i_lobe != NO_LOBE && shine_of(i, source, view, l).x > 0.0 && part > 0.0) {
+            g *= shining_from(cell, source, emitter, taker, l);
+            vec3 shining = LIGHT(l).energy * emitter.ks;
+            indirect += shining * dot(g, vec4(1.0));
+#if GLOSSY
+            glossy += shining * dot(g, taken);
+#endif
         }
 #endif
-        e += LIGHT(l).energy * g * f;
     }
-    add(view, e, taker);
 }
 
 // The lobe's gap where it is nearest to its peak in a cell that turns the half vector by `turn`.
@@ -185,7 +217,7 @@ void main() {
     }
     KEEP_LIGHTS
     Facet facet = facets[j];
-    Region own = regions[facet.i_region];
+    Region own = region_at(facet.i_region);
     vec3 to_eye = push.eye - facet.position;
     vec3 albedo = own.kd * facet.color * PI_INVERSE;
     Taker taker = Taker(facet.position, facet.normal, normalize(to_eye), albedo, own);
@@ -194,7 +226,7 @@ void main() {
         Pairing pairing = pairings[block.i_pairing + k];
         last = pairing.i_source + pairing.n_sources;
         bool open = n_turns < BATCH_TURNS && n_torn < MAX_TORN && next < last;
-        Region emitter = regions[pairing.i_region];
+        Region emitter = region_at(pairing.i_region);
         uint s = begin_of(pairing, next);
         uint n = open ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position, open);

@@ -21,7 +21,8 @@ layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 // [facet][light], and what of it the clouds let through.
 layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
 layout(std430, binding = 3) readonly buffer Through { float through[]; };
-layout(std430, binding = 4) readonly buffer Regions { Region regions[]; };
+layout(binding = 4) uniform usamplerBuffer regions;
+#include "regions.glsl"
 // Facet of each place in the order of facets.
 layout(std430, binding = 5) readonly buffer Order { uint order[]; };
 // Source of each place.
@@ -47,7 +48,7 @@ void main() {
         uint j = order[place];
         uint i = leaves[place];
         Facet facet = facets[j];
-        Region region = regions[facet.i_region];
+        Region region = region_at(facet.i_region);
         bool is_surface = region.kind == REGION_SURFACE;
         vec3 u = region.u / float(max(region.n_u, 1u)), v = region.v / float(max(region.n_v, 1u));
         // A particle's facet is a disc.

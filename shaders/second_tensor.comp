@@ -58,18 +58,19 @@ layout(std430, binding = 1) readonly buffer Pairings { Pairing pairings[]; };
 layout(std430, binding = 2) readonly buffer Occluders { uint occluders[]; };
 layout(std430, binding = 3) readonly buffer Order { uint order[]; };
 layout(std430, binding = 4) readonly buffer Facets { Facet facets[]; };
-layout(std430, binding = 5) readonly buffer Regions { Region regions[]; };
+layout(binding = 5) uniform usamplerBuffer regions;
+#include "regions.glsl"
 layout(std430, binding = 6) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 7) readonly buffer Sources { Source sources[]; };
-layout(std430, binding = 8) readonly buffer Fluxes { vec4 fluxes[]; };
-layout(std430, binding = 9) readonly buffer Table { float table[]; };
-layout(std430, binding = 10) readonly buffer Density { float density[]; };
+layout(binding = 7) uniform usamplerBuffer sources;
+layout(binding = 8) uniform usamplerBuffer fluxes;
+layout(binding = 9) uniform samplerBuffer table;
+layout(binding = 10) uniform samplerBuffer density;
 layout(std430, binding = 11) buffer LitFacets { Lit lit[]; };
 // As tensor.glsl has it.
 layout(std430, binding = 12) buffer Second { float t2[]; };
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
 // As second_sources.comp leaves them.
-layout(std430, binding = 14) readonly buffer Stencils { Packed stencils[]; };
+layout(binding = 14) uniform usamplerBuffer stencils;
 // Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
 layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
@@ -111,14 +112,14 @@ void clear() {
 #endif
 }
 
-// Adds what comes along the view's way: `share` of the light's energy that a source or cell is lit with, by channel where it
+// Adds what comes along a way: `share` of the light's energy that a source or cell is lit with, by channel where it
 // has colours.
-void add(vec4 share, Sender source, View view, Region emitter) {
+void add(vec4 share, vec3 normal, vec3 position, vec3 way, float taker_gap, Region emitter) {
     Light light = LIGHT(push.i_light);
     float response[N_RESPONSES];
     response[0] = PI_INVERSE;
 #if GLOSSY && N_BASES > 1
-    Knot knot = knot_at(view.taker_gap);
+    Knot knot = knot_at(taker_gap);
     [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
         response[b + 1u] = front * value_at(push.i_vectors + b, knot);
     }
@@ -130,7 +131,7 @@ void add(vec4 share, Sender source, View view, Region emitter) {
 #if N_BASES > 1
     uint n_shiny = emitter.i_lobe != NO_LOBE && light.kind != LIGHT_SKY ? 1u : 0u;
     for (uint k = 0u; k < n_shiny; ++k) {
-        Knot from = knot_at(half_vector_gap(source.normal, arrival_at(light, view.position).toward, -view.way));
+        Knot from = knot_at(half_vector_gap(normal, arrival_at(light, position).toward, -way));
         [[unroll]] for (uint b = 0u; b < N_VECTORS; ++b) {
             float e = share.w * value_at(push.i_vectors + b, from);
             [[unroll]] for (uint r = 0u; r < N_RESPONSES; ++r) {
@@ -144,17 +145,23 @@ void add(vec4 share, Sender source, View view, Region emitter) {
 void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, float share) {
     // A loop and not a condition: a device that runs both sides of a condition then leaves it out.
     for (uint k = 0u; k < (share > 0.0 ? 1u : 0u); ++k) {
-        add(share * fluxes[i * N_LIGHTS + push.i_light], source, view, emitter);
+        add(share * flux_at(i, push.i_light), source.normal, view.position, view.way, view.taker_gap, emitter);
     }
 }
 
 void take_cell(
     uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part, uint i_own,
     const bool own) {
-    for (uint k = 0u; k < (part > 0.0 ? 1u : 0u); ++k) {
-        float g = part * arriving_by(i, source, walk, cell, seen, i_own, own, push.i_light);
+    vec4 g = part * arriving_by(i, source, walk, cell, seen, i_own, own, push.i_light);
+    // Lobes are met in each quarter.
+    bool alike = N_BASES == 1;
+    g.x = alike ? dot(g, vec4(1.0)) : g.x;
+    for (uint q = 0u; q < (part > 0.0 ? (alike ? 1u : 4u) : 0u); ++q) {
+        vec3 p = quarter_at(cell, q);
+        vec3 way = normalize(p - taker.position);
         // Only surfaces' facets have cells, and these no colours of their own.
-        add(vec4(0.0, 0.0, 0.0, g), source, view, emitter);
+        add(vec4(0.0, 0.0, 0.0, g[q]), source.normal, p, way, half_vector_gap(taker.normal, way, taker.outgoing), emitter);
+        n_turns += 1u;
     }
 }
 
@@ -198,7 +205,7 @@ void main() {
     }
     KEEP_LIGHTS
     Facet facet = facets[j];
-    Region own = regions[facet.i_region];
+    Region own = region_at(facet.i_region);
     Taker taker = Taker(facet.position, facet.normal, normalize(push.eye - facet.position), vec3(0.0), own);
     n_unresolved = 0.0;
     front = dot(taker.outgoing, taker.normal) > 0.0 ? 1.0 : 0.0;
@@ -207,7 +214,7 @@ void main() {
         Pairing pairing = pairings[block.i_pairing + k];
         last = pairing.i_source + pairing.n_sources;
         bool open = n_turns < BATCH_TURNS && n_torn < MAX_TORN && next < last;
-        Region emitter = regions[pairing.i_region];
+        Region emitter = region_at(pairing.i_region);
         uint s = begin_of(pairing, next);
         uint n = open ? pairing.n_sources : 0u;
         Veil veil = veil_of(pairing, emitter, facet.position, open);

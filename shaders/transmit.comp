@@ -15,8 +15,9 @@ layout(constant_id = 0) const uint APART = 0;
 layout(push_constant) uniform Push { Grid grid; uint n_facets; uint n_lights; uint n_surfaces; float step_length; float backward; uint max_steps; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
 layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 2) readonly buffer Regions { Region regions[]; };
-layout(std430, binding = 3) readonly buffer Density { float density[]; };
+layout(binding = 2) uniform usamplerBuffer regions;
+#include "regions.glsl"
+layout(binding = 3) uniform samplerBuffer density;
 // [facet][light]
 layout(std430, binding = 4) writeonly buffer Transmittance { float transmittance[]; };
 layout(std430, binding = 5) writeonly buffer Through { float through[]; };

@@ -190,7 +190,7 @@ fn wrong_light_is_noticed() {
         ("include/light.glsl", "dot(toward, light.toward)", "dot(toward, -light.toward)"),
         ("first.comp", "0.318309886183791", "0.3183"),
         ("first.comp", "* facet.color", ""),
-        ("first.comp", "regions[facet.i_region]", "regions[0]"),
+        ("first.comp", "region_at(facet.i_region)", "region_at(0u)"),
         ("first.comp", "j * push.n_lights + l", "l * push.n_facets + j"),
         ("first.comp", "arrival_at(light, facet.position)", "arrival_at(light, vec3(0.0))"),
     ] {

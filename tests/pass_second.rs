@@ -209,6 +209,8 @@ fn wrong_gathers_are_noticed() {
         (0, "include/cells.glsl", "const float SINGLE = 0.25", "const float SINGLE = 0.5"),
         (0, "include/cells.glsl", "const float BROAD = 3.0", "const float BROAD = 4.0"),
         (0, "include/cells.glsl", "const float LOBE_STEP = 3.0", "const float LOBE_STEP = 4.0"),
+        (0, "include/cells.glsl", "const float LOBE_PARTS = 1.5", "const float LOBE_PARTS = 2.0"),
+        (0, "include/stencil.glsl", "0.5) * cell.u", "0.45) * cell.u"),
         (0, "include/cells.glsl", "walk.at * 2u", "walk.at"),
         (2, "include/occlude.glsl", "const float SOFT = 0.70710678", "const float SOFT = 0.8"),
         (0, "include/stencil.glsl", "steep = 2.0", "steep = 1.0"),

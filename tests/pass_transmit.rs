@@ -315,7 +315,7 @@ fn wrong_transmittance_is_noticed() {
         (0, "include/occlude.glsl", "p - d * (a / b)", "p + d * (a / b)"),
         (0, "include/occlude.glsl", "? e : 0.0", "? e : 1e-30"),
         (0, "include/density.glsl", "inv_cell - 0.5", "inv_cell"),
-        (0, "include/density.glsl", "density[c + 1]", "density[c]"),
+        (0, "include/density.glsl", "cell_at(c + 1)", "cell_at(c)"),
         (0, "include/density.glsl", "n.x * n.y;", "n.x * n.z;"),
     ] {
         let values = case.run(&mut gpu, Some(&Gpu::wrong_compiler(file, from, to)), step, forward);

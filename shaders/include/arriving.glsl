@@ -24,7 +24,7 @@ Stencil arriving(Light light, Cell cell, vec3 normal, float through, uint shadow
     uint i = shadows != 0u ? uint(findLSB(shadows)) : n_surfaces;
     while (i < n_surfaces) {
         if (i != i_own) {
-            shade(s, regions[i], lamp ? light.position : light.toward, lamp ? 1.0 : 0.0, cell);
+            shade(s, region_at(i), lamp ? light.position : light.toward, lamp ? 1.0 : 0.0, cell);
         }
         n_turns += 1u;
         i += N_MASK;

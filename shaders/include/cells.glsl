@@ -6,6 +6,8 @@ const float LOBE_REACH = 4.0;
 // Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
 // width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
 const float LOBE_STEP = 3.0;
+// Lobes are met in each quarter of a cell, so that a cell may be this much wider.
+const float LOBE_PARTS = 1.5;
 // The half vector turns by at most this share of a cell's width over its distance between its centre and its corner: half
 // the direction's turn, of half a diagonal of sqrt 2; twice that where the light is as near as the receiver.
 const float TURN = 0.75;
@@ -165,7 +167,7 @@ View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitt
     view.width = side * inverse;
     float excess = view.width / (broad * push.pair_size);
     float by_lobes = 0.0;
-    float lobe_limit = LOBE_STEP * push.pair_size;
+    float lobe_limit = (broad > 1.0 ? LOBE_PARTS : 1.0) * LOBE_STEP * push.pair_size;
     vec3 face = source.normal;
 #if TREE
     float theta = emitter.kind == REGION_SURFACE ? push.theta : CLOUD_THETA * push.theta;
@@ -180,7 +182,7 @@ View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitt
 #if SHINY
     if (emitter.i_lobe != NO_LOBE) {
         [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
-            float g = LIGHT(l).kind != LIGHT_SKY ? fluxes[i * N_LIGHTS + l].w : 0.0;
+            float g = LIGHT(l).kind != LIGHT_SKY ? flux_at(i, l).w : 0.0;
             float gap = gap_of(view.position, face, -view.way, l);
             view.emitter_gap = g > 0.0 ? min(view.emitter_gap, gap) : view.emitter_gap;
 #if N_KEPT > 0
@@ -204,7 +206,7 @@ View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitt
     faces = faces || (cluster && dot(source.normal, source.normal) < EVEN * EVEN);
 #endif
     view.wide = before && faces && max(excess, by_lobes) > 1.0;
-    view.quartered = before && faces && (view.width > BROAD * push.pair_size || by_lobes > 1.0);
+    view.quartered = before && faces && (view.width > BROAD * push.pair_size || by_lobes > (broad > 1.0 ? 1.0 : LOBE_PARTS));
     return view;
 }
 
@@ -218,15 +220,15 @@ bool may_be_torn(Sender source, View view) {
     return view.width > push.pair_size * RIM;
 }
 
-// What of light l's energy a facet's cell sends on: A times the share at each of its points as they are seen; `own`: of the
-// cell itself, else of the parts of its facet that its points lie in.
-float arriving_by(uint i, Sender source, Walk walk, Cell cell, Stencil seen, uint i_own, const bool own, uint l) {
-    vec3 flux = fluxes[i * N_LIGHTS + l].xyz;
+// What of light l's energy the quarters of a facet's cell send on: A times the share at each of their points as they are seen;
+// `own`: of the cell itself, else of the parts of its facet that its points lie in.
+vec4 arriving_by(uint i, Sender source, Walk walk, Cell cell, Stencil seen, uint i_own, const bool own, uint l) {
+    vec3 flux = flux_at(i, l).xyz;
     if (own) {
         Stencil s = arriving(LIGHT(l), cell, source.normal, flux.y, uint(flux.z), i_own, push.n_surfaces);
-        return source.area * weighted(seen, s);
+        return source.area * quarters(seen, s);
     }
-    return flux.x * weighted(seen, part_of(unpacked(stencils[i * N_LIGHTS + l]), walk.at, walk.level));
+    return flux.x * quarters(seen, part_of(unpacked(stencil_at(i, l)), walk.at, walk.level));
 }
 
 // Light l's share that makes the lobe of a source shine, and 1 - cos gamma there.
@@ -234,7 +236,7 @@ vec2 shine_of(uint i, Sender source, View view, uint l) {
 #if N_KEPT > 0
     return vec2(view.shine[l], view.gaps[l]);
 #else
-    float g = LIGHT(l).kind != LIGHT_SKY ? fluxes[i * N_LIGHTS + l].w : 0.0;
+    float g = LIGHT(l).kind != LIGHT_SKY ? flux_at(i, l).w : 0.0;
     vec3 face = source.normal * inversesqrt(max(dot(source.normal, source.normal), 1e-30));
     return vec2(g, gap_of(view.position, face, -view.way, l));
 #endif

@@ -43,11 +43,12 @@ struct Sender {
 };
 
 Sender sender_at(uint i, Region emitter, Pane pane) {
-    vec4 place = sources[i].place, sent = sources[i].sent;
+    int k = int(i) * 4;
+    vec4 place = uintBitsToFloat(texelFetch(sources, k)), sent = uintBitsToFloat(texelFetch(sources, k + 1));
     Sender s = Sender(place.xyz, place.w, sent.xyz, 1u, sent.w < 0.0, emitter.normal, pane.area, pane.area, 0.0);
     // Where it need not be loaded it is not.
     if (emitter.kind != REGION_SURFACE) {
-        vec4 face = sources[i].face;
+        vec4 face = uintBitsToFloat(texelFetch(sources, k + 2));
         s.normal = face.xyz;
         s.area = face.w;
         s.total_area = face.w;
@@ -55,12 +56,20 @@ Sender sender_at(uint i, Region emitter, Pane pane) {
 #if TREE
     s.n_nodes = uint(max(sent.w, 1.0));
     if (s.n_nodes > 1u) {
-        vec2 extent = sources[i].extent.xy;
+        vec2 extent = uintBitsToFloat(texelFetch(sources, k + 3).xy);
         s.total_area = extent.x;
         s.spread = extent.y;
     }
 #endif
     return s;
+}
+
+// Of light l: what second_sources.comp leaves.
+vec4 flux_at(uint i, uint l) { return uintBitsToFloat(texelFetch(fluxes, int(i * push.n_lights + l))); }
+
+Packed stencil_at(uint i, uint l) {
+    int k = int(i * push.n_lights + l) * 2;
+    return Packed(texelFetch(stencils, k), texelFetch(stencils, k + 1));
 }
 
 // The receiver: where it is, whither it reflects, and how much diffusely.
@@ -110,7 +119,7 @@ vec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool w
         n_turns += 1u;
     }
     for (uint k = n_near; k < n; ++k) {
-        vec2 by = hides_ball(regions[occluder_of(pairing, veil, k)], p, q, radius);
+        vec2 by = hides_ball(region_at(occluder_of(pairing, veil, k)), p, q, radius);
         found = vec2(found.x * (1.0 - by.x), max(found.y, by.y));
         n_turns += 1u;
     }
@@ -125,7 +134,7 @@ void shade_all(inout Stencil seen, Pairing pairing, Veil veil, vec3 p, Cell cell
         n_turns += 1u;
     }
     for (uint k = n_near; k < n; ++k) {
-        shade(seen, regions[occluder_of(pairing, veil, k)], p, 1.0, cell);
+        shade(seen, region_at(occluder_of(pairing, veil, k)), p, 1.0, cell);
         n_turns += 1u;
     }
 }

@@ -1,5 +1,5 @@
 // Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector (docs/model.md §6). Needs
-// `float table[]`, a lobe a row.
+// `samplerBuffer table`, a lobe a row.
 
 const uint N_NODES = 1025;
 
@@ -13,8 +13,8 @@ Knot knot_at(float w) {
 }
 
 float value_at(uint i_row, Knot knot) {
-    uint k = i_row * N_NODES + knot.i;
-    return mix(table[k], table[k + 1u], knot.part);
+    int k = int(i_row * N_NODES + knot.i);
+    return mix(texelFetch(table, k).x, texelFetch(table, k + 1).x, knot.part);
 }
 
 float lobe_at(uint i_row, float w) {

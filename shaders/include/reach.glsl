@@ -1,10 +1,10 @@
 // Whether light reaches a point past all surfaces (docs/model.md §11 "transmit"). Needs light.glsl, occlude.glsl and
-// `Region regions[]`, the surfaces' first.
+// regions.glsl, the surfaces' first.
 
 // Whether no surface but the point's own hides the light from p.
 bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
     for (uint i = 0; i < n_surfaces; ++i) {
-        Region r = regions[i];
+        Region r = region_at(i);
         if (i != i_own && (light.kind == LIGHT_POINT ? hides(r, p, light.position) : shades(r, p, light.toward))) {
             return false;
         }
@@ -15,7 +15,7 @@ bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
 // The light's way to the ball about p past one surface: x, whether its middle is hidden; y, whether the shadow's rim runs
 // through it.
 bvec2 shadow_of(uint i, vec3 p, float radius, Light light, uint i_own) {
-    Region r = regions[i];
+    Region r = region_at(i);
     vec2 past = hides_ball(r, light.position, p, radius);
     bvec2 by = light.kind == LIGHT_POINT ? bvec2(past.x > 0.0, past.y > 0.0) : shades_ball(r, p, light.toward, radius);
     return bvec2(i != i_own && by.x, i != i_own && by.y);

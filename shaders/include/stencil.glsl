@@ -105,10 +105,15 @@ float total(Stencil s) {
     return (sum.x + sum.y) + (sum.z + sum.w);
 }
 
-// Sum over the points of one stencil weighted by another.
-float weighted(Stencil s, Stencil by) {
-    vec4 sum = (s.a * by.a + s.b * by.b) + (s.c * by.c + s.d * by.d);
-    return (sum.x + sum.y) + (sum.z + sum.w);
+// Sums over the points of each quarter of the cell, u first, of one stencil weighted by another.
+vec4 quarters(Stencil s, Stencil by) {
+    vec4 low = s.a * by.a + s.b * by.b, high = s.c * by.c + s.d * by.d;
+    return vec4(low.x + low.y, low.z + low.w, high.x + high.y, high.z + high.w);
+}
+
+// The middle of quarter q.
+vec3 quarter_at(Cell cell, uint q) {
+    return cell.middle + ((q & 1u) == 0u ? -0.5 : 0.5) * cell.u + ((q & 2u) == 0u ? -0.5 : 0.5) * cell.v;
 }
 
 // Of numbers from 0 to 1, sixteen bits each.

@@ -73,7 +73,7 @@ Veil veil_of(Pairing pairing, Region emitter, vec3 p, bool wanted) {
     veil.closed = false;
     uint n = wanted && emitter.kind == REGION_SURFACE ? min(pairing.n_occluders, 256u) : 0u;
     for (uint k = 0u; k < n; ++k) {
-        uint covers = cover(regions[occluders[pairing.i_occluder + k]], emitter, p);
+        uint covers = cover(region_at(occluders[pairing.i_occluder + k]), emitter, p);
         veil.closed = veil.closed || covers == 2u;
         uint entry = k << (8u * (veil.n & 3u));
         veil.list |= uvec2(covers == 0u || veil.n >= 4u ? 0u : entry, covers == 0u || veil.n < 4u ? 0u : entry);
@@ -85,9 +85,9 @@ Veil veil_of(Pairing pairing, Region emitter, vec3 p, bool wanted) {
     veil.n = veil.whole ? pairing.n_occluders : veil.n;
     uint last = max(veil.n, 1u) - 1u;
     for (uint k = 0u; k < (veil.whole ? 0u : min(veil.n, 1u)); ++k) {
-        veil.first = regions[occluder_of(pairing, veil, 0u)];
-        veil.second = regions[occluder_of(pairing, veil, min(1u, last))];
-        veil.third = regions[occluder_of(pairing, veil, min(2u, last))];
+        veil.first = region_at(occluder_of(pairing, veil, 0u));
+        veil.second = region_at(occluder_of(pairing, veil, min(1u, last)));
+        veil.third = region_at(occluder_of(pairing, veil, min(2u, last)));
     }
     return veil;
 }

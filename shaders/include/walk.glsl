@@ -51,7 +51,7 @@ void gather_torn(Taker taker) {
     while (walk.s < n_torn) {
         uvec2 facet = torn[walk.s];
         Pairing pairing = pairings[facet.y];
-        Region emitter = regions[pairing.i_region];
+        Region emitter = region_at(pairing.i_region);
         // All that may stand between the surfaces: a veil of its own would be looked at for one facet.
         Veil veil = whole_veil(pairing);
         walk = advance(walk, take_or_quarter(facet.x, walk, pairing, emitter, taker, veil, pane_of(emitter), true));

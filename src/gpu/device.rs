@@ -31,6 +31,8 @@ pub struct DeviceInfo {
 pub struct Limits {
     /// Bytes of one storage buffer that a shader can see.
     pub max_storage_buffer_bytes: u64,
+    /// Of a texel buffer.
+    pub max_texels: u64,
     /// Workgroups along x of one dispatch.
     pub max_workgroups_x: u32,
     pub max_workgroup_invocations: u32,
@@ -232,6 +234,7 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
         unusable: unusable(instance, physical, version, family),
         limits: Limits {
             max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+            max_texels: u64::from(limits.max_texel_buffer_elements),
             max_workgroups_x: limits.max_compute_work_group_count[0],
             max_workgroup_invocations: limits.max_compute_work_group_invocations,
             max_shared_memory_bytes: limits.max_compute_shared_memory_size,
@@ -314,6 +317,7 @@ mod tests {
     fn device(index: usize, name: &str, kind: &'static str) -> DeviceInfo {
         let limits = Limits {
             max_storage_buffer_bytes: 0,
+            max_texels: 0,
             max_workgroups_x: 0,
             max_workgroup_invocations: 0,
             max_shared_memory_bytes: 0,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::device::{Device, Shared};
-use super::reflect::{Binding, Reflection, reflect};
+use super::reflect::{Binding, BindingKind, Reflection, reflect};
 use super::shader::{Compiler, Optimize};
 use crate::error::{Error, Result};
 
@@ -15,8 +15,18 @@ pub type Field = (&'static str, usize, usize);
 /// How a pipeline touches one binding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Access {
+    pub kind: BindingKind,
     pub reads: bool,
     pub writes: bool,
+}
+
+impl Access {
+    pub fn descriptor(&self) -> vk::DescriptorType {
+        match self.kind {
+            BindingKind::Storage => vk::DescriptorType::STORAGE_BUFFER,
+            BindingKind::Texels | BindingKind::Floats => vk::DescriptorType::UNIFORM_TEXEL_BUFFER,
+        }
+    }
 }
 
 /// What compute and draw pipelines share: layouts, and what the shaders do with each binding.
@@ -106,13 +116,15 @@ impl Interface {
         let n = used().map(|b| b.binding + 1).max().unwrap_or(0);
         let merge = |k: u32| {
             let touched = |f: fn(&Binding) -> bool| used().any(|b| b.binding == k && f(b));
-            Access { reads: touched(|b| b.reads), writes: touched(|b| b.writes) }
+            let kind = used().find(|b| b.binding == k).map_or(BindingKind::Storage, |b| b.kind);
+            Access { kind, reads: touched(|b| b.reads), writes: touched(|b| b.writes) }
         };
         let access: Vec<Access> = (0..n).map(merge).collect();
         let bindings: Vec<_> = (0..n)
-            .map(|k| {
+            .zip(&access)
+            .map(|(k, a)| {
                 let b = vk::DescriptorSetLayoutBinding::default().binding(k).descriptor_count(1);
-                b.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(all_stages)
+                b.descriptor_type(a.descriptor()).stage_flags(all_stages)
             })
             .collect();
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);

@@ -9,6 +9,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::device::{Device, Limits, Shared};
+use super::reflect::BindingKind;
 use crate::error::{Error, Result};
 
 /// Where a buffer lives, by who touches it.
@@ -22,8 +23,14 @@ pub enum Place {
     Readback,
 }
 
+/// What texels are: as words, so that every bit passes; and as floats. Every device reads both.
+const TEXELS: [(BindingKind, vk::Format); 2] =
+    [(BindingKind::Texels, vk::Format::R32G32B32A32_UINT), (BindingKind::Floats, vk::Format::R32_SFLOAT)];
+
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
+    /// All of it, by kind of texel; null where it has more than the device reads.
+    views: [vk::BufferView; 2],
     allocation: Option<Allocation>,
     bytes: u64,
     name: String,
@@ -36,6 +43,7 @@ impl Buffer {
         let bytes = storage_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
         let shared = device.shared().clone();
         let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST
             | vk::BufferUsageFlags::INDIRECT_BUFFER;
@@ -49,13 +57,44 @@ impl Buffer {
             Place::Upload => MemoryLocation::CpuToGpu,
             Place::Readback => MemoryLocation::GpuToCpu,
         };
-        let mut buffer = Buffer { raw, allocation: None, bytes, name: name.to_owned(), shared };
+        let views = [vk::BufferView::null(); 2];
+        let mut buffer = Buffer { raw, views, allocation: None, bytes, name: name.to_owned(), shared };
         let allocation = allocate(&buffer.shared, name, requirements, location, true)?;
         let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
         buffer.allocation = Some(allocation);
         unsafe { buffer.shared.raw.bind_buffer_memory(raw, memory, offset) }
             .map_err(|e| Error::vulkan(format!("vkBindBufferMemory {name}"), e))?;
+        buffer.make_views(device.limits())?;
         Ok(buffer)
+    }
+
+    fn make_views(&mut self, limits: &Limits) -> Result<()> {
+        for (view, (kind, format)) in self.views.iter_mut().zip(TEXELS) {
+            let n = self.bytes / u64::from(kind.texel_bytes());
+            if n == 0 || n > limits.max_texels {
+                continue;
+            }
+            let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format);
+            let info = info.range(n * u64::from(kind.texel_bytes()));
+            *view = unsafe { self.shared.raw.create_buffer_view(&info, None) }
+                .map_err(|e| Error::vulkan(format!("vkCreateBufferView {}", self.name), e))?;
+        }
+        Ok(())
+    }
+
+    /// As shaders read it by texels; null for records.
+    pub(super) fn texels(&self, kind: BindingKind) -> Result<vk::BufferView> {
+        let Some(i) = TEXELS.iter().position(|(k, _)| *k == kind) else { return Ok(vk::BufferView::null()) };
+        if self.views[i] == vk::BufferView::null() {
+            let most = self.shared.limits.max_texels;
+            return Err(Error::limit(format!(
+                "{}: {} bytes are to be read by {}, this device takes {most} such texels at most (maxTexelBufferElements)",
+                self.name,
+                self.bytes,
+                kind.texel_bytes()
+            )));
+        }
+        Ok(self.views[i])
     }
 
     pub fn bytes(&self) -> u64 {
@@ -103,7 +142,12 @@ impl Buffer {
 impl Drop for Buffer {
     fn drop(&mut self) {
         // SAFETY: whoever drops a buffer has waited for the commands that use it (frame/ waits every frame).
-        unsafe { self.shared.raw.destroy_buffer(self.raw, None) };
+        unsafe {
+            for view in self.views {
+                self.shared.raw.destroy_buffer_view(view, None);
+            }
+            self.shared.raw.destroy_buffer(self.raw, None);
+        }
         free(&self.shared, self.allocation.take());
     }
 }

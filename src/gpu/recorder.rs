@@ -10,6 +10,7 @@ use bytemuck::Pod;
 use super::device::{Device, Shared};
 use super::kernel::{Interface, Kernel};
 use super::memory::Buffer;
+use super::reflect::BindingKind;
 use super::timer::{ScopeTime, Timer};
 use crate::error::{Error, Result};
 
@@ -122,9 +123,8 @@ impl Commands {
     }
 
     fn add_descriptor_pool(&mut self) -> Result<()> {
-        let size =
-            vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: 8 * SETS_PER_POOL };
-        let sizes = [size];
+        let size = |ty, a_set: u32| vk::DescriptorPoolSize { ty, descriptor_count: a_set * SETS_PER_POOL };
+        let sizes = [size(vk::DescriptorType::STORAGE_BUFFER, 8), size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER, 2)];
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
         let pool = unsafe { self.shared.raw.create_descriptor_pool(&info, None) }
             .map_err(|e| Error::vulkan("vkCreateDescriptorPool", e))?;
@@ -171,6 +171,7 @@ const WRITES: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
 );
 const READS: vk::AccessFlags2 = vk::AccessFlags2::from_raw(
     vk::AccessFlags2::SHADER_STORAGE_READ.as_raw()
+        | vk::AccessFlags2::SHADER_SAMPLED_READ.as_raw()
         | vk::AccessFlags2::INDIRECT_COMMAND_READ.as_raw()
         | vk::AccessFlags2::TRANSFER_READ.as_raw(),
 );
@@ -265,6 +266,10 @@ impl Recorder<'_> {
         }
         let uses: Vec<_> = buffers.iter().zip(&interface.access).map(|(b, a)| (b.raw, a.reads, a.writes)).collect();
         self.depend(&uses);
+        let mut views = vec![];
+        for (buffer, access) in buffers.iter().zip(&interface.access) {
+            views.push([buffer.texels(access.kind)?]);
+        }
         let set = self.descriptor_set(interface.set_layout)?;
         let infos: Vec<_> = buffers
             .iter()
@@ -272,10 +277,17 @@ impl Recorder<'_> {
             .collect();
         let writes: Vec<_> = infos
             .iter()
+            .zip(&views)
+            .zip(&interface.access)
             .enumerate()
-            .map(|(k, info)| {
+            .map(|(k, ((info, view), access))| {
                 let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(k as u32);
-                write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
+                let write = write.descriptor_type(access.descriptor());
+                if access.kind == BindingKind::Storage {
+                    write.buffer_info(info)
+                } else {
+                    write.texel_buffer_view(view)
+                }
             })
             .collect();
         let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);

@@ -30,9 +30,32 @@ pub struct Member {
     pub bytes: u32,
 }
 
+/// How a shader asks for a buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BindingKind {
+    /// `buffer`: read and written as records.
+    Storage,
+    /// `usamplerBuffer`: read only, four words at a time.
+    Texels,
+    /// `samplerBuffer`: read only, float by float.
+    Floats,
+}
+
+impl BindingKind {
+    /// Of one texel; 0 for records, whose block tells.
+    pub fn texel_bytes(self) -> u32 {
+        match self {
+            BindingKind::Storage => 0,
+            BindingKind::Texels => 16,
+            BindingKind::Floats => 4,
+        }
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Binding {
     pub binding: u32,
+    pub kind: BindingKind,
     pub name: String,
     pub reads: bool,
     pub writes: bool,
@@ -57,6 +80,7 @@ pub fn reflect(name: &str, words: &[u32]) -> Result<Reflection> {
         match class {
             StorageClass::PushConstant => found.push = Some(m.structure(pointee)),
             StorageClass::StorageBuffer => found.bindings.push(m.binding(id, pointee)),
+            StorageClass::UniformConstant => found.bindings.push(m.texels(id, pointee)),
             StorageClass::Workgroup => found.shared_bytes += m.size(pointee, None),
             _ => {}
         }
@@ -186,11 +210,28 @@ impl Reader<'_> {
         let is_struct = |id: &u32| self.definition(*id).is_some_and(|i| i.class.opcode == Op::TypeStruct);
         Binding {
             binding,
+            kind: BindingKind::Storage,
             name: self.name(block, Some(0)),
             reads: !has(Decoration::NonReadable),
             writes: !has(Decoration::NonWritable),
             stride: array.and_then(|a| self.decoration(a, None, Decoration::ArrayStride)).unwrap_or(0),
             element: element.filter(is_struct).map(|e| self.structure(e)),
+        }
+    }
+
+    /// An image of dimension "buffer"; what it samples as tells its texels.
+    fn texels(&self, id: u32, image: u32) -> Binding {
+        let sampled = self.definition(image).and_then(|i| self.id(i, 0)).and_then(|t| self.definition(t));
+        let of_floats = sampled.is_some_and(|t| t.class.opcode == Op::TypeFloat);
+        let kind = if of_floats { BindingKind::Floats } else { BindingKind::Texels };
+        Binding {
+            binding: self.decoration(id, None, Decoration::Binding).unwrap_or(0),
+            kind,
+            name: self.name(id, None),
+            reads: true,
+            writes: false,
+            stride: kind.texel_bytes(),
+            element: None,
         }
     }
 }

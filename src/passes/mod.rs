@@ -43,6 +43,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/philox.glsl",
     "include/reach.glsl",
     "include/records.glsl",
+    "include/regions.glsl",
     "include/shell.glsl",
     "include/stencil.glsl",
     "include/sort.glsl",

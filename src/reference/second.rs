@@ -33,8 +33,9 @@ use crate::model::scene::Pairs;
 
 /// Lobes are met within this many of their widths.
 const LOBE_REACH: f64 = 4.0;
-/// Widths of a lobe, times pair_size, that a facet or a cell may be wide.
+/// Widths of a lobe, times pair_size, that a facet may be wide; and a cell, which meets lobes in its quarters.
 const LOBE_STEP: f64 = 3.0;
+const CELL_STEP: f64 = 4.5;
 /// Of a width over its distance, what the half vector turns from centre to corner.
 const TURN: f64 = 0.75;
 /// Facets that a shadow's rim runs through are looked at closely where wider than this share of pair_size; where both the
@@ -245,9 +246,9 @@ impl View<'_> {
         let side = 2.0 * u.length().max(v.length());
         let b = side / way.d2.sqrt();
         let form = way.part_form(u, v);
-        let wide = self
-            .faces(&way, side)
-            .and(Decision::above(b, x.pairs.size, b * ROUNDINGS * way.turn).or(self.meets_lobe(i, &way, q, b)));
+        let wide = self.faces(&way, side).and(
+            Decision::above(b, x.pairs.size, b * ROUNDINGS * way.turn).or(self.meets_lobe(i, &way, q, b, LOBE_STEP)),
+        );
         let sends = |rim: f64| form.is_positive().and(Decision::above(b, rim * x.pairs.size, b * ROUNDINGS * way.turn));
         let sender = &self.senders[i];
         let torn = if sends(BOTH_RIMS).is_possible() { self.is_torn(i) } else { Decision::NO };
@@ -270,15 +271,15 @@ impl View<'_> {
         ahead.and(Decision::above(-d * way.n_i.dot(way.way), 0.0, slack))
     }
 
-    /// A lobe is met by what is `b` wide at `q`, and wider than it should be for that.
-    fn meets_lobe(&self, i: usize, way: &Way, q: DVec3, b: f64) -> Decision {
+    /// A lobe is met by what is `b` wide at `q`, and wider than `step` says.
+    fn meets_lobe(&self, i: usize, way: &Way, q: DVec3, b: f64, step: f64) -> Decision {
         let x = self.exchange;
         let source = &x.regions[x.facets[i].i_region];
         let receiver = &x.regions[self.receiver.i_region];
         let met = |ns: f64, angle: Known| {
             let slack = angle.error + b * ROUNDINGS * way.turn;
             let near = Decision::above(TURN * b + LOBE_REACH * width(ns), angle.value, slack);
-            near.and(Decision::above(b, LOBE_STEP * x.pairs.size * width(ns), b * ROUNDINGS * way.turn))
+            near.and(Decision::above(b, step * x.pairs.size * width(ns), b * ROUNDINGS * way.turn))
         };
         let mut found = Decision::NO;
         if source.lobe.is_some() {

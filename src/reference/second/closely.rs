@@ -37,22 +37,22 @@ impl View<'_> {
         let side = 2.0 * patch.u.length().max(patch.v.length());
         let b = side / way.d2.sqrt();
         let wide = Decision::above(b, COARSE * x.pairs.size, b * ROUNDINGS * way.turn);
-        let open = self.faces(&way, side).and(wide.or(self.meets_lobe(i, &way, q, b)));
+        let open = self.faces(&way, side).and(wide.or(self.meets_lobe(i, &way, q, b, CELL_STEP)));
         if cell.level == x.pairs.levels {
             let count = |is: bool| f64::from(u8::from(is));
             let (n_unresolved, n_doubted) = (count(open.taken), count(!open.sure));
-            return Gathered { n_unresolved, n_doubted, ..self.by_points(i, &way, cell, &patch, sender) };
+            return Gathered { n_unresolved, n_doubted, ..self.by_points(i, cell, &patch, sender) };
         }
         let quarters = || {
             let mut sum = Gathered::default();
             (0..4).for_each(|k| sum.add(&self.cell(i, &cell.quarter(k), sender)));
             sum
         };
-        Gathered::by(open, quarters, || self.by_points(i, &way, cell, &patch, sender))
+        Gathered::by(open, quarters, || self.by_points(i, cell, &patch, sender))
     }
 
-    /// A cell by the middles of its parts.
-    fn by_points(&self, i: usize, way: &Way, cell: &Cell, patch: &Patch, sender: &Sender) -> Gathered {
+    /// A cell by the middles of its parts, and by its quarters for the lobes.
+    fn by_points(&self, i: usize, cell: &Cell, patch: &Patch, sender: &Sender) -> Gathered {
         let (x, p) = (self.exchange, self.receiver.position);
         let area = 4.0 * patch.u.length() * patch.v.length();
         let edges = |(r, counts): &(&Rectangle, Decision)| {
@@ -61,7 +61,7 @@ impl View<'_> {
         };
         let occluders: Vec<_> = self.before[x.facets[i].i_region].iter().filter_map(edges).collect();
         let shares: Vec<_> = (0..x.lights.len()).map(|k| x.shares_of(i, k, sender, cell, patch)).collect();
-        let mut sums = vec![Known::NOTHING; x.lights.len()];
+        let mut sums = vec![[Known::NOTHING; 4]; x.lights.len()];
         for (n, at) in Patch::middles().enumerate() {
             let place = patch.point(at);
             let seen = occluders.iter().map(|(e, counts)| e.hidden(at).where_or(*counts, Known::NOTHING).rest());
@@ -69,11 +69,17 @@ impl View<'_> {
             if form.is_nothing() {
                 continue;
             }
+            let quarter = Patch::quarter_of(at);
             for (k, sum) in sums.iter_mut().enumerate() {
-                *sum = sum.plus(form.times(shares[k][n]));
+                sum[quarter] = sum[quarter].plus(form.times(shares[k][n]));
             }
         }
-        let g: Vec<Known> = sums.into_iter().map(|s| s.scaled(PART)).collect();
-        self.sent(i, way, patch.q, &g, x.through(p, patch.q).scaled(area))
+        let through = x.through(p, patch.q).scaled(area);
+        let mut sent = Gathered::default();
+        for (quarter, middle) in patch.quarters().into_iter().enumerate() {
+            let g: Vec<Known> = sums.iter().map(|s| s[quarter].scaled(PART)).collect();
+            sent.add(&self.sent(i, &self.way(i, middle), middle, &g, through));
+        }
+        sent
     }
 }

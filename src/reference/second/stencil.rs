@@ -29,6 +29,16 @@ impl Patch {
         let at = |i: u32| 0.5 * f64::from(i) - 0.75;
         (0..16u32).map(move |i| DVec2::new(at(i % 4), at(i / 4)))
     }
+
+    /// In which quarter of the cell a part lies.
+    pub fn quarter_of(at: DVec2) -> usize {
+        usize::from(at.x > 0.0) + 2 * usize::from(at.y > 0.0)
+    }
+
+    /// The quarters' middles.
+    pub fn quarters(&self) -> [DVec3; 4] {
+        [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)].map(|at| self.point(at.into()))
+    }
 }
 
 /// A function linear over a cell, and what it is known to.

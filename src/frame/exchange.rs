@@ -200,6 +200,14 @@ pub fn is_glossy(scene: &Scene, i_region: usize) -> bool {
     scene.lighting.bases > 1 && scene.region_material(i_region).is_glossy()
 }
 
+/// In the order of their numbers' bits reversed, so that every stretch of them is a fair sample of all: a device that deals
+/// out stretches (llvmpipe one a thread) would else wait for the one with the crowded surfaces.
+fn scattered(blocks: &[BlockRecord]) -> Vec<BlockRecord> {
+    let mut order: Vec<u32> = (0..blocks.len() as u32).collect();
+    order.sort_by_key(|i| i.reverse_bits());
+    order.into_iter().map(|i| blocks[i as usize]).collect()
+}
+
 impl Lists {
     fn of(scene: &Scene, block_len: u32, tree: bool) -> Lists {
         let sizes = region_sizes(scene);
@@ -221,6 +229,8 @@ impl Lists {
                 blocks.push(BlockRecord { i_first: firsts[i] + first, n_facets, i_pairing, n_pairings });
             }
         }
+        lists.diffuse = scattered(&lists.diffuse);
+        lists.glossy = scattered(&lists.glossy);
         lists
     }
 

@@ -39,17 +39,20 @@ void main() {
         float inverse = whole > 0.0 ? 1.0 / whole : 0.0;
         vec3 position = whole > 0.0 ? (shines ? by_flux : by_area) * inverse : sources[i + 1u].place.xyz;
         vec3 normal = whole > 0.0 ? (shines ? normal_by_flux : normal_by_area) * inverse : sources[i + 1u].face.xyz;
-        float radius = 0.0, spread = 0.0;
+        float radius = 0.0;
+        vec3 square = vec3(0.0), leaning = vec3(0.0);
         for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {
             Source child = sources[c];
-            float apart = distance(child.place.xyz, position);
-            radius = max(radius, apart + child.place.w);
-            float w = shines ? child.sent.x + child.sent.y + child.sent.z : child.extent.x;
-            spread += w * inverse * (child.extent.y + apart * apart);
+            vec3 apart = child.place.xyz - position;
+            radius = max(radius, length(apart) + child.place.w);
+            float w = (shines ? child.sent.x + child.sent.y + child.sent.z : child.extent.x) * inverse;
+            square += w * (child.extent.yzw + apart * apart);
+            leaning += w * (child.leaning.xyz + apart.xxy * apart.yzz);
         }
         float area = total_area > 0.0 ? square_area / total_area : 0.0;
         sources[i] = Source(
-            vec4(position, radius), vec4(flux, float(nodes[i].n_nodes)), vec4(normal, area), vec4(total_area, spread, 0.0, 0.0));
+            vec4(position, radius), vec4(flux, float(nodes[i].n_nodes)), vec4(normal, area), vec4(total_area, square),
+            vec4(leaning, 0.0));
         for (uint l = 0u; l < push.n_lights; ++l) {
             vec4 sum = vec4(0.0);
             for (uint c = i + 1u; c < end; c += nodes[c].n_nodes) {

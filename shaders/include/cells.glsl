@@ -87,20 +87,27 @@ float positive_part(float mean, float variance) {
     return max(z > 5.9 ? mean : deviation * (z * below + 0.39894228 * exp(-0.5 * z * z)), 0.0);
 }
 
-// The mean of cos cos/d^2 over a cluster whose mean square distance from its middle is `extent` d^2: the middle's value and
-// the second derivatives' share. A surface's cluster lies in its plane (half of the spread an axis) and has one normal; a
-// cloud's is as deep as it is wide (a third an axis) and its normals spread about their mean.
-float cluster_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float extent, uint kind) {
-    float at_source = -dot(source_normal, way), at_receiver = dot(receiver_normal, way);
-    float turned = dot(receiver_normal, source_normal);
+// A cluster's second moments times a vector.
+vec3 moments_by(Sender s, vec3 x) {
+    return s.square * x + vec3(dot(s.leaning.xy, x.yz), s.leaning.x * x.x + s.leaning.z * x.z, dot(s.leaning.yz, x.xy));
+}
+
+// The mean of cos cos/d^2 over a cluster: the middle's value, and half its second derivatives times the second moments. A
+// cloud's normals spread about their mean.
+float cluster_form(Sender source, vec3 receiver_normal, vec3 way, float d2, uint kind) {
+    float at_source = -dot(source.normal, way), at_receiver = dot(receiver_normal, way);
+    float inverse = 1.0 / max(d2, 1e-30);
+    vec3 along = moments_by(source, way) * inverse;
+    float extent = (source.square.x + source.square.y + source.square.z) * inverse;
+    float bent = at_source * at_receiver * (12.0 * dot(along, way) - 2.0 * extent)
+        - 4.0 * (at_source * dot(receiver_normal, along) - at_receiver * dot(source.normal, along))
+        - dot(receiver_normal, moments_by(source, source.normal)) * inverse;
+    bent = at_source > 0.0 && at_receiver > 0.0 ? bent : 0.0;
     if (kind == REGION_SURFACE) {
-        float bent = 2.0 * extent * at_source * (at_receiver - turned * at_source - 3.0 * at_receiver * at_source * at_source);
-        return at_source > 0.0 && at_receiver > 0.0 ? max(at_source * at_receiver + bent, 0.0) / d2 : 0.0;
+        return at_source > 0.0 && at_receiver > 0.0 ? max(at_source * at_receiver + bent, 0.0) * inverse : 0.0;
     }
-    float bent = -extent * (turned + 2.0 * at_source * at_receiver) / 3.0;
-    float apart = max(1.0 - dot(source_normal, source_normal), 0.0) / 3.0;
-    float both = positive_part(at_source, apart) * positive_part(at_receiver, extent / 3.0);
-    return max(both + (at_source > 0.0 && at_receiver > 0.0 ? bent : 0.0), 0.0) / d2;
+    float apart = max(1.0 - dot(source.normal, source.normal), 0.0) / 3.0;
+    return max(positive_part(at_source, apart) * positive_part(at_receiver, extent / 3.0) + bent, 0.0) * inverse;
 }
 #endif
 
@@ -128,8 +135,7 @@ float form_of(Sender source, View view, Pane pane, Region emitter, Taker taker) 
         ? rectangle_form(taker.normal, source.normal, view.way, view.d2, pane.half_u, pane.half_v)
         : form(taker.normal, source.normal, view.way, view.d2, source.area);
 #if TREE
-    float extent = source.spread / max(view.d2, 1e-30);
-    share = is_cluster(source) ? cluster_form(taker.normal, source.normal, view.way, view.d2, extent, emitter.kind) : share;
+    share = is_cluster(source) ? cluster_form(source, taker.normal, view.way, view.d2, emitter.kind) : share;
 #endif
     return share;
 }
@@ -138,14 +144,17 @@ float form_of(Sender source, View view, Pane pane, Region emitter, Taker taker) 
 // How much more a cluster's extent may change of its form factor than the opening angle allows: in radius over distance,
 // and the cosines.
 float cluster_excess(Sender source, View view, Region emitter, Taker taker) {
-    // A cluster is opened by its radius, and where its facets look different ways.
     float theta = emitter.kind == REGION_SURFACE ? push.theta : CLOUD_THETA * push.theta;
     float tilt = 0.5 * view.width;
     float even = dot(source.normal, source.normal);
     float at_taker = max(dot(taker.normal, view.way) + tilt, 0.0);
     float at_source = max(-dot(source.normal, view.way), 0.0) + 1.0 - sqrt(even);
     float mixed = sqrt(max(1.0 - even, 0.0));
-    float wrong = tilt * (tilt + MIXED * mixed) * min(at_taker, 1.0) * at_source * source.total_area / max(view.d2, 1e-30);
+    // Its second moments are in its form factor: beyond them a surface's cluster is wrong by the third order, counted from its
+    // nearest point; where facets look different ways, one of a cloud by the first.
+    float nearest = tilt / max(1.0 - tilt, 0.01);
+    float order = emitter.kind == REGION_SURFACE ? nearest * nearest * nearest : tilt * (tilt + MIXED * mixed);
+    float wrong = order * min(at_taker, 1.0) * at_source * source.total_area / max(view.d2, 1e-30);
     float allowed = theta * theta;
     return tilt > 1.0 ? 2.0 : wrong / (allowed * allowed);
 }

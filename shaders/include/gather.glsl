@@ -39,13 +39,15 @@ struct Sender {
     vec3 normal;
     float area;
     float total_area;
-    float spread;
+    // Of a cluster its second moments: xx, yy, zz; xy, xz, yz.
+    vec3 square;
+    vec3 leaning;
 };
 
 Sender sender_at(uint i, Region emitter, Pane pane) {
-    int k = int(i) * 4;
+    int k = int(i) * 5;
     vec4 place = uintBitsToFloat(texelFetch(sources, k)), sent = uintBitsToFloat(texelFetch(sources, k + 1));
-    Sender s = Sender(place.xyz, place.w, sent.xyz, 1u, sent.w < 0.0, emitter.normal, pane.area, pane.area, 0.0);
+    Sender s = Sender(place.xyz, place.w, sent.xyz, 1u, sent.w < 0.0, emitter.normal, pane.area, pane.area, vec3(0.0), vec3(0.0));
     // Where it need not be loaded it is not.
     if (emitter.kind != REGION_SURFACE) {
         vec4 face = uintBitsToFloat(texelFetch(sources, k + 2));
@@ -56,9 +58,10 @@ Sender sender_at(uint i, Region emitter, Pane pane) {
 #if TREE
     s.n_nodes = uint(max(sent.w, 1.0));
     if (s.n_nodes > 1u) {
-        vec2 extent = uintBitsToFloat(texelFetch(sources, k + 3).xy);
+        vec4 extent = uintBitsToFloat(texelFetch(sources, k + 3));
         s.total_area = extent.x;
-        s.spread = extent.y;
+        s.square = extent.yzw;
+        s.leaning = uintBitsToFloat(texelFetch(sources, k + 4).xyz);
     }
 #endif
     return s;

@@ -10,7 +10,7 @@ struct Run { uint i_first; uint n_particles; };
 struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float n_lost; vec3 second; float unused; };
 struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float lobe_width_most; uint i_column; uint i_row; };
 struct RegionBounds { vec3 low; uint unused; vec3 scale; uint unused_too; };
-struct Source { vec4 place; vec4 sent; vec4 face; vec4 extent; };
+struct Source { vec4 place; vec4 sent; vec4 face; vec4 extent; vec4 leaning; };
 struct Packed { uvec4 ab; uvec4 cd; };
 struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
 struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; uint n_sources; };

@@ -14,8 +14,10 @@ record! {
         /// Mean normal by flux, shorter than 1 where a cluster's normals differ; and the mean area of its facets, by area:
         /// what bounds the form factor as the distance goes to 0.
         face: [f32; 4],
-        /// Σ A_i; mean square distance of its facets' centres from the position, by flux; 0; 0.
+        /// Σ A_i; and second moments M about the position, by flux: xx, yy, zz.
         extent: [f32; 4],
+        /// xy, xz, yz; 0.
+        leaning: [f32; 4],
     }
 }
 

@@ -23,14 +23,16 @@ layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
 layout(binding = 2) uniform usamplerBuffer regions;
 #include "regions.glsl"
 // By column.
-layout(std430, binding = 3) readonly buffer Coefficients { vec4 coefficients[]; };
+layout(binding = 3) uniform usamplerBuffer coefficients;
 // [light][row]
-layout(std430, binding = 4) readonly buffer First { float t1[]; };
+layout(binding = 4) uniform samplerBuffer t1;
 // As tensor.glsl has it.
-layout(std430, binding = 5) readonly buffer Second { float t2[]; };
+layout(binding = 5) uniform samplerBuffer t2;
 // By region (first, number) of its spans; then the spans, (first, number) of columns that it can receive light from.
 layout(std430, binding = 6) readonly buffer Spans { uvec2 spans[]; };
 layout(std430, binding = 7) writeonly buffer LitFacets { Lit lit[]; };
+
+vec3 coefficient_of(uint column) { return uintBitsToFloat(texelFetch(coefficients, int(column)).rgb); }
 
 struct Sum { vec3 direct; vec3 indirect; vec3 first; vec3 second; };
 
@@ -41,11 +43,11 @@ uint rows[N_BASES];
 // What one light of energy 1 brings. A column's coefficient is loaded once for all bases.
 Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
     uint at[N_BASES];
-    float direct = t1[l * push.n_rows + rows[0]];
+    float direct = texelFetch(t1, int(l * push.n_rows + rows[0])).x;
     Sum sum = Sum(vec3(direct), vec3(0.0), own[0] * direct, vec3(0.0));
     for (uint k = 0u; k < n_shiny; ++k) {
         [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
-            sum.first += own[b] * t1[l * push.n_rows + rows[b]];
+            sum.first += own[b] * texelFetch(t1, int(l * push.n_rows + rows[b])).x;
         }
     }
     [[unroll]] for (uint b = 0u; b < N_BASES; ++b) {
@@ -54,12 +56,12 @@ Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
     for (uint i = 0u; i < own_spans.y; ++i) {
         uvec2 span = spans[own_spans.x + i];
         for (uint c = span.x; c < span.x + span.y; ++c) {
-            vec3 column = coefficients[c].rgb;
-            float indirect = t2[at[0] + c * TILE];
+            vec3 column = coefficient_of(c);
+            float indirect = texelFetch(t2, int(at[0] + c * TILE)).x;
             vec3 second = own[0] * indirect;
             for (uint k = 0u; k < n_shiny; ++k) {
                 [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
-                    second += own[b] * t2[at[b] + c * TILE];
+                    second += own[b] * texelFetch(t2, int(at[b] + c * TILE)).x;
                 }
             }
             sum.indirect += column * indirect;
@@ -78,7 +80,7 @@ void main() {
         own[0] = region.kd * facet.color;
         rows[0] = region.i_row + j - region.i_first_facet;
         [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
-            own[b] = glossy ? coefficients[i_vector + b - 1u].rgb : vec3(0.0);
+            own[b] = glossy ? coefficient_of(i_vector + b - 1u) : vec3(0.0);
             rows[b] = glossy ? rows[b - 1u] + region.n_facets : rows[0];
         }
         Sum sum = Sum(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));

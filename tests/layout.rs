@@ -45,7 +45,7 @@ const RECORDS: [Record; 18] = [
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
 const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
-    ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, B(16), B(4), B(4), B(8), R("Lit")]),
+    ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
     ("first_tensor.comp", first::TensorPush::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, B(4), R("Lit")]),

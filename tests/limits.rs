@@ -1,6 +1,9 @@
 //! What a scene may ask for, and what it is told before it costs dearly.
 
-use nimbus::frame::limits::{advice, n_deposits};
+mod harness;
+
+use harness::Gpu;
+use nimbus::frame::limits::{advice, check, n_deposits};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Scene;
 
@@ -21,6 +24,16 @@ fn blobs_much_larger_than_cells_are_told_of() {
     assert_eq!(advice(&scene(300_000, 64, "none")), None);
     // The inner cells halve: 60 to 30 a side.
     assert!(n_deposits(&scene(1000, 64, "first")) > 6.0 * n_deposits(&scene(1000, 34, "first")));
+}
+
+#[test]
+fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
+    let mut limits = *Gpu::new().device.limits();
+    let scene = scene(500, 64, "first");
+    assert!(check(&scene, &limits).is_ok());
+    limits.max_texels = 1000;
+    let refused = check(&scene, &limits).unwrap_err().to_string();
+    assert!(refused.contains("the density grid") && refused.contains("takes 1000 at most"), "{refused}");
 }
 
 #[test]

@@ -196,9 +196,9 @@ fn a_wrong_sum_is_noticed() {
     let case = case(3, true);
     let (truths, bounds) = (case.truth(false), case.bounds());
     for (from, to) in [
-        ("t2[at[0] + c * TILE]", "t2[at[0] + c]"),
+        ("int(at[0] + c * TILE)", "int(at[0] + c)"),
         ("second_at(l, rows", "second_at(0u, rows"),
-        ("t1[l * push.n_rows + rows[b]]", "t1[rows[b]]"),
+        ("int(l * push.n_rows + rows[b])", "int(rows[b])"),
         ("region.kind == REGION_COLORED ? 3u : 1u", "1u"),
         ("region.kd * facet.color", "region.kd"),
         ("glossy ? 1u : 0u", "0u"),

@@ -214,6 +214,9 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     assert_eq!(limits::tensors(&shape, &limits, bytes + first - 1), Tensors::TooLarge { bytes, most: bytes - 1 });
     limits.max_storage_buffer_bytes = bytes - 4;
     assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
+    limits.max_storage_buffer_bytes = u64::MAX;
+    limits.max_texels = bytes / 4 - 1;
+    assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
     // Sizes beyond 64 bits are only large.
     let huge = Shape { n_rows: u64::MAX / 4, ..shape };
     assert!(matches!(limits::tensors(&huge, &limits, u64::MAX), Tensors::TooLarge { bytes: u64::MAX, .. }));

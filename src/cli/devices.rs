@@ -47,7 +47,12 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
         out += &format!("   not usable: {why}\n");
     }
     out += &format!("   driver {}, Vulkan {}, uuid {}\n", d.driver, version(d), d.uuid);
-    out += &format!("   memory {}, storage buffer {}\n", mib(l.device_memory_bytes), mib(l.max_storage_buffer_bytes));
+    out += &format!(
+        "   memory {}, storage buffer {}, {} texels of a buffer\n",
+        mib(l.device_memory_bytes),
+        mib(l.max_storage_buffer_bytes),
+        l.max_texels
+    );
     out += &format!(
         "   workgroups {} along x, {} invocations each, {} KiB shared; subgroup {}; push constants {} B\n",
         l.max_workgroups_x,
@@ -70,6 +75,7 @@ fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
         "used": Some(d.index) == i_used, "unusable": d.unusable,
         "limits": {
             "device_memory_bytes": l.device_memory_bytes, "max_storage_buffer_bytes": l.max_storage_buffer_bytes,
+            "max_texels": l.max_texels,
             "max_workgroups_x": l.max_workgroups_x, "max_workgroup_invocations": l.max_workgroup_invocations,
             "max_shared_memory_bytes": l.max_shared_memory_bytes, "max_push_constant_bytes": l.max_push_constant_bytes,
             "max_image_extent": l.max_image_extent, "subgroup_size": l.subgroup_size,

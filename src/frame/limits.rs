@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
 use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, storage_bytes};
+use crate::gpu::reflect::BindingKind;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
@@ -20,6 +21,15 @@ use super::grouping::is_grouped;
 use super::plan::Tensors;
 use super::render::target_format;
 use super::tensor::Shape;
+
+/// Of the buffers that grow with the scene those that shaders read by texels.
+const READ_BY_TEXELS: [(&str, BindingKind); 5] = [
+    ("the second reflection's sources", BindingKind::Texels),
+    ("their flux by light", BindingKind::Texels),
+    ("their light by points", BindingKind::Texels),
+    ("the regions", BindingKind::Texels),
+    ("the density grid", BindingKind::Floats),
+];
 
 /// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
 /// target) each checks for itself when it is made. The bytes of that sum.
@@ -63,6 +73,14 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let mut total = 0;
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
+        let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
+        if let Some(texel) = texel.filter(|texel| n * bytes / u64::from(*texel) > limits.max_texels) {
+            return Err(Error::limit(format!(
+                "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
+                n * bytes / u64::from(texel),
+                limits.max_texels
+            )));
+        }
     }
     // Receivers in blocks, and each region's last block need not be full.
     let n_blocks = scene.n_facets() / u64::from(LEAST_BLOCK) + scene.n_regions() as u64;
@@ -86,12 +104,10 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
 pub fn tensors(shape: &Shape, limits: &Limits, free: u64) -> Tensors {
     let bytes_of = |n: u64| n.max(1).saturating_mul(4);
     let (first, second) = (bytes_of(shape.n_first()), shape.n_second().map_or(u64::MAX, bytes_of));
-    let most = free.saturating_sub(first).min(limits.max_storage_buffer_bytes);
-    if second <= most && first <= limits.max_storage_buffer_bytes {
-        Tensors::Kept
-    } else {
-        Tensors::TooLarge { bytes: second, most }
-    }
+    // Both are written as buffers and read float by float.
+    let binding = limits.max_storage_buffer_bytes.min(limits.max_texels.saturating_mul(4));
+    let most = free.saturating_sub(first).min(binding);
+    if second <= most && first <= binding { Tensors::Kept } else { Tensors::TooLarge { bytes: second, most } }
 }
 
 /// Most cells the grid can have at any time. Clouds that drift apart change its proportions, so a scene that moves needs

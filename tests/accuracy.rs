@@ -128,6 +128,18 @@ fn random_rooms_are_within_one_percent() {
     }
 }
 
+/// The scene that the time of docs/measured.md is measured with.
+#[test]
+fn the_scene_of_rectangles_is_within_one_percent() {
+    let gpu = Gpu::new();
+    let scene = nimbus::io::scene_file::load(std::path::Path::new("scenes/rectangles.toml"), &[], None).unwrap().scene;
+    let eye = scene.camera.pose(0.0).expect("a camera").position;
+    let truths = truths(&scene, eye, 1, 1e-3);
+    let [radiance, irradiance] = Squares::of(&frame(&gpu, scene), &truths).relative();
+    println!("scenes/rectangles.toml: L2 and I_i {radiance:.4}, {irradiance:.4}");
+    assert!(radiance <= PROMISED);
+}
+
 #[test]
 fn what_the_lights_bring_is_right_to_rounding() {
     let gpu = Gpu::new();

@@ -330,7 +330,7 @@ fn every_scene_of_the_repository_loads() {
         if path.extension().is_some_and(|e| e == "toml") {
             let loaded = load(&path, &[], None).unwrap_or_else(|e| panic!("{e}"));
             assert_eq!(loaded.warnings, [""; 0], "{}", path.display());
-            assert!(loaded.scene.n_particles() > 0 && !loaded.scene.title.is_empty());
+            assert!(loaded.scene.n_facets() > 0 && !loaded.scene.title.is_empty());
             n += 1;
         }
     }

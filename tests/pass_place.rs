@@ -154,7 +154,7 @@ fn gust_bound(scene: &Scene, i: usize) -> f64 {
 #[test]
 fn gusts_move_particles_as_their_closed_form_says() {
     let mut gpu = Gpu::new();
-    let scene = scene(Gust { amplitude: 0.4, length: 3.0, period_s: 7.0 });
+    let scene = scene(Gust { amplitude: 0.4, length: 3.0, period_s: 7.0, n_waves: 16 });
     let compiler = Compiler::new(nimbus::passes::sources(), None).unwrap();
     let mut exact = place(&scene.positions, &scene.groups, &scene.offsets);
     let still = exact.clone();

@@ -14,7 +14,7 @@ use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
 use crate::model::boxes::Form;
 use crate::model::cloud::{Cloud, CloudSource};
-use crate::model::gust::Gust;
+use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 
 /// What a cloud's keys refer to.
@@ -29,7 +29,7 @@ pub struct CloudReader<'a> {
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "seed"]
+        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "seed"]
     };
 }
 
@@ -103,6 +103,7 @@ fn read_gust(s: &mut Section) -> Result<Gust> {
         amplitude: s.f64("gust", 0.0, AMOUNT)?,
         length: s.f64("gust_length", 4.0, DIVISOR)?,
         period_s: s.f64("gust_period_s", 8.0, DIVISOR)?,
+        n_waves: s.u32("gust_waves", 16, 1, MAX_WAVES)?,
     })
 }
 

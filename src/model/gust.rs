@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use super::philox::{philox4x32_10, uniform};
 
-pub const N_MODES: usize = 16;
+/// Most waves of a cloud's gusts.
+pub const MAX_WAVES: u32 = 1024;
 
 /// Smallest eddies are this much smaller than the largest: three octaves.
 const SPECTRUM_WIDTH: f64 = 8.0;
@@ -23,6 +24,8 @@ pub struct Gust {
     pub length: f64,
     /// Period of the largest eddy.
     pub period_s: f64,
+    /// How many waves stand for the spectrum; at least 1.
+    pub n_waves: u32,
 }
 
 /// One wave of the displacement d(x, t) = Σ a sin(k·x + ω t + φ), a ⟂ k.
@@ -35,7 +38,7 @@ pub struct Mode {
 }
 
 impl Gust {
-    pub const CALM: Gust = Gust { amplitude: 0.0, length: 1.0, period_s: 1.0 };
+    pub const CALM: Gust = Gust { amplitude: 0.0, length: 1.0, period_s: 1.0, n_waves: 16 };
 
     pub fn is_calm(&self) -> bool {
         self.amplitude == 0.0
@@ -48,18 +51,18 @@ impl Gust {
             return vec![];
         }
         let first = self.first_amplitude();
-        (0..N_MODES)
+        (0..self.n_waves)
             .map(|m| {
-                let words = philox4x32_10([seed, STREAM], [m as u32, 0, 0, STREAM]);
+                let words = philox4x32_10([seed, STREAM], [m, 0, 0, STREAM]);
                 let [u0, u1, u2, u3] = words.map(uniform);
                 let direction = on_sphere(u0, u1);
                 let across = direction.any_orthonormal_vector();
                 let turn = TAU * u2;
                 let side = across * turn.cos() + direction.cross(across) * turn.sin();
                 Mode {
-                    k: direction * (TAU / self.length * scale(m)),
-                    a: side * (first / scale(m)),
-                    omega: TAU / self.period_s * scale(m).powf(2.0 / 3.0),
+                    k: direction * (TAU / self.length * self.scale(m)),
+                    a: side * (first / self.scale(m)),
+                    omega: TAU / self.period_s * self.scale(m).powf(2.0 / 3.0),
                     phase: TAU * u3,
                 }
             })
@@ -68,13 +71,18 @@ impl Gust {
 
     /// No displacement is longer: Σ|a|.
     pub fn reach(&self) -> f64 {
-        if self.is_calm() { 0.0 } else { (0..N_MODES).map(|m| self.first_amplitude() / scale(m)).sum() }
+        if self.is_calm() { 0.0 } else { (0..self.n_waves).map(|m| self.first_amplitude() / self.scale(m)).sum() }
     }
 
     /// |a| of the first wave: the mean square of the sum is half the sum of the squares.
     fn first_amplitude(&self) -> f64 {
-        let sum: f64 = (0..N_MODES).map(|m| 0.5 * scale(m).powi(-2)).sum();
+        let sum: f64 = (0..self.n_waves).map(|m| 0.5 * self.scale(m).powi(-2)).sum();
         self.amplitude / sum.sqrt()
+    }
+
+    /// Wave number of wave m over the first one's.
+    fn scale(&self, m: u32) -> f64 {
+        SPECTRUM_WIDTH.powf(f64::from(m) / f64::from(self.n_waves.max(2) - 1))
     }
 }
 
@@ -90,11 +98,6 @@ pub fn displacement(modes: &[Mode], phases: &[f64], x: DVec3) -> DVec3 {
     modes.iter().zip(phases).map(|(m, phase)| m.a * (m.k.dot(x) + phase).sin()).sum()
 }
 
-/// Wave number of wave m over the first one's.
-fn scale(m: usize) -> f64 {
-    SPECTRUM_WIDTH.powf(m as f64 / (N_MODES - 1) as f64)
-}
-
 fn on_sphere(u: f64, v: f64) -> DVec3 {
     let z = 2.0 * u - 1.0;
     let r = (1.0 - z * z).max(0.0).sqrt();
@@ -105,7 +108,7 @@ fn on_sphere(u: f64, v: f64) -> DVec3 {
 mod tests {
     use super::*;
 
-    const GUST: Gust = Gust { amplitude: 0.3, length: 4.0, period_s: 5.0 };
+    const GUST: Gust = Gust { amplitude: 0.3, length: 4.0, period_s: 5.0, n_waves: 16 };
 
     #[test]
     fn displacements_have_the_amplitude_asked_for_and_stay_in_reach() {
@@ -121,6 +124,19 @@ mod tests {
         }
         // Few modes dominate, so the mean square of n samples scatters by about 1/√n of itself: 5 sigma are 4 %.
         assert!((sum / f64::from(n) / 0.09 - 1.0).abs() < 0.04, "{}", sum / f64::from(n));
+    }
+
+    #[test]
+    fn any_number_of_waves_has_the_same_power_and_the_same_widest_and_narrowest() {
+        for n_waves in [1, 2, 64] {
+            let gust = Gust { n_waves, ..GUST };
+            let modes = gust.modes(7);
+            let power: f64 = modes.iter().map(|m| 0.5 * m.a.length_squared()).sum();
+            assert!(modes.len() == n_waves as usize && (power - 0.09).abs() < 1e-12, "{n_waves}: {power}");
+            assert!((modes[0].k.length() - TAU / 4.0).abs() < 1e-12);
+            let narrowest = modes[n_waves as usize - 1].k.length() / modes[0].k.length();
+            assert!((narrowest - if n_waves == 1 { 1.0 } else { 8.0 }).abs() < 1e-12, "{narrowest}");
+        }
     }
 
     #[test]

@@ -22,6 +22,8 @@ pub enum Error {
     Usage { what: String },
     /// A check that was asked for and failed (validation messages, a comparison).
     Check { what: String },
+    /// A fault of nimbus itself: a thread that panicked.
+    Fault { what: String },
     /// Ctrl-C; what was finished is kept.
     Interrupted,
 }
@@ -76,7 +78,7 @@ impl Error {
         Error::Usage { what: what.into() }
     }
 
-    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 130 interrupted.
+    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 101 a fault of nimbus itself; 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Check { .. } => 1,
@@ -86,6 +88,7 @@ impl Error {
             | Error::Io { .. }
             | Error::Usage { .. } => 2,
             Error::Vulkan { .. } => 3,
+            Error::Fault { .. } => 101,
             Error::Interrupted => 130,
         }
     }
@@ -99,7 +102,7 @@ impl fmt::Display for Error {
             Error::Vulkan { call, what } => write!(f, "Vulkan: {call}: {what}"),
             Error::Limit { what } => write!(f, "limit: {what}"),
             Error::Io { path, what } => write!(f, "{}: {what}", path.display()),
-            Error::Usage { what } | Error::Check { what } => write!(f, "{what}"),
+            Error::Usage { what } | Error::Check { what } | Error::Fault { what } => write!(f, "{what}"),
             Error::Interrupted => write!(f, "interrupted"),
         }
     }

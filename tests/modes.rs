@@ -166,3 +166,33 @@ fn an_error_of_the_game_step_ends_both_loops() {
         assert_eq!((done.expect_err("the error comes through").exit_code(), n), (2, 1));
     }
 }
+
+#[test]
+fn a_panic_of_the_game_thread_ends_both_sides_with_what_it_said() {
+    let gpu = Gpu::new();
+    let scene = Arc::new(scene(&["threads.simulate=cpu"]));
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    // Fewer particles than the scene has.
+    let mut game = Game::new(scene.clone(), Some(vec![]));
+    let done =
+        parallel::run(&mut game, &mut renderer, 0..10, &mut |_, _| Ok(true)).expect_err("the panic comes through");
+    assert!(done.exit_code() == 101 && done.to_string().contains("the game thread panicked: range end"), "{done}");
+}
+
+#[test]
+fn a_parallel_run_that_is_stopped_leaves_nothing_in_flight() {
+    let gpu = Gpu::new();
+    let scene = Arc::new(scene(&[]));
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    let mut game = Game::new(scene.clone(), None);
+    let mut seen = vec![];
+    let on_frame = &mut |times: FrameTimes, _: &mut Renderer| {
+        seen.push(times.i_frame);
+        Ok(times.i_frame < 4)
+    };
+    parallel::run(&mut game, &mut renderer, 0..u32::MAX, on_frame).expect("a run");
+    assert_eq!(seen, [0, 1, 2, 3, 4]);
+    // Two may be in flight, and a third is refused.
+    let mut begin = |i| renderer.begin(game.step(i).expect("a packet")).map(|_| ());
+    assert!(begin(5).is_ok() && begin(6).is_ok() && begin(7).is_err());
+}

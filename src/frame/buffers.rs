@@ -1,7 +1,7 @@
 //! The buffers that the passes hand to each other, and what they are filled with once.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Device, Place};
+use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
@@ -10,8 +10,10 @@ use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 
+use super::feed::Feed;
 use super::grouping::is_grouped;
 use super::limits::n_cells_max;
+use super::packet::Packet;
 
 /// Named by content; record types as in [`crate::layout`].
 pub struct Buffers {
@@ -21,34 +23,64 @@ pub struct Buffers {
     pub particles: Buffer,
     /// u32 by particle: attempts, and whether it was folded.
     pub status: Buffer,
-    /// Written by the host every frame.
-    pub groups: Buffer,
-    /// Written by the host every frame.
-    pub modes: Buffer,
-    /// Written by the host every frame where the game thread places the particles.
-    pub placed_upload: Option<Buffer>,
-    pub placed: Buffer,
+    pub groups: Feed,
+    pub modes: Feed,
+    /// Fed where the game thread places the particles, else written by `place`.
+    pub placed: Placed,
     pub density: Buffer,
     pub facets: Buffer,
-    /// Written by the host every frame.
-    pub regions: Buffer,
-    /// Written by the host every frame.
-    pub lights: Buffer,
+    pub regions: Feed,
+    pub lights: Feed,
     pub transmittance: Buffer,
     /// Its mean over each facet; empty where nothing asks for it.
     pub through: Buffer,
     pub lit: Buffer,
     /// Region of each facet of a surface.
     pub i_region: Buffer,
-    /// Lobes by material, then the basis' vectors, N_NODES numbers each; written by the host every frame.
-    pub table: Buffer,
+    /// Lobes by material, then the basis' vectors, N_NODES numbers each.
+    pub table: Feed,
     /// Facet of each particle, where facets stand for several.
     pub i_facet: Buffer,
     /// [key, particle].
     pub entries: Buffer,
 }
 
+/// Every particle's place.
+pub enum Placed {
+    ByHost(Feed),
+    ByDevice(Buffer),
+}
+
+impl Placed {
+    pub fn buffer(&self) -> &Buffer {
+        match self {
+            Placed::ByHost(feed) => &feed.buffer,
+            Placed::ByDevice(buffer) => buffer,
+        }
+    }
+}
+
 impl Buffers {
+    /// Writes what every frame brings along, into staging buffers of `slot`.
+    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        self.groups.write(slot, &packet.groups)?;
+        self.modes.write(slot, &packet.modes)?;
+        self.table.write(slot, &packet.table)?;
+        self.regions.write(slot, &packet.regions)?;
+        self.lights.write(slot, &packet.lights)?;
+        match (&mut self.placed, &packet.placed) {
+            (Placed::ByHost(feed), Some(placed)) => feed.write(slot, placed),
+            _ => Ok(()),
+        }
+    }
+
+    /// Copies it to where shaders read it; the particles' places are `place`'s.
+    pub fn record(&self, rec: &mut Recorder<'_>, slot: usize) {
+        for feed in [&self.groups, &self.modes, &self.table, &self.regions, &self.lights] {
+            feed.record(rec, slot);
+        }
+    }
+
     pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
         let n = scene.n_particles();
         let n_facets = scene.n_facets();
@@ -59,26 +91,25 @@ impl Buffers {
         let n_through = if has_second(scene) { n_facets * n_lights } else { 0 };
         // No more vectors than were asked for.
         let n_table_rows = scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1;
-        let placed_upload = match host_places {
-            true => Some(Buffer::new::<PlacedRecord>(device, "place.upload", n, Place::Upload)?),
-            false => None,
+        let placed = match host_places {
+            true => Placed::ByHost(Feed::new::<PlacedRecord>(device, "place.placed", n)?),
+            false => Placed::ByDevice(Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?),
         };
         Ok(Buffers {
             boxes: Buffer::new::<BoxRecord>(device, "generate.boxes", n_groups, Place::Device)?,
             i_group: Buffer::new::<u32>(device, "generate.i_group", n, Place::Device)?,
             particles: Buffer::new::<ParticleRecord>(device, "generate.particles", n, Place::Device)?,
             status: Buffer::new::<u32>(device, "generate.status", n, Place::Device)?,
-            groups: Buffer::new::<GroupRecord>(device, "place.groups", n_groups, Place::Upload)?,
-            modes: Buffer::new::<ModeRecord>(device, "place.modes", n_modes, Place::Upload)?,
-            placed_upload,
-            placed: Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?,
+            groups: Feed::new::<GroupRecord>(device, "place.groups", n_groups)?,
+            modes: Feed::new::<ModeRecord>(device, "place.modes", n_modes)?,
+            placed,
             density: Buffer::new::<f32>(device, "grid.density", n_cells_max(scene), Place::Device)?,
             facets: Buffer::new::<FacetRecord>(device, "facets.facets", n_facets, Place::Device)?,
-            regions: Buffer::new::<RegionRecord>(device, "first.regions", scene.n_regions() as u64, Place::Upload)?,
-            lights: Buffer::new::<LightRecord>(device, "transmit.lights", n_lights, Place::Upload)?,
+            regions: Feed::new::<RegionRecord>(device, "first.regions", scene.n_regions() as u64)?,
+            lights: Feed::new::<LightRecord>(device, "transmit.lights", n_lights)?,
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
             i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
-            table: Buffer::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64, Place::Upload)?,
+            table: Feed::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64)?,
             through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,

@@ -1,6 +1,7 @@
 //! What puts the particles into Morton order, where facets stand for runs of them.
 
 use super::buffers::{Buffers, upload};
+use super::feed::Feed;
 use super::packet::Packet;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
@@ -22,8 +23,7 @@ pub struct Grouping {
     order: Buffer,
     /// Places of each of the clouds' facets.
     runs: Buffer,
-    /// Written by the host every frame.
-    bounds: Buffer,
+    bounds: Feed,
     n_particles: u32,
     n_surface_facets: u32,
     n_runs: u32,
@@ -46,7 +46,7 @@ impl Grouping {
             entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, Place::Device)?,
             order: Buffer::new::<u32>(device, "morton.order", n, Place::Device)?,
             runs: Buffer::new::<RunRecord>(device, "facets.runs", runs.len() as u64, Place::Device)?,
-            bounds: Buffer::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64, Place::Upload)?,
+            bounds: Feed::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64)?,
             n_particles: n as u32,
             n_surface_facets: scene.n_surface_facets() as u32,
             n_runs: runs.len() as u32,
@@ -56,19 +56,23 @@ impl Grouping {
         Ok(grouping)
     }
 
-    pub fn upload(&mut self, packet: &Packet) -> Result<()> {
-        self.bounds.write(&packet.bounds)
+    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        self.bounds.write(slot, &packet.bounds)
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, slot: usize) {
+        self.bounds.record(rec, slot);
     }
 
     pub fn record_order(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
-        let buffers = [&b.placed, &b.i_group, &b.groups, &self.bounds, &self.entries];
+        let buffers = [b.placed.buffer(), &b.i_group, &b.groups.buffer, &self.bounds.buffer, &self.entries];
         self.morton.record_particles(rec, buffers, self.n_particles, self.n_regions)?;
         self.sort.record(rec, &self.entries, self.n_particles, KEY_BITS)?;
         self.morton.record_order(rec, [&self.entries, &self.order], self.n_particles)
     }
 
     pub fn record_facets(&self, rec: &mut Recorder<'_>, facets: &Facets, b: &Buffers, packet: &Packet) -> Result<()> {
-        let [placed, particles, i_group, groups] = [&b.placed, &b.particles, &b.i_group, &b.groups];
+        let [placed, particles, i_group, groups] = [b.placed.buffer(), &b.particles, &b.i_group, &b.groups.buffer];
         let buffers = [placed, particles, i_group, groups, &b.density, &self.order, &self.runs, &b.facets, &b.i_facet];
         facets.record_groups(rec, buffers, &packet.grid, self.n_runs, self.n_surface_facets)
     }

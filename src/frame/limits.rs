@@ -12,11 +12,11 @@ use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord
 use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
-use crate::model::gust::N_MODES;
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
 
 use super::buffers::has_second;
+use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
 use super::render::target_format;
@@ -47,7 +47,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
-        ("the particles' places, as uploaded", n, size(size_of::<PlacedRecord>())),
+        ("the particles' places, as uploaded", IN_FLIGHT as u64 * n, size(size_of::<PlacedRecord>())),
         ("the particles' groups", n, 4),
         ("the particles' generation status", n, 4),
         ("the facets", scene.n_facets(), size(size_of::<FacetRecord>())),
@@ -63,7 +63,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),
-        ("the gusts", (scene.clouds.len() * N_MODES) as u64, size(size_of::<ModeRecord>())),
+        ("the gusts", scene.clouds.iter().map(|c| u64::from(c.gust.n_waves)).sum(), size(size_of::<ModeRecord>())),
         ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
         ("the density grid's sums", n_cells_max(scene), 8),
         ("the density grid", n_cells_max(scene), 4),

@@ -3,12 +3,14 @@
 
 pub mod buffers;
 pub mod exchange;
+pub mod feed;
 pub mod game;
 pub mod grouping;
 pub mod limits;
 pub mod packet;
 pub mod parallel;
 pub mod plan;
+mod readback;
 pub mod relay;
 pub mod render;
 pub mod serial;
@@ -20,7 +22,7 @@ use crate::error::Result;
 use crate::gpu::ScopeTime;
 use packet::Packet;
 use plan::Plan;
-use render::Renderer;
+use render::{Rendered, Renderer};
 
 /// What one frame took. Times in ms.
 #[derive(Debug, Clone)]
@@ -32,11 +34,11 @@ pub struct FrameTimes {
     pub game_ms: f64,
     /// Uploading, planning and recording.
     pub record_ms: f64,
-    /// Submitting, and waiting for the GPU.
+    /// From the submission, or from the end of the frame before where that was later, to the frame's end.
     pub submit_wait_ms: f64,
     /// From the start of the game step to the finished image.
     pub latency_ms: f64,
-    /// Packets that were ready when the render step asked for one; 0 where it had to wait for the game step.
+    /// Frames that the device still had when this one was handed to it; 0 where it had nothing to do.
     pub queue_depth: u32,
     pub plan: Plan,
     /// GPU time of every pass that ran; empty where the device has no timestamps.
@@ -46,30 +48,37 @@ pub struct FrameTimes {
 /// Told of every frame as it ends; `false` ends the loop after it.
 pub type OnFrame<'a> = dyn FnMut(FrameTimes, &mut Renderer) -> Result<bool> + 'a;
 
-/// Draws `packet` and puts the times together; `last_end` is the end of the frame before.
-fn render_timed(
-    renderer: &mut Renderer,
-    packet: Packet,
+/// What of a packet the times of its frame are made with.
+struct Started {
+    i_frame: u32,
+    time_s: f64,
+    begin: Instant,
+    game_ms: f64,
     queue_depth: u32,
-    last_end: &mut Instant,
-) -> Result<FrameTimes> {
-    let (i_frame, time_s, begin, game_ms) = (packet.i_frame, packet.time_s, packet.begin, packet.game_ms);
-    let done = renderer.step(packet)?;
-    let end = Instant::now();
-    let frame_ms = ms(*last_end, end);
-    *last_end = end;
-    Ok(FrameTimes {
-        i_frame,
-        time_s,
-        frame_ms,
-        game_ms,
-        record_ms: done.record_ms,
-        submit_wait_ms: done.submit_wait_ms,
-        latency_ms: ms(begin, end),
-        queue_depth,
-        plan: done.plan,
-        passes: done.passes,
-    })
+}
+
+impl Started {
+    fn of(packet: &Packet, queue_depth: u32) -> Started {
+        let Packet { i_frame, time_s, begin, game_ms, .. } = *packet;
+        Started { i_frame, time_s, begin, game_ms, queue_depth }
+    }
+
+    /// The times of a frame whose picture was finished at `end`; `last_end` is that of the frame before.
+    fn ended(self, done: Rendered, end: Instant, last_end: &mut Instant) -> FrameTimes {
+        let frame_ms = ms(std::mem::replace(last_end, end), end);
+        FrameTimes {
+            i_frame: self.i_frame,
+            time_s: self.time_s,
+            frame_ms,
+            game_ms: self.game_ms,
+            record_ms: done.record_ms,
+            submit_wait_ms: done.submit_wait_ms,
+            latency_ms: ms(self.begin, end),
+            queue_depth: self.queue_depth,
+            plan: done.plan,
+            passes: done.passes,
+        }
+    }
 }
 
 fn ms(begin: Instant, end: Instant) -> f64 {

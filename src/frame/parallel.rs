@@ -1,57 +1,138 @@
-//! Game step and render step side by side: a game thread one frame ahead, an owned packet a frame through a bounded
-//! channel, and no lock that both take.
+//! Game step and render step side by side: a thread plays, one draws, one waits for the device. An owned packet a frame
+//! crosses, through bounded channels, and there is no lock that two of them take.
+//!
+//! A frame's game step may begin when the second frame before it has ended. So the device always has the next frame at
+//! hand, recorded while it draws, and a picture is never older than two frames.
 
+use std::collections::VecDeque;
 use std::ops::Range;
-use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::sync_channel;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{Builder, Scope};
 use std::time::Instant;
 
+use super::feed::IN_FLIGHT;
 use super::game::Game;
 use super::packet::Packet;
 use super::render::Renderer;
-use super::{OnFrame, render_timed};
+use super::{OnFrame, Started};
 use crate::error::{Error, Result};
+use crate::gpu::Pending;
 
-/// Packets that may wait. 0 hands over from hand to hand: the game thread makes frame n + 1 while frame n is drawn, and
-/// then waits, which is one frame ahead. More would only add latency.
-const WAITING_PACKETS: usize = 0;
+/// What the drawing thread is told.
+enum Event {
+    Packet(Packet),
+    /// The oldest frame in flight was finished at this time.
+    Ended(Instant),
+    /// There is no further frame; an error where there should have been one.
+    Played(Result<()>),
+    /// The device, or a thread: nothing more will end.
+    Failed(Error),
+}
+
+/// Room for all that can be told at once, so that nobody who tells has to wait: a packet and an end for each frame in
+/// flight, and how either thread ends.
+const EVENTS: usize = 2 * IN_FLIGHT + 2;
 
 /// Runs `frames`; `on_frame` sees each as it ends. An error or panic on either side ends both.
 pub fn run(game: &mut Game, renderer: &mut Renderer, frames: Range<u32>, on_frame: &mut OnFrame<'_>) -> Result<()> {
-    let (send, receive) = sync_channel::<Result<Packet>>(WAITING_PACKETS);
-    let n_ready = &AtomicU32::new(0);
-    std::thread::scope(|scope| {
-        let play = move || {
-            for i_frame in frames {
-                let packet = game.step(i_frame);
-                let failed = packet.is_err();
-                n_ready.fetch_add(1, Ordering::Relaxed);
-                // The receiver is gone when the render side has ended: nothing is left to do.
-                if send.send(packet).is_err() || failed {
-                    return;
-                }
-            }
-        };
-        let named = std::thread::Builder::new().name("game".into()).spawn_scoped(scope, play);
-        let player = named.map_err(|e| Error::vulkan("starting the game thread", e))?;
-        let mut last_end = Instant::now();
-        let mut draw = || -> Result<()> {
-            loop {
-                let depth = n_ready.load(Ordering::Relaxed);
-                let Ok(packet) = receive.recv() else { return Ok(()) };
-                n_ready.fetch_sub(1, Ordering::Relaxed);
-                let times = render_timed(renderer, packet?, depth, &mut last_end)?;
-                if !on_frame(times, renderer)? {
-                    return Ok(());
-                }
-            }
-        };
-        let drawn = draw();
-        // Ends a game thread that still has a packet to hand over.
-        drop(receive);
-        match player.join() {
-            Ok(()) => drawn,
-            Err(panic) => std::panic::resume_unwind(panic),
+    let drawn = std::thread::scope(|scope| {
+        let (tell, events) = sync_channel::<Event>(EVENTS);
+        let (grant, granted) = sync_channel::<()>(IN_FLIGHT);
+        let (submit, submitted) = sync_channel::<Pending>(IN_FLIGHT);
+        let teller = tell.clone();
+        start(scope, "game", tell.clone(), move || play(game, frames, &granted, &teller))?;
+        let teller = tell.clone();
+        start(scope, "wait", tell, move || wait(&submitted, &teller))?;
+        for _ in 0..IN_FLIGHT {
+            // There is room for as many.
+            let _ = grant.send(());
         }
-    })
+        // What is still owned here ends with this block, and with it both threads.
+        Drawing { renderer: &mut *renderer, grant, submit, started: VecDeque::new() }.run(&events, on_frame)
+    });
+    renderer.drain();
+    drawn
+}
+
+/// Starts a thread whose panic is told as an error.
+fn start<'scope>(
+    scope: &'scope Scope<'scope, '_>,
+    name: &'static str,
+    tell: SyncSender<Event>,
+    work: impl FnOnce() + Send + 'scope,
+) -> Result<()> {
+    let guarded = move || {
+        if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
+            let text = panic.downcast_ref::<String>().cloned();
+            let text = text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_default();
+            // Nobody listens when the drawing thread has ended.
+            let _ = tell.send(Event::Failed(Error::Fault { what: format!("the {name} thread panicked: {text}") }));
+        }
+    };
+    let started = Builder::new().name(name.into()).spawn_scoped(scope, guarded);
+    started.map(|_| ()).map_err(|e| Error::vulkan(format!("starting the {name} thread"), e))
+}
+
+/// The game thread: a step for every grant.
+fn play(game: &mut Game, frames: Range<u32>, granted: &Receiver<()>, tell: &SyncSender<Event>) {
+    for i_frame in frames {
+        // The other side has ended where it grants nothing any more, or hears nothing.
+        if granted.recv().is_err() {
+            return;
+        }
+        let event = game.step(i_frame).map_or_else(|e| Event::Played(Err(e)), Event::Packet);
+        let is_last = matches!(event, Event::Played(_));
+        if tell.send(event).is_err() || is_last {
+            return;
+        }
+    }
+    let _ = tell.send(Event::Played(Ok(())));
+}
+
+/// The waiting thread: tells when each submission was finished.
+fn wait(submitted: &Receiver<Pending>, tell: &SyncSender<Event>) {
+    while let Ok(pending) = submitted.recv() {
+        let event = pending.wait().map_or_else(Event::Failed, |()| Event::Ended(Instant::now()));
+        if tell.send(event).is_err() {
+            return;
+        }
+    }
+}
+
+/// The drawing thread, which is the caller's.
+struct Drawing<'a> {
+    renderer: &'a mut Renderer,
+    grant: SyncSender<()>,
+    submit: SyncSender<Pending>,
+    started: VecDeque<Started>,
+}
+
+impl Drawing<'_> {
+    fn run(mut self, events: &Receiver<Event>, on_frame: &mut OnFrame<'_>) -> Result<()> {
+        let (mut last_end, mut played) = (Instant::now(), None);
+        while played.is_none() || !self.started.is_empty() {
+            // Nobody tells anything any more: both threads have ended, and said so before.
+            let Ok(event) = events.recv() else { break };
+            match event {
+                Event::Packet(packet) => {
+                    self.started.push_back(Started::of(&packet, self.started.len() as u32));
+                    let pending = self.renderer.begin(packet)?;
+                    // There is room for every frame in flight; a waiting thread that is gone has told why.
+                    let _ = self.submit.send(pending);
+                }
+                Event::Ended(end) => {
+                    let Some(started) = self.started.pop_front() else { continue };
+                    let times = started.ended(self.renderer.end()?, end, &mut last_end);
+                    if !on_frame(times, self.renderer)? {
+                        return Ok(());
+                    }
+                    let _ = self.grant.send(());
+                }
+                Event::Played(how) => played = Some(how),
+                Event::Failed(error) => return Err(error),
+            }
+        }
+        played.unwrap_or(Ok(()))
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::buffers::Buffers;
 use super::exchange::{Exchange, is_glossy, turns};
+use super::feed::Feed;
 use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::tensor::TensorStage;
@@ -32,7 +33,7 @@ struct Order {
     sort: Sort,
     entries: Buffer,
     /// Written by the host every frame.
-    bounds: Buffer,
+    bounds: Feed,
     n_regions: u32,
 }
 
@@ -63,8 +64,15 @@ impl Relay {
         })
     }
 
-    pub fn upload(&mut self, packet: &Packet) -> Result<()> {
-        self.order.as_mut().map_or(Ok(()), |order| order.bounds.write(&packet.bounds))
+    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        self.order.as_mut().map_or(Ok(()), |order| order.bounds.write(slot, &packet.bounds))
+    }
+
+    /// Copies what was written to where shaders read it.
+    pub fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
+        if let Some(order) = &self.order {
+            order.bounds.record(rec, slot);
+        }
     }
 
     /// Gathers at once, or into `tensor` where there is one.
@@ -127,10 +135,10 @@ impl Relay {
         let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights, n_surfaces: self.n_surfaces };
         let buffers = [
             &b.facets,
-            &b.lights,
+            &b.lights.buffer,
             &b.transmittance,
             &b.through,
-            &b.regions,
+            &b.regions.buffer,
             &x.order,
             &x.leaves,
             &x.sources,
@@ -153,13 +161,13 @@ impl Order {
             morton: Morton::new(device, compiler)?,
             sort: Sort::new(device, compiler, n as u32)?,
             entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, Place::Device)?,
-            bounds: Buffer::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64, Place::Upload)?,
+            bounds: Feed::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64)?,
             n_regions: n_regions as u32,
         })
     }
 
     fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, order: &Buffer, n_facets: u32) -> Result<()> {
-        self.morton.record_facets(rec, [&b.facets, &self.bounds, &self.entries], n_facets, self.n_regions)?;
+        self.morton.record_facets(rec, [&b.facets, &self.bounds.buffer, &self.entries], n_facets, self.n_regions)?;
         self.sort.record(rec, &self.entries, n_facets, 32)?;
         self.morton.record_order(rec, [&self.entries, order], n_facets)
     }

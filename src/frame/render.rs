@@ -1,20 +1,20 @@
 //! The render step: the whole frame on one page.
 
+use std::collections::VecDeque;
 use std::time::Instant;
 
-use super::buffers::{Buffers, download, has_second};
+use super::buffers::{Buffers, Placed, has_second};
 use super::exchange::{gathers_from_tree, is_glossy};
+use super::feed::IN_FLIGHT;
 use super::grouping::{Grouping, is_grouped};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::relay::Relay;
 use super::tensor::{TensorStage, tensor_stage};
 use super::{limits, ms};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Place, Recorder, ScopeTime, Target};
-use crate::layout::facet::{FacetRecord, LitRecord};
-use crate::layout::particle::{ParticleRecord, PlacedRecord};
+use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Pending, Place, Recorder, ScopeTime, Target};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::{CloudSource, heaviest_blob};
 use crate::model::film::FilmFormat;
@@ -29,8 +29,14 @@ use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
 use crate::passes::transmit::Transmit;
 
+// Commands first: they are dropped first, and wait for what is still under way.
 pub struct Renderer {
-    generate: Generate,
+    /// One for each frame in flight.
+    frames: [Commands; IN_FLIGHT],
+    /// For what is asked between frames.
+    pub(super) host: Commands,
+    in_flight: VecDeque<InFlight>,
+    pub(super) generate: Generate,
     place: PlacePass,
     grid: Grid,
     facets: Facets,
@@ -41,20 +47,37 @@ pub struct Renderer {
     tensor: Option<TensorStage>,
     sort: Sort,
     sprites: Sprites,
-    buffers: Buffers,
-    target: Image,
+    pub(super) buffers: Buffers,
+    /// A frame that changes the picture draws into the one that the frame before has not.
+    pub(super) targets: [Image; IN_FLIGHT],
+    /// The last submitted frame's target.
+    i_target: usize,
+    /// The last ended frame's.
+    pub(super) i_ended_target: usize,
     /// What draws the surfaces, and their depth; none where there are none.
     scenery: Option<(Surfaces, Image)>,
-    readback: Buffer,
-    commands: Commands,
-    settings: Settings,
-    traits: Traits,
+    pub(super) readback: Buffer,
+    pub(super) settings: Settings,
+    pub(super) traits: Traits,
     last: Option<Packet>,
+    /// Frames submitted so far.
+    n_begun: u64,
+    /// When the last one ended.
+    last_end: Instant,
+}
+
+/// A frame that was submitted and has not been waited for.
+struct InFlight {
+    slot: usize,
+    i_target: usize,
+    plan: Plan,
+    record_ms: f64,
+    submitted: Instant,
 }
 
 /// What of the scene the passes are told and that is constant over a run.
 pub(super) struct Settings {
-    n_particles: u32,
+    pub n_particles: u32,
     n_surface_facets: u32,
     pub n_facets: u32,
     pub n_lights: u32,
@@ -64,7 +87,7 @@ pub(super) struct Settings {
     pub forward: f64,
     sort_bits: u32,
     cutoff: f64,
-    format: TargetFormat,
+    pub format: TargetFormat,
 }
 
 /// What a render step tells of itself.
@@ -86,13 +109,13 @@ impl Renderer {
         let format = target_format(scene.film.format);
         let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
-        let mut commands = Commands::new(device, "frame")?;
-        let (tensors, tensor) = tensor_stage(device, compiler, &mut commands, scene, free)?;
+        let mut host = Commands::new(device, "frame.host")?;
+        let (tensors, tensor) = tensor_stage(device, compiler, &mut host, scene, free)?;
         let two_reflections = scene.lighting.mode == LightingMode::TwoReflection;
         // Tensors hold every pair.
         let tree = tensor.is_none() && gathers_from_tree(scene);
         let second = match two_reflections {
-            true => Some(Relay::new(device, compiler, &mut commands, scene, tree)?),
+            true => Some(Relay::new(device, compiler, &mut host, scene, tree)?),
             false => None,
         };
         let scenery = match scene.surfaces.is_empty() {
@@ -104,10 +127,14 @@ impl Renderer {
         };
         let grouped = is_grouped(scene);
         let grouping = match grouped {
-            true => Some(Grouping::new(device, compiler, &mut commands, scene)?),
+            true => Some(Grouping::new(device, compiler, &mut host, scene)?),
             false => None,
         };
+        let target = |name| Image::color_target(device, name, scene.film.width, scene.film.height, format);
         let mut renderer = Renderer {
+            frames: [Commands::new(device, "frame.even")?, Commands::new(device, "frame.odd")?],
+            host,
+            in_flight: VecDeque::with_capacity(IN_FLIGHT),
             generate: Generate::new(device, compiler)?,
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
@@ -120,10 +147,11 @@ impl Renderer {
             sort: Sort::new(device, compiler, n_particles)?,
             sprites: Sprites::new(device, compiler, format, lit, [scenery.is_some(), grouped])?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
-            target: Image::color_target(device, "sprites.target", scene.film.width, scene.film.height, format)?,
+            targets: [target("sprites.even")?, target("sprites.odd")?],
+            i_target: 0,
+            i_ended_target: 0,
             scenery,
             readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
-            commands,
             settings: Settings {
                 n_particles,
                 n_surface_facets: scene.n_surface_facets() as u32,
@@ -151,22 +179,58 @@ impl Renderer {
                 skip,
             },
             last: None,
+            n_begun: 0,
+            last_end: Instant::now(),
         };
-        renderer.buffers.fill(device, &mut renderer.commands, scene, &groups)?;
+        renderer.buffers.fill(device, &mut renderer.host, scene, &groups)?;
         Ok(renderer)
     }
 
     /// Draws one frame and waits for it.
     pub fn step(&mut self, packet: Packet) -> Result<Rendered> {
+        self.begin(packet)?.wait()?;
+        self.end()
+    }
+
+    /// Uploads, records and submits a frame, and gives what can be waited for. At most [`IN_FLIGHT`] frames may have begun
+    /// and not ended.
+    pub fn begin(&mut self, packet: Packet) -> Result<Pending> {
+        if self.in_flight.len() == IN_FLIGHT {
+            return Err(Error::usage(format!("{IN_FLIGHT} frames are in flight; one must end before the next begins")));
+        }
         let begin = Instant::now();
         let plan = plan(&self.traits, self.last.as_ref(), &packet);
-        self.upload(&packet, &plan)?;
-        self.record(&packet, &plan)?;
-        let recorded = Instant::now();
-        self.commands.submit()?;
-        let passes = self.commands.wait()?;
+        let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
+        if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) {
+            self.i_target = (self.i_target + 1) % IN_FLIGHT;
+        }
+        self.write(slot, &packet)?;
+        self.record(slot, &packet, &plan)?;
+        let submitted = Instant::now();
+        let pending = self.frames[slot].submit()?;
+        let (i_target, record_ms) = (self.i_target, ms(begin, submitted));
+        self.in_flight.push_back(InFlight { slot, i_target, plan, record_ms, submitted });
+        self.n_begun += 1;
         self.last = Some(packet);
-        Ok(Rendered { plan, record_ms: ms(begin, recorded), submit_wait_ms: ms(recorded, Instant::now()), passes })
+        Ok(pending)
+    }
+
+    /// Waits for the oldest frame in flight and gives what it tells.
+    pub fn end(&mut self) -> Result<Rendered> {
+        let frame = self.in_flight.pop_front().ok_or_else(|| Error::usage("no frame is in flight"))?;
+        let passes = self.frames[frame.slot].wait()?;
+        self.i_ended_target = frame.i_target;
+        let now = Instant::now();
+        // What was waited for the frame before is that one's.
+        let submit_wait_ms = ms(frame.submitted.max(std::mem::replace(&mut self.last_end, now)), now);
+        Ok(Rendered { plan: frame.plan, record_ms: frame.record_ms, submit_wait_ms, passes })
+    }
+
+    /// Waits for every frame in flight, of which nothing is wanted.
+    pub fn drain(&mut self) {
+        // What went wrong was or will be told by whoever asks for a frame.
+        while !self.in_flight.is_empty() && self.end().is_ok() {}
+        self.in_flight.clear();
     }
 
     /// Forgets the last frame: the next one does everything, as the first did.
@@ -174,29 +238,22 @@ impl Renderer {
         self.last = None;
     }
 
-    fn upload(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
-        self.buffers.groups.write(&packet.groups)?;
-        self.buffers.modes.write(&packet.modes)?;
+    fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        self.buffers.write(slot, packet)?;
         if let Some(grouping) = &mut self.grouping {
-            grouping.upload(packet)?;
+            grouping.write(slot, packet)?;
         }
         if let Some(second) = &mut self.second {
-            second.upload(packet)?;
+            second.write(slot, packet)?;
         }
-        self.buffers.table.write(&packet.table)?;
-        self.buffers.regions.write(&packet.regions)?;
-        self.buffers.lights.write(&packet.lights)?;
-        if let Some(tensor) = &mut self.tensor {
-            tensor.upload(packet)?;
-        }
-        match (&mut self.buffers.placed_upload, &packet.placed) {
-            (Some(upload), Some(placed)) if plan.runs(Pass::Place) => upload.write(placed),
-            _ => Ok(()),
+        match &mut self.tensor {
+            Some(tensor) => tensor.write(slot, packet),
+            None => Ok(()),
         }
     }
 
     /// The frame, pass by pass.
-    fn record(&mut self, packet: &Packet, plan: &Plan) -> Result<()> {
+    fn record(&mut self, slot: usize, packet: &Packet, plan: &Plan) -> Result<()> {
         let Renderer {
             generate,
             place,
@@ -211,38 +268,48 @@ impl Renderer {
             sprites,
             scenery,
             buffers: b,
-            target,
+            targets,
+            i_target,
             settings: s,
+            frames,
             ..
         } = self;
-        let n = s.n_particles;
-        self.commands.record(Barriers::Placed, |rec| {
+        let (n, target) = (s.n_particles, &mut targets[*i_target]);
+        frames[slot].record(Barriers::Placed, |rec| {
+            b.record(rec, slot);
+            grouping.iter().for_each(|g| g.record(rec, slot));
+            second.iter().for_each(|s| s.record_feeds(rec, slot));
+            tensor.iter().for_each(|t| t.record_feeds(rec, slot));
             pass(rec, plan, Pass::Generate, |rec| {
                 generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS)
             })?;
-            pass(rec, plan, Pass::Place, |rec| match &b.placed_upload {
-                Some(upload) => {
-                    rec.copy(upload, &b.placed);
+            pass(rec, plan, Pass::Place, |rec| match &b.placed {
+                Placed::ByHost(feed) => {
+                    feed.record(rec, slot);
                     Ok(())
                 }
-                None => place.record(rec, [&b.particles, &b.i_group, &b.groups, &b.modes, &b.placed], n),
+                Placed::ByDevice(placed) => {
+                    place.record(rec, [&b.particles, &b.i_group, &b.groups.buffer, &b.modes.buffer, placed], n)
+                }
             })?;
+            let placed = b.placed.buffer();
             pass(rec, plan, Pass::Grid, |rec| {
-                grid.record(rec, [&b.placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
+                grid.record(rec, [placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
             })?;
             pass(rec, plan, Pass::Morton, |rec| grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b)))?;
             pass(rec, plan, Pass::Facets, |rec| {
                 match grouping {
                     Some(grouping) => grouping.record_facets(rec, facets, b, packet)?,
                     None => {
-                        let buffers = [&b.placed, &b.particles, &b.i_group, &b.groups, &b.density, &b.facets];
+                        let buffers = [placed, &b.particles, &b.i_group, &b.groups.buffer, &b.density, &b.facets];
                         facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
                     }
                 }
-                facets.record_surfaces(rec, [&b.regions, &b.i_region, &b.facets], s.n_surface_facets)
+                facets.record_surfaces(rec, [&b.regions.buffer, &b.i_region, &b.facets], s.n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
-                let buffers = [&b.facets, &b.lights, &b.regions, &b.density, &b.transmittance, &b.through];
+                let buffers =
+                    [&b.facets, &b.lights.buffer, &b.regions.buffer, &b.density, &b.transmittance, &b.through];
                 transmit.record(
                     rec,
                     buffers,
@@ -256,7 +323,7 @@ impl Renderer {
                 if let Some(tensor) = tensor {
                     return tensor.record_first(rec, b, packet, s);
                 }
-                let from = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &b.lit];
+                let from = [&b.facets, &b.lights.buffer, &b.transmittance, &b.regions.buffer, &b.table.buffer, &b.lit];
                 let push = FirstPush { eye: packet.camera.eye, n_facets: s.n_facets, n_lights: s.n_lights };
                 first.record(rec, from, &push)
             })?;
@@ -269,69 +336,23 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {
-                sort.record_keys(rec, [&b.placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
+                sort.record_keys(rec, [placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
                 sort.record(rec, &b.entries, n, s.sort_bits)
             })?;
             let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
             pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
                 Some(surfaces) => {
                     let target = Target { color: &mut *target, depth: depth.as_deref_mut() };
-                    surfaces.record(rec, [&b.regions, &b.lit], target, &packet.camera, s.n_surfaces)
+                    surfaces.record(rec, [&b.regions.buffer, &b.lit], target, &packet.camera, s.n_surfaces)
                 }
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, &b.placed, &b.particles, &b.lit, &b.i_facet];
+                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet];
                 let counts = [n, s.n_surface_facets];
                 sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
             })
         })
-    }
-
-    /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
-    pub fn image(&mut self) -> Result<Vec<f32>> {
-        let bytes = self.image_bytes()?;
-        Ok(match self.settings.format {
-            TargetFormat::Rgba16f => {
-                let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
-                halves.into_iter().map(half::f16::to_f32).collect()
-            }
-            TargetFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
-        })
-    }
-
-    /// The last frame as it lies in the target: what "the same bytes" means.
-    pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
-        let (target, readback) = (&mut self.target, &self.readback);
-        self.commands.run(|rec| {
-            rec.copy_image(target, readback);
-            Ok(())
-        })?;
-        readback.read((target.n_pixels() * self.settings.format.bytes_per_pixel()) as usize)
-    }
-
-    /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.
-    pub fn generate_now(&mut self, device: &Device) -> Result<(Vec<ParticleRecord>, Vec<u32>)> {
-        let n = self.settings.n_particles;
-        let (generate, b) = (&self.generate, &self.buffers);
-        if self.traits.has_boxes {
-            self.commands
-                .run(|rec| generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS))?;
-        }
-        let particles = download(device, &mut self.commands, &self.buffers.particles, n)?;
-        Ok((particles, download(device, &mut self.commands, &self.buffers.status, n)?))
-    }
-
-    /// Where the last frame had the particles, relative to its lighting origin.
-    pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
-        download(device, &mut self.commands, &self.buffers.placed, self.settings.n_particles)
-    }
-
-    /// The last frame's facets and their light; only meaningful where the scene is lit.
-    pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
-        let n = self.settings.n_facets;
-        let facets = download(device, &mut self.commands, &self.buffers.facets, n)?;
-        Ok((facets, download(device, &mut self.commands, &self.buffers.lit, n)?))
     }
 }
 

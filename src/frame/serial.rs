@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::game::Game;
 use super::render::Renderer;
-use super::{OnFrame, render_timed};
+use super::{OnFrame, Started};
 use crate::error::Result;
 
 /// Runs `frames`; `on_frame` sees each as it ends.
@@ -13,7 +13,9 @@ pub fn run(game: &mut Game, renderer: &mut Renderer, frames: Range<u32>, on_fram
     let mut last_end = Instant::now();
     for i_frame in frames {
         let packet = game.step(i_frame)?;
-        let times = render_timed(renderer, packet, 1, &mut last_end)?;
+        let started = Started::of(&packet, 0);
+        let done = renderer.step(packet)?;
+        let times = started.ended(done, Instant::now(), &mut last_end);
         if !on_frame(times, renderer)? {
             break;
         }

@@ -3,6 +3,7 @@
 
 use super::buffers::{Buffers, upload};
 use super::exchange::{Exchange, is_glossy, region_sizes, turns};
+use super::feed::Feed;
 use super::limits;
 use super::packet::Packet;
 use super::plan::Tensors;
@@ -165,7 +166,7 @@ pub struct TensorStage {
     t2: Buffer,
     spans: Buffer,
     /// Written by the host every frame.
-    coefficients: Buffer,
+    coefficients: Feed,
     /// First row of the basis' vectors in the table.
     i_vectors: u32,
 }
@@ -194,19 +195,18 @@ impl TensorStage {
             contract: Contract::new(device, compiler, shape.n_bases)?,
             t1: Buffer::new::<f32>(device, "first.t1", shape.n_first(), Place::Device)?,
             t2: Buffer::new::<f32>(device, "second.t2", n_second, Place::Device)?,
-            coefficients: Buffer::new::<[f32; 4]>(
-                device,
-                "contract.coefficients",
-                u64::from(shape.n_columns),
-                Place::Upload,
-            )?,
+            coefficients: Feed::new::<[f32; 4]>(device, "contract.coefficients", u64::from(shape.n_columns))?,
             i_vectors: scene.materials.len() as u32,
             shape,
         })
     }
 
-    pub(super) fn upload(&mut self, packet: &Packet) -> Result<()> {
-        self.coefficients.write(&packet.coefficients)
+    pub(super) fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        self.coefficients.write(slot, &packet.coefficients)
+    }
+
+    pub(super) fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
+        self.coefficients.record(rec, slot);
     }
 
     pub(super) fn record_first(
@@ -224,7 +224,8 @@ impl TensorStage {
             n_rows: self.shape.n_rows as u32,
             i_vectors: self.i_vectors,
         };
-        let buffers = [&b.facets, &b.lights, &b.transmittance, &b.regions, &b.table, &self.t1, &b.lit];
+        let buffers =
+            [&b.facets, &b.lights.buffer, &b.transmittance, &b.regions.buffer, &b.table.buffer, &self.t1, &b.lit];
         self.first.record(rec, buffers, &push)
     }
 
@@ -281,7 +282,16 @@ impl TensorStage {
             n_rows: self.shape.n_rows as u32,
             n_columns: self.shape.n_columns,
         };
-        let buffers = [&b.facets, &b.lights, &b.regions, &self.coefficients, &self.t1, &self.t2, &self.spans, &b.lit];
+        let buffers = [
+            &b.facets,
+            &b.lights.buffer,
+            &b.regions.buffer,
+            &self.coefficients.buffer,
+            &self.t1,
+            &self.t2,
+            &self.spans,
+            &b.lit,
+        ];
         self.contract.record(rec, buffers, &push)
     }
 }

@@ -19,7 +19,7 @@ pub use draw::DrawPipeline;
 pub use instance::Instance;
 pub use kernel::{Field, Kernel};
 pub use memory::{Buffer, Image, Place};
-pub use recorder::{Barriers, Commands, Recorder};
+pub use recorder::{Barriers, Commands, Pending, Recorder};
 pub use recorder_draw::{Start, Target};
 pub use shader::{Compiler, Sources};
 pub use timer::ScopeTime;

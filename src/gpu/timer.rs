@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::device::{Device, Shared};
+use super::memory::{Buffer, Place};
 use crate::error::{Error, Result};
 
 /// GPU time of one named scope.
@@ -25,6 +26,9 @@ impl ScopeTime {
 /// A pool of timestamps, two a scope. On a queue without timestamps it records nothing.
 pub(super) struct Timer {
     pool: vk::QueryPool,
+    /// Where the submission itself copies them: to ask the pool is to wait for all later submissions on some drivers
+    /// (lavapipe waits for the whole device).
+    ticks: Option<Buffer>,
     names: Vec<&'static str>,
     max_scopes: u32,
     shared: Arc<Shared>,
@@ -33,14 +37,21 @@ pub(super) struct Timer {
 impl Timer {
     pub fn new(device: &Device, name: &str, max_scopes: u32) -> Result<Timer> {
         let shared = device.shared().clone();
-        let mut timer =
-            Timer { pool: vk::QueryPool::null(), names: Vec::with_capacity(max_scopes as usize), max_scopes, shared };
+        let mut timer = Timer {
+            pool: vk::QueryPool::null(),
+            ticks: None,
+            names: Vec::with_capacity(max_scopes as usize),
+            max_scopes,
+            shared,
+        };
         if device.limits().timestamp_valid_bits > 0 {
             let info =
                 vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * max_scopes);
             timer.pool = unsafe { timer.shared.raw.create_query_pool(&info, None) }
                 .map_err(|e| Error::vulkan(format!("vkCreateQueryPool {name}"), e))?;
             timer.shared.name(timer.pool, name);
+            let n = u64::from(2 * max_scopes);
+            timer.ticks = Some(Buffer::new::<u64>(device, &format!("{name}.ticks"), n, Place::Readback)?);
         }
         Ok(timer)
     }
@@ -82,21 +93,19 @@ impl Timer {
         }
     }
 
+    /// Copies the scopes' times to where `read` finds them; the last command of a submission but for its barrier.
+    pub fn copy(&self, commands: vk::CommandBuffer) {
+        let n = 2 * self.names.len() as u32;
+        if let Some(ticks) = self.ticks.as_ref().filter(|_| n > 0) {
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+            unsafe { self.shared.raw.cmd_copy_query_pool_results(commands, self.pool, 0, n, ticks.raw, 0, 8, flags) };
+        }
+    }
+
     /// Times of a finished submission.
     pub fn read(&self) -> Result<Vec<ScopeTime>> {
-        if self.names.is_empty() {
-            return Ok(vec![]);
-        }
-        let mut ticks = vec![0u64; 2 * self.names.len()];
-        unsafe {
-            self.shared.raw.get_query_pool_results(
-                self.pool,
-                0,
-                &mut ticks,
-                vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT,
-            )
-        }
-        .map_err(|e| Error::vulkan("vkGetQueryPoolResults", e))?;
+        let Some(ticks) = self.ticks.as_ref().filter(|_| !self.names.is_empty()) else { return Ok(vec![]) };
+        let ticks: Vec<u64> = ticks.read(2 * self.names.len())?;
         let limits = &self.shared.limits;
         let mask = u64::MAX.checked_shr(64 - limits.timestamp_valid_bits).unwrap_or(0);
         let times = self.names.iter().zip(ticks.chunks_exact(2)).map(|(name, t)| {

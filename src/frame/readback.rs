@@ -1,0 +1,58 @@
+//! What a renderer reads back for those who ask between frames: pictures, particles, facets.
+
+use super::buffers::download;
+use super::render::Renderer;
+use crate::error::Result;
+use crate::gpu::Device;
+use crate::gpu::memory::TargetFormat;
+use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::particle::{ParticleRecord, PlacedRecord};
+use crate::model::boxes::MAX_ATTEMPTS;
+
+impl Renderer {
+    /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
+    pub fn image(&mut self) -> Result<Vec<f32>> {
+        let bytes = self.image_bytes()?;
+        Ok(match self.settings.format {
+            TargetFormat::Rgba16f => {
+                let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+                halves.into_iter().map(half::f16::to_f32).collect()
+            }
+            TargetFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
+        })
+    }
+
+    /// The last frame as it lies in the target: what "the same bytes" means.
+    pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
+        let (target, readback) = (&mut self.targets[self.i_ended_target], &self.readback);
+        self.host.run(|rec| {
+            rec.copy_image(target, readback);
+            Ok(())
+        })?;
+        readback.read((target.n_pixels() * self.settings.format.bytes_per_pixel()) as usize)
+    }
+
+    /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.
+    pub fn generate_now(&mut self, device: &Device) -> Result<(Vec<ParticleRecord>, Vec<u32>)> {
+        let n = self.settings.n_particles;
+        let (generate, b) = (&self.generate, &self.buffers);
+        if self.traits.has_boxes {
+            self.host
+                .run(|rec| generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS))?;
+        }
+        let particles = download(device, &mut self.host, &self.buffers.particles, n)?;
+        Ok((particles, download(device, &mut self.host, &self.buffers.status, n)?))
+    }
+
+    /// Where the last frame had the particles, relative to its lighting origin.
+    pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
+        download(device, &mut self.host, self.buffers.placed.buffer(), self.settings.n_particles)
+    }
+
+    /// The last frame's facets and their light; only meaningful where the scene is lit.
+    pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
+        let n = self.settings.n_facets;
+        let facets = download(device, &mut self.host, &self.buffers.facets, n)?;
+        Ok((facets, download(device, &mut self.host, &self.buffers.lit, n)?))
+    }
+}

@@ -10,6 +10,7 @@ use nimbus::frame::plan::Pass;
 use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
+use nimbus::model::camera::CameraKey;
 use nimbus::model::scene::{Scene, Simulate, Threading};
 use std::path::Path;
 use std::sync::Arc;
@@ -26,6 +27,10 @@ fn scene(overrides: &[&str]) -> Scene {
 
 /// Every frame's bytes, and what each ran.
 fn run(scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTimes)> {
+    run_for(N_FRAMES, scene, threading, skip)
+}
+
+fn run_for(n_frames: u32, scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTimes)> {
     let gpu = Gpu::new();
     let scene = Arc::new(scene);
     let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, skip).expect("a renderer");
@@ -40,11 +45,11 @@ fn run(scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTim
         Ok(true)
     };
     let done = match threading {
-        Threading::Serial => serial::run(&mut game, &mut renderer, 0..N_FRAMES, on_frame),
-        Threading::Parallel => parallel::run(&mut game, &mut renderer, 0..N_FRAMES, on_frame),
+        Threading::Serial => serial::run(&mut game, &mut renderer, 0..n_frames, on_frame),
+        Threading::Parallel => parallel::run(&mut game, &mut renderer, 0..n_frames, on_frame),
     };
     done.expect("the frames run");
-    assert_eq!(frames.len(), N_FRAMES as usize);
+    assert_eq!(frames.len(), n_frames as usize);
     assert!(frames.iter().all(|(bytes, _)| bytes.iter().any(|b| *b != 0)), "a frame is empty");
     frames
 }
@@ -66,6 +71,26 @@ fn two_runs_serial_parallel_and_no_skip_give_the_same_bytes_for_every_frame() {
             assert!(first.windows(2).all(|w| w[0] != w[1]));
         }
     }
+}
+
+/// A camera that moves, stands still for a while and moves on: frames in flight share a picture and part again.
+#[test]
+fn three_hundred_frames_are_the_same_in_both_loops() {
+    let still = ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
+    let scene = || {
+        let mut scene = scene(&[&still[..], &["film.width=48", "film.height=36", "time.step_s=0.01"]].concat());
+        let [first, second] = [0, 1].map(|k| scene.camera.keys[k]);
+        // A path's curve between two keys looks at the keys beside them, too.
+        let stop = [0.99, 1.0, 2.0, 2.01].map(|time_s| CameraKey { time_s, ..second });
+        scene.camera.keys = [&[first][..], &stop, &[CameraKey { time_s: 3.0, ..first }]].concat();
+        scene
+    };
+    let serial = run_for(300, scene(), Threading::Serial, true);
+    let stood = serial.iter().filter(|f| !f.1.plan.runs(Pass::Sprites)).count();
+    assert!((90..110).contains(&stood), "{stood}");
+    let serial = images(serial);
+    assert!(serial == images(run_for(300, scene(), Threading::Parallel, true)), "the loops differ");
+    assert_ne!(serial[0], serial[150]);
 }
 
 #[test]

@@ -161,6 +161,51 @@ fn several_scenes_get_a_folder_each_and_a_bad_one_none() {
 }
 
 #[test]
+fn bench_writes_a_time_line_of_every_step_and_pass() {
+    let dir = temp();
+    let file = path(&dir, "trace.json");
+    let args = [
+        "bench",
+        "scenes/hello.toml",
+        "--frames",
+        "4",
+        "--warmup",
+        "1",
+        "--repeat",
+        "1",
+        "--no-skip",
+        "-q",
+        "--trace",
+        &file,
+    ];
+    assert_eq!(run(&args).0, 0);
+    let trace: Value = serde_json::from_slice(&std::fs::read(&file).expect("the trace")).expect("JSON");
+    let events = trace["traceEvents"].as_array().expect("events");
+    let steps = |tid: u64| events.iter().filter(move |e| e["ph"] == "X" && e["tid"] == tid);
+    // Five frames of each loop.
+    assert_eq!((steps(0).count(), steps(1).count()), (10, 10));
+    let span =
+        |e: &Value| [e["ts"].as_f64().expect("ts"), e["ts"].as_f64().expect("ts") + e["dur"].as_f64().expect("dur")];
+    for frame in steps(0) {
+        let same =
+            |e: &&Value| e["args"]["frame"] == frame["args"]["frame"] && e["args"]["block"] == frame["args"]["block"];
+        let record = span(steps(1).find(same).expect("it was recorded"));
+        let id = format!("{}/{}", frame["args"]["block"], frame["args"]["frame"]);
+        let end =
+            events.iter().find(|e| e["ph"] == "e" && e["id"] == *id).expect("it ended")["ts"].as_f64().expect("ts");
+        let passes: Vec<[f64; 2]> = steps(2).filter(same).map(span).collect();
+        assert!(passes.len() >= 5 && passes.windows(2).all(|p| p[0][1] <= p[1][0] + 1e-3), "passes in their order");
+        // Game step, recording, passes, end: in this order, but for a clock that is laid on another one.
+        assert!(span(frame)[0] >= 0.0 && span(frame)[1] <= record[0] + 1.0 && record[1] <= end);
+        assert!(passes.iter().all(|p| p[1] <= end + 1e-3 && p[0] >= record[0] - 1000.0));
+    }
+    let (code, _, stderr) = run(&args);
+    assert!(code == 2 && stderr.contains("trace.json"), "{stderr}");
+    let two = run(&["bench", "scenes/hello.toml", "scenes/static.toml", "--trace", &path(&dir, "b.json")]);
+    assert!(two.0 == 2 && two.2.contains("one scene, found 2"), "{}", two.2);
+}
+
+#[test]
 fn bench_json_is_json_and_nothing_else() {
     let (code, stdout, _) =
         run(&["bench", "scenes/hello.toml", "--frames", "3", "--warmup", "1", "--repeat", "1", "--json"]);

@@ -110,6 +110,9 @@ pub struct BenchArgs {
     /// Write every frame's image hash to frames.csv; reading the frames back disturbs the times
     #[arg(long, requires = "out")]
     pub hash_frames: bool,
+    /// Time line of every step and pass, for Perfetto or chrome://tracing (one scene)
+    #[arg(long, value_name = "FILE")]
+    pub trace: Option<PathBuf>,
     /// Replace existing results
     #[arg(long)]
     pub force: bool,

@@ -12,9 +12,16 @@ use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Outcome, pass_names};
 use crate::study::records::{self, Run};
 use crate::study::stage::Stage;
+use crate::study::trace;
 
 pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
     let outs = out_dirs(args)?;
+    if let Some(file) = &args.trace {
+        super::refuse_existing(file, args.force)?;
+        if args.scenes.len() > 1 {
+            return Err(Error::usage(format!("--trace takes one scene, found {}", args.scenes.len())));
+        }
+    }
     // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no folder
     // is made for results that will not come.
     for scene in &args.scenes {
@@ -108,6 +115,9 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         ratio: outcome.ratio_record(),
         interrupted: outcome.interrupted,
     };
+    if let Some(file) = &args.trace {
+        trace::write(file, &outcome.samples)?;
+    }
     if let Some(dir) = out {
         records::write_results(dir, &run, &pass_names(), &outcome.rows())?;
     }

@@ -16,7 +16,7 @@ pub mod render;
 pub mod serial;
 pub mod tensor;
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::error::Result;
 use crate::gpu::ScopeTime;
@@ -40,9 +40,19 @@ pub struct FrameTimes {
     pub latency_ms: f64,
     /// Frames that the device still had when this one was handed to it; 0 where it had nothing to do.
     pub queue_depth: u32,
+    pub marks: Marks,
     pub plan: Plan,
     /// GPU time of every pass that ran; empty where the device has no timestamps.
     pub passes: Vec<ScopeTime>,
+}
+
+/// When a frame's steps began and ended, on the host's clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Marks {
+    pub game: [Instant; 2],
+    pub record: [Instant; 2],
+    /// The picture was finished.
+    pub end: Instant,
 }
 
 /// Told of every frame as it ends; `false` ends the loop after it.
@@ -71,10 +81,15 @@ impl Started {
             time_s: self.time_s,
             frame_ms,
             game_ms: self.game_ms,
-            record_ms: done.record_ms,
+            record_ms: ms(done.recorded[0], done.recorded[1]),
             submit_wait_ms: done.submit_wait_ms,
             latency_ms: ms(self.begin, end),
             queue_depth: self.queue_depth,
+            marks: Marks {
+                game: [self.begin, self.begin + Duration::from_secs_f64(1e-3 * self.game_ms)],
+                record: done.recorded,
+                end,
+            },
             plan: done.plan,
             passes: done.passes,
         }

@@ -71,8 +71,7 @@ struct InFlight {
     slot: usize,
     i_target: usize,
     plan: Plan,
-    record_ms: f64,
-    submitted: Instant,
+    recorded: [Instant; 2],
 }
 
 /// What of the scene the passes are told and that is constant over a run.
@@ -93,7 +92,8 @@ pub(super) struct Settings {
 /// What a render step tells of itself.
 pub struct Rendered {
     pub plan: Plan,
-    pub record_ms: f64,
+    /// When uploading, planning and recording began, and ended.
+    pub recorded: [Instant; 2],
     pub submit_wait_ms: f64,
     pub passes: Vec<ScopeTime>,
 }
@@ -206,10 +206,9 @@ impl Renderer {
         }
         self.write(slot, &packet)?;
         self.record(slot, &packet, &plan)?;
-        let submitted = Instant::now();
+        let recorded = [begin, Instant::now()];
         let pending = self.frames[slot].submit()?;
-        let (i_target, record_ms) = (self.i_target, ms(begin, submitted));
-        self.in_flight.push_back(InFlight { slot, i_target, plan, record_ms, submitted });
+        self.in_flight.push_back(InFlight { slot, i_target: self.i_target, plan, recorded });
         self.n_begun += 1;
         self.last = Some(packet);
         Ok(pending)
@@ -222,8 +221,8 @@ impl Renderer {
         self.i_ended_target = frame.i_target;
         let now = Instant::now();
         // What was waited for the frame before is that one's.
-        let submit_wait_ms = ms(frame.submitted.max(std::mem::replace(&mut self.last_end, now)), now);
-        Ok(Rendered { plan: frame.plan, record_ms: frame.record_ms, submit_wait_ms, passes })
+        let submit_wait_ms = ms(frame.recorded[1].max(std::mem::replace(&mut self.last_end, now)), now);
+        Ok(Rendered { plan: frame.plan, recorded: frame.recorded, submit_wait_ms, passes })
     }
 
     /// Waits for every frame in flight, of which nothing is wanted.

@@ -5,4 +5,5 @@ pub mod bench;
 pub mod inspect;
 pub mod records;
 pub mod stage;
+pub mod trace;
 pub mod truth;

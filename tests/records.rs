@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use nimbus::measure::stats::{Bootstrap, Summary};
+use nimbus::measure::bootstrap::Bootstrap;
+use nimbus::measure::stats::Summary;
 use nimbus::study::records::{
     Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, cpu, environment,
     prepare_out_dir, read_run, revision, utc_now, write_results, write_run,

@@ -12,8 +12,9 @@ use crate::frame::FrameTimes;
 use crate::frame::plan::Pass;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
+use crate::measure::bootstrap::{Bootstrap, Interval};
 use crate::measure::clock::ClockQuality;
-use crate::measure::stats::{Bootstrap, Interval, Summary, median};
+use crate::measure::stats::{Summary, median};
 use crate::model::scene::{Simulate, Threading};
 
 /// How long and how often.
@@ -121,8 +122,7 @@ impl Outcome {
     pub fn ratio(&self) -> Option<Interval> {
         let of = |threading| self.timed(threading).iter().map(|t| t.frame_ms).collect::<Vec<f64>>();
         let (parallel, serial) = (of(Threading::Parallel), of(Threading::Serial));
-        let block_len = (serial.len().min(parallel.len()) as f64).sqrt().ceil().max(1.0) as usize;
-        Bootstrap { block_len, ..Bootstrap::default() }.ratio_of_medians(&parallel, &serial)
+        Bootstrap::of_neighbours(serial.len().min(parallel.len())).ratio_of_medians(&parallel, &serial)
     }
 
     /// The largest of game and render medians over their sum: what an ideal overlap would leave of the serial time.

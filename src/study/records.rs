@@ -13,8 +13,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
+use crate::measure::bootstrap::Interval;
 use crate::measure::clock::ClockQuality;
-use crate::measure::stats::{Interval, Summary};
+use crate::measure::stats::Summary;
 
 pub const SCHEMA_VERSION: u32 = 1;
 pub const RUN_FILE: &str = "run.json";

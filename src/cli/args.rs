@@ -101,7 +101,7 @@ pub struct BenchArgs {
     /// Frames at the start of every block that are not counted
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub warmup: u32,
-    /// Blocks of each loop
+    /// Blocks of each loop, in the order A B B A …; with an even number a steady drift cancels
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     pub repeat: u32,
     /// Folder for run.json and frames.csv (with several scenes: a folder each in it)

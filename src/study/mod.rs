@@ -3,6 +3,7 @@
 pub mod basis;
 pub mod bench;
 pub mod inspect;
+pub mod overlap;
 pub mod records;
 pub mod stage;
 pub mod truth;

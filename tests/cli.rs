@@ -326,7 +326,7 @@ fn devices_lists_at_least_the_one_that_is_used() {
 fn help_teaches() {
     let (code, help, _) = run(&["--help"]);
     assert_eq!(code, 0);
-    for word in ["render", "bench", "inspect", "devices", "Exit codes", "scenes/hello.toml"] {
+    for word in ["render", "bench", "compare", "inspect", "devices", "Exit codes", "scenes/hello.toml"] {
         assert!(help.contains(word), "{word}");
     }
 }

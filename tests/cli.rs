@@ -131,14 +131,23 @@ fn bench_prints_its_table_and_writes_its_results_once() {
     let args = ["bench", "scenes/hello.toml", "--frames", "6", "--warmup", "2", "--repeat", "2", "--out", &out];
     let (code, stdout, stderr) = run(&args);
     assert_eq!((code, stderr.as_str()), (0, ""));
-    for word in ["serial", "parallel", "p50", "p99", "parallel / serial", "sprites", "to the byte"] {
+    for word in ["serial", "parallel", "p50", "p99", "parallel / serial", "sprites", "to the byte", "A B B A"] {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }
     let json: Value =
         serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json")).expect("JSON");
     assert_eq!(json["modes"].as_array().map(Vec::len), Some(2));
     assert_eq!(json["modes"][0]["frames"], 12);
+    assert_eq!(json["block_order"], serde_json::json!(["serial", "parallel", "parallel", "serial"]));
     assert_eq!(json["modes"][0]["image_hash"], json["modes"][1]["image_hash"]);
+    for word in ["1 % low: p99", "mean of slowest 1 %", "1 % of the time", "perfect overlap = max(game", "host clock"] {
+        assert!(stdout.contains(word), "{word} in\n{stdout}");
+    }
+    let number = |pointer: &str| json.pointer(pointer).and_then(Value::as_f64).expect("a number");
+    let overlap = number("/overlap/bound_ms");
+    assert_eq!(overlap, number("/overlap/game_ms").max(number("/overlap/render_ms")));
+    assert_eq!(number("/overlap/serial_ms"), number("/modes/0/frame_ms/p50"));
+    assert_eq!(number("/modes/0/frame_lows/p99_fps"), 1000.0 / number("/modes/0/frame_ms/p99"));
     let rows = std::fs::read_to_string(path(&dir, "run/frames.csv")).expect("frames.csv");
     assert_eq!(rows.lines().count(), 1 + 2 * 2 * (6 + 2));
     let (code, _, stderr) = run(&args);
@@ -362,7 +371,7 @@ fn devices_lists_at_least_the_one_that_is_used() {
 fn help_teaches() {
     let (code, help, _) = run(&["--help"]);
     assert_eq!(code, 0);
-    for word in ["render", "bench", "inspect", "devices", "Exit codes", "scenes/hello.toml"] {
+    for word in ["render", "bench", "compare", "inspect", "devices", "Exit codes", "scenes/hello.toml"] {
         assert!(help.contains(word), "{word}");
     }
 }

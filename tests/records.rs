@@ -4,7 +4,10 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use nimbus::measure::stats::{Bootstrap, Summary};
+use nimbus::measure::bootstrap::Bootstrap;
+use nimbus::measure::lows::Lows;
+use nimbus::measure::stats::Summary;
+use nimbus::study::overlap::{Overlap, SerialFrame};
 use nimbus::study::records::{
     Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, cpu, environment,
     prepare_out_dir, read_run, revision, utc_now, write_results, write_run,
@@ -30,6 +33,7 @@ fn mode(threading: &str) -> Mode {
         warm_up: 2,
         blocks: 1,
         frame_ms: ms,
+        frame_lows: Lows::of(&[16.5, 17.0, 16.0, 40.25]),
         game_ms: ms,
         record_ms: ms,
         render_ms: ms,
@@ -78,8 +82,10 @@ fn sample() -> Run {
         cpu: cpu(),
         environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
         clocks: Clocks { resolution_ns: 1.0, overhead_ns: 22.5, timestamp_period_ns: None },
+        block_order: ["serial", "parallel", "parallel", "serial"].map(str::to_owned).to_vec(),
         modes: vec![mode("serial"), mode("parallel")],
         ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
+        overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }], &[21.0]),
         interrupted: false,
     }
 }
@@ -110,6 +116,8 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
         revision: "unknown".to_owned(),
         modes: Vec::new(),
         ratio: None,
+        block_order: Vec::new(),
+        overlap: None,
         interrupted: true,
         environment: environment(),
         cpu: Cpu { model: "unknown".to_owned(), logical_cores: 1 },
@@ -122,12 +130,15 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
 fn the_schema_refuses_what_is_wrong() {
     let good = serde_json::to_value(sample()).unwrap();
     for (pointer, wrong) in [
-        ("/schema", json!(2)),
+        ("/schema", json!(1)),
         ("/date", json!("yesterday")),
         ("/device/type", json!("toaster")),
         ("/cpu/logical_cores", json!(0)),
         ("/modes/0/threading", json!("both")),
+        ("/block_order/0", json!("both")),
+        ("/overlap/bound_ms", Value::Null),
         ("/modes/0/frame_ms/p50", Value::Null),
+        ("/modes/0/frame_lows/p99_fps", json!(0)),
         ("/modes/0/passes/0/share", json!(1.5)),
         ("/scene_hash", json!("ab")),
     ] {
@@ -172,8 +183,8 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
-    // The run, device, cpu, clocks, ratio; twice a mode with five summaries and two passes.
-    assert_eq!(n_compared, 5 + 2 * (1 + 5 + 2));
+    // The run, device, cpu, clocks, ratio, overlap and its share; twice a mode, five summaries, lows, two passes.
+    assert_eq!(n_compared, 7 + 2 * (1 + 5 + 1 + 2));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use crate::io::scene_file::MAX_SIDE;
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
-    nimbus bench scenes/threads.toml\n  nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
+    nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 130 interrupted.")]
 pub struct Args {
     #[command(subcommand)]
@@ -26,6 +26,19 @@ pub enum Command {
     Render(RenderArgs),
     /// Time a scene, one thread against two
     Bench(BenchArgs),
+    /// Say whether one bench's results are faster than another's
+    ///
+    /// For every loop that both ran, and for frame, game step, render step, GPU and each pass: the medians of A and B,
+    /// their ratio B / A with a 95 % interval, and a verdict. "faster" and "slower" mean that the interval leaves out 1;
+    /// "no difference found" means that it does not, which is not the same as "equal": more frames make it narrower.
+    ///
+    /// Only `frame` is the headline. The other rows are not corrected for many comparisons: of twenty that are equal,
+    /// one will seem to differ.
+    ///
+    /// The interval (block bootstrap over the frames of frames.csv, runs of √n neighbours drawn together) knows the
+    /// noise within the two runs, not what changes from one start to the next, such as who else uses the machine. Time
+    /// A twice and compare the two to see that: what differs there is no difference.
+    Compare(CompareArgs),
     /// Print a stage's buffer, or what f64 says it should be
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
@@ -101,7 +114,7 @@ pub struct BenchArgs {
     /// Frames at the start of every block that are not counted
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub warmup: u32,
-    /// Blocks of each loop
+    /// Blocks of each loop, in the order A B B A …; with an even number a steady drift cancels
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     pub repeat: u32,
     /// Folder for run.json and frames.csv (with several scenes: a folder each in it)
@@ -128,6 +141,36 @@ pub enum ThreadingArg {
     Serial,
     Parallel,
     Both,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "Two settings of a scene:\n  \
+    nimbus bench scenes/threads.toml --out before\n  \
+    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
+    nimbus compare before after --allow scene\n\n\
+    Two builds:\n  nimbus compare old new --allow build\n\n\
+    Exit codes: 0 compared, whatever the verdict; 2 not comparable, or not results of nimbus bench.")]
+pub struct CompareArgs {
+    /// Results folder (`nimbus bench --out DIR`) to measure by
+    pub a: PathBuf,
+    /// Results folder that may be faster or slower
+    pub b: PathBuf,
+    /// What may differ between A and B; anything else that does is refused
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…")]
+    pub allow: Vec<SamenessArg>,
+    /// JSON in place of the table
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SamenessArg {
+    /// Device, driver, processor, and variables that change what drivers do
+    Device,
+    /// Version and revision of nimbus
+    Build,
+    /// The scene's settings and files
+    Scene,
 }
 
 #[derive(Debug, ClapArgs)]

@@ -7,9 +7,11 @@ use super::args::{BenchArgs, ThreadingArg};
 use super::{device_choice, load, output, say_notes, say_sizes};
 use crate::error::{Error, Result};
 use crate::gpu::DeviceInfo;
+use crate::measure::lows::fps;
 use crate::measure::stats::Summary;
 use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Outcome, pass_names};
+use crate::study::overlap::Overlap;
 use crate::study::records::{self, Run};
 use crate::study::stage::Stage;
 use crate::study::trace;
@@ -111,8 +113,10 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         cpu: records::cpu(),
         environment: records::environment(),
         clocks: bench::clocks_record(&info),
+        block_order: outcome.block_order(),
         modes: plan.modes.iter().map(|m| outcome.mode(*m, simulate, &plan)).collect(),
         ratio: outcome.ratio_record(),
+        overlap: outcome.overlap(),
         interrupted: outcome.interrupted,
     };
     if let Some(file) = &args.trace {
@@ -141,19 +145,23 @@ fn report(path: &Path, run: &Run, info: &DeviceInfo, outcome: &Outcome, args: &B
         run.cpu.logical_cores
     );
     out += &format!(
-        "{} blocks of each loop in turn; the first {} frames of every block are not counted{}\n\n",
-        args.repeat,
+        "{}; the first {} frames of every block are not counted{}\n\n",
+        blocks_line(&run.block_order),
         args.warmup,
         if outcome.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
     out += &output::table(&time_rows(run));
     out.push('\n');
+    out += &output::table(&low_rows(run));
+    out.push('\n');
     out += &output::table(&pass_rows(run));
-    if let (Some(ratio), Some(ideal)) = (outcome.ratio(), outcome.ideal_ratio()) {
-        out += &format!(
-            "\nparallel / serial = {:.3} (95 % interval {:.3} to {:.3}); perfect overlap of game and render would give {ideal:.3}\n",
-            ratio.estimate, ratio.low, ratio.high
-        );
+    out.push('\n');
+    if let Some(ratio) = run.ratio {
+        let (low, high) = (ratio.low, ratio.high);
+        out += &format!("parallel / serial = {:.3} (95 % interval {low:.3} to {high:.3})\n", ratio.parallel_by_serial);
+    }
+    if let Some(overlap) = &run.overlap {
+        out += &overlap_lines(overlap);
     }
     let hashes: Vec<&String> = outcome.image_hashes.values().collect();
     if let [a, b] = hashes[..] {
@@ -163,7 +171,70 @@ fn report(path: &Path, run: &Run, info: &DeviceInfo, outcome: &Outcome, args: &B
             "THE LAST FRAMES DIFFER between the two loops\n"
         };
     }
+    out + &clocks_line(&run.clocks)
+}
+
+/// How the blocks of the loops took turns.
+fn blocks_line(order: &[String]) -> String {
+    /// Two full turns show the pattern.
+    const N_SHOWN: usize = 8;
+    let Some(first) = order.first() else { return "no block was begun".to_owned() };
+    let Some(second) = order.iter().find(|name| *name != first) else {
+        return format!("{} blocks, all {first}", order.len());
+    };
+    let letter = |name: &String| if name == first { "A" } else { "B" };
+    let shown: Vec<&str> = order.iter().take(N_SHOWN).map(letter).collect();
+    let more = if order.len() > N_SHOWN { " …" } else { "" };
+    // A B B A: a steady drift adds up to the same for both; of an odd number of pairs one is left over.
+    let is_balanced = order.len().is_multiple_of(4);
+    let balance = if is_balanced { "" } else { " (a steady drift does not cancel; with an even --repeat it does)" };
+    format!("{} blocks, {}{more}, A = {first}, B = {second}{balance}", order.len(), shown.join(" "))
+}
+
+/// The bound of what overlap can do, and how near the parallel loop came.
+fn overlap_lines(o: &Overlap) -> String {
+    let (game, render, bound, serial) = (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
+    let share = o.bound_ms / o.serial_ms;
+    let mut out = format!(
+        "perfect overlap = max(game {game}, render {render}) = {bound} ms, {share:.3} of the serial {serial} ms\n"
+    );
+    if let Some(r) = o.reached {
+        let [share, low, high] = [r.share, r.low, r.high].map(|s| 100.0 * s);
+        let possible = ms(o.serial_ms - o.bound_ms);
+        out += &format!(
+            "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval {low:.1} to {high:.1})\n"
+        );
+        if r.share > 1.0 {
+            // What cannot come from overlap came from elsewhere.
+            out += "that is more than overlap can give: something else changed from block to block\n";
+        }
+    } else if o.parallel_ms.is_some() {
+        out += "that is no certain gain, so what share of it was reached cannot be said\n";
+    }
     out
+}
+
+/// The host's clock and the device's: a time near these says nothing.
+fn clocks_line(clocks: &records::Clocks) -> String {
+    let device = clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
+    format!(
+        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}\n",
+        clocks.resolution_ns, clocks.overhead_ns
+    )
+}
+
+/// Frame rates: the median's, and that of the slowest frames by each of the three definitions.
+fn low_rows(run: &Run) -> Vec<Vec<String>> {
+    let header = ["fps", "loop", "p50", "1 % low: p99", "mean of slowest 1 %", "1 % of the time"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    for mode in &run.modes {
+        let (Some(frame), Some(lows)) = (&mode.frame_ms, &mode.frame_lows) else { continue };
+        let rates = [fps(frame.p50), lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];
+        let mut row = vec!["frame".to_owned(), mode.threading.clone()];
+        row.extend(rates.map(|rate| format!("{rate:.1}")));
+        rows.push(row);
+    }
+    rows
 }
 
 fn time_rows(run: &Run) -> Vec<Vec<String>> {

@@ -2,6 +2,7 @@
 
 pub mod args;
 mod bench;
+mod compare;
 mod devices;
 mod inspect;
 mod output;
@@ -40,6 +41,7 @@ pub fn main() -> ExitCode {
             GRACEFUL.store(true, Ordering::Relaxed);
             bench::run(a, &STOP)
         }
+        Command::Compare(a) => compare::run(a),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
     };

@@ -1,4 +1,7 @@
 //! Clocks and statistics; knows nothing of clouds or Vulkan.
 
+pub mod bootstrap;
 pub mod clock;
+pub mod lows;
+pub(crate) mod random;
 pub mod stats;

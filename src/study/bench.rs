@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use sha2::{Digest, Sha256};
 
+use super::overlap::{Overlap, SerialFrame};
 use super::records::{self, FrameRow, Mode, Pass as PassRecord, Ratio};
 use super::stage::Stage;
 use crate::error::{Error, Result};
@@ -12,8 +13,10 @@ use crate::frame::FrameTimes;
 use crate::frame::plan::Pass;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
+use crate::measure::bootstrap::{Bootstrap, Interval};
 use crate::measure::clock::ClockQuality;
-use crate::measure::stats::{Bootstrap, Interval, Summary, median};
+use crate::measure::lows::Lows;
+use crate::measure::stats::{Summary, median};
 use crate::model::scene::{Simulate, Threading};
 
 /// How long and how often.
@@ -119,18 +122,29 @@ impl Outcome {
     /// Ratio of the median frame times, parallel over serial, with its bootstrap 95 % interval. Neighbouring frames are
     /// alike, so whole runs of frames are drawn, not single ones: √n frames each.
     pub fn ratio(&self) -> Option<Interval> {
-        let of = |threading| self.timed(threading).iter().map(|t| t.frame_ms).collect::<Vec<f64>>();
-        let (parallel, serial) = (of(Threading::Parallel), of(Threading::Serial));
-        let block_len = (serial.len().min(parallel.len()) as f64).sqrt().ceil().max(1.0) as usize;
-        Bootstrap { block_len, ..Bootstrap::default() }.ratio_of_medians(&parallel, &serial)
+        let (parallel, serial) = (self.frame_ms(Threading::Parallel), self.frame_ms(Threading::Serial));
+        Bootstrap::of_neighbours(serial.len().min(parallel.len())).ratio_of_medians(&parallel, &serial)
     }
 
-    /// The largest of game and render medians over their sum: what an ideal overlap would leave of the serial time.
-    pub fn ideal_ratio(&self) -> Option<f64> {
-        let serial = self.timed(Threading::Serial);
-        let game = median(&serial.iter().map(|t| t.game_ms).collect::<Vec<_>>())?;
-        let render = median(&serial.iter().map(|t| t.record_ms + t.submit_wait_ms).collect::<Vec<_>>())?;
-        Some(game.max(render) / (game + render))
+    fn frame_ms(&self, threading: Threading) -> Vec<f64> {
+        self.timed(threading).iter().map(|t| t.frame_ms).collect()
+    }
+
+    /// What overlap could gain, and how much of it the parallel loop gained. None without the serial loop.
+    pub fn overlap(&self) -> Option<Overlap> {
+        let row = |t: &&FrameTimes| SerialFrame {
+            frame_ms: t.frame_ms,
+            game_ms: t.game_ms,
+            render_ms: t.record_ms + t.submit_wait_ms,
+        };
+        let serial: Vec<SerialFrame> = self.timed(Threading::Serial).iter().map(row).collect();
+        Overlap::of(&serial, &self.frame_ms(Threading::Parallel))
+    }
+
+    /// The loop of every block that was begun, in order.
+    pub fn block_order(&self) -> Vec<String> {
+        let blocks: BTreeMap<u32, Threading> = self.samples.iter().map(|s| (s.i_block, s.threading)).collect();
+        blocks.into_values().map(|threading| name_of(threading).to_owned()).collect()
     }
 
     /// The record of one mode.
@@ -148,6 +162,7 @@ impl Outcome {
             warm_up: plan.n_warm_up as usize,
             blocks: blocks.len(),
             frame_ms: summary(&|t| Some(t.frame_ms)),
+            frame_lows: Lows::of(&self.frame_ms(threading)),
             game_ms: summary(&|t| Some(t.game_ms)),
             record_ms: summary(&|t| Some(t.record_ms)),
             render_ms: summary(&|t| Some(t.record_ms + t.submit_wait_ms)),
@@ -234,5 +249,6 @@ mod tests {
     fn blocks_alternate_their_order() {
         use Threading::{Parallel as P, Serial as S};
         assert_eq!(block_order(&[S, P], 3), [S, P, P, S, S, P]);
+        assert_eq!(block_order(&[S, P], 4), [S, P, P, S, S, P, P, S]);
     }
 }

@@ -2,7 +2,11 @@
 
 pub mod basis;
 pub mod bench;
+pub mod compare;
+pub mod difference;
 pub mod inspect;
+pub mod overlap;
+pub mod recorded;
 pub mod records;
 pub mod stage;
 pub mod trace;

@@ -1,6 +1,6 @@
 //! Results on disk: `run.json` (what was run, where, and what it says) and `frames.csv` (every frame, raw).
 //!
-//! The form of `run.json` is docs/run.schema.json; a change of meaning or a key taken away raises `SCHEMA_VERSION`.
+//! The form of `run.json` is docs/run.schema.json; a change of meaning, or of a key, raises `SCHEMA_VERSION`.
 //! Files appear whole or not at all: each is written beside its place and then renamed.
 
 use std::collections::BTreeMap;
@@ -11,12 +11,15 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
+use super::overlap::Overlap;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
+use crate::measure::bootstrap::Interval;
 use crate::measure::clock::ClockQuality;
-use crate::measure::stats::{Interval, Summary};
+use crate::measure::lows::Lows;
+use crate::measure::stats::Summary;
 
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 pub const RUN_FILE: &str = "run.json";
 pub const FRAMES_FILE: &str = "frames.csv";
 
@@ -40,9 +43,13 @@ pub struct Run {
     /// Variables that change what drivers do.
     pub environment: BTreeMap<String, String>,
     pub clocks: Clocks,
+    /// The threading of every block, in the order they ran: A B B A and so on, so that drift falls on both alike.
+    pub block_order: Vec<String>,
     pub modes: Vec<Mode>,
     /// Parallel against serial frame time, where both ran; below 1 parallel is faster.
     pub ratio: Option<Ratio>,
+    /// What overlap could gain and what was gained; null where the serial loop did not run.
+    pub overlap: Option<Overlap>,
     /// Ctrl-C came before the end; what is here was finished.
     pub interrupted: bool,
 }
@@ -87,6 +94,8 @@ pub struct Mode {
     pub blocks: usize,
     /// From the end of one frame to the end of the next: what a viewer would see.
     pub frame_ms: Option<Summary>,
+    /// "1 % low" frame rates of `frame_ms`, by all three definitions.
+    pub frame_lows: Option<Lows>,
     pub game_ms: Option<Summary>,
     pub record_ms: Option<Summary>,
     /// Recording, submission and the wait for the device.
@@ -205,7 +214,8 @@ pub fn write_run(path: &Path, run: &Run) -> Result<()> {
 pub fn read_run(path: &Path) -> Result<Run> {
     let path = if path.is_dir() { path.join(RUN_FILE) } else { path.to_owned() };
     let text = fs::read_to_string(&path).map_err(|cause| Error::io(&path, cause))?;
-    let value: serde_json::Value = serde_json::from_str(&text).map_err(|cause| Error::io(&path, cause))?;
+    let broken = |cause| Error::io(&path, format!("not JSON, or not all of it: {cause}"));
+    let value: serde_json::Value = serde_json::from_str(&text).map_err(broken)?;
     // The version is looked at first: of another version any other complaint would mislead.
     match value.get("schema").and_then(serde_json::Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}
@@ -214,7 +224,7 @@ pub fn read_run(path: &Path) -> Result<Run> {
         }
         None => return Err(Error::io(&path, "not a run.json of nimbus: it names no schema version")),
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(&path, cause))
+    serde_json::from_value(value).map_err(|cause| Error::io(&path, format!("not a run.json of nimbus: {cause}")))
 }
 
 pub fn write_frames(path: &Path, pass_names: &[String], rows: &[FrameRow]) -> Result<()> {

@@ -1,0 +1,188 @@
+//! `nimbus compare A B`.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::args::{CompareArgs, SamenessArg};
+use super::output;
+use crate::error::{Error, Result};
+use crate::measure::bootstrap::Bootstrap;
+use crate::study::compare::{Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks};
+use crate::study::difference::{Difference, Sameness, differences, remarks};
+use crate::study::recorded::{Recorded, read_results};
+use crate::study::records::Run;
+
+/// What `--json` prints. A change of meaning, or of a key, raises `schema`.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: u32,
+    a: Side,
+    b: Side,
+    /// What differs and was allowed to.
+    allowed: Vec<Difference>,
+    n_resamples: usize,
+    /// The measure that decides; the others are not corrected for many comparisons.
+    headline: &'static str,
+    modes: Vec<ComparedMode>,
+    remarks: Vec<String>,
+}
+
+const REPORT_SCHEMA: u32 = 1;
+
+/// Where a run lies, and what it is.
+#[derive(Debug, Serialize)]
+struct Side {
+    folder: String,
+    date: String,
+    nimbus: String,
+    revision: String,
+    device: String,
+    scene_hash: String,
+}
+
+impl Side {
+    fn of(folder: &Path, run: &Run) -> Side {
+        Side {
+            folder: folder.display().to_string(),
+            date: run.date.clone(),
+            nimbus: run.nimbus.clone(),
+            revision: run.revision.clone(),
+            device: format!("{} ({})", run.device.name, run.device.driver),
+            scene_hash: run.scene_hash.clone(),
+        }
+    }
+}
+
+pub fn run(args: &CompareArgs) -> Result<()> {
+    let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
+    let found = differences(&a.run, &b.run);
+    let is_allowed = |d: &Difference| args.allow.iter().any(|allowed| sameness(*allowed) == d.kind);
+    let (allowed, refused): (Vec<Difference>, Vec<Difference>) = found.into_iter().partition(is_allowed);
+    if !refused.is_empty() {
+        return Err(Error::usage(refusal(args, &refused)));
+    }
+    let report = report(args, &a, &b, allowed);
+    if report.modes.is_empty() {
+        let ran = |of: &Recorded| of.modes.iter().map(|m| m.threading.clone()).collect::<Vec<_>>().join(", ");
+        let [of_a, of_b] = [&a, &b].map(ran).map(|names| if names.is_empty() { "none".into() } else { names });
+        return Err(Error::usage(format!("A and B have no timed loop in common: A has {of_a}, B has {of_b}")));
+    }
+    if args.json { output::object(&report) } else { output::text(&text(&report)) }
+}
+
+fn sameness(arg: SamenessArg) -> Sameness {
+    match arg {
+        SamenessArg::Device => Sameness::Device,
+        SamenessArg::Build => Sameness::Build,
+        SamenessArg::Scene => Sameness::Scene,
+    }
+}
+
+/// What differs, and the flag that lets it.
+fn refusal(args: &CompareArgs, refused: &[Difference]) -> String {
+    let mut kinds: Vec<&str> = args.allow.iter().map(|a| sameness(*a).name()).collect();
+    kinds.extend(refused.iter().map(|d| d.kind.name()));
+    // Every name once, in the order device, build, scene.
+    let all = [Sameness::Device, Sameness::Build, Sameness::Scene].map(Sameness::name);
+    let flag = all.into_iter().filter(|name| kinds.contains(name)).collect::<Vec<_>>().join(",");
+    let mut what = format!(
+        "{} and {} did not measure the same; --allow {flag} compares them all the same",
+        args.a.display(),
+        args.b.display()
+    );
+    for difference in refused {
+        what += &format!("\n  {}", line(difference));
+    }
+    what
+}
+
+fn line(d: &Difference) -> String {
+    format!("{}, {}: A {}, B {}", d.kind.name(), d.what, d.a, d.b)
+}
+
+fn report(args: &CompareArgs, a: &Recorded, b: &Recorded, allowed: Vec<Difference>) -> Report {
+    let mut said = remarks(&a.run, &b.run);
+    said.extend(frame_remarks(&a.modes, &b.modes));
+    let modes = compare_modes(&a.modes, &b.modes);
+    said.extend(steadiness_remarks(&a.modes, &b.modes, &modes));
+    Report {
+        schema: REPORT_SCHEMA,
+        a: Side::of(&args.a, &a.run),
+        b: Side::of(&args.b, &b.run),
+        allowed,
+        n_resamples: Bootstrap::default().n_resamples,
+        headline: HEADLINE,
+        modes,
+        remarks: said,
+    }
+}
+
+/// The human table.
+fn text(report: &Report) -> String {
+    let mut out = String::new();
+    for (name, side) in [("A", &report.a), ("B", &report.b)] {
+        let Side { folder, date, nimbus, revision, device, scene_hash: _ } = side;
+        out += &format!("{name}  {folder}, {date}, nimbus {nimbus} {revision}, {device}\n");
+    }
+    for difference in &report.allowed {
+        out += &format!("allowed to differ: {}\n", line(difference));
+    }
+    for remark in &report.remarks {
+        out += &format!("note: {remark}\n");
+    }
+    for mode in &report.modes {
+        out += &format!("\n{}", output::table(&rows(mode)));
+    }
+    out.push('\n');
+    for mode in &report.modes {
+        if let Some(headline) = mode.headline() {
+            out += &format!("{} frame: {}\n", mode.threading, sentence(headline));
+        }
+    }
+    out + &foot(report)
+}
+
+fn rows(mode: &ComparedMode) -> Vec<Vec<String>> {
+    let header = ["A p50", "B p50", "B / A", "95 % low", "high", "n A", "n B", "B is"];
+    let mut rows = vec![std::iter::once(format!("{}, ms", mode.threading)).chain(header.map(str::to_owned)).collect()];
+    for m in &mode.measures {
+        let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+        rows.push(vec![
+            m.measure.clone(),
+            number(m.a_ms),
+            number(m.b_ms),
+            number(m.b_by_a.map(|r| r.estimate)),
+            number(m.b_by_a.map(|r| r.low)),
+            number(m.b_by_a.map(|r| r.high)),
+            m.n_a.to_string(),
+            m.n_b.to_string(),
+            m.verdict.text().to_owned(),
+        ]);
+    }
+    rows
+}
+
+fn sentence(m: &Compared) -> String {
+    let verdict = m.verdict.text();
+    match m.b_by_a {
+        Some(r) => {
+            let (estimate, low, high) = (r.estimate, r.low, r.high);
+            format!("B takes {estimate:.3} of A's time (95 % interval {low:.3} to {high:.3}): {verdict}")
+        }
+        None => verdict.to_owned(),
+    }
+}
+
+/// How the intervals were made, and what they do not know.
+fn foot(report: &Report) -> String {
+    let lens: Vec<String> = report.modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
+    let lens =
+        if lens.windows(2).all(|w| w[0] == w[1]) { lens[..lens.len().min(1)].join("") } else { lens.join(" and ") };
+    format!(
+        "\nIntervals: block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together (frame: {lens}).\n\
+        They know the noise within the runs, not from one start to the next. frame decides; the other rows are not\n\
+        corrected for many comparisons: of twenty equal ones, one will seem to differ.\n",
+        report.n_resamples
+    )
+}

@@ -2,6 +2,8 @@
 
 #[path = "harness/bounded.rs"]
 mod bounded;
+#[path = "harness/gathers.rs"]
+mod gathers;
 mod harness;
 #[path = "harness/rooms.rs"]
 mod rooms;
@@ -9,23 +11,13 @@ mod rooms;
 mod scene_text;
 
 use bounded::Random;
+use gathers::{assert_agrees, reference, truths, values};
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say, check_within};
-use nimbus::frame::game::Setting;
 use nimbus::gpu::Compiler;
-use nimbus::model::basis::Basis;
-use nimbus::model::light::Light;
-use nimbus::model::pairings::pairings;
 use nimbus::model::scene::Scene;
-use nimbus::reference::area::mean::each;
-use nimbus::reference::occlude::Rectangle;
-use nimbus::reference::second::{Exchange, Facet, Gathered, Region};
-use nimbus::reference::transmit::{Obstacles, Receiver};
-use nimbus::reference::{grid, place};
-use rooms::{Frame, HEAD, frame, frame_by, plates_text, random_plates, sun_and_lamp};
+use rooms::{HEAD, SKY, frame, frame_by, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
-
-const SKY: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.3, 0.4, 0.6]\nconstant = 0.2\n";
 
 /// Six plates that shade each other, about a place far from the origin.
 fn room(seed: u64, lighting: &str) -> Scene {
@@ -56,98 +48,6 @@ fn cloud(lighting: &str) -> Scene {
     );
     let sun = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = [3.0, 2.9, 2.7]\n";
     load_with(&(head + sun + SKY + &plates_text(plates)), &[], None).unwrap().scene
-}
-
-/// Every facet's light in f64: facets as the device has them, all else from the scene.
-fn reference(f: &Frame) -> Vec<Gathered> {
-    let scene = &*f.scene;
-    let setting = Setting::at(scene, &scene.groups(), 0.0).unwrap();
-    let origin = setting.light_origin;
-    let basis = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling);
-    let region = |i: usize| {
-        let brdf = scene.region_material(i).at(0.0);
-        let has_lobe = brdf.ks != DVec3::ZERO && scene.lighting.bases > 1;
-        let lobe = has_lobe.then(|| basis.lobe(brdf.ns));
-        Region { rectangle: scene.surfaces.get(i).map(|s| Rectangle::new(s, origin)), brdf, lobe }
-    };
-    let regions: Vec<Region> = (0..scene.n_regions()).map(region).collect();
-    let rectangles: Vec<Rectangle> = regions.iter().filter_map(|r| r.rectangle).collect();
-    let double = |v: [f32; 3]| DVec3::from(v.map(f64::from));
-    let facets: Vec<Facet> = f
-        .facets
-        .iter()
-        .map(|r| Facet {
-            position: double(r.position),
-            normal: double(r.normal),
-            area: f64::from(r.area),
-            i_region: r.i_region as usize,
-            color: double(r.color),
-        })
-        .collect();
-    let groups = scene.groups();
-    let generated: Vec<_> = scene.clouds.iter().flat_map(nimbus::reference::generate::cloud).collect();
-    let offsets = place::offsets(&groups, &scene.clouds, 0.0, origin);
-    let rest: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
-    let blobs = place::blobs(&generated, &place::place(&rest, &groups, &offsets));
-    let cells = grid::deposit(&setting.grid, &blobs);
-    let forward = if blobs.is_empty() { 1.0 } else { scene.lighting.forward };
-    let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(origin)).collect();
-    let step = scene.lighting.step;
-    let obstacles = Obstacles { spec: &setting.grid, cells: &cells, rectangles: &rectangles, step, forward };
-    let receivers: Vec<Receiver> =
-        facets.iter().map(|f| Receiver { position: f.position, i_region: f.i_region as u32 }).collect();
-    let transmittance = obstacles.transmittance(&receivers, &lights);
-    let through = obstacles.through(&receivers, &lights);
-    let pairings = pairings(&scene.surfaces, scene.clouds.len());
-    let exchange = Exchange {
-        facets: &facets,
-        regions: &regions,
-        lights: &lights,
-        transmittance: &transmittance,
-        through: &through,
-        spec: &setting.grid,
-        cells: &cells,
-        forward,
-        step,
-        pairs: scene.lighting.pairs,
-        eye: f.eye,
-        pairings: &pairings,
-        reach: setting.radius.max(2.0),
-    };
-    let senders = exchange.senders();
-    each(facets.len(), |j| exchange.gather(j, &senders))
-}
-
-/// I_i and L2, channel by channel.
-fn values(f: &Frame) -> [Vec<f64>; 2] {
-    let of = |k: usize| f.lit.iter().flat_map(|l| if k == 0 { l.indirect } else { l.second }).map(f64::from).collect();
-    [of(0), of(1)]
-}
-
-/// Truths and bounds of both.
-fn truths(found: &[Gathered]) -> ([Vec<f64>; 2], [Vec<f64>; 2]) {
-    let flat = |of: &dyn Fn(&Gathered) -> DVec3| found.iter().flat_map(|g| of(g).to_array()).collect::<Vec<f64>>();
-    ([flat(&|g| g.indirect), flat(&|g| g.second)], [flat(&|g| g.indirect_error), flat(&|g| g.second_error)])
-}
-
-fn assert_agrees(what: &str, f: &Frame) {
-    let found = reference(f);
-    let (values, (truths, bounds)) = (values(f), truths(&found));
-    for (k, quantity) in ["I_i", "L2"].into_iter().enumerate() {
-        assert_within_and_say(&format!("{what}, {quantity}"), &values[k], &truths[k], &bounds[k]);
-        // The bound says something: all but a few facets' light is known to a thousandth of the greatest.
-        let greatest = truths[k].iter().cloned().fold(0.0, f64::max);
-        let n_loose = bounds[k].iter().filter(|b| **b > 1e-3 * greatest).count();
-        println!("  greatest {greatest:.3e}, {n_loose} of {} loose", bounds[k].len());
-        assert!(greatest > 0.0 && n_loose * 20 <= bounds[k].len(), "{what}: {n_loose} loose bounds");
-    }
-    let mut n = 0.0;
-    for (j, (lit, truth)) in f.lit.iter().zip(&found).enumerate() {
-        let off = (f64::from(lit.n_unresolved) - truth.n_unresolved).abs();
-        assert!(off <= truth.n_doubted, "{what}: facet {j} counts {} for {truth:?}", lit.n_unresolved);
-        n += truth.n_unresolved;
-    }
-    println!("  {n} cells unresolved");
 }
 
 #[test]

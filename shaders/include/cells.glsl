@@ -19,6 +19,8 @@ const float CLOUD_THETA = 0.4;
 // Where a cluster's normals differ, those nearer to the receiver may be those that face it: an error of the first order,
 // of this share of radius over distance times the normals' spread.
 const float MIXED = 0.5;
+// 1 - cos gamma where no light shines on a lobe: out of any lobe's reach, and of any turn's.
+const float UNLIT = 1e6;
 // Facets wider than this share of their distance are discs to their receiver.
 const float NEAR = 1.0;
 // A facet that a shadow's rim runs through is looked at closely down to this share of pair_size.
@@ -187,7 +189,7 @@ View look(Sender source, uint i, Walk walk, float broad, Pane pane, Region emitt
     float turn = TURN * view.width;
     view.shine = vec4(0.0);
     view.gaps = vec4(2.0);
-    view.emitter_gap = 2.0;
+    view.emitter_gap = UNLIT;
 #if SHINY
     if (emitter.i_lobe != NO_LOBE) {
         [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {

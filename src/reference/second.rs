@@ -4,12 +4,14 @@
 
 mod closely;
 mod doubt;
+mod gathered;
 mod rims;
 mod shapes;
 mod source;
 mod stencil;
 #[cfg(test)]
 mod tests;
+pub mod tree;
 
 use std::f64::consts::{FRAC_1_PI, PI};
 
@@ -17,7 +19,8 @@ use glam::{DVec2, DVec3};
 
 use closely::Cell;
 use doubt::{Decision, Known};
-use rims::{meets, shadow};
+pub use gathered::Gathered;
+use rims::{Ball, hides_all, meets, shadow};
 use shapes::{Way, half_angle, lobe, width};
 use source::Sender;
 
@@ -92,51 +95,6 @@ pub struct Exchange<'a> {
     pub reach: f64,
 }
 
-/// What a receiver gathers.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Gathered {
-    pub indirect: DVec3,
-    /// Σ Λ G V S of the receiver's lobe.
-    glossy: DVec3,
-    pub second: DVec3,
-    pub n_unresolved: f64,
-    /// What rounding may change of I_i and L2 (before K_d and K_s), and what decisions within rounding may.
-    error: [DVec3; 2],
-    pub indirect_error: DVec3,
-    pub second_error: DVec3,
-    /// Of n_unresolved.
-    pub n_doubted: f64,
-}
-
-impl Gathered {
-    fn add(&mut self, b: &Gathered) {
-        self.indirect += b.indirect;
-        self.glossy += b.glossy;
-        self.n_unresolved += b.n_unresolved;
-        self.error[0] += b.error[0];
-        self.error[1] += b.error[1];
-        self.n_doubted += b.n_doubted;
-    }
-
-    /// `self`, in doubt whether it is not `b`.
-    fn or(mut self, b: &Gathered) -> Gathered {
-        self.error[0] += (self.indirect - b.indirect).abs() + b.error[0];
-        self.error[1] += (self.glossy - b.glossy).abs() + b.error[1];
-        self.n_doubted += (self.n_unresolved - b.n_unresolved).abs() + b.n_doubted;
-        self
-    }
-
-    /// `is` where `d`, else `other`; both where rounding may turn it.
-    fn by(d: Decision, is: impl Fn() -> Gathered, other: impl Fn() -> Gathered) -> Gathered {
-        match (d.taken, d.sure) {
-            (true, true) => is(),
-            (false, true) => other(),
-            (true, false) => is().or(&other()),
-            (false, false) => other().or(&is()),
-        }
-    }
-}
-
 /// A receiver, and by emitting region the rectangles that count before it.
 struct View<'a> {
     exchange: &'a Exchange<'a>,
@@ -148,13 +106,23 @@ struct View<'a> {
 impl Exchange<'_> {
     /// I_i and L2 of facet `j` from `senders`.
     pub fn gather(&self, j: usize, senders: &[Sender]) -> Gathered {
-        let (receiver, mut sum) = (&self.facets[j], Gathered::default());
+        let of_region = |e: usize| (0..self.facets.len()).filter(move |&i| i != j && self.facets[i].i_region == e);
+        self.received(j, senders, |view, e| of_region(e).map(|i| view.of_facet(i)).collect())
+    }
+
+    /// What facet `j` gathers where `gathered` says from each region what.
+    fn received<'a>(
+        &'a self,
+        j: usize,
+        senders: &'a [Sender<'a>],
+        gathered: impl Fn(&View<'a>, usize) -> Gathered,
+    ) -> Gathered {
+        let receiver = &self.facets[j];
         let before = (0..self.regions.len()).map(|e| self.before(receiver, e)).collect();
         let view = View { exchange: self, receiver, before, senders };
-        for i in (0..self.facets.len()).filter(|&i| i != j && self.is_pair(receiver.i_region, self.facets[i].i_region))
-        {
-            sum.add(&view.of_facet(i));
-        }
+        let from = |e: &usize| self.is_pair(receiver.i_region, *e);
+        let of = |e: usize| Gathered::by(self.is_hidden(receiver, e), Gathered::default, || gathered(&view, e));
+        let mut sum: Gathered = (0..self.regions.len()).filter(from).map(of).collect();
         let region = &self.regions[receiver.i_region];
         let albedo = region.brdf.kd * receiver.color * FRAC_1_PI;
         let front = (self.eye - receiver.position).dot(receiver.normal) > 0.0;
@@ -194,6 +162,14 @@ impl Exchange<'_> {
         all.filter(|(_, counts)| counts.is_possible()).collect()
     }
 
+    /// One rectangle alone hides all of region `e`, a surface.
+    fn is_hidden(&self, receiver: &Facet, e: usize) -> Decision {
+        let occluders = self.pairing(receiver.i_region, e).map_or(&[][..], |p| &p.occluders);
+        let rectangle = |k: usize| self.regions[k].rectangle.as_ref();
+        let all = occluders.iter().filter_map(|k| rectangle(*k).zip(rectangle(e)));
+        all.map(|(r, e)| hides_all(r, e, receiver.position, self.slack())).fold(Decision::NO, Decision::or)
+    }
+
     /// What the distance of a place from a plane is known to.
     fn slack(&self) -> f64 {
         8.0 * U * self.reach
@@ -214,18 +190,32 @@ impl Exchange<'_> {
         self.axes(i).map_or((self.facets[i].area * FRAC_1_PI).sqrt(), |(u, v)| (u + v).length())
     }
 
-    /// e^{−(1−g)τ} between two points: equal steps over what lies in the grid's box.
-    fn through(&self, p: DVec3, q: DVec3) -> Known {
+    /// The ball about facet `i`.
+    fn ball(&self, i: usize) -> Ball {
+        let radius = Known { value: self.radius(i), error: 0.0 };
+        Ball { at: self.facets[i].position, radius, slack: self.slack() }
+    }
+
+    /// e^{−(1−g)τ} between two points, of which `q` is off by `moved`: equal steps over what lies in the grid's box.
+    fn through(&self, p: DVec3, q: DVec3, moved: f64) -> Known {
         let d = q - p;
         let Some((enter, leave)) = crossing(self.spec, p, d, 1.0).filter(|_| self.forward < 1.0) else {
             return Known::ONE;
         };
         let length = (leave - enter) * d.length();
-        let n = ((length / (self.step * self.spec.cell)).ceil() as u32).clamp(1, self.pairs.steps);
-        let at = |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
-        let sum: f64 = (0..n).map(|k| sample(self.spec, self.cells, at(k))).sum();
-        let depth = (1.0 - self.forward) * sum * length / f64::from(n);
-        Known { value: (-depth).exp(), error: (-depth).exp() * depth * MARCH * self.turn(d.length()) }
+        let turn = self.turn(d.length());
+        let off = MARCH * turn + 2.0 * moved * (1.0 / self.spec.cell + 1.0 / d.length().max(LEAST_DISTANCE));
+        let by = |n: u32| {
+            let at = |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
+            let sum: f64 = (0..n).map(|k| sample(self.spec, self.cells, at(k))).sum();
+            let depth = (1.0 - self.forward) * sum * length / f64::from(n);
+            Known { value: (-depth).exp(), error: (-depth).exp() * depth * off }
+        };
+        // A length that rounding takes past a whole number of steps has another number of them.
+        let steps = |length: f64| ((length / (self.step * self.spec.cell)).ceil() as u32).clamp(1, self.pairs.steps);
+        let (n, slack) = (steps(length), self.slack() + moved + length * ROUNDINGS * U);
+        let others = [steps(length - slack), steps(length + slack)].into_iter().filter(|other| *other != n);
+        others.fold(by(n), |known, other| known.or(by(other)))
     }
 }
 
@@ -245,16 +235,16 @@ impl View<'_> {
         let Some((u, v)) = x.axes(i) else { return self.whole(i, &way, way.disc_form(x.facets[i].area)) };
         let side = 2.0 * u.length().max(v.length());
         let b = side / way.d2.sqrt();
+        let b = Known { value: b, error: b * ROUNDINGS * way.turn };
         let form = way.part_form(u, v);
-        let wide = self.faces(&way, side).and(
-            Decision::above(b, x.pairs.size, b * ROUNDINGS * way.turn).or(self.meets_lobe(i, &way, q, b, LOBE_STEP)),
-        );
-        let sends = |rim: f64| form.is_positive().and(Decision::above(b, rim * x.pairs.size, b * ROUNDINGS * way.turn));
-        let sender = &self.senders[i];
-        let torn = if sends(BOTH_RIMS).is_possible() { self.is_torn(i) } else { Decision::NO };
+        let above = |share: f64| Decision::above(b.value, share * x.pairs.size, b.error);
+        let wide = self.faces(&way, side).and(above(1.0).or(self.facet_meets_lobe(i, &way, q, b, LOBE_STEP)));
+        let sends = |rim: f64| form.is_positive().and(above(rim));
+        let (sender, ball, i_region) = (&self.senders[i], x.ball(i), x.facets[i].i_region);
+        let torn = if sends(BOTH_RIMS).is_possible() { self.is_torn(i_region, &ball) } else { Decision::NO };
         // What of a light is torn matters where something of the facet is seen.
         let light = if sender.torn.is_possible() && sends(RIM).is_possible() {
-            sender.torn.and(self.seen_of_ball(i).is_positive())
+            sender.torn.and(self.seen_of_ball(i_region, &ball).is_positive())
         } else {
             Decision::NO
         };
@@ -271,22 +261,35 @@ impl View<'_> {
         ahead.and(Decision::above(-d * way.n_i.dot(way.way), 0.0, slack))
     }
 
-    /// A lobe is met by what is `b` wide at `q`, and wider than `step` says.
-    fn meets_lobe(&self, i: usize, way: &Way, q: DVec3, b: f64, step: f64) -> Decision {
-        let x = self.exchange;
-        let source = &x.regions[x.facets[i].i_region];
-        let receiver = &x.regions[self.receiver.i_region];
+    /// A lobe is met by what is `b` wide at `q` on facet `i`, and wider than `step` says.
+    fn facet_meets_lobe(&self, i: usize, way: &Way, q: DVec3, b: Known, step: f64) -> Decision {
+        let (x, lit) = (self.exchange, &self.senders[i].lights);
+        let angles = (0..x.lights.len()).filter(|k| lit[*k].mean.value > 0.0);
+        let angles = angles.filter_map(|k| Some((Decision::YES, x.light_angle(k, q, way, 0.0)?)));
+        self.meets_lobe(x.facets[i].i_region, angles, way, b, step * x.pairs.size)
+    }
+
+    /// A lobe is met by what is `b` wide, and wider than `limit` widths of it: the emitter's by one of the lights that
+    /// shine there, each with its angle; the receiver's.
+    fn meets_lobe(
+        &self,
+        i_region: usize,
+        mut lights: impl Iterator<Item = (Decision, Known)>,
+        way: &Way,
+        b: Known,
+        limit: f64,
+    ) -> Decision {
         let met = |ns: f64, angle: Known| {
-            let slack = angle.error + b * ROUNDINGS * way.turn;
-            let near = Decision::above(TURN * b + LOBE_REACH * width(ns), angle.value, slack);
-            near.and(Decision::above(b, step * x.pairs.size * width(ns), b * ROUNDINGS * way.turn))
+            let slack = angle.error + b.error;
+            let near = Decision::above(TURN * b.value + LOBE_REACH * width(ns), angle.value, slack);
+            near.and(Decision::above(b.value, limit * width(ns), b.error))
         };
+        let source = &self.exchange.regions[i_region];
+        let receiver = &self.exchange.regions[self.receiver.i_region];
         let mut found = Decision::NO;
         if source.lobe.is_some() {
-            let lit = &self.senders[i].lights;
-            let angles = (0..x.lights.len()).filter(|k| lit[*k].mean.value > 0.0);
-            let angles = angles.filter_map(|k| x.light_angle(i, k, q, way));
-            found = angles.map(|angle| met(source.brdf.ns, angle)).fold(found, Decision::or);
+            found =
+                lights.by_ref().map(|(shines, angle)| shines.and(met(source.brdf.ns, angle))).fold(found, Decision::or);
         }
         if receiver.lobe.is_some() {
             found = found.or(met(receiver.brdf.ns, self.eye_angle(way)));
@@ -301,22 +304,19 @@ impl View<'_> {
         half_angle(self.receiver.normal, way.way, to_eye.normalize_or_zero(), turn)
     }
 
-    /// A rim runs through facet `i` as the receiver sees it.
-    fn is_torn(&self, i: usize) -> Decision {
-        let x = self.exchange;
-        let (q, radius, from) = (x.facets[i].position, x.radius(i), Source::At(self.receiver.position));
-        let torn = |(r, counts): &(&Rectangle, Decision)| counts.and(shadow(r, from, q, radius, x.slack()).torn);
-        self.before[x.facets[i].i_region].iter().map(torn).fold(Decision::NO, Decision::or)
+    /// A rim runs through a ball on a region as the receiver sees it.
+    fn is_torn(&self, i_region: usize, ball: &Ball) -> Decision {
+        let from = Source::At(self.receiver.position);
+        let torn = |(r, counts): &(&Rectangle, Decision)| counts.and(shadow(r, from, ball).torn);
+        self.before[i_region].iter().map(torn).fold(Decision::NO, Decision::or)
     }
 
-    /// Π (1 − h_r) of the ball about facet `i`.
-    fn seen_of_ball(&self, i: usize) -> Known {
-        let x = self.exchange;
-        let (q, radius, from) = (x.facets[i].position, x.radius(i), Source::At(self.receiver.position));
-        let seen = |(r, counts): &(&Rectangle, Decision)| {
-            shadow(r, from, q, radius, x.slack()).share.where_or(*counts, Known::NOTHING).rest()
-        };
-        self.before[x.facets[i].i_region].iter().map(seen).fold(Known::ONE, Known::times)
+    /// Π (1 − h_r) of a ball on a region.
+    fn seen_of_ball(&self, i_region: usize, ball: &Ball) -> Known {
+        let from = Source::At(self.receiver.position);
+        let seen =
+            |(r, counts): &(&Rectangle, Decision)| shadow(r, from, ball).share.where_or(*counts, Known::NOTHING).rest();
+        self.before[i_region].iter().map(seen).fold(Known::ONE, Known::times)
     }
 
     /// Facet `i` as one.
@@ -326,14 +326,18 @@ impl View<'_> {
             return Gathered::default();
         }
         let (q, p) = (x.facets[i].position, self.receiver.position);
-        let seen = self.seen_of_ball(i);
+        let seen = self.seen_of_ball(x.facets[i].i_region, &x.ball(i));
         let g: Vec<Known> = self.senders[i].lights.iter().map(|l| l.mean).collect();
-        self.sent(i, way, q, &g, form.times(seen).times(x.through(p, q)).scaled(x.facets[i].area))
+        self.sent(i, way, q, &g, form.times(seen).times(x.through(p, q, 0.0)).scaled(x.facets[i].area))
     }
 
     /// What facet `i` sends from `q` under shares `g` of the lights, times `by`.
     fn sent(&self, i: usize, way: &Way, q: DVec3, g: &[Known], by: Known) -> Gathered {
-        let (radiance, radiance_error) = self.exchange.radiance(i, way, q, g);
+        self.arrives(way, self.exchange.radiance(i, way, q, g), by)
+    }
+
+    /// A radiance and its error times `by`, along the way.
+    fn arrives(&self, way: &Way, (radiance, radiance_error): (DVec3, DVec3), by: Known) -> Gathered {
         let e = radiance * by.value;
         let error = radiance.abs() * by.error + radiance_error * (by.value + by.error) + e.abs() * (ROUNDINGS * U);
         let taken = match &self.exchange.regions[self.receiver.i_region].lobe {

@@ -20,6 +20,9 @@ use crate::harness::Gpu;
 /// What every scene here begins with: the picture does not matter.
 pub const HEAD: &str = "title = 'room'\n[film]\nwidth = 8\nheight = 8\n";
 
+/// A light from everywhere.
+pub const SKY: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.3, 0.4, 0.6]\nconstant = 0.2\n";
+
 /// A rectangle and its material, as they are written.
 #[derive(Debug, Clone, Copy)]
 pub struct Plate {

@@ -36,18 +36,15 @@ impl View<'_> {
         let way = self.way(i, q);
         let side = 2.0 * patch.u.length().max(patch.v.length());
         let b = side / way.d2.sqrt();
-        let wide = Decision::above(b, COARSE * x.pairs.size, b * ROUNDINGS * way.turn);
-        let open = self.faces(&way, side).and(wide.or(self.meets_lobe(i, &way, q, b, CELL_STEP)));
+        let b = Known { value: b, error: b * ROUNDINGS * way.turn };
+        let wide = Decision::above(b.value, COARSE * x.pairs.size, b.error);
+        let open = self.faces(&way, side).and(wide.or(self.facet_meets_lobe(i, &way, q, b, CELL_STEP)));
         if cell.level == x.pairs.levels {
             let count = |is: bool| f64::from(u8::from(is));
             let (n_unresolved, n_doubted) = (count(open.taken), count(!open.sure));
             return Gathered { n_unresolved, n_doubted, ..self.by_points(i, cell, &patch, sender) };
         }
-        let quarters = || {
-            let mut sum = Gathered::default();
-            (0..4).for_each(|k| sum.add(&self.cell(i, &cell.quarter(k), sender)));
-            sum
-        };
+        let quarters = || (0..4).map(|k| self.cell(i, &cell.quarter(k), sender)).collect();
         Gathered::by(open, quarters, || self.by_points(i, cell, &patch, sender))
     }
 
@@ -74,7 +71,7 @@ impl View<'_> {
                 sum[quarter] = sum[quarter].plus(form.times(shares[k][n]));
             }
         }
-        let through = x.through(p, patch.q).scaled(area);
+        let through = x.through(p, patch.q, 0.0).scaled(area);
         let mut sent = Gathered::default();
         for (quarter, middle) in patch.quarters().into_iter().enumerate() {
             let g: Vec<Known> = sums.iter().map(|s| s[quarter].scaled(PART)).collect();

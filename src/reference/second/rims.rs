@@ -13,6 +13,14 @@ pub const OF_UNITS: f64 = 8.0 * super::U;
 /// No divisor is less: what it divides ends beyond all bounds, in either sense.
 const LEAST: f64 = 1e-30;
 
+/// The ball about a facet or cluster; `slack`: what the distance of its middle from a plane is known to.
+#[derive(Debug, Clone, Copy)]
+pub struct Ball {
+    pub at: DVec3,
+    pub radius: Known,
+    pub slack: f64,
+}
+
 /// How a rectangle lies in the way to a ball.
 #[derive(Debug, Clone, Copy)]
 pub struct Shadow {
@@ -71,18 +79,19 @@ fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Kn
     }
 }
 
-/// The shadow of `r` on the ball about `q`; `slack`: what the distance of a point from a plane is known to.
-pub fn shadow(r: &Rectangle, source: Source, q: DVec3, radius: f64, slack: f64) -> Shadow {
+/// The shadow of `r` on a ball.
+pub fn shadow(r: &Rectangle, source: Source, ball: &Ball) -> Shadow {
+    let Ball { at: q, radius, slack } = *ball;
     let ((a, of_a), (b, of_b)) = (sides_of(r, source, slack), sides(r, q, slack));
     let (foot, moved, stretch) = foot(source, q, a, b, slack);
     let o = foot - r.center;
     let beyond = |axis: DVec3| o.dot(axis).abs() / axis.length() - axis.length();
     let m = Known { value: beyond(r.u).max(beyond(r.v)), error: moved };
-    let reach = stretch.scaled(radius);
+    let reach = stretch.times(radius);
     let apart = Decision::of(of_a.iter().flat_map(|x| of_b.iter().map(move |y| x * y < 0.0)));
     // From within its plane a rectangle hides nothing.
     let parts = Decision::of(of_a.iter().map(|x| *x != 0.0));
-    let near = Decision::above(radius, b.abs(), slack);
+    let near = Decision::above(radius.value, b.abs(), slack + radius.error);
     let across = Known { value: m.value.abs(), ..m };
     let torn = parts.and(apart.and(Decision::greater(reach, across)).or(near.and(Decision::greater(reach, m))));
     let half = (SQRT_2 * reach.value).max(f64::MIN_POSITIVE);
@@ -120,4 +129,33 @@ pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     };
     let out = (0..4).map(outside).fold(Decision::NO, Decision::or);
     out.not().and(far.iter().map(behind).fold(Decision::NO, Decision::or))
+}
+
+/// Planes through a point hold what they are said to hold by this share of the lengths that make them up.
+const TRUST: f64 = 1e-5;
+
+/// Whether `r` alone hides all of `e` from `p`: its corners are within the pyramid from `p` over `r`, and beyond `r`.
+pub fn hides_all(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
+    let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
+    let inside = |k: usize| {
+        let (a, b) = (rim[k], rim[(k + 1) % 4]);
+        let plane = a.cross(b);
+        let inward = plane * plane.dot(r.center - p).signum();
+        let (a, b) = (a.length(), b.length());
+        let within = |c: &DVec3| {
+            let off = 2.0 * slack * (a * b + (a + b) * c.length());
+            Decision::above(inward.dot(*c), TRUST * a * b * c.length(), off)
+        };
+        far.iter().map(within).fold(Decision::YES, Decision::and)
+    };
+    let (_, of_p) = sides(r, p, slack);
+    let beyond = |c: &DVec3| {
+        let o = *c + p - r.center;
+        let depth = r.normal.dot(o);
+        Decision::of(
+            of_p.iter()
+                .flat_map(|s| [0.0, slack, -slack].map(|off| -s * (depth + off) > TRUST * o.abs().element_sum())),
+        )
+    };
+    (0..4).map(inside).chain(far.iter().map(beyond)).fold(Decision::YES, Decision::and)
 }

@@ -37,13 +37,13 @@ impl Exchange<'_> {
     }
 
     fn lit(&self, i: usize, i_light: usize) -> Lit<'_> {
-        let (facet, radius, source) = (&self.facets[i], self.radius(i), source_of(&self.lights[i_light]));
+        let (facet, ball, source) = (&self.facets[i], self.ball(i), source_of(&self.lights[i_light]));
         let Some((u, v)) = self.axes(i) else {
             let mean = self.share_at(i, i_light, facet.position, self.known(self.transmittance, i, i_light));
             return Lit { torn: Decision::NO, rectangles: vec![], source, points: vec![], mean };
         };
         let shadows = self.others(facet.i_region, facet.i_region);
-        let shadows = shadows.map(|(_, r)| (r, shadow(r, source, facet.position, radius, self.slack())));
+        let shadows = shadows.map(|(_, r)| (r, shadow(r, source, &ball)));
         // One that only rounding may bring here hides nothing of the facet: it is within the ball.
         let met: Vec<_> = shadows.filter(|(_, s)| s.torn.or(s.hidden).is_possible()).collect();
         let torn = met.iter().map(|(_, s)| s.torn).fold(Decision::NO, Decision::or);
@@ -114,12 +114,13 @@ impl Exchange<'_> {
         Known { value: own(v.value), error }
     }
 
-    /// Between the normal of facet `i` and the half vector of a light that is not the sky and the way back.
-    pub(super) fn light_angle(&self, i: usize, i_light: usize, q: DVec3, way: &Way) -> Option<Known> {
+    /// Between the unit normal at the end of `way` and the half vector of a light that is not the sky and the way back;
+    /// `q`, that end, is off by `moved`.
+    pub(super) fn light_angle(&self, i_light: usize, q: DVec3, way: &Way, moved: f64) -> Option<Known> {
         let light = &self.lights[i_light];
         let arrival = light.arrival(q);
-        let turn = way.turn + self.turn(arrival.distance);
-        (!light.is_sky()).then(|| half_angle(self.facets[i].normal, arrival.toward, -way.way, turn))
+        let turn = way.turn + self.turn(arrival.distance) + 2.0 * moved / arrival.distance.max(LEAST_DISTANCE);
+        (!light.is_sky()).then(|| half_angle(way.n_i, arrival.toward, -way.way, turn))
     }
 
     /// Radiance of facet `i` against `way` from `q` under shares `g` of the lights, and its error.
@@ -128,7 +129,7 @@ impl Exchange<'_> {
         let region = &self.regions[source.i_region];
         let (mut sum, mut error) = (DVec3::ZERO, DVec3::ZERO);
         for (k, (light, g)) in self.lights.iter().zip(g).enumerate().filter(|(_, (_, g))| !g.is_nothing()) {
-            let glossy = region.lobe.as_ref().zip(self.light_angle(i, k, q, way));
+            let glossy = region.lobe.as_ref().zip(self.light_angle(k, q, way, 0.0));
             let glossy = glossy.map_or(Known::NOTHING, |(table, angle)| lobe(table, angle));
             let f = region.brdf.kd * source.color / PI + region.brdf.ks * glossy.value;
             sum += light.energy() * f * g.value;

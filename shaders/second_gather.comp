@@ -119,7 +119,7 @@ void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, f
 vec4 taken_from(Cell cell, Taker taker) {
     vec4 lobes;
     [[unroll]] for (uint q = 0u; q < 4u; ++q) {
-        vec3 way = normalize(quarter_at(cell, q) - taker.position);
+        vec3 way = unit(quarter_at(cell, q) - taker.position);
         lobes[q] = lobe_at(taker.region.i_lobe, half_vector_gap(taker.normal, way, taker.outgoing));
     }
     return lobes;
@@ -131,7 +131,7 @@ vec4 shining_from(Cell cell, Sender source, Region emitter, Taker taker, uint l)
     vec4 lobes;
     [[unroll]] for (uint q = 0u; q < 4u; ++q) {
         vec3 p = quarter_at(cell, q);
-        lobes[q] = lobe_at(emitter.i_lobe, gap_of(p, source.normal, normalize(taker.position - p), l));
+        lobes[q] = lobe_at(emitter.i_lobe, gap_of(p, source.normal, unit(taker.position - p), l));
     }
     return lobes;
 }
@@ -178,7 +178,7 @@ void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, f
     float most = min(PI, area / max(nearest * nearest, 1e-30));
     float share = view.width > 1.0 ? most : min(most, area / max(view.d2, 1e-30));
     // As if nothing shaded the cell: its facet's mean may be mostly shadow.
-    vec3 met = vec3(0.0), sent = vec3(0.0);
+    vec3 met = vec3(0.0), sent = vec3(0.0), plain = vec3(0.0);
     for (uint l = 0u; l < N_LIGHTS; ++l) {
         float g = share_of(LIGHT(l), arrival_at(LIGHT(l), view.position), source.normal, 1.0);
         float peak = 0.0, lobe = 0.0;
@@ -191,6 +191,7 @@ void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, f
 #endif
         met += LIGHT(l).energy * g * (emitter.kd * PI_INVERSE + emitter.ks * lobe);
         sent += LIGHT(l).energy * g * (emitter.kd * PI_INVERSE + emitter.ks * max(peak, lobe));
+        plain += LIGHT(l).energy * g * (emitter.kd * PI_INVERSE);
     }
     vec3 received = taker.albedo, taken = taker.albedo;
 #if GLOSSY
@@ -199,8 +200,8 @@ void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, f
     taken += taker.region.ks * max(at, lobe_at(taker.region.i_lobe, nearest_gap(view.taker_gap, turn)));
 #endif
     // Of geometry: all that it may be where the cell is wider than far, else the midpoint rule's error. Of lobes: their
-    // greatest values in place of those met.
-    vec3 e = met * received * share * min(view.width * view.width, 1.0) + (sent * taken - met * received) * share;
+    // greatest values, since the quarters' middles may have met nothing of them.
+    vec3 e = met * received * share * min(view.width * view.width, 1.0) + (sent * taken - plain * taker.albedo) * share;
     unresolved += max(e.x, max(e.y, e.z));
     n_unresolved += 1.0;
 }

@@ -74,7 +74,7 @@ void main() {
             irradiance += light.energy * g;
         }
         vec3 flux = facet.area * INV_PI * region.kd * facet.color * irradiance;
-        // Second moments of its rectangle; of a disc the form factor has them.
+        // Second moments of its rectangle; a disc has none, as its form factor is of another kind.
         vec3 square = is_surface ? (u * u + v * v) / 3.0 : vec3(0.0), leaning = is_surface ? (u.xxy * u.yzz + v.xxy * v.yzz) / 3.0 : vec3(0.0);
         sources[i] = Source(
             vec4(facet.position, radius), vec4(flux, in_part ? -1.0 : 1.0), vec4(facet.normal, facet.area), vec4(facet.area, square),

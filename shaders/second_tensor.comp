@@ -154,11 +154,11 @@ void take_cell(
     const bool own) {
     vec4 g = part * arriving_by(i, source, walk, cell, seen, i_own, own, push.i_light);
     // Lobes are met in each quarter.
-    bool alike = N_BASES == 1;
+    bool alike = N_BASES == 1 || (!bool(GLOSSY) && emitter.i_lobe == NO_LOBE);
     g.x = alike ? dot(g, vec4(1.0)) : g.x;
     for (uint q = 0u; q < (part > 0.0 ? (alike ? 1u : 4u) : 0u); ++q) {
         vec3 p = quarter_at(cell, q);
-        vec3 way = normalize(p - taker.position);
+        vec3 way = unit(p - taker.position);
         // Only surfaces' facets have cells, and these no colours of their own.
         add(vec4(0.0, 0.0, 0.0, g[q]), source.normal, p, way, half_vector_gap(taker.normal, way, taker.outgoing), emitter);
         n_turns += 1u;

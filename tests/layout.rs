@@ -1,13 +1,16 @@
 //! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared with the host's
 //! records, push constants and shared constants.
 
+mod harness;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-use nimbus::gpu::Compiler;
+use harness::Gpu;
 use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{BindingKind, Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
+use nimbus::gpu::{Buffer, Compiler, Place};
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
@@ -221,6 +224,40 @@ fn every_shader_and_every_record_is_covered() {
     let structs = records_glsl().lines().filter_map(|l| l.strip_prefix("struct ")?.split(' ').next()).collect();
     let known: BTreeSet<&str> = RECORDS.iter().map(|(name, _, _)| *name).collect();
     assert_eq!(known, structs);
+}
+
+/// Records that shaders read by texels have no layout to reflect: read by the shaders' own function and written as records,
+/// every word is where it was. A source and a packed stencil are four-word fields in the host's order.
+#[test]
+fn a_region_read_by_texels_is_the_record() {
+    let mut gpu = Gpu::new();
+    let text = r#"#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+layout(local_size_x = 1) in;
+layout(binding = 0) uniform usamplerBuffer regions;
+layout(std430, binding = 1) writeonly buffer Copies { Region copies[]; };
+#include "regions.glsl"
+void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
+"#;
+    let kernel = gpu.test_kernel("texels", text, &[]);
+    const N_WORDS: usize = size_of::<RegionRecord>() / 4;
+    // Small normal floats, so that whatever is taken for a float keeps its bits.
+    let words: Vec<u32> = (0..3 * N_WORDS as u32).map(|i| (1.0 + i as f32).to_bits()).collect();
+    let mut from = Buffer::new::<u32>(&gpu.device, "test.from", words.len() as u64, Place::Upload).unwrap();
+    from.write(&words).unwrap();
+    let to = Buffer::new::<u32>(&gpu.device, "test.to", words.len() as u64, Place::Readback).unwrap();
+    gpu.run(|rec| rec.dispatch_groups(&kernel, &[&from, &to], &(), 3));
+    assert_eq!(to.read::<u32>(words.len()).unwrap(), words);
+    let gather = text_of("include/gather.glsl");
+    for (record, n_texels) in
+        [("sources", size_of::<SourceRecord>() / 16), ("stencils", size_of::<PackedRecord>() / 16)]
+    {
+        let first = gather.split(&format!("texelFetch({record}, k)")).next().unwrap();
+        assert!(first.ends_with("Float(") || first.ends_with("Packed("), "{record}");
+        let stride = first.rsplit_once("* ").unwrap().1.split(';').next().unwrap();
+        assert_eq!(stride.parse(), Ok(n_texels), "{record}");
+    }
 }
 
 fn text_of(name: &str) -> &'static str {

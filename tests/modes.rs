@@ -221,3 +221,17 @@ fn a_parallel_run_that_is_stopped_leaves_nothing_in_flight() {
     let mut begin = |i| renderer.begin(game.step(i).expect("a packet")).map(|_| ());
     assert!(begin(5).is_ok() && begin(6).is_ok() && begin(7).is_err());
 }
+
+#[test]
+fn after_a_frame_that_failed_no_other_is_drawn_on_what_it_left() {
+    let gpu = Gpu::new();
+    let scene = Arc::new(scene(&[]));
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    let mut game = Game::new(scene.clone(), None);
+    let mut packet = game.step(0).expect("a packet");
+    // More than there is room for.
+    packet.lights = packet.lights.repeat(3);
+    assert!(renderer.step(packet).is_err());
+    let refused = renderer.step(game.step(1).expect("a packet")).map(|_| ()).expect_err("it is refused");
+    assert!(refused.to_string().contains("a frame has failed"), "{refused}");
+}

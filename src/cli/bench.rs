@@ -119,11 +119,11 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         overlap: outcome.overlap(),
         interrupted: outcome.interrupted,
     };
-    if let Some(file) = &args.trace {
-        trace::write(file, &outcome.samples)?;
-    }
     if let Some(dir) = out {
         records::write_results(dir, &run, &pass_names(), &outcome.rows())?;
+    }
+    if let Some(file) = &args.trace {
+        trace::write(file, &outcome.samples)?;
     }
     if !args.json {
         output::text(&report(path, &run, &info, &outcome, args))?;

@@ -47,7 +47,7 @@ pub struct Buffers {
 
 /// Every particle's place.
 pub enum Placed {
-    ByHost(Feed),
+    ByHost(Box<Feed>),
     ByDevice(Buffer),
 }
 
@@ -92,7 +92,7 @@ impl Buffers {
         // No more vectors than were asked for.
         let n_table_rows = scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1;
         let placed = match host_places {
-            true => Placed::ByHost(Feed::new::<PlacedRecord>(device, "place.placed", n)?),
+            true => Placed::ByHost(Box::new(Feed::new::<PlacedRecord>(device, "place.placed", n)?)),
             false => Placed::ByDevice(Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?),
         };
         Ok(Buffers {

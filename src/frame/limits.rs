@@ -10,6 +10,7 @@ use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::layout::second::{PackedRecord, SourceRecord};
+use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::scene::{LightingMode, Scene};
@@ -23,12 +24,13 @@ use super::render::target_format;
 use super::tensor::Shape;
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 5] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 6] = [
     ("the second reflection's sources", BindingKind::Texels),
     ("their flux by light", BindingKind::Texels),
     ("their light by points", BindingKind::Texels),
     ("the regions", BindingKind::Texels),
     ("the density grid", BindingKind::Floats),
+    ("the lobes of materials and basis", BindingKind::Floats),
 ];
 
 /// Checks the buffers that grow with the scene, and their sum; what is made beside them (staging, the sort's table, the
@@ -40,6 +42,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     }
     // A tree has at most a cluster for every three of its facets, and each region a root.
     let n_sources = if has_second(scene) { scene.n_facets() * 4 / 3 + scene.n_regions() as u64 } else { 0 };
+    let n_lobes = scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1;
+    let is_lit = scene.lighting.mode != LightingMode::None;
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
     let pixel = target_format(scene.film.format).bytes_per_pixel();
     let size = |record: usize| record as u64;
@@ -67,6 +71,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
         ("the density grid's sums", n_cells_max(scene), 8),
         ("the density grid", n_cells_max(scene), 4),
+        ("the lobes of materials and basis", n_lobes * N_NODES as u64, 4),
         ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
         ("the film, read back", n_pixels, pixel),
     ];
@@ -74,7 +79,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
-        if let Some(texel) = texel.filter(|texel| n * bytes / u64::from(*texel) > limits.max_texels) {
+        if let Some(texel) = texel.filter(|texel| is_lit && n * bytes / u64::from(*texel) > limits.max_texels) {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
                 n * bytes / u64::from(texel),

@@ -1,8 +1,9 @@
 //! Game step and render step side by side: a thread plays, one draws, one waits for the device. An owned packet a frame
 //! crosses, through bounded channels, and there is no lock that two of them take.
 //!
-//! A frame's game step may begin when the second frame before it has ended. So the device always has the next frame at
-//! hand, recorded while it draws, and a picture is never older than two frames.
+//! A frame's game step may begin when the second frame before it has ended. So the device has the next frame at hand,
+//! recorded while it draws, wherever game step and recording take less than it does; and a picture is never older than two
+//! frames.
 
 use std::collections::VecDeque;
 use std::ops::Range;
@@ -21,7 +22,7 @@ use crate::gpu::Pending;
 
 /// What the drawing thread is told.
 enum Event {
-    Packet(Packet),
+    Packet(Box<Packet>),
     /// The oldest frame in flight was finished at this time.
     Ended(Instant),
     /// There is no further frame; an error where there should have been one.
@@ -49,7 +50,8 @@ pub fn run(game: &mut Game, renderer: &mut Renderer, frames: Range<u32>, on_fram
             let _ = grant.send(());
         }
         // What is still owned here ends with this block, and with it both threads.
-        Drawing { renderer: &mut *renderer, grant, submit, started: VecDeque::new() }.run(&events, on_frame)
+        Drawing { renderer: &mut *renderer, grant, submit, started: VecDeque::new(), under_way: VecDeque::new() }
+            .run(&events, on_frame)
     });
     renderer.drain();
     drawn
@@ -81,7 +83,7 @@ fn play(game: &mut Game, frames: Range<u32>, granted: &Receiver<()>, tell: &Sync
         if granted.recv().is_err() {
             return;
         }
-        let event = game.step(i_frame).map_or_else(|e| Event::Played(Err(e)), Event::Packet);
+        let event = game.step(i_frame).map_or_else(|e| Event::Played(Err(e)), |packet| Event::Packet(Box::new(packet)));
         let is_last = matches!(event, Event::Played(_));
         if tell.send(event).is_err() || is_last {
             return;
@@ -106,6 +108,8 @@ struct Drawing<'a> {
     grant: SyncSender<()>,
     submit: SyncSender<Pending>,
     started: VecDeque<Started>,
+    /// Of the same frames.
+    under_way: VecDeque<Pending>,
 }
 
 impl Drawing<'_> {
@@ -116,13 +120,19 @@ impl Drawing<'_> {
             let Ok(event) = events.recv() else { break };
             match event {
                 Event::Packet(packet) => {
-                    self.started.push_back(Started::of(&packet, self.started.len() as u32));
-                    let pending = self.renderer.begin(packet)?;
+                    let mut started = Started::of(&packet, 0);
+                    let pending = self.renderer.begin(*packet)?;
+                    for before in &self.under_way {
+                        started.queue_depth += u32::from(!before.is_done()?);
+                    }
+                    self.started.push_back(started);
+                    self.under_way.push_back(pending.clone());
                     // There is room for every frame in flight; a waiting thread that is gone has told why.
                     let _ = self.submit.send(pending);
                 }
                 Event::Ended(end) => {
                     let Some(started) = self.started.pop_front() else { continue };
+                    self.under_way.pop_front();
                     let times = started.ended(self.renderer.end()?, end, &mut last_end);
                     if !on_frame(times, self.renderer)? {
                         return Ok(());

@@ -2,7 +2,7 @@
 
 use super::buffers::download;
 use super::render::Renderer;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::Device;
 use crate::gpu::memory::TargetFormat;
 use crate::layout::facet::{FacetRecord, LitRecord};
@@ -44,13 +44,20 @@ impl Renderer {
         Ok((particles, download(device, &mut self.host, &self.buffers.status, n)?))
     }
 
-    /// Where the last frame had the particles, relative to its lighting origin.
+    /// Of frames in flight nobody knows which one's would be read.
+    fn check_alone(&self) -> Result<()> {
+        if self.in_flight.is_empty() { Ok(()) } else { Err(Error::usage("frames are in flight")) }
+    }
+
+    /// Where the last frame had the particles, relative to its lighting origin. No frame may be in flight.
     pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
+        self.check_alone()?;
         download(device, &mut self.host, self.buffers.placed.buffer(), self.settings.n_particles)
     }
 
-    /// The last frame's facets and their light; only meaningful where the scene is lit.
+    /// The last frame's facets and their light; only meaningful where the scene is lit. No frame may be in flight.
     pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
+        self.check_alone()?;
         let n = self.settings.n_facets;
         let facets = download(device, &mut self.host, &self.buffers.facets, n)?;
         Ok((facets, download(device, &mut self.host, &self.buffers.lit, n)?))

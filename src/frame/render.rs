@@ -35,7 +35,7 @@ pub struct Renderer {
     frames: [Commands; IN_FLIGHT],
     /// For what is asked between frames.
     pub(super) host: Commands,
-    in_flight: VecDeque<InFlight>,
+    pub(super) in_flight: VecDeque<InFlight>,
     pub(super) generate: Generate,
     place: PlacePass,
     grid: Grid,
@@ -64,10 +64,12 @@ pub struct Renderer {
     n_begun: u64,
     /// When the last one ended.
     last_end: Instant,
+    /// A frame went wrong on its way.
+    failed: bool,
 }
 
 /// A frame that was submitted and has not been waited for.
-struct InFlight {
+pub(super) struct InFlight {
     slot: usize,
     i_target: usize,
     plan: Plan,
@@ -181,6 +183,7 @@ impl Renderer {
             last: None,
             n_begun: 0,
             last_end: Instant::now(),
+            failed: false,
         };
         renderer.buffers.fill(device, &mut renderer.host, scene, &groups)?;
         Ok(renderer)
@@ -195,9 +198,20 @@ impl Renderer {
     /// Uploads, records and submits a frame, and gives what can be waited for. At most [`IN_FLIGHT`] frames may have begun
     /// and not ended.
     pub fn begin(&mut self, packet: Packet) -> Result<Pending> {
+        if self.failed {
+            return Err(Error::usage("a frame has failed: what the device holds is not known any more"));
+        }
         if self.in_flight.len() == IN_FLIGHT {
             return Err(Error::usage(format!("{IN_FLIGHT} frames are in flight; one must end before the next begins")));
         }
+        // Until all of it has gone well the device and what is remembered of it may differ.
+        self.failed = true;
+        let pending = self.submit(packet)?;
+        self.failed = false;
+        Ok(pending)
+    }
+
+    fn submit(&mut self, packet: Packet) -> Result<Pending> {
         let begin = Instant::now();
         let plan = plan(&self.traits, self.last.as_ref(), &packet);
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
@@ -217,7 +231,9 @@ impl Renderer {
     /// Waits for the oldest frame in flight and gives what it tells.
     pub fn end(&mut self) -> Result<Rendered> {
         let frame = self.in_flight.pop_front().ok_or_else(|| Error::usage("no frame is in flight"))?;
+        self.failed = true;
         let passes = self.frames[frame.slot].wait()?;
+        self.failed = false;
         self.i_ended_target = frame.i_target;
         let now = Instant::now();
         // What was waited for the frame before is that one's.

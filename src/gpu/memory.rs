@@ -141,7 +141,7 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: whoever drops a buffer has waited for the commands that use it (frame/ waits every frame).
+        // SAFETY: whoever drops a buffer has waited for the commands that use it, or drops those first, which wait.
         unsafe {
             for view in self.views {
                 self.shared.raw.destroy_buffer_view(view, None);

@@ -40,6 +40,7 @@ pub struct Commands {
 }
 
 /// A submission that any thread can wait for, as long as its commands are there.
+#[derive(Clone)]
 pub struct Pending {
     shared: Arc<Shared>,
     semaphore: vk::Semaphore,
@@ -54,6 +55,15 @@ impl Pending {
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         unsafe { self.shared.raw.wait_semaphores(&info, TIMEOUT_NS) }
             .map_err(|e| Error::vulkan(format!("vkWaitSemaphores {}", self.name), e))
+    }
+}
+
+impl Pending {
+    /// Whether the device has done it already.
+    pub fn is_done(&self) -> Result<bool> {
+        let reached = unsafe { self.shared.raw.get_semaphore_counter_value(self.semaphore) };
+        let failed = |e| Error::vulkan(format!("vkGetSemaphoreCounterValue {}", self.name), e);
+        Ok(reached.map_err(failed)? >= self.value)
     }
 }
 
@@ -103,7 +113,7 @@ impl Commands {
         }
         self.timer.reset(self.buffer);
         let mut recorder = Recorder { commands: self, uses: HashMap::new(), i_pool: 0, barriers };
-        // What earlier submissions wrote: waiting for them on the host makes it available, not visible to this one.
+        // What earlier submissions wrote and read, which may still be under way: this alone orders them before this one.
         // Synchronization validation of 1.3.239 does not look across submissions, so no test would notice if this line went.
         recorder.barrier(WRITES, STAGES, READS | WRITES);
         f(&mut recorder)?;

@@ -19,14 +19,15 @@ pub struct Overlap {
     /// Of the serial loop, where neither step disturbs the other.
     pub game_ms: f64,
     pub render_ms: f64,
-    /// max(game, render): no overlap of the two does better.
+    /// max(game, render): what overlapping these two alone can come to. Recording overlaps the device as well, so that the parallel
+    /// loop may come below it.
     pub bound_ms: f64,
     /// None where the parallel loop did not run, or the possible gain is not certainly above 0: then any share of it,
     /// or none, might have been reached.
     pub reached: Option<Reached>,
 }
 
-/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap, 0 no gain, below 0 a loss.
+/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap of the two, above it recording was hidden too, 0 no gain, below 0 a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
     pub share: f64,

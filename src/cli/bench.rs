@@ -206,7 +206,7 @@ fn overlap_lines(o: &Overlap) -> String {
         );
         if r.share > 1.0 {
             // What cannot come from overlap came from elsewhere.
-            out += "that is more than overlap can give: something else changed from block to block\n";
+            out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the machine changed from block to block\n";
         }
     } else if o.parallel_ms.is_some() {
         out += "that is no certain gain, so what share of it was reached cannot be said\n";

@@ -25,6 +25,13 @@ fn scene(overrides: &[&str]) -> Scene {
     scene_file::load(Path::new("tests/data/modes.toml"), &all, None).expect("the scene loads").scene
 }
 
+/// The scene on a device, and its game step on the GPU's behalf.
+fn started(gpu: &Gpu, overrides: &[&str]) -> (Renderer, Game) {
+    let scene = Arc::new(scene(overrides));
+    let renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    (renderer, Game::new(scene, None))
+}
+
 /// Every frame's bytes, and what each ran.
 fn run(scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTimes)> {
     run_for(N_FRAMES, scene, threading, skip)
@@ -207,9 +214,7 @@ fn a_panic_of_the_game_thread_ends_both_sides_with_what_it_said() {
 #[test]
 fn a_parallel_run_that_is_stopped_leaves_nothing_in_flight() {
     let gpu = Gpu::new();
-    let scene = Arc::new(scene(&[]));
-    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
-    let mut game = Game::new(scene.clone(), None);
+    let (mut renderer, mut game) = started(&gpu, &[]);
     let mut seen = vec![];
     let on_frame = &mut |times: FrameTimes, _: &mut Renderer| {
         seen.push(times.i_frame);
@@ -225,9 +230,7 @@ fn a_parallel_run_that_is_stopped_leaves_nothing_in_flight() {
 #[test]
 fn after_a_frame_that_failed_no_other_is_drawn_on_what_it_left() {
     let gpu = Gpu::new();
-    let scene = Arc::new(scene(&[]));
-    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
-    let mut game = Game::new(scene.clone(), None);
+    let (mut renderer, mut game) = started(&gpu, &[]);
     let mut packet = game.step(0).expect("a packet");
     // More than there is room for.
     packet.lights = packet.lights.repeat(3);

@@ -11,9 +11,9 @@ mod rooms;
 mod scene_text;
 
 use bounded::Random;
-use gathers::{assert_agrees, reference, truths, values};
+use gathers::{assert_agrees, is_noticed, reference, truths, values};
 use glam::DVec3;
-use harness::{Gpu, assert_within_and_say, check_within};
+use harness::{Gpu, assert_within_and_say};
 use nimbus::gpu::Compiler;
 use nimbus::model::scene::Scene;
 use rooms::{HEAD, SKY, frame, frame_by, plates_text, random_plates, sun_and_lamp};
@@ -96,11 +96,7 @@ fn wrong_gathers_are_noticed() {
     // With pair_size 4 most facets are taken as wholes.
     let scenes = [room(1, ""), cloud("forward = 0"), room(1, "pair_size = 4")];
     let references = scenes.clone().map(|s| truths(&reference(&frame(&gpu, s))));
-    let wrong = |compiler: &Compiler, scene: usize| {
-        let found = values(&frame_by(&gpu, compiler, scenes[scene].clone()));
-        let (truths, bounds) = &references[scene];
-        [0, 1].iter().any(|&k| check_within("wrong", &found[k], &truths[k], &bounds[k]).is_err())
-    };
+    let wrong = |compiler: &Compiler, i: usize| is_noticed(&gpu, compiler, &scenes[i], &references[i]);
     assert!((0..3).all(|scene| !wrong(&gpu.compiler, scene)));
     for (scene, file, from, to) in [
         (0, "include/gather.glsl", "2.0 / (3.0 * d2)", "1.0 / (3.0 * d2)"),

@@ -3,10 +3,11 @@
 
 // A lobe is met within this many of its widths (e^-8 of its peak beyond).
 const float LOBE_REACH = 4.0;
-// Cells no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
+// Wholes no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
 // width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
 const float LOBE_STEP = 3.0;
-// Lobes are met in each quarter of a cell, so that a cell may be this much wider.
+// Lobes are met in each quarter of a cell, so that a cell may be this much wider: its quarters, 3/4 as wide as a whole may
+// be, are finer than they need be for the lobe, and its points as fine as rims need (docs/measured.md).
 const float LOBE_PARTS = 1.5;
 // The half vector turns by at most this share of a cell's width over its distance between its centre and its corner: half
 // the direction's turn, of half a diagonal of sqrt 2; twice that where the light is as near as the receiver.

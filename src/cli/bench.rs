@@ -205,8 +205,8 @@ fn overlap_lines(o: &Overlap) -> String {
             "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval {low:.1} to {high:.1})\n"
         );
         if r.share > 1.0 {
-            // What cannot come from overlap came from elsewhere.
-            out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the machine changed from block to block\n";
+            out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the \
+                    machine changed from block to block\n";
         }
     } else if o.parallel_ms.is_some() {
         out += "that is no certain gain, so what share of it was reached cannot be said\n";

@@ -75,7 +75,7 @@ impl Buffers {
     }
 
     /// Copies it to where shaders read it; the particles' places are `place`'s.
-    pub fn record(&self, rec: &mut Recorder<'_>, slot: usize) {
+    pub fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
         for feed in [&self.groups, &self.modes, &self.table, &self.regions, &self.lights] {
             feed.record(rec, slot);
         }

@@ -60,7 +60,8 @@ impl Grouping {
         self.bounds.write(slot, &packet.bounds)
     }
 
-    pub fn record(&self, rec: &mut Recorder<'_>, slot: usize) {
+    /// Copies what was written to where shaders read it.
+    pub fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
         self.bounds.record(rec, slot);
     }
 

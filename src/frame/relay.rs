@@ -32,7 +32,6 @@ struct Order {
     morton: Morton,
     sort: Sort,
     entries: Buffer,
-    /// Written by the host every frame.
     bounds: Feed,
     n_regions: u32,
 }

@@ -291,8 +291,8 @@ impl Renderer {
         } = self;
         let (n, target) = (s.n_particles, &mut targets[*i_target]);
         frames[slot].record(Barriers::Placed, |rec| {
-            b.record(rec, slot);
-            grouping.iter().for_each(|g| g.record(rec, slot));
+            b.record_feeds(rec, slot);
+            grouping.iter().for_each(|g| g.record_feeds(rec, slot));
             second.iter().for_each(|s| s.record_feeds(rec, slot));
             tensor.iter().for_each(|t| t.record_feeds(rec, slot));
             pass(rec, plan, Pass::Generate, |rec| {

@@ -1,7 +1,8 @@
 //! What running the game step beside the render step could gain, and how much of it was gained.
 //!
-//! The serial loop takes T_serial ≈ T_game + T_render a frame. Side by side no frame can be faster than the slower of
-//! the two: max(T_game, T_render), with both as long as they take alone. T_serial less that is the possible gain;
+//! The serial loop takes T_serial ≈ T_game + T_render a frame. Side by side a frame takes no less than the slower of
+//! the two, max(T_game, T_render), with both as long as they take alone; but recording is a part of the render step that
+//! the parallel loop lays beside the device's, so that it may come below that. T_serial less that is the possible gain;
 //! T_serial − T_parallel is what was gained. (Steps that slow one another down by sharing cores, caches or memory
 //! gain less; that is what the share is there to show.) All T are medians.
 
@@ -19,15 +20,15 @@ pub struct Overlap {
     /// Of the serial loop, where neither step disturbs the other.
     pub game_ms: f64,
     pub render_ms: f64,
-    /// max(game, render): what overlapping these two alone can come to. Recording overlaps the device as well, so that the parallel
-    /// loop may come below it.
+    /// max(game, render): what overlapping these two alone can come to.
     pub bound_ms: f64,
     /// None where the parallel loop did not run, or the possible gain is not certainly above 0: then any share of it,
     /// or none, might have been reached.
     pub reached: Option<Reached>,
 }
 
-/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap of the two, above it recording was hidden too, 0 no gain, below 0 a loss.
+/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap of the two, above it
+/// recording was hidden too, 0 no gain, below 0 a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
     pub share: f64,

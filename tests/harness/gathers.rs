@@ -4,20 +4,21 @@
 
 use glam::DVec3;
 use nimbus::frame::game::Setting;
+use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, KeyBits, RegionBoundsRecord};
 use nimbus::model::basis::Basis;
 use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
-use nimbus::model::scene::Gather;
+use nimbus::model::scene::{Gather, Scene};
 use nimbus::reference::area::mean::each;
 use nimbus::reference::occlude::Rectangle;
 use nimbus::reference::second::{Exchange, Facet, Gathered, Region};
 use nimbus::reference::transmit::{Obstacles, Receiver};
 use nimbus::reference::{grid, morton, place, sort};
 
-use crate::harness::assert_within_and_say;
-use crate::rooms::Frame;
+use crate::harness::{Gpu, assert_within_and_say, check_within};
+use crate::rooms::{Frame, frame_by};
 
 /// Every facet's light in f64: facets as the device has them, all else from the scene.
 pub fn reference(f: &Frame) -> Vec<Gathered> {
@@ -102,8 +103,10 @@ pub fn values(f: &Frame) -> [Vec<f64>; 2] {
     [of(0), of(1)]
 }
 
-/// Truths and bounds of both.
-pub fn truths(found: &[Gathered]) -> ([Vec<f64>; 2], [Vec<f64>; 2]) {
+/// Of I_i and L2, and the bounds of both.
+pub type Truths = ([Vec<f64>; 2], [Vec<f64>; 2]);
+
+pub fn truths(found: &[Gathered]) -> Truths {
     let flat = |of: &dyn Fn(&Gathered) -> DVec3| found.iter().flat_map(|g| of(g).to_array()).collect::<Vec<f64>>();
     ([flat(&|g| g.indirect), flat(&|g| g.second)], [flat(&|g| g.indirect_error), flat(&|g| g.second_error)])
 }
@@ -126,4 +129,10 @@ pub fn assert_agrees(what: &str, f: &Frame) {
         n += truth.n_unresolved;
     }
     println!("  {n} cells unresolved");
+}
+
+/// Whether what `compiler`'s shaders make of the scene is out of the bounds about its truths.
+pub fn is_noticed(gpu: &Gpu, compiler: &Compiler, scene: &Scene, (truths, bounds): &Truths) -> bool {
+    let found = values(&frame_by(gpu, compiler, scene.clone()));
+    [0, 1].iter().any(|&k| check_within("wrong", &found[k], &truths[k], &bounds[k]).is_err())
 }

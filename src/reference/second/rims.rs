@@ -109,16 +109,20 @@ fn corners(r: &Rectangle) -> [DVec3; 4] {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| r.center + x * r.u + y * r.v)
 }
 
+/// Face k of the pyramid over `rim`: what is within is on the positive side of its normal; and its edges' lengths.
+fn face(rim: &[DVec3; 4], k: usize, middle: DVec3) -> (DVec3, [f64; 2]) {
+    let (a, b) = (rim[k], rim[(k + 1) % 4]);
+    let plane = a.cross(b);
+    (plane * plane.dot(middle).signum(), [a.length(), b.length()])
+}
+
 /// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor `r`'s plane, has all of
 /// `e`'s corners outside.
 pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
     // All of `far` below 0 of a plane through `p`, corners and normal known as their products are.
     let outside = |k: usize| {
-        let (a, b) = (rim[k], rim[(k + 1) % 4]);
-        let plane = a.cross(b);
-        let inward = plane * plane.dot(r.center - p).signum();
-        let (a, b) = (a.length(), b.length());
+        let (inward, [a, b]) = face(&rim, k, r.center - p);
         let below = |c: &DVec3| Decision::above(0.0, inward.dot(*c), 2.0 * slack * (a * b + (a + b) * c.length()));
         far.iter().map(below).fold(Decision::YES, Decision::and)
     };
@@ -138,10 +142,7 @@ const TRUST: f64 = 1e-5;
 pub fn hides_all(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
     let inside = |k: usize| {
-        let (a, b) = (rim[k], rim[(k + 1) % 4]);
-        let plane = a.cross(b);
-        let inward = plane * plane.dot(r.center - p).signum();
-        let (a, b) = (a.length(), b.length());
+        let (inward, [a, b]) = face(&rim, k, r.center - p);
         let within = |c: &DVec3| {
             let off = 2.0 * slack * (a * b + (a + b) * c.length());
             Decision::above(inward.dot(*c), TRUST * a * b * c.length(), off)

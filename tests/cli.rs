@@ -131,25 +131,41 @@ fn bench_prints_its_table_and_writes_its_results_once() {
     let args = ["bench", "scenes/hello.toml", "--frames", "6", "--warmup", "2", "--repeat", "2", "--out", &out];
     let (code, stdout, stderr) = run(&args);
     assert_eq!((code, stderr.as_str()), (0, ""));
-    for word in ["serial", "parallel", "p50", "p99", "parallel / serial", "sprites", "to the byte", "A B B A"] {
+    for word in [
+        "serial",
+        "parallel",
+        "p50",
+        "p99",
+        "parallel / serial",
+        "sprites",
+        "to the byte",
+        "A B C C B A",
+        "skipping saves",
+    ] {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }
     let json: Value =
         serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json")).expect("JSON");
-    assert_eq!(json["modes"].as_array().map(Vec::len), Some(2));
-    assert_eq!(json["modes"][0]["frames"], 12);
-    assert_eq!(json["block_order"], serde_json::json!(["serial", "parallel", "parallel", "serial"]));
-    assert_eq!(json["modes"][0]["image_hash"], json["modes"][1]["image_hash"]);
+    let case = &json["cases"][0];
+    assert_eq!((json["cases"].as_array().map(Vec::len), case["modes"].as_array().map(Vec::len)), (Some(1), Some(3)));
+    assert_eq!((&case["modes"][0]["frames"], &case["modes"][2]["skip"]), (&12.into(), &false.into()));
+    assert_eq!(json["block_order"].as_array().map(Vec::len), Some(6));
+    assert!((0..3).all(|i| case["modes"][i]["image_hash"] == case["modes"][0]["image_hash"]));
+    assert_eq!(case["skipping"]["same_bytes"], true);
+    // What skipping saved a frame is what the pass takes where nothing is skipped.
+    let sprites = |i: usize| case["modes"][i]["passes"].as_array().and_then(|p| p.last()).expect("sprites");
+    assert_eq!((&sprites(0)["n_skipped"], &sprites(2)["n_skipped"]), (&12.into(), &0.into()));
+    assert_eq!(sprites(0)["saved_ms"], sprites(2)["p50_ms"]);
     for word in ["1 % low: p99", "mean of slowest 1 %", "1 % of the time", "perfect overlap = max(game", "host clock"] {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }
-    let number = |pointer: &str| json.pointer(pointer).and_then(Value::as_f64).expect("a number");
+    let number = |pointer: &str| case.pointer(pointer).and_then(Value::as_f64).expect("a number");
     let overlap = number("/overlap/bound_ms");
     assert_eq!(overlap, number("/overlap/game_ms").max(number("/overlap/render_ms")));
     assert_eq!(number("/overlap/serial_ms"), number("/modes/0/frame_ms/p50"));
     assert_eq!(number("/modes/0/frame_lows/p99_fps"), 1000.0 / number("/modes/0/frame_ms/p99"));
     let rows = std::fs::read_to_string(path(&dir, "run/frames.csv")).expect("frames.csv");
-    assert_eq!(rows.lines().count(), 1 + 2 * 2 * (6 + 2));
+    assert_eq!(rows.lines().count(), 1 + 3 * 2 * (6 + 2));
     let (code, _, stderr) = run(&args);
     assert!(code == 2 && stderr.contains("--force"), "{stderr}");
 }
@@ -220,7 +236,7 @@ fn bench_json_is_json_and_nothing_else() {
         run(&["bench", "scenes/hello.toml", "--frames", "3", "--warmup", "1", "--repeat", "1", "--json"]);
     assert_eq!(code, 0);
     let json: Value = serde_json::from_str(&stdout).expect("JSON");
-    assert!(json["ratio"]["parallel_by_serial"].as_f64().is_some_and(|r| r > 0.0));
+    assert!(json["cases"][0]["ratio"]["parallel_by_serial"].as_f64().is_some_and(|r| r > 0.0));
     let schema: Value = serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
     assert!(jsonschema::is_valid(&schema, &json), "{:?}", jsonschema::validate(&schema, &json));
 }
@@ -243,7 +259,7 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     let json: Value =
         serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json")).expect("JSON");
     assert_eq!(json["interrupted"], true);
-    assert!(json["modes"][0]["frames"].as_u64().is_some_and(|n| n > 0));
+    assert!(json["cases"][0]["modes"][0]["frames"].as_u64().is_some_and(|n| n > 0));
 }
 
 /// Sends Ctrl-C's signal once `is_begun`: the exit code, stderr, and the time from the signal to the end.

@@ -6,10 +6,9 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use nimbus::measure::stats::Summary;
+use nimbus::study::machine::{Clocks, Cpu, Device};
 use nimbus::study::recorded::read_results;
-use nimbus::study::records::{
-    Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, RUN_FILE, Run, SCHEMA_VERSION, write_results,
-};
+use nimbus::study::records::{Block, Case, FRAMES_FILE, FrameRow, Mode, RUN_FILE, Run, SCHEMA_VERSION, write_results};
 use serde_json::{Value, json};
 
 const N_FRAMES: u32 = 60;
@@ -27,6 +26,9 @@ fn rows(threading: &str, ms: f64) -> Vec<FrameRow> {
     let row = |i: u32| {
         let ms = ms * (1.0 + 0.01 * f64::from(i * 7 % 11) / 5.0 - 0.01);
         FrameRow {
+            phase: String::new(),
+            sweep: String::new(),
+            skip: true,
             threading: threading.to_owned(),
             block: 0,
             frame: i,
@@ -46,20 +48,26 @@ fn rows(threading: &str, ms: f64) -> Vec<FrameRow> {
     (0..N_FRAMES + 2).map(row).collect()
 }
 
+fn block(threading: &str) -> Block {
+    Block { case: 0, threading: threading.to_owned(), skip: true }
+}
+
 fn run() -> Run {
     let mode = |threading: &str| Mode {
         threading: threading.to_owned(),
+        skip: true,
         simulate: "gpu".to_owned(),
         frames: N_FRAMES as usize,
         warm_up: 2,
         blocks: 1,
-        frame_ms: Summary::of(&[1.0]),
+        frame_ms: None,
         frame_lows: None,
         game_ms: None,
         record_ms: None,
         render_ms: None,
         gpu_ms: None,
         latency_ms: None,
+        queue_depth: None,
         passes: Vec::new(),
         image_hash: None,
     };
@@ -81,10 +89,18 @@ fn run() -> Run {
         cpu: Cpu { model: "a processor".to_owned(), logical_cores: 2 },
         environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
         clocks: Clocks { resolution_ns: 1.0, overhead_ns: 22.5, timestamp_period_ns: None },
-        block_order: ["serial", "parallel"].map(str::to_owned).to_vec(),
-        modes: vec![mode("serial"), mode("parallel")],
-        ratio: None,
-        overlap: None,
+        block_order: ["serial", "parallel"].map(block).to_vec(),
+        cases: vec![Case {
+            phase: None,
+            sweep: Vec::new(),
+            particles: 554,
+            width: 800,
+            height: 600,
+            modes: vec![mode("serial"), mode("parallel")],
+            ratio: None,
+            overlap: None,
+            skipping: None,
+        }],
         interrupted: false,
     }
 }
@@ -235,8 +251,8 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
         assert!(table.contains(word), "{word} in\n{table}");
     }
     let mut serial = run();
-    serial.modes.remove(0);
-    serial.modes[0].threading = "elsewhere".to_owned();
+    serial.cases[0].modes.remove(0);
+    serial.cases[0].modes[0].threading = "elsewhere".to_owned();
     let none = dir.path().join("none");
     fs::create_dir(&none).expect("a folder");
     write_results(&none, &serial, &["grid".to_owned(), "sort".to_owned()], &rows("elsewhere", 1.0)).expect("results");
@@ -260,19 +276,19 @@ const DAMAGES: [Damage; 14] = [
     (|d| edit(&d.join(RUN_FILE), |t| t[..t.len() / 2].to_owned()), "run.json", "not JSON, or not all of it"),
     (|d| edit(&d.join(RUN_FILE), |_| "{\"name\": 1}".to_owned()), "run.json", "names no schema version"),
     (
-        |d| edit(&d.join(RUN_FILE), |_| "{\"schema\": 2}".to_owned()),
+        |d| edit(&d.join(RUN_FILE), |_| "{\"schema\": 3}".to_owned()),
         "run.json",
         "not a run.json of nimbus: missing field",
     ),
-    (|d| edit(&d.join(RUN_FILE), |t| t.replace("\"schema\": 2", "\"schema\": 1")), "run.json", "schema 1; this nimbus"),
+    (|d| edit(&d.join(RUN_FILE), |t| t.replace("\"schema\": 3", "\"schema\": 2")), "run.json", "schema 2; this nimbus"),
     (|d| edit(&d.join(FRAMES_FILE), |t| t[..t.len() - 40].to_owned()), "frames.csv: line 125: ", "cut off?"),
     (
         |d| edit(&d.join(FRAMES_FILE), |t| whole_lines(t, 100)),
         "frames.csv",
         "holds 35 timed parallel frames and run.json names 60",
     ),
-    (|d| edit(&d.join(FRAMES_FILE), |_| String::new()), "frames.csv", "no column threading"),
-    (|d| edit(&d.join(FRAMES_FILE), |_| "x,y\n1,2\n".to_owned()), "frames.csv", "no column threading"),
+    (|d| edit(&d.join(FRAMES_FILE), |_| String::new()), "frames.csv", "no column phase"),
+    (|d| edit(&d.join(FRAMES_FILE), |_| "x,y\n1,2\n".to_owned()), "frames.csv", "no column phase"),
     (|d| edit(&d.join(FRAMES_FILE), |t| t.replace(",1,1.0", ",fast,1.0")), "frames.csv", "expected"),
     (|d| fs::write(d.join(FRAMES_FILE), [0xff, 0xfe, 0]).expect("written"), "frames.csv", "UTF-8"),
     (|d| edit(&d.join(FRAMES_FILE), |t| t.replace("parallel", "sideways")), "frames.csv", "0 timed parallel frames"),
@@ -314,18 +330,24 @@ fn what_bench_wrote_is_read_back_whole_and_does_not_differ_from_itself() {
     bench.args(["bench", "scenes/hello.toml", "--size", "64x48", "--frames", "16", "--warmup", "2", "--repeat", "2"]);
     bench.arg("--out").arg(&out).assert().success();
     let recorded = read_results(&out).expect("results");
-    assert_eq!(recorded.run.block_order, ["serial", "parallel", "parallel", "serial"]);
-    for (timed, mode) in recorded.modes.iter().zip(&recorded.run.modes) {
-        assert_eq!((&timed.threading, timed.frames.len()), (&mode.threading, 32));
+    let order: Vec<(&str, bool)> = recorded.run.block_order.iter().map(|b| (&b.threading[..], b.skip)).collect();
+    let there = [("serial", true), ("parallel", true), ("serial", false)];
+    let back = there.iter().rev();
+    assert_eq!(order, there.iter().chain(back).copied().collect::<Vec<_>>());
+    let modes = &recorded.run.cases[0].modes;
+    assert_eq!((recorded.modes.len(), modes.len()), (3, 3));
+    for (timed, mode) in recorded.modes.iter().zip(modes) {
+        let name = if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) };
+        assert_eq!((&timed.threading, timed.frames.len()), (&name, 32));
         // Every summary can be computed again from the frames.
-        let summaries = [mode.frame_ms, mode.game_ms, mode.render_ms, mode.gpu_ms];
+        let summaries = [mode.frame_ms, mode.game_ms, mode.render_ms, mode.gpu_ms].map(|m| m.map(|m| m.of));
         for (measure, summary) in timed.measures.iter().zip(summaries) {
             assert_eq!(Summary::of(&measure.ms), summary, "{}", measure.name);
         }
     }
     let out = out.to_str().expect("a UTF-8 path");
     let (code, table, _) = compare(&[out, out]);
-    assert!(code == 0 && table.matches("frame: B takes 1.000 of A's time").count() == 2, "{table}");
+    assert!(code == 0 && table.matches("frame: B takes 1.000 of A's time").count() == 3, "{table}");
     assert!(!table.contains("slower") && !table.contains("faster"), "{table}");
 }
 

@@ -7,10 +7,11 @@ use std::path::Path;
 use nimbus::measure::bootstrap::Bootstrap;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
+use nimbus::study::machine::{Clocks, Cpu, Device, cpu, environment, revision, utc_now};
 use nimbus::study::overlap::{Overlap, SerialFrame};
 use nimbus::study::records::{
-    Clocks, Cpu, Device, FRAMES_FILE, FrameRow, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, cpu, environment,
-    prepare_out_dir, read_run, revision, utc_now, write_results, write_run,
+    Block, Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, Setting, Skipping,
+    prepare_out_dir, read_run, write_results, write_run,
 };
 use serde_json::{Value, json};
 
@@ -25,9 +26,11 @@ fn complaints(run: &Value) -> Vec<String> {
 }
 
 fn mode(threading: &str) -> Mode {
-    let ms = Summary::of(&[16.5, 17.0, 16.0, 40.25]);
+    let measured = |values: &[f64], p50_low, p50_high| Summary::of(values).map(|of| Measured { of, p50_low, p50_high });
+    let ms = measured(&[16.5, 17.0, 16.0, 40.25], Some(16.0), Some(17.0));
     Mode {
         threading: threading.to_owned(),
+        skip: true,
         simulate: "gpu".to_owned(),
         frames: 4,
         warm_up: 2,
@@ -38,7 +41,8 @@ fn mode(threading: &str) -> Mode {
         record_ms: ms,
         render_ms: ms,
         gpu_ms: None,
-        latency_ms: Summary::of(&[17.0]),
+        latency_ms: measured(&[17.0], None, None),
+        queue_depth: Some(0.75),
         passes: vec![
             Pass {
                 name: "sort".to_owned(),
@@ -63,6 +67,10 @@ fn mode(threading: &str) -> Mode {
     }
 }
 
+fn block(threading: &str) -> Block {
+    Block { case: 0, threading: threading.to_owned(), skip: true }
+}
+
 fn sample() -> Run {
     Run {
         schema: SCHEMA_VERSION,
@@ -82,16 +90,27 @@ fn sample() -> Run {
         cpu: cpu(),
         environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
         clocks: Clocks { resolution_ns: 1.0, overhead_ns: 22.5, timestamp_period_ns: None },
-        block_order: ["serial", "parallel", "parallel", "serial"].map(str::to_owned).to_vec(),
-        modes: vec![mode("serial"), mode("parallel")],
-        ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
-        overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }], &[21.0]),
+        block_order: ["serial", "parallel", "parallel", "serial"].map(block).to_vec(),
+        cases: vec![Case {
+            phase: Some("dense".to_owned()),
+            sweep: vec![Setting { key: "draw.cutoff".to_owned(), value: "2".to_owned() }],
+            particles: 554,
+            width: 800,
+            height: 600,
+            modes: vec![mode("serial"), mode("parallel")],
+            ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
+            overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }], &[21.0]),
+            skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
+        }],
         interrupted: false,
     }
 }
 
 fn row(i: u32) -> FrameRow {
     FrameRow {
+        phase: "dense".to_owned(),
+        sweep: "a=1, b=2".to_owned(),
+        skip: true,
         threading: "serial".to_owned(),
         block: 0,
         frame: i,
@@ -114,10 +133,16 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
     assert_eq!(complaints(&serde_json::to_value(sample()).unwrap()), [""; 0]);
     let bare = Run {
         revision: "unknown".to_owned(),
-        modes: Vec::new(),
-        ratio: None,
+        cases: vec![Case {
+            phase: None,
+            sweep: Vec::new(),
+            modes: Vec::new(),
+            ratio: None,
+            overlap: None,
+            skipping: None,
+            ..sample().cases[0].clone()
+        }],
         block_order: Vec::new(),
-        overlap: None,
         interrupted: true,
         environment: environment(),
         cpu: Cpu { model: "unknown".to_owned(), logical_cores: 1 },
@@ -134,12 +159,13 @@ fn the_schema_refuses_what_is_wrong() {
         ("/date", json!("yesterday")),
         ("/device/type", json!("toaster")),
         ("/cpu/logical_cores", json!(0)),
-        ("/modes/0/threading", json!("both")),
-        ("/block_order/0", json!("both")),
-        ("/overlap/bound_ms", Value::Null),
-        ("/modes/0/frame_ms/p50", Value::Null),
-        ("/modes/0/frame_lows/p99_fps", json!(0)),
-        ("/modes/0/passes/0/share", json!(1.5)),
+        ("/cases/0/modes/0/threading", json!("both")),
+        ("/block_order/0/threading", json!("both")),
+        ("/cases/0/skipping/gpu_ms", json!(-1)),
+        ("/cases/0/overlap/bound_ms", Value::Null),
+        ("/cases/0/modes/0/frame_ms/p50", Value::Null),
+        ("/cases/0/modes/0/frame_lows/p99_fps", json!(0)),
+        ("/cases/0/modes/0/passes/0/share", json!(1.5)),
         ("/scene_hash", json!("ab")),
     ] {
         let mut bad = good.clone();
@@ -183,8 +209,9 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
-    // The run, device, cpu, clocks, ratio, overlap and its share; twice a mode, five summaries, lows, two passes.
-    assert_eq!(n_compared, 7 + 2 * (1 + 5 + 1 + 2));
+    // The run, device, cpu, clocks, four blocks, the case, its setting, ratio, overlap and its share, skipping; twice a
+    // mode, five summaries, lows, two passes.
+    assert_eq!(n_compared, 4 + 4 + 6 + 2 * (1 + 5 + 1 + 2));
 }
 
 #[test]
@@ -200,10 +227,10 @@ fn a_run_comes_back_as_it_was_written() {
     assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
-        "i_row,threading,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_wait_ms,gpu_ms,latency_ms,\
+        "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_wait_ms,gpu_ms,latency_ms,\
          queue_depth,gpu_sort_ms,gpu_first_ms,image_hash\n\
-         0,serial,0,0,0,true,16.123456789012344,1,0.5,15,,,1,1.5,,\n\
-         1,serial,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,15,,,1,1.5,,\n"
+         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,15,,,1,1.5,,\n\
+         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,15,,,1,1.5,,\n"
     );
 }
 

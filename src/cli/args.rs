@@ -46,7 +46,7 @@ pub enum Command {
 }
 
 /// What every command with a scene takes.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Clone, ClapArgs)]
 pub struct SceneArgs {
     /// Vulkan device, by index or part of its name (see `nimbus devices`)
     #[arg(long, value_name = "INDEX|NAME", help_heading = "Device")]
@@ -101,19 +101,30 @@ pub struct RenderArgs {
 }
 
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "Time against particles and picture size:\n  \
+    nimbus bench scenes/cubes-554.toml --sweep draw.particles=500,5000,50000 --sweep size=800x600,1024x768\n\n\
+    A scene's [[phase]] sections are timed one by one; --set and --sweep count for each of them.\n\n\
+    Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept.")]
 pub struct BenchArgs {
     /// Scene files, timed one after the other
     #[arg(required = true)]
     pub scenes: Vec<PathBuf>,
-    /// Which loops to time; "both" runs them in alternating blocks
+    /// Which loops to time; "both" runs them in alternating blocks. A phase that sets threads.mode has its own
     #[arg(long, value_enum, default_value = "both")]
     pub threading: ThreadingArg,
-    /// Timed frames in a block [default: the scene's]
+    /// Time the scene at each of these values of a key, e.g. draw.cutoff=2,3 or size=800x600,1024x768 (repeatable: all
+    /// combinations)
+    #[arg(long, value_name = "KEY=VALUE,…")]
+    pub sweep: Vec<String>,
+    /// Timed frames in a block [default: the scene's, or the phase's]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: Option<u32>,
     /// Frames at the start of every block that are not counted
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub warmup: u32,
+    /// Do not time blocks of frames that skip nothing: quicker, but what skipping saves is not known
+    #[arg(long, conflicts_with = "no_skip")]
+    pub no_saved: bool,
     /// Blocks of each loop, in the order A B B A …; with an even number a steady drift cancels
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     pub repeat: u32,

@@ -12,15 +12,16 @@ use crate::study::{basis, inspect};
 const PLAN_FRAMES: u32 = 3;
 
 pub fn run(args: &InspectArgs) -> Result<()> {
-    let loaded = load(&args.scene, &args.options)?;
+    // With --plan a number of frames from the first on.
+    let i_frame = args.frame.filter(|_| !args.plan).unwrap_or(0);
+    let scene = load(&args.scene, &args.options)?.at_frame(i_frame);
     if let Some(what) = args.basis {
-        return print_basis(&basis::report(&loaded.scene), what, args);
+        return print_basis(&basis::report(&scene), what, args);
     }
-    let i_frame = args.frame.unwrap_or(0);
-    check_time(&loaded.scene, loaded.scene.time.at(i_frame))?;
+    check_time(&scene, scene.time.at(args.frame.unwrap_or(0)))?;
     let spinner = output::spinner("inspecting", args.options.quiet);
     if args.reference {
-        let scene = &loaded.scene;
+        let scene = &scene;
         let found = match (args.particles, args.facets) {
             (true, _) => Found::Particles(inspect::particles_reference(scene, i_frame)?),
             (_, true) => Found::Facets(of_surfaces(args, scene, inspect::facets_reference(scene, i_frame)?)),
@@ -32,7 +33,7 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         }
         return print(&found, args.json);
     }
-    let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
+    let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
     let found = match (args.particles, args.facets, args.plan) {
         (true, _, _) => Found::Particles(inspect::particles(&mut stage, i_frame)?),
         (_, true, _) => {

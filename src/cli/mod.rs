@@ -2,6 +2,7 @@
 
 pub mod args;
 mod bench;
+mod bench_table;
 mod compare;
 mod devices;
 mod inspect;

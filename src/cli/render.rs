@@ -10,7 +10,7 @@ use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
 use crate::io::image::{self, ImageKind};
 use crate::model::film::FilmFormat;
-use crate::study::bench::device_record;
+use crate::study::machine::device_record;
 use crate::study::stage::Stage;
 
 pub fn run(args: &RenderArgs) -> Result<()> {
@@ -19,12 +19,14 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     refuse_existing(&args.output, args.force)?;
     let loaded = load(&args.scene, &args.options)?;
     let time_s = args.time.unwrap_or_else(|| loaded.scene.time.at(args.frame));
-    check_time(&loaded.scene, time_s)?;
-    let film = loaded.scene.film;
+    let i_frame = args.time.map_or(args.frame, |time_s| loaded.scene.time.frame_at(time_s));
+    let scene = loaded.at_frame(i_frame);
+    check_time(&scene, time_s)?;
+    let film = scene.film;
     let quiet = args.options.quiet;
 
     let spinner = output::spinner("drawing", quiet);
-    let mut stage = Stage::new(loaded.scene, &device_choice(&args.options), !args.options.no_skip)?;
+    let mut stage = Stage::new(scene, &device_choice(&args.options), !args.options.no_skip)?;
     let packet = stage.game.step_at(args.frame, time_s)?;
     let rendered = stage.renderer.step(packet)?;
     let rgba = stage.renderer.image()?;

@@ -253,6 +253,11 @@ impl Renderer {
         self.last = None;
     }
 
+    /// Whether the next frames leave out what they do not need.
+    pub fn set_skip(&mut self, skip: bool) {
+        self.traits.skip = skip;
+    }
+
     fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
         self.buffers.write(slot, packet)?;
         if let Some(grouping) = &mut self.grouping {

@@ -8,7 +8,8 @@
 //! A scene is read in three steps, each with one subject: [`toml_tree`] turns text into a tree in which every
 //! key and value knows its origin, [`toml_override`] lays `--set` over it, and [`toml_section`] takes values
 //! out of it, checks them and writes down what they came to (the *resolved scene* that results carry).
-//! `scene_sections`, `scene_lights` and `scene_clouds` say what a scene's keys mean, and [`magnitude`] how great and
+//! `scene_sections`, `scene_lights` and `scene_clouds` say what a scene's keys mean, `scene_phases` which of them parts of
+//! a run set anew, and [`magnitude`] how great and
 //! how small their numbers may be.
 
 pub mod atomic;
@@ -19,6 +20,7 @@ pub mod particle_file;
 mod scene_clouds;
 pub mod scene_file;
 mod scene_lights;
+mod scene_phases;
 mod scene_sections;
 mod scene_surfaces;
 mod suggest;

@@ -1,5 +1,6 @@
 //! A scene file (TOML) and what it names, to a complete [`Scene`].
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
@@ -8,37 +9,121 @@ use sha2::{Digest, Sha256};
 
 use super::magnitude::{GREATEST, is_carried_place, shortest};
 use super::scene_clouds::{CloudReader, read_cloud};
+use super::scene_phases::PhaseSpec;
 pub use super::scene_sections::MAX_SIDE;
 use super::toml_section::Section;
 use super::toml_tree::Document;
-use super::{scene_lights, scene_sections, scene_surfaces};
-use crate::error::{Error, Result};
+use super::{scene_lights, scene_phases, scene_sections, scene_surfaces};
+use crate::error::{Error, Place, Result};
 use crate::model::scene::Scene;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadedScene {
+    /// Without what its phases set.
     pub scene: Scene,
+    /// In order; none where the scene is the same throughout.
+    pub phases: Vec<Phase>,
     /// Every value the scene came to, defaults and `--set` included, under the scene file's keys.
     pub resolved: Json,
-    /// SHA-256 (hex) over the resolved scene and the content of every file it names. Where the files lie and
-    /// how the TOML is laid out do not enter.
+    /// SHA-256 (hex) over the resolved scene, those of its phases, and the content of every file they name. Where the
+    /// files lie and how the TOML is laid out do not enter.
     pub hash: String,
     /// What is allowed but hardly meant, with its place.
     pub warnings: Vec<String>,
     pub path: PathBuf,
 }
 
-const ROOT_KEYS: &[&str] =
-    &["title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "cloud"];
+/// Part of a run with settings of its own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Phase {
+    pub name: String,
+    pub n_frames: u32,
+    /// The whole scene, with what the phase sets.
+    pub scene: Scene,
+    /// Whether it names the loop it is run in, `threads.mode`.
+    pub sets_mode: bool,
+}
+
+impl LoadedScene {
+    /// The scene as frame `i_frame` has it: of the last phase where there are no further ones.
+    pub fn at_frame(self, i_frame: u32) -> Scene {
+        let mut end = 0u64;
+        let n = self.phases.len();
+        for (i, phase) in self.phases.into_iter().enumerate() {
+            end += u64::from(phase.n_frames);
+            if u64::from(i_frame) < end || i + 1 == n {
+                return phase.scene;
+            }
+        }
+        self.scene
+    }
+}
+
+const ROOT_KEYS: &[&str] = &[
+    "title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "cloud", "phase",
+];
 
 /// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
 /// N + i, whatever the scene says.
 pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
-    let mut document = Document::read(path)?;
-    document.default_to("light", scene_lights::DEFAULT_LIGHTS);
-    document.default_to("material", scene_lights::DEFAULT_MATERIAL);
+    let mut file = Document::read(path)?;
+    file.default_to("light", scene_lights::DEFAULT_LIGHTS);
+    file.default_to("material", scene_lights::DEFAULT_MATERIAL);
+    let mut document = file.clone();
     document.apply(overrides)?;
-    let mut root = Section::root(&document)?;
+    let specs = scene_phases::read_phases(&document)?;
+    if !specs.is_empty() {
+        let n_frames: u64 = specs.iter().map(|s| u64::from(s.n_frames)).sum();
+        let too_many =
+            |_| Error::scene(Place::file(path), format!("the phases have {n_frames} frames: at most {}", u32::MAX));
+        let n_frames = u32::try_from(n_frames).map_err(too_many)?;
+        scene_phases::set_frames(&mut document, n_frames)?;
+        scene_phases::set_frames(&mut file, n_frames)?;
+    }
+    let mut read = read_document(&document, path, seed)?;
+    let mut hashed = vec![read.resolved.to_string()];
+    let mut phases = Vec::new();
+    for spec in &specs {
+        let mut document = file.clone();
+        spec.apply(&mut document)?;
+        document.apply(overrides)?;
+        let of_phase = read_document(&document, path, seed).map_err(|e| in_phase(e, &spec.name))?;
+        hashed.push(of_phase.resolved.to_string());
+        read.digests.extend(of_phase.digests);
+        read.warnings.extend(of_phase.warnings);
+        let PhaseSpec { name, n_frames, .. } = spec;
+        let (name, sets_mode) = (name.clone(), spec.sets_mode());
+        phases.push(Phase { name, n_frames: *n_frames, scene: of_phase.scene, sets_mode });
+    }
+    // Phases share most of what is to be said of them.
+    let mut said = BTreeSet::new();
+    read.warnings.retain(|warning| said.insert(warning.clone()));
+    let Read { scene, mut resolved, digests, warnings } = read;
+    if let (Json::Object(root), false) = (&mut resolved, specs.is_empty()) {
+        root.insert("phase".to_owned(), specs.into_iter().map(|s| s.resolved).collect());
+    }
+    Ok(LoadedScene { scene, phases, resolved, hash: hash(&hashed, &digests), warnings, path: path.to_owned() })
+}
+
+/// What is wrong may lie in a line that is right without the phase.
+fn in_phase(error: Error, name: &str) -> Error {
+    match error {
+        Error::Scene { at, what } => Error::Scene { at, what: format!("{what} (in phase \"{name}\")") },
+        other => other,
+    }
+}
+
+/// A document's scene, and what is told of it.
+struct Read {
+    scene: Scene,
+    resolved: Json,
+    /// SHA-256 of every file it names, in order.
+    digests: Vec<[u8; 32]>,
+    warnings: Vec<String>,
+}
+
+fn read_document(document: &Document, path: &Path, seed: Option<u32>) -> Result<Read> {
+    let mut root = Section::root(document)?;
     root.expect_keys(ROOT_KEYS, &[])?;
     let title = root.string("title", "")?;
 
@@ -88,15 +173,15 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
             ),
         ));
     }
-    let resolved = root.finish();
-    let hash = hash(&resolved, &digests);
-    Ok(LoadedScene { scene, resolved, hash, warnings, path: path.to_owned() })
+    Ok(Read { scene, resolved: root.finish(), digests, warnings })
 }
 
 /// Digests have a fixed length and follow the JSON's closing brace, so that no two scenes run together.
-fn hash(resolved: &Json, digests: &[[u8; 32]]) -> String {
+fn hash(resolved: &[String], digests: &[[u8; 32]]) -> String {
     let mut hasher = Sha256::new();
-    hasher.update(resolved.to_string());
+    for text in resolved {
+        hasher.update(text);
+    }
     for digest in digests {
         hasher.update(digest);
     }

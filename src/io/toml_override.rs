@@ -48,7 +48,7 @@ fn is_word(text: &str) -> bool {
 }
 
 /// Puts `value` at `segments[i..]` below `node`.
-fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> std::result::Result<(), String> {
+pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> std::result::Result<(), String> {
     let Some(segment) = segments.get(i) else {
         *node = value;
         return Ok(());

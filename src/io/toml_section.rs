@@ -275,11 +275,17 @@ impl<'a> Section<'a> {
         Ok(())
     }
 
-    fn require(&self, key: &str, expected: &dyn fmt::Display) -> Result<()> {
+    /// An error where the key is not there.
+    pub fn require(&self, key: &str, expected: &dyn fmt::Display) -> Result<()> {
         if self.has(key) {
             return Ok(());
         }
         Err(Error::scene(self.place(key), format!("missing key `{}`: expected {expected}", self.name(key))))
+    }
+
+    /// What was given for a key, whatever it is.
+    pub fn value(&self, key: &str) -> Option<&'a Node> {
+        self.get(key)
     }
 
     fn get(&self, key: &str) -> Option<&'a Node> {

@@ -10,6 +10,7 @@ use super::text_file::{self, line_column};
 use super::toml_depth::too_deep;
 use crate::error::{Error, Place, Result};
 
+#[derive(Clone)]
 pub struct Document {
     pub source: Source,
     pub root: Node,
@@ -19,6 +20,7 @@ pub struct Document {
 pub const TOO_DEEP: &str = "no key of nimbus has this many dots";
 
 /// What origins point into.
+#[derive(Clone)]
 pub struct Source {
     pub path: PathBuf,
     pub text: String,
@@ -87,6 +89,14 @@ impl Document {
             Ok(root) => Ok(Document { source, root }),
             Err(OutOfRange(origin)) => Err(Error::scene(source.place(origin), OutOfRange::WHAT)),
         }
+    }
+
+    /// What lies at `path`, whose segments are keys.
+    pub fn at(&self, path: &[&str]) -> Option<&Node> {
+        path.iter().try_fold(&self.root, |node, key| match &node.value {
+            Value::Table(table) => table.get(*key).map(|entry| &entry.node),
+            _ => None,
+        })
     }
 
     /// Gives the document `key` from `toml` (text of ours, which defines nothing else) if it has none.

@@ -37,6 +37,12 @@ impl Time {
     pub fn at(&self, i_frame: u32) -> f64 {
         self.start_s + f64::from(i_frame) * self.step_s
     }
+
+    /// The last frame at or before `time_s`; the first for all that comes before it.
+    pub fn frame_at(&self, time_s: f64) -> u32 {
+        // A cast to an integer stops at its ends. Where time stands still every frame is at the same time.
+        if self.step_s > 0.0 { ((time_s - self.start_s) / self.step_s) as u32 } else { 0 }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

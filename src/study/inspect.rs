@@ -262,7 +262,7 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
         Ok(true)
     };
     let mode = stage.scene.threads.mode;
-    stage.run(mode, n_frames, on_frame)?;
+    stage.run(mode, 0..n_frames, on_frame)?;
     Ok(rows)
 }
 

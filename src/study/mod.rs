@@ -2,9 +2,12 @@
 
 pub mod basis;
 pub mod bench;
+pub mod cases;
 pub mod compare;
 pub mod difference;
 pub mod inspect;
+pub mod machine;
+pub mod outcome;
 pub mod overlap;
 pub mod recorded;
 pub mod records;

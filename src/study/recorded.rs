@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use csv::StringRecord;
 
-use super::records::{FRAMES_FILE, RUN_FILE, Run, read_run};
+use super::records::{FRAMES_FILE, RUN_FILE, Run, case_name, read_run};
 use crate::error::{Error, Result};
 
 /// A results folder.
@@ -49,13 +49,14 @@ pub fn read_results(folder: &Path) -> Result<Recorded> {
     let text = fs::read_to_string(&path).map_err(|cause| Error::io(&path, cause))?;
     let mut by_mode = read_frames(&path, &text)?;
     let mut modes = Vec::new();
-    for mode in &run.modes {
-        let timed = by_mode.remove(&mode.threading);
+    for (case, mode) in run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (c, m))) {
+        let name = mode_name(&case.name(), &mode.threading, mode.skip);
+        let timed = by_mode.remove(&name);
         let n = timed.as_ref().map_or(0, |timed| timed.frames.len());
         if n != mode.frames {
-            let (threading, wanted) = (&mode.threading, mode.frames);
+            let wanted = mode.frames;
             let what =
-                format!("holds {n} timed {threading} frames and {RUN_FILE} names {wanted}: cut off, or another run's");
+                format!("holds {n} timed {name} frames and {RUN_FILE} names {wanted}: cut off, or another run's");
             return Err(Error::io(&path, what));
         }
         modes.extend(timed);
@@ -77,9 +78,18 @@ fn expected_in(folder: &Path) -> String {
     }
 }
 
+/// A case's loop in words: "dense, size=800x600: serial", or the loop alone where there is one case.
+fn mode_name(case: &str, threading: &str, skip: bool) -> String {
+    let of = if skip { threading.to_owned() } else { format!("{threading} no-skip") };
+    if case.is_empty() { of } else { format!("{case}: {of}") }
+}
+
 /// Where the columns are.
 struct Columns {
+    phase: usize,
+    sweep: usize,
     threading: usize,
+    skip: usize,
     block: usize,
     frame: usize,
     warm_up: usize,
@@ -99,7 +109,10 @@ impl Columns {
         let find = |name: &'static str| header.iter().position(|field| field == name).ok_or(name);
         let pass = |field: &str| Some(field.strip_prefix("gpu_")?.strip_suffix("_ms")?.to_owned());
         Ok(Columns {
+            phase: find("phase")?,
+            sweep: find("sweep")?,
             threading: find("threading")?,
+            skip: find("skip")?,
             block: find("block")?,
             frame: find("frame")?,
             warm_up: find("warm_up")?,
@@ -171,22 +184,21 @@ fn add_line(
     if line.len() != columns.n {
         return Err(format!("expected {} fields as in the header, found {}: cut off?", columns.n, line.len()));
     }
-    match &line[columns.warm_up] {
-        "true" => return Ok(()),
-        "false" => {}
-        other => return Err(odd("true or false for warm_up", other)),
+    let is = |column: usize, of: &str| match &line[column] {
+        "true" => Ok(true),
+        "false" => Ok(false),
+        other => Err(odd(&format!("true or false for {of}"), other)),
+    };
+    if is(columns.warm_up, "warm_up")? {
+        return Ok(());
     }
     let number = |column: usize, what: &str| line[column].parse::<u32>().map_err(|_| odd(what, &line[column]));
     let (block, frame) = (number(columns.block, "a block's number")?, number(columns.frame, "a frame's number")?);
     let times = columns.times(line)?;
-    let threading = &line[columns.threading];
-    let lines = modes.entry(threading.to_owned()).or_insert_with(|| Lines {
-        mode: TimedMode {
-            threading: threading.to_owned(),
-            frames: Vec::new(),
-            blocks: Vec::new(),
-            measures: columns.measures(),
-        },
+    let case = case_name(&line[columns.phase], &line[columns.sweep]);
+    let name = mode_name(&case, &line[columns.threading], is(columns.skip, "skip")?);
+    let lines = modes.entry(name.clone()).or_insert_with(|| Lines {
+        mode: TimedMode { threading: name, frames: Vec::new(), blocks: Vec::new(), measures: columns.measures() },
         last_block: None,
     });
     if lines.last_block.replace(block) != Some(block) {

@@ -7,19 +7,18 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io::Write;
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
+use super::machine::{Clocks, Cpu, Device};
 use super::overlap::Overlap;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::measure::bootstrap::Interval;
-use crate::measure::clock::ClockQuality;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
 
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 pub const RUN_FILE: &str = "run.json";
 pub const FRAMES_FILE: &str = "frames.csv";
 
@@ -43,43 +42,77 @@ pub struct Run {
     /// Variables that change what drivers do.
     pub environment: BTreeMap<String, String>,
     pub clocks: Clocks,
-    /// The threading of every block, in the order they ran: A B B A and so on, so that drift falls on both alike.
-    pub block_order: Vec<String>,
+    /// Every block in the order they ran: A B B A and so on, so that drift falls on all alike.
+    pub block_order: Vec<Block>,
+    /// One a phase and point of a sweep, in their order; a scene with neither has one.
+    pub cases: Vec<Case>,
+    /// Ctrl-C came before the end; what is here was finished.
+    pub interrupted: bool,
+}
+
+/// A run of frames without a break.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Block {
+    /// Number of its case.
+    pub case: usize,
+    /// "serial" or "parallel".
+    pub threading: String,
+    pub skip: bool,
+}
+
+/// The scene in one of its phases, at one point of the sweep.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Case {
+    pub phase: Option<String>,
+    pub sweep: Vec<Setting>,
+    pub particles: u64,
+    /// Of the film, pixels.
+    pub width: u32,
+    pub height: u32,
     pub modes: Vec<Mode>,
     /// Parallel against serial frame time, where both ran; below 1 parallel is faster.
     pub ratio: Option<Ratio>,
     /// What overlap could gain and what was gained; null where the serial loop did not run.
     pub overlap: Option<Overlap>,
-    /// Ctrl-C came before the end; what is here was finished.
-    pub interrupted: bool,
+    /// What leaving out saved; null where frames that leave nothing out were not timed.
+    pub skipping: Option<Skipping>,
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Device {
-    pub name: String,
-    pub driver: String,
-    /// Vulkan version, "1.3.230".
-    pub api: String,
-    /// "discrete", "integrated", "virtual", "cpu" or "other".
-    #[serde(rename = "type")]
-    pub kind: String,
-    /// 32 hex digits.
-    pub uuid: String,
+impl Case {
+    /// Phase and sweep in words; empty where there is neither.
+    pub fn name(&self) -> String {
+        let settings = self.sweep.iter().map(|s| format!("{}={}", s.key, s.value)).collect::<Vec<_>>();
+        case_name(self.phase.as_deref().unwrap_or_default(), &settings.join(", "))
+    }
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Cpu {
-    pub model: String,
-    /// Logical cores that this process may use.
-    pub logical_cores: usize,
+/// "phase, key=value", or one of the two, or nothing.
+pub fn case_name(phase: &str, sweep: &str) -> String {
+    [phase, sweep].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Setting {
+    pub key: String,
+    pub value: String,
+}
+
+/// Device time of a frame, ms, in means: what was saved is their difference.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Clocks {
-    pub resolution_ns: f64,
-    pub overhead_ns: f64,
-    /// Of the device; null where it has no timestamps.
-    pub timestamp_period_ns: Option<f64>,
+pub struct Skipping {
+    pub gpu_ms: f64,
+    pub gpu_no_skip_ms: f64,
+    /// Whether the last frames are the same, to the byte; null where one was not reached.
+    pub same_bytes: Option<bool>,
+}
+
+/// A list of times, and the 95 % bootstrap interval of its median; null where there are too few frames for one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    #[serde(flatten)]
+    pub of: Summary,
+    pub p50_low: Option<f64>,
+    pub p50_high: Option<f64>,
 }
 
 /// One way of running the scene. A summary is null where nothing finite was measured. Warm-up frames are in none.
@@ -87,22 +120,26 @@ pub struct Clocks {
 pub struct Mode {
     /// "serial" or "parallel".
     pub threading: String,
+    /// False where every pass was run in every frame.
+    pub skip: bool,
     /// "gpu" or "cpu": who moves the particles.
     pub simulate: String,
     pub frames: usize,
     pub warm_up: usize,
     pub blocks: usize,
     /// From the end of one frame to the end of the next: what a viewer would see.
-    pub frame_ms: Option<Summary>,
+    pub frame_ms: Option<Measured>,
     /// "1 % low" frame rates of `frame_ms`, by all three definitions.
     pub frame_lows: Option<Lows>,
-    pub game_ms: Option<Summary>,
-    pub record_ms: Option<Summary>,
+    pub game_ms: Option<Measured>,
+    pub record_ms: Option<Measured>,
     /// Recording, submission and the wait for the device.
-    pub render_ms: Option<Summary>,
-    pub gpu_ms: Option<Summary>,
+    pub render_ms: Option<Measured>,
+    pub gpu_ms: Option<Measured>,
     /// From the start of a frame's game step to the end of its render step.
-    pub latency_ms: Option<Summary>,
+    pub latency_ms: Option<Measured>,
+    /// Mean of the frames that the device still had when it was handed one.
+    pub queue_depth: Option<f64>,
     pub passes: Vec<Pass>,
     /// SHA-256 of the last frame's pixels, where it was taken.
     pub image_hash: Option<String>,
@@ -119,7 +156,8 @@ pub struct Pass {
     pub n_skipped: usize,
     /// Why it was skipped, the last time.
     pub reason: Option<String>,
-    /// Device time a frame saved by skipping, where it was measured against `--no-skip`.
+    /// Device time that skipping it saved a frame: its median where nothing is skipped, in the share of the frames that
+    /// skipped it. null where that was not measured.
     pub saved_ms: Option<f64>,
 }
 
@@ -138,17 +176,16 @@ impl From<Interval> for Ratio {
     }
 }
 
-impl Clocks {
-    pub fn of(clock: &ClockQuality, timestamp_period_ns: Option<f64>) -> Self {
-        Clocks { resolution_ns: clock.resolution_ns as f64, overhead_ns: clock.overhead_ns, timestamp_period_ns }
-    }
-}
-
 /// One line of `frames.csv`. Times in ms; NaN and None become an empty field.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameRow {
+    /// Empty where the scene has no phases.
+    pub phase: String,
+    /// "key=value, key=value"; empty without a sweep.
+    pub sweep: String,
     pub threading: String,
-    /// Blocks count over the whole run, serial and parallel taking turns.
+    pub skip: bool,
+    /// Blocks count over the whole run, cases and loops taking turns.
     pub block: usize,
     /// Frame of the scene.
     pub frame: u32,
@@ -161,16 +198,19 @@ pub struct FrameRow {
     pub submit_wait_ms: f64,
     pub gpu_ms: Option<f64>,
     pub latency_ms: f64,
-    /// Packets waiting when this one was taken.
+    /// Frames that the device still had when it was handed this one.
     pub queue_depth: usize,
     /// In the order of the names handed to `write_results`; None where skipped.
     pub pass_ms: Vec<Option<f64>>,
     pub image_hash: Option<String>,
 }
 
-const FRAME_COLUMNS: [&str; 13] = [
+const FRAME_COLUMNS: [&str; 16] = [
     "i_row",
+    "phase",
+    "sweep",
     "threading",
+    "skip",
     "block",
     "frame",
     "time_s",
@@ -247,7 +287,10 @@ pub fn write_frames(path: &Path, pass_names: &[String], rows: &[FrameRow]) -> Re
 fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
     let mut fields = vec![
         i_row.to_string(),
+        row.phase.clone(),
+        row.sweep.clone(),
         row.threading.clone(),
+        row.skip.to_string(),
         row.block.to_string(),
         row.frame.to_string(),
         number(Some(row.time_s)),
@@ -268,77 +311,4 @@ fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
 /// The shortest text that reads back as the same f64.
 fn number(value: Option<f64>) -> String {
     value.filter(|value| value.is_finite()).map(|value| value.to_string()).unwrap_or_default()
-}
-
-/// The revision that was built (see build.rs).
-pub fn revision() -> &'static str {
-    env!("NIMBUS_GIT_REVISION")
-}
-
-pub fn cpu() -> Cpu {
-    let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
-    Cpu {
-        model: model.map_or_else(|| "unknown".to_owned(), |name| name.trim().to_owned()),
-        logical_cores: std::thread::available_parallelism().map_or(1, usize::from),
-    }
-}
-
-/// Of the process: Mesa, its software rasteriser, and the Vulkan loader.
-pub fn environment() -> BTreeMap<String, String> {
-    relevant(std::env::vars_os().filter_map(|(key, value)| Some((key.into_string().ok()?, value.into_string().ok()?))))
-}
-
-fn relevant(variables: impl Iterator<Item = (String, String)>) -> BTreeMap<String, String> {
-    const PREFIXES: [&str; 4] = ["LP_", "MESA_", "VK_", "GALLIUM_"];
-    variables.filter(|(key, _)| PREFIXES.iter().any(|prefix| key.starts_with(prefix))).collect()
-}
-
-/// Now, as "2024-02-29T12:34:56Z". A clock before 1970 gives 1970.
-pub fn utc_now() -> String {
-    iso_8601_utc(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()))
-}
-
-/// Seconds since 1970-01-01T00:00:00Z, without leap seconds. The date is Howard Hinnant's `civil_from_days`: years
-/// begin in March, so that the leap day is a year's last, and repeat every 400 years of 146 097 days.
-pub fn iso_8601_utc(unix_s: u64) -> String {
-    let (days, second) = (unix_s / 86_400, unix_s % 86_400);
-    // Days from 0000-03-01 to 1970-01-01.
-    let days = days + 719_468;
-    let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    // Months from March have 31, 30, 31, 30, 31 days and again: 153 days in five.
-    let month_from_march = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
-    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
-    let year = 400 * era + year_of_era + u64::from(month <= 2);
-    let (hour, minute, second) = (second / 3_600, second / 60 % 60, second % 60);
-    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn known_dates() {
-        // From `date -u -d @N`.
-        for (unix_s, text) in [
-            (0, "1970-01-01T00:00:00Z"),
-            (951_782_400, "2000-02-29T00:00:00Z"),
-            (951_868_799, "2000-02-29T23:59:59Z"),
-            (1_709_210_096, "2024-02-29T12:34:56Z"),
-            (4_107_542_400, "2100-03-01T00:00:00Z"),
-        ] {
-            assert_eq!(iso_8601_utc(unix_s), text);
-        }
-    }
-
-    #[test]
-    fn only_variables_that_matter_are_kept() {
-        let given = ["LP_NUM_THREADS", "HOME", "VK_DRIVER_FILES", "MESA_VK_DEVICE_SELECT", "SECRET_VK_KEY"];
-        let kept = relevant(given.iter().map(|key| ((*key).to_owned(), "1".to_owned())));
-        assert_eq!(kept.keys().collect::<Vec<_>>(), ["LP_NUM_THREADS", "MESA_VK_DEVICE_SELECT", "VK_DRIVER_FILES"]);
-    }
 }

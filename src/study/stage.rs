@@ -1,5 +1,6 @@
 //! A scene on a device, ready to run.
 
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -26,13 +27,14 @@ pub struct Stage {
     pub renderer: Renderer,
     pub game: Game,
     pub scene: Arc<Scene>,
+    compiler: Compiler,
     pub device: Device,
     instance: Arc<Instance>,
 }
 
 impl Stage {
     /// Opens a device and makes everything the scene needs on it. `skip`: leave out what a frame does not need.
-    pub fn new(scene: Scene, choice: &DeviceChoice, skip: bool) -> Result<Stage> {
+    pub fn new(scene: impl Into<Arc<Scene>>, choice: &DeviceChoice, skip: bool) -> Result<Stage> {
         let instance = Instance::new(choice.validation)?;
         let device = Device::open(&instance, choice.device.as_deref())?;
         let mut sources = passes::sources();
@@ -40,23 +42,44 @@ impl Stage {
             sources = sources.with_dir(dir)?;
         }
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
-        let scene = Arc::new(scene);
+        Stage::build(scene.into(), skip, compiler, device, instance)
+    }
+
+    /// Another scene on the same device; what was there for this one is given back first.
+    pub fn again(self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Stage> {
+        let Stage { renderer, game, scene: _, compiler, device, instance } = self;
+        drop((renderer, game));
+        Stage::build(scene.into(), skip, compiler, device, instance)
+    }
+
+    fn build(
+        scene: Arc<Scene>,
+        skip: bool,
+        compiler: Compiler,
+        device: Device,
+        instance: Arc<Instance>,
+    ) -> Result<Stage> {
         let mut renderer = Renderer::new(&device, &compiler, &scene, skip)?;
         let rest = match scene.threads.simulate {
             Simulate::Gpu => None,
             Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
         };
         let game = Game::new(scene.clone(), rest);
-        Ok(Stage { renderer, game, scene, device, instance })
+        Ok(Stage { renderer, game, scene, compiler, device, instance })
     }
 
-    /// Runs frames `0..n_frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
-    pub fn run(&mut self, threading: Threading, n_frames: u32, on_frame: &mut OnFrame<'_>) -> Result<()> {
+    /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
+    pub fn run(&mut self, threading: Threading, frames: Range<u32>, on_frame: &mut OnFrame<'_>) -> Result<()> {
         self.renderer.reset();
         match threading {
-            Threading::Serial => serial::run(&mut self.game, &mut self.renderer, 0..n_frames, on_frame),
-            Threading::Parallel => parallel::run(&mut self.game, &mut self.renderer, 0..n_frames, on_frame),
+            Threading::Serial => serial::run(&mut self.game, &mut self.renderer, frames, on_frame),
+            Threading::Parallel => parallel::run(&mut self.game, &mut self.renderer, frames, on_frame),
         }
+    }
+
+    /// Whether frames leave out what they do not need, from the next run on.
+    pub fn set_skip(&mut self, skip: bool) {
+        self.renderer.set_skip(skip);
     }
 
     pub fn info(&self) -> &DeviceInfo {
@@ -65,7 +88,7 @@ impl Stage {
 
     /// Ends the stage; an error where validation or the leak report had anything to say.
     pub fn close(self) -> Result<()> {
-        let Stage { renderer, game, scene: _, device, instance } = self;
+        let Stage { renderer, game, scene: _, compiler: _, device, instance } = self;
         drop((renderer, game));
         drop(device);
         let said = instance.messages().take();

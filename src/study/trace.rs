@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
-use super::bench::{Sample, name_of};
+use super::bench::Sample;
 use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
 use crate::io::atomic::write_atomic;
@@ -38,7 +38,7 @@ pub fn time_line(samples: &[Sample]) -> Value {
         let mut push = |tid: usize, name: &str, [begin, end]: [f64; 2]| {
             events.push(json!({
                 "ph": "X", "pid": 1, "tid": tid, "name": name, "ts": begin, "dur": end - begin,
-                "args": { "frame": times.i_frame, "loop": name_of(sample.threading), "block": sample.i_block, "warm_up": sample.warm_up },
+                "args": { "frame": times.i_frame, "loop": sample.of.name(), "block": sample.i_block, "warm_up": sample.warm_up },
             }));
         };
         push(0, "game", marks.game.map(us));

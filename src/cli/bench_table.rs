@@ -1,0 +1,281 @@
+//! What `nimbus bench` prints for people.
+
+use std::path::Path;
+
+use super::output;
+use crate::measure::lows::fps;
+use crate::study::machine::Clocks;
+use crate::study::overlap::Overlap;
+use crate::study::records::{Block, Case, Measured, Mode, Run, Skipping};
+
+/// The whole of it. `same`: of each case whether all its last frames are the same, to the byte. `verbose`: every table of
+/// every case.
+pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> String {
+    let threads = run.environment.get("LP_NUM_THREADS").map_or(String::new(), |n| format!(", LP_NUM_THREADS={n}"));
+    let mut out = format!(
+        "{}\n{} ({}), {} ({} cores){threads}\n",
+        path.display(),
+        run.device.name,
+        run.device.driver,
+        run.cpu.model,
+        run.cpu.logical_cores
+    );
+    let n_warm_up = run.cases.first().and_then(|c| c.modes.first()).map_or(0, |m| m.warm_up);
+    out += &format!(
+        "{}; the first {n_warm_up} frames of every block are not counted{}\n\n",
+        blocks_line(run),
+        if run.interrupted { "; INTERRUPTED: what was finished" } else { "" }
+    );
+    if run.cases.len() > 1 {
+        out += &output::table(&case_rows(run));
+        out.push('\n');
+    }
+    for (case, same) in run.cases.iter().zip(same) {
+        if run.cases.len() == 1 || verbose {
+            out += &case_report(case, *same);
+        } else if *same == Some(false) {
+            out += &format!("{}: {DIFFER}", case.name());
+        }
+    }
+    if run.cases.len() > 1 && !verbose {
+        let n_same = same.iter().filter(|s| **s == Some(true)).count();
+        out += &format!("{n_same} of {} cases gave the same last frame in all their blocks, to the byte\n", same.len());
+    }
+    out + &clocks_line(&run.clocks)
+}
+
+const DIFFER: &str = "THE LAST FRAMES DIFFER between the blocks\n";
+
+/// All that is said of one case.
+fn case_report(case: &Case, same: Option<bool>) -> String {
+    let mut out = String::new();
+    if !case.name().is_empty() {
+        out += &format!("{}\n", case.name());
+    }
+    for rows in [time_rows(case), low_rows(case), pass_rows(case)] {
+        out += &output::table(&rows);
+        out.push('\n');
+    }
+    if let Some(ratio) = case.ratio {
+        let (low, high) = (ratio.low, ratio.high);
+        out += &format!("parallel / serial = {:.3} (95 % interval {low:.3} to {high:.3})\n", ratio.parallel_by_serial);
+    }
+    out += &case.overlap.as_ref().map_or(String::new(), overlap_lines);
+    out += &latency_line(case).unwrap_or_default();
+    out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
+    out += match same {
+        Some(true) => "the last frames of all blocks are the same, to the byte\n",
+        Some(false) => DIFFER,
+        None => "",
+    };
+    out
+}
+
+/// How the blocks took turns.
+fn blocks_line(run: &Run) -> String {
+    /// Two full turns show the pattern.
+    const N_SHOWN: usize = 12;
+    let order = &run.block_order;
+    let mut kinds: Vec<&Block> = Vec::new();
+    for block in order {
+        if !kinds.contains(&block) {
+            kinds.push(block);
+        }
+    }
+    let n = order.len();
+    let n_rounds = n / kinds.len().max(1);
+    // There and back: a steady drift adds up to the same for all; of an odd number of rounds one is left over.
+    let is_balanced = n_rounds.is_multiple_of(2) && n == n_rounds * kinds.len();
+    let balance = if is_balanced { "" } else { " (a steady drift does not cancel; with an even --repeat it does)" };
+    match kinds[..] {
+        [] => "no block was begun".to_owned(),
+        [one] => format!("{n} blocks, all {}", loop_name(&one.threading, one.skip)),
+        _ if run.cases.len() > 1 => {
+            format!("{} cases, {n} blocks, every second round in reverse order{balance}", run.cases.len())
+        }
+        _ => {
+            let letter = |block: &Block| {
+                let i = kinds.iter().position(|kind| *kind == block).unwrap_or_default();
+                char::from(b'A' + i as u8).to_string()
+            };
+            let shown: Vec<String> = order.iter().take(N_SHOWN).map(letter).collect();
+            let more = if n > N_SHOWN { " …" } else { "" };
+            let name = |kind: &&Block| format!("{} = {}", letter(kind), loop_name(&kind.threading, kind.skip));
+            let names: Vec<String> = kinds.iter().map(name).collect();
+            format!("{n} blocks, {}{more}, {}{balance}", shown.join(" "), names.join(", "))
+        }
+    }
+}
+
+fn loop_name(threading: &str, skip: bool) -> String {
+    if skip { threading.to_owned() } else { format!("{threading} no-skip") }
+}
+
+fn name_of(mode: &Mode) -> String {
+    loop_name(&mode.threading, mode.skip)
+}
+
+/// A row a case and loop.
+fn case_rows(run: &Run) -> Vec<Vec<String>> {
+    let keys: Vec<&String> = run.cases.first().map_or(vec![], |c| c.sweep.iter().map(|s| &s.key).collect());
+    let has_phases = run.cases.iter().any(|c| c.phase.is_some());
+    let mut header: Vec<String> = if has_phases { vec!["phase".to_owned()] } else { vec![] };
+    header.extend(keys.into_iter().cloned());
+    let figures = ["particles", "pixels", "loop", "n", "frame p50", "low", "high", "fps", "game", "gpu", "latency"];
+    header.extend(figures.map(str::to_owned));
+    header.push("parallel/serial".to_owned());
+    let mut rows = vec![header];
+    for case in &run.cases {
+        for mode in &case.modes {
+            let mut row: Vec<String> = if has_phases { vec![case.phase.clone().unwrap_or_default()] } else { vec![] };
+            row.extend(case.sweep.iter().map(|s| s.value.clone()));
+            let p50 = |m: &Option<Measured>| m.map_or("-".to_owned(), |m| ms(m.of.p50));
+            let end = |of: fn(&Measured) -> Option<f64>| mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms);
+            row.extend([
+                case.particles.to_string(),
+                format!("{}x{}", case.width, case.height),
+                name_of(mode),
+                mode.frames.to_string(),
+                p50(&mode.frame_ms),
+                end(|m| m.p50_low),
+                end(|m| m.p50_high),
+                mode.frame_ms.map_or("-".to_owned(), |m| format!("{:.1}", fps(m.of.p50))),
+                p50(&mode.game_ms),
+                p50(&mode.gpu_ms),
+                p50(&mode.latency_ms),
+                case.ratio
+                    .filter(|_| mode.threading == "parallel")
+                    .map_or("-".to_owned(), |r| format!("{:.3} ({:.3}-{:.3})", r.parallel_by_serial, r.low, r.high)),
+            ]);
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+/// The bound of what overlap can do, and how near the parallel loop came.
+fn overlap_lines(o: &Overlap) -> String {
+    let (game, render, bound, serial) = (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
+    let share = o.bound_ms / o.serial_ms;
+    let mut out = format!(
+        "perfect overlap = max(game {game}, render {render}) = {bound} ms, {share:.3} of the serial {serial} ms\n"
+    );
+    if let Some(r) = o.reached {
+        let [share, low, high] = [r.share, r.low, r.high].map(|s| 100.0 * s);
+        let possible = ms(o.serial_ms - o.bound_ms);
+        out += &format!(
+            "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval {low:.1} to {high:.1})\n"
+        );
+        if r.share > 1.0 {
+            out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the \
+                    machine changed from block to block\n";
+        }
+    } else if o.parallel_ms.is_some() {
+        out += "that is no certain gain, so what share of it was reached cannot be said\n";
+    }
+    out
+}
+
+/// What overlap costs: the picture's age.
+fn latency_line(case: &Case) -> Option<String> {
+    let of = |threading: &str| case.modes.iter().find(|m| m.threading == threading);
+    let (serial, parallel) = (of("serial")?, of("parallel")?);
+    let (a, b) = (serial.latency_ms?.of.p50, parallel.latency_ms?.of.p50);
+    let frame = parallel.frame_ms?.of.p50;
+    let depth = parallel.queue_depth.map_or(String::new(), |n| format!(", {n:.2} frames queued"));
+    Some(format!(
+        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the parallel loop{depth}\n",
+        ms(a),
+        ms(b),
+        (b - a) / frame
+    ))
+}
+
+fn skipping_line(s: &Skipping) -> String {
+    let saved = s.gpu_no_skip_ms - s.gpu_ms;
+    let times = if s.gpu_ms > 0.0 {
+        format!("{:.1} times less", s.gpu_no_skip_ms / s.gpu_ms)
+    } else {
+        "nothing is left to do".to_owned()
+    };
+    let bytes = match s.same_bytes {
+        Some(true) => "; same bytes",
+        Some(false) => "; NOT THE SAME BYTES",
+        None => "",
+    };
+    format!("skipping saves {} of {} ms of GPU time a frame ({times}){bytes}\n", ms(saved), ms(s.gpu_no_skip_ms))
+}
+
+/// The host's clock and the device's: a time near these says nothing.
+fn clocks_line(clocks: &Clocks) -> String {
+    let device = clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
+    format!(
+        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}\n",
+        clocks.resolution_ns, clocks.overhead_ns
+    )
+}
+
+/// Frame rates: the median's, and that of the slowest frames by each of the three definitions, beside how much frame times
+/// vary.
+fn low_rows(case: &Case) -> Vec<Vec<String>> {
+    let header = ["fps", "loop", "p50", "1 % low: p99", "mean of slowest 1 %", "1 % of the time", "sd / mean"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    for mode in case.modes.iter() {
+        let (Some(frame), Some(lows)) = (&mode.frame_ms, &mode.frame_lows) else { continue };
+        let rates = [fps(frame.of.p50), lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];
+        let mut row = vec!["frame".to_owned(), name_of(mode)];
+        row.extend(rates.map(|rate| format!("{rate:.1}")));
+        row.push(frame.of.sd.map_or("-".to_owned(), |sd| format!("{:.1}%", 100.0 * sd / frame.of.mean)));
+        rows.push(row);
+    }
+    rows
+}
+
+/// The median of each time with its 95 % interval, and how the times spread.
+fn time_rows(case: &Case) -> Vec<Vec<String>> {
+    let header = ["ms", "loop", "n", "p50", "low", "high", "mean", "sd", "min", "p1", "p5", "p95", "p99", "max"];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    for (what, of) in [
+        ("frame", (|m| m.frame_ms.as_ref()) as fn(&Mode) -> Option<&Measured>),
+        ("game", |m| m.game_ms.as_ref()),
+        ("record", |m| m.record_ms.as_ref()),
+        ("render", |m| m.render_ms.as_ref()),
+        ("gpu", |m| m.gpu_ms.as_ref()),
+        ("latency", |m| m.latency_ms.as_ref()),
+    ] {
+        // Of frames that skip nothing only what skipping is measured by.
+        let is_shown = |m: &&Mode| m.skip || what == "frame" || what == "gpu" || case.modes.iter().all(|m| !m.skip);
+        for mode in case.modes.iter().filter(is_shown) {
+            let Some(m) = of(mode) else { continue };
+            let s = &m.of;
+            let mut row = vec![what.to_owned(), name_of(mode), s.n.to_string(), ms(s.p50)];
+            row.extend([m.p50_low, m.p50_high].map(|end| end.map_or("-".to_owned(), ms)));
+            let sd = s.sd.map_or("-".to_owned(), ms);
+            row.extend([ms(s.mean), sd, ms(s.min), ms(s.p1), ms(s.p5), ms(s.p95), ms(s.p99), ms(s.max)]);
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+/// A row a pass: its median in every loop, and of the first loop how often it ran and why not.
+fn pass_rows(case: &Case) -> Vec<Vec<String>> {
+    let Some(first) = case.modes.first() else { return vec![] };
+    let mut header = vec!["pass, p50 ms".to_owned()];
+    header.extend(case.modes.iter().map(name_of));
+    header.extend(["share", "run", "skipped", "saved", "why"].map(str::to_owned));
+    let mut rows = vec![header];
+    for (i, pass) in first.passes.iter().enumerate() {
+        let share = pass.share.filter(|_| pass.n_run > 0).map_or("-".to_owned(), |s| format!("{:.1}%", 100.0 * s));
+        let mut row = vec![pass.name.clone()];
+        row.extend(case.modes.iter().map(|m| m.passes.get(i).and_then(|p| p.p50_ms).map_or("-".to_owned(), ms)));
+        row.extend([share, pass.n_run.to_string(), pass.n_skipped.to_string()]);
+        row.extend([pass.saved_ms.map_or("-".to_owned(), ms), pass.reason.clone().unwrap_or_default()]);
+        rows.push(row);
+    }
+    rows
+}
+
+fn ms(value: f64) -> String {
+    format!("{value:.3}")
+}

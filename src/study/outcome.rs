@@ -1,0 +1,216 @@
+//! What a bench's frames say: the records of a run, from its samples.
+
+use std::collections::BTreeSet;
+
+use super::bench::{BenchPlan, Outcome, Sample};
+use super::cases::{Case, Loop, sweep_text};
+use super::overlap::{Overlap, SerialFrame};
+use super::records::{self, FrameRow, Measured, Mode, Pass as PassRecord, Ratio, Skipping};
+use crate::frame::FrameTimes;
+use crate::frame::plan::Pass;
+use crate::measure::bootstrap::Bootstrap;
+use crate::measure::lows::Lows;
+use crate::measure::stats::{Summary, mean, median};
+use crate::model::scene::{Simulate, Threading};
+
+pub fn name_of(threading: Threading) -> &'static str {
+    match threading {
+        Threading::Serial => "serial",
+        Threading::Parallel => "parallel",
+    }
+}
+
+impl FrameTimes {
+    /// Sum of the passes; 0 where none had to run, `None` without timestamps.
+    pub fn gpu_ms(&self) -> Option<f64> {
+        let timed = !self.passes.is_empty() || !Pass::ALL.into_iter().any(|p| self.plan.runs(p));
+        // A sum of nothing is -0.
+        timed.then(|| self.passes.iter().map(|p| p.ms()).sum::<f64>() + 0.0)
+    }
+
+    fn pass_ms(&self, name: &str) -> Option<f64> {
+        self.passes.iter().find(|p| p.name == name).map(|p| p.ms())
+    }
+}
+
+/// Timed frames of one case in one loop.
+struct Timed<'a>(Vec<&'a FrameTimes>);
+
+impl Timed<'_> {
+    fn column(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Vec<f64> {
+        self.0.iter().filter_map(|t| of(t)).collect()
+    }
+
+    fn frame_ms(&self) -> Vec<f64> {
+        self.column(|t| Some(t.frame_ms))
+    }
+
+    fn measured(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Option<Measured> {
+        let values = self.column(of);
+        let interval = Bootstrap::of_neighbours(values.len()).median(&values);
+        let (p50_low, p50_high) = interval.map(|i| (i.low, i.high)).unzip();
+        Summary::of(&values).map(|of| Measured { of, p50_low, p50_high })
+    }
+}
+
+impl Outcome {
+    fn timed(&self, i_case: usize, of: Loop) -> Timed<'_> {
+        let is_one = |s: &&Sample| s.i_case == i_case && s.of == of && !s.warm_up;
+        Timed(self.samples.iter().filter(is_one).map(|s| &s.times).collect())
+    }
+
+    /// The records of every case, in order.
+    pub fn cases(&self, cases: &[Case], plan: &BenchPlan) -> Vec<records::Case> {
+        cases.iter().enumerate().map(|(i, case)| self.case(i, case, plan)).collect()
+    }
+
+    fn case(&self, i: usize, case: &Case, plan: &BenchPlan) -> records::Case {
+        let find = |threading, skip| case.loops.iter().copied().find(|of| *of == Loop { threading, skip });
+        // With --no-skip no loop skips.
+        let both = |threading| find(threading, true).or_else(|| find(threading, false));
+        let (serial, parallel) = (both(Threading::Serial), both(Threading::Parallel));
+        let pair = serial.zip(parallel).filter(|(a, b)| a.skip == b.skip);
+        let unskipped = find(Threading::Serial, false).filter(|_| case.loops.iter().any(|of| of.skip));
+        let modes = case.loops.iter().map(|of| self.mode(i, case, *of, unskipped, plan)).collect();
+        records::Case {
+            phase: case.phase.clone(),
+            sweep: case.sweep.clone(),
+            particles: case.scene.n_particles(),
+            width: case.scene.film.width,
+            height: case.scene.film.height,
+            modes,
+            ratio: pair.and_then(|(serial, parallel)| self.ratio(i, serial, parallel)),
+            overlap: serial.and_then(|serial| self.overlap(i, serial, pair.map(|p| p.1))),
+            skipping: unskipped.and_then(|unskipped| self.skipping(i, case.loops[0], unskipped)),
+        }
+    }
+
+    /// Ratio of the median frame times with its bootstrap 95 % interval. Neighbouring frames are alike, so whole runs of
+    /// frames are drawn, not single ones: √n frames each.
+    fn ratio(&self, i: usize, serial: Loop, parallel: Loop) -> Option<Ratio> {
+        let (serial, parallel) = (self.timed(i, serial).frame_ms(), self.timed(i, parallel).frame_ms());
+        let n = serial.len().min(parallel.len());
+        Bootstrap::of_neighbours(n).ratio_of_medians(&parallel, &serial).map(Ratio::from)
+    }
+
+    /// What overlap could gain, and how much of it the parallel loop gained.
+    fn overlap(&self, i: usize, serial: Loop, parallel: Option<Loop>) -> Option<Overlap> {
+        let row = |t: &&FrameTimes| SerialFrame {
+            frame_ms: t.frame_ms,
+            game_ms: t.game_ms,
+            render_ms: t.record_ms + t.submit_wait_ms,
+        };
+        let serial: Vec<SerialFrame> = self.timed(i, serial).0.iter().map(row).collect();
+        Overlap::of(&serial, &parallel.map_or(vec![], |of| self.timed(i, of).frame_ms()))
+    }
+
+    fn skipping(&self, i: usize, skipped: Loop, unskipped: Loop) -> Option<Skipping> {
+        let [gpu, all] = [skipped, unskipped].map(|of| self.timed(i, of).column(|t| t.gpu_ms()));
+        if gpu.is_empty() || all.is_empty() {
+            return None;
+        }
+        let hashes = [skipped, unskipped].map(|of| self.image_hash(i, of));
+        let same_bytes = if let [Some(a), Some(b)] = hashes { Some(a == b) } else { None };
+        Some(Skipping { gpu_ms: mean(&gpu), gpu_no_skip_ms: mean(&all), same_bytes })
+    }
+
+    /// Of the last frame of one case in one loop, where one was reached.
+    fn image_hash(&self, i_case: usize, of: Loop) -> Option<&str> {
+        let mut blocks = self.blocks.iter().filter(|b| b.i_case == i_case && b.of == of);
+        blocks.find_map(|b| b.image_hash.as_deref())
+    }
+
+    /// Whether the last frames of all blocks of a case are the same, to the byte; none of fewer than two.
+    pub fn is_same_picture(&self, i_case: usize) -> Option<bool> {
+        let hashes: Vec<&str> =
+            self.blocks.iter().filter(|b| b.i_case == i_case).filter_map(|b| b.image_hash.as_deref()).collect();
+        (hashes.len() > 1).then(|| hashes.windows(2).all(|w| w[0] == w[1]))
+    }
+
+    /// Every block that was begun, in order.
+    pub fn block_order(&self) -> Vec<records::Block> {
+        let of = |b: &super::bench::Block| records::Block {
+            case: b.i_case,
+            threading: name_of(b.of.threading).to_owned(),
+            skip: b.of.skip,
+        };
+        self.blocks.iter().map(of).collect()
+    }
+
+    fn mode(&self, i: usize, case: &Case, of: Loop, unskipped: Option<Loop>, plan: &BenchPlan) -> Mode {
+        let timed = self.timed(i, of);
+        let blocks: BTreeSet<u32> =
+            self.samples.iter().filter(|s| s.i_case == i && s.of == of).map(|s| s.i_block).collect();
+        let depths = timed.column(|t| Some(f64::from(t.queue_depth)));
+        let against = unskipped.filter(|u| *u != of).map(|u| self.timed(i, u));
+        Mode {
+            threading: name_of(of.threading).into(),
+            skip: of.skip,
+            simulate: if case.scene.threads.simulate == Simulate::Cpu { "cpu" } else { "gpu" }.into(),
+            frames: timed.0.len(),
+            warm_up: plan.n_warm_up as usize,
+            blocks: blocks.len(),
+            frame_ms: timed.measured(|t| Some(t.frame_ms)),
+            frame_lows: Lows::of(&timed.frame_ms()),
+            game_ms: timed.measured(|t| Some(t.game_ms)),
+            record_ms: timed.measured(|t| Some(t.record_ms)),
+            render_ms: timed.measured(|t| Some(t.record_ms + t.submit_wait_ms)),
+            gpu_ms: timed.measured(FrameTimes::gpu_ms),
+            latency_ms: timed.measured(|t| Some(t.latency_ms)),
+            queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
+            passes: pass_records(&timed, against.as_ref()),
+            image_hash: self.image_hash(i, of).map(str::to_owned),
+        }
+    }
+
+    /// The rows of frames.csv, passes in the order of [`pass_names`].
+    pub fn rows(&self, cases: &[Case]) -> Vec<FrameRow> {
+        let names = pass_names();
+        let row = |s: &Sample| FrameRow {
+            phase: cases[s.i_case].phase.clone().unwrap_or_default(),
+            sweep: sweep_text(&cases[s.i_case].sweep),
+            threading: name_of(s.of.threading).into(),
+            skip: s.of.skip,
+            block: s.i_block as usize,
+            frame: s.times.i_frame,
+            time_s: s.times.time_s,
+            warm_up: s.warm_up,
+            frame_ms: s.times.frame_ms,
+            game_ms: s.times.game_ms,
+            record_ms: s.times.record_ms,
+            submit_wait_ms: s.times.submit_wait_ms,
+            gpu_ms: s.times.gpu_ms(),
+            latency_ms: s.times.latency_ms,
+            queue_depth: s.times.queue_depth as usize,
+            pass_ms: names.iter().map(|n| s.times.pass_ms(n)).collect(),
+            image_hash: s.image_hash.clone(),
+        };
+        self.samples.iter().map(row).collect()
+    }
+}
+
+/// Timer scopes of a frame.
+pub fn pass_names() -> Vec<String> {
+    Pass::ALL.iter().map(|p| p.name().to_owned()).collect()
+}
+
+/// `against`: frames of the same case that skip nothing.
+fn pass_records(timed: &Timed<'_>, against: Option<&Timed<'_>>) -> Vec<PassRecord> {
+    let total: f64 = timed.column(FrameTimes::gpu_ms).iter().sum();
+    let n = timed.0.len();
+    let record = |pass: Pass| {
+        let ms = timed.column(|t| t.pass_ms(pass.name()));
+        let skipped: Vec<&&FrameTimes> = timed.0.iter().filter(|t| !t.plan.runs(pass)).collect();
+        let whole = against.and_then(|a| median(&a.column(|t| t.pass_ms(pass.name()))));
+        PassRecord {
+            name: pass.name().to_owned(),
+            p50_ms: median(&ms),
+            share: (total > 0.0).then(|| ms.iter().sum::<f64>() / total),
+            n_run: n - skipped.len(),
+            n_skipped: skipped.len(),
+            reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_string()),
+            saved_ms: whole.filter(|_| !skipped.is_empty()).map(|ms| ms * skipped.len() as f64 / n as f64),
+        }
+    };
+    Pass::ALL.into_iter().map(record).collect()
+}

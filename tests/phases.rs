@@ -1,0 +1,212 @@
+//! `[[phase]]` sections and `--sweep`: parts of a run with settings of their own, from the scene file to the results.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use nimbus::io::scene_file::{LoadedScene, load};
+use nimbus::model::scene::{LightingMode, Threading};
+use nimbus::study::recorded::read_results;
+use nimbus::study::records::read_run;
+use serde_json::{Value, json};
+
+const SCENE: &str = r#"
+[film]
+width = 64
+height = 48
+
+[lighting]
+mode = "first"
+grid = 16
+
+[camera]
+path = [
+    { time_s = 0.0, position = [0, 0, 18], target = [0, 0, 0] },
+    { time_s = 3.0, position = [9, 0, 15], target = [0, 0, 0] },
+]
+
+[time]
+step_s = 0.1
+
+[[cloud]]
+from = "particles"
+file = "points.csv"
+
+[[phase]]
+name = "lit"
+frames = 4
+
+[[phase]]
+name = "unlit and small"
+frames = 3
+set.lighting.mode = "none"
+set.film = { width = 32, height = 24 }
+set.cloud.0.position = [1, 0, 0]
+
+[[phase]]
+name = "alone"
+frames = 5
+set."threads.mode" = "serial"
+"#;
+
+fn temp(scene: &str) -> (tempfile::TempDir, String) {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = dir.path().join("scene.toml");
+    fs::write(&path, scene).expect("the scene");
+    fs::write(dir.path().join("points.csv"), "x,y,z,radius,kappa\n0,0,0,3,1\n2,1,0,2,1\n").expect("points");
+    (dir, path.display().to_string())
+}
+
+fn loaded(scene: &str, overrides: &[&str]) -> nimbus::error::Result<LoadedScene> {
+    let (_dir, path) = temp(scene);
+    load(Path::new(&path), &overrides.iter().map(|s| s.to_string()).collect::<Vec<_>>(), None)
+}
+
+/// Exit code, stdout, stderr.
+fn nimbus(args: &[&str]) -> (i32, String, String) {
+    let output = Command::cargo_bin("nimbus").expect("the program is built").args(args).output().expect("it runs");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
+    (output.status.code().expect("an exit code"), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn a_phase_is_the_scene_with_what_it_sets() {
+    let all = loaded(SCENE, &[]).expect("the scene loads");
+    let names: Vec<(&str, u32, bool)> = all.phases.iter().map(|p| (p.name.as_str(), p.n_frames, p.sets_mode)).collect();
+    assert_eq!(names, [("lit", 4, false), ("unlit and small", 3, false), ("alone", 5, true)]);
+    let [lit, unlit, alone] = [0, 1, 2].map(|i| all.phases[i].scene.clone());
+    assert_eq!(lit, all.scene);
+    assert_eq!((lit.time.n_frames, lit.film.width, lit.lighting.mode), (12, 64, LightingMode::First));
+    assert_eq!((unlit.film.width, unlit.film.height, unlit.lighting.mode), (32, 24, LightingMode::None));
+    assert_eq!((unlit.clouds[0].position.x, alone.clouds[0].position.x), (1.0, 0.0));
+    assert_eq!((alone.threads.mode, lit.threads.mode), (Threading::Serial, Threading::Parallel));
+    // What was typed has the last word, in every phase.
+    let typed = loaded(SCENE, &["film.width=16", "lighting.grid=8"]).expect("the scene loads");
+    assert!(typed.phases.iter().all(|p| (p.scene.film.width, p.scene.lighting.grid) == (16, 8)));
+    assert_eq!(typed.phases[1].scene.film.height, 24);
+    assert_eq!(all.resolved["phase"][1]["set"]["film.width"], 32);
+    assert_eq!(all.resolved["time"]["frames"], 12);
+}
+
+#[test]
+fn frames_are_of_the_phase_they_fall_in() {
+    for (i_frame, width) in [(0, 64), (3, 64), (4, 32), (6, 32), (7, 64), (11, 64), (99, 64)] {
+        assert_eq!(loaded(SCENE, &[]).expect("the scene loads").at_frame(i_frame).film.width, width, "{i_frame}");
+    }
+}
+
+#[test]
+fn the_hash_knows_what_phases_set() {
+    let hash = |scene: &str| loaded(scene, &[]).expect("the scene loads").hash;
+    assert_eq!(hash(SCENE), hash(SCENE));
+    assert_ne!(hash(SCENE), hash(&SCENE.replace("height = 24", "height = 25")));
+    assert_ne!(hash(SCENE), hash(SCENE.split("[[phase]]").next().expect("a part")));
+}
+
+#[test]
+fn what_is_wrong_in_a_phase_is_said_where_it_stands() {
+    let refusal = |from: &str, to: &str| {
+        assert!(SCENE.contains(from), "{from}");
+        loaded(&SCENE.replace(from, to), &[]).expect_err(to).to_string()
+    };
+    for (from, to, parts) in [
+        ("set.lighting.mode = \"none\"", "set.lighting.mode = \"nine\"", &["toml:30:", "`nine`", "small\")"][..]),
+        (
+            "set.lighting.mode = \"none\"",
+            "set.lightning.mode = 1",
+            &["toml:30:", "unknown key `lightning`", "in phase"],
+        ),
+        ("set.lighting.mode = \"none\"", "set.time.step_s = 1", &["toml:30:", "cannot set title, time and phase"]),
+        (
+            "set.lighting.mode = \"none\"",
+            "set.cloud.3.seed = 1",
+            &["toml:30:", "phase \"unlit and small\"", "from 0 to 0"],
+        ),
+        ("set.\"threads.mode\" = \"serial\"", "set = 3", &["toml:37:", "expected a table of keys"]),
+        ("name = \"lit\"", "name = \"alone\"", &["toml:", "another phase's name already"]),
+        ("frames = 4", "", &["missing key `phase.0.frames`"]),
+        ("frames = 4", "frames = 0", &["expected an integer from 1"]),
+        ("step_s = 0.1", "frames = 7", &["toml:18:", "the phases have 12 frames in all"]),
+        ("[[phase]]\nname = \"lit\"", "[[phase]]\nnme = 1\nname = \"lit\"", &["unknown key `phase.0.nme`"]),
+    ] {
+        let message = refusal(from, to);
+        assert!(parts.iter().all(|part| message.contains(part)), "{to}: {message}");
+    }
+    assert!(loaded(SCENE, &["time.frames=12"]).is_ok());
+    assert!(loaded(SCENE, &["time.frames=13"]).expect_err("13").to_string().contains("--set time.frames=13"));
+}
+
+#[test]
+fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
+    let (dir, path) = temp(SCENE);
+    let out = dir.path().join("run").display().to_string();
+    let args = ["bench", &path, "--warmup", "2", "--repeat", "2", "--sweep", "draw.cutoff=2,3", "--out", &out];
+    let (code, table, stderr) = nimbus(&args);
+    assert_eq!((code, stderr.as_str()), (0, ""));
+    let cases: Vec<&str> = table.lines().filter(|l| l.contains("serial  ") && !l.contains("no-skip")).collect();
+    assert_eq!(cases.len(), 6, "{table}");
+    assert!(table.contains("6 of 6 cases gave the same last frame"), "{table}");
+    let run = read_run(Path::new(&out)).expect("the run");
+    let names: Vec<String> = run.cases.iter().map(|c| c.name()).collect();
+    let phases = ["lit", "unlit and small", "alone"];
+    let all = ["2", "3"].map(|v| phases.map(|p| format!("{p}, draw.cutoff={v}"))).concat();
+    assert_eq!(names, all);
+    let loops: Vec<usize> = run.cases.iter().map(|c| c.modes.len()).collect();
+    // Serial, parallel, and serial without skipping; the last phase names its loop.
+    assert_eq!(loops, [3, 3, 2, 3, 3, 2]);
+    assert_eq!((run.cases[4].width, run.cases[4].particles), (32, 2));
+    assert_eq!(run.block_order.len(), 2 * 16);
+    // There and back.
+    assert!(run.block_order.iter().eq(run.block_order.iter().rev()));
+    let recorded = read_results(Path::new(&out)).expect("the results");
+    // Timed frames follow each other from phase to phase, after the warm-up of the first.
+    let frames = |name: &str| {
+        let mode = recorded.modes.iter().find(|m| m.threading == name).expect(name);
+        mode.frames.clone()
+    };
+    assert_eq!(frames("lit, draw.cutoff=2: serial"), [2, 3, 4, 5, 2, 3, 4, 5]);
+    assert_eq!(frames("unlit and small, draw.cutoff=3: parallel"), [6, 7, 8, 6, 7, 8]);
+    assert_eq!(frames("alone, draw.cutoff=3: serial no-skip"), [9, 10, 11, 12, 13, 9, 10, 11, 12, 13]);
+    let csv = fs::read_to_string(Path::new(&out).join("frames.csv")).expect("frames.csv");
+    assert!(csv.lines().filter(|l| l.contains(",unlit and small,draw.cutoff=3,")).count() == 2 * 3 * 5, "{csv}");
+    // Read back, every case meets itself.
+    let (code, table, _) = nimbus(&["compare", &out, &out]);
+    assert!(code == 0 && table.contains("lit, draw.cutoff=2: serial frame"), "{table}");
+}
+
+#[test]
+fn each_setting_of_a_sweep_reaches_the_picture() {
+    let (_dir, path) = temp(SCENE.split("[[phase]]").next().expect("a part"));
+    let sweep = ["--sweep", "size=32x24,40x30", "--sweep", "cloud.0.position=[0,0,0],[1,0,0]"];
+    let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--threading", "serial", "--no-saved", "--json"];
+    let (code, text, stderr) = nimbus(&[&["bench", path.as_str()][..], &sweep, &short].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let run: Value = serde_json::from_str(&text).expect("JSON");
+    let cases = run["cases"].as_array().expect("cases");
+    let sizes: Vec<String> = cases.iter().map(|c| format!("{}x{}", c["width"], c["height"])).collect();
+    assert_eq!(sizes, ["32x24", "32x24", "40x30", "40x30"]);
+    let mut hashes: Vec<&Value> = cases.iter().map(|c| &c["modes"][0]["image_hash"]).collect();
+    hashes.dedup();
+    assert_eq!(hashes.len(), 4, "four pictures");
+    assert!(cases.iter().all(|c| c["modes"].as_array().map(Vec::len) == Some(1) && c["skipping"] == Value::Null));
+    assert_eq!(cases[1]["sweep"][1], json!({ "key": "cloud.0.position", "value": "[1,0,0]" }));
+}
+
+#[test]
+fn a_sweep_that_makes_no_scene_is_refused_before_anything_runs() {
+    let (dir, path) = temp(SCENE);
+    let out = dir.path().join("run").display().to_string();
+    for (sweep, part) in [
+        ("draw.cutoff=2,900", "--set draw.cutoff=900"),
+        ("draw.cutof=2", "unknown key `draw.cutof`"),
+        ("size=2", "expected WIDTHxHEIGHT"),
+        ("draw.cutoff", "no `=`"),
+        ("draw.cutoff=2,2", "2 twice"),
+    ] {
+        let (code, stdout, stderr) = nimbus(&["bench", &path, "--sweep", sweep, "--out", &out]);
+        assert!(code == 2 && stdout.is_empty() && stderr.contains(part), "{sweep}: {stderr}");
+        assert!(!Path::new(&out).exists());
+    }
+    let twice = ["bench", &path, "--sweep", "draw.cutoff=2", "--sweep", "draw.cutoff=3"];
+    assert!(nimbus(&twice).2.contains("the key twice"));
+}

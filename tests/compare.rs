@@ -88,7 +88,12 @@ fn run() -> Run {
         },
         cpu: Cpu { model: "a processor".to_owned(), logical_cores: 2 },
         environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
-        clocks: Clocks { resolution_ns: 1.0, overhead_ns: 22.5, timestamp_period_ns: None },
+        clocks: Clocks {
+            resolution_ns: 1.0,
+            overhead_ns: 22.5,
+            timestamp_period_ns: None,
+            timestamp_overhead_ns: None,
+        },
         block_order: ["serial", "parallel"].map(block).to_vec(),
         cases: vec![Case {
             phase: None,

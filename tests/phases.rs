@@ -116,7 +116,7 @@ fn what_is_wrong_in_a_phase_is_said_where_it_stands() {
             "set.lightning.mode = 1",
             &["toml:30:", "unknown key `lightning`", "in phase"],
         ),
-        ("set.lighting.mode = \"none\"", "set.time.step_s = 1", &["toml:30:", "cannot set title, time and phase"]),
+        ("set.lighting.mode = \"none\"", "set.time.step_s = 1", &["toml:30:", "cannot set `title`, `time`, `phase`"]),
         (
             "set.lighting.mode = \"none\"",
             "set.cloud.3.seed = 1",
@@ -126,7 +126,7 @@ fn what_is_wrong_in_a_phase_is_said_where_it_stands() {
         ("name = \"lit\"", "name = \"alone\"", &["toml:", "another phase's name already"]),
         ("frames = 4", "", &["missing key `phase.0.frames`"]),
         ("frames = 4", "frames = 0", &["expected an integer from 1"]),
-        ("step_s = 0.1", "frames = 7", &["toml:18:", "the phases have 12 frames in all"]),
+        ("step_s = 0.1", "frames = 7", &["toml:17:", "the phases have 12 frames in all"]),
         ("[[phase]]\nname = \"lit\"", "[[phase]]\nnme = 1\nname = \"lit\"", &["unknown key `phase.0.nme`"]),
     ] {
         let message = refusal(from, to);

@@ -89,7 +89,12 @@ fn sample() -> Run {
         },
         cpu: cpu(),
         environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
-        clocks: Clocks { resolution_ns: 1.0, overhead_ns: 22.5, timestamp_period_ns: None },
+        clocks: Clocks {
+            resolution_ns: 1.0,
+            overhead_ns: 22.5,
+            timestamp_period_ns: None,
+            timestamp_overhead_ns: None,
+        },
         block_order: ["serial", "parallel", "parallel", "serial"].map(block).to_vec(),
         cases: vec![Case {
             phase: Some("dense".to_owned()),

@@ -125,7 +125,7 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         device: machine::device_record(&info),
         cpu: machine::cpu(),
         environment: machine::environment(),
-        clocks: machine::clocks_record(&info),
+        clocks: machine::clocks_record(&mut stage)?,
         block_order: outcome.block_order(),
         cases: outcome.cases(&cases, &plan),
         interrupted: outcome.interrupted,

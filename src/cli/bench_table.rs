@@ -209,8 +209,9 @@ fn skipping_line(s: &Skipping) -> String {
 /// The host's clock and the device's: a time near these says nothing.
 fn clocks_line(clocks: &Clocks) -> String {
     let device = clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
+    let empty = clocks.timestamp_overhead_ns.map_or(String::new(), |ns| format!(", {ns:.0} ns for an empty pass"));
     format!(
-        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}\n",
+        "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}{empty}\n",
         clocks.resolution_ns, clocks.overhead_ns
     )
 }

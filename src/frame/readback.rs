@@ -44,6 +44,15 @@ impl Renderer {
         Ok((particles, download(device, &mut self.host, &self.buffers.status, n)?))
     }
 
+    /// What a pass that does nothing measures on the device, ns: median of several. None without timestamps.
+    pub fn empty_scope_ns(&mut self) -> Result<Option<f64>> {
+        const N_SCOPES: usize = 15;
+        let scopes = self.host.run(|rec| (0..N_SCOPES).try_for_each(|_| rec.scope("empty", |_| Ok(()))))?;
+        let mut ns: Vec<f64> = scopes.iter().map(|s| s.end_ns - s.begin_ns).collect();
+        ns.sort_by(f64::total_cmp);
+        Ok(ns.get(ns.len() / 2).copied())
+    }
+
     /// Of frames in flight nobody knows which one's would be read.
     fn check_alone(&self) -> Result<()> {
         if self.in_flight.is_empty() { Ok(()) } else { Err(Error::usage("frames are in flight")) }

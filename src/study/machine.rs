@@ -6,6 +6,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
+use super::stage::Stage;
+use crate::error::Result;
 use crate::gpu::DeviceInfo;
 use crate::measure::clock::ClockQuality;
 
@@ -35,12 +37,8 @@ pub struct Clocks {
     pub overhead_ns: f64,
     /// Of the device; null where it has no timestamps.
     pub timestamp_period_ns: Option<f64>,
-}
-
-impl Clocks {
-    pub fn of(clock: &ClockQuality, timestamp_period_ns: Option<f64>) -> Self {
-        Clocks { resolution_ns: clock.resolution_ns as f64, overhead_ns: clock.overhead_ns, timestamp_period_ns }
-    }
+    /// What a pass that does nothing measures; a pass near it says nothing.
+    pub timestamp_overhead_ns: Option<f64>,
 }
 
 /// The device as results name it.
@@ -55,10 +53,14 @@ pub fn device_record(info: &DeviceInfo) -> Device {
     }
 }
 
-/// The host's clock and the device's.
-pub fn clocks_record(info: &DeviceInfo) -> Clocks {
-    let has_timestamps = info.limits.timestamp_valid_bits > 0;
-    Clocks::of(&ClockQuality::measure(), has_timestamps.then_some(info.limits.timestamp_period_ns))
+/// The host's clock and the device's, measured.
+pub fn clocks_record(stage: &mut Stage) -> Result<Clocks> {
+    let host = ClockQuality::measure();
+    let limits = &stage.info().limits;
+    let timestamp_period_ns = (limits.timestamp_valid_bits > 0).then_some(limits.timestamp_period_ns);
+    let timestamp_overhead_ns = stage.renderer.empty_scope_ns()?;
+    let (resolution_ns, overhead_ns) = (host.resolution_ns as f64, host.overhead_ns);
+    Ok(Clocks { resolution_ns, overhead_ns, timestamp_period_ns, timestamp_overhead_ns })
 }
 
 /// The revision that was built (see build.rs).

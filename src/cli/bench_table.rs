@@ -27,8 +27,10 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
         if run.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
     if run.cases.len() > 1 {
-        out += &output::table(&case_rows(run));
-        out.push('\n');
+        for rows in [case_rows(run), pass_by_case_rows(run)] {
+            out += &output::table(&rows);
+            out.push('\n');
+        }
     }
     for (case, same) in run.cases.iter().zip(same) {
         if run.cases.len() == 1 || verbose {
@@ -115,20 +117,49 @@ fn name_of(mode: &Mode) -> String {
     loop_name(&mode.threading, mode.skip)
 }
 
-/// A row a case and loop.
-fn case_rows(run: &Run) -> Vec<Vec<String>> {
-    let keys: Vec<&String> = run.cases.first().map_or(vec![], |c| c.sweep.iter().map(|s| &s.key).collect());
+/// What a case is called, in columns: its phase where there are phases, then the values of the sweep's keys.
+fn case_columns(run: &Run) -> (Vec<String>, impl Fn(&Case) -> Vec<String>) {
     let has_phases = run.cases.iter().any(|c| c.phase.is_some());
     let mut header: Vec<String> = if has_phases { vec!["phase".to_owned()] } else { vec![] };
-    header.extend(keys.into_iter().cloned());
+    header.extend(run.cases.first().map_or(vec![], |c| c.sweep.iter().map(|s| s.key.clone()).collect()));
+    let of = move |case: &Case| {
+        let mut row: Vec<String> = if has_phases { vec![case.phase.clone().unwrap_or_default()] } else { vec![] };
+        row.extend(case.sweep.iter().map(|s| s.value.clone()));
+        row
+    };
+    (header, of)
+}
+
+/// A row a case: the median of every pass that ran in some case, where nothing is skipped or else in the first loop.
+fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
+    let (mut header, columns) = case_columns(run);
+    let whole = |case: &Case| case.modes.iter().position(|m| !m.skip).unwrap_or_default();
+    let p50 = |case: &Case, i: usize| case.modes.get(whole(case))?.passes.get(i)?.p50_ms;
+    let names: Vec<&String> =
+        run.cases.iter().find_map(|c| c.modes.first()).map_or(vec![], |m| m.passes.iter().map(|p| &p.name).collect());
+    let ran: Vec<usize> = (0..names.len()).filter(|i| run.cases.iter().any(|c| p50(c, *i).is_some())).collect();
+    header.push("p50 ms of".to_owned());
+    header.extend(ran.iter().map(|i| names[*i].clone()));
+    let mut rows = vec![header];
+    for case in &run.cases {
+        let mut row = columns(case);
+        row.push(case.modes.get(whole(case)).map_or("-".to_owned(), name_of));
+        row.extend(ran.iter().map(|i| p50(case, *i).map_or("-".to_owned(), ms)));
+        rows.push(row);
+    }
+    rows
+}
+
+/// A row a case and loop.
+fn case_rows(run: &Run) -> Vec<Vec<String>> {
+    let (mut header, columns) = case_columns(run);
     let figures = ["particles", "pixels", "loop", "n", "frame p50", "low", "high", "fps", "game", "gpu", "latency"];
     header.extend(figures.map(str::to_owned));
     header.push("parallel/serial".to_owned());
     let mut rows = vec![header];
     for case in &run.cases {
         for mode in &case.modes {
-            let mut row: Vec<String> = if has_phases { vec![case.phase.clone().unwrap_or_default()] } else { vec![] };
-            row.extend(case.sweep.iter().map(|s| s.value.clone()));
+            let mut row = columns(case);
             let p50 = |m: &Option<Measured>| m.map_or("-".to_owned(), |m| ms(m.of.p50));
             let end = |of: fn(&Measured) -> Option<f64>| mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms);
             row.extend([

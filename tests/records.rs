@@ -85,7 +85,7 @@ fn sample() -> Run {
         block_order: ["serial", "parallel", "parallel", "serial"].map(str::to_owned).to_vec(),
         modes: vec![mode("serial"), mode("parallel")],
         ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
-        overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }], &[21.0]),
+        overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
         interrupted: false,
     }
 }

@@ -104,7 +104,7 @@ fn sample() -> Run {
             height: 600,
             modes: vec![mode("serial"), mode("parallel")],
             ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
-            overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }], &[21.0]),
+            overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
             skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
         }],
         interrupted: false,

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 /// The temporaries that exist. Files are made, renamed and removed under its lock.
 static IN_PROGRESS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
+pub(super) fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
     // A list of paths is whole at every moment, so a panic beside it leaves nothing to mistrust.
     IN_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -21,11 +21,14 @@ fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
 /// Removes what is half written, and lets no thread begin or finish a file any more: the process is to end at once.
 pub fn abandon() {
     let paths = in_progress();
-    for path in paths.iter() {
-        // Nobody is left to be told.
-        let _ = fs::remove_file(path);
-    }
+    paths.iter().for_each(|path| remove(path));
     std::mem::forget(paths);
+}
+
+/// A file, or a folder and all in it. What cannot be removed stays: nobody is left to be told.
+fn remove(path: &Path) {
+    let is_folder = fs::symlink_metadata(path).is_ok_and(|about| about.is_dir());
+    let _ = if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) };
 }
 
 /// Writes `path` with `write`. When that fails or panics the old file stays, and nothing else is left behind.
@@ -42,9 +45,9 @@ pub fn write_atomic<E: Display>(
     fs::rename(&temporary.path, path).map_err(|e| Error::io(path, e))
 }
 
-/// Removes its file when dropped; after the rename there is none.
-struct Temporary {
-    path: PathBuf,
+/// Removes its file or folder when dropped; after the rename there is none.
+pub(super) struct Temporary {
+    pub path: PathBuf,
 }
 
 impl Temporary {
@@ -63,25 +66,44 @@ impl Temporary {
         if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
             return Err(Error::io(path, "exists and is not a regular file"));
         }
-        // Two threads of one process may write files of one name.
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let name = format!(".{}.{}-{count}.tmp", name.to_string_lossy(), std::process::id());
-        let temporary = Temporary { path: folder.join(name) };
-        let mut paths = in_progress();
-        let file = OpenOptions::new().write(true).create_new(true).open(&temporary.path);
-        // Before it is known to be there: `temporary` goes through the list when it is dropped, and must find no lock.
-        paths.push(temporary.path.clone());
-        drop(paths);
-        Ok((temporary, file.map_err(|e| Error::io(path, format!("cannot be written: {e}")))?))
+        let name = format!(".{}.{}.tmp", name.to_string_lossy(), unique());
+        let create = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
+        Temporary::create(folder.join(name), create).map_err(|e| Error::io(path, format!("cannot be written: {e}")))
     }
+
+    /// An empty folder in `parent` for what is to become, or stand in, the folder `name`. Unlike a file's its name is
+    /// not hidden: what a killed process leaves may hold results that were just replaced.
+    pub(super) fn folder(parent: &Path, name: &str) -> std::io::Result<Temporary> {
+        let path = parent.join(format!("{name}.{}.nimbus.tmp", unique()));
+        Temporary::create(path, |path| fs::create_dir(path)).map(|(temporary, ())| temporary)
+    }
+
+    fn create<T>(path: PathBuf, create: impl FnOnce(&Path) -> std::io::Result<T>) -> std::io::Result<(Temporary, T)> {
+        let mut paths = in_progress();
+        // Nothing is removed that was there before.
+        let made = create(&path)?;
+        paths.push(path.clone());
+        Ok((Temporary { path }, made))
+    }
+
+    /// Leaves alone what lies there now; `paths` is the list, locked.
+    pub(super) fn let_go(self, paths: &mut Vec<PathBuf>) {
+        paths.retain(|path| *path != self.path);
+        std::mem::forget(self);
+    }
+}
+
+/// Two threads of one process may write files of one name.
+fn unique() -> String {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    format!("{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
 }
 
 impl Drop for Temporary {
     fn drop(&mut self) {
         let mut paths = in_progress();
         // Gone already when all went well; otherwise the error that led here is the one to report.
-        let _ = fs::remove_file(&self.path);
+        remove(&self.path);
         paths.retain(|path| *path != self.path);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! What goes in: a scene ([`scene_file`]), which names box files ([`box_file`]) and particle lists
 //! ([`particle_file`]). What comes out: images ([`image`]); every result is written through [`atomic`], so that
-//! a file is either the old one or the new one whole.
+//! a file is either the old one or the new one whole, and files that belong together through [`folder`].
 //!
 //! Every complaint about an input says file:line:column, or the `--set` argument, and what was expected.
 //! A scene is read in three steps, each with one subject: [`toml_tree`] turns text into a tree in which every
@@ -14,6 +14,7 @@
 
 pub mod atomic;
 pub mod box_file;
+pub mod folder;
 pub mod image;
 pub mod magnitude;
 pub mod particle_file;

@@ -1,7 +1,7 @@
 //! Results on disk: `run.json` (what was run, where, and what it says) and `frames.csv` (every frame, raw).
 //!
 //! The form of `run.json` is docs/run.schema.json; a change of meaning, or of a key, raises `SCHEMA_VERSION`.
-//! Files appear whole or not at all: each is written beside its place and then renamed.
+//! Both appear whole and together, or not at all ([`crate::io::folder`]).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,6 +14,7 @@ use super::machine::{Clocks, Cpu, Device};
 use super::overlap::Overlap;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
+use crate::io::folder::{check_writable, replace_files};
 use crate::measure::bootstrap::Interval;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
@@ -233,15 +234,17 @@ pub fn prepare_out_dir(path: &Path, force: bool) -> Result<()> {
             Err(Error::usage(format!("{path}: exists already; name another folder, or add --force to overwrite it")))
         }
         Ok(_) if !path.is_dir() => Err(Error::io(path, "is not a folder; results need one")),
-        Ok(_) => Ok(()),
+        Ok(_) => check_writable(path),
         Err(_) => fs::create_dir_all(path).map_err(|cause| Error::io(path, cause)),
     }
 }
 
-/// Both files. The frames come first, so that a `run.json` never stands without them.
+/// Both files, at once: never a `run.json` beside another run's frames.
 pub fn write_results(out_dir: &Path, run: &Run, pass_names: &[String], rows: &[FrameRow]) -> Result<()> {
-    write_frames(&out_dir.join(FRAMES_FILE), pass_names, rows)?;
-    write_run(&out_dir.join(RUN_FILE), run)
+    replace_files(out_dir, &[FRAMES_FILE, RUN_FILE], |folder| {
+        write_frames(&folder.join(FRAMES_FILE), pass_names, rows)?;
+        write_run(&folder.join(RUN_FILE), run)
+    })
 }
 
 pub fn write_run(path: &Path, run: &Run) -> Result<()> {

@@ -1,0 +1,291 @@
+//! Files that belong together, replaced together: a reader, or whoever looks after the process was killed at any moment,
+//! finds all old ones or all new ones, and whatever else lies in their folder where it lay.
+//!
+//! A folder with the new files, and with hard links to everything else, is made beside the old one, and the two exchange
+//! their names in one step. Where that cannot be (see [`exchanged`]) the files are replaced one by one: there a kill
+//! within the few microseconds between the renames leaves the folder without its last file, never with files of two
+//! kinds that seem to be of one. Nothing here outlasts a power cut that the file system's own order of writes does not.
+
+use std::fs;
+use std::path::Path;
+
+use super::atomic::{Temporary, in_progress};
+use crate::error::{Error, Result};
+
+/// Makes `folder` hold the `files` that `write` puts into the folder it is given, which may be asked for twice. Readers
+/// look for the last of `files` first. When `write` fails the old files stay.
+pub fn replace_files(folder: &Path, files: &[&str], write: impl Fn(&Path) -> Result<()>) -> Result<()> {
+    if exchanged(folder, files, &write)? { Ok(()) } else { one_by_one(folder, files, &write) }
+}
+
+/// An error where no file can be made in `folder`.
+pub fn check_writable(folder: &Path) -> Result<()> {
+    let made = Temporary::folder(folder, "results");
+    made.map(drop).map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
+}
+
+/// Takes the last file away, replaces the others, and puts the new last file there.
+fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<()> {
+    let failed = |cause| Error::io(folder, cause);
+    // In the folder itself: another one may lie on another file system.
+    let staged = Temporary::folder(folder, "results").map_err(failed)?;
+    write(&staged.path)?;
+    let Some(last) = files.last().map(|name| folder.join(name)) else { return Ok(()) };
+    let aside = staged.path.join("replaced");
+    let _lock = in_progress();
+    let had_one = last.symlink_metadata().is_ok();
+    if had_one {
+        fs::rename(&last, &aside).map_err(failed)?;
+    }
+    for (i, name) in files.iter().enumerate() {
+        if let Err(cause) = fs::rename(staged.path.join(name), folder.join(name)) {
+            // With no file replaced the old ones are whole again.
+            if i == 0 && had_one {
+                fs::rename(&aside, &last).map_err(failed)?;
+            }
+            return Err(failed(cause));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn exchanged(_: &Path, _: &[&str], _: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
+    Ok(false)
+}
+
+/// Replaces the folder as a whole; false, with nothing changed, where that cannot be:
+/// - the file system knows no exchange or no hard links, or the folder is a mount point or a file system's root;
+/// - the parent may not be written, or folder or file belong to somebody else, who would lose them to us;
+/// - this process, and most likely the shell that started it, stands in the folder, which would vanish under its feet.
+#[cfg(target_os = "linux")]
+fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    // Not a link to it: that stays, and points to the new folder.
+    let Ok(folder) = fs::canonicalize(folder) else { return moved_in(folder, write) };
+    let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else { return Ok(false) };
+    if std::env::current_dir().and_then(fs::canonicalize).is_ok_and(|here| here.starts_with(&folder)) {
+        return Ok(false);
+    }
+    let Ok(staged) = Temporary::folder(parent, &name.to_string_lossy()) else { return Ok(false) };
+    write(&staged.path)?;
+    // From here on Ctrl-C waits until all is done.
+    let mut paths = in_progress();
+    if !beside::link_others(&folder, &staged.path, files)
+        || renameat_with(CWD, &staged.path, CWD, &folder, RenameFlags::EXCHANGE).is_err()
+    {
+        return Ok(false);
+    }
+    // What `staged` names is the old folder now.
+    beside::discard(&staged.path, &folder, files);
+    staged.let_go(&mut paths);
+    Ok(true)
+}
+
+/// For a folder that is not there yet.
+#[cfg(target_os = "linux")]
+fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
+    let failed = |cause| Error::io(folder, cause);
+    let Some(name) = folder.file_name() else { return Err(Error::io(folder, "expected a folder's name")) };
+    let parent = folder.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
+    let staged = Temporary::folder(parent, &name.to_string_lossy()).map_err(failed)?;
+    write(&staged.path)?;
+    let mut paths = in_progress();
+    // What came into being meanwhile is not replaced unless it is empty.
+    fs::rename(&staged.path, folder).map_err(failed)?;
+    staged.let_go(&mut paths);
+    Ok(true)
+}
+
+/// Two folders of which one is to stand in for the other.
+#[cfg(target_os = "linux")]
+mod beside {
+    use std::fs::{self, Metadata};
+    use std::io;
+    use std::os::unix::fs::MetadataExt;
+    use std::path::Path;
+
+    /// Links everything in `from` but `left_out` into `to`, folders made anew and theirs in turn; false where
+    /// something cannot be linked as it is.
+    pub fn link_others(from: &Path, to: &Path, left_out: &[&str]) -> bool {
+        let link = || -> io::Result<bool> {
+            if !is_owned_alike(from, to)? {
+                return Ok(false);
+            }
+            for entry in fs::read_dir(from)? {
+                let entry = entry?;
+                let (old, new) = (entry.path(), to.join(entry.file_name()));
+                if left_out.iter().any(|name| entry.file_name() == *name) {
+                    continue;
+                }
+                if entry.file_type()?.is_dir() {
+                    fs::create_dir(&new)?;
+                    if !link_others(&old, &new, &[]) {
+                        return Ok(false);
+                    }
+                } else {
+                    fs::hard_link(&old, &new)?;
+                }
+            }
+            // Last: a folder that may not be written takes no links.
+            fs::set_permissions(to, fs::metadata(from)?.permissions())?;
+            Ok(true)
+        };
+        link().unwrap_or(false)
+    }
+
+    /// On the same file system and the same people's.
+    fn is_owned_alike(a: &Path, b: &Path) -> io::Result<bool> {
+        let of = |about: Metadata| (about.dev(), about.uid(), about.gid());
+        Ok(of(fs::metadata(a)?) == of(fs::metadata(b)?))
+    }
+
+    /// Removes the folder `old`, whose place `new` has taken: `replaced` files, and what both hold. What came into the
+    /// old one since its files were linked goes over to the new. What cannot be removed stays, and the results are
+    /// there all the same.
+    pub fn discard(old: &Path, new: &Path, replaced: &[&str]) {
+        for entry in fs::read_dir(old).into_iter().flatten().flatten() {
+            let (gone, kept) = (entry.path(), new.join(entry.file_name()));
+            let is_replaced = replaced.iter().any(|name| entry.file_name() == *name);
+            let (Ok(of_gone), of_kept) = (gone.symlink_metadata(), kept.symlink_metadata()) else { continue };
+            let is_same = of_kept.as_ref().is_ok_and(|k| (k.dev(), k.ino()) == (of_gone.dev(), of_gone.ino()));
+            if of_gone.is_dir() && of_kept.is_ok_and(|k| k.is_dir()) {
+                discard(&gone, &kept, &[]);
+            } else {
+                let _ = if is_replaced || is_same { fs::remove_file(&gone) } else { fs::rename(&gone, &kept) };
+            }
+        }
+        let _ = fs::remove_dir(old);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+
+    fn write_both(text: &str) -> impl Fn(&Path) -> Result<()> {
+        move |folder| {
+            for name in ["rows", "head"] {
+                fs::write(folder.join(name), text).map_err(|cause| Error::io(folder, cause))?;
+            }
+            Ok(())
+        }
+    }
+
+    /// Names under `folder` and what the files hold; of a link where it points.
+    fn tree(folder: &Path) -> Vec<(String, String)> {
+        let mut found = Vec::new();
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            if let Ok(target) = fs::read_link(&path) {
+                found.push((name, format!("-> {}", target.display())));
+            } else if path.is_dir() {
+                found.push((name.clone(), String::new()));
+                found.extend(tree(&path).into_iter().map(|(inner, text)| (format!("{name}/{inner}"), text)));
+            } else {
+                found.push((name, fs::read_to_string(&path).unwrap()));
+            }
+        }
+        found.sort();
+        found
+    }
+
+    /// A folder of a user's with results `text`.
+    fn kept(parent: &Path, text: &str) -> std::path::PathBuf {
+        let folder = parent.join("run");
+        fs::create_dir_all(folder.join("plots/deep")).unwrap();
+        write_both(text)(&folder).unwrap();
+        fs::write(folder.join("notes.txt"), "mine").unwrap();
+        fs::write(folder.join("plots/deep/a.png"), "picture").unwrap();
+        symlink("nowhere", folder.join("link")).unwrap();
+        folder
+    }
+
+    fn expected(text: &str) -> Vec<(String, String)> {
+        let all = [
+            ("head", text),
+            ("link", "-> nowhere"),
+            ("notes.txt", "mine"),
+            ("plots", ""),
+            ("plots/deep", ""),
+            ("plots/deep/a.png", "picture"),
+            ("rows", text),
+        ];
+        all.map(|(name, text)| (name.to_owned(), text.to_owned())).to_vec()
+    }
+
+    const FILES: [&str; 2] = ["rows", "head"];
+
+    #[test]
+    fn both_ways_replace_the_files_and_keep_all_else() {
+        for at_once in [true, false] {
+            let way = |folder: &Path, write: &dyn Fn(&Path) -> Result<()>| match at_once {
+                true => replace_files(folder, &FILES, write),
+                false => one_by_one(folder, &FILES, write),
+            };
+            let dir = tempfile::tempdir().unwrap();
+            let folder = kept(dir.path(), "old");
+            fs::set_permissions(&folder, fs::Permissions::from_mode(0o2750)).unwrap();
+            let inode = fs::metadata(folder.join("notes.txt")).unwrap().ino();
+            way(&folder, &write_both("new")).unwrap();
+            assert_eq!(tree(&folder), expected("new"));
+            assert_eq!(fs::metadata(&folder).unwrap().permissions().mode() & 0o7777, 0o2750);
+            assert_eq!(fs::metadata(folder.join("notes.txt")).unwrap().ino(), inode, "the file itself, not a copy");
+            assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left beside it");
+            way(&folder, &|f| write_both("half")(f).and(Err(Error::usage("no more")))).unwrap_err();
+            assert_eq!(tree(&folder), expected("new"));
+            assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nor of what failed");
+        }
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn the_folder_is_exchanged_where_it_can_be() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = kept(dir.path(), "old");
+        let held = fs::File::open(&folder).unwrap();
+        assert!(exchanged(&folder, &FILES, &write_both("new")).unwrap());
+        // The folder is another one; the old one is gone.
+        assert_ne!(fs::metadata(&folder).unwrap().ino(), held.metadata().unwrap().ino());
+        assert_eq!(held.metadata().unwrap().nlink(), 0);
+        // A link to a folder stays one.
+        symlink("run", dir.path().join("latest")).unwrap();
+        assert!(exchanged(&dir.path().join("latest"), &FILES, &write_both("newer")).unwrap());
+        assert_eq!(
+            (fs::read_link(dir.path().join("latest")).unwrap(), tree(&folder)),
+            ("run".into(), expected("newer"))
+        );
+        // One that is not there is made.
+        assert!(exchanged(&dir.path().join("first"), &FILES, &write_both("new")).unwrap());
+        assert_eq!(tree(&dir.path().join("first")).len(), 2);
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 3);
+        // Not the file system's root.
+        assert!(!exchanged(Path::new("/"), &FILES, &|_| panic!("must not be called")).unwrap());
+    }
+
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn what_came_meanwhile_goes_over() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folder, other) = (kept(dir.path(), "old"), dir.path().join("other"));
+        fs::create_dir(&other).unwrap();
+        write_both("new")(&other).unwrap();
+        assert!(beside::link_others(&folder, &other, &FILES));
+        // Saved anew by an editor; made; made in a folder; a folder made.
+        fs::write(dir.path().join("saved"), "edited").unwrap();
+        fs::rename(dir.path().join("saved"), folder.join("notes.txt")).unwrap();
+        fs::write(folder.join("later.txt"), "later").unwrap();
+        fs::write(folder.join("plots/b.png"), "second").unwrap();
+        fs::create_dir(folder.join("empty")).unwrap();
+        beside::discard(&folder, &other, &FILES);
+        assert!(!folder.exists());
+        let mut all = expected("new");
+        all[2].1 = "edited".to_owned();
+        let came = [("later.txt", "later"), ("plots/b.png", "second"), ("empty", "")];
+        all.extend(came.map(|(name, text)| (name.to_owned(), text.to_owned())));
+        all.sort();
+        assert_eq!(tree(&other), all);
+    }
+}

@@ -1,0 +1,214 @@
+//! A process that is killed, at whatever moment, while it replaces results leaves the old ones or the new ones, whole, and
+//! what else lies in their folder.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use nimbus::measure::stats::Summary;
+use nimbus::study::machine::{Clocks, Cpu, Device};
+use nimbus::study::recorded::read_results;
+use nimbus::study::records::{
+    Block, Case, FRAMES_FILE, FrameRow, Measured, Mode, RUN_FILE, Run, SCHEMA_VERSION, write_frames, write_results,
+    write_run,
+};
+use serde_json::json;
+
+/// Names the folder in which this program is to replace results without end.
+const WRITER_FOLDER: &str = "NIMBUS_TEST_WRITER_FOLDER";
+/// Where set: it replaces one file after the other, and pauses so long between them.
+const PAUSE_US: &str = "NIMBUS_TEST_WRITER_PAUSE_US";
+const N_KILLS: u32 = 100;
+
+/// Rows of generation `k`: their number differs from one generation to the next, and every one carries k.
+fn rows(k: u32) -> Vec<FrameRow> {
+    let row = |i: u32| FrameRow {
+        phase: String::new(),
+        sweep: String::new(),
+        skip: true,
+        threading: "serial".to_owned(),
+        block: 0,
+        frame: i,
+        time_s: f64::from(i) * 0.1,
+        warm_up: false,
+        frame_ms: f64::from(k),
+        game_ms: 1.0,
+        record_ms: 0.5,
+        submit_wait_ms: 1.0,
+        gpu_ms: None,
+        latency_ms: 2.0,
+        queue_depth: 1,
+        pass_ms: vec![],
+        image_hash: None,
+    };
+    (0..n_rows(k)).map(row).collect()
+}
+
+fn n_rows(k: u32) -> u32 {
+    100 + k % 7
+}
+
+fn run(k: u32) -> Run {
+    let mode = Mode {
+        threading: "serial".to_owned(),
+        skip: true,
+        simulate: "gpu".to_owned(),
+        frames: n_rows(k) as usize,
+        warm_up: 0,
+        blocks: 1,
+        frame_ms: Summary::of(&[f64::from(k)]).map(|of| Measured { of, p50_low: None, p50_high: None }),
+        frame_lows: None,
+        game_ms: None,
+        record_ms: None,
+        render_ms: None,
+        gpu_ms: None,
+        latency_ms: None,
+        queue_depth: None,
+        passes: Vec::new(),
+        image_hash: None,
+    };
+    Run {
+        schema: SCHEMA_VERSION,
+        nimbus: "0.1.0".to_owned(),
+        revision: "unknown".to_owned(),
+        date: "2024-02-29T12:34:56Z".to_owned(),
+        command: vec!["nimbus".to_owned()],
+        scene_hash: "ab".repeat(32),
+        scene: json!({ "generation": k }),
+        device: Device {
+            name: "none".to_owned(),
+            driver: String::new(),
+            api: "1.3.0".to_owned(),
+            kind: "cpu".to_owned(),
+            uuid: "00".repeat(16),
+        },
+        cpu: Cpu { model: "a processor".to_owned(), logical_cores: 1 },
+        environment: BTreeMap::new(),
+        clocks: Clocks {
+            resolution_ns: 1.0,
+            overhead_ns: 20.0,
+            timestamp_period_ns: None,
+            timestamp_overhead_ns: None,
+        },
+        block_order: vec![Block { case: 0, threading: "serial".to_owned(), skip: true }],
+        cases: vec![Case {
+            phase: None,
+            sweep: vec![],
+            particles: 1,
+            width: 1,
+            height: 1,
+            modes: vec![mode],
+            ratio: None,
+            overlap: None,
+            skipping: None,
+        }],
+        interrupted: false,
+    }
+}
+
+/// Not a test of its own: what the killed process does.
+#[test]
+fn writer() {
+    let Ok(folder) = std::env::var(WRITER_FOLDER) else { return };
+    let folder = Path::new(&folder);
+    let pause = std::env::var(PAUSE_US).ok().map(|us| Duration::from_micros(us.parse().expect("a number")));
+    for k in generation(folder).expect("results to begin with") + 1.. {
+        let written = match pause {
+            None => write_results(folder, &run(k), &[], &rows(k)),
+            // Each file is whole at every moment, and the two are not replaced together.
+            Some(pause) => write_frames(&folder.join(FRAMES_FILE), &[], &rows(k)).and_then(|()| {
+                std::thread::sleep(pause);
+                write_run(&folder.join(RUN_FILE), &run(k))
+            }),
+        };
+        written.expect("written");
+    }
+}
+
+/// Which generation `folder` holds; an error where it is none, or not whole, or of two.
+fn generation(folder: &Path) -> Result<u32, String> {
+    let recorded = read_results(folder).map_err(|e| e.to_string())?;
+    let k = recorded.run.scene["generation"].as_u64().ok_or("no generation")? as u32;
+    if recorded.run != run(k) {
+        return Err(format!("run.json is not that of generation {k}"));
+    }
+    let times = &recorded.modes[0].measures[0].ms;
+    match times.iter().find(|ms| **ms != f64::from(k)) {
+        Some(other) => Err(format!("run.json of generation {k} beside frames of {other}")),
+        None if times.len() == n_rows(k) as usize => Ok(k),
+        None => Err(format!("{} frames of generation {k}", times.len())),
+    }
+}
+
+fn prepared() -> (tempfile::TempDir, std::path::PathBuf) {
+    let dir = tempfile::tempdir().expect("a folder");
+    let folder = dir.path().join("run");
+    write_results(&folder, &run(1), &[], &rows(1)).expect("results");
+    fs::write(folder.join("notes.txt"), "mine").expect("a file");
+    fs::create_dir(folder.join("plots")).expect("a folder");
+    fs::write(folder.join("plots/a.png"), "picture").expect("a file");
+    (dir, folder)
+}
+
+/// Starts the writer, lets it replace generation `k`, and kills it a few replacements later: 0 to 8 ms by `i`, in steps
+/// of the golden ratio.
+fn write_and_kill(folder: &Path, k: u32, i: u32, pause_us: Option<u32>) {
+    let mut command = Command::new(std::env::current_exe().expect("this program"));
+    command.args(["--exact", "writer"]).env(WRITER_FOLDER, folder).stdout(Stdio::null());
+    command.envs(pause_us.map(|us| (PAUSE_US, us.to_string())));
+    let mut child = command.spawn().expect("a child");
+    let begin = Instant::now();
+    while generation(folder).is_ok_and(|now| now <= k) {
+        assert!(begin.elapsed() < Duration::from_secs(60), "the child never writes");
+    }
+    std::thread::sleep(Duration::from_secs_f64(8e-3 * (f64::from(i) * 0.618_033_988_75).fract()));
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+}
+
+#[test]
+fn a_process_killed_at_any_moment_leaves_results_of_one_run() {
+    let (dir, folder) = prepared();
+    let mut k = 1;
+    for i in 0..N_KILLS {
+        write_and_kill(&folder, k, i, None);
+        let found = generation(&folder).unwrap_or_else(|what| panic!("after kill {i}: {what}"));
+        assert!(found > k, "generation {found} after {k}");
+        k = found;
+        let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!((text("notes.txt").as_str(), text("plots/a.png").as_str()), ("mine", "picture"), "after kill {i}");
+        assert_eq!(fs::read_dir(&folder).expect("the folder").count(), 4, "nothing else after kill {i}");
+    }
+    let n_left = fs::read_dir(dir.path()).expect("a folder").count() - 1;
+    println!("{N_KILLS} kills in {} replacements; {n_left} left a temporary folder", k - 1);
+    // Kills that meet a replacement at work leave what it was at; where none did, nothing was tested.
+    assert!(n_left > 0);
+}
+
+/// Files that are replaced one after the other do not stand this.
+#[test]
+fn the_kills_would_find_a_mixture() {
+    let (_dir, folder) = prepared();
+    let mut k = 1;
+    for i in 0..N_KILLS {
+        write_and_kill(&folder, k, i, Some(1000));
+        match generation(&folder) {
+            Ok(found) => k = found,
+            Err(what) => return println!("kill {i}: {what}"),
+        }
+    }
+    panic!("{N_KILLS} kills found none");
+}
+
+#[test]
+fn a_mixture_is_noticed() {
+    let (_dir, folder) = prepared();
+    assert_eq!(generation(&folder), Ok(1));
+    // As many rows: only the times tell.
+    write_frames(&folder.join(FRAMES_FILE), &[], &rows(8)).expect("frames");
+    assert!(generation(&folder).expect_err("a mixture").contains("beside frames of 8"));
+    write_frames(&folder.join(FRAMES_FILE), &[], &rows(2)).expect("frames");
+    assert!(generation(&folder).expect_err("a mixture").contains("cut off, or another run's"));
+}

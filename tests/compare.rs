@@ -343,7 +343,7 @@ fn what_bench_wrote_is_read_back_whole_and_does_not_differ_from_itself() {
     assert_eq!((recorded.modes.len(), modes.len()), (3, 3));
     for (timed, mode) in recorded.modes.iter().zip(modes) {
         let name = if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) };
-        assert_eq!((&timed.threading, timed.frames.len()), (&name, 32));
+        assert_eq!((&timed.name, timed.frames.len()), (&name, 32));
         // Every summary can be computed again from the frames.
         let summaries = [mode.frame_ms, mode.game_ms, mode.render_ms, mode.gpu_ms].map(|m| m.map(|m| m.of));
         for (measure, summary) in timed.measures.iter().zip(summaries) {

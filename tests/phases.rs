@@ -161,7 +161,7 @@ fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
     let recorded = read_results(Path::new(&out)).expect("the results");
     // Timed frames follow each other from phase to phase, after the warm-up of the first.
     let frames = |name: &str| {
-        let mode = recorded.modes.iter().find(|m| m.threading == name).expect(name);
+        let mode = recorded.modes.iter().find(|m| m.name == name).expect(name);
         mode.frames.clone()
     };
     assert_eq!(frames("lit, draw.cutoff=2: serial"), [2, 3, 4, 5, 2, 3, 4, 5]);

@@ -28,7 +28,7 @@ struct Report {
     remarks: Vec<String>,
 }
 
-const REPORT_SCHEMA: u32 = 1;
+const REPORT_SCHEMA: u32 = 2;
 
 /// Where a run lies, and what it is.
 #[derive(Debug, Serialize)]
@@ -64,7 +64,7 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     }
     let report = report(args, &a, &b, allowed);
     if report.modes.is_empty() {
-        let ran = |of: &Recorded| of.modes.iter().map(|m| m.threading.clone()).collect::<Vec<_>>().join(", ");
+        let ran = |of: &Recorded| of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ");
         let [of_a, of_b] = [&a, &b].map(ran).map(|names| if names.is_empty() { "none".into() } else { names });
         return Err(Error::usage(format!("A and B have no timed loop in common: A has {of_a}, B has {of_b}")));
     }
@@ -137,7 +137,7 @@ fn text(report: &Report) -> String {
     out.push('\n');
     for mode in &report.modes {
         if let Some(headline) = mode.headline() {
-            out += &format!("{} frame: {}\n", mode.threading, sentence(headline));
+            out += &format!("{} frame: {}\n", mode.name, sentence(headline));
         }
     }
     out + &foot(report)
@@ -145,7 +145,7 @@ fn text(report: &Report) -> String {
 
 fn rows(mode: &ComparedMode) -> Vec<Vec<String>> {
     let header = ["A p50", "B p50", "B / A", "95 % low", "high", "n A", "n B", "B is"];
-    let mut rows = vec![std::iter::once(format!("{}, ms", mode.threading)).chain(header.map(str::to_owned)).collect()];
+    let mut rows = vec![std::iter::once(format!("{}, ms", mode.name)).chain(header.map(str::to_owned)).collect()];
     for m in &mode.measures {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
         rows.push(vec![

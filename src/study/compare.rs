@@ -77,7 +77,8 @@ pub struct Compared {
 /// One mode that both ran.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedMode {
-    pub threading: String,
+    /// Phase, sweep and loop, in words.
+    pub name: String,
     /// `frame` first; passes that ran in neither are left out.
     pub measures: Vec<Compared>,
 }
@@ -117,8 +118,8 @@ pub fn compare(measure: &str, a: &[f64], b: &[f64]) -> Compared {
 
 /// Every mode that both ran, and every measure of it that either took, in A's order and then B's.
 pub fn compare_modes(a: &[TimedMode], b: &[TimedMode]) -> Vec<ComparedMode> {
-    let both = a.iter().filter_map(|of_a| Some((of_a, b.iter().find(|of_b| of_b.threading == of_a.threading)?)));
-    both.map(|(a, b)| ComparedMode { threading: a.threading.clone(), measures: compare_measures(a, b) }).collect()
+    let both = a.iter().filter_map(|of_a| Some((of_a, b.iter().find(|of_b| of_b.name == of_a.name)?)));
+    both.map(|(a, b)| ComparedMode { name: a.name.clone(), measures: compare_measures(a, b) }).collect()
 }
 
 fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<Compared> {
@@ -141,11 +142,10 @@ pub fn steadiness_remarks(a: &[TimedMode], b: &[TimedMode], compared: &[Compared
         let Some(headline) = mode.headline() else { continue };
         let Some(ratio) = headline.b_by_a.filter(|_| headline.verdict != Verdict::NoDifferenceFound) else { continue };
         for (name, of) in [("A", a), ("B", b)] {
-            let spread = of.iter().find(|m| m.threading == mode.threading).and_then(spread_of_blocks);
+            let spread = of.iter().find(|m| m.name == mode.name).and_then(spread_of_blocks);
             if let Some(spread) = spread.filter(|spread| spread.ln() >= ratio.estimate.ln().abs()) {
                 let what = "as far as A and B, or further: the machine was not steady";
-                remarks
-                    .push(format!("{}: {name}'s own blocks lie a factor of {spread:.3} apart, {what}", mode.threading));
+                remarks.push(format!("{}: {name}'s own blocks lie a factor of {spread:.3} apart, {what}", mode.name));
             }
         }
     }
@@ -163,18 +163,15 @@ fn spread_of_blocks(mode: &TimedMode) -> Option<f64> {
 pub fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
     let mut remarks = Vec::new();
     for (name, of, other_name, other) in [("A", a, "B", b), ("B", b, "A", a)] {
-        for mode in of.iter().filter(|mode| other.iter().all(|o| o.threading != mode.threading)) {
-            remarks.push(format!(
-                "{} frames are in {name} alone and not compared ({other_name} has none)",
-                mode.threading
-            ));
+        for mode in of.iter().filter(|mode| other.iter().all(|o| o.name != mode.name)) {
+            remarks.push(format!("{} frames are in {name} alone and not compared ({other_name} has none)", mode.name));
         }
     }
     let numbers = |mode: &TimedMode| mode.frames.iter().copied().collect::<BTreeSet<u32>>();
-    let differs = |a: &TimedMode| b.iter().any(|b| b.threading == a.threading && numbers(a) != numbers(b));
+    let differs = |a: &TimedMode| b.iter().any(|b| b.name == a.name && numbers(a) != numbers(b));
     for mode in a.iter().filter(|mode| differs(mode)) {
         let what = "timed different frames of the scene: where it changes, so may the median";
-        remarks.push(format!("{}: A and B {what}", mode.threading));
+        remarks.push(format!("{}: A and B {what}", mode.name));
     }
     remarks
 }
@@ -273,11 +270,11 @@ mod tests {
         assert_eq!(compare("x", &[1.0], &[4.0]).b_ms, Some(4.0));
     }
 
-    fn mode(threading: &str, frames: std::ops::Range<u32>, measures: &[(&str, f64)]) -> TimedMode {
+    fn mode(name: &str, frames: std::ops::Range<u32>, measures: &[(&str, f64)]) -> TimedMode {
         let n = frames.len();
         let measure = |&(name, ms): &(&str, f64)| Measure { name: name.to_owned(), ms: vec![ms; n] };
         TimedMode {
-            threading: threading.to_owned(),
+            name: name.to_owned(),
             frames: frames.collect(),
             blocks: Vec::new(),
             measures: measures.iter().map(measure).collect(),

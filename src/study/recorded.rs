@@ -20,7 +20,8 @@ pub struct Recorded {
 /// The timed frames of one mode; warm-up is left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimedMode {
-    pub threading: String,
+    /// Phase, sweep and loop, in words.
+    pub name: String,
     /// Frames of the scene, in the order they ran.
     pub frames: Vec<u32>,
     /// The times of `frame`, block by block.
@@ -173,7 +174,7 @@ fn read_frames(path: &Path, text: &str) -> Result<BTreeMap<String, TimedMode>> {
         let at = line.position().map_or(0, csv::Position::line);
         add_line(&columns, &line, &mut modes).map_err(|what| Error::io(path, format!("line {at}: {what}")))?;
     }
-    Ok(modes.into_iter().map(|(threading, lines)| (threading, lines.mode)).collect())
+    Ok(modes.into_iter().map(|(name, lines)| (name, lines.mode)).collect())
 }
 
 fn add_line(
@@ -198,7 +199,7 @@ fn add_line(
     let case = case_name(&line[columns.phase], &line[columns.sweep]);
     let name = mode_name(&case, &line[columns.threading], is(columns.skip, "skip")?);
     let lines = modes.entry(name.clone()).or_insert_with(|| Lines {
-        mode: TimedMode { threading: name, frames: Vec::new(), blocks: Vec::new(), measures: columns.measures() },
+        mode: TimedMode { name, frames: Vec::new(), blocks: Vec::new(), measures: columns.measures() },
         last_block: None,
     });
     if lines.last_block.replace(block) != Some(block) {

@@ -17,7 +17,7 @@ fn the_interval_covers_the_truth_about_as_often_as_it_says() {
     let mut random = SplitMix64(11);
     let of_median = coverage(400, |seed| {
         let values = normal(&mut random, 60);
-        let interval = Bootstrap { n_resamples: 400, block_len: 1, seed }.median(&values).unwrap();
+        let interval = Bootstrap { n_resamples: 400, block_len: 1, seed }.median(&values).expect("finite values");
         interval.low <= 0.0 && 0.0 <= interval.high
     });
     assert!((0.91..=0.99).contains(&of_median), "{of_median}");
@@ -25,7 +25,7 @@ fn the_interval_covers_the_truth_about_as_often_as_it_says() {
         let slow: Vec<f64> = normal(&mut random, 60).iter().map(|z| 20.0 + z).collect();
         let fast: Vec<f64> = normal(&mut random, 60).iter().map(|z| 10.0 + z).collect();
         let bootstrap = Bootstrap { n_resamples: 400, block_len: 1, seed };
-        let interval = bootstrap.ratio_of_medians(&slow, &fast).unwrap();
+        let interval = bootstrap.ratio_of_medians(&slow, &fast).expect("finite values");
         interval.low <= 2.0 && 2.0 <= interval.high
     });
     assert!((0.91..=0.99).contains(&of_ratio), "{of_ratio}");
@@ -35,14 +35,14 @@ fn the_interval_covers_the_truth_about_as_often_as_it_says() {
 fn of_neighbours(n_trials: usize, n_resamples: usize, n: usize, rho: f64) -> [f64; 2] {
     const SD: f64 = 0.03;
     let mut random = SplitMix64(29);
-    let truth = median(&frame_times(&mut random, 1_000_001, 1.0, SD, 0.0)).unwrap();
+    let truth = median(&frame_times(&mut random, 1_000_001, 1.0, SD, 0.0)).expect("finite values");
     let mut n_held = [0; 2];
     for seed in 0..n_trials as u64 {
         let bootstrap = Bootstrap { n_resamples, seed, ..Bootstrap::of_neighbours(n) };
         let [one, two] = [(); 2].map(|()| frame_times(&mut random, n, 1.0, SD, rho));
         let intervals = [(bootstrap.median(&one), truth), (bootstrap.ratio_of_medians(&one, &two), 1.0)];
         for (n_held, (interval, truth)) in n_held.iter_mut().zip(intervals) {
-            let interval = interval.unwrap();
+            let interval = interval.expect("finite values");
             *n_held += u64::from(interval.low <= truth && truth <= interval.high);
         }
     }
@@ -84,7 +84,7 @@ fn the_interval_is_widened_by_the_blocks_there_are() {
     let bootstrap = Bootstrap { block_len: 4, ..Bootstrap::default() };
     for (n_rows, t) in [(&[36][..], 2.306), (&[108, 36], 2.032)] {
         let want = (9.0_f64 / 8.0).sqrt() * t / 1.959_964;
-        assert!((bootstrap.widening(n_rows).unwrap() / want - 1.0).abs() < 5e-4, "{n_rows:?}");
+        assert!((bootstrap.widening(n_rows).expect("finite values") / want - 1.0).abs() < 5e-4, "{n_rows:?}");
     }
     // A block that is the whole list: every resample is the list.
     assert_eq!((bootstrap.widening(&[4]), bootstrap.widening(&[36, 3]), bootstrap.widening(&[0])), (None, None, None));

@@ -209,7 +209,7 @@ fn pass_records(timed: &Timed<'_>, against: Option<&Timed<'_>>) -> Vec<PassRecor
             n_run: n - skipped.len(),
             n_skipped: skipped.len(),
             reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_string()),
-            saved_ms: whole.filter(|_| !skipped.is_empty()).map(|ms| ms * skipped.len() as f64 / n as f64),
+            saved_ms: whole.filter(|_| !skipped.is_empty()).map(|ms| ms * (skipped.len() as f64 / n as f64)),
         }
     };
     Pass::ALL.into_iter().map(record).collect()

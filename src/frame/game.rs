@@ -16,7 +16,8 @@ use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
 use crate::model::cloud::Group;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
-use crate::model::gust::{Mode, displacement};
+use crate::model::gust::Mode;
+use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
 use crate::model::scene::Scene;
 
@@ -98,8 +99,12 @@ impl Game {
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let groups: Vec<GroupRecord> = self.groups.iter().map(|g| self.group(g, origins[g.i_cloud])).collect();
-        let modes = self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect();
         let placed = self.rest.as_ref().map(|rest| self.place(rest, &origins, time_s));
+        // The device moves nothing that is placed already.
+        let modes = match placed {
+            Some(_) => vec![],
+            None => self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect(),
+        };
         Ok(Packet {
             i_frame,
             time_s,
@@ -183,22 +188,29 @@ impl Game {
 
     /// Every particle at its group's place, in f64 until the last step.
     fn place(&self, rest: &[ParticleRecord], origins: &[DVec3], time_s: f64) -> Vec<PlacedRecord> {
+        let waves: Vec<Waves> = self.modes.iter().map(|modes| Waves::at(modes, time_s)).collect();
         let mut placed = Vec::with_capacity(rest.len());
         for group in &self.groups {
             let offset = origins[group.i_cloud] + group.center;
-            let modes = &self.modes[group.i_cloud];
-            let phases: Vec<f64> = modes.iter().map(|m| m.phase_at(time_s)).collect();
             let first = group.i_first as usize;
-            let particles = &rest[first..first + group.n_particles as usize];
-            placed.extend(particles.iter().map(|p| {
-                let rest = Vec3::from(p.position).as_dvec3();
-                let moved = rest + offset + displacement(modes, &phases, rest + group.center);
-                let position = moved.as_vec3();
-                PlacedRecord { position: position.to_array(), sigma: p.sigma }
-            }));
+            for some in rest[first..first + group.n_particles as usize].chunks(LANES) {
+                place_some(some, group.center, offset, &waves[group.i_cloud], &mut placed);
+            }
         }
         placed
     }
+}
+
+/// At most [`LANES`] particles of one group, whose centre and offset these are.
+fn place_some(some: &[ParticleRecord], center: DVec3, offset: DVec3, waves: &Waves, placed: &mut Vec<PlacedRecord>) {
+    let rest: [DVec3; LANES] =
+        std::array::from_fn(|l| some.get(l).map_or(DVec3::ZERO, |p| Vec3::from(p.position).as_dvec3()));
+    let along = |axis: usize| -> Lanes { std::array::from_fn(|l| rest[l][axis] + center[axis]) };
+    let [x, y, z] = waves.displace(&[along(0), along(1), along(2)]);
+    placed.extend(some.iter().enumerate().map(|(l, p)| {
+        let moved = rest[l] + offset + DVec3::new(x[l], y[l], z[l]);
+        PlacedRecord { position: moved.as_vec3().to_array(), sigma: p.sigma }
+    }));
 }
 
 /// A row a material: its lobe as the basis has it; zeros where it has none. Then a row a vector.

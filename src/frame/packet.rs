@@ -17,7 +17,7 @@ pub struct Packet {
     pub game_ms: f64,
     pub camera: CameraRecord,
     pub groups: Vec<GroupRecord>,
-    /// Gusts of all clouds, one after the other.
+    /// Gusts of all clouds, one after the other; none where the game thread moves the particles.
     pub modes: Vec<ModeRecord>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,

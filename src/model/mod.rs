@@ -8,6 +8,7 @@ pub mod cloud;
 pub mod film;
 pub mod grid;
 pub mod gust;
+pub mod gust_lanes;
 pub mod light;
 pub mod material;
 pub mod pairings;

@@ -115,11 +115,11 @@ pub fn tensors(shape: &Shape, limits: &Limits, free: u64) -> Tensors {
     if second <= most && first <= binding { Tensors::Kept } else { Tensors::TooLarge { bytes: second, most } }
 }
 
-/// Most cells the grid can have at any time. Clouds that drift apart change its proportions, so a scene that moves needs
+/// Most cells the grid can have at any time. Clouds that drift apart or grow change its proportions, so a scene that moves needs
 /// room for a cube.
 pub fn n_cells_max(scene: &Scene) -> u64 {
     let side = u64::from(scene.lighting.grid.min(MAX_CELLS));
-    let stands_still = scene.clouds.iter().all(|c| c.wind == DVec3::ZERO);
+    let stands_still = scene.clouds.iter().all(|c| c.wind == DVec3::ZERO && c.growth.is_none());
     match scene.bounds(&scene.groups(), scene.time.start_s, DEPOSIT_CUT_SIGMA) {
         Some((low, high)) if stands_still => {
             let half = 0.5 * (high - low);
@@ -139,7 +139,7 @@ pub fn n_deposits(scene: &Scene) -> f64 {
         let covered = DVec3::splat(across).min(grid.n_cells.as_dvec3());
         f64::from(g.n_particles) * covered.x * covered.y * covered.z
     };
-    groups.iter().map(blob).sum()
+    scene.grown(&groups, scene.time.start_s).iter().map(blob).sum()
 }
 
 /// What a demanding scene should be told before it runs; nothing for most.

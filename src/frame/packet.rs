@@ -31,6 +31,8 @@ pub struct Packet {
     pub coefficients: Vec<[f32; 4]>,
     pub lights: Vec<LightRecord>,
     pub grid: GridRecord,
+    /// Bounds every blob's mass κ (2π)^{3/2} σ³.
+    pub heaviest: f64,
     /// Bounds |view depth| relative to the lighting origin.
     pub radius: f64,
 }

@@ -261,6 +261,7 @@ mod tests {
             coefficients: vec![[0.5; 4]],
             lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
             grid: GridRecord::default(),
+            heaviest: 1.0,
             radius: 1.0,
         }
     }

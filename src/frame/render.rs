@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Pending, Place, Recorder, ScopeTime, Target};
 use crate::model::boxes::MAX_ATTEMPTS;
-use crate::model::cloud::{CloudSource, heaviest_blob};
+use crate::model::cloud::CloudSource;
 use crate::model::film::FilmFormat;
 use crate::model::scene::{LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
@@ -83,7 +83,6 @@ pub(super) struct Settings {
     pub n_facets: u32,
     pub n_lights: u32,
     n_surfaces: u32,
-    heaviest: f64,
     pub step_cells: f64,
     pub forward: f64,
     sort_bits: u32,
@@ -160,7 +159,6 @@ impl Renderer {
                 n_facets: scene.n_facets() as u32,
                 n_lights: scene.lights.len() as u32,
                 n_surfaces: scene.surfaces.len() as u32,
-                heaviest: heaviest_blob(&groups),
                 step_cells: scene.lighting.step,
                 // Without particles there is nothing to march through.
                 forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
@@ -309,7 +307,7 @@ impl Renderer {
             })?;
             let placed = b.placed.buffer();
             pass(rec, plan, Pass::Grid, |rec| {
-                grid.record(rec, [placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
+                grid.record(rec, [placed, &b.particles, &b.density], &packet.grid, n, packet.heaviest)
             })?;
             pass(rec, plan, Pass::Morton, |rec| grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b)))?;
             pass(rec, plan, Pass::Facets, |rec| {

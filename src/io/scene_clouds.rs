@@ -9,11 +9,12 @@ use sha2::{Digest, Sha256};
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
 use super::scene_lights::material_named;
 use super::text_file::{DATA_LIMIT, read_text};
-use super::toml_section::Section;
+use super::toml_section::{Bounds, Section};
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
 use crate::model::boxes::Form;
 use crate::model::cloud::{Cloud, CloudSource};
+use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 
@@ -29,7 +30,7 @@ pub struct CloudReader<'a> {
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "seed"]
+        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
     };
 }
 
@@ -89,13 +90,24 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
+        growth: read_growth(s)?,
         i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
-    match magnitude::beyond(&cloud, &lines) {
-        Some(what) => Err(s.fault("file", what)),
+    if let Some(what) = magnitude::beyond(&cloud, &lines) {
+        return Err(s.fault("file", what));
+    }
+    match magnitude::grown_beyond(&cloud) {
+        Some(what) => Err(s.fault("grow_to", what)),
         None => Ok(cloud),
     }
+}
+
+fn read_growth(s: &mut Section) -> Result<Growth> {
+    Ok(Growth {
+        to: s.f64("grow_to", Growth::NONE.to, Bounds::Within(LEAST_SCALE, GREATEST_SCALE))?,
+        time_s: s.f64("grow_time_s", Growth::NONE.time_s, DIVISOR)?,
+    })
 }
 
 fn read_gust(s: &mut Section) -> Result<Gust> {

@@ -71,7 +71,11 @@ impl Gust {
 
     /// No displacement is longer: Σ|a|.
     pub fn reach(&self) -> f64 {
-        if self.is_calm() { 0.0 } else { (0..self.n_waves).map(|m| self.first_amplitude() / self.scale(m)).sum() }
+        if self.is_calm() {
+            return 0.0;
+        }
+        let first = self.first_amplitude();
+        (0..self.n_waves).map(|m| first / self.scale(m)).sum()
     }
 
     /// |a| of the first wave: the mean square of the sum is half the sum of the squares.

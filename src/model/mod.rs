@@ -7,6 +7,7 @@ pub mod camera;
 pub mod cloud;
 pub mod film;
 pub mod grid;
+pub mod growth;
 pub mod gust;
 pub mod gust_lanes;
 pub mod light;

@@ -161,6 +161,11 @@ impl Scene {
         groups
     }
 
+    /// `groups` as they have grown at `time_s`.
+    pub fn grown(&self, groups: &[Group], time_s: f64) -> Vec<Group> {
+        groups.iter().map(|g| g.grown(self.clouds[g.i_cloud].growth.at(time_s))).collect()
+    }
+
     /// Facets of the surfaces, which come before those of the clouds.
     pub fn n_surface_facets(&self) -> u64 {
         self.surfaces.iter().map(Surface::n_facets).sum()
@@ -237,8 +242,9 @@ impl Scene {
 
     fn group_bounds(&self, group: &Group, time_s: f64, n_sigma: f64) -> (DVec3, DVec3) {
         let cloud = &self.clouds[group.i_cloud];
+        let group = group.grown(cloud.growth.at(time_s));
         let center = cloud.origin_at(time_s) + group.center;
-        let reach = group.half_extent + DVec3::splat(n_sigma * group.sigma_max + cloud.gust.reach());
+        let reach = group.half_extent + DVec3::splat(n_sigma * group.sigma_max + group.gust_reach);
         (center - reach, center + reach)
     }
 }

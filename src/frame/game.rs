@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
+use super::drawn::drawn;
 use super::exchange::is_glossy;
 use super::packet::Packet;
 use super::tensor::{Shape, basis_of, is_edited, kind_of};
@@ -34,6 +35,8 @@ pub struct Game {
     shape: Option<Shape>,
     /// Every particle relative to its group, where this thread moves them.
     rest: Option<Vec<ParticleRecord>>,
+    /// Groups that cannot be in the picture are not drawn.
+    culls: bool,
 }
 
 /// What a frame's time says of the scene, before it becomes records: shared with the references.
@@ -81,7 +84,12 @@ impl Game {
         let table = Arc::new(table(&scene, basis.as_ref(), scene.time.start_s));
         let n_bases = basis.as_ref().map_or(1, Basis::n_bases);
         let shape = is_edited(&scene).then(|| Shape::of(&scene, n_bases));
-        Game { scene, groups, modes, i_modes, basis, table, shape, rest }
+        Game { scene, groups, modes, i_modes, basis, table, shape, rest, culls: true }
+    }
+
+    /// Whether groups that cannot be in the picture are left out of it, as they are unless told otherwise.
+    pub fn culling(self, culls: bool) -> Game {
+        Game { culls, ..self }
     }
 
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
@@ -96,6 +104,7 @@ impl Game {
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let grown = self.scene.grown(&self.groups, time_s);
+        let (drawn, n_drawn) = drawn(&self.scene, &grown, &setting, self.culls);
         let placed = self.rest.as_ref().map(|rest| self.place(rest, &grown, &origins, time_s));
         // The device moves nothing that is placed already.
         let modes = match placed {
@@ -108,6 +117,8 @@ impl Game {
             begin,
             camera: CameraRecord::new(&self.scene.camera, &setting.pose, &self.scene.film, setting.light_origin),
             groups: grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect(),
+            drawn,
+            n_drawn,
             modes,
             placed,
             table: self.table_at(time_s),

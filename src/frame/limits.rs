@@ -8,7 +8,7 @@ use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, storage_bytes};
 use crate::gpu::reflect::BindingKind;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
@@ -67,6 +67,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),
+        ("what is drawn of them", groups, size(size_of::<DrawnRecord>())),
         ("the gusts", scene.clouds.iter().map(|c| u64::from(c.gust.n_waves)).sum(), size(size_of::<ModeRecord>())),
         ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
         ("the density grid's sums", n_cells_max(scene), 8),

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-use crate::layout::particle::{GroupRecord, ModeRecord, PlacedRecord};
+use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, PlacedRecord};
 
 #[derive(Debug, Clone)]
 pub struct Packet {
@@ -17,6 +17,10 @@ pub struct Packet {
     pub game_ms: f64,
     pub camera: CameraRecord,
     pub groups: Vec<GroupRecord>,
+    /// What of each group is drawn.
+    pub drawn: Vec<DrawnRecord>,
+    /// Particles that are drawn.
+    pub n_drawn: u32,
     /// Gusts of all clouds, one after the other; none where the game thread moves the particles.
     pub modes: Vec<ModeRecord>,
     /// Every particle's place, where the game thread moves the particles.

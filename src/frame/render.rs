@@ -146,7 +146,13 @@ impl Renderer {
             second,
             tensor,
             sort: Sort::new(device, compiler, n_particles)?,
-            sprites: Sprites::new(device, compiler, format, lit, [scenery.is_some(), grouped])?,
+            sprites: Sprites::new(
+                device,
+                compiler,
+                format,
+                lit,
+                [scenery.is_some(), grouped, scene.draw.count.is_some()],
+            )?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             targets: [target("sprites.even")?, target("sprites.odd")?],
             i_target: 0,
@@ -349,8 +355,9 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {
-                sort.record_keys(rec, [placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
-                sort.record(rec, &b.entries, n, s.sort_bits)
+                let buffers = [placed, &b.i_group, &b.drawn.buffer, &b.entries];
+                sort.record_keys(rec, buffers, packet.camera.forward, n, packet.radius, s.sort_bits)?;
+                sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits)
             })?;
             let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
             pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
@@ -361,8 +368,8 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet];
-                let counts = [n, s.n_surface_facets];
+                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, &b.drawn.buffer];
+                let counts = [packet.n_drawn, s.n_surface_facets];
                 sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
             })
         })

@@ -12,7 +12,7 @@ use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
-use crate::model::boxes::Form;
+use crate::model::boxes::{CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
@@ -110,6 +110,46 @@ fn read_growth(s: &mut Section) -> Result<Growth> {
     })
 }
 
+/// Gives the clouds that are made from boxes `n` particles together, dealt to the boxes by their counts (largest remainder,
+/// of equal ones the first). κ changes against the count, so that the expected optical depth stays. An error says what is
+/// wrong with `n`.
+pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
+    let counts: Vec<u32> = clouds.iter_mut().flat_map(boxes_of).map(|b| b.n_particles).collect();
+    let total: u128 = counts.iter().map(|n| u128::from(*n)).sum();
+    if total == 0 {
+        return Err("the scene has no cloud made from boxes that has particles".to_owned());
+    }
+    let quota = |count: u32| (u128::from(n) * u128::from(count) / total, u128::from(n) * u128::from(count) % total);
+    let mut shares: Vec<u32> = counts.iter().map(|count| quota(*count).0 as u32).collect();
+    let mut by_remainder: Vec<usize> = (0..counts.len()).collect();
+    // Stable: of equal ones the first.
+    by_remainder.sort_by_key(|i| std::cmp::Reverse(quota(counts[*i]).1));
+    let left = n - shares.iter().sum::<u32>();
+    for i in by_remainder.into_iter().take(left as usize) {
+        shares[i] += 1;
+    }
+    for (b, share) in clouds.iter_mut().flat_map(boxes_of).zip(shares) {
+        b.n_particles = share;
+    }
+    for (i, cloud) in clouds.iter_mut().enumerate() {
+        if let CloudSource::Boxes { optical_depth, .. } = &mut cloud.source {
+            *optical_depth *= total as f64 / f64::from(n);
+            let wrong = magnitude::beyond(cloud, &[]).or_else(|| magnitude::grown_beyond(cloud));
+            if let Some(what) = wrong {
+                return Err(format!("makes cloud {i}'s particles too dense: {what}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn boxes_of(cloud: &mut Cloud) -> &mut [CloudBox] {
+    match &mut cloud.source {
+        CloudSource::Boxes { boxes, .. } => boxes,
+        CloudSource::Particles(_) => &mut [],
+    }
+}
+
 fn read_gust(s: &mut Section) -> Result<Gust> {
     Ok(Gust {
         amplitude: s.f64("gust", 0.0, AMOUNT)?,
@@ -128,4 +168,41 @@ fn read_boxes(s: &mut Section, reader: &mut CloudReader) -> Result<CloudSource> 
         optical_depth: s.f64("optical_depth", 1.0, AMOUNT)?,
         radius_scale: s.f64("radius_scale", 1.0, AMOUNT)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(counts: &[u32]) -> Cloud {
+        let b = |n: &u32| CloudBox { n_particles: *n, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+        let boxes = counts.iter().map(b).collect();
+        let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
+        let (gust, growth) = (Gust::CALM, Growth::NONE);
+        Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 }
+    }
+
+    fn counts(clouds: &mut [Cloud]) -> Vec<u32> {
+        clouds.iter_mut().flat_map(boxes_of).map(|b| b.n_particles).collect()
+    }
+
+    #[test]
+    fn particles_are_dealt_by_the_largest_remainder() {
+        let mut clouds =
+            [cloud(&[3, 0, 4]), Cloud { source: CloudSource::Particles(vec![]), ..cloud(&[]) }, cloud(&[3])];
+        // 5 · (3, 0, 4, 3)/10 is 1.5, 0, 2, 1.5: one is left, and the first of the two has it.
+        deal(&mut clouds, 5).unwrap();
+        assert_eq!(counts(&mut clouds), [2, 0, 2, 1]);
+        for i in [0, 2] {
+            assert!(matches!(clouds[i].source, CloudSource::Boxes { optical_depth: 2.0, .. }));
+        }
+        deal(&mut clouds, 50_000).unwrap();
+        assert_eq!(counts(&mut clouds), [20_000, 0, 20_000, 10_000]);
+        assert!(matches!(clouds[0].source, CloudSource::Boxes { optical_depth: 2e-4, .. }));
+        assert!(deal(&mut [cloud(&[0])], 7).unwrap_err().contains("no cloud made from boxes"));
+        let mut dense = cloud(&[u32::MAX]);
+        let CloudSource::Boxes { optical_depth, .. } = &mut dense.source else { panic!() };
+        *optical_depth = 1e14;
+        assert!(deal(&mut [dense], 1).unwrap_err().contains("too dense"));
+    }
 }

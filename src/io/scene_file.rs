@@ -7,7 +7,7 @@ use serde_json::{Value as Json, json};
 use sha2::{Digest, Sha256};
 
 use super::magnitude::{GREATEST, is_carried_place, shortest};
-use super::scene_clouds::{CloudReader, read_cloud};
+use super::scene_clouds::{CloudReader, deal, read_cloud};
 pub use super::scene_sections::MAX_SIDE;
 use super::toml_section::Section;
 use super::toml_tree::Document;
@@ -71,6 +71,12 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
         }
         clouds.push(cloud);
         resolved_clouds.push(section.finish());
+    }
+    if draw.n_particles > 0 {
+        deal(&mut clouds, draw.n_particles).map_err(|what| match root.section("draw") {
+            Ok(section) => section.fault("particles", what),
+            Err(e) => e,
+        })?;
     }
     let digests = reader.digests;
     root.record("cloud", json!(resolved_clouds));

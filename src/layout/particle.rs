@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::layout::record;
 use crate::model::boxes::{CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::count::Drawn;
 use crate::model::gust::Mode;
 
 record! {
@@ -134,6 +135,31 @@ impl GroupRecord {
             n_modes,
             scale: group.scale as f32,
             unused: [0; 2],
+        }
+    }
+}
+
+record! {
+    /// What is drawn of a group this frame.
+    pub struct DrawnRecord {
+        /// From the number of a drawn particle to that of its entry, modulo 2³².
+        shift: u32,
+        /// The group's first particle that is not drawn.
+        end: u32,
+        /// Factor on κ, and on the last drawn particle's beside it.
+        kappa_scale: f32,
+        last_weight: f32,
+    }
+}
+
+impl DrawnRecord {
+    /// `i_entry`: of the group's first drawn particle.
+    pub fn new(group: &Group, drawn: &Drawn, i_entry: u32) -> Self {
+        DrawnRecord {
+            shift: i_entry.wrapping_sub(group.i_first),
+            end: group.i_first + drawn.n,
+            kappa_scale: drawn.kappa_scale as f32,
+            last_weight: drawn.last_weight as f32,
         }
     }
 }

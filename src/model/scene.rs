@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::basis::Sampling;
 use super::camera::Camera;
 use super::cloud::{Cloud, Group, runs};
+use super::count::Count;
 use super::film::Film;
 use super::light::Light;
 use super::material::Material;
@@ -112,6 +113,10 @@ pub struct Draw {
     pub cutoff: f64,
     /// Bits of the sort key: 16 or 32.
     pub sort_bits: u32,
+    /// How many particles are drawn of a cloud; `None`: all.
+    pub count: Option<Count>,
+    /// The clouds made from boxes have so many particles together; 0: as many as their files say.
+    pub n_particles: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -46,7 +46,7 @@ impl Stage {
             Simulate::Gpu => None,
             Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
         };
-        let game = Game::new(scene.clone(), rest);
+        let game = Game::new(scene.clone(), rest).culling(skip);
         Ok(Stage { renderer, game, scene, device, instance })
     }
 

@@ -4,8 +4,8 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// Positions relative to the lighting origin: position + its group's offset + the gusts' displacement (docs/model.md §11,
-// §12).
+// Positions relative to the lighting origin: position, as it has grown, + its group's offset + the gusts' displacement
+// (docs/model.md §11 to §13).
 
 layout(local_size_x = 64) in;
 
@@ -19,12 +19,12 @@ layout(std430, binding = 4) writeonly buffer PlacedParticles { Placed placed[]; 
 void main() {
     FOR_EACH(i, push.n_particles) {
         Group group = groups[i_group[i]];
-        vec3 rest = particles[i].position;
+        vec3 rest = particles[i].position * group.scale;
         vec3 x = rest + group.center;
         vec3 d = vec3(0.0);
         for (uint m = group.i_mode; m < group.i_mode + group.n_modes; ++m) {
             d += modes[m].a * sine(dot(modes[m].k, x) + modes[m].phase);
         }
-        placed[i] = Placed(rest + group.offset + d, particles[i].sigma);
+        placed[i] = Placed(rest + group.offset + d, particles[i].sigma * group.scale);
     }
 }

@@ -11,12 +11,17 @@ layout(constant_id = 1) const uint BEHIND = 0;
 // 0: a facet a particle; 1: i_facet names it.
 layout(constant_id = 2) const uint GROUPED = 0;
 
+// 1: not all particles of a group are drawn, and those that are have weights.
+layout(constant_id = 3) const uint WEIGHTED = 0;
+
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
 layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
 layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
+layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
+layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
 
 const float SQRT_TAU = 2.50662827463;
 // The quad is this much larger than the silhouette, so that rounding never cuts a pixel that the fragment shader would
@@ -50,6 +55,10 @@ void main() {
     float sigma = placed[i].sigma;
     vec3 v = vec3(dot(push.camera.right, c), dot(push.camera.up, c), dot(push.camera.forward, c));
     float tau = SQRT_TAU * particles[i].kappa * sigma;
+    if (WEIGHTED != 0) {
+        Drawn group = drawn[i_group[i]];
+        tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
+    }
     out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
     out_radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;

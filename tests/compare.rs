@@ -41,6 +41,7 @@ fn rows(threading: &str, ms: f64) -> Vec<FrameRow> {
             gpu_ms: Some(0.5 * ms),
             latency_ms: ms,
             queue_depth: 1,
+            n_drawn: 7,
             pass_ms: vec![Some(0.5 * ms), None],
             image_hash: None,
         }
@@ -68,6 +69,7 @@ fn run() -> Run {
         gpu_ms: None,
         latency_ms: None,
         queue_depth: None,
+        drawn: None,
         passes: Vec::new(),
         image_hash: None,
     };

@@ -190,7 +190,8 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": 0,
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16,
             },
-            "draw": { "path": "sprites", "cutoff": 3.0, "sort_bits": 32, "resolution": 1.0 },
+            "draw": { "path": "sprites", "cutoff": 3.0, "sort_bits": 32, "resolution": 1.0, "count": "all", "count_a": 280.0, "count_d0": 1.0,
+                      "count_normalised": false, "count_conserve": true, "particles": 0 },
             "threads": { "mode": "parallel", "simulate": "gpu" },
             "light": [
                 { "kind": "directional", "direction": [-0.5, -0.8, -0.3], "irradiance": [3.0, 2.9, 2.7] },
@@ -201,7 +202,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "cloud": [{
                 "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none",
                 "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0],
-                "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "material": "cloud", "seed": 1,
+                "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "grow_to": 1.0, "grow_time_s": 60.0, "material": "cloud", "seed": 1,
             }],
         })
     );

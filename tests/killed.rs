@@ -40,6 +40,7 @@ fn rows(k: u32) -> Vec<FrameRow> {
         gpu_ms: None,
         latency_ms: 2.0,
         queue_depth: 1,
+        n_drawn: 7,
         pass_ms: vec![],
         image_hash: None,
     };
@@ -66,6 +67,7 @@ fn run(k: u32) -> Run {
         gpu_ms: None,
         latency_ms: None,
         queue_depth: None,
+        drawn: None,
         passes: Vec::new(),
         image_hash: None,
     };

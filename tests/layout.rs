@@ -15,7 +15,7 @@ use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGIO
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
-use nimbus::layout::particle::{ModeRecord, PlacedRecord};
+use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
@@ -24,12 +24,13 @@ use nimbus::passes::{surfaces, transmit};
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 18] = [
+const RECORDS: [Record; 19] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
     ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
+    ("Drawn", DrawnRecord::FIELDS, size_of::<DrawnRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
     ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
     ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
@@ -98,11 +99,11 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
         &[R("Block"), R("Pairing"), B(4), B(4), R("Facet"), T, R("Light"), T, T, F, F, R("Lit"), B(4), B(4), T, B(4)],
     ),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
-    ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(8)]),
+    ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(4), R("Drawn"), B(8)]),
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
-    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4)]),
+    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn")]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),

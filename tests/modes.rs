@@ -45,7 +45,7 @@ fn run_for(n_frames: u32, scene: Scene, threading: Threading, skip: bool) -> Vec
         Simulate::Gpu => None,
         Simulate::Cpu => Some(renderer.generate_now(&gpu.device).expect("particles").0),
     };
-    let mut game = Game::new(scene.clone(), rest);
+    let mut game = Game::new(scene.clone(), rest).culling(skip);
     let mut frames = Vec::new();
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         frames.push((renderer.image_bytes()?, times));

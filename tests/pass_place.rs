@@ -7,17 +7,18 @@ use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::cloud::{Cloud, CloudSource, Group, Particle};
+use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::passes::place::Place;
 use nimbus::reference::generate::{cloud as generated, uniforms};
-use nimbus::reference::place::{add_gusts, cloud_centers, offsets, place, placed_bound};
+use nimbus::reference::place::{add_gusts, cloud_centers, grown, offsets, place, placed_bound};
 use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32};
 
 const TIME_S: f64 = 3600.25;
 const ORIGIN: DVec3 = DVec3::new(1_000_123.456, 2000.5, -3e5);
 
 /// Lists of particles, one of them empty, one far from the others; the wind carries them for an hour.
-fn clouds(gust: Gust) -> Vec<Cloud> {
+fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
     let particle = |i: u32, spread: f64| {
         let [a, b, c, d] = uniforms(0x91ace, 0, i, 0);
         let position = spread * (DVec3::new(a, b, c) - 0.5) + 1e4;
@@ -28,6 +29,7 @@ fn clouds(gust: Gust) -> Vec<Cloud> {
         position,
         wind,
         gust,
+        growth,
         i_material: 0,
         seed: 5,
     };
@@ -51,14 +53,15 @@ struct Scene {
     offsets: Vec<DVec3>,
 }
 
-fn scene(gust: Gust) -> Scene {
-    let clouds = clouds(gust);
+fn scene(gust: Gust, growth: Growth) -> Scene {
+    let clouds = clouds(gust, growth);
     let mut groups = vec![];
     for (i, cloud) in clouds.iter().enumerate() {
         let first = groups.last().map_or(0, |g: &Group| g.i_first + g.n_particles);
         groups.extend(cloud.groups(i, first));
     }
-    let given = clouds.iter().flat_map(generated);
+    let given: Vec<_> = clouds.iter().flat_map(generated).collect();
+    let given = grown(&given, &groups, &clouds, TIME_S).into_iter();
     let (positions, sigmas): (Vec<DVec3>, Vec<f64>) = given.map(|g| (g.position, g.sigma)).unzip();
     let list = |c: &Cloud, g: &Group| match &c.source {
         CloudSource::Particles(list) => list.iter().map(|p| ParticleRecord::new(p, g)).collect::<Vec<_>>(),
@@ -70,7 +73,8 @@ fn scene(gust: Gust) -> Scene {
         let cloud = &clouds[g.i_cloud];
         let n_modes = cloud.gust.modes(cloud.seed).len() as u32;
         let modes = (g.i_cloud as u32 * n_modes, n_modes);
-        GroupRecord::new(g, g.i_cloud as u32, cloud.origin_at(TIME_S) - ORIGIN, cloud.center(), modes)
+        let grown = g.grown(cloud.growth.at(TIME_S));
+        GroupRecord::new(&grown, g.i_cloud as u32, cloud.origin_at(TIME_S) - ORIGIN, modes)
     };
     let records = groups.iter().map(record).collect();
     let offsets = offsets(&groups, &clouds, TIME_S, ORIGIN);
@@ -105,7 +109,7 @@ fn flat(v: impl Iterator<Item = DVec3>) -> Vec<f64> {
 #[test]
 fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
     let mut gpu = Gpu::new();
-    let scene = scene(Gust::CALM);
+    let scene = scene(Gust::CALM, Growth::NONE);
     let compiler = Compiler::new(nimbus::passes::sources(), None).unwrap();
     let placed = run(&mut gpu, &compiler, &scene);
     let exact = place(&scene.positions, &scene.groups, &scene.offsets);
@@ -118,7 +122,7 @@ fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
     let bounds = flat((0..exact.len()).map(bound));
     let values = |placed: &[PlacedRecord]| flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()));
     assert_within_and_say("placed", &values(&placed), &truths, &bounds);
-    // σ is copied.
+    // σ times 1.
     assert!(placed.iter().zip(&scene.sigmas).all(|(p, s)| p.sigma == *s as f32));
     assert_eq!(run(&mut gpu, &compiler, &scene), placed);
 
@@ -137,8 +141,9 @@ fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
 fn gust_bound(scene: &Scene, i: usize) -> f64 {
     let group = &scene.groups[scene.i_group[i] as usize];
     let cloud = &scene.clouds[group.i_cloud];
-    let (rest, x) = (scene.positions[i], scene.positions[i] + group.center);
-    let dx = U_F32 * (rest.abs() + group.center.abs() + x.abs());
+    let center = group.grown(cloud.growth.at(TIME_S)).center;
+    let x = scene.positions[i] + center;
+    let dx = rest_bound(scene, i) + U_F32 * (center.abs() + x.abs());
     let wave = |m: &nimbus::model::gust::Mode| {
         let (k, phase) = (m.k.abs(), m.phase_at(TIME_S));
         let kx = k.dot(x.abs());
@@ -154,23 +159,51 @@ fn gust_bound(scene: &Scene, i: usize) -> f64 {
 #[test]
 fn gusts_move_particles_as_their_closed_form_says() {
     let mut gpu = Gpu::new();
-    let scene = scene(Gust { amplitude: 0.4, length: 3.0, period_s: 7.0, n_waves: 16 });
+    // After an hour the second has grown to 2.9975.
+    for growth in [Growth::NONE, Growth { to: 3.0, time_s: 540.0 }] {
+        gusts(&mut gpu, growth);
+    }
+}
+
+fn gusts(gpu: &mut Gpu, growth: Growth) {
+    let scene = scene(Gust { amplitude: 0.4, length: 3.0, period_s: 7.0, n_waves: 16 }, growth);
     let compiler = Compiler::new(nimbus::passes::sources(), None).unwrap();
     let mut exact = place(&scene.positions, &scene.groups, &scene.offsets);
     let still = exact.clone();
     add_gusts(&mut exact, &scene.positions, &scene.groups, &scene.clouds, TIME_S);
     assert!(exact.iter().zip(&still).filter(|(a, b)| a.distance(**b) > 0.05).count() > exact.len() / 2);
     let bound = |i: usize| {
-        let own = U_F32 * scene.positions[i].abs();
-        let inherited = placed_bound(own, scene.offsets[scene.i_group[i] as usize], still[i], U_F32);
+        let inherited = placed_bound(rest_bound(&scene, i), scene.offsets[scene.i_group[i] as usize], still[i], U_F32);
         // One more sum, rounded.
         inherited + gust_bound(&scene, i) + U_F32 * (exact[i].abs() + 1.0)
     };
     let bounds = flat((0..exact.len()).map(bound));
     let truths = flat(exact.iter().copied());
     let values = |placed: &[PlacedRecord]| flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()));
-    assert_within_and_say("gusts", &values(&run(&mut gpu, &compiler, &scene)), &truths, &bounds);
+    let placed = run(gpu, &compiler, &scene);
+    assert_within_and_say("gusts", &values(&placed), &truths, &bounds);
+    let sigmas: Vec<f64> = placed.iter().map(|p| f64::from(p.sigma)).collect();
+    // Rounded itself, as its factor and as their product.
+    let of_sigmas: Vec<f64> = scene.sigmas.iter().map(|s| 3.01 * U_F32 * s).collect();
+    assert_within_and_say("sigma", &sigmas, &scene.sigmas, &of_sigmas);
     // At 10⁴ units from its origin a particle's own f32 rounding decides much of its phase; nearer it does not.
-    let wrong = Gpu::wrong_compiler("place.comp", "+ modes[m].phase", "- modes[m].phase");
-    assert!(check_within("wrong", &values(&run(&mut gpu, &wrong, &scene)), &truths, &bounds).is_err());
+    let mut wrong = vec![("+ modes[m].phase", "- modes[m].phase")];
+    if !growth.is_none() {
+        wrong.push(("particles[i].position * group.scale", "particles[i].position"));
+        wrong.push(("particles[i].sigma * group.scale", "particles[i].sigma"));
+    }
+    for (from, to) in wrong {
+        let placed = run(gpu, &Gpu::wrong_compiler("place.comp", from, to), &scene);
+        let sigmas: Vec<f64> = placed.iter().map(|p| f64::from(p.sigma)).collect();
+        let off = check_within("wrong", &values(&placed), &truths, &bounds).is_err()
+            || check_within("wrong", &sigmas, &scene.sigmas, &of_sigmas).is_err();
+        assert!(off, "{to} was not noticed");
+    }
+}
+
+/// Bound on the error of a position relative to its group: the record's rounding, and where the cloud has grown that of
+/// the scale and of the product.
+fn rest_bound(scene: &Scene, i: usize) -> DVec3 {
+    let grows = !scene.clouds[scene.groups[scene.i_group[i] as usize].i_cloud].growth.is_none();
+    (if grows { 3.01 } else { 1.0 }) * U_F32 * scene.positions[i].abs()
 }

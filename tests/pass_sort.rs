@@ -8,7 +8,7 @@ use bounded::{Bounded, Random, dot, exact3};
 use glam::DVec3;
 use harness::Gpu;
 use nimbus::gpu::Compiler;
-use nimbus::layout::particle::PlacedRecord;
+use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
 use nimbus::passes::{self, sort::Sort};
 use nimbus::reference::sort::{depths, key32, order};
 
@@ -124,7 +124,9 @@ fn placed() -> Vec<PlacedRecord> {
 fn keys(gpu: &mut Gpu, sort: &Sort, placed: &[PlacedRecord], forward: [f32; 3], radius: f64, n_bits: u32) -> Vec<u32> {
     let n = placed.len();
     let (from, entries) = (gpu.upload(placed), gpu.buffer::<Entry>(n));
-    gpu.run(|rec| sort.record_keys(rec, [&from, &entries], forward, n as u32, radius, n_bits));
+    let all = DrawnRecord { shift: 0, end: n as u32, ..DrawnRecord::default() };
+    let (i_group, drawn) = (gpu.upload(&vec![0u32; n]), gpu.upload(&[all]));
+    gpu.run(|rec| sort.record_keys(rec, [&from, &i_group, &drawn, &entries], forward, n as u32, radius, n_bits));
     let found: Vec<Entry> = gpu.download(&entries, n);
     assert!(found.iter().zip(0..).all(|(e, i)| e[1] == i), "every entry names its particle");
     found.iter().map(|e| e[0]).collect()
@@ -225,5 +227,49 @@ fn wrong_keys_are_noticed() {
         let wrong = Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort");
         let found = keys(&mut gpu, &wrong, &placed, forward, RADIUS, 32);
         assert!(wrong_depth(&found, &bounds).is_some(), "{from} as {to}");
+    }
+}
+
+/// Runs of particles, some of which are drawn in part, some not at all: what the entries hold before the sort.
+#[test]
+fn entries_are_those_of_the_drawn_particles() {
+    let mut gpu = Gpu::new();
+    let sort = Sort::new(&gpu.device, &gpu.compiler, N_PLACED as u32).expect("sort");
+    let (placed, forward) = (placed(), Random(6).direction());
+    let all = keys(&mut gpu, &sort, &placed, forward, RADIUS, 32);
+    let (sizes, counts) = ([5000u32, 0, 1, 7999, 3000, 4000], [4999u32, 0, 1, 0, 3000, 17]);
+    let (mut i_first, mut n_drawn) = (0, 0);
+    let (mut i_group, mut drawn, mut expected) = (vec![], vec![], vec![]);
+    for (g, (size, count)) in sizes.into_iter().zip(counts).enumerate() {
+        i_group.extend(vec![g as u32; size as usize]);
+        let shift = u32::wrapping_sub(n_drawn, i_first);
+        drawn.push(DrawnRecord { shift, end: i_first + count, kappa_scale: 1.0, last_weight: 1.0 });
+        expected.extend((i_first..i_first + count).map(|i| [all[i as usize], i]));
+        (i_first, n_drawn) = (i_first + size, n_drawn + count);
+    }
+    assert_eq!((i_first as usize, expected.len()), (N_PLACED, n_drawn as usize));
+    let wrongs = [("i < group.end", "i <= group.end"), ("i + group.shift", "i")].map(|(from, to)| {
+        let compiler = Gpu::wrong_compiler("sort_key.comp", from, to);
+        (to, Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort"))
+    });
+    let mut run = |sort: &Sort, n_sorted: u32| {
+        let (from, groups, parts) = (gpu.upload(&placed), gpu.upload(&i_group), gpu.upload(&drawn));
+        let entries = gpu.upload(&vec![[7u32, u32::MAX]; N_PLACED]);
+        gpu.run(|rec| {
+            let buffers = [&from, &groups, &parts, &entries];
+            sort.record_keys(rec, buffers, forward, N_PLACED as u32, RADIUS, 32)?;
+            sort.record(rec, &entries, n_sorted, 32)
+        });
+        gpu.download::<Entry>(&entries, N_PLACED)
+    };
+    let unsorted = run(&sort, 0);
+    assert!(unsorted[..expected.len()] == expected, "the drawn ones in their order");
+    assert!(unsorted[expected.len()..].iter().all(|e| *e == [7, u32::MAX]), "and no others");
+    let found = run(&sort, n_drawn);
+    let of = |e: &Entry| (e[0], e[1]);
+    expected.sort_by_key(of);
+    assert!(found[..expected.len()] == expected, "sorted, ties by index");
+    for (what, wrong) in wrongs {
+        assert!(run(&wrong, 0) != unsorted, "{what} was not noticed");
     }
 }

@@ -17,7 +17,7 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::io::scene_file;
 use nimbus::layout::facet::LitRecord;
-use nimbus::layout::particle::ParticleRecord;
+use nimbus::layout::particle::{DrawnRecord, ParticleRecord};
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::{generate, place};
@@ -196,6 +196,30 @@ fn wrong_pictures_are_noticed() {
         assert!(sources.replace(file, from, to), "{from}");
         let compiler = Compiler::new(sources, None).expect("shaderc");
         let values = picture.draw(&mut gpu, Some(&compiler), TargetFormat::Rgba16f);
+        assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+/// Groups of which a part is drawn, and the last of it in part.
+#[test]
+fn what_is_drawn_in_part_has_weights() {
+    let mut gpu = Gpu::new();
+    let mut picture = front();
+    for k in 0..12 {
+        let at = picture.at(0.35 * f64::from(k) - 2.0, 0.1 * f64::from(k % 3), 5.0 + 0.1 * f64::from(k % 5));
+        picture = picture.blob(at, 0.4, 0.5);
+    }
+    let part = |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
+    let i_group = vec![0, 0, 0, 0, 1, 1, 2, 2, 2, 2, 2, 3];
+    let drawn = vec![part(3, 1.6, 0.25), part(4, 1.0, 1.0), part(11, 1.0, 1.0), part(12, 3.0, 0.5)];
+    let picture = Picture { drawn: Some((i_group, drawn)), ..picture };
+    assert!(compare(&mut gpu, "weights", &picture) > 0.3);
+    let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
+    for (from, to) in
+        [("group.kappa_scale *", "1.0 *"), ("? group.last_weight : 1.0", "? 1.0 : 1.0"), ("i + 1u ==", "i ==")]
+    {
+        let wrong = Gpu::wrong_compiler("sprites.vert", from, to);
+        let values = picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba32f);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }
 }

@@ -43,6 +43,7 @@ fn mode(threading: &str) -> Mode {
         gpu_ms: None,
         latency_ms: measured(&[17.0], None, None),
         queue_depth: Some(0.75),
+        drawn: Some([5.0, 6.5, 7.0]),
         passes: vec![
             Pass {
                 name: "sort".to_owned(),
@@ -128,6 +129,7 @@ fn row(i: u32) -> FrameRow {
         gpu_ms: None,
         latency_ms: f64::NAN,
         queue_depth: 1,
+        n_drawn: 7,
         pass_ms: vec![Some(1.5), None],
         image_hash: None,
     }
@@ -233,9 +235,9 @@ fn a_run_comes_back_as_it_was_written() {
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
         "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_wait_ms,gpu_ms,latency_ms,\
-         queue_depth,gpu_sort_ms,gpu_first_ms,image_hash\n\
-         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,15,,,1,1.5,,\n\
-         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,15,,,1,1.5,,\n"
+         queue_depth,n_drawn,gpu_sort_ms,gpu_first_ms,image_hash\n\
+         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,15,,,1,7,1.5,,\n\
+         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,15,,,1,7,1.5,,\n"
     );
 }
 

@@ -64,6 +64,7 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
     }
     out += &case.overlap.as_ref().map_or(String::new(), overlap_lines);
     out += &latency_line(case).unwrap_or_default();
+    out += &drawn_line(case).unwrap_or_default();
     out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
     out += match same {
         Some(true) => "the last frames of all blocks are the same, to the byte\n",
@@ -153,7 +154,8 @@ fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
 /// A row a case and loop.
 fn case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
-    let figures = ["particles", "pixels", "loop", "n", "frame p50", "low", "high", "fps", "game", "gpu", "latency"];
+    let figures =
+        ["particles", "drawn", "pixels", "loop", "n", "frame p50", "low", "high", "fps", "game", "gpu", "latency"];
     header.extend(figures.map(str::to_owned));
     header.push("parallel/serial".to_owned());
     let mut rows = vec![header];
@@ -164,6 +166,7 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
             let end = |of: fn(&Measured) -> Option<f64>| mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms);
             row.extend([
                 case.particles.to_string(),
+                mode.drawn.map_or("-".to_owned(), |[_, mean, _]| format!("{mean:.0}")),
                 format!("{}x{}", case.width, case.height),
                 name_of(mode),
                 mode.frames.to_string(),
@@ -220,6 +223,13 @@ fn latency_line(case: &Case) -> Option<String> {
         ms(b),
         (b - a) / frame
     ))
+}
+
+/// How many particles were drawn, where that were not all in every frame.
+fn drawn_line(case: &Case) -> Option<String> {
+    let [least, mean, most] = case.modes.iter().find(|m| m.skip)?.drawn?;
+    let n = case.particles;
+    (mean < n as f64).then(|| format!("drawn: {mean:.0} of {n} particles a frame, {least:.0} to {most:.0}\n"))
 }
 
 fn skipping_line(s: &Skipping) -> String {

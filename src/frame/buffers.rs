@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::{BoxLaw, BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{BoxLaw, BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
@@ -24,6 +24,8 @@ pub struct Buffers {
     /// u32 by particle: attempts, and whether it was folded.
     pub status: Buffer,
     pub groups: Feed,
+    /// What of each group is drawn.
+    pub drawn: Feed,
     pub modes: Feed,
     /// Fed where the game thread places the particles, else written by `place`.
     pub placed: Placed,
@@ -64,6 +66,7 @@ impl Buffers {
     /// Writes what every frame brings along, into staging buffers of `slot`.
     pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
         self.groups.write(slot, &packet.groups)?;
+        self.drawn.write(slot, &packet.drawn)?;
         self.modes.write(slot, &packet.modes)?;
         self.table.write(slot, &packet.table)?;
         self.regions.write(slot, &packet.regions)?;
@@ -76,7 +79,7 @@ impl Buffers {
 
     /// Copies it to where shaders read it; the particles' places are `place`'s.
     pub fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
-        for feed in [&self.groups, &self.modes, &self.table, &self.regions, &self.lights] {
+        for feed in [&self.groups, &self.drawn, &self.modes, &self.table, &self.regions, &self.lights] {
             feed.record(rec, slot);
         }
     }
@@ -101,6 +104,7 @@ impl Buffers {
             particles: Buffer::new::<ParticleRecord>(device, "generate.particles", n, Place::Device)?,
             status: Buffer::new::<u32>(device, "generate.status", n, Place::Device)?,
             groups: Feed::new::<GroupRecord>(device, "place.groups", n_groups)?,
+            drawn: Feed::new::<DrawnRecord>(device, "sort.drawn", n_groups)?,
             modes: Feed::new::<ModeRecord>(device, "place.modes", n_modes)?,
             placed,
             density: Buffer::new::<f32>(device, "grid.density", n_cells_max(scene), Place::Device)?,

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use glam::{DVec3, Vec3};
 
+use super::drawn::drawn;
 use super::exchange::is_glossy;
 use super::packet::Packet;
 use super::tensor::{Shape, basis_of, is_edited, kind_of};
@@ -14,17 +15,16 @@ use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::Group;
+use crate::model::cloud::{Group, heaviest_blob};
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
-use crate::model::gust::{Mode, displacement};
+use crate::model::gust::Mode;
+use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
 use crate::model::scene::Scene;
 
 pub struct Game {
     scene: Arc<Scene>,
     groups: Vec<Group>,
-    /// Centre of each cloud relative to its origin.
-    cloud_centers: Vec<DVec3>,
     /// Waves of each cloud's gusts, and how many those before it have.
     modes: Vec<Vec<Mode>>,
     i_modes: Vec<u32>,
@@ -35,6 +35,8 @@ pub struct Game {
     shape: Option<Shape>,
     /// Every particle relative to its group, where this thread moves them.
     rest: Option<Vec<ParticleRecord>>,
+    /// Groups that cannot be in the picture are not drawn.
+    culls: bool,
 }
 
 /// What a frame's time says of the scene, before it becomes records: shared with the references.
@@ -75,7 +77,6 @@ impl Game {
     /// `rest` are all particles in order, given where the game thread is to move them (`simulate = "cpu"`).
     pub fn new(scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) -> Game {
         let groups = scene.groups();
-        let cloud_centers = scene.clouds.iter().map(|c| c.center()).collect();
         let modes: Vec<Vec<Mode>> = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
         let count = |n: &mut u32, waves: &Vec<Mode>| Some(std::mem::replace(n, *n + waves.len() as u32));
         let i_modes = modes.iter().scan(0, count).collect();
@@ -83,7 +84,17 @@ impl Game {
         let table = Arc::new(table(&scene, basis.as_ref(), scene.time.start_s));
         let n_bases = basis.as_ref().map_or(1, Basis::n_bases);
         let shape = is_edited(&scene).then(|| Shape::of(&scene, n_bases));
-        Game { scene, groups, cloud_centers, modes, i_modes, basis, table, shape, rest }
+        Game { scene, groups, modes, i_modes, basis, table, shape, rest, culls: true }
+    }
+
+    /// Whether groups that cannot be in the picture are left out of it, as they are unless told otherwise.
+    pub fn culling(self, culls: bool) -> Game {
+        Game { culls, ..self }
+    }
+
+    /// The same for the next steps of a game that is under way.
+    pub fn set_culling(&mut self, culls: bool) {
+        self.culls = culls;
     }
 
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
@@ -97,15 +108,22 @@ impl Game {
         let setting = Setting::at(&self.scene, &self.groups, time_s)?;
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
-        let groups: Vec<GroupRecord> = self.groups.iter().map(|g| self.group(g, origins[g.i_cloud])).collect();
-        let modes = self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect();
-        let placed = self.rest.as_ref().map(|rest| self.place(rest, &origins, time_s));
+        let grown = self.scene.grown(&self.groups, time_s);
+        let (drawn, n_drawn) = drawn(&self.scene, &grown, &setting, self.culls);
+        let placed = self.rest.as_ref().map(|rest| self.place(rest, &grown, &origins, time_s));
+        // The device moves nothing that is placed already.
+        let modes = match placed {
+            Some(_) => vec![],
+            None => self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect(),
+        };
         Ok(Packet {
             i_frame,
             time_s,
             begin,
             camera: CameraRecord::new(&self.scene.camera, &setting.pose, &self.scene.film, setting.light_origin),
-            groups,
+            groups: grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect(),
+            drawn,
+            n_drawn,
             modes,
             placed,
             table: self.table_at(time_s),
@@ -114,6 +132,7 @@ impl Game {
             regions: self.regions(time_s, setting.light_origin),
             lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
             grid: GridRecord::from(&setting.grid),
+            heaviest: heaviest_blob(&grown),
             radius: setting.radius,
             game_ms: super::ms(begin, Instant::now()),
         })
@@ -178,27 +197,35 @@ impl Game {
     fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
         let i_region = (self.scene.surfaces.len() + group.i_cloud) as u32;
         let modes = (self.i_modes[group.i_cloud], self.modes[group.i_cloud].len() as u32);
-        GroupRecord::new(group, i_region, origin, self.cloud_centers[group.i_cloud], modes)
+        GroupRecord::new(group, i_region, origin, modes)
     }
 
     /// Every particle at its group's place, in f64 until the last step.
-    fn place(&self, rest: &[ParticleRecord], origins: &[DVec3], time_s: f64) -> Vec<PlacedRecord> {
+    fn place(&self, rest: &[ParticleRecord], groups: &[Group], origins: &[DVec3], time_s: f64) -> Vec<PlacedRecord> {
+        let waves: Vec<Waves> = self.modes.iter().map(|modes| Waves::at(modes, time_s)).collect();
         let mut placed = Vec::with_capacity(rest.len());
-        for group in &self.groups {
+        for group in groups {
             let offset = origins[group.i_cloud] + group.center;
-            let modes = &self.modes[group.i_cloud];
-            let phases: Vec<f64> = modes.iter().map(|m| m.phase_at(time_s)).collect();
             let first = group.i_first as usize;
-            let particles = &rest[first..first + group.n_particles as usize];
-            placed.extend(particles.iter().map(|p| {
-                let rest = Vec3::from(p.position).as_dvec3();
-                let moved = rest + offset + displacement(modes, &phases, rest + group.center);
-                let position = moved.as_vec3();
-                PlacedRecord { position: position.to_array(), sigma: p.sigma }
-            }));
+            for some in rest[first..first + group.n_particles as usize].chunks(LANES) {
+                place_some(some, group, offset, &waves[group.i_cloud], &mut placed);
+            }
         }
         placed
     }
+}
+
+/// At most [`LANES`] particles of one group.
+fn place_some(some: &[ParticleRecord], group: &Group, offset: DVec3, waves: &Waves, placed: &mut Vec<PlacedRecord>) {
+    let rest: [DVec3; LANES] =
+        std::array::from_fn(|l| some.get(l).map_or(DVec3::ZERO, |p| group.scale * Vec3::from(p.position).as_dvec3()));
+    let along = |axis: usize| -> Lanes { std::array::from_fn(|l| rest[l][axis] + group.center[axis]) };
+    let [x, y, z] = waves.displace(&[along(0), along(1), along(2)]);
+    placed.extend(some.iter().enumerate().map(|(l, p)| {
+        let moved = rest[l] + offset + DVec3::new(x[l], y[l], z[l]);
+        let sigma = (group.scale * f64::from(p.sigma)) as f32;
+        PlacedRecord { position: moved.as_vec3().to_array(), sigma }
+    }));
 }
 
 /// A row a material: its lobe as the basis has it; zeros where it has none. Then a row a vector.

@@ -8,7 +8,7 @@ use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, storage_bytes};
 use crate::gpu::reflect::BindingKind;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::{BoxRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
@@ -67,6 +67,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
         ("the groups", groups, size(size_of::<GroupRecord>())),
+        ("what is drawn of them", groups, size(size_of::<DrawnRecord>())),
         ("the gusts", scene.clouds.iter().map(|c| u64::from(c.gust.n_waves)).sum(), size(size_of::<ModeRecord>())),
         ("the lights", scene.lights.len() as u64, size(size_of::<LightRecord>())),
         ("the density grid's sums", n_cells_max(scene), 8),
@@ -115,11 +116,11 @@ pub fn tensors(shape: &Shape, limits: &Limits, free: u64) -> Tensors {
     if second <= most && first <= binding { Tensors::Kept } else { Tensors::TooLarge { bytes: second, most } }
 }
 
-/// Most cells the grid can have at any time. Clouds that drift apart change its proportions, so a scene that moves needs
+/// Most cells the grid can have at any time. Clouds that drift apart or grow change its proportions, so a scene that moves needs
 /// room for a cube.
 pub fn n_cells_max(scene: &Scene) -> u64 {
     let side = u64::from(scene.lighting.grid.min(MAX_CELLS));
-    let stands_still = scene.clouds.iter().all(|c| c.wind == DVec3::ZERO);
+    let stands_still = scene.clouds.iter().all(|c| c.wind == DVec3::ZERO && c.growth.is_none());
     match scene.bounds(&scene.groups(), scene.time.start_s, DEPOSIT_CUT_SIGMA) {
         Some((low, high)) if stands_still => {
             let half = 0.5 * (high - low);
@@ -139,7 +140,7 @@ pub fn n_deposits(scene: &Scene) -> f64 {
         let covered = DVec3::splat(across).min(grid.n_cells.as_dvec3());
         f64::from(g.n_particles) * covered.x * covered.y * covered.z
     };
-    groups.iter().map(blob).sum()
+    scene.grown(&groups, scene.time.start_s).iter().map(blob).sum()
 }
 
 /// What a demanding scene should be told before it runs; nothing for most.

@@ -2,6 +2,7 @@
 //! [`parallel`] are two loops around these two; [`plan`] says what a frame can leave out.
 
 pub mod buffers;
+mod drawn;
 pub mod exchange;
 pub mod feed;
 pub mod game;
@@ -40,6 +41,8 @@ pub struct FrameTimes {
     pub latency_ms: f64,
     /// Frames that the device still had when this one was handed to it; 0 where it had nothing to do.
     pub queue_depth: u32,
+    /// Particles that were drawn: those of clouds in view, as many as `draw.count` asks for.
+    pub n_drawn: u32,
     pub marks: Marks,
     pub plan: Plan,
     /// GPU time of every pass that ran; empty where the device has no timestamps.
@@ -65,12 +68,13 @@ struct Started {
     begin: Instant,
     game_ms: f64,
     queue_depth: u32,
+    n_drawn: u32,
 }
 
 impl Started {
     fn of(packet: &Packet, queue_depth: u32) -> Started {
-        let Packet { i_frame, time_s, begin, game_ms, .. } = *packet;
-        Started { i_frame, time_s, begin, game_ms, queue_depth }
+        let Packet { i_frame, time_s, begin, game_ms, n_drawn, .. } = *packet;
+        Started { i_frame, time_s, begin, game_ms, queue_depth, n_drawn }
     }
 
     /// The times of a frame whose picture was finished at `end`; `last_end` is that of the frame before.
@@ -85,6 +89,7 @@ impl Started {
             submit_wait_ms: done.submit_wait_ms,
             latency_ms: ms(self.begin, end),
             queue_depth: self.queue_depth,
+            n_drawn: self.n_drawn,
             marks: Marks {
                 game: [self.begin, self.begin + Duration::from_secs_f64(1e-3 * self.game_ms)],
                 record: done.recorded,

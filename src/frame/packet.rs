@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-use crate::layout::particle::{GroupRecord, ModeRecord, PlacedRecord};
+use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, PlacedRecord};
 
 #[derive(Debug, Clone)]
 pub struct Packet {
@@ -17,7 +17,11 @@ pub struct Packet {
     pub game_ms: f64,
     pub camera: CameraRecord,
     pub groups: Vec<GroupRecord>,
-    /// Gusts of all clouds, one after the other.
+    /// What of each group is drawn.
+    pub drawn: Vec<DrawnRecord>,
+    /// Particles that are drawn.
+    pub n_drawn: u32,
+    /// Gusts of all clouds, one after the other; none where the game thread moves the particles.
     pub modes: Vec<ModeRecord>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
@@ -31,6 +35,8 @@ pub struct Packet {
     pub coefficients: Vec<[f32; 4]>,
     pub lights: Vec<LightRecord>,
     pub grid: GridRecord,
+    /// Bounds every blob's mass κ (2π)^{3/2} σ³.
+    pub heaviest: f64,
     /// Bounds |view depth| relative to the lighting origin.
     pub radius: f64,
 }

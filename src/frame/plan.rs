@@ -157,7 +157,8 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let kept = traits.tensors == Tensors::Kept;
     let same_response = if kept { same_tensors } else { same_light };
     let unchanged = if kept { "facets and lights stand still" } else { "facets and lights are the same" };
-    let same_order = still && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
+    let same_drawn = same(&|a, b| a.drawn == b.drawn);
+    let same_order = still && same_drawn && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
     let same_picture = same_order && same_view && (same_light || !traits.lit);
 
@@ -225,7 +226,7 @@ fn skip(reason: &'static str) -> Decision {
 mod tests {
     use super::*;
     use crate::layout::frame::{CameraRecord, GridRecord};
-    use crate::layout::particle::{GroupRecord, ModeRecord};
+    use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord};
     use std::sync::Arc;
     use std::time::Instant;
 
@@ -253,6 +254,8 @@ mod tests {
             game_ms: 0.0,
             camera: CameraRecord { forward: [0.0, 0.0, -1.0], ..CameraRecord::default() },
             groups: vec![GroupRecord::default()],
+            drawn: vec![DrawnRecord::default()],
+            n_drawn: 0,
             modes: vec![],
             placed: None,
             bounds: vec![Default::default()],
@@ -261,6 +264,7 @@ mod tests {
             coefficients: vec![[0.5; 4]],
             lights: vec![LightRecord { energy: [0.0, 1.0, 0.0], ..LightRecord::default() }],
             grid: GridRecord::default(),
+            heaviest: 1.0,
             radius: 1.0,
         }
     }
@@ -293,6 +297,7 @@ mod tests {
         };
         assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
         assert_eq!(after(&|p| p.camera.forward = [1.0, 0.0, 0.0]), ["sort", "sprites"]);
+        assert_eq!(after(&|p| p.drawn[0].end = 5), ["sort", "sprites"]);
         assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
         assert_eq!(after(&|p| p.regions[0].kd[1] = 0.5), ["first", "sprites"]);
         let of_rays: [&dyn Fn(&mut Packet); 3] =

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Pending, Place, Recorder, ScopeTime, Target};
 use crate::model::boxes::MAX_ATTEMPTS;
-use crate::model::cloud::{CloudSource, heaviest_blob};
+use crate::model::cloud::CloudSource;
 use crate::model::film::FilmFormat;
 use crate::model::scene::{LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
@@ -83,7 +83,6 @@ pub(super) struct Settings {
     pub n_facets: u32,
     pub n_lights: u32,
     n_surfaces: u32,
-    heaviest: f64,
     pub step_cells: f64,
     pub forward: f64,
     sort_bits: u32,
@@ -147,7 +146,13 @@ impl Renderer {
             second,
             tensor,
             sort: Sort::new(device, compiler, n_particles)?,
-            sprites: Sprites::new(device, compiler, format, lit, [scenery.is_some(), grouped])?,
+            sprites: Sprites::new(
+                device,
+                compiler,
+                format,
+                lit,
+                [scenery.is_some(), grouped, scene.draw.count.is_some()],
+            )?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             targets: [target("sprites.even")?, target("sprites.odd")?],
             i_target: 0,
@@ -160,7 +165,6 @@ impl Renderer {
                 n_facets: scene.n_facets() as u32,
                 n_lights: scene.lights.len() as u32,
                 n_surfaces: scene.surfaces.len() as u32,
-                heaviest: heaviest_blob(&groups),
                 step_cells: scene.lighting.step,
                 // Without particles there is nothing to march through.
                 forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
@@ -314,7 +318,7 @@ impl Renderer {
             })?;
             let placed = b.placed.buffer();
             pass(rec, plan, Pass::Grid, |rec| {
-                grid.record(rec, [placed, &b.particles, &b.density], &packet.grid, n, s.heaviest)
+                grid.record(rec, [placed, &b.particles, &b.density], &packet.grid, n, packet.heaviest)
             })?;
             pass(rec, plan, Pass::Morton, |rec| grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b)))?;
             pass(rec, plan, Pass::Facets, |rec| {
@@ -356,8 +360,9 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sort, |rec| {
-                sort.record_keys(rec, [placed, &b.entries], packet.camera.forward, n, packet.radius, s.sort_bits)?;
-                sort.record(rec, &b.entries, n, s.sort_bits)
+                let buffers = [placed, &b.i_group, &b.drawn.buffer, &b.entries];
+                sort.record_keys(rec, buffers, packet.camera.forward, n, packet.radius, s.sort_bits)?;
+                sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits)
             })?;
             let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
             pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
@@ -368,8 +373,8 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet];
-                let counts = [n, s.n_surface_facets];
+                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, &b.drawn.buffer];
+                let counts = [packet.n_drawn, s.n_surface_facets];
                 sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
             })
         })

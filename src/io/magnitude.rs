@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use super::toml_section::Bounds;
-use crate::model::cloud::{Cloud, CloudSource, Group, mass};
+use crate::model::cloud::{Cloud, CloudSource, Group, SIGMA_PER_RADIUS, mass};
 
 /// Coordinates, lengths, times, κ, optical depths, irradiance, colours.
 pub const GREATEST: f64 = 1e15;
@@ -97,6 +97,37 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
             Some(format!("line {line}: κ (2π)^{{3/2}} σ³: expected at most {expected}, found {found}"))
         }
     }
+}
+
+/// What of a cloud that is grown the device could not carry; between start and end lies nothing that is greater or smaller.
+pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
+    let to = cloud.growth.to;
+    let groups: Vec<Group> = cloud.groups(0, 0).iter().map(|g| g.grown(to)).collect();
+    let greatest = |of: &dyn Fn(&Group) -> f64| groups.iter().map(of).fold(0.0, f64::max);
+    let places = greatest(&|g| (g.center.abs() + g.half_extent).max_element());
+    let expected = |what: &str, most: f64, found: f64| {
+        (found > most).then(|| format!("{what}, grown: expected at most {}, found {}", shortest(most), rounded(found)))
+    };
+    let least = least_sigma(cloud) * to;
+    // As great as a cloud may be that does not grow.
+    expected("places", 2.0 * GREATEST, places)
+        .or_else(|| expected("σ", GREATEST, greatest(&|g| g.sigma_max)))
+        .or_else(|| expected("κ (2π)^{3/2} σ³", GREATEST_PRODUCT, greatest(&|g| g.mass_max)))
+        .or_else(|| expected("κ σ", GREATEST_PRODUCT, greatest(&|g| g.kappa_max * g.sigma_max)))
+        .or_else(|| {
+            let (low, found) = (shortest(LEAST * SIGMA_PER_RADIUS), rounded(least));
+            (least < LEAST * SIGMA_PER_RADIUS).then(|| format!("σ, shrunk: expected at least {low}, found {found}"))
+        })
+        .filter(|_| !cloud.growth.is_none())
+}
+
+/// Of the blobs, or the boxes' greatest blobs, that have a size; infinite where none has.
+fn least_sigma(cloud: &Cloud) -> f64 {
+    let sigmas: Vec<f64> = match &cloud.source {
+        CloudSource::Boxes { .. } => cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect(),
+        CloudSource::Particles(list) => list.iter().map(|p| p.sigma).collect(),
+    };
+    sigmas.into_iter().filter(|sigma| *sigma > 0.0).fold(f64::INFINITY, f64::min)
 }
 
 fn too_great(groups: &[Group], what: &str, greatest: f64, of: &dyn Fn(&Group) -> f64) -> Option<String> {

@@ -9,11 +9,12 @@ use sha2::{Digest, Sha256};
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
 use super::scene_lights::material_named;
 use super::text_file::{DATA_LIMIT, read_text};
-use super::toml_section::Section;
+use super::toml_section::{Bounds, Section};
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
-use crate::model::boxes::Form;
+use crate::model::boxes::{CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource};
+use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 
@@ -29,7 +30,7 @@ pub struct CloudReader<'a> {
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "seed"]
+        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
     };
 }
 
@@ -89,12 +90,63 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
+        growth: read_growth(s)?,
         i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
-    match magnitude::beyond(&cloud, &lines) {
-        Some(what) => Err(s.fault("file", what)),
+    if let Some(what) = magnitude::beyond(&cloud, &lines) {
+        return Err(s.fault("file", what));
+    }
+    match magnitude::grown_beyond(&cloud) {
+        Some(what) => Err(s.fault("grow_to", what)),
         None => Ok(cloud),
+    }
+}
+
+fn read_growth(s: &mut Section) -> Result<Growth> {
+    Ok(Growth {
+        to: s.f64("grow_to", Growth::NONE.to, Bounds::Within(LEAST_SCALE, GREATEST_SCALE))?,
+        time_s: s.f64("grow_time_s", Growth::NONE.time_s, DIVISOR)?,
+    })
+}
+
+/// Gives the clouds that are made from boxes `n` particles together, dealt to the boxes by their counts (largest remainder,
+/// of equal ones the first). κ changes against the count, so that the expected optical depth stays. An error says what is
+/// wrong with `n`.
+pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
+    let counts: Vec<u32> = clouds.iter_mut().flat_map(boxes_of).map(|b| b.n_particles).collect();
+    let total: u128 = counts.iter().map(|n| u128::from(*n)).sum();
+    if total == 0 {
+        return Err("the scene has no cloud made from boxes that has particles".to_owned());
+    }
+    let quota = |count: u32| (u128::from(n) * u128::from(count) / total, u128::from(n) * u128::from(count) % total);
+    let mut shares: Vec<u32> = counts.iter().map(|count| quota(*count).0 as u32).collect();
+    let mut by_remainder: Vec<usize> = (0..counts.len()).collect();
+    // Stable: of equal ones the first.
+    by_remainder.sort_by_key(|i| std::cmp::Reverse(quota(counts[*i]).1));
+    let left = n - shares.iter().sum::<u32>();
+    for i in by_remainder.into_iter().take(left as usize) {
+        shares[i] += 1;
+    }
+    for (b, share) in clouds.iter_mut().flat_map(boxes_of).zip(shares) {
+        b.n_particles = share;
+    }
+    for (i, cloud) in clouds.iter_mut().enumerate() {
+        if let CloudSource::Boxes { optical_depth, .. } = &mut cloud.source {
+            *optical_depth *= total as f64 / f64::from(n);
+            let wrong = magnitude::beyond(cloud, &[]).or_else(|| magnitude::grown_beyond(cloud));
+            if let Some(what) = wrong {
+                return Err(format!("makes cloud {i}'s particles too dense: {what}"));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn boxes_of(cloud: &mut Cloud) -> &mut [CloudBox] {
+    match &mut cloud.source {
+        CloudSource::Boxes { boxes, .. } => boxes,
+        CloudSource::Particles(_) => &mut [],
     }
 }
 
@@ -116,4 +168,41 @@ fn read_boxes(s: &mut Section, reader: &mut CloudReader) -> Result<CloudSource> 
         optical_depth: s.f64("optical_depth", 1.0, AMOUNT)?,
         radius_scale: s.f64("radius_scale", 1.0, AMOUNT)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cloud(counts: &[u32]) -> Cloud {
+        let b = |n: &u32| CloudBox { n_particles: *n, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+        let boxes = counts.iter().map(b).collect();
+        let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
+        let (gust, growth) = (Gust::CALM, Growth::NONE);
+        Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 }
+    }
+
+    fn counts(clouds: &mut [Cloud]) -> Vec<u32> {
+        clouds.iter_mut().flat_map(boxes_of).map(|b| b.n_particles).collect()
+    }
+
+    #[test]
+    fn particles_are_dealt_by_the_largest_remainder() {
+        let mut clouds =
+            [cloud(&[3, 0, 4]), Cloud { source: CloudSource::Particles(vec![]), ..cloud(&[]) }, cloud(&[3])];
+        // 5 · (3, 0, 4, 3)/10 is 1.5, 0, 2, 1.5: one is left, and the first of the two has it.
+        deal(&mut clouds, 5).unwrap();
+        assert_eq!(counts(&mut clouds), [2, 0, 2, 1]);
+        for i in [0, 2] {
+            assert!(matches!(clouds[i].source, CloudSource::Boxes { optical_depth: 2.0, .. }));
+        }
+        deal(&mut clouds, 50_000).unwrap();
+        assert_eq!(counts(&mut clouds), [20_000, 0, 20_000, 10_000]);
+        assert!(matches!(clouds[0].source, CloudSource::Boxes { optical_depth: 2e-4, .. }));
+        assert!(deal(&mut [cloud(&[0])], 7).unwrap_err().contains("no cloud made from boxes"));
+        let mut dense = cloud(&[u32::MAX]);
+        let CloudSource::Boxes { optical_depth, .. } = &mut dense.source else { panic!() };
+        *optical_depth = 1e14;
+        assert!(deal(&mut [dense], 1).unwrap_err().contains("too dense"));
+    }
 }

@@ -8,7 +8,7 @@ use serde_json::{Value as Json, json};
 use sha2::{Digest, Sha256};
 
 use super::magnitude::{GREATEST, is_carried_place, shortest};
-use super::scene_clouds::{CloudReader, read_cloud};
+use super::scene_clouds::{CloudReader, deal, read_cloud};
 use super::scene_phases::PhaseSpec;
 pub use super::scene_sections::MAX_SIDE;
 use super::toml_section::Section;
@@ -156,6 +156,12 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>) -> Result<
         }
         clouds.push(cloud);
         resolved_clouds.push(section.finish());
+    }
+    if draw.n_particles > 0 {
+        deal(&mut clouds, draw.n_particles).map_err(|what| match root.section("draw") {
+            Ok(section) => section.fault("particles", what),
+            Err(e) => e,
+        })?;
     }
     let digests = reader.digests;
     root.record("cloud", json!(resolved_clouds));

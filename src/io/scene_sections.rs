@@ -8,6 +8,7 @@ use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::camera::{Camera, CameraKey};
+use crate::model::count::Count;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::scene::MAX_PAIR_LEVELS;
@@ -170,7 +171,7 @@ fn read_exponents(s: &mut Section, of_materials: &[f64]) -> Result<[f64; 2]> {
 
 pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let mut s = root.section("draw")?;
-    s.expect_keys(&["path", "cutoff", "sort_bits", "resolution"], &[])?;
+    s.expect_keys(DRAW_KEYS, &[])?;
     s.choice("path", "sprites", &[("sprites", ())], &["tiles"])?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
@@ -178,8 +179,34 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
     }
     s.only("resolution", json!(1.0), "every pixel is drawn")?;
+    let count = read_count(&mut s)?;
+    let n_particles = s.u32("particles", 0, 0, u32::MAX)?;
     root.record("draw", s.finish());
-    Ok(Draw { cutoff, sort_bits })
+    Ok(Draw { cutoff, sort_bits, count, n_particles })
+}
+
+const DRAW_KEYS: &[&str] = &[
+    "path",
+    "cutoff",
+    "sort_bits",
+    "resolution",
+    "particles",
+    "count",
+    "count_a",
+    "count_d0",
+    "count_normalised",
+    "count_conserve",
+];
+
+fn read_count(s: &mut Section) -> Result<Option<Count>> {
+    let by_distance = s.choice("count", "all", &[("all", false), ("distance", true)], &[])?;
+    let count = Count {
+        a: s.f64("count_a", 280.0, DIVISOR)?,
+        d0: s.f64("count_d0", 1.0, DIVISOR)?,
+        normalised: s.bool("count_normalised", false)?,
+        conserve: s.bool("count_conserve", true)?,
+    };
+    Ok(by_distance.then_some(count))
 }
 
 pub fn read_threads(root: &mut Section) -> Result<Threads> {

@@ -169,6 +169,16 @@ impl<'a> Section<'a> {
         Ok(v)
     }
 
+    pub fn bool(&mut self, key: &str, default: bool) -> Result<bool> {
+        let v = match self.get(key).map(|node| &node.value) {
+            None => default,
+            Some(Value::Boolean(b)) => *b,
+            Some(other) => return Err(self.fault(key, format!("expected true or false, found {}", other.describe()))),
+        };
+        self.record(key, json!(v));
+        Ok(v)
+    }
+
     pub fn vec3(&mut self, key: &str, default: DVec3, bounds: Bounds) -> Result<DVec3> {
         Ok(DVec3::from_array(self.numbers(key, default.to_array(), bounds)?))
     }

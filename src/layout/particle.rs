@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::layout::record;
 use crate::model::boxes::{CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::count::Drawn;
 use crate::model::gust::Mode;
 
 record! {
@@ -102,43 +103,63 @@ record! {
 record! {
     /// What moves a group this frame.
     pub struct GroupRecord {
-        /// Cloud origin(t) + group centre − lighting origin.
+        /// Cloud origin(t) + group centre, as it has grown, − lighting origin.
         offset: [f32; 3],
         i_region: u32,
         /// The cloud's centre relative to the lighting origin.
         cloud_center: [f32; 3],
-        /// Mean σ of the group's particles.
+        /// Mean σ of the group's particles, as they have grown.
         sigma_mean: f32,
-        /// The group's centre relative to its cloud's origin.
+        /// The group's centre relative to its cloud's origin, as it has grown.
         center: [f32; 3],
         /// Its cloud's first gust mode.
         i_mode: u32,
         n_modes: u32,
-        unused: u32,
-        unused_too: [u32; 2],
+        /// s: lengths over those at time 0.
+        scale: f32,
+        unused: [u32; 2],
     }
 }
 
 impl GroupRecord {
-    /// `origin_from_light`: the cloud's origin at the frame's time minus the lighting origin, in f64.
-    /// `i_region`: the cloud's; `modes`: first gust mode of the cloud, and how many it has.
-    pub fn new(
-        group: &Group,
-        i_region: u32,
-        origin_from_light: DVec3,
-        cloud_center: DVec3,
-        (i_mode, n_modes): (u32, u32),
-    ) -> Self {
+    /// `group`: as it has grown; `origin_from_light`: the cloud's origin at the frame's time minus the lighting origin, in
+    /// f64. `i_region`: the cloud's; `modes`: first gust mode of the cloud, and how many it has.
+    pub fn new(group: &Group, i_region: u32, origin_from_light: DVec3, (i_mode, n_modes): (u32, u32)) -> Self {
         GroupRecord {
             offset: (origin_from_light + group.center).as_vec3().to_array(),
             i_region,
-            cloud_center: (origin_from_light + cloud_center).as_vec3().to_array(),
+            cloud_center: (origin_from_light + group.cloud_center).as_vec3().to_array(),
             sigma_mean: group.sigma_mean as f32,
             center: group.center.as_vec3().to_array(),
             i_mode,
             n_modes,
-            unused: 0,
-            unused_too: [0; 2],
+            scale: group.scale as f32,
+            unused: [0; 2],
+        }
+    }
+}
+
+record! {
+    /// What is drawn of a group this frame.
+    pub struct DrawnRecord {
+        /// From the number of a drawn particle to that of its entry, modulo 2³².
+        shift: u32,
+        /// The group's first particle that is not drawn.
+        end: u32,
+        /// Factor on κ, and on the last drawn particle's beside it.
+        kappa_scale: f32,
+        last_weight: f32,
+    }
+}
+
+impl DrawnRecord {
+    /// `i_entry`: of the group's first drawn particle.
+    pub fn new(group: &Group, drawn: &Drawn, i_entry: u32) -> Self {
+        DrawnRecord {
+            shift: i_entry.wrapping_sub(group.i_first),
+            end: group.i_first + drawn.n,
+            kappa_scale: drawn.kappa_scale as f32,
+            last_weight: drawn.last_weight as f32,
         }
     }
 }

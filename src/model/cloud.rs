@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
+use super::growth::Growth;
 use super::gust::Gust;
 
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
@@ -19,6 +20,7 @@ pub struct Cloud {
     /// Scene units per second; the cloud's origin at time t is position + wind·t.
     pub wind: DVec3,
     pub gust: Gust,
+    pub growth: Growth,
     /// Index into the scene's materials.
     pub i_material: usize,
     pub seed: u32,
@@ -53,6 +55,10 @@ pub struct Group {
     pub n_particles: u32,
     /// Origin of the group's positions, relative to the cloud's.
     pub center: DVec3,
+    /// The cloud's own centre, relative to its origin: what it grows about.
+    pub cloud_center: DVec3,
+    /// Lengths over those at time 0: 1 but in what [`Group::grown`] gives.
+    pub scale: f64,
     /// Positions lie within center ± half_extent.
     pub half_extent: DVec3,
     pub sigma_max: f64,
@@ -60,6 +66,8 @@ pub struct Group {
     pub kappa_max: f64,
     /// Greatest mass κ (2π)^{3/2} σ³ of a blob.
     pub mass_max: f64,
+    /// How far the cloud's gusts carry a particle at most.
+    pub gust_reach: f64,
 }
 
 impl Cloud {
@@ -98,6 +106,7 @@ impl Cloud {
     /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups, so that a
     /// group's number is its box's number.
     pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
+        let (cloud_center, gust_reach) = (self.center(), self.gust.reach());
         match &self.source {
             CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
                 .iter()
@@ -109,17 +118,41 @@ impl Cloud {
                         i_first,
                         n_particles: b.n_particles,
                         center: b.center,
+                        cloud_center,
+                        scale: 1.0,
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
                         kappa_max: kappa,
                         mass_max: mass(kappa, sigma_max),
+                        gust_reach,
                     };
                     i_first += b.n_particles;
                     group
                 })
                 .collect(),
-            CloudSource::Particles(list) => vec![list_group(list, i_cloud, i_first)],
+            CloudSource::Particles(list) => {
+                vec![Group { cloud_center, gust_reach, ..list_group(list, i_cloud, i_first) }]
+            }
+        }
+    }
+}
+
+impl Group {
+    /// The group in its cloud grown to `scale`: every place x is at c + s (x − c), c the cloud's centre, every length s times
+    /// as long, κ the same. To the bit as it was where nothing has grown.
+    pub fn grown(&self, scale: f64) -> Group {
+        if scale == 1.0 {
+            return *self;
+        }
+        Group {
+            center: self.cloud_center + scale * (self.center - self.cloud_center),
+            scale,
+            half_extent: scale * self.half_extent,
+            sigma_max: scale * self.sigma_max,
+            sigma_mean: scale * self.sigma_mean,
+            mass_max: scale.powi(3) * self.mass_max,
+            ..*self
         }
     }
 }
@@ -155,11 +188,14 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         i_first,
         n_particles: list.len() as u32,
         center: 0.5 * (low + high),
+        cloud_center: DVec3::ZERO,
+        scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
         mass_max: list.iter().map(|p| mass(p.kappa, p.sigma)).fold(0.0, f64::max),
+        gust_reach: 0.0,
     }
 }
 
@@ -193,7 +229,8 @@ mod tests {
             optical_depth: 1.0,
             radius_scale: 1.0,
         };
-        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::X, gust: Gust::CALM, i_material: 0, seed: 1 };
+        let (gust, growth) = (Gust::CALM, Growth::NONE);
+        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::X, gust, growth, i_material: 0, seed: 1 };
         let firsts: Vec<u32> = cloud.groups(0, 10).iter().map(|g| g.i_first).collect();
         assert_eq!(firsts, [10, 13, 13]);
         assert_eq!(cloud.center(), DVec3::X);
@@ -201,11 +238,29 @@ mod tests {
     }
 
     #[test]
+    fn a_grown_group_is_similar_about_the_clouds_centre() {
+        let blob = |x: f64, sigma| Particle { position: DVec3::X * x, sigma, kappa: 2.0, color: DVec3::ONE };
+        // Mean position 2, bounds from 0 to 5.
+        let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
+        let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
+        let cloud = Cloud { source, position: DVec3::Y, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 };
+        let group = cloud.groups(0, 0)[0];
+        let grown = group.grown(3.0);
+        assert_eq!((group.center.x, group.cloud_center.x), (2.5, 2.0));
+        // The least and greatest x: 2 + 3 (0 − 2) and 2 + 3 (5 − 2).
+        assert_eq!((grown.center - grown.half_extent).x, -4.0);
+        assert_eq!((grown.center + grown.half_extent).x, 11.0);
+        assert_eq!((grown.sigma_max, grown.sigma_mean, grown.kappa_max, grown.scale), (3.0, 2.25, 2.0, 3.0));
+        assert!((grown.mass_max / mass(2.0, 3.0) - 1.0).abs() < 1e-15);
+        assert_eq!(group.grown(1.0), group);
+    }
+
+    #[test]
     fn the_heaviest_blob_is_a_blob_and_not_two_maxima() {
         let blob = |sigma, kappa| Particle { position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
         let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
-        let gust = Gust::CALM;
-        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, i_material: 0, seed: 1 };
+        let (gust, growth) = (Gust::CALM, Growth::NONE);
+        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 };
         assert_eq!(heaviest_blob(&cloud.groups(0, 0)), mass(2.0, 1.0));
     }
 }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::basis::Sampling;
 use super::camera::Camera;
 use super::cloud::{Cloud, Group, runs};
+use super::count::Count;
 use super::film::Film;
 use super::light::Light;
 use super::material::Material;
@@ -118,6 +119,10 @@ pub struct Draw {
     pub cutoff: f64,
     /// Bits of the sort key: 16 or 32.
     pub sort_bits: u32,
+    /// How many particles are drawn of a cloud; `None`: all.
+    pub count: Option<Count>,
+    /// The clouds made from boxes have so many particles together; 0: as many as their files say.
+    pub n_particles: u32,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -165,6 +170,11 @@ impl Scene {
             i_first = groups.last().map_or(i_first, |g| g.i_first + g.n_particles);
         }
         groups
+    }
+
+    /// `groups` as they have grown at `time_s`.
+    pub fn grown(&self, groups: &[Group], time_s: f64) -> Vec<Group> {
+        groups.iter().map(|g| g.grown(self.clouds[g.i_cloud].growth.at(time_s))).collect()
     }
 
     /// Facets of the surfaces, which come before those of the clouds.
@@ -243,8 +253,9 @@ impl Scene {
 
     fn group_bounds(&self, group: &Group, time_s: f64, n_sigma: f64) -> (DVec3, DVec3) {
         let cloud = &self.clouds[group.i_cloud];
+        let group = group.grown(cloud.growth.at(time_s));
         let center = cloud.origin_at(time_s) + group.center;
-        let reach = group.half_extent + DVec3::splat(n_sigma * group.sigma_max + cloud.gust.reach());
+        let reach = group.half_extent + DVec3::splat(n_sigma * group.sigma_max + group.gust_reach);
         (center - reach, center + reach)
     }
 }

@@ -1,6 +1,6 @@
-//! sort: particles far to near.
+//! sort: the drawn particles far to near.
 //!
-//! In: placed particles, the camera's forward. Out: (key, particle) in ascending key, ties in ascending index. Law:
+//! In: placed particles, group of each, what is drawn of the groups, the camera's forward. Out: (key, particle) in ascending key, ties in ascending index. Law:
 //! stable least-significant-digit radix sort, 8 bits a pass, keys of 16 or 32 bits. Source: docs/model.md §9, §11.
 //! Error: none in the sort; a key holds the depth to an ulp (32 bits) or to 2⁻¹⁶ of the scene (16 bits).
 
@@ -52,12 +52,12 @@ impl Sort {
         })
     }
 
-    /// Writes the keys of `placed` (PlacedRecord) to `entries` ([key, particle]). `radius` bounds |depth| and places
-    /// the 16-bit keys' range.
+    /// Writes the keys of the drawn particles of `placed` (PlacedRecord) to `entries` ([key, particle]), as `i_group` (u32) and
+    /// `drawn` (DrawnRecord) say. `radius` bounds |depth| and places the 16-bit keys' range.
     pub fn record_keys(
         &self,
         rec: &mut Recorder<'_>,
-        [placed, entries]: [&Buffer; 2],
+        [placed, i_group, drawn, entries]: [&Buffer; 4],
         forward: [f32; 3],
         n_particles: u32,
         radius: f64,
@@ -66,7 +66,7 @@ impl Sort {
         // A scene without extent has one depth: any finite factor gives one key.
         let steps_per_depth = if radius > 0.0 { (65536.0 / (2.0 * radius)) as f32 } else { 0.0 };
         let push = KeyPush { forward, n_particles, depth_high: radius as f32, steps_per_depth, n_bits };
-        rec.dispatch(&self.key, &[placed, entries], &push, n_particles)
+        rec.dispatch(&self.key, &[placed, i_group, drawn, entries], &push, n_particles)
     }
 
     /// Sorts the first `n_entries` of `entries` by the low `n_bits` (16 or 32) of their keys, in place.

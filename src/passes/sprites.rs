@@ -1,7 +1,7 @@
 //! sprites: the particles as thin Gaussian sprites, blended far to near.
 //!
 //! In: sorted entries, placed particles, particles (κ, colour), lit facets, the depth of surfaces drawn before. Out:
-//! premultiplied linear RGBA in the film's format. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
+//! premultiplied linear RGBA in the film's format. Of groups that are drawn in part, what is drawn of them, and weights on κ. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
 //! §9, §11. Error: α to a few 1e-6 relative, and the target's rounding at each layer.
 
 use crate::error::Result;
@@ -20,34 +20,36 @@ pub struct Sprites {
 
 impl Sprites {
     /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
-    /// depth; else the target is cleared. `grouped`: facets stand for several particles.
+    /// depth; else the target is cleared. `grouped`: facets stand for several particles. `weighted`: κ has factors.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
         lit: bool,
-        [behind, grouped]: [bool; 2],
+        [behind, grouped, weighted]: [bool; 3],
     ) -> Result<Sprites> {
-        let constants = [(0, u32::from(lit)), (1, u32::from(behind)), (2, u32::from(grouped))];
+        let constants = [lit, behind, grouped, weighted].map(u32::from);
+        let constants: Vec<(u32, u32)> = (0..).zip(constants).collect();
         let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
         Ok(Sprites { pipeline })
     }
 
     /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
-    /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped. `target` has depth where surfaces have been drawn.
+    /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped; `i_group`: u32 by particle, and
+    /// `drawn`: DrawnRecord, read where κ has factors. `target` has depth where surfaces have been drawn.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 5],
+        buffers: [&Buffer; 7],
         target: Target<'_>,
         camera: &CameraRecord,
         cutoff: f64,
-        [n_particles, i_first_facet]: [u32; 2],
+        [n_drawn, i_first_facet]: [u32; 2],
     ) -> Result<()> {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet };
         let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
-        rec.draw(&self.pipeline, target, start, &buffers, &push, n_particles)
+        rec.draw(&self.pipeline, target, start, &buffers, &push, n_drawn)
     }
 }

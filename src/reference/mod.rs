@@ -5,6 +5,7 @@
 
 pub mod area;
 pub mod contract;
+pub mod count;
 pub mod facets;
 pub mod first;
 pub mod generate;

@@ -1,5 +1,5 @@
 //! From group-relative positions to positions relative to the lighting origin O: model.md §11 "Frames of
-//! reference". All in f64; the GPU rounds the offset once and the sum once.
+//! reference", §12, §13. All in f64; the GPU rounds the offset once and the sum once.
 
 use glam::DVec3;
 
@@ -7,9 +7,41 @@ use super::Blob;
 use super::generate::Generated;
 use crate::model::cloud::{Cloud, Group};
 
-/// Offset of every group's particles: cloud origin(t) + group centre − O.
+/// s(t) of model.md §13.
+pub fn scale(cloud: &Cloud, time_s: f64) -> f64 {
+    1.0 + (cloud.growth.to - 1.0) * (1.0 - (-time_s.max(0.0) / cloud.growth.time_s).exp())
+}
+
+/// Centre of every group relative to its cloud's origin, as the cloud has grown: c + s (x − c).
+fn grown_centers(groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<DVec3> {
+    let centers: Vec<DVec3> = clouds.iter().map(Cloud::center).collect();
+    let of = |g: &Group| {
+        let c = centers[g.i_cloud];
+        c + scale(&clouds[g.i_cloud], time_s) * (g.center - c)
+    };
+    groups.iter().map(of).collect()
+}
+
+/// What is relative to the groups, as the clouds have grown: positions and σ times s.
+pub fn grown(generated: &[Generated], groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<Generated> {
+    let scales = by_particle(groups, |g| scale(&clouds[g.i_cloud], time_s));
+    let of = |(g, s): (&Generated, f64)| Generated { position: s * g.position, sigma: s * g.sigma, ..*g };
+    generated.iter().zip(scales).map(of).collect()
+}
+
+/// Mean σ of each particle's group, as the cloud has grown.
+pub fn sigma_means(groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<f64> {
+    by_particle(groups, |g| g.sigma_mean * scale(&clouds[g.i_cloud], time_s)).collect()
+}
+
+fn by_particle<T: Clone>(groups: &[Group], of: impl Fn(&Group) -> T) -> impl Iterator<Item = T> {
+    groups.iter().flat_map(move |g| std::iter::repeat_n(of(g), g.n_particles as usize))
+}
+
+/// Offset of every group's particles: cloud origin(t) + group centre, as it has grown, − O.
 pub fn offsets(groups: &[Group], clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
-    groups.iter().map(|g| clouds[g.i_cloud].origin_at(time_s) + g.center - origin).collect()
+    let centers = grown_centers(groups, clouds, time_s);
+    groups.iter().zip(centers).map(|(g, center)| clouds[g.i_cloud].origin_at(time_s) + center - origin).collect()
 }
 
 /// Centre of every cloud relative to O at `time_s`: what the facets' fallback normal points away from.
@@ -17,7 +49,7 @@ pub fn cloud_centers(clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3>
     clouds.iter().map(|c| c.origin_at(time_s) + c.center() - origin).collect()
 }
 
-/// Placed positions: particle k of group g at positions[g.i_first + k] + offsets[g].
+/// Placed positions (of grown ones): particle k of group g at positions[g.i_first + k] + offsets[g].
 pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DVec3> {
     let mut placed = positions.to_vec();
     for (group, offset) in groups.iter().zip(offsets) {
@@ -30,14 +62,14 @@ pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DV
 }
 
 /// Adds the gusts of model.md §12 to placed positions: d(x, t) = Σ a sin(k·x + ω t + φ), x the particle at rest relative
-/// to its cloud's origin. `rest` are the group-relative positions.
+/// to its cloud's origin, as the cloud has grown. `rest` are the group-relative positions, grown.
 pub fn add_gusts(placed: &mut [DVec3], rest: &[DVec3], groups: &[Group], clouds: &[Cloud], time_s: f64) {
-    for group in groups {
+    for (group, center) in groups.iter().zip(grown_centers(groups, clouds, time_s)) {
         let cloud = &clouds[group.i_cloud];
         let modes = cloud.gust.modes(cloud.seed);
         let first = group.i_first as usize;
         for i in first..first + group.n_particles as usize {
-            let x = rest[i] + group.center;
+            let x = rest[i] + center;
             for m in &modes {
                 placed[i] += m.a * (m.k.dot(x) + m.omega * time_s + m.phase).sin();
             }
@@ -55,7 +87,7 @@ pub fn placed_bound(position_bound: DVec3, offset: DVec3, placed: DVec3, u: f64)
 
 /// Number of the cloud (the region) that each particle belongs to.
 pub fn regions(groups: &[Group]) -> Vec<u32> {
-    groups.iter().flat_map(|g| std::iter::repeat_n(g.i_cloud as u32, g.n_particles as usize)).collect()
+    by_particle(groups, |g| g.i_cloud as u32).collect()
 }
 
 /// Generated particles at their placed positions.
@@ -67,6 +99,7 @@ pub fn blobs(generated: &[Generated], placed: &[DVec3]) -> Vec<Blob> {
 mod tests {
     use super::*;
     use crate::model::cloud::{CloudSource, Particle};
+    use crate::model::growth::Growth;
     use crate::model::gust::Gust;
 
     #[test]
@@ -77,6 +110,7 @@ mod tests {
             position: DVec3::Y * y,
             wind,
             gust: Gust::CALM,
+            growth: Growth::NONE,
             i_material: 0,
             seed: 0,
         };
@@ -99,5 +133,33 @@ mod tests {
         assert_eq!(bound, DVec3::splat(1.5 + 11.5 / 8.0));
         assert_eq!(cloud_centers(&clouds, 10.0, origin)[0], offsets[0]);
         assert_eq!(blobs(&generated, &placed)[1], Blob { position: placed[1], sigma: 1.0, kappa: 1.0 });
+    }
+
+    #[test]
+    fn a_cloud_grows_about_its_own_centre() {
+        let particle = |x| Particle { position: DVec3::X * x, sigma: 0.5, kappa: 1.0, color: DVec3::ONE };
+        let cloud = Cloud {
+            source: CloudSource::Particles(vec![particle(0.0), particle(0.0), particle(6.0)]),
+            position: DVec3::Y,
+            wind: DVec3::Z,
+            gust: Gust::CALM,
+            growth: Growth { to: 3.0, time_s: 1.0 / std::f64::consts::LN_2 },
+            i_material: 0,
+            seed: 0,
+        };
+        let (groups, clouds) = (cloud.groups(0, 0), [cloud.clone()]);
+        // After 1 s half the way from 1 to 3 is grown; about x = 2 the list lies from −2 to 10 then.
+        assert!((scale(&cloud, 1.0) - 2.0).abs() < 1e-15 && scale(&cloud, -1.0) == 1.0);
+        let given = super::super::generate::cloud(&cloud);
+        let grown = grown(&given, &groups, &clouds, 1.0);
+        let positions: Vec<DVec3> = grown.iter().map(|g| g.position).collect();
+        let placed = place(&positions, &groups, &offsets(&groups, &clouds, 1.0, DVec3::ZERO));
+        for (p, x) in placed.iter().zip([-2.0, -2.0, 10.0]) {
+            assert!((*p - DVec3::new(x, 1.0, 1.0)).length() < 1e-14, "{p}");
+        }
+        assert!((grown[0].sigma - 1.0).abs() < 1e-15 && grown[0].kappa == 1.0);
+        assert!((sigma_means(&groups, &clouds, 1.0)[2] - 1.0).abs() < 1e-15);
+        // Its centre stays where it is.
+        assert_eq!(cloud_centers(&clouds, 1.0, DVec3::ZERO)[0], DVec3::new(2.0, 1.0, 1.0));
     }
 }

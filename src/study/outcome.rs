@@ -158,6 +158,7 @@ impl Outcome {
             gpu_ms: timed.measured(FrameTimes::gpu_ms),
             latency_ms: timed.measured(|t| Some(t.latency_ms)),
             queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
+            drawn: Summary::of(&timed.column(|t| Some(f64::from(t.n_drawn)))).map(|s| [s.min, s.mean, s.max]),
             passes: pass_records(&timed, against.as_ref()),
             image_hash: self.image_hash(i, of).map(str::to_owned),
         }
@@ -182,6 +183,7 @@ impl Outcome {
             gpu_ms: s.times.gpu_ms(),
             latency_ms: s.times.latency_ms,
             queue_depth: s.times.queue_depth as usize,
+            n_drawn: s.times.n_drawn,
             pass_ms: names.iter().map(|n| s.times.pass_ms(n)).collect(),
             image_hash: s.image_hash.clone(),
         };

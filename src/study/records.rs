@@ -141,6 +141,8 @@ pub struct Mode {
     pub latency_ms: Option<Measured>,
     /// Mean of the frames that the device still had when it was handed one.
     pub queue_depth: Option<f64>,
+    /// Particles that were drawn in a frame, which distance and view make fewer: least, mean and most.
+    pub drawn: Option<[f64; 3]>,
     pub passes: Vec<Pass>,
     /// SHA-256 of the last frame's pixels, where it was taken.
     pub image_hash: Option<String>,
@@ -201,12 +203,14 @@ pub struct FrameRow {
     pub latency_ms: f64,
     /// Frames that the device still had when it was handed this one.
     pub queue_depth: usize,
+    /// Particles that were drawn.
+    pub n_drawn: u32,
     /// In the order of the names handed to `write_results`; None where skipped.
     pub pass_ms: Vec<Option<f64>>,
     pub image_hash: Option<String>,
 }
 
-const FRAME_COLUMNS: [&str; 16] = [
+const FRAME_COLUMNS: [&str; 17] = [
     "i_row",
     "phase",
     "sweep",
@@ -223,6 +227,7 @@ const FRAME_COLUMNS: [&str; 16] = [
     "gpu_ms",
     "latency_ms",
     "queue_depth",
+    "n_drawn",
 ];
 
 /// Makes the folder results will go to, before anything is measured. What exists is refused unless `force`; then its
@@ -305,6 +310,7 @@ fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
         number(row.gpu_ms),
         number(Some(row.latency_ms)),
         row.queue_depth.to_string(),
+        row.n_drawn.to_string(),
     ];
     fields.extend(row.pass_ms.iter().map(|ms| number(*ms)));
     fields.push(row.image_hash.clone().unwrap_or_default());

@@ -64,7 +64,7 @@ impl Stage {
             Simulate::Gpu => None,
             Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
         };
-        let game = Game::new(scene.clone(), rest);
+        let game = Game::new(scene.clone(), rest).culling(skip);
         Ok(Stage { renderer, game, scene, compiler, device, instance })
     }
 
@@ -80,6 +80,7 @@ impl Stage {
     /// Whether frames leave out what they do not need, from the next run on.
     pub fn set_skip(&mut self, skip: bool) {
         self.renderer.set_skip(skip);
+        self.game.set_culling(skip);
     }
 
     pub fn info(&self) -> &DeviceInfo {

@@ -43,6 +43,7 @@ impl Truth {
         let setting = Setting::at(scene, &groups, time_s)?;
         let generated: Vec<Generated> = scene.clouds.iter().flat_map(reference::generate::cloud).collect();
         let offsets = reference::place::offsets(&groups, &scene.clouds, time_s, setting.light_origin);
+        let generated = reference::place::grown(&generated, &groups, &scene.clouds, time_s);
         let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
         let mut placed = reference::place::place(&positions, &groups, &offsets);
         reference::place::add_gusts(&mut placed, &positions, &groups, &scene.clouds, time_s);
@@ -72,8 +73,7 @@ impl Truth {
         let cells = reference::grid::deposit(grid, &self.blobs);
         let centers = reference::place::cloud_centers(&scene.clouds, self.setting.time_s, self.setting.light_origin);
         let regions = reference::place::regions(&self.groups);
-        let scales: Vec<f64> =
-            self.groups.iter().flat_map(|g| std::iter::repeat_n(g.sigma_mean, g.n_particles as usize)).collect();
+        let scales = reference::place::sigma_means(&self.groups, &scene.clouds, self.setting.time_s);
         let members = Members { blobs: &self.blobs, sigma_means: &scales, regions: &regions, colors: &self.colors };
         (self.facets, self.facet_colors) = if scene.groups_facets() {
             let order = self.order(scene, &regions);

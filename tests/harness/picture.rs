@@ -8,7 +8,7 @@ use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
-use nimbus::layout::particle::{ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
@@ -38,6 +38,8 @@ pub struct Picture {
     pub lit: Option<Vec<LitRecord>>,
     /// Facet of each particle, where they are not in the particles' order.
     pub i_facet: Option<Vec<u32>>,
+    /// Group of each particle and what is drawn of each group, where not all is.
+    pub drawn: Option<(Vec<u32>, Vec<DrawnRecord>)>,
     /// Rectangles under the sprites.
     pub scenery: Option<Scenery>,
 }
@@ -52,7 +54,16 @@ impl Picture {
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
         let view = View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0 };
-        Picture { camera, view, placed: vec![], particles: vec![], lit: None, i_facet: None, scenery: None }
+        Picture {
+            camera,
+            view,
+            placed: vec![],
+            particles: vec![],
+            lit: None,
+            i_facet: None,
+            drawn: None,
+            scenery: None,
+        }
     }
 
     /// A blob whose τ through the centre is `tau`.
@@ -77,7 +88,19 @@ impl Picture {
             sigma: f64::from(p.sigma),
             kappa: f64::from(q.kappa),
         };
-        self.placed.iter().zip(&self.particles).map(blob).collect()
+        let blobs = self.placed.iter().zip(&self.particles).map(blob);
+        blobs.enumerate().map(|(i, b)| Blob { kappa: b.kappa * self.weight(i), ..b }).collect()
+    }
+
+    /// Factor on particle `i`'s κ; 0 where it is not drawn.
+    fn weight(&self, i: usize) -> f64 {
+        let Some((i_group, drawn)) = &self.drawn else { return 1.0 };
+        let group = drawn[i_group[i] as usize];
+        match (i as u32 + 1).cmp(&group.end) {
+            std::cmp::Ordering::Less => f64::from(group.kappa_scale),
+            std::cmp::Ordering::Equal => f64::from(group.kappa_scale) * f64::from(group.last_weight),
+            std::cmp::Ordering::Greater => 0.0,
+        }
     }
 
     fn radiance(&self) -> Vec<DVec3> {
@@ -95,14 +118,17 @@ impl Picture {
     fn order(&self) -> Vec<u32> {
         let positions: Vec<DVec3> = self.placed.iter().map(|p| double(p.position)).collect();
         let keys = depths(self.view.pose.forward, &positions).into_iter().map(|z| key32(z as f32));
-        order(&keys.collect::<Vec<_>>())
+        let order = order(&keys.collect::<Vec<_>>());
+        order.into_iter().filter(|i| self.weight(*i as usize) > 0.0).collect()
     }
 
     /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let pass = Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some()]).expect("sprites");
+        let pass =
+            Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some(), self.drawn.is_some()])
+                .expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
@@ -116,6 +142,8 @@ impl Picture {
         let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
         let i_facet = gpu.upload(&named);
         let regions = gpu.upload(&scenery.regions);
+        let (of_particles, of_groups) = self.drawn.clone().unwrap_or_default();
+        let (i_group, drawn) = (gpu.upload(&of_particles), gpu.upload(&of_groups));
         let (width, height) = (self.view.width, self.view.height);
         let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
         let mut depth = behind.then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
@@ -139,7 +167,7 @@ impl Picture {
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
                 let n = [entries.len() as u32, scenery.lit.len() as u32];
-                let from = [&by_order, &placed, &particles, &lit, &i_facet];
+                let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn];
                 pass.record(rec, from, target, &camera, self.view.cutoff, n)?;
             }
             rec.copy_image(&mut target, &readback);
@@ -259,11 +287,11 @@ impl Picture {
         let (c, z) = (self.offset(placed), self.view_depth(placed));
         let slope = |axis: DVec3| dot(once(axis), c).over(z);
         let z_sigmas = z.over(Bounded::exact(blob.sigma));
-        Sprite {
-            s: [slope(pose.right), slope(pose.up)],
-            z: z_sigmas.squared().scaled(0.5),
-            tau: Bounded::once(SQRT_TAU).times(Bounded::exact(blob.kappa)).times(Bounded::exact(blob.sigma)),
-        }
+        // The factor is a product, and multiplied.
+        let tau = Bounded::once(SQRT_TAU).times(Bounded::exact(blob.kappa)).times(Bounded::exact(blob.sigma));
+        let one = Bounded::exact(1.0);
+        let tau = if self.drawn.is_some() { tau.times(one).times(one) } else { tau };
+        Sprite { s: [slope(pose.right), slope(pose.up)], z: z_sigmas.squared().scaled(0.5), tau }
     }
 }
 

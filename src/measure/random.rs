@@ -18,11 +18,39 @@ impl SplitMix64 {
     }
 }
 
-/// Standard normal values by Box and Muller.
+#[cfg(test)]
+impl SplitMix64 {
+    /// In [0, 1).
+    fn uniform(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// By Box and Muller.
+    fn normal(&mut self) -> f64 {
+        (-2.0 * (1.0 - self.uniform()).ln()).sqrt() * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
+
+/// Standard normal values.
 #[cfg(test)]
 pub(crate) fn normal(random: &mut SplitMix64, n: usize) -> Vec<f64> {
-    let mut uniform = || (random.next() >> 11) as f64 / (1u64 << 53) as f64;
-    (0..n).map(|_| (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos()).collect()
+    (0..n).map(|_| random.normal()).collect()
+}
+
+/// Frame times as a machine gives them: about `median`, lognormal with `sd` of the logarithm under a first-order
+/// autoregression with `rho`, and one in twenty late by an exponential tenth on top. (The median so lies 0.1 `sd` higher.)
+#[cfg(test)]
+pub(crate) fn frame_times(random: &mut SplitMix64, n: usize, median: f64, sd: f64, rho: f64) -> Vec<f64> {
+    const LATE_SHARE: f64 = 0.05;
+    const LATE_BY: f64 = 0.1;
+    let mut state = random.normal();
+    let mut next = || {
+        state = rho * state + (1.0 - rho * rho).sqrt() * random.normal();
+        let is_late = random.uniform() < LATE_SHARE;
+        let late_by = if is_late { -LATE_BY * (1.0 - random.uniform()).ln() } else { 0.0 };
+        median * (sd * state).exp() * (1.0 + late_by)
+    };
+    (0..n).map(|_| next()).collect()
 }
 
 #[cfg(test)]

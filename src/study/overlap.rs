@@ -105,23 +105,42 @@ mod tests {
         assert_eq!(Overlap::of(&[nan], &[1.0]), None);
     }
 
-    #[test]
-    fn the_interval_holds_the_truth_about_as_often_as_it_says() {
-        // Render 10 ± 0.5 ms, game 4 ± 0.1 ms; parallel 12 ± 0.5 ms: half of the 4 ms to gain. 95 % nominal over 300
-        // trials: standard error 1.3 %; outside 90–99 % it would be wrong, not unlucky.
+    /// Of `n_trials` intervals how many hold the truth. Render 10 ± 0.5 ms, game 4 ± 0.1 ms; parallel 12 ± 0.5 ms: half of
+    /// the 4 ms to gain.
+    fn n_held(n_trials: usize, n: usize, rho: f64) -> usize {
         let mut random = SplitMix64(19);
-        let n = 120;
-        let mut n_held = 0;
-        for _ in 0..300 {
-            let steps = normal(&mut random, n).into_iter().zip(normal(&mut random, n));
-            let frames = steps.map(|(a, b)| (4.0 + 0.1 * a, 10.0 + 0.5 * b));
+        let mut values = || {
+            let mut values = normal(&mut random, n);
+            for i in 1..n {
+                values[i] = rho * values[i - 1] + (1.0 - rho * rho).sqrt() * values[i];
+            }
+            values
+        };
+        let mut holds = || {
+            let frames = values().into_iter().zip(values()).map(|(a, b)| (4.0 + 0.1 * a, 10.0 + 0.5 * b));
             let serial: Vec<SerialFrame> = frames
                 .map(|(game_ms, render_ms)| SerialFrame { frame_ms: game_ms + render_ms, game_ms, render_ms })
                 .collect();
-            let parallel: Vec<f64> = normal(&mut random, n).iter().map(|z| 12.0 + 0.5 * z).collect();
+            let parallel: Vec<f64> = values().iter().map(|z| 12.0 + 0.5 * z).collect();
             let reached = Overlap::of(&serial, &parallel).unwrap().reached.unwrap();
-            n_held += usize::from(reached.low <= 0.5 && 0.5 <= reached.high);
+            reached.low <= 0.5 && 0.5 <= reached.high
+        };
+        (0..n_trials).filter(|_| holds()).count()
+    }
+
+    #[test]
+    fn the_interval_holds_the_truth_about_as_often_as_it_says() {
+        // 96.0 % of 2000 trials (ρ = 0: 96.3; 0.6: 95.7; n = 60, ρ = 0.3: 95.7). Over 300 the standard error is 1.2 %;
+        // outside 91–98.5 % it would be wrong, not unlucky.
+        let n_held = n_held(300, 120, 0.3);
+        assert!((273..=295).contains(&n_held), "{n_held} of 300");
+    }
+
+    #[test]
+    #[ignore = "minutes: prints the figures of the comments"]
+    fn coverage_of_the_share_in_thousands_of_trials() {
+        for (n, rho) in [(60, 0.3), (240, 0.0), (240, 0.3), (240, 0.6)] {
+            println!("n {n}, rho {rho}: share {:.1} %", n_held(2000, n, rho) as f64 / 20.0);
         }
-        assert!((270..=297).contains(&n_held), "{n_held} of 300");
     }
 }

@@ -6,17 +6,22 @@ use std::sync::atomic::AtomicBool;
 use super::args::{BenchArgs, ThreadingArg};
 use super::{device_choice, load, output, say_notes, say_sizes};
 use crate::error::{Error, Result};
-use crate::gpu::DeviceInfo;
+use crate::gpu::{ClockFit, DeviceInfo};
 use crate::measure::lows::fps;
 use crate::measure::stats::Summary;
+use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Outcome, pass_names};
 use crate::study::overlap::Overlap;
 use crate::study::records::{self, Run};
 use crate::study::stage::Stage;
-use crate::study::trace;
+use crate::study::trace::{self, Beside};
 
-pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
+/// Of the device's clock beside the host's, before the frames and after them.
+const N_CLOCK_READINGS: usize = 8;
+
+/// `zones`: where what the threads do is collected.
+pub fn run(args: &BenchArgs, stop: &AtomicBool, zones: Option<&Zones>) -> Result<()> {
     let outs = out_dirs(args)?;
     if let Some(file) = &args.trace {
         super::refuse_existing(file, args.force)?;
@@ -32,7 +37,7 @@ pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
     let mut runs = Vec::new();
     let mut interrupted = false;
     for (scene, out) in args.scenes.iter().zip(&outs) {
-        let run = bench_one(args, scene, out.as_deref(), stop)?;
+        let run = bench_one(args, scene, out.as_deref(), stop, zones)?;
         interrupted = run.interrupted;
         runs.push(run);
         if interrupted {
@@ -75,7 +80,13 @@ fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
     Ok(names.into_iter().map(|n| Some(out.join(n))).collect())
 }
 
-fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBool) -> Result<Run> {
+fn bench_one(
+    args: &BenchArgs,
+    path: &Path,
+    out: Option<&Path>,
+    stop: &AtomicBool,
+    zones: Option<&Zones>,
+) -> Result<Run> {
     let date = records::utc_now();
     let loaded = load(path, &args.options)?;
     let modes = match args.threading {
@@ -97,9 +108,12 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
     }
     let n_total = u64::from(plan.n_blocks) * plan.modes.len() as u64 * (u64::from(n_frames) + u64::from(args.warmup));
     let bar = output::progress(n_total, &path.display().to_string(), args.options.quiet);
+    // Before and after, so that what the two clocks drift apart shows.
+    let mut clocks = stage.device.read_clocks(N_CLOCK_READINGS)?;
     let outcome = bench::run(&mut stage, &plan, stop, &mut || bar.inc(1));
     bar.finish_and_clear();
     let outcome = outcome?;
+    clocks.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
     let info = stage.info().clone();
     let run = Run {
         schema: records::SCHEMA_VERSION,
@@ -123,7 +137,8 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         records::write_results(dir, &run, &pass_names(), &outcome.rows())?;
     }
     if let Some(file) = &args.trace {
-        trace::write(file, &outcome.samples)?;
+        let zones = zones.map(Zones::take);
+        trace::write(file, &outcome.samples, &Beside { zones: zones.as_ref(), clock: ClockFit::of(&clocks) })?;
     }
     if !args.json {
         output::text(&report(path, &run, &info, &outcome, args))?;

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
+use tracing::info_span;
 
 use super::exchange::is_glossy;
 use super::packet::Packet;
@@ -94,12 +95,17 @@ impl Game {
     /// A frame at any time.
     pub fn step_at(&mut self, i_frame: u32, time_s: f64) -> Result<Packet> {
         let begin = Instant::now();
-        let setting = Setting::at(&self.scene, &self.groups, time_s)?;
+        let _zone = info_span!("game step").entered();
+        let setting = info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
-        let groups: Vec<GroupRecord> = self.groups.iter().map(|g| self.group(g, origins[g.i_cloud])).collect();
+        let groups: Vec<GroupRecord> =
+            info_span!("groups").in_scope(|| self.groups.iter().map(|g| self.group(g, origins[g.i_cloud])).collect());
         let modes = self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect();
-        let placed = self.rest.as_ref().map(|rest| self.place(rest, &origins, time_s));
+        let placed = self
+            .rest
+            .as_ref()
+            .map(|rest| info_span!("place particles").in_scope(|| self.place(rest, &origins, time_s)));
         Ok(Packet {
             i_frame,
             time_s,

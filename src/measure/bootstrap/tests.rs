@@ -1,5 +1,5 @@
-//! Among others how often intervals hold the truth: a few hundred trials that every run of the tests can afford, and the thousands
-//! behind the figures in the comments (`cargo test --release --lib coverage -- --ignored --nocapture`).
+//! Among others how often intervals hold the truth: a few hundred trials that every run of the tests can afford, and the
+//! thousands behind the figures in the comments (`cargo test --release --lib coverage -- --ignored --nocapture`).
 
 use super::*;
 use crate::measure::random::{frame_times, normal};

@@ -6,15 +6,22 @@ use std::sync::atomic::AtomicBool;
 use super::args::{BenchArgs, ThreadingArg};
 use super::{bench_table, device_choice, load, output, say_notes, say_sizes};
 use crate::error::{Error, Result};
+use crate::gpu::ClockFit;
+use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan};
 use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points};
+use crate::study::machine;
 use crate::study::outcome::pass_names;
 use crate::study::records::{self, Run};
 use crate::study::stage::Stage;
-use crate::study::{machine, trace};
+use crate::study::trace::{self, Beside};
 
-pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
+/// Of the device's clock beside the host's, before the frames and after them.
+const N_CLOCK_READINGS: usize = 8;
+
+/// `zones`: where what the threads do is collected.
+pub fn run(args: &BenchArgs, stop: &AtomicBool, zones: Option<&Zones>) -> Result<()> {
     let outs = out_dirs(args)?;
     if let Some(file) = &args.trace {
         super::refuse_existing(file, args.force)?;
@@ -31,7 +38,7 @@ pub fn run(args: &BenchArgs, stop: &AtomicBool) -> Result<()> {
     let mut runs = Vec::new();
     let mut interrupted = false;
     for (scene, out) in args.scenes.iter().zip(&outs) {
-        let run = bench_one(args, scene, out.as_deref(), stop)?;
+        let run = bench_one(args, scene, out.as_deref(), stop, zones)?;
         interrupted = run.interrupted;
         runs.push(run);
         if interrupted {
@@ -97,7 +104,13 @@ fn prepare(args: &BenchArgs, path: &Path, options: &super::SceneArgs) -> Result<
     Ok(Prepared { cases: all, scene_hash, resolved })
 }
 
-fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBool) -> Result<Run> {
+fn bench_one(
+    args: &BenchArgs,
+    path: &Path,
+    out: Option<&Path>,
+    stop: &AtomicBool,
+    zones: Option<&Zones>,
+) -> Result<Run> {
     let date = machine::utc_now();
     let Prepared { cases, scene_hash, resolved } = prepare(args, path, &args.options)?;
     let plan = BenchPlan { n_warm_up: args.warmup, n_rounds: args.repeat, hash_frames: args.hash_frames };
@@ -110,9 +123,12 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         say_sizes(&stage.scene, Some(&stage));
     }
     let bar = output::progress(bench::n_frames_total(&cases, &plan), &path.display().to_string(), args.options.quiet);
+    // Before and after, so that what the two clocks drift apart shows.
+    let mut readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
     let outcome = bench::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
     bar.finish_and_clear();
     let (mut stage, outcome) = outcome?;
+    readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
     let info = stage.info().clone();
     let run = Run {
         schema: records::SCHEMA_VERSION,
@@ -134,7 +150,8 @@ fn bench_one(args: &BenchArgs, path: &Path, out: Option<&Path>, stop: &AtomicBoo
         records::write_results(dir, &run, &pass_names(), &outcome.rows(&cases))?;
     }
     if let Some(file) = &args.trace {
-        trace::write(file, &outcome.samples)?;
+        let zones = zones.map(Zones::take);
+        trace::write(file, &outcome.samples, &Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
     }
     if !args.json {
         let same: Vec<Option<bool>> = (0..cases.len()).map(|i| outcome.is_same_picture(i)).collect();

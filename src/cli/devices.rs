@@ -65,7 +65,13 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
         0 => "no timestamps: passes are not timed".to_owned(),
         bits => format!("timestamps {bits} bits, {} ns a tick", l.timestamp_period_ns),
     };
-    out + &format!("   images up to {} a side; {timestamps}\n", l.max_image_extent)
+    out += &format!("   images up to {} a side; {timestamps}\n", l.max_image_extent);
+    out + &match d.calibrated_timestamps {
+        Some(name) => format!("   clock calibrated with the host's by {}\n", name.to_string_lossy()),
+        None => {
+            "   clock not calibrated with the host's: VK_KHR_ and VK_EXT_calibrated_timestamps are missing\n".to_owned()
+        }
+    }
 }
 
 fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
@@ -73,6 +79,7 @@ fn to_json(d: &DeviceInfo, i_used: Option<usize>) -> serde_json::Value {
     json!({
         "index": d.index, "name": d.name, "driver": d.driver, "api": version(d), "type": d.kind, "uuid": d.uuid,
         "used": Some(d.index) == i_used, "unusable": d.unusable,
+        "calibrated_timestamps": d.calibrated_timestamps.map(|name| name.to_string_lossy()),
         "limits": {
             "device_memory_bytes": l.device_memory_bytes, "max_storage_buffer_bytes": l.max_storage_buffer_bytes,
             "max_texels": l.max_texels,

@@ -1,6 +1,7 @@
 //! What was typed ([`args`]) → what it means (one file a command) → an exit code.
 
 pub mod args;
+mod attach;
 mod bench;
 mod bench_table;
 mod compare;
@@ -36,11 +37,12 @@ pub fn main() -> ExitCode {
     let args = Args::parse();
     // Without a handler Ctrl-C still ends the program, only less cleanly.
     let _ = ctrlc::set_handler(interrupted);
+    let zones = attach::attach(matches!(&args.command, Command::Bench(a) if a.trace.is_some()));
     let done = match &args.command {
         Command::Render(a) => render::run(a),
         Command::Bench(a) => {
             GRACEFUL.store(true, Ordering::Relaxed);
-            bench::run(a, &STOP)
+            bench::run(a, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
         Command::Inspect(a) => inspect::run(a),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3};
+use tracing::info_span;
 
 use super::drawn::drawn;
 use super::exchange::is_glossy;
@@ -105,12 +106,16 @@ impl Game {
     /// A frame at any time.
     pub fn step_at(&mut self, i_frame: u32, time_s: f64) -> Result<Packet> {
         let begin = Instant::now();
-        let setting = Setting::at(&self.scene, &self.groups, time_s)?;
+        let _zone = info_span!("game step").entered();
+        let setting = info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let grown = self.scene.grown(&self.groups, time_s);
-        let (drawn, n_drawn) = drawn(&self.scene, &grown, &setting, self.culls);
-        let placed = self.rest.as_ref().map(|rest| self.place(rest, &grown, &origins, time_s));
+        let (drawn, n_drawn) = info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, self.culls));
+        let placed = self
+            .rest
+            .as_ref()
+            .map(|rest| info_span!("place particles").in_scope(|| self.place(rest, &grown, &origins, time_s)));
         // The device moves nothing that is placed already.
         let modes = match placed {
             Some(_) => vec![],

@@ -1,5 +1,7 @@
 //! What a renderer reads back for those who ask between frames: pictures, particles, facets.
 
+use tracing::info_span;
+
 use super::buffers::download;
 use super::render::Renderer;
 use crate::error::{Error, Result};
@@ -24,6 +26,7 @@ impl Renderer {
 
     /// The last frame as it lies in the target: what "the same bytes" means.
     pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
+        let _zone = info_span!("read back").entered();
         let (target, readback) = (&mut self.targets[self.i_ended_target], &self.readback);
         self.host.run(|rec| {
             rec.copy_image(target, readback);

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use tracing::info_span;
+
 use super::buffers::{Buffers, Placed, has_second};
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::feed::IN_FLIGHT;
@@ -217,12 +219,13 @@ impl Renderer {
 
     fn submit(&mut self, packet: Packet) -> Result<Pending> {
         let begin = Instant::now();
-        let plan = plan(&self.traits, self.last.as_ref(), &packet);
+        let _zone = info_span!("render step").entered();
+        let plan = info_span!("plan").in_scope(|| plan(&self.traits, self.last.as_ref(), &packet));
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
         if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) {
             self.i_target = (self.i_target + 1) % IN_FLIGHT;
         }
-        self.write(slot, &packet)?;
+        info_span!("upload").in_scope(|| self.write(slot, &packet))?;
         self.record(slot, &packet, &plan)?;
         let recorded = [begin, Instant::now()];
         let pending = self.frames[slot].submit()?;

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ash::{ext, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
+use super::calibration;
 use super::instance::Instance;
 use crate::error::{Error, Result};
 
@@ -22,6 +23,8 @@ pub struct DeviceInfo {
     /// Why nimbus cannot use it, if it cannot.
     pub unusable: Option<String>,
     pub limits: Limits,
+    /// The extension by which the device's clock and the host's can be read at one moment, where there is one.
+    pub calibrated_timestamps: Option<&'static CStr>,
     physical: vk::PhysicalDevice,
     queue_family: u32,
 }
@@ -49,6 +52,18 @@ pub struct Limits {
     pub timestamp_period_ns: f64,
 }
 
+impl Limits {
+    /// Nanoseconds from the device's own zero to a timestamp of its queue.
+    pub(super) fn ticks_ns(&self, ticks: u64) -> f64 {
+        (ticks & self.tick_mask()) as f64 * self.timestamp_period_ns
+    }
+
+    /// The bits of a timestamp that count.
+    pub(super) fn tick_mask(&self) -> u64 {
+        u64::MAX.checked_shr(64 - self.timestamp_valid_bits).unwrap_or(0)
+    }
+}
+
 /// An open device. Dropping it reports every allocation that is still alive to the instance's messages.
 pub struct Device {
     shared: Arc<Shared>,
@@ -71,7 +86,7 @@ impl Device {
     pub fn list(instance: &Instance) -> Result<Vec<DeviceInfo>> {
         let physical = unsafe { instance.raw.enumerate_physical_devices() }
             .map_err(|e| Error::vulkan("vkEnumeratePhysicalDevices", e))?;
-        Ok(physical.into_iter().enumerate().map(|(i, p)| describe(&instance.raw, i, p)).collect())
+        Ok(physical.into_iter().enumerate().map(|(i, p)| describe(instance, i, p)).collect())
     }
 
     /// Opens the device named by `choice` (an index, or part of a name), else the best one: discrete, then
@@ -204,7 +219,9 @@ impl Drop for Shared {
     }
 }
 
-fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice) -> DeviceInfo {
+fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> DeviceInfo {
+    let calibrated_timestamps = calibration::probe(instance, physical);
+    let instance = &instance.raw;
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut id = vk::PhysicalDeviceIDProperties::default();
     let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
@@ -250,6 +267,7 @@ fn describe(instance: &ash::Instance, index: usize, physical: vk::PhysicalDevice
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
             timestamp_period_ns: f64::from(limits.timestamp_period),
         },
+        calibrated_timestamps,
         physical,
         queue_family: family.unwrap_or(0) as u32,
     }
@@ -290,7 +308,9 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .synchronization2(true)
         .dynamic_rendering(true)
         .shader_demote_to_helper_invocation(true);
-    let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut v12).push_next(&mut v13);
+    let extensions: Vec<_> = info.calibrated_timestamps.iter().map(|name| name.as_ptr()).collect();
+    let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
+    let create = create.push_next(&mut v12).push_next(&mut v13);
     unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
 }
 
@@ -338,6 +358,7 @@ mod tests {
             uuid: String::new(),
             unusable: None,
             limits,
+            calibrated_timestamps: None,
             physical: vk::PhysicalDevice::null(),
             queue_family: 0,
         }

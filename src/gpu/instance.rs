@@ -30,7 +30,7 @@ pub struct Instance {
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Arc<Messages>,
     // Holds the loader's library open; dropped last.
-    _entry: ash::Entry,
+    pub(super) entry: ash::Entry,
 }
 
 impl Instance {
@@ -68,7 +68,7 @@ impl Instance {
         } else {
             None
         };
-        Ok(Arc::new(Instance { raw, has_debug_utils, messenger, messages, _entry: entry }))
+        Ok(Arc::new(Instance { raw, has_debug_utils, messenger, messages, entry }))
     }
 
     pub fn messages(&self) -> &Arc<Messages> {

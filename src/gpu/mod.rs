@@ -3,6 +3,7 @@
 //! Vulkan 1.3 core (synchronization2, dynamic rendering, timeline semaphores). What a shader reads and writes is
 //! reflected from its SPIR-V, and the recorder derives the barriers from that.
 
+pub mod calibration;
 pub mod device;
 pub mod draw;
 pub mod instance;
@@ -14,6 +15,7 @@ pub mod reflect;
 pub mod shader;
 pub mod timer;
 
+pub use calibration::{ClockFit, ClockPair};
 pub use device::{Device, DeviceInfo};
 pub use draw::DrawPipeline;
 pub use instance::Instance;

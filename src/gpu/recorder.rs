@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::Pod;
+use tracing::info_span;
 
 use super::device::{Device, Shared};
 use super::kernel::{Interface, Kernel};
@@ -51,6 +52,7 @@ pub struct Pending {
 impl Pending {
     /// Returns when the device has done it all.
     pub fn wait(&self) -> Result<()> {
+        let _zone = info_span!("wait").entered();
         let (semaphores, values) = ([self.semaphore], [self.value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         unsafe { self.shared.raw.wait_semaphores(&info, TIMEOUT_NS) }
@@ -100,6 +102,7 @@ impl Commands {
 
     /// Records anew what `f` asks for. The previous submission must have been waited for.
     pub fn record(&mut self, barriers: Barriers, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
+        let _zone = info_span!("record").entered();
         let raw = self.shared.raw.clone();
         unsafe {
             for pool in &self.descriptors {
@@ -124,6 +127,7 @@ impl Commands {
 
     /// Starts the recorded commands; returns at once.
     pub fn submit(&mut self) -> Result<Pending> {
+        let _zone = info_span!("submit").entered();
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
         let value = self.submitted + 1;
         let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.semaphore).value(value);
@@ -221,6 +225,7 @@ pub struct Recorder<'a> {
 impl Recorder<'_> {
     /// Runs `f` between two timestamps under `name`.
     pub fn scope(&mut self, name: &'static str, f: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        let _zone = info_span!("record", name).entered();
         let i = self.commands.timer.begin(self.commands.buffer, name);
         let done = f(self);
         self.commands.timer.end(self.commands.buffer, i);

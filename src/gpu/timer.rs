@@ -107,12 +107,12 @@ impl Timer {
         let Some(ticks) = self.ticks.as_ref().filter(|_| !self.names.is_empty()) else { return Ok(vec![]) };
         let ticks: Vec<u64> = ticks.read(2 * self.names.len())?;
         let limits = &self.shared.limits;
-        let mask = u64::MAX.checked_shr(64 - limits.timestamp_valid_bits).unwrap_or(0);
+        let mask = limits.tick_mask();
         let times = self.names.iter().zip(ticks.chunks_exact(2)).map(|(name, t)| {
             let (begin, end) = (t[0] & mask, t[1] & mask);
             // The counter wraps at its valid bits; a difference modulo them is right all the same.
             let length = end.wrapping_sub(begin) & mask;
-            let begin_ns = begin as f64 * limits.timestamp_period_ns;
+            let begin_ns = limits.ticks_ns(begin);
             ScopeTime { name, begin_ns, end_ns: begin_ns + length as f64 * limits.timestamp_period_ns }
         });
         Ok(times.collect())

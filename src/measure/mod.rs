@@ -1,7 +1,8 @@
-//! Clocks and statistics; knows nothing of clouds or Vulkan.
+//! Clocks, zones and statistics; knows nothing of clouds or Vulkan.
 
 pub mod bootstrap;
 pub mod clock;
 pub mod lows;
 pub(crate) mod random;
 pub mod stats;
+pub mod zones;

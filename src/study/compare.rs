@@ -182,7 +182,7 @@ mod tests {
     use crate::measure::random::{SplitMix64, frame_times};
 
     const N_TRIALS: usize = 100;
-    const SEED: u64 = 10;
+    const SEED: u64 = 1;
     /// What a scene of 120 frames gives in the two blocks that are the default.
     const N_FRAMES: usize = 240;
     /// A quiet machine's noise, of the median: least and greatest.
@@ -209,12 +209,12 @@ mod tests {
 
     #[test]
     fn of_a_hundred_pairs_of_equal_runs_few_seem_to_differ() {
-        // 95.4 % of 4000 trials at either noise (below): 2.3 % seemed faster, 2.2 % slower. Of a hundred that is 95.4 with a
-        // standard deviation of 2.1, so that one seed in three gives fewer than 95. This one gives 96 at either.
+        // 95.4 % of 4000 trials at either noise (below): 2.3 % seemed faster, 2.2 % slower. Of 400 that is 382 with a
+        // standard deviation of 4.2: 371 is two and a half below.
         for noise in NOISE {
-            let (faster, none, slower) = verdicts(1.0, noise, N_TRIALS, SEED);
-            assert!(none >= 95, "{faster} faster, {none} no difference, {slower} slower");
-            assert!(none < N_TRIALS, "a rule that never finds a difference");
+            let (faster, none, slower) = verdicts(1.0, noise, 4 * N_TRIALS, SEED);
+            assert!(none >= 371, "{faster} faster, {none} no difference, {slower} slower");
+            assert!(none < 4 * N_TRIALS, "a rule that never finds a difference");
         }
     }
 

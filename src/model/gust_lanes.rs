@@ -126,12 +126,12 @@ fn sum(waves: &[Wave], x: &[Lanes; 3]) -> [Lanes; 3] {
     let mut d = [[0.0; LANES]; 3];
     for w in waves {
         let mut sines = [0.0; LANES];
-        for l in 0..LANES {
-            sines[l] = sine(w.k[0] * x[0][l] + w.k[1] * x[1][l] + w.k[2] * x[2][l] + w.phase);
+        for (l, value) in sines.iter_mut().enumerate() {
+            *value = sine(w.k[0] * x[0][l] + w.k[1] * x[1][l] + w.k[2] * x[2][l] + w.phase);
         }
         for (along, a) in d.iter_mut().zip(w.a) {
-            for l in 0..LANES {
-                along[l] += a * sines[l];
+            for (along, value) in along.iter_mut().zip(&sines) {
+                *along += a * value;
             }
         }
     }

@@ -26,7 +26,7 @@ pub const SINE_REACH: f64 = 2_097_152.0;
 const TO_INTEGER: f64 = 6_755_399_441_055_744.0;
 /// π's first 33 bits, and the rest.
 const PI_1: f64 = f64::from_bits(0x4009_21fb_5440_0000);
-const PI_2: f64 = 1.215_420_101_301_238_45e-10;
+const PI_2: f64 = 1.215_420_101_301_238_5e-10;
 /// (−1)ⁿ/(2n + 1)!, n from 9 to 1.
 const SERIES: [f64; 9] = [
     -1.0 / 121_645_100_408_832_000.0,

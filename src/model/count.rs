@@ -46,8 +46,7 @@ impl Count {
     /// What is drawn of a group of `n` particles where `share` of its cloud is.
     pub fn drawn(&self, n: u32, share: f64) -> Drawn {
         let x = f64::from(n) * share;
-        // Written so that what is no number draws nothing.
-        if !(x >= LEAST_DRAWN) {
+        if x.is_nan() || x < LEAST_DRAWN {
             return Drawn::NOTHING;
         }
         let n = (x.ceil() as u32).min(n);

@@ -26,7 +26,7 @@ pub const SINE_REACH: f64 = 2_097_152.0;
 const TO_INTEGER: f64 = 6_755_399_441_055_744.0;
 /// π's first 33 bits, and the rest.
 const PI_1: f64 = f64::from_bits(0x4009_21fb_5440_0000);
-const PI_2: f64 = 1.215_420_101_301_238_45e-10;
+const PI_2: f64 = 1.215_420_101_301_238_5e-10;
 /// (−1)ⁿ/(2n + 1)!, n from 9 to 1.
 const SERIES: [f64; 9] = [
     -1.0 / 121_645_100_408_832_000.0,
@@ -126,12 +126,12 @@ fn sum(waves: &[Wave], x: &[Lanes; 3]) -> [Lanes; 3] {
     let mut d = [[0.0; LANES]; 3];
     for w in waves {
         let mut sines = [0.0; LANES];
-        for l in 0..LANES {
-            sines[l] = sine(w.k[0] * x[0][l] + w.k[1] * x[1][l] + w.k[2] * x[2][l] + w.phase);
+        for (l, value) in sines.iter_mut().enumerate() {
+            *value = sine(w.k[0] * x[0][l] + w.k[1] * x[1][l] + w.k[2] * x[2][l] + w.phase);
         }
         for (along, a) in d.iter_mut().zip(w.a) {
-            for l in 0..LANES {
-                along[l] += a * sines[l];
+            for (along, value) in along.iter_mut().zip(&sines) {
+                *along += a * value;
             }
         }
     }

@@ -78,6 +78,22 @@ impl Error {
         Error::Usage { what: what.into() }
     }
 
+    /// The same error with where it happened, such as which part of a run.
+    pub fn within(mut self, place: &str) -> Self {
+        match &mut self {
+            Error::Scene { what, .. }
+            | Error::Shader { what, .. }
+            | Error::Vulkan { what, .. }
+            | Error::Limit { what }
+            | Error::Io { what, .. }
+            | Error::Usage { what }
+            | Error::Check { what }
+            | Error::Fault { what } => what.push_str(&format!(" (in {place})")),
+            Error::Interrupted => {}
+        }
+        self
+    }
+
     /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 101 a fault of nimbus itself; 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -195,7 +195,7 @@ fn bench_writes_a_time_line_of_every_step_and_pass() {
         "--frames",
         "4",
         "--warmup",
-        "1",
+        "0",
         "--repeat",
         "1",
         "--no-skip",
@@ -207,8 +207,8 @@ fn bench_writes_a_time_line_of_every_step_and_pass() {
     let trace: Value = serde_json::from_slice(&std::fs::read(&file).expect("the trace")).expect("JSON");
     let events = trace["traceEvents"].as_array().expect("events");
     let steps = |tid: u64| events.iter().filter(move |e| e["ph"] == "X" && e["tid"] == tid);
-    // Five frames of each loop.
-    assert_eq!((steps(0).count(), steps(1).count()), (10, 10));
+    // Four frames of each loop.
+    assert_eq!((steps(0).count(), steps(1).count()), (8, 8));
     let span =
         |e: &Value| [e["ts"].as_f64().expect("ts"), e["ts"].as_f64().expect("ts") + e["dur"].as_f64().expect("dur")];
     for frame in steps(0) {
@@ -226,6 +226,8 @@ fn bench_writes_a_time_line_of_every_step_and_pass() {
     }
     let (code, _, stderr) = run(&args);
     assert!(code == 2 && stderr.contains("trace.json"), "{stderr}");
+    let nowhere = run(&["bench", "scenes/hello.toml", "--trace", &path(&dir, "absent/b.json")]);
+    assert!(nowhere.0 == 2 && nowhere.1.is_empty() && nowhere.2.contains("does not exist"), "{}", nowhere.2);
     let two = run(&["bench", "scenes/hello.toml", "scenes/static.toml", "--trace", &path(&dir, "b.json")]);
     assert!(two.0 == 2 && two.2.contains("one scene, found 2"), "{}", two.2);
 }

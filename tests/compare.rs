@@ -72,6 +72,7 @@ fn run() -> Run {
         drawn: None,
         passes: Vec::new(),
         image_hash: None,
+        block_spread: None,
     };
     Run {
         schema: SCHEMA_VERSION,
@@ -100,6 +101,7 @@ fn run() -> Run {
         cases: vec![Case {
             phase: None,
             sweep: Vec::new(),
+            scene_hash: "cd".repeat(32),
             particles: 554,
             width: 800,
             height: 600,

@@ -82,7 +82,10 @@ fn counted(out: &str) -> Vec<(String, usize, usize)> {
             modes.push((line[threading].to_owned(), 0, 0));
         }
         let (_, n, n_warm_up) = modes.last_mut().expect("a mode");
-        assert_eq!(line[frame].parse(), Ok((*n + *n_warm_up) as u32), "frames follow one another");
+        // Frames to warm up with run backwards to the first one.
+        let is_warm_up = &line[warm_up] == "true";
+        let want = if is_warm_up { N_WARM_UP as usize - *n_warm_up } else { *n };
+        assert_eq!(line[frame].parse(), Ok(want as u32), "frames follow one another");
         *(if &line[warm_up] == "true" { n_warm_up } else { n }) += 1;
     }
     modes

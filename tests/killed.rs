@@ -70,6 +70,7 @@ fn run(k: u32) -> Run {
         drawn: None,
         passes: Vec::new(),
         image_hash: None,
+        block_spread: None,
     };
     Run {
         schema: SCHEMA_VERSION,
@@ -98,6 +99,7 @@ fn run(k: u32) -> Run {
         cases: vec![Case {
             phase: None,
             sweep: vec![],
+            scene_hash: "cd".repeat(32),
             particles: 1,
             width: 1,
             height: 1,
@@ -149,8 +151,7 @@ fn prepared() -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = dir.path().join("run");
     write_results(&folder, &run(1), &[], &rows(1)).expect("results");
     fs::write(folder.join("notes.txt"), "mine").expect("a file");
-    fs::create_dir(folder.join("plots")).expect("a folder");
-    fs::write(folder.join("plots/a.png"), "picture").expect("a file");
+    fs::write(folder.join("a.png"), "picture").expect("a file");
     (dir, folder)
 }
 
@@ -180,7 +181,7 @@ fn a_process_killed_at_any_moment_leaves_results_of_one_run() {
         assert!(found > k, "generation {found} after {k}");
         k = found;
         let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert_eq!((text("notes.txt").as_str(), text("plots/a.png").as_str()), ("mine", "picture"), "after kill {i}");
+        assert_eq!((text("notes.txt").as_str(), text("a.png").as_str()), ("mine", "picture"), "after kill {i}");
         assert_eq!(fs::read_dir(&folder).expect("the folder").count(), 4, "nothing else after kill {i}");
     }
     let n_left = fs::read_dir(dir.path()).expect("a folder").count() - 1;

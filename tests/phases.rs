@@ -143,7 +143,7 @@ fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
     let args = ["bench", &path, "--warmup", "2", "--repeat", "2", "--sweep", "draw.cutoff=2,3", "--out", &out];
     let (code, table, stderr) = nimbus(&args);
     assert_eq!((code, stderr.as_str()), (0, ""));
-    let cases: Vec<&str> = table.lines().filter(|l| l.contains("serial  ") && !l.contains("no-skip")).collect();
+    let cases: Vec<&str> = table.lines().filter(|l| l.contains(" serial  ") && !l.contains("no-skip")).collect();
     assert_eq!(cases.len(), 6, "{table}");
     assert!(table.contains("6 of 6 cases gave the same last frame"), "{table}");
     let run = read_run(Path::new(&out)).expect("the run");
@@ -159,14 +159,14 @@ fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
     // There and back.
     assert!(run.block_order.iter().eq(run.block_order.iter().rev()));
     let recorded = read_results(Path::new(&out)).expect("the results");
-    // Timed frames follow each other from phase to phase, after the warm-up of the first.
+    // Timed frames are those of the scene, and follow each other from phase to phase.
     let frames = |name: &str| {
         let mode = recorded.modes.iter().find(|m| m.name == name).expect(name);
         mode.frames.clone()
     };
-    assert_eq!(frames("lit, draw.cutoff=2: serial"), [2, 3, 4, 5, 2, 3, 4, 5]);
-    assert_eq!(frames("unlit and small, draw.cutoff=3: parallel"), [6, 7, 8, 6, 7, 8]);
-    assert_eq!(frames("alone, draw.cutoff=3: serial no-skip"), [9, 10, 11, 12, 13, 9, 10, 11, 12, 13]);
+    assert_eq!(frames("lit, draw.cutoff=2: serial"), [0, 1, 2, 3, 0, 1, 2, 3]);
+    assert_eq!(frames("unlit and small, draw.cutoff=3: parallel"), [4, 5, 6, 4, 5, 6]);
+    assert_eq!(frames("alone, draw.cutoff=3: serial no-skip"), [7, 8, 9, 10, 11, 7, 8, 9, 10, 11]);
     let csv = fs::read_to_string(Path::new(&out).join("frames.csv")).expect("frames.csv");
     assert!(csv.lines().filter(|l| l.contains(",unlit and small,draw.cutoff=3,")).count() == 2 * 3 * 5, "{csv}");
     // Read back, every case meets itself.
@@ -197,8 +197,8 @@ fn a_sweep_that_makes_no_scene_is_refused_before_anything_runs() {
     let (dir, path) = temp(SCENE);
     let out = dir.path().join("run").display().to_string();
     for (sweep, part) in [
-        ("draw.cutoff=2,900", "--set draw.cutoff=900"),
-        ("draw.cutof=2", "unknown key `draw.cutof`"),
+        ("draw.cutoff=2,900", "--sweep draw.cutoff=900: "),
+        ("draw.cutof=2", "--sweep draw.cutof=2: unknown key `draw.cutof`"),
         ("size=2", "expected WIDTHxHEIGHT"),
         ("draw.cutoff", "no `=`"),
         ("draw.cutoff=2,2", "2 twice"),
@@ -207,6 +207,62 @@ fn a_sweep_that_makes_no_scene_is_refused_before_anything_runs() {
         assert!(code == 2 && stdout.is_empty() && stderr.contains(part), "{sweep}: {stderr}");
         assert!(!Path::new(&out).exists());
     }
-    let twice = ["bench", &path, "--sweep", "draw.cutoff=2", "--sweep", "draw.cutoff=3"];
-    assert!(nimbus(&twice).2.contains("the key twice"));
+    let twice = |a, b| nimbus(&["bench", &path, "--sweep", a, "--sweep", b]).2;
+    assert!(twice("draw.cutoff=2", "draw.cutoff=3").contains("the key twice"));
+    assert!(twice("size=8x8,9x9", "film.width=4").contains("which another --sweep sets"));
+    let frames = nimbus(&["bench", &path, "--sweep", "time.frames=12", "--frames", "3"]);
+    assert!(frames.0 == 2 && frames.2.contains("--frames says"), "{}", frames.2);
+}
+
+#[test]
+fn a_case_that_cannot_run_is_named_before_any_does() {
+    let scene = SCENE.replace("from = \"particles\"\nfile = \"points.csv\"", "from = \"boxes\"\nfile = \"box.dat\"");
+    let (dir, path) = temp(&scene);
+    fs::write(dir.path().join("box.dat"), "5\n1\n5, 1, 1, 1, 0, 0, 0, 0.5\n").expect("a box");
+    let out = dir.path().join("run").display().to_string();
+    let args = ["bench", &path, "--sweep", "draw.particles=5,2000000000", "--out", &out];
+    let (code, stdout, stderr) = nimbus(&args);
+    assert!(code == 2 && stdout.is_empty(), "{stderr}");
+    assert!(stderr.contains("draw.particles=2000000000"), "{stderr}");
+    assert!(!Path::new(&out).exists(), "nothing stands in the way of the next run");
+}
+
+#[test]
+fn a_sweep_over_files_knows_what_is_in_them() {
+    let (dir, path) = temp(SCENE.split("[[phase]]").next().expect("a part"));
+    let other = |radius: &str| {
+        let text = format!("x,y,z,radius,kappa\n0,0,0,{radius},1\n");
+        fs::write(dir.path().join("other.csv"), text).expect("points");
+    };
+    let run = |name: &str| {
+        let out = dir.path().join(name).display().to_string();
+        let args = ["bench", &path, "--sweep", "cloud.0.file=points.csv,other.csv", "--frames", "2", "--no-saved"];
+        assert_eq!(nimbus(&[&args[..], &["--warmup", "0", "--repeat", "1", "--out", &out]].concat()).0, 0);
+        out
+    };
+    other("3");
+    let a = run("a");
+    other("4");
+    let b = run("b");
+    let (code, _, stderr) = nimbus(&["compare", &a, &b]);
+    assert!(
+        code == 2 && stderr.contains("cloud.0.file=other.csv, hash") && !stderr.contains("=points.csv, hash"),
+        "{stderr}"
+    );
+    assert_eq!(nimbus(&["compare", &a, &b, "--allow", "scene"]).0, 0);
+}
+
+#[test]
+fn one_loop_alone_is_not_compared_with_what_measures_skipping() {
+    let (_dir, path) = temp(SCENE.split("[[phase]]").next().expect("a part"));
+    let short = ["--frames", "3", "--warmup", "1", "--repeat", "1", "--threading", "parallel", "--json"];
+    let (code, text, stderr) = nimbus(&[&["bench", path.as_str()][..], &short].concat());
+    assert_eq!(code, 0, "{stderr}");
+    let run: Value = serde_json::from_str(&text).expect("JSON");
+    let case = &run["cases"][0];
+    assert_eq!((&case["overlap"], &case["ratio"]), (&Value::Null, &Value::Null));
+    // The loop that skips nothing is of the same kind.
+    let loops: Vec<_> = (0..2).map(|i| (&case["modes"][i]["threading"], &case["modes"][i]["skip"])).collect();
+    assert_eq!(loops, [(&json!("parallel"), &json!(true)), (&json!("parallel"), &json!(false))]);
+    assert_eq!(case["skipping"]["same_bytes"], true);
 }

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use nimbus::measure::bootstrap::Bootstrap;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
 use nimbus::study::machine::{Clocks, Cpu, Device, cpu, environment, revision, utc_now};
@@ -65,6 +64,7 @@ fn mode(threading: &str) -> Mode {
             },
         ],
         image_hash: Some("0123456789abcdef".repeat(4)),
+        block_spread: None,
     }
 }
 
@@ -100,11 +100,12 @@ fn sample() -> Run {
         cases: vec![Case {
             phase: Some("dense".to_owned()),
             sweep: vec![Setting { key: "draw.cutoff".to_owned(), value: "2".to_owned() }],
+            scene_hash: "cd".repeat(32),
             particles: 554,
             width: 800,
             height: 600,
             modes: vec![mode("serial"), mode("parallel")],
-            ratio: Bootstrap::default().ratio_of_medians(&[10.0, 11.0], &[20.0, 22.0]).map(Ratio::from),
+            ratio: Some(Ratio { parallel_by_serial: 0.5, low: Some(0.25), high: Some(0.75) }),
             overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
             skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
         }],

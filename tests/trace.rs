@@ -30,7 +30,9 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
     let plan = BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false };
-    let (stage, outcome) = bench::run(stage, &cases, &plan, &AtomicBool::new(false), &mut || {}).expect("frames");
+    let ran = bench::run(stage, &cases, &plan, &AtomicBool::new(false), &mut || {});
+    assert_eq!(ran.failure, None);
+    let (stage, outcome) = (ran.stage.expect("a stage"), ran.outcome);
     (outcome.samples, stage, zones.take())
 }
 
@@ -129,12 +131,13 @@ fn zones_nest_and_passes_lie_in_their_frames() {
     let count = |track: &str, name: &str| of_tracks[track].iter().filter(|(_, zone)| *zone == name).count();
     let drawing = format!("thread {}", std::thread::current().name().expect("a name"));
     let n = N_FRAMES as usize;
-    for name in ["game step", "setting", "groups", "place particles"] {
+    for name in ["game step", "setting", "visibility", "groups", "place particles"] {
         assert_eq!((count(&drawing, name), count("thread game", name)), (n, n), "{name}");
     }
-    // After each loop its last frame is read back, once more recorded, submitted and waited for.
+    // After each loop its last frame is read back, and after the last one facets and light, each once more recorded,
+    // submitted and waited for.
     for (name, extra) in
-        [("render step", 0), ("plan", 0), ("upload", 0), ("record", 2), ("submit", 2), ("read back", 2)]
+        [("render step", 0), ("plan", 0), ("upload", 0), ("record", 4), ("submit", 4), ("read back", 2)]
     {
         let want = if name == "read back" { extra } else { 2 * n + extra };
         assert_eq!(count(&drawing, name), want, "{name}");

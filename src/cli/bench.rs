@@ -1,16 +1,19 @@
 //! `nimbus bench SCENE…`.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::args::{BenchArgs, ThreadingArg};
-use super::{bench_table, device_choice, load, output, say_notes, say_sizes};
+use super::{bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
+use crate::frame::limits;
 use crate::gpu::ClockFit;
+use crate::io::atomic;
 use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
-use crate::study::bench::{self, BenchPlan};
-use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points};
+use crate::study::bench::{self, BenchPlan, Ran};
+use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points, sweep_text};
 use crate::study::machine;
 use crate::study::outcome::pass_names;
 use crate::study::records::{self, Run};
@@ -25,6 +28,7 @@ pub fn run(args: &BenchArgs, stop: &AtomicBool, zones: Option<&Zones>) -> Result
     let outs = out_dirs(args)?;
     if let Some(file) = &args.trace {
         super::refuse_existing(file, args.force)?;
+        atomic::check_place(file)?;
         if args.scenes.len() > 1 {
             return Err(Error::usage(format!("--trace takes one scene, found {}", args.scenes.len())));
         }
@@ -82,26 +86,71 @@ fn prepare(args: &BenchArgs, path: &Path, options: &super::SceneArgs) -> Result<
         ThreadingArg::Parallel => &[Threading::Parallel],
         ThreadingArg::Both => &[Threading::Serial, Threading::Parallel],
     };
-    let axes = args.sweep.iter().map(|text| Axis::parse(text)).collect::<Result<Vec<Axis>>>()?;
-    if let Some((_, twice)) = axes.iter().enumerate().find(|(i, axis)| axes[..*i].iter().any(|a| a.key == axis.key)) {
-        return Err(Error::usage(format!("--sweep {}: the key twice; name all its values in one", twice.key)));
-    }
+    let axes = axes(args)?;
     let flags = [!options.no_skip, !args.no_saved];
     let loaded = load(path, options)?;
     let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());
     if axes.is_empty() {
         return Ok(Prepared { cases: cases(loaded, &[], modes, args.frames, flags), scene_hash, resolved });
     }
-    let mut all = Vec::new();
+    let (mut all, mut said) = (Vec::new(), BTreeSet::from_iter(warnings_of(&loaded)));
     for point in points(&axes) {
-        let mut with = super::SceneArgs { quiet: true, verbose: false, ..options.clone() };
-        with.set.extend(overrides(&point)?);
+        let overrides = overrides(&point)?;
+        let mut with = super::SceneArgs { quiet: true, ..options.clone() };
+        with.set.extend(overrides.iter().cloned());
         if point.iter().any(|s| s.key == SIZE_KEY) {
             with.size = None;
         }
-        all.extend(cases(load(path, &with)?, &point, modes, args.frames, flags));
+        let at = load(path, &with).map_err(|e| as_swept(e, &overrides))?;
+        for warning in warnings_of(&at).into_iter().filter(|_| !options.quiet) {
+            if said.insert(warning.clone()) {
+                eprintln!("warning: {}: {warning}", sweep_text(&point));
+            }
+        }
+        all.extend(cases(at, &point, modes, args.frames, flags));
     }
     Ok(Prepared { cases: all, scene_hash, resolved })
+}
+
+/// The sweep's keys, each once.
+fn axes(args: &BenchArgs) -> Result<Vec<Axis>> {
+    let axes = args.sweep.iter().map(|text| Axis::parse(text)).collect::<Result<Vec<Axis>>>()?;
+    let refuse = |key: &str, what: &str| Err(Error::usage(format!("--sweep {key}: {what}")));
+    for (i, axis) in axes.iter().enumerate() {
+        let has = |key: &str| axes.iter().any(|a| a.key == key);
+        if axes[..i].iter().any(|before| before.key == axis.key) {
+            return refuse(&axis.key, "the key twice; name all its values in one");
+        }
+        if axis.key == SIZE_KEY && (has("film.width") || has("film.height")) {
+            return refuse(SIZE_KEY, "sets film.width and film.height, which another --sweep sets, too");
+        }
+        if axis.key == "time.frames" && args.frames.is_some() {
+            return refuse("time.frames", "--frames says how many frames are timed");
+        }
+    }
+    Ok(axes)
+}
+
+/// A fault in what a sweep set is the sweep's.
+fn as_swept(error: Error, overrides: &[String]) -> Error {
+    match error {
+        Error::Scene { mut at, what } => {
+            if let Some(set) = at.source.strip_prefix("--set ").filter(|set| overrides.iter().any(|o| o == set)) {
+                at.source = format!("--sweep {set}");
+            }
+            Error::Scene { at, what }
+        }
+        other => other,
+    }
+}
+
+/// Opens the device, and checks what every case asks of it before the first is run.
+fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
+    let stage = Stage::new(cases[0].scene.clone(), &device_choice(&args.options), cases[0].loops[0].skip)?;
+    for case in &cases[1..] {
+        limits::check(&case.scene, stage.device.limits()).map_err(|e| e.within(&case.name()))?;
+    }
+    Ok(stage)
 }
 
 fn bench_one(
@@ -114,22 +163,26 @@ fn bench_one(
     let date = machine::utc_now();
     let Prepared { cases, scene_hash, resolved } = prepare(args, path, &args.options)?;
     let plan = BenchPlan { n_warm_up: args.warmup, n_rounds: args.repeat, hash_frames: args.hash_frames };
-    let stage = Stage::new(cases[0].scene.clone(), &device_choice(&args.options), cases[0].loops[0].skip)?;
+    let mut stage = open(args, &cases)?;
+    if args.options.verbose {
+        say_sizes(&stage.scene, Some(&stage));
+    }
+    let info = stage.info().clone();
+    let clocks = machine::clocks_record(&mut stage)?;
+    // Before and after, so that what the two clocks drift apart shows.
+    let mut readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
     if let Some(dir) = out {
         // What stood here was refused or forced above.
         records::prepare_out_dir(dir, true)?;
     }
-    if args.options.verbose {
-        say_sizes(&stage.scene, Some(&stage));
-    }
     let bar = output::progress(bench::n_frames_total(&cases, &plan), &path.display().to_string(), args.options.quiet);
-    // Before and after, so that what the two clocks drift apart shows.
-    let mut readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
-    let outcome = bench::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
+    let Ran { stage, outcome, failure } = bench::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
     bar.finish_and_clear();
-    let (mut stage, outcome) = outcome?;
-    readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
-    let info = stage.info().clone();
+    if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
+        // A folder that holds nothing would only be in the way of the next run.
+        let _ = out.map(std::fs::remove_dir);
+        return Err(failure.clone());
+    }
     let run = Run {
         schema: records::SCHEMA_VERSION,
         nimbus: env!("CARGO_PKG_VERSION").into(),
@@ -141,23 +194,31 @@ fn bench_one(
         device: machine::device_record(&info),
         cpu: machine::cpu(),
         environment: machine::environment(),
-        clocks: machine::clocks_record(&mut stage)?,
+        clocks,
         block_order: outcome.block_order(),
         cases: outcome.cases(&cases, &plan),
-        interrupted: outcome.interrupted,
+        interrupted: outcome.interrupted || failure.is_some(),
     };
     if let Some(dir) = out {
         records::write_results(dir, &run, &pass_names(), &outcome.rows(&cases))?;
-    }
-    if let Some(file) = &args.trace {
-        let zones = zones.map(Zones::take);
-        trace::write(file, &outcome.samples, &Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
     }
     if !args.json {
         let same: Vec<Option<bool>> = (0..cases.len()).map(|i| outcome.is_same_picture(i)).collect();
         output::text(&bench_table::report(path, &run, &same, args.options.verbose))?;
     }
-    say_notes(&mut stage, &args.options)?;
-    stage.close()?;
+    if let Some(file) = &args.trace {
+        if let Some(stage) = &stage {
+            readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
+        }
+        let zones = zones.map(Zones::take);
+        trace::write(file, &outcome.samples, &Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
+    }
+    for note in outcome.notes.iter().filter(|_| !args.options.quiet) {
+        eprintln!("warning: {note}");
+    }
+    match failure {
+        Some(failure) => return Err(failure),
+        None => stage.map_or(Ok(()), Stage::close)?,
+    }
     Ok(run)
 }

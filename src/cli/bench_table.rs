@@ -6,7 +6,7 @@ use super::output;
 use crate::measure::lows::fps;
 use crate::study::machine::Clocks;
 use crate::study::overlap::Overlap;
-use crate::study::records::{Block, Case, Measured, Mode, Run, Skipping};
+use crate::study::records::{Block, Case, Measured, Mode, Ratio, Run, Skipping};
 
 /// The whole of it. `same`: of each case whether all its last frames are the same, to the byte. `verbose`: every table of
 /// every case.
@@ -41,7 +41,8 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     }
     if run.cases.len() > 1 && !verbose {
         let n_same = same.iter().filter(|s| **s == Some(true)).count();
-        out += &format!("{n_same} of {} cases gave the same last frame in all their blocks, to the byte\n", same.len());
+        let n_told = same.iter().flatten().count();
+        out += &format!("{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n");
     }
     out + &clocks_line(&run.clocks)
 }
@@ -59,10 +60,14 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
         out.push('\n');
     }
     if let Some(ratio) = case.ratio {
-        let (low, high) = (ratio.low, ratio.high);
-        out += &format!("parallel / serial = {:.3} (95 % interval {low:.3} to {high:.3})\n", ratio.parallel_by_serial);
+        let interval = match ratio.low.zip(ratio.high) {
+            Some((low, high)) => format!("95 % interval {low:.3} to {high:.3}"),
+            None => "too few frames for an interval".to_owned(),
+        };
+        out += &format!("parallel / serial = {:.3} ({interval})\n", ratio.parallel_by_serial);
     }
-    out += &case.overlap.as_ref().map_or(String::new(), overlap_lines);
+    out += &spread_lines(case);
+    out += &case.overlap.as_ref().map_or(String::new(), |overlap| overlap_lines(overlap, case));
     out += &latency_line(case).unwrap_or_default();
     out += &drawn_line(case).unwrap_or_default();
     out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
@@ -118,6 +123,11 @@ fn name_of(mode: &Mode) -> String {
     loop_name(&mode.threading, mode.skip)
 }
 
+fn ratio_text(r: Ratio) -> String {
+    let interval = r.low.zip(r.high).map_or(String::new(), |(low, high)| format!(" ({low:.3}-{high:.3})"));
+    format!("{:.3}{interval}", r.parallel_by_serial)
+}
+
 /// What a case is called, in columns: its phase where there are phases, then the values of the sweep's keys.
 fn case_columns(run: &Run) -> (Vec<String>, impl Fn(&Case) -> Vec<String>) {
     let has_phases = run.cases.iter().any(|c| c.phase.is_some());
@@ -157,10 +167,13 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
     let figures =
         ["particles", "drawn", "pixels", "loop", "n", "frame p50", "low", "high", "fps", "game", "gpu", "latency"];
     header.extend(figures.map(str::to_owned));
-    header.push("parallel/serial".to_owned());
+    header.extend(["parallel/serial", "reached", "gpu saved"].map(str::to_owned));
     let mut rows = vec![header];
     for case in &run.cases {
-        for mode in &case.modes {
+        let reached = case.overlap.and_then(|o| o.reached);
+        let saved = case.skipping.map(|s| s.gpu_no_skip_ms - s.gpu_ms);
+        for mode in case.modes.iter().filter(|m| m.frames > 0) {
+            let is_parallel = mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
             let mut row = columns(case);
             let p50 = |m: &Option<Measured>| m.map_or("-".to_owned(), |m| ms(m.of.p50));
             let end = |of: fn(&Measured) -> Option<f64>| mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms);
@@ -177,9 +190,9 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
                 p50(&mode.game_ms),
                 p50(&mode.gpu_ms),
                 p50(&mode.latency_ms),
-                case.ratio
-                    .filter(|_| mode.threading == "parallel")
-                    .map_or("-".to_owned(), |r| format!("{:.3} ({:.3}-{:.3})", r.parallel_by_serial, r.low, r.high)),
+                if is_parallel { case.ratio.map_or("-".to_owned(), ratio_text) } else { "-".to_owned() },
+                reached.filter(|_| is_parallel).map_or("-".to_owned(), |r| format!("{:.0}%", 100.0 * r.share)),
+                saved.filter(|_| !mode.skip).map_or("-".to_owned(), ms),
             ]);
             rows.push(row);
         }
@@ -188,7 +201,7 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
 }
 
 /// The bound of what overlap can do, and how near the parallel loop came.
-fn overlap_lines(o: &Overlap) -> String {
+fn overlap_lines(o: &Overlap, case: &Case) -> String {
     let (game, render, bound, serial) = (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
     let share = o.bound_ms / o.serial_ms;
     let mut out = format!(
@@ -204,21 +217,51 @@ fn overlap_lines(o: &Overlap) -> String {
             out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the \
                     machine changed from block to block\n";
         }
+        out += &slowed_line(o, case).unwrap_or_default();
     } else if o.parallel_ms.is_some() {
-        out += "that is no certain gain, so what share of it was reached cannot be said\n";
+        out += "that is next to nothing, or not certain: what share of it was reached cannot be said\n";
     }
     out
 }
 
+/// Why overlap gains less than it could: steps that slow one another down.
+fn slowed_line(o: &Overlap, case: &Case) -> Option<String> {
+    let skip = case.modes.iter().any(|m| m.skip);
+    let parallel = case.modes.iter().find(|m| m.threading == "parallel" && m.skip == skip)?;
+    let (game, render) = (parallel.game_ms?.of.p50, parallel.render_ms?.of.p50);
+    // As much as the intervals of short runs leave open says nothing.
+    let is_slower = game > 1.05 * o.game_ms || render > 1.05 * o.render_ms;
+    is_slower.then(|| {
+        format!(
+            "side by side the game step takes {} in place of {}, the render step {} in place of {} ms: they share cores\n",
+            ms(game),
+            ms(o.game_ms),
+            ms(render),
+            ms(o.render_ms)
+        )
+    })
+}
+
+/// Where blocks of one loop lie as far apart as the two loops do, or a tenth.
+fn spread_lines(case: &Case) -> String {
+    let effect = case.ratio.map_or(f64::INFINITY, |r| r.parallel_by_serial.ln().abs());
+    let of = |m: &Mode| {
+        let spread = m.block_spread.filter(|s| s.ln() >= effect || *s >= 1.1)?;
+        Some(format!("{}: blocks lie a factor of {spread:.3} apart: the machine was not steady\n", name_of(m)))
+    };
+    case.modes.iter().filter_map(of).collect()
+}
+
 /// What overlap costs: the picture's age.
 fn latency_line(case: &Case) -> Option<String> {
-    let of = |threading: &str| case.modes.iter().find(|m| m.threading == threading);
+    let skip = case.modes.iter().any(|m| m.skip);
+    let of = |threading: &str| case.modes.iter().find(|m| m.threading == threading && m.skip == skip);
     let (serial, parallel) = (of("serial")?, of("parallel")?);
     let (a, b) = (serial.latency_ms?.of.p50, parallel.latency_ms?.of.p50);
-    let frame = parallel.frame_ms?.of.p50;
+    let frame = serial.frame_ms?.of.p50;
     let depth = parallel.queue_depth.map_or(String::new(), |n| format!(", {n:.2} frames queued"));
     Some(format!(
-        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the parallel loop{depth}\n",
+        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the serial loop{depth}\n",
         ms(a),
         ms(b),
         (b - a) / frame

@@ -80,13 +80,23 @@ fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
         overrides.push(format!("film.height={height}"));
     }
     let loaded = scene_file::load(path, &overrides, args.seed)?;
-    if !args.quiet {
-        let basis = basis_warnings(&loaded.scene);
-        for warning in loaded.warnings.iter().chain(&basis).chain(&advice(&loaded.scene)) {
-            eprintln!("warning: {warning}");
-        }
+    for warning in warnings_of(&loaded).iter().filter(|_| !args.quiet) {
+        eprintln!("warning: {warning}");
     }
     Ok(loaded)
+}
+
+/// What is allowed but hardly meant in a scene or one of its phases.
+fn warnings_of(loaded: &LoadedScene) -> Vec<String> {
+    let of_scene = |scene: &Scene| basis_warnings(scene).into_iter().chain(advice(scene)).collect::<Vec<_>>();
+    let mut all: Vec<String> = loaded.warnings.clone();
+    let phases = loaded.phases.iter().map(|p| &p.scene);
+    for warning in std::iter::once(&loaded.scene).chain(phases).flat_map(of_scene) {
+        if !all.contains(&warning) {
+            all.push(warning);
+        }
+    }
+    all
 }
 
 fn device_choice(args: &SceneArgs) -> DeviceChoice {

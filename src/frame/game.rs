@@ -126,7 +126,7 @@ impl Game {
             time_s,
             begin,
             camera: CameraRecord::new(&self.scene.camera, &setting.pose, &self.scene.film, setting.light_origin),
-            groups: grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect(),
+            groups: info_span!("groups").in_scope(|| grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect()),
             drawn,
             n_drawn,
             modes,

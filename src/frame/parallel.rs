@@ -6,7 +6,6 @@
 //! frames.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Builder, Scope};
@@ -36,7 +35,12 @@ enum Event {
 const EVENTS: usize = 2 * IN_FLIGHT + 2;
 
 /// Runs `frames`; `on_frame` sees each as it ends. An error or panic on either side ends both.
-pub fn run(game: &mut Game, renderer: &mut Renderer, frames: Range<u32>, on_frame: &mut OnFrame<'_>) -> Result<()> {
+pub fn run(
+    game: &mut Game,
+    renderer: &mut Renderer,
+    frames: impl Iterator<Item = u32> + Send,
+    on_frame: &mut OnFrame<'_>,
+) -> Result<()> {
     let drawn = std::thread::scope(|scope| {
         let (tell, events) = sync_channel::<Event>(EVENTS);
         let (grant, granted) = sync_channel::<()>(IN_FLIGHT);
@@ -77,7 +81,7 @@ fn start<'scope>(
 }
 
 /// The game thread: a step for every grant.
-fn play(game: &mut Game, frames: Range<u32>, granted: &Receiver<()>, tell: &SyncSender<Event>) {
+fn play(game: &mut Game, frames: impl Iterator<Item = u32>, granted: &Receiver<()>, tell: &SyncSender<Event>) {
     for i_frame in frames {
         // The other side has ended where it grants nothing any more, or hears nothing.
         if granted.recv().is_err() {

@@ -158,9 +158,12 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let same_response = if kept { same_tensors } else { same_light };
     let unchanged = if kept { "facets and lights stand still" } else { "facets and lights are the same" };
     let same_drawn = same(&|a, b| a.drawn == b.drawn);
-    let same_order = still && same_drawn && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
+    // How dense they are does not order them.
+    let same_names =
+        same(&|a, b| a.drawn.iter().map(|d| (d.shift, d.end)).eq(b.drawn.iter().map(|d| (d.shift, d.end))));
+    let same_order = still && same_names && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
-    let same_picture = same_order && same_view && (same_light || !traits.lit);
+    let same_picture = same_order && same_drawn && same_view && (same_light || !traits.lit);
 
     let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
     let lighting =

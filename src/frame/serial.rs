@@ -1,6 +1,5 @@
 //! Game step and render step one after the other.
 
-use std::ops::Range;
 use std::time::Instant;
 
 use super::game::Game;
@@ -9,7 +8,12 @@ use super::{OnFrame, Started};
 use crate::error::Result;
 
 /// Runs `frames`; `on_frame` sees each as it ends.
-pub fn run(game: &mut Game, renderer: &mut Renderer, frames: Range<u32>, on_frame: &mut OnFrame<'_>) -> Result<()> {
+pub fn run(
+    game: &mut Game,
+    renderer: &mut Renderer,
+    frames: impl Iterator<Item = u32>,
+    on_frame: &mut OnFrame<'_>,
+) -> Result<()> {
     let mut last_end = Instant::now();
     for i_frame in frames {
         let packet = game.step(i_frame)?;

@@ -45,6 +45,11 @@ pub fn write_atomic<E: Display>(
     fs::rename(&temporary.path, path).map_err(|e| Error::io(path, e))
 }
 
+/// An error where `path` could not be written, known before there is anything to write.
+pub fn check_place(path: &Path) -> Result<()> {
+    Temporary::beside(path).map(drop)
+}
+
 /// Removes its file or folder when dropped; after the rename there is none.
 pub(super) struct Temporary {
     pub path: PathBuf,

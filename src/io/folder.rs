@@ -32,18 +32,21 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
     write(&staged.path)?;
     let Some(last) = files.last().map(|name| folder.join(name)) else { return Ok(()) };
     let aside = staged.path.join("replaced");
-    let _lock = in_progress();
+    let mut paths = in_progress();
     let had_one = last.symlink_metadata().is_ok();
     if had_one {
         fs::rename(&last, &aside).map_err(failed)?;
     }
     for (i, name) in files.iter().enumerate() {
         if let Err(cause) = fs::rename(staged.path.join(name), folder.join(name)) {
-            // With no file replaced the old ones are whole again.
+            // With no file replaced the old ones are whole again; else the old last one is kept where it is.
             if i == 0 && had_one {
                 fs::rename(&aside, &last).map_err(failed)?;
+                return Err(failed(cause));
             }
-            return Err(failed(cause));
+            let kept = staged.path.display().to_string();
+            staged.let_go(&mut paths);
+            return Err(Error::io(folder, format!("{cause}; what was not put there is kept in {kept}")));
         }
     }
     Ok(())
@@ -57,7 +60,8 @@ fn exchanged(_: &Path, _: &[&str], _: &dyn Fn(&Path) -> Result<()>) -> Result<bo
 /// Replaces the folder as a whole; false, with nothing changed, where that cannot be:
 /// - the file system knows no exchange or no hard links, or the folder is a mount point or a file system's root;
 /// - the parent may not be written, or folder or file belong to somebody else, who would lose them to us;
-/// - this process, and most likely the shell that started it, stands in the folder, which would vanish under its feet.
+/// - it holds folders, in which somebody may be at work, or this process, and most likely the shell that started it, stands
+///   in it: it would vanish under their feet.
 #[cfg(target_os = "linux")]
 fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
@@ -105,8 +109,8 @@ mod beside {
     use std::os::unix::fs::MetadataExt;
     use std::path::Path;
 
-    /// Links everything in `from` but `left_out` into `to`, folders made anew and theirs in turn; false where
-    /// something cannot be linked as it is.
+    /// Links everything in `from` but `left_out` into `to`; false where something cannot be linked as it is, a folder among
+    /// others.
     pub fn link_others(from: &Path, to: &Path, left_out: &[&str]) -> bool {
         let link = || -> io::Result<bool> {
             if !is_owned_alike(from, to)? {
@@ -115,15 +119,10 @@ mod beside {
             for entry in fs::read_dir(from)? {
                 let entry = entry?;
                 let (old, new) = (entry.path(), to.join(entry.file_name()));
-                if left_out.iter().any(|name| entry.file_name() == *name) {
-                    continue;
-                }
                 if entry.file_type()?.is_dir() {
-                    fs::create_dir(&new)?;
-                    if !link_others(&old, &new, &[]) {
-                        return Ok(false);
-                    }
-                } else {
+                    return Ok(false);
+                }
+                if !left_out.iter().any(|name| entry.file_name() == *name) {
                     fs::hard_link(&old, &new)?;
                 }
             }
@@ -149,11 +148,14 @@ mod beside {
             let is_replaced = replaced.iter().any(|name| entry.file_name() == *name);
             let (Ok(of_gone), of_kept) = (gone.symlink_metadata(), kept.symlink_metadata()) else { continue };
             let is_same = of_kept.as_ref().is_ok_and(|k| (k.dev(), k.ino()) == (of_gone.dev(), of_gone.ino()));
-            if of_gone.is_dir() && of_kept.is_ok_and(|k| k.is_dir()) {
-                discard(&gone, &kept, &[]);
-            } else {
-                let _ = if is_replaced || is_same { fs::remove_file(&gone) } else { fs::rename(&gone, &kept) };
-            }
+            // What was saved to the old folder goes over, unless the new one got something newer of that name since.
+            let saved = |about: &Metadata| about.modified().ok();
+            let is_newer = of_kept.map_or(true, |kept| saved(&of_gone) >= saved(&kept));
+            let _ = match (is_replaced || is_same, is_newer) {
+                (true, _) => fs::remove_file(&gone),
+                (false, true) => fs::rename(&gone, &kept),
+                (false, false) => Ok(()),
+            };
         }
         let _ = fs::remove_dir(old);
     }
@@ -216,6 +218,10 @@ mod tests {
         all.map(|(name, text)| (name.to_owned(), text.to_owned())).to_vec()
     }
 
+    fn without_plots(text: &str) -> Vec<(String, String)> {
+        expected(text).into_iter().filter(|(name, _)| !name.starts_with("plots")).collect()
+    }
+
     const FILES: [&str; 2] = ["rows", "head"];
 
     #[test]
@@ -227,6 +233,10 @@ mod tests {
             };
             let dir = tempfile::tempdir().unwrap();
             let folder = kept(dir.path(), "old");
+            let expected = if at_once { without_plots } else { expected };
+            if at_once {
+                fs::remove_dir_all(folder.join("plots")).unwrap();
+            }
             fs::set_permissions(&folder, fs::Permissions::from_mode(0o2750)).unwrap();
             let inode = fs::metadata(folder.join("notes.txt")).unwrap().ino();
             way(&folder, &write_both("new")).unwrap();
@@ -245,6 +255,9 @@ mod tests {
     fn the_folder_is_exchanged_where_it_can_be() {
         let dir = tempfile::tempdir().unwrap();
         let folder = kept(dir.path(), "old");
+        // Somebody may be at work in its folders.
+        assert!(!exchanged(&folder, &FILES, &write_both("new")).unwrap());
+        fs::remove_dir_all(folder.join("plots")).unwrap();
         let held = fs::File::open(&folder).unwrap();
         assert!(exchanged(&folder, &FILES, &write_both("new")).unwrap());
         // The folder is another one; the old one is gone.
@@ -255,7 +268,7 @@ mod tests {
         assert!(exchanged(&dir.path().join("latest"), &FILES, &write_both("newer")).unwrap());
         assert_eq!(
             (fs::read_link(dir.path().join("latest")).unwrap(), tree(&folder)),
-            ("run".into(), expected("newer"))
+            ("run".into(), without_plots("newer"))
         );
         // One that is not there is made.
         assert!(exchanged(&dir.path().join("first"), &FILES, &write_both("new")).unwrap());
@@ -270,20 +283,20 @@ mod tests {
     fn what_came_meanwhile_goes_over() {
         let dir = tempfile::tempdir().unwrap();
         let (folder, other) = (kept(dir.path(), "old"), dir.path().join("other"));
+        fs::remove_dir_all(folder.join("plots")).unwrap();
         fs::create_dir(&other).unwrap();
         write_both("new")(&other).unwrap();
         assert!(beside::link_others(&folder, &other, &FILES));
-        // Saved anew by an editor; made; made in a folder; a folder made.
+        // Saved anew by an editor; made; a folder made.
         fs::write(dir.path().join("saved"), "edited").unwrap();
         fs::rename(dir.path().join("saved"), folder.join("notes.txt")).unwrap();
         fs::write(folder.join("later.txt"), "later").unwrap();
-        fs::write(folder.join("plots/b.png"), "second").unwrap();
         fs::create_dir(folder.join("empty")).unwrap();
         beside::discard(&folder, &other, &FILES);
         assert!(!folder.exists());
-        let mut all = expected("new");
+        let mut all = without_plots("new");
         all[2].1 = "edited".to_owned();
-        let came = [("later.txt", "later"), ("plots/b.png", "second"), ("empty", "")];
+        let came = [("later.txt", "later"), ("empty", "")];
         all.extend(came.map(|(name, text)| (name.to_owned(), text.to_owned())));
         all.sort();
         assert_eq!(tree(&other), all);

@@ -87,7 +87,9 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
         let mut document = file.clone();
         spec.apply(&mut document)?;
         document.apply(overrides)?;
-        let of_phase = read_document(&document, path, seed).map_err(|e| in_phase(e, &spec.name))?;
+        // What is wrong may lie in a line that is right without the phase.
+        let of_phase =
+            read_document(&document, path, seed).map_err(|e| e.within(&format!("phase \"{}\"", spec.name)))?;
         hashed.push(of_phase.resolved.to_string());
         read.digests.extend(of_phase.digests);
         read.warnings.extend(of_phase.warnings);
@@ -103,14 +105,6 @@ pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<Load
         root.insert("phase".to_owned(), specs.into_iter().map(|s| s.resolved).collect());
     }
     Ok(LoadedScene { scene, phases, resolved, hash: hash(&hashed, &digests), warnings, path: path.to_owned() })
-}
-
-/// What is wrong may lie in a line that is right without the phase.
-fn in_phase(error: Error, name: &str) -> Error {
-    match error {
-        Error::Scene { at, what } => Error::Scene { at, what: format!("{what} (in phase \"{name}\")") },
-        other => other,
-    }
 }
 
 /// A document's scene, and what is told of it.

@@ -1,7 +1,7 @@
 //! How many of a cloud's particles are drawn, by its distance and size: C (4)–(6), docs/model.md §3.
 
-/// Of a group of which fewer than this of a particle would be drawn nothing is: with `conserve` the rest would have to be
-/// more than 2²⁰ times as dense as the group, at 14 a, some 3900 d₀, and farther. Keeps every factor within f32.
+/// Of a group of which fewer than this of a particle would be drawn nothing is: at 14 a, some 3900 d₀, and farther. Keeps
+/// every factor within f32; with `conserve` less than this share of the group's optical depth goes at once.
 pub const LEAST_DRAWN: f64 = 1.0 / 1_048_576.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -49,8 +49,10 @@ impl Count {
         if x.is_nan() || x < LEAST_DRAWN {
             return Drawn::NOTHING;
         }
+        // One particle stands for all at most: below one it fades with x, where it would otherwise stay as dense as all of
+        // them until it vanished.
+        let kappa_scale = if self.conserve { (1.0 / share).min(f64::from(n)) } else { 1.0 };
         let n = (x.ceil() as u32).min(n);
-        let kappa_scale = if self.conserve { 1.0 / share } else { 1.0 };
         Drawn { n, kappa_scale, last_weight: x - f64::from(n - 1) }
     }
 }
@@ -70,7 +72,7 @@ mod tests {
         }
         // As long as anything is drawn every factor is a number that f32 has.
         let far = COUNT.drawn(1, LEAST_DRAWN);
-        assert_eq!((far.n, far.kappa_scale, far.last_weight), (1, 1_048_576.0, LEAST_DRAWN));
+        assert_eq!((far.n, far.kappa_scale, far.last_weight), (1, 1.0, LEAST_DRAWN));
         assert_eq!(Count { normalised: true, ..COUNT }.share(1.0, 0.0), 1.0);
         assert!(COUNT.share(10.0, 100.0) == 1.0 && COUNT.share(0.5, 0.0) == 0.125);
     }
@@ -85,7 +87,9 @@ mod tests {
             }
             let sum = f64::from(drawn.n - 1) + drawn.last_weight;
             assert!((sum - 37.0 * share).abs() < 1e-13 && drawn.last_weight > 0.0 && drawn.last_weight <= 1.0);
-            assert!((sum * drawn.kappa_scale - 37.0).abs() < 1e-12);
+            // Below one particle what it stands for fades.
+            let of_all = if sum < 1.0 { sum } else { 1.0 };
+            assert!((sum * drawn.kappa_scale - 37.0 * of_all).abs() < 1e-12, "{k}");
         }
     }
 }

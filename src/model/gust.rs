@@ -8,7 +8,7 @@ use glam::DVec3;
 use super::philox::{philox4x32_10, uniform};
 
 /// Most waves of a cloud's gusts.
-pub const MAX_WAVES: u32 = 1024;
+pub const MAX_WAVES: u32 = 2048;
 
 /// Smallest eddies are this much smaller than the largest: three octaves.
 const SPECTRUM_WIDTH: f64 = 8.0;

@@ -8,12 +8,13 @@ pub fn printed(d_over_d0: f64, r_over_r0: f64, a: f64, normalised: bool) -> f64 
 }
 
 /// Factor on the κ of each of a group's `n` particles where n/n₀ = `share`: 1 for whole ones, the rest for the last, 0 for
-/// those that are not drawn; all over the share where `conserve`.
+/// those that are not drawn; all over the share where `conserve`, and none more than n.
 pub fn weights(n: u32, share: f64, conserve: bool) -> Vec<f64> {
     let share = share.min(1.0);
     let x = f64::from(n) * share;
     let whole = |k: u32| (x - f64::from(k)).clamp(0.0, 1.0);
-    (0..n).map(|k| if conserve { whole(k) / share } else { whole(k) }).collect()
+    let dense = if conserve { f64::from(n).min(1.0 / share) } else { 1.0 };
+    (0..n).map(|k| whole(k) * dense).collect()
 }
 
 #[cfg(test)]
@@ -37,6 +38,8 @@ mod tests {
         assert_eq!(weights(4, 0.625, false), [1.0, 1.0, 0.5, 0.0]);
         assert_eq!(weights(4, 0.625, true), [1.6, 1.6, 0.8, 0.0]);
         assert_eq!(weights(4, 0.5, false), [1.0, 1.0, 0.0, 0.0]);
+        // Half a particle: half of all four.
+        assert_eq!(weights(4, 0.125, true), [2.0, 0.0, 0.0, 0.0]);
         assert_eq!((weights(3, 7.0, true), weights(0, 0.5, true)), (vec![1.0; 3], vec![]));
     }
 }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use sha2::{Digest, Sha256};
 
 use super::cases::{Case, Loop};
+use super::inspect::light_notes;
 use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
@@ -43,13 +44,24 @@ pub struct Block {
     pub image_hash: Option<String>,
 }
 
-/// What a bench came to. Kept whole also when it was interrupted.
+/// What a bench came to. Kept whole also when it was interrupted, or a case failed.
 #[derive(Debug, Clone, Default)]
 pub struct Outcome {
     pub samples: Vec<Sample>,
     /// In the order they ran.
     pub blocks: Vec<Block>,
+    /// What is odd about the light of a case's last frame.
+    pub notes: Vec<String>,
     pub interrupted: bool,
+}
+
+/// A bench that has ended.
+pub struct Ran {
+    /// Of the last case; none where making it failed.
+    pub stage: Option<Stage>,
+    pub outcome: Outcome,
+    /// Why it ended before its end, other than by being asked to.
+    pub failure: Option<Error>,
 }
 
 /// Cases and loops in the order A B, B A, A B, …: whatever drifts over the run (heat, neighbours) falls on all alike.
@@ -72,43 +84,72 @@ pub fn n_frames_total(cases: &[Case], plan: &BenchPlan) -> u64 {
     u64::from(plan.n_rounds) * cases.iter().map(of).sum::<u64>()
 }
 
-/// Runs the plan on `stage`, which holds the first case, and gives back the stage of the last; `tick` is called after every
-/// frame, for progress. Ends early, and cleanly, once `stop` is set.
-pub fn run(
-    mut stage: Stage,
-    cases: &[Case],
-    plan: &BenchPlan,
-    stop: &AtomicBool,
-    tick: &mut dyn FnMut(),
-) -> Result<(Stage, Outcome)> {
-    let mut outcome = Outcome::default();
+/// Runs the plan on `stage`, which holds the first case; `tick` is called after every frame, for progress. Ends early, and
+/// cleanly, once `stop` is set.
+pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, tick: &mut dyn FnMut()) -> Ran {
+    let mut ran = Ran { stage: Some(stage), outcome: Outcome::default(), failure: None };
+    let order = block_order(cases, plan.n_rounds);
     let mut i_staged = 0;
-    for (i_block, (i_case, of)) in (0..).zip(block_order(cases, plan.n_rounds)) {
+    for (i_block, (i_case, of)) in (0u32..).zip(order.iter().copied()) {
         let case = &cases[i_case];
-        let n = plan.n_warm_up.checked_add(case.n_frames).and_then(|n| case.i_first.checked_add(n));
-        let end = n.ok_or_else(|| Error::usage("the frames of a block, warm-up included, exceed 32 bits"))?;
-        if std::mem::replace(&mut i_staged, i_case) != i_case {
-            stage = stage.again(case.scene.clone(), of.skip)?;
-        }
-        stage.set_skip(of.skip);
-        let samples = &mut outcome.samples;
-        let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
-            let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
-            let warm_up = times.i_frame - case.i_first < plan.n_warm_up;
-            samples.push(Sample { i_case, of, i_block, warm_up, times, image_hash });
-            tick();
-            Ok(!stop.load(Ordering::Relaxed))
+        let is_staged = std::mem::replace(&mut i_staged, i_case) == i_case;
+        let is_last = !order[i_block as usize + 1..].iter().any(|(i, _)| *i == i_case);
+        let mut block = || -> Result<()> {
+            let stage = ran.stage.take().ok_or_else(|| Error::usage("the stage before this block has failed"))?;
+            let stage = if is_staged { stage } else { stage.again(case.scene.clone(), of.skip)? };
+            let stage = ran.stage.insert(stage);
+            run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
+            if is_last {
+                let name = if cases.len() > 1 { format!("{}: ", case.name()) } else { String::new() };
+                ran.outcome.notes.extend(light_notes(stage)?.into_iter().map(|note| name.clone() + &note));
+            }
+            Ok(())
         };
-        stage.run(of.threading, case.i_first..end, on_frame)?;
-        let is_cut = stop.load(Ordering::Relaxed);
-        let image_hash = if is_cut { None } else { Some(image_hash(&mut stage.renderer)?) };
-        outcome.blocks.push(Block { i_case, of, image_hash });
-        if is_cut {
-            outcome.interrupted = true;
+        if let Err(error) = block() {
+            ran.failure = Some(if cases.len() > 1 { error.within(&case.name()) } else { error });
+            break;
+        }
+        if stop.load(Ordering::Relaxed) {
+            ran.outcome.interrupted = true;
             break;
         }
     }
-    Ok((stage, outcome))
+    ran
+}
+
+fn run_block(
+    stage: &mut Stage,
+    outcome: &mut Outcome,
+    [i_case, i_block]: [usize; 2],
+    (case, of): (&Case, Loop),
+    plan: &BenchPlan,
+    stop: &AtomicBool,
+    tick: &mut dyn FnMut(),
+) -> Result<()> {
+    stage.set_skip(of.skip);
+    let samples = &mut outcome.samples;
+    let n_before = samples.len();
+    let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
+        let image_hash = if plan.hash_frames { Some(image_hash(renderer)?) } else { None };
+        let warm_up = samples.len() - n_before < plan.n_warm_up as usize;
+        samples.push(Sample { i_case, of, i_block: i_block as u32, warm_up, times, image_hash });
+        tick();
+        Ok(!stop.load(Ordering::Relaxed))
+    };
+    stage.run(of.threading, frames_of(case, plan.n_warm_up), on_frame)?;
+    // Of a block that was cut short the last frame is another one.
+    let image_hash = if stop.load(Ordering::Relaxed) { None } else { Some(image_hash(&mut stage.renderer)?) };
+    outcome.blocks.push(Block { i_case, of, image_hash });
+    Ok(())
+}
+
+/// The frames of a block: those that are timed, and before them those that lead up to them. Where there are none time runs
+/// backwards first: n, n − 1, …, 1, 0, 1, …, so that what is done in a frame is what is done in any.
+fn frames_of(case: &Case, n_warm_up: u32) -> impl Iterator<Item = u32> + Send + use<> {
+    let first = i64::from(case.i_first) - i64::from(n_warm_up);
+    let end = i64::from(case.i_first) + i64::from(case.n_frames);
+    // Within u32: the timed frames are, and no more warm-up than that was asked for.
+    (first..end).map(|i| u32::try_from(i.unsigned_abs()).unwrap_or(u32::MAX))
 }
 
 /// SHA-256 of the last frame, as it lies in the target.
@@ -121,6 +162,19 @@ mod tests {
     use super::*;
     use crate::model::scene::Threading::{Parallel, Serial};
     use crate::study::cases::cases;
+
+    #[test]
+    fn warm_up_leads_to_the_timed_frames() {
+        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
+        let loaded = crate::io::scene_file::load(&path, &[], None).unwrap();
+        let mut case = cases(loaded, &[], &[Serial], Some(3), [true, false]).remove(0);
+        let frames = |case: &Case, n| frames_of(case, n).collect::<Vec<u32>>();
+        assert_eq!(frames(&case, 0), [0, 1, 2]);
+        assert_eq!(frames(&case, 2), [2, 1, 0, 1, 2]);
+        case.i_first = 5;
+        assert_eq!(frames(&case, 2), [3, 4, 5, 6, 7]);
+        assert_eq!(frames(&case, 7), [2, 1, 0, 1, 2, 3, 4, 5, 6, 7]);
+    }
 
     #[test]
     fn rounds_alternate_their_order() {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::records::Setting;
+use super::records::{Setting, case_name};
 use crate::error::{Error, Result};
 use crate::io::scene_file::{LoadedScene, Phase};
 use crate::model::scene::{Scene, Threading};
@@ -32,12 +32,21 @@ pub struct Case {
     pub phase: Option<String>,
     pub sweep: Vec<Setting>,
     pub scene: Arc<Scene>,
-    /// First frame, warm-up included. Timed frames of the phases follow each other without a gap.
+    /// Of the scene at this point of the sweep, with all its phases and files.
+    pub scene_hash: String,
+    /// First timed frame. Those of the phases follow each other without a gap.
     pub i_first: u32,
     /// Timed frames of a block.
     pub n_frames: u32,
     /// In the order of the first round.
     pub loops: Vec<Loop>,
+}
+
+impl Case {
+    /// Its phase and sweep in words; empty where there is neither.
+    pub fn name(&self) -> String {
+        case_name(self.phase.as_deref().unwrap_or_default(), &sweep_text(&self.sweep))
+    }
 }
 
 /// "key=value, key=value".
@@ -121,25 +130,36 @@ pub fn cases(
         let modes = if own { vec![scene.threads.mode] } else { modes.to_vec() };
         let mut loops: Vec<Loop> = modes.iter().map(|&threading| Loop { threading, skip }).collect();
         if skip && saved {
-            loops.push(Loop { threading: Threading::Serial, skip: false });
+            // Of the first one's kind, so that nothing but skipping differs.
+            loops.push(Loop { skip: false, ..loops[0] });
         }
         loops
     };
     let swept = sweep.iter().any(|s| s.key == "threads.mode");
-    let LoadedScene { scene, phases, .. } = loaded;
+    let LoadedScene { scene, phases, hash: scene_hash, .. } = loaded;
     if phases.is_empty() {
         let (n_frames, loops) = (n_frames.unwrap_or(scene.time.n_frames), loops(&scene, swept));
-        return vec![Case { phase: None, sweep: sweep.to_vec(), scene: scene.into(), i_first: 0, n_frames, loops }];
+        return vec![Case {
+            phase: None,
+            sweep: sweep.to_vec(),
+            scene: scene.into(),
+            scene_hash,
+            i_first: 0,
+            n_frames,
+            loops,
+        }];
     }
     let mut i_first = 0u32;
     let of_phase = |phase: Phase| {
+        let n_frames = n_frames.unwrap_or(phase.n_frames);
         let loops = loops(&phase.scene, swept || phase.sets_mode);
         let case = Case {
             phase: Some(phase.name),
             sweep: sweep.to_vec(),
             scene: phase.scene.into(),
             i_first,
-            n_frames: n_frames.unwrap_or(phase.n_frames),
+            n_frames,
+            scene_hash: scene_hash.clone(),
             loops,
         };
         // The frames of all phases together fit.

@@ -142,7 +142,8 @@ pub fn steadiness_remarks(a: &[TimedMode], b: &[TimedMode], compared: &[Compared
         let Some(headline) = mode.headline() else { continue };
         let Some(ratio) = headline.b_by_a.filter(|_| headline.verdict != Verdict::NoDifferenceFound) else { continue };
         for (name, of) in [("A", a), ("B", b)] {
-            let spread = of.iter().find(|m| m.name == mode.name).and_then(spread_of_blocks);
+            let found = of.iter().find(|m| m.name == mode.name);
+            let spread = found.and_then(|m| spread_of_blocks(m.blocks.iter().map(Vec::as_slice)));
             if let Some(spread) = spread.filter(|spread| spread.ln() >= ratio.estimate.ln().abs()) {
                 let what = "as far as A and B, or further: the machine was not steady";
                 remarks.push(format!("{}: {name}'s own blocks lie a factor of {spread:.3} apart, {what}", mode.name));
@@ -153,8 +154,8 @@ pub fn steadiness_remarks(a: &[TimedMode], b: &[TimedMode], compared: &[Compared
 }
 
 /// Greatest median of a block by the least; None of fewer than two blocks, or where the least is 0.
-fn spread_of_blocks(mode: &TimedMode) -> Option<f64> {
-    let medians: Vec<f64> = mode.blocks.iter().filter_map(|block| median(block)).collect();
+pub fn spread_of_blocks<'a>(blocks: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
+    let medians: Vec<f64> = blocks.filter_map(median).collect();
     let (least, greatest) = medians.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), m| (l.min(*m), g.max(*m)));
     (medians.len() > 1 && least > 0.0).then(|| greatest / least)
 }

@@ -68,6 +68,15 @@ pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
     compare(Sameness::Build, "revision", a.revision.clone(), b.revision.clone());
     if a.scene_hash != b.scene_hash {
         found.extend(scene_differences(a, b));
+        return found;
+    }
+    // Points of a sweep may name files of their own.
+    for of_a in &a.cases {
+        let of_b = b.cases.iter().find(|of_b| of_b.name() == of_a.name());
+        if let Some(of_b) = of_b.filter(|of_b| of_b.scene_hash != of_a.scene_hash) {
+            let (a, b) = (short(&of_a.scene_hash).to_owned(), short(&of_b.scene_hash).to_owned());
+            found.push(Difference { kind: Sameness::Scene, what: format!("{}, hash", of_a.name()), a, b });
+        }
     }
     found
 }

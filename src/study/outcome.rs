@@ -1,9 +1,10 @@
 //! What a bench's frames say: the records of a run, from its samples.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::bench::{BenchPlan, Outcome, Sample};
 use super::cases::{Case, Loop, sweep_text};
+use super::compare::{N_FRAMES_NEEDED, spread_of_blocks};
 use super::overlap::{Overlap, SerialFrame};
 use super::records::{self, FrameRow, Measured, Mode, Pass as PassRecord, Ratio, Skipping};
 use crate::frame::FrameTimes;
@@ -47,8 +48,10 @@ impl Timed<'_> {
 
     fn measured(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Option<Measured> {
         let values = self.column(of);
-        let interval = Bootstrap::of_neighbours(values.len()).median(&values);
-        let (p50_low, p50_high) = interval.map(|i| (i.low, i.high)).unzip();
+        let bootstrap = Bootstrap::of_neighbours(values.len());
+        let interval = if values.len() < N_FRAMES_NEEDED { None } else { bootstrap.median(&values) };
+        // The widened interval may reach below what a time can be.
+        let (p50_low, p50_high) = interval.map(|i| (i.low.max(0.0), i.high)).unzip();
         Summary::of(&values).map(|of| Measured { of, p50_low, p50_high })
     }
 }
@@ -65,23 +68,24 @@ impl Outcome {
     }
 
     fn case(&self, i: usize, case: &Case, plan: &BenchPlan) -> records::Case {
-        let find = |threading, skip| case.loops.iter().copied().find(|of| *of == Loop { threading, skip });
-        // With --no-skip no loop skips.
-        let both = |threading| find(threading, true).or_else(|| find(threading, false));
-        let (serial, parallel) = (both(Threading::Serial), both(Threading::Parallel));
-        let pair = serial.zip(parallel).filter(|(a, b)| a.skip == b.skip);
-        let unskipped = find(Threading::Serial, false).filter(|_| case.loops.iter().any(|of| of.skip));
+        // With --no-skip no loop skips; else the one that does not is there to measure skipping by.
+        let skip = case.loops.iter().any(|of| of.skip);
+        let find = |threading| case.loops.iter().copied().find(|of| *of == Loop { threading, skip });
+        let (serial, parallel) = (find(Threading::Serial), find(Threading::Parallel));
+        let pair = serial.zip(parallel);
+        let unskipped = case.loops.iter().copied().find(|of| skip && !of.skip);
         let modes = case.loops.iter().map(|of| self.mode(i, case, *of, unskipped, plan)).collect();
         records::Case {
             phase: case.phase.clone(),
             sweep: case.sweep.clone(),
+            scene_hash: case.scene_hash.clone(),
             particles: case.scene.n_particles(),
             width: case.scene.film.width,
             height: case.scene.film.height,
             modes,
             ratio: pair.and_then(|(serial, parallel)| self.ratio(i, serial, parallel)),
             overlap: serial.and_then(|serial| self.overlap(i, serial, pair.map(|p| p.1))),
-            skipping: unskipped.and_then(|unskipped| self.skipping(i, case.loops[0], unskipped)),
+            skipping: unskipped.and_then(|unskipped| self.skipping(i, Loop { skip: true, ..unskipped }, unskipped)),
         }
     }
 
@@ -90,7 +94,11 @@ impl Outcome {
     fn ratio(&self, i: usize, serial: Loop, parallel: Loop) -> Option<Ratio> {
         let (serial, parallel) = (self.timed(i, serial).frame_ms(), self.timed(i, parallel).frame_ms());
         let n = serial.len().min(parallel.len());
-        Bootstrap::of_neighbours(n).ratio_of_medians(&parallel, &serial).map(Ratio::from)
+        let bootstrap = Bootstrap::of_neighbours(n);
+        let interval = if n < N_FRAMES_NEEDED { None } else { bootstrap.ratio_of_medians(&parallel, &serial) };
+        let (low, high) = interval.map(|i| (i.low, i.high)).unzip();
+        let parallel_by_serial = median(&parallel)? / median(&serial).filter(|ms| *ms > 0.0)?;
+        Some(Ratio { parallel_by_serial, low, high })
     }
 
     /// What overlap could gain, and how much of it the parallel loop gained.
@@ -161,7 +169,17 @@ impl Outcome {
             drawn: Summary::of(&timed.column(|t| Some(f64::from(t.n_drawn)))).map(|s| [s.min, s.mean, s.max]),
             passes: pass_records(&timed, against.as_ref()),
             image_hash: self.image_hash(i, of).map(str::to_owned),
+            block_spread: self.block_spread(i, of),
         }
+    }
+
+    /// Greatest median frame time of a block by the least.
+    fn block_spread(&self, i: usize, of: Loop) -> Option<f64> {
+        let mut blocks: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
+        for s in self.samples.iter().filter(|s| s.i_case == i && s.of == of && !s.warm_up) {
+            blocks.entry(s.i_block).or_default().push(s.times.frame_ms);
+        }
+        spread_of_blocks(blocks.values().map(Vec::as_slice))
     }
 
     /// The rows of frames.csv, passes in the order of [`pass_names`].

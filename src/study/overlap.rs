@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 use crate::measure::bootstrap::{Bootstrap, median_of_rows};
 use crate::measure::stats::median;
 
+/// Of the serial frame. What is spent between the steps, some microseconds, is no gain to speak of.
+const LEAST_GAIN: f64 = 0.05;
+
 /// Medians in ms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Overlap {
@@ -22,8 +25,8 @@ pub struct Overlap {
     pub render_ms: f64,
     /// max(game, render): what overlapping these two alone can come to.
     pub bound_ms: f64,
-    /// None where the parallel loop did not run, or the possible gain is not certainly above 0: then any share of it,
-    /// or none, might have been reached.
+    /// None where the parallel loop did not run, or the possible gain is less than [`LEAST_GAIN`] of the serial frame or not
+    /// certainly above 0: a share of next to nothing says nothing.
     pub reached: Option<Reached>,
 }
 
@@ -53,7 +56,8 @@ impl Overlap {
         let column = |f: fn(&SerialFrame) -> f64| serial.iter().map(f).collect::<Vec<f64>>();
         let (frame, game, render) = (column(|f| f.frame_ms), column(|f| f.game_ms), column(|f| f.render_ms));
         let parallel: Vec<f64> = parallel_ms.iter().copied().filter(|ms| ms.is_finite()).collect();
-        let (game_ms, render_ms) = (median(&game)?, median(&render)?);
+        let (game_ms, render_ms, serial_ms) = (median(&game)?, median(&render)?, median(&frame)?);
+        let is_worth_it = serial_ms - game_ms.max(render_ms) >= LEAST_GAIN * serial_ms;
         // A serial frame is drawn with its game and render step: what slows all three together cancels.
         let bootstrap = Bootstrap::of_neighbours(serial.len().min(parallel.len()));
         let reached = bootstrap.interval([serial.len(), parallel.len()], |[rows, parallel_rows]| {
@@ -63,12 +67,12 @@ impl Overlap {
             if possible > 0.0 { gained / possible } else { f64::NAN }
         });
         Some(Overlap {
-            serial_ms: median(&frame)?,
+            serial_ms,
             parallel_ms: median(&parallel),
             game_ms,
             render_ms,
             bound_ms: game_ms.max(render_ms),
-            reached: reached.map(|i| Reached { share: i.estimate, low: i.low, high: i.high }),
+            reached: reached.filter(|_| is_worth_it).map(|i| Reached { share: i.estimate, low: i.low, high: i.high }),
         })
     }
 }

@@ -10,12 +10,12 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::cases::sweep_text;
 use super::machine::{Clocks, Cpu, Device};
 use super::overlap::Overlap;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::folder::{check_writable, replace_files};
-use crate::measure::bootstrap::Interval;
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
 
@@ -47,7 +47,7 @@ pub struct Run {
     pub block_order: Vec<Block>,
     /// One a phase and point of a sweep, in their order; a scene with neither has one.
     pub cases: Vec<Case>,
-    /// Ctrl-C came before the end; what is here was finished.
+    /// Ctrl-C, or an error, came before the end; what is here was finished.
     pub interrupted: bool,
 }
 
@@ -66,6 +66,8 @@ pub struct Block {
 pub struct Case {
     pub phase: Option<String>,
     pub sweep: Vec<Setting>,
+    /// SHA-256 of the resolved scene at this point of the sweep, with its files and phases.
+    pub scene_hash: String,
     pub particles: u64,
     /// Of the film, pixels.
     pub width: u32,
@@ -82,8 +84,7 @@ pub struct Case {
 impl Case {
     /// Phase and sweep in words; empty where there is neither.
     pub fn name(&self) -> String {
-        let settings = self.sweep.iter().map(|s| format!("{}={}", s.key, s.value)).collect::<Vec<_>>();
-        case_name(self.phase.as_deref().unwrap_or_default(), &settings.join(", "))
+        case_name(self.phase.as_deref().unwrap_or_default(), &sweep_text(&self.sweep))
     }
 }
 
@@ -146,6 +147,8 @@ pub struct Mode {
     pub passes: Vec<Pass>,
     /// SHA-256 of the last frame's pixels, where it was taken.
     pub image_hash: Option<String>,
+    /// Greatest median frame time of a block by the least: what the machine's own changes come to. null of one block.
+    pub block_spread: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -168,15 +171,9 @@ pub struct Pass {
 pub struct Ratio {
     /// Median parallel frame time by median serial frame time.
     pub parallel_by_serial: f64,
-    /// 95 % bootstrap interval.
-    pub low: f64,
-    pub high: f64,
-}
-
-impl From<Interval> for Ratio {
-    fn from(interval: Interval) -> Self {
-        Ratio { parallel_by_serial: interval.estimate, low: interval.low, high: interval.high }
-    }
+    /// 95 % bootstrap interval; null where there are too few frames for one.
+    pub low: Option<f64>,
+    pub high: Option<f64>,
 }
 
 /// One line of `frames.csv`. Times in ms; NaN and None become an empty field.

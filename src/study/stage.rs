@@ -1,6 +1,5 @@
 //! A scene on a device, ready to run.
 
-use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -69,7 +68,12 @@ impl Stage {
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
-    pub fn run(&mut self, threading: Threading, frames: Range<u32>, on_frame: &mut OnFrame<'_>) -> Result<()> {
+    pub fn run(
+        &mut self,
+        threading: Threading,
+        frames: impl Iterator<Item = u32> + Send,
+        on_frame: &mut OnFrame<'_>,
+    ) -> Result<()> {
         self.renderer.reset();
         match threading {
             Threading::Serial => serial::run(&mut self.game, &mut self.renderer, frames, on_frame),

@@ -56,7 +56,14 @@ fn emit_all(samples: &[Sample], beside: &Beside<'_>, emit: &mut Emit<'_>) -> std
         // There is an offset where there is a pass.
         None => 1e-3 * device_ns + by_ends.unwrap_or(0.0),
     };
+    // Frames to warm up with come again.
+    let (mut i_block, mut i_in_block) = (0, 0u32);
     for sample in samples {
+        if std::mem::replace(&mut i_block, sample.i_block) != sample.i_block {
+            i_in_block = 0;
+        }
+        let id = format!("{}/{i_in_block}", sample.i_block);
+        i_in_block += 1;
         let (times, marks) = (&sample.times, &sample.times.marks);
         let event = |tid: usize, name: &str, [begin, end]: [f64; 2]| {
             json!({
@@ -71,7 +78,6 @@ fn emit_all(samples: &[Sample], beside: &Beside<'_>, emit: &mut Emit<'_>) -> std
         }
         // From the game step's begin to the picture: frames in flight overlap, so they are no step of a track.
         for (ph, at) in [("b", marks.game[0]), ("e", marks.end)] {
-            let id = format!("{}/{}", sample.i_block, times.i_frame);
             emit(json!({ "ph": ph, "cat": "frame", "id": id, "pid": 1, "tid": 1, "name": "frame", "ts": us(at) }))?;
         }
     }

@@ -38,6 +38,8 @@ fn mode(threading: &str) -> Mode {
         frame_lows: Lows::of(&[16.5, 17.0, 16.0, 40.25]),
         game_ms: ms,
         record_ms: ms,
+        submit_ms: ms,
+        wait_ms: ms,
         render_ms: ms,
         gpu_ms: None,
         latency_ms: measured(&[17.0], None, None),
@@ -126,7 +128,8 @@ fn row(i: u32) -> FrameRow {
         frame_ms: 16.123456789012345,
         game_ms: 1.0,
         record_ms: 0.5,
-        submit_wait_ms: 15.0,
+        submit_ms: 0.25,
+        wait_ms: 14.5,
         gpu_ms: None,
         latency_ms: f64::NAN,
         queue_depth: 1,
@@ -218,8 +221,8 @@ fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
     // The run, device, cpu, clocks, four blocks, the case, its setting, ratio, overlap and its share, skipping; twice a
-    // mode, five summaries, lows, two passes.
-    assert_eq!(n_compared, 4 + 4 + 6 + 2 * (1 + 5 + 1 + 2));
+    // mode, seven summaries, lows, two passes.
+    assert_eq!(n_compared, 4 + 4 + 6 + 2 * (1 + 7 + 1 + 2));
 }
 
 #[test]
@@ -235,10 +238,10 @@ fn a_run_comes_back_as_it_was_written() {
     assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
-        "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_wait_ms,gpu_ms,latency_ms,\
+        "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_ms,wait_ms,gpu_ms,latency_ms,\
          queue_depth,n_drawn,gpu_sort_ms,gpu_first_ms,image_hash\n\
-         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,15,,,1,7,1.5,,\n\
-         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,15,,,1,7,1.5,,\n"
+         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,1.5,,\n\
+         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,0.25,14.5,,,1,7,1.5,,\n"
     );
 }
 

@@ -217,7 +217,9 @@ fn overlap_lines(o: &Overlap, case: &Case) -> String {
             out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the \
                     machine changed from block to block\n";
         }
-        out += &slowed_line(o, case).unwrap_or_default();
+        if r.share < 0.9 {
+            out += &slowed_line(o, case).unwrap_or_default();
+        }
     } else if o.parallel_ms.is_some() {
         out += "that is next to nothing, or not certain: what share of it was reached cannot be said\n";
     }
@@ -324,6 +326,8 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
         ("frame", (|m| m.frame_ms.as_ref()) as fn(&Mode) -> Option<&Measured>),
         ("game", |m| m.game_ms.as_ref()),
         ("record", |m| m.record_ms.as_ref()),
+        ("submit", |m| m.submit_ms.as_ref()),
+        ("wait", |m| m.wait_ms.as_ref()),
         ("render", |m| m.render_ms.as_ref()),
         ("gpu", |m| m.gpu_ms.as_ref()),
         ("latency", |m| m.latency_ms.as_ref()),

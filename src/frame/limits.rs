@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
-use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, storage_bytes};
+use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, TargetFormat, storage_bytes};
 use crate::gpu::reflect::BindingKind;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
@@ -12,6 +12,7 @@ use crate::layout::particle::{BoxRecord, DrawnRecord, GroupRecord, ModeRecord, P
 use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
+use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
@@ -20,7 +21,6 @@ use super::buffers::has_second;
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
-use super::render::target_format;
 use super::tensor::Shape;
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
@@ -127,6 +127,14 @@ pub fn n_cells_max(scene: &Scene) -> u64 {
             GridSpec::fit(-half, half, scene.lighting.grid).n_total()
         }
         _ => side * side * side,
+    }
+}
+
+/// The film's format as a render target.
+pub fn target_format(format: FilmFormat) -> TargetFormat {
+    match format {
+        FilmFormat::Rgba16f => TargetFormat::Rgba16f,
+        FilmFormat::Rgba32f => TargetFormat::Rgba32f,
     }
 }
 

@@ -35,8 +35,10 @@ pub struct FrameTimes {
     pub game_ms: f64,
     /// Uploading, planning and recording.
     pub record_ms: f64,
-    /// From the submission, or from the end of the frame before where that was later, to the frame's end.
-    pub submit_wait_ms: f64,
+    /// Handing the commands to the driver.
+    pub submit_ms: f64,
+    /// From the end of the submission, or from the end of the frame before where that was later, to the frame's end.
+    pub wait_ms: f64,
     /// From the start of the game step to the finished image.
     pub latency_ms: f64,
     /// Frames that the device still had when this one was handed to it; 0 where it had nothing to do.
@@ -47,6 +49,13 @@ pub struct FrameTimes {
     pub plan: Plan,
     /// GPU time of every pass that ran; empty where the device has no timestamps.
     pub passes: Vec<ScopeTime>,
+}
+
+impl FrameTimes {
+    /// Recording, submission and the wait for the device.
+    pub fn render_ms(&self) -> f64 {
+        self.record_ms + self.submit_ms + self.wait_ms
+    }
 }
 
 /// When a frame's steps began and ended, on the host's clock.
@@ -86,7 +95,8 @@ impl Started {
             frame_ms,
             game_ms: self.game_ms,
             record_ms: ms(done.recorded[0], done.recorded[1]),
-            submit_wait_ms: done.submit_wait_ms,
+            submit_ms: ms(done.recorded[1], done.submitted),
+            wait_ms: done.wait_ms,
             latency_ms: ms(self.begin, end),
             queue_depth: self.queue_depth,
             n_drawn: self.n_drawn,

@@ -19,7 +19,6 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Pending, Place, Recorder, ScopeTime, Target};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
-use crate::model::film::FilmFormat;
 use crate::model::scene::{LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
@@ -76,6 +75,7 @@ pub(super) struct InFlight {
     i_target: usize,
     plan: Plan,
     recorded: [Instant; 2],
+    submitted: Instant,
 }
 
 /// What of the scene the passes are told and that is constant over a run.
@@ -97,7 +97,9 @@ pub struct Rendered {
     pub plan: Plan,
     /// When uploading, planning and recording began, and ended.
     pub recorded: [Instant; 2],
-    pub submit_wait_ms: f64,
+    /// When the device had been handed them.
+    pub submitted: Instant,
+    pub wait_ms: f64,
     pub passes: Vec<ScopeTime>,
 }
 
@@ -109,7 +111,7 @@ impl Renderer {
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
-        let format = target_format(scene.film.format);
+        let format = limits::target_format(scene.film.format);
         let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut host = Commands::new(device, "frame.host")?;
@@ -229,7 +231,8 @@ impl Renderer {
         self.record(slot, &packet, &plan)?;
         let recorded = [begin, Instant::now()];
         let pending = self.frames[slot].submit()?;
-        self.in_flight.push_back(InFlight { slot, i_target: self.i_target, plan, recorded });
+        let (i_target, submitted) = (self.i_target, Instant::now());
+        self.in_flight.push_back(InFlight { slot, i_target, plan, recorded, submitted });
         self.n_begun += 1;
         self.last = Some(packet);
         Ok(pending)
@@ -244,8 +247,9 @@ impl Renderer {
         self.i_ended_target = frame.i_target;
         let now = Instant::now();
         // What was waited for the frame before is that one's.
-        let submit_wait_ms = ms(frame.recorded[1].max(std::mem::replace(&mut self.last_end, now)), now);
-        Ok(Rendered { plan: frame.plan, recorded: frame.recorded, submit_wait_ms, passes })
+        let wait_ms = ms(frame.submitted.max(std::mem::replace(&mut self.last_end, now)), now);
+        let InFlight { plan, recorded, submitted, .. } = frame;
+        Ok(Rendered { plan, recorded, submitted, wait_ms, passes })
     }
 
     /// Waits for every frame in flight, of which nothing is wanted.
@@ -392,12 +396,4 @@ fn pass(
     f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
 ) -> Result<()> {
     if plan.runs(pass) { rec.scope(pass.name(), f) } else { Ok(()) }
-}
-
-/// The film's format as a render target.
-pub fn target_format(format: FilmFormat) -> TargetFormat {
-    match format {
-        FilmFormat::Rgba16f => TargetFormat::Rgba16f,
-        FilmFormat::Rgba32f => TargetFormat::Rgba32f,
-    }
 }

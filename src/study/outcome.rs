@@ -103,11 +103,7 @@ impl Outcome {
 
     /// What overlap could gain, and how much of it the parallel loop gained.
     fn overlap(&self, i: usize, serial: Loop, parallel: Option<Loop>) -> Option<Overlap> {
-        let row = |t: &&FrameTimes| SerialFrame {
-            frame_ms: t.frame_ms,
-            game_ms: t.game_ms,
-            render_ms: t.record_ms + t.submit_wait_ms,
-        };
+        let row = |t: &&FrameTimes| SerialFrame { frame_ms: t.frame_ms, game_ms: t.game_ms, render_ms: t.render_ms() };
         let serial: Vec<SerialFrame> = self.timed(i, serial).0.iter().map(row).collect();
         Overlap::of(&serial, &parallel.map_or(vec![], |of| self.timed(i, of).frame_ms()))
     }
@@ -162,7 +158,9 @@ impl Outcome {
             frame_lows: Lows::of(&timed.frame_ms()),
             game_ms: timed.measured(|t| Some(t.game_ms)),
             record_ms: timed.measured(|t| Some(t.record_ms)),
-            render_ms: timed.measured(|t| Some(t.record_ms + t.submit_wait_ms)),
+            submit_ms: timed.measured(|t| Some(t.submit_ms)),
+            wait_ms: timed.measured(|t| Some(t.wait_ms)),
+            render_ms: timed.measured(|t| Some(t.render_ms())),
             gpu_ms: timed.measured(FrameTimes::gpu_ms),
             latency_ms: timed.measured(|t| Some(t.latency_ms)),
             queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
@@ -197,7 +195,8 @@ impl Outcome {
             frame_ms: s.times.frame_ms,
             game_ms: s.times.game_ms,
             record_ms: s.times.record_ms,
-            submit_wait_ms: s.times.submit_wait_ms,
+            submit_ms: s.times.submit_ms,
+            wait_ms: s.times.wait_ms,
             gpu_ms: s.times.gpu_ms(),
             latency_ms: s.times.latency_ms,
             queue_depth: s.times.queue_depth as usize,

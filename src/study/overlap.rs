@@ -13,6 +13,8 @@ use crate::measure::stats::median;
 
 /// Of the serial frame. What is spent between the steps, some microseconds, is no gain to speak of.
 const LEAST_GAIN: f64 = 0.05;
+/// To hand a packet to another thread and wake it takes about as long.
+const LEAST_GAIN_MS: f64 = 0.05;
 
 /// Medians in ms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -25,7 +27,7 @@ pub struct Overlap {
     pub render_ms: f64,
     /// max(game, render): what overlapping these two alone can come to.
     pub bound_ms: f64,
-    /// None where the parallel loop did not run, or the possible gain is less than [`LEAST_GAIN`] of the serial frame or not
+    /// None where the parallel loop did not run, or the possible gain is less than 0.05 ms, a twentieth of the serial frame, or not
     /// certainly above 0: a share of next to nothing says nothing.
     pub reached: Option<Reached>,
 }
@@ -57,7 +59,7 @@ impl Overlap {
         let (frame, game, render) = (column(|f| f.frame_ms), column(|f| f.game_ms), column(|f| f.render_ms));
         let parallel: Vec<f64> = parallel_ms.iter().copied().filter(|ms| ms.is_finite()).collect();
         let (game_ms, render_ms, serial_ms) = (median(&game)?, median(&render)?, median(&frame)?);
-        let is_worth_it = serial_ms - game_ms.max(render_ms) >= LEAST_GAIN * serial_ms;
+        let is_worth_it = serial_ms - game_ms.max(render_ms) >= LEAST_GAIN_MS.max(LEAST_GAIN * serial_ms);
         // A serial frame is drawn with its game and render step: what slows all three together cancels.
         let bootstrap = Bootstrap::of_neighbours(serial.len().min(parallel.len()));
         let reached = bootstrap.interval([serial.len(), parallel.len()], |[rows, parallel_rows]| {

@@ -97,7 +97,8 @@ struct Columns {
     frame_ms: usize,
     game_ms: usize,
     record_ms: usize,
-    submit_wait_ms: usize,
+    submit_ms: usize,
+    wait_ms: usize,
     gpu_ms: usize,
     /// Names and places.
     passes: Vec<(String, usize)>,
@@ -120,7 +121,8 @@ impl Columns {
             frame_ms: find("frame_ms")?,
             game_ms: find("game_ms")?,
             record_ms: find("record_ms")?,
-            submit_wait_ms: find("submit_wait_ms")?,
+            submit_ms: find("submit_ms")?,
+            wait_ms: find("wait_ms")?,
             gpu_ms: find("gpu_ms")?,
             passes: header.iter().enumerate().filter_map(|(i, field)| Some((pass(field)?, i))).collect(),
             n: header.len(),
@@ -141,7 +143,8 @@ impl Columns {
                 text.parse::<f64>().ok().filter(|ms| ms.is_finite()).map(Some).ok_or_else(|| odd("a time in ms", text))
             }
         };
-        let render = ms(self.record_ms)?.zip(ms(self.submit_wait_ms)?).map(|(record, wait)| record + wait);
+        let parts = [ms(self.record_ms)?, ms(self.submit_ms)?, ms(self.wait_ms)?];
+        let render = parts.into_iter().try_fold(0.0, |sum, part| part.map(|part| sum + part));
         let mut times = vec![ms(self.frame_ms)?, ms(self.game_ms)?, render, ms(self.gpu_ms)?];
         for (_, column) in &self.passes {
             times.push(ms(*column)?);

@@ -135,6 +135,8 @@ pub struct Mode {
     pub frame_lows: Option<Lows>,
     pub game_ms: Option<Measured>,
     pub record_ms: Option<Measured>,
+    pub submit_ms: Option<Measured>,
+    pub wait_ms: Option<Measured>,
     /// Recording, submission and the wait for the device.
     pub render_ms: Option<Measured>,
     pub gpu_ms: Option<Measured>,
@@ -195,7 +197,8 @@ pub struct FrameRow {
     pub frame_ms: f64,
     pub game_ms: f64,
     pub record_ms: f64,
-    pub submit_wait_ms: f64,
+    pub submit_ms: f64,
+    pub wait_ms: f64,
     pub gpu_ms: Option<f64>,
     pub latency_ms: f64,
     /// Frames that the device still had when it was handed this one.
@@ -207,7 +210,7 @@ pub struct FrameRow {
     pub image_hash: Option<String>,
 }
 
-const FRAME_COLUMNS: [&str; 17] = [
+const FRAME_COLUMNS: [&str; 18] = [
     "i_row",
     "phase",
     "sweep",
@@ -220,7 +223,8 @@ const FRAME_COLUMNS: [&str; 17] = [
     "frame_ms",
     "game_ms",
     "record_ms",
-    "submit_wait_ms",
+    "submit_ms",
+    "wait_ms",
     "gpu_ms",
     "latency_ms",
     "queue_depth",
@@ -303,7 +307,8 @@ fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
         number(Some(row.frame_ms)),
         number(Some(row.game_ms)),
         number(Some(row.record_ms)),
-        number(Some(row.submit_wait_ms)),
+        number(Some(row.submit_ms)),
+        number(Some(row.wait_ms)),
         number(row.gpu_ms),
         number(Some(row.latency_ms)),
         row.queue_depth.to_string(),

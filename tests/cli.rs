@@ -156,6 +156,7 @@ fn bench_prints_its_table_and_writes_its_results_once() {
     let sprites = |i: usize| case["modes"][i]["passes"].as_array().and_then(|p| p.last()).expect("sprites");
     assert_eq!((&sprites(0)["n_skipped"], &sprites(2)["n_skipped"]), (&12.into(), &0.into()));
     assert_eq!(sprites(0)["saved_ms"], sprites(2)["p50_ms"]);
+    assert_eq!(sprites(0)["reasons"], serde_json::json!([{ "reason": "the picture is the same", "n": 12 }]));
     for word in ["1 % low: p99", "mean of slowest 1 %", "1 % of the time", "perfect overlap = max(game", "host clock"] {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }

@@ -1,14 +1,15 @@
 //! `nimbus compare` as a user runs it, on results folders made here: verdicts, refusals, and files that are not whole.
 
-use std::collections::BTreeMap;
+#[path = "harness/results.rs"]
+mod results;
+
 use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
 use nimbus::measure::stats::Summary;
-use nimbus::study::machine::{Clocks, Cpu, Device};
 use nimbus::study::recorded::read_results;
-use nimbus::study::records::{Block, Case, FRAMES_FILE, FrameRow, Mode, RUN_FILE, Run, SCHEMA_VERSION, write_results};
+use nimbus::study::records::{FRAMES_FILE, FrameRow, RUN_FILE, Run, write_results};
 use serde_json::{Value, json};
 
 const N_FRAMES: u32 = 60;
@@ -26,13 +27,6 @@ fn rows(threading: &str, ms: f64) -> Vec<FrameRow> {
     let row = |i: u32| {
         let ms = ms * (1.0 + 0.01 * f64::from(i * 7 % 11) / 5.0 - 0.01);
         FrameRow {
-            phase: String::new(),
-            sweep: String::new(),
-            skip: true,
-            threading: threading.to_owned(),
-            block: 0,
-            frame: i,
-            time_s: f64::from(i) * 0.1,
             warm_up: i < 2,
             frame_ms: if i < 2 { 1000.0 } else { ms },
             game_ms: 1.0,
@@ -41,84 +35,19 @@ fn rows(threading: &str, ms: f64) -> Vec<FrameRow> {
             wait_ms: 0.7 * ms,
             gpu_ms: Some(0.5 * ms),
             latency_ms: ms,
-            queue_depth: 1,
-            n_drawn: 7,
             pass_ms: vec![Some(0.5 * ms), None],
-            image_hash: None,
+            ..results::row(threading, i)
         }
     };
     (0..N_FRAMES + 2).map(row).collect()
 }
 
-fn block(threading: &str) -> Block {
-    Block { case: 0, threading: threading.to_owned(), skip: true }
-}
-
 fn run() -> Run {
-    let mode = |threading: &str| Mode {
-        threading: threading.to_owned(),
-        skip: true,
-        simulate: "gpu".to_owned(),
-        frames: N_FRAMES as usize,
-        warm_up: 2,
-        blocks: 1,
-        frame_ms: None,
-        frame_lows: None,
-        game_ms: None,
-        record_ms: None,
-        submit_ms: None,
-        wait_ms: None,
-        render_ms: None,
-        gpu_ms: None,
-        latency_ms: None,
-        queue_depth: None,
-        drawn: None,
-        passes: Vec::new(),
-        image_hash: None,
-        block_spread: None,
-    };
-    Run {
-        schema: SCHEMA_VERSION,
-        nimbus: "0.1.0".to_owned(),
-        revision: "0123456789ab".to_owned(),
-        date: "2024-02-29T12:34:56Z".to_owned(),
-        command: ["nimbus", "bench", "a.toml", "--out", "a"].map(str::to_owned).to_vec(),
-        scene_hash: "ab".repeat(32),
-        scene: json!({ "lighting": { "grid": 64 }, "cloud": [{ "wind": [0.5, 0.0, 0.0] }] }),
-        device: Device {
-            name: "llvmpipe".to_owned(),
-            driver: "Mesa 22.3.6".to_owned(),
-            api: "1.3.230".to_owned(),
-            kind: "cpu".to_owned(),
-            uuid: "00".repeat(16),
-        },
-        cpu: Cpu { model: "a processor".to_owned(), logical_cores: 2 },
-        environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
-        clocks: Clocks {
-            resolution_ns: 1.0,
-            overhead_ns: 22.5,
-            timestamp_period_ns: None,
-            timestamp_overhead_ns: None,
-        },
-        block_order: ["serial", "parallel"].map(block).to_vec(),
-        cases: vec![Case {
-            phase: None,
-            sweep: Vec::new(),
-            scene_hash: "cd".repeat(32),
-            particles: 554,
-            width: 800,
-            height: 600,
-            modes: vec![mode("serial"), mode("parallel")],
-            ratio: None,
-            overlap: None,
-            skipping: None,
-        }],
-        interrupted: false,
-    }
+    results::run(["serial", "parallel"].map(|of| results::mode(of, N_FRAMES as usize, 2)).to_vec())
 }
 
 /// A results folder in `dir` whose serial frames take `ms`, and parallel ones 0.9 of it.
-fn results(dir: &tempfile::TempDir, name: &str, ms: f64, run: &Run) -> String {
+fn written(dir: &tempfile::TempDir, name: &str, ms: f64, run: &Run) -> String {
     let folder = dir.path().join(name);
     fs::create_dir(&folder).expect("a folder");
     let rows = [rows("serial", ms), rows("parallel", 0.9 * ms)].concat();
@@ -133,8 +62,8 @@ fn temp() -> tempfile::TempDir {
 #[test]
 fn a_run_and_itself_and_a_slower_one() {
     let dir = temp();
-    let a = results(&dir, "a", 10.0, &run());
-    let b = results(&dir, "b", 10.5, &run());
+    let a = written(&dir, "a", 10.0, &run());
+    let b = written(&dir, "b", 10.5, &run());
     let (code, table, stderr) = compare(&[&a, &a]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     assert!(table.contains("serial frame: B takes 1.000 of A's time"), "{table}");
@@ -155,7 +84,7 @@ fn a_run_and_itself_and_a_slower_one() {
 #[test]
 fn a_machine_that_was_not_steady_is_remarked_on() {
     let dir = temp();
-    let a = results(&dir, "a", 10.2, &run());
+    let a = written(&dir, "a", 10.2, &run());
     let drifting = dir.path().join("b");
     fs::create_dir(&drifting).expect("a folder");
     let mut all = [rows("serial", 10.0), rows("parallel", 0.9 * 10.2)].concat();
@@ -173,7 +102,7 @@ fn a_machine_that_was_not_steady_is_remarked_on() {
 #[test]
 fn json_says_what_the_table_says() {
     let dir = temp();
-    let (a, b) = (results(&dir, "a", 10.0, &run()), results(&dir, "b", 10.5, &run()));
+    let (a, b) = (written(&dir, "a", 10.0, &run()), written(&dir, "b", 10.5, &run()));
     let (code, text, _) = compare(&[&a, &b, "--json"]);
     let json: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!((code, &json["headline"], &json["a"]["folder"]), (0, &json!("frame"), &json!(a)));
@@ -218,11 +147,11 @@ const CHANGES: [Change; 8] = [
 #[test]
 fn what_differs_is_refused_by_name_unless_allowed() {
     let dir = temp();
-    let a = results(&dir, "a", 10.0, &run());
+    let a = written(&dir, "a", 10.0, &run());
     for (i, (change, kind, shown)) in CHANGES.into_iter().enumerate() {
         let mut changed = run();
         change(&mut changed);
-        let b = results(&dir, &format!("b{i}"), 10.0, &changed);
+        let b = written(&dir, &format!("b{i}"), 10.0, &changed);
         let others: Vec<&str> = ["device", "build", "scene"].into_iter().filter(|k| *k != kind).collect();
         for refused in [compare(&[&a, &b]), compare(&[&a, &b, "--allow", &others.join(",")])] {
             assert_eq!((refused.0, refused.1.as_str()), (2, ""), "{kind}");
@@ -239,9 +168,9 @@ fn what_differs_is_refused_by_name_unless_allowed() {
 #[test]
 fn the_flag_to_add_names_all_that_differs_and_what_was_allowed() {
     let dir = temp();
-    let a = results(&dir, "a", 10.0, &run());
+    let a = written(&dir, "a", 10.0, &run());
     let other = Run { scene_hash: "cd".repeat(32), nimbus: "0.2.0".to_owned(), ..run() };
-    let b = results(&dir, "b", 10.0, &other);
+    let b = written(&dir, "b", 10.0, &other);
     assert!(compare(&[&a, &b]).2.contains("--allow build,scene"));
     let (code, _, stderr) = compare(&[&a, &b, "--allow", "scene"]);
     assert!(code == 2 && stderr.contains("--allow build,scene") && !stderr.contains("scene_hash"), "{stderr}");
@@ -256,7 +185,7 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
     let dirty = Run { revision: "0123456789ab-dirty".to_owned(), ..run() };
     let mut asked = Run { interrupted: true, ..dirty.clone() };
     asked.command.extend(["--no-skip".to_owned(), "-q".to_owned()]);
-    let (a, b) = (results(&dir, "a", 10.0, &dirty), results(&dir, "b", 10.0, &asked));
+    let (a, b) = (written(&dir, "a", 10.0, &dirty), written(&dir, "b", 10.0, &asked));
     let (code, table, _) = compare(&[&a, &b]);
     assert_eq!((code, table.matches("note: ").count()), (0, 3), "{table}");
     for word in ["-dirty: that does not say", "B was interrupted", "A \"bench a.toml\", B \"bench a.toml --no-skip\""] {
@@ -268,7 +197,7 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
     let none = dir.path().join("none");
     fs::create_dir(&none).expect("a folder");
     write_results(&none, &serial, &["grid".to_owned(), "sort".to_owned()], &rows("elsewhere", 1.0)).expect("results");
-    let a = results(&dir, "c", 10.0, &run());
+    let a = written(&dir, "c", 10.0, &run());
     let (code, _, stderr) = compare(&[&a, none.to_str().expect("UTF-8")]);
     assert!(code == 2 && stderr.contains("A has serial, parallel, B has elsewhere"), "{stderr}");
 }
@@ -313,10 +242,10 @@ fn whole_lines(text: &str, n: usize) -> String {
 #[test]
 fn what_is_not_whole_or_not_ours_is_one_message_with_its_path() {
     let dir = temp();
-    let a = results(&dir, "a", 10.0, &run());
+    let a = written(&dir, "a", 10.0, &run());
     for (damage, file, fault) in DAMAGES {
         let inner = temp();
-        let b = results(&inner, "b", 10.0, &run());
+        let b = written(&inner, "b", 10.0, &run());
         damage(Path::new(&b));
         for args in [[&a, &b], [&b, &a]] {
             let (code, stdout, stderr) = compare(&args.map(String::as_str));
@@ -329,7 +258,7 @@ fn what_is_not_whole_or_not_ours_is_one_message_with_its_path() {
 #[test]
 fn a_folder_of_folders_is_explained() {
     let dir = temp();
-    let a = results(&dir, "hello", 10.0, &run());
+    let a = written(&dir, "hello", 10.0, &run());
     let (code, _, stderr) = compare(&[dir.path().to_str().expect("UTF-8"), &a]);
     assert!(code == 2 && stderr.contains("name one of those, such as ") && stderr.contains("hello"), "{stderr}");
 }

@@ -1,18 +1,18 @@
 //! A process that is killed, at whatever moment, while it replaces results leaves the old ones or the new ones, whole, and
 //! what else lies in their folder.
 
-use std::collections::BTreeMap;
+#[path = "harness/results.rs"]
+mod results;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use nimbus::measure::stats::Summary;
-use nimbus::study::machine::{Clocks, Cpu, Device};
 use nimbus::study::recorded::read_results;
 use nimbus::study::records::{
-    Block, Case, FRAMES_FILE, FrameRow, Measured, Mode, RUN_FILE, Run, SCHEMA_VERSION, write_frames, write_results,
-    write_run,
+    FRAMES_FILE, FrameRow, Measured, Mode, RUN_FILE, Run, write_frames, write_results, write_run,
 };
 use serde_json::json;
 
@@ -24,27 +24,7 @@ const N_KILLS: u32 = 100;
 
 /// Rows of generation `k`: their number differs from one generation to the next, and every one carries k.
 fn rows(k: u32) -> Vec<FrameRow> {
-    let row = |i: u32| FrameRow {
-        phase: String::new(),
-        sweep: String::new(),
-        skip: true,
-        threading: "serial".to_owned(),
-        block: 0,
-        frame: i,
-        time_s: f64::from(i) * 0.1,
-        warm_up: false,
-        frame_ms: f64::from(k),
-        game_ms: 1.0,
-        record_ms: 0.5,
-        submit_ms: 0.25,
-        wait_ms: 0.75,
-        gpu_ms: None,
-        latency_ms: 2.0,
-        queue_depth: 1,
-        n_drawn: 7,
-        pass_ms: vec![],
-        image_hash: None,
-    };
+    let row = |i: u32| FrameRow { frame_ms: f64::from(k), ..results::row("serial", i) };
     (0..n_rows(k)).map(row).collect()
 }
 
@@ -53,66 +33,9 @@ fn n_rows(k: u32) -> u32 {
 }
 
 fn run(k: u32) -> Run {
-    let mode = Mode {
-        threading: "serial".to_owned(),
-        skip: true,
-        simulate: "gpu".to_owned(),
-        frames: n_rows(k) as usize,
-        warm_up: 0,
-        blocks: 1,
-        frame_ms: Summary::of(&[f64::from(k)]).map(|of| Measured { of, p50_low: None, p50_high: None }),
-        frame_lows: None,
-        game_ms: None,
-        record_ms: None,
-        submit_ms: None,
-        wait_ms: None,
-        render_ms: None,
-        gpu_ms: None,
-        latency_ms: None,
-        queue_depth: None,
-        drawn: None,
-        passes: Vec::new(),
-        image_hash: None,
-        block_spread: None,
-    };
-    Run {
-        schema: SCHEMA_VERSION,
-        nimbus: "0.1.0".to_owned(),
-        revision: "unknown".to_owned(),
-        date: "2024-02-29T12:34:56Z".to_owned(),
-        command: vec!["nimbus".to_owned()],
-        scene_hash: "ab".repeat(32),
-        scene: json!({ "generation": k }),
-        device: Device {
-            name: "none".to_owned(),
-            driver: String::new(),
-            api: "1.3.0".to_owned(),
-            kind: "cpu".to_owned(),
-            uuid: "00".repeat(16),
-        },
-        cpu: Cpu { model: "a processor".to_owned(), logical_cores: 1 },
-        environment: BTreeMap::new(),
-        clocks: Clocks {
-            resolution_ns: 1.0,
-            overhead_ns: 20.0,
-            timestamp_period_ns: None,
-            timestamp_overhead_ns: None,
-        },
-        block_order: vec![Block { case: 0, threading: "serial".to_owned(), skip: true }],
-        cases: vec![Case {
-            phase: None,
-            sweep: vec![],
-            scene_hash: "cd".repeat(32),
-            particles: 1,
-            width: 1,
-            height: 1,
-            modes: vec![mode],
-            ratio: None,
-            overlap: None,
-            skipping: None,
-        }],
-        interrupted: false,
-    }
+    let frame_ms = Summary::of(&[f64::from(k)]).map(|of| Measured { of, p50_low: None, p50_high: None });
+    let mode = Mode { frame_ms, ..results::mode("serial", n_rows(k) as usize, 0) };
+    Run { scene: json!({ "generation": k }), ..results::run(vec![mode]) }
 }
 
 /// Not a test of its own: what the killed process does.

@@ -9,8 +9,8 @@ use nimbus::measure::stats::Summary;
 use nimbus::study::machine::{Clocks, Cpu, Device, cpu, environment, revision, utc_now};
 use nimbus::study::overlap::{Overlap, SerialFrame};
 use nimbus::study::records::{
-    Block, Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Run, SCHEMA_VERSION, Setting, Skipping,
-    prepare_out_dir, read_run, write_results, write_run,
+    Block, Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, SCHEMA_VERSION, Setting,
+    Skipping, prepare_out_dir, read_run, write_results, write_run,
 };
 use serde_json::{Value, json};
 
@@ -53,6 +53,7 @@ fn mode(threading: &str) -> Mode {
                 n_run: 3,
                 n_skipped: 1,
                 reason: Some("camera did not move".to_owned()),
+                reasons: vec![Reason { reason: "camera did not move".to_owned(), n: 1 }],
                 saved_ms: None,
             },
             Pass {
@@ -62,6 +63,7 @@ fn mode(threading: &str) -> Mode {
                 n_run: 0,
                 n_skipped: 4,
                 reason: None,
+                reasons: vec![],
                 saved_ms: Some(0.5),
             },
         ],
@@ -134,6 +136,7 @@ fn row(i: u32) -> FrameRow {
         latency_ms: f64::NAN,
         queue_depth: 1,
         n_drawn: 7,
+        ran: "sort+sprites".to_owned(),
         pass_ms: vec![Some(1.5), None],
         image_hash: None,
     }
@@ -221,8 +224,8 @@ fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
     // The run, device, cpu, clocks, four blocks, the case, its setting, ratio, overlap and its share, skipping; twice a
-    // mode, seven summaries, lows, two passes.
-    assert_eq!(n_compared, 4 + 4 + 6 + 2 * (1 + 7 + 1 + 2));
+    // mode, seven summaries, lows, two passes, a reason.
+    assert_eq!(n_compared, 4 + 4 + 6 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]
@@ -239,9 +242,9 @@ fn a_run_comes_back_as_it_was_written() {
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
         "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_ms,wait_ms,gpu_ms,latency_ms,\
-         queue_depth,n_drawn,gpu_sort_ms,gpu_first_ms,image_hash\n\
-         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,1.5,,\n\
-         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,0.25,14.5,,,1,7,1.5,,\n"
+         queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,image_hash\n\
+         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
+         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n"
     );
 }
 

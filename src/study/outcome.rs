@@ -6,7 +6,7 @@ use super::bench::{BenchPlan, Outcome, Sample};
 use super::cases::{Case, Loop, sweep_text};
 use super::compare::{N_FRAMES_NEEDED, spread_of_blocks};
 use super::overlap::{Overlap, SerialFrame};
-use super::records::{self, FrameRow, Measured, Mode, Pass as PassRecord, Ratio, Skipping};
+use super::records::{self, FrameRow, Measured, Mode, Pass as PassRecord, Ratio, Reason, Skipping};
 use crate::frame::FrameTimes;
 use crate::frame::plan::Pass;
 use crate::measure::bootstrap::Bootstrap;
@@ -201,11 +201,28 @@ impl Outcome {
             latency_ms: s.times.latency_ms,
             queue_depth: s.times.queue_depth as usize,
             n_drawn: s.times.n_drawn,
+            ran: ran(&s.times),
             pass_ms: names.iter().map(|n| s.times.pass_ms(n)).collect(),
             image_hash: s.image_hash.clone(),
         };
         self.samples.iter().map(row).collect()
     }
+}
+
+/// "sort+sprites".
+fn ran(times: &FrameTimes) -> String {
+    Pass::ALL.into_iter().filter(|p| times.plan.runs(*p)).map(Pass::name).collect::<Vec<_>>().join("+")
+}
+
+/// Each once, the most frequent first.
+fn reasons(all: impl Iterator<Item = String>) -> Vec<Reason> {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for reason in all {
+        *counts.entry(reason).or_default() += 1;
+    }
+    let mut reasons: Vec<Reason> = counts.into_iter().map(|(reason, n)| Reason { reason, n }).collect();
+    reasons.sort_by_key(|r| std::cmp::Reverse(r.n));
+    reasons
 }
 
 /// Timer scopes of a frame.
@@ -228,6 +245,7 @@ fn pass_records(timed: &Timed<'_>, against: Option<&Timed<'_>>) -> Vec<PassRecor
             n_run: n - skipped.len(),
             n_skipped: skipped.len(),
             reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_string()),
+            reasons: reasons(skipped.iter().map(|t| t.plan.decision(pass).reason.to_string())),
             saved_ms: whole.filter(|_| !skipped.is_empty()).map(|ms| ms * (skipped.len() as f64 / n as f64)),
         }
     };

@@ -164,9 +164,18 @@ pub struct Pass {
     pub n_skipped: usize,
     /// Why it was skipped, the last time.
     pub reason: Option<String>,
+    /// Every reason it was skipped for, the most frequent first.
+    pub reasons: Vec<Reason>,
     /// Device time that skipping it saved a frame: its median where nothing is skipped, in the share of the frames that
     /// skipped it. null where that was not measured.
     pub saved_ms: Option<f64>,
+}
+
+/// Why a pass was skipped, and in how many frames.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Reason {
+    pub reason: String,
+    pub n: usize,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -205,12 +214,14 @@ pub struct FrameRow {
     pub queue_depth: usize,
     /// Particles that were drawn.
     pub n_drawn: u32,
+    /// Names of the passes that ran, joined by "+"; what a frame left out is the others.
+    pub ran: String,
     /// In the order of the names handed to `write_results`; None where skipped.
     pub pass_ms: Vec<Option<f64>>,
     pub image_hash: Option<String>,
 }
 
-const FRAME_COLUMNS: [&str; 18] = [
+const FRAME_COLUMNS: [&str; 19] = [
     "i_row",
     "phase",
     "sweep",
@@ -229,6 +240,7 @@ const FRAME_COLUMNS: [&str; 18] = [
     "latency_ms",
     "queue_depth",
     "n_drawn",
+    "ran",
 ];
 
 /// Makes the folder results will go to, before anything is measured. What exists is refused unless `force`; then its
@@ -313,6 +325,7 @@ fn fields(i_row: usize, row: &FrameRow) -> Vec<String> {
         number(Some(row.latency_ms)),
         row.queue_depth.to_string(),
         row.n_drawn.to_string(),
+        row.ran.clone(),
     ];
     fields.extend(row.pass_ms.iter().map(|ms| number(*ms)));
     fields.push(row.image_hash.clone().unwrap_or_default());

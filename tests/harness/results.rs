@@ -1,0 +1,102 @@
+//! Results of a bench that never ran, for tests of what is done with results.
+
+use std::collections::BTreeMap;
+
+use nimbus::study::machine::{Clocks, Cpu, Device};
+use nimbus::study::records::{Block, Case, FrameRow, Mode, Run, SCHEMA_VERSION};
+use serde_json::json;
+
+/// A loop of `frames` timed frames, of which nothing is said.
+pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {
+    Mode {
+        threading: threading.to_owned(),
+        skip: true,
+        simulate: "gpu".to_owned(),
+        frames,
+        warm_up,
+        blocks: 1,
+        frame_ms: None,
+        frame_lows: None,
+        game_ms: None,
+        record_ms: None,
+        submit_ms: None,
+        wait_ms: None,
+        render_ms: None,
+        gpu_ms: None,
+        latency_ms: None,
+        queue_depth: None,
+        drawn: None,
+        passes: Vec::new(),
+        image_hash: None,
+        block_spread: None,
+    }
+}
+
+/// A run of one case, a block a loop.
+pub fn run(modes: Vec<Mode>) -> Run {
+    let block = |m: &Mode| Block { case: 0, threading: m.threading.clone(), skip: m.skip };
+    Run {
+        schema: SCHEMA_VERSION,
+        nimbus: "0.1.0".to_owned(),
+        revision: "0123456789ab".to_owned(),
+        date: "2024-02-29T12:34:56Z".to_owned(),
+        command: ["nimbus", "bench", "a.toml", "--out", "a"].map(str::to_owned).to_vec(),
+        scene_hash: "ab".repeat(32),
+        scene: json!({ "lighting": { "grid": 64 }, "cloud": [{ "wind": [0.5, 0.0, 0.0] }] }),
+        device: Device {
+            name: "llvmpipe".to_owned(),
+            driver: "Mesa 22.3.6".to_owned(),
+            api: "1.3.230".to_owned(),
+            kind: "cpu".to_owned(),
+            uuid: "00".repeat(16),
+        },
+        cpu: Cpu { model: "a processor".to_owned(), logical_cores: 2 },
+        environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
+        clocks: Clocks {
+            resolution_ns: 1.0,
+            overhead_ns: 22.5,
+            timestamp_period_ns: None,
+            timestamp_overhead_ns: None,
+        },
+        block_order: modes.iter().map(block).collect(),
+        cases: vec![Case {
+            phase: None,
+            sweep: Vec::new(),
+            scene_hash: "cd".repeat(32),
+            particles: 554,
+            width: 800,
+            height: 600,
+            modes,
+            ratio: None,
+            overlap: None,
+            skipping: None,
+        }],
+        interrupted: false,
+    }
+}
+
+/// Frame `frame`, timed, of 1 ms.
+pub fn row(threading: &str, frame: u32) -> FrameRow {
+    FrameRow {
+        phase: String::new(),
+        sweep: String::new(),
+        threading: threading.to_owned(),
+        skip: true,
+        block: 0,
+        frame,
+        time_s: f64::from(frame) * 0.1,
+        warm_up: false,
+        frame_ms: 1.0,
+        game_ms: 0.25,
+        record_ms: 0.125,
+        submit_ms: 0.125,
+        wait_ms: 0.5,
+        gpu_ms: None,
+        latency_ms: 1.0,
+        queue_depth: 1,
+        n_drawn: 7,
+        ran: "sort+sprites".to_owned(),
+        pass_ms: Vec::new(),
+        image_hash: None,
+    }
+}

@@ -1,16 +1,18 @@
 //! What is written is what the schema says, and both say the same keys.
 
-use std::collections::BTreeMap;
+#[path = "harness/results.rs"]
+mod results;
+
 use std::fs;
 use std::path::Path;
 
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
-use nimbus::study::machine::{Clocks, Cpu, Device, cpu, environment, revision, utc_now};
+use nimbus::study::machine::{Cpu, cpu, environment, revision, utc_now};
 use nimbus::study::overlap::{Overlap, SerialFrame};
 use nimbus::study::records::{
-    Block, Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, SCHEMA_VERSION, Setting,
-    Skipping, prepare_out_dir, read_run, write_results, write_run,
+    Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, Setting, Skipping,
+    prepare_out_dir, read_run, write_results, write_run,
 };
 use serde_json::{Value, json};
 
@@ -28,12 +30,6 @@ fn mode(threading: &str) -> Mode {
     let measured = |values: &[f64], p50_low, p50_high| Summary::of(values).map(|of| Measured { of, p50_low, p50_high });
     let ms = measured(&[16.5, 17.0, 16.0, 40.25], Some(16.0), Some(17.0));
     Mode {
-        threading: threading.to_owned(),
-        skip: true,
-        simulate: "gpu".to_owned(),
-        frames: 4,
-        warm_up: 2,
-        blocks: 1,
         frame_ms: ms,
         frame_lows: Lows::of(&[16.5, 17.0, 16.0, 40.25]),
         game_ms: ms,
@@ -41,7 +37,6 @@ fn mode(threading: &str) -> Mode {
         submit_ms: ms,
         wait_ms: ms,
         render_ms: ms,
-        gpu_ms: None,
         latency_ms: measured(&[17.0], None, None),
         queue_depth: Some(0.75),
         drawn: Some([5.0, 6.5, 7.0]),
@@ -68,52 +63,27 @@ fn mode(threading: &str) -> Mode {
             },
         ],
         image_hash: Some("0123456789abcdef".repeat(4)),
-        block_spread: None,
+        ..results::mode(threading, 4, 2)
     }
 }
 
-fn block(threading: &str) -> Block {
-    Block { case: 0, threading: threading.to_owned(), skip: true }
-}
-
 fn sample() -> Run {
+    let blank = results::run(vec![mode("serial"), mode("parallel")]);
+    let case = Case {
+        phase: Some("dense".to_owned()),
+        sweep: vec![Setting { key: "draw.cutoff".to_owned(), value: "2".to_owned() }],
+        ratio: Some(Ratio { parallel_by_serial: 0.5, low: Some(0.25), high: Some(0.75) }),
+        overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
+        skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
+        ..blank.cases[0].clone()
+    };
     Run {
-        schema: SCHEMA_VERSION,
         nimbus: env!("CARGO_PKG_VERSION").to_owned(),
         revision: revision().to_owned(),
         date: utc_now(),
-        command: vec!["nimbus".to_owned(), "bench".to_owned(), "cubes.toml".to_owned()],
-        scene_hash: "ab".repeat(32),
-        scene: json!({ "title": "Seventeen boxes", "film": { "width": 800 } }),
-        device: Device {
-            name: "llvmpipe".to_owned(),
-            driver: "Mesa 22.3.6".to_owned(),
-            api: "1.3.230".to_owned(),
-            kind: "cpu".to_owned(),
-            uuid: "00".repeat(16),
-        },
         cpu: cpu(),
-        environment: BTreeMap::from([("LP_NUM_THREADS".to_owned(), "1".to_owned())]),
-        clocks: Clocks {
-            resolution_ns: 1.0,
-            overhead_ns: 22.5,
-            timestamp_period_ns: None,
-            timestamp_overhead_ns: None,
-        },
-        block_order: ["serial", "parallel", "parallel", "serial"].map(block).to_vec(),
-        cases: vec![Case {
-            phase: Some("dense".to_owned()),
-            sweep: vec![Setting { key: "draw.cutoff".to_owned(), value: "2".to_owned() }],
-            scene_hash: "cd".repeat(32),
-            particles: 554,
-            width: 800,
-            height: 600,
-            modes: vec![mode("serial"), mode("parallel")],
-            ratio: Some(Ratio { parallel_by_serial: 0.5, low: Some(0.25), high: Some(0.75) }),
-            overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
-            skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
-        }],
-        interrupted: false,
+        cases: vec![case],
+        ..blank
     }
 }
 
@@ -121,24 +91,15 @@ fn row(i: u32) -> FrameRow {
     FrameRow {
         phase: "dense".to_owned(),
         sweep: "a=1, b=2".to_owned(),
-        skip: true,
-        threading: "serial".to_owned(),
-        block: 0,
-        frame: i,
-        time_s: f64::from(i) * 0.1,
         warm_up: i == 0,
         frame_ms: 16.123456789012345,
         game_ms: 1.0,
         record_ms: 0.5,
         submit_ms: 0.25,
         wait_ms: 14.5,
-        gpu_ms: None,
         latency_ms: f64::NAN,
-        queue_depth: 1,
-        n_drawn: 7,
-        ran: "sort+sprites".to_owned(),
         pass_ms: vec![Some(1.5), None],
-        image_hash: None,
+        ..results::row("serial", i)
     }
 }
 
@@ -223,9 +184,9 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
-    // The run, device, cpu, clocks, four blocks, the case, its setting, ratio, overlap and its share, skipping; twice a
+    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping; twice a
     // mode, seven summaries, lows, two passes, a reason.
-    assert_eq!(n_compared, 4 + 4 + 6 + 2 * (1 + 7 + 1 + 2 + 1));
+    assert_eq!(n_compared, 4 + 2 + 6 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]

@@ -40,21 +40,25 @@ pub fn run(args: &BenchArgs, stop: &AtomicBool, zones: Option<&Zones>) -> Result
         prepare(args, scene, &quiet)?;
     }
     let mut runs = Vec::new();
-    let mut interrupted = false;
+    let mut ended = None;
     for (scene, out) in args.scenes.iter().zip(&outs) {
-        let run = bench_one(args, scene, out.as_deref(), stop, zones)?;
-        interrupted = run.interrupted;
-        runs.push(run);
-        if interrupted {
+        let (run, end) = match bench_one(args, scene, out.as_deref(), stop, zones) {
+            Ok((run, end)) => (Some(run), end),
+            Err(error) => (None, Some(error)),
+        };
+        runs.extend(run);
+        ended = end;
+        if ended.is_some() {
             break;
         }
     }
-    if args.json {
+    // Also where a later scene failed: what was finished is told.
+    if args.json && !runs.is_empty() {
         let text =
             if let [run] = &runs[..] { serde_json::to_string_pretty(run) } else { serde_json::to_string_pretty(&runs) };
         output::text(&(text.map_err(|e| Error::Io { path: "stdout".into(), what: e.to_string() })? + "\n"))?;
     }
-    if interrupted { Err(Error::Interrupted) } else { Ok(()) }
+    ended.map_or(Ok(()), Err)
 }
 
 /// A results folder for every scene. What exists already is refused here, before any work; what does not is made once
@@ -153,13 +157,14 @@ fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
     Ok(stage)
 }
 
+/// The run, and why it ended before its end, if it did.
 fn bench_one(
     args: &BenchArgs,
     path: &Path,
     out: Option<&Path>,
     stop: &AtomicBool,
     zones: Option<&Zones>,
-) -> Result<Run> {
+) -> Result<(Run, Option<Error>)> {
     let date = machine::utc_now();
     let Prepared { cases, scene_hash, resolved } = prepare(args, path, &args.options)?;
     let plan = BenchPlan { n_warm_up: args.warmup, n_rounds: args.repeat, hash_frames: args.hash_frames };
@@ -216,9 +221,9 @@ fn bench_one(
     for note in outcome.notes.iter().filter(|_| !args.options.quiet) {
         eprintln!("warning: {note}");
     }
-    match failure {
-        Some(failure) => return Err(failure),
-        None => stage.map_or(Ok(()), Stage::close)?,
+    if failure.is_none() {
+        stage.map_or(Ok(()), Stage::close)?;
     }
-    Ok(run)
+    let end = failure.or(outcome.interrupted.then_some(Error::Interrupted));
+    Ok((run, end))
 }

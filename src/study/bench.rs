@@ -126,6 +126,10 @@ fn run_block(
     stop: &AtomicBool,
     tick: &mut dyn FnMut(),
 ) -> Result<()> {
+    // A frame's number has 32 bits, and so has the warm-up's.
+    if case.i_first.checked_add(case.n_frames).is_none() {
+        return Err(Error::usage("the frames of a block, counted from the scene's first, exceed 32 bits"));
+    }
     stage.set_skip(of.skip);
     let samples = &mut outcome.samples;
     let n_before = samples.len();
@@ -148,7 +152,7 @@ fn run_block(
 fn frames_of(case: &Case, n_warm_up: u32) -> impl Iterator<Item = u32> + Send + use<> {
     let first = i64::from(case.i_first) - i64::from(n_warm_up);
     let end = i64::from(case.i_first) + i64::from(case.n_frames);
-    // Within u32: the timed frames are, and no more warm-up than that was asked for.
+    // Within u32: see `run_block`.
     (first..end).map(|i| u32::try_from(i.unsigned_abs()).unwrap_or(u32::MAX))
 }
 

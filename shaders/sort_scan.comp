@@ -6,15 +6,16 @@
 
 layout(local_size_x = 256) in;
 
-layout(std430, binding = 0) buffer Table { uint table[]; };
+layout(std430, binding = 1) buffer Table { uint table[]; };
 
 shared uint sums[N_DIGITS];
 
 void main() {
+    uint n_tiles = n_tiles();
     uint d = gl_LocalInvocationID.x;
-    uint row = d * push.n_tiles;
+    uint row = d * n_tiles;
     uint total = 0;
-    for (uint tile = 0; tile < push.n_tiles; ++tile) {
+    for (uint tile = 0; tile < n_tiles; ++tile) {
         total += table[row + tile];
     }
     sums[d] = total;
@@ -27,7 +28,7 @@ void main() {
         barrier();
     }
     uint before = sums[d] - total;
-    for (uint tile = 0; tile < push.n_tiles; ++tile) {
+    for (uint tile = 0; tile < n_tiles; ++tile) {
         uint count = table[row + tile];
         table[row + tile] = before;
         before += count;

@@ -1,32 +1,34 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "sort.glsl"
+#include "one_subgroup.glsl"
 
 // Moves every entry to its place: the table's base for (digit, tile) plus its rank among its digit inside the tile.
 
 layout(local_size_x = TILE_INVOCATIONS) in;
 
-layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
-layout(std430, binding = 1) readonly buffer Table { uint table[]; };
-layout(std430, binding = 2) writeonly buffer Sorted { uvec2 entries_sorted[]; };
+layout(std430, binding = 1) readonly buffer Entries { uvec2 entries[]; };
+layout(std430, binding = 2) readonly buffer Table { uint table[]; };
+layout(std430, binding = 3) writeonly buffer Sorted { uvec2 entries_sorted[]; };
 
 // Counters of two digits a word: word w of invocation t at [w * TILE_INVOCATIONS + t]. 16 KiB for 32 invocations, which every
 // Vulkan device has; a tile's 1024 entries fit 16 bits.
 shared uint ranks[N_DIGITS / 2 * TILE_INVOCATIONS];
 
 void main() {
+    uint n = n_entries(), n_tiles = n_tiles();
     uint t = gl_LocalInvocationID.x;
-    for (uint tile = gl_WorkGroupID.x; tile < push.n_tiles; tile += gl_NumWorkGroups.x) {
+    for (uint tile = gl_WorkGroupID.x; tile < n_tiles; tile += gl_NumWorkGroups.x) {
         uint first = tile * TILE + t * RUN;
-        uint n = first < push.n_entries ? min(RUN, push.n_entries - first) : 0u;
+        uint n_run = first < n ? min(RUN, n - first) : 0u;
         for (uint w = 0; w < N_DIGITS / 2; ++w) {
             ranks[w * TILE_INVOCATIONS + t] = 0;
         }
-        for (uint j = 0; j < n; ++j) {
+        for (uint j = 0; j < n_run; ++j) {
             uint d = digit_of(entries[first + j].x);
             ranks[(d >> 1) * TILE_INVOCATIONS + t] += 1u << (16 * (d & 1));
         }
-        barrier();
+        wait_for_all();
         for (uint w = t; w < N_DIGITS / 2; w += TILE_INVOCATIONS) {
             uint before = 0;
             for (uint k = 0; k < TILE_INVOCATIONS; ++k) {
@@ -35,15 +37,15 @@ void main() {
                 before += count;
             }
         }
-        barrier();
-        for (uint j = 0; j < n; ++j) {
+        wait_for_all();
+        for (uint j = 0; j < n_run; ++j) {
             uvec2 entry = entries[first + j];
             uint d = digit_of(entry.x);
             uint word = (d >> 1) * TILE_INVOCATIONS + t;
             uint rank = (ranks[word] >> (16 * (d & 1))) & 0xffffu;
             ranks[word] += 1u << (16 * (d & 1));
-            entries_sorted[table[d * push.n_tiles + tile] + rank] = entry;
+            entries_sorted[table[d * n_tiles + tile] + rank] = entry;
         }
-        barrier();
+        wait_for_all();
     }
 }

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "blob.glsl"
 
 // A screen-aligned quad around each blob's silhouette, far to near (docs/model.md §9).
 
@@ -23,11 +24,6 @@ layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
 layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
 
-const float SQRT_TAU = 2.50662827463;
-// The quad is this much larger than the silhouette, so that rounding never cuts a pixel that the fragment shader would
-// keep; the fragment shader's own test decides.
-const float GROWTH = 1.0 + 1e-4;
-
 // Centre's slopes (x/z, y/z), z^2/(2 sigma^2), optical depth through the centre.
 layout(location = 0) flat out vec4 out_blob;
 layout(location = 1) flat out vec3 out_radiance;
@@ -35,25 +31,11 @@ layout(location = 1) flat out vec3 out_radiance;
 // Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is snapped.
 const float SNAP = 1.0 / 16.0;
 
-// Slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the circle reaches beside the eye,
-// lines of either sign meet it, before the eye or behind: no bounds.
-vec2 tangents(float a, float z, float r) {
-    float t2 = a * a + z * z - r * r;
-    if (t2 > 0.0) {
-        float t = sqrt(t2);
-        float low = z * t + a * r, high = z * t - a * r;
-        if (min(low, high) > 0.0) {
-            return vec2((a * t - z * r) / low, (a * t + z * r) / high);
-        }
-    }
-    return vec2(-1e9, 1e9);
-}
-
 void main() {
     uint i = entries[gl_InstanceIndex].y;
     vec3 c = placed[i].position - push.camera.eye;
     float sigma = placed[i].sigma;
-    vec3 v = vec3(dot(push.camera.right, c), dot(push.camera.up, c), dot(push.camera.forward, c));
+    vec3 v = along_camera(push.camera, c);
     float tau = SQRT_TAU * particles[i].kappa * sigma;
     if (WEIGHTED != 0) {
         Drawn group = drawn[i_group[i]];

@@ -17,14 +17,15 @@ use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_P
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
 use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
+use nimbus::layout::tiles::{RoundRecord, SplatRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
-use nimbus::passes::{surfaces, transmit};
+use nimbus::passes::{surfaces, tiles, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 19] = [
+const RECORDS: [Record; 21] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
@@ -43,12 +44,14 @@ const RECORDS: [Record; 19] = [
     ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
+    ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
+    ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
 ];
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 31] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
@@ -98,14 +101,24 @@ const INTERFACES: [(&str, &[Field], &[Element]); 25] = [
         second::TensorPush::FIELDS,
         &[R("Block"), R("Pairing"), B(4), B(4), R("Facet"), T, R("Light"), T, T, F, F, R("Lit"), B(4), B(4), T, B(4)],
     ),
-    ("sort_count.comp", sort::DigitPush::FIELDS, &[B(8), B(4)]),
+    ("sort_count.comp", sort::DigitPush::FIELDS, &[B(4), B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(4), R("Drawn"), B(8)]),
-    ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
-    ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
+    ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4), B(4)]),
+    ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(4), B(8), B(4), B(8)]),
     ("sprites.frag", sprites::Push::FIELDS, &[]),
     ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn")]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
+    ("tiles.comp", tiles::Push::FIELDS, &[T, B(8), R("Round"), B(16), B(16), B(4)]),
+    ("tiles_clear.comp", tiles::ClearPush::FIELDS, &[R("Round"), B(16)]),
+    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, &[B(8), B(4), B(4), R("Round"), B(8), R("Splat")]),
+    ("tiles_ranges.comp", tiles::RangesPush::FIELDS, &[B(8), R("Round"), B(16)]),
+    ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, &[B(4), R("Round")]),
+    (
+        "tiles_splat.comp",
+        tiles::SplatPush::FIELDS,
+        &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Splat"), B(4), B(4), B(8)],
+    ),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
 ];
 

@@ -187,8 +187,8 @@ fn wrong_pictures_are_noticed() {
         ("sprites.frag", " + twist * twist", ""),
         ("sprites.frag", " / (1.0 + dot(ray, ray))", ""),
         ("sprites.frag", "exp(-e)", "(1.0 - e)"),
-        ("sprites.vert", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
-        ("sprites.vert", "min(low, high) > 0.0", "true"),
+        ("include/blob.glsl", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
+        ("include/blob.glsl", "min(low, high) > 0.0", "true"),
         ("sprites.vert", "-(top ? y.y : y.x)", "(top ? y.y : y.x)"),
         ("sprites.vert", "entries[gl_InstanceIndex].y", "gl_InstanceIndex"),
     ] {

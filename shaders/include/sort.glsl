@@ -10,6 +10,13 @@ const uint TILE = 1024;
 const uint RUN = TILE / TILE_INVOCATIONS;
 const uint N_DIGITS = 256;
 
-layout(push_constant) uniform Push { uint n_entries; uint n_tiles; uint shift; } push;
+// `i_count`: the word of `n_counted` that holds the number of entries; NO_COUNT where the host knows it.
+layout(push_constant) uniform Push { uint n_entries; uint i_count; uint shift; } push;
+layout(std430, binding = 0) readonly buffer Counts { uint n_counted[]; };
+
+const uint NO_COUNT = 0xFFFFFFFFu;
+
+uint n_entries() { return push.i_count == NO_COUNT ? push.n_entries : n_counted[push.i_count]; }
+uint n_tiles() { return (n_entries() + TILE - 1u) / TILE; }
 
 uint digit_of(uint key) { return (key >> push.shift) & (N_DIGITS - 1u); }

@@ -16,6 +16,7 @@ pub mod relay;
 pub mod render;
 pub mod serial;
 pub mod tensor;
+pub mod tiling;
 
 use std::time::{Duration, Instant};
 

@@ -6,6 +6,7 @@ use std::fmt;
 use super::packet::Packet;
 use crate::layout::facet::RegionRecord;
 use crate::layout::frame::LightRecord;
+use crate::model::scene::DrawPath;
 
 /// The passes in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,10 +23,11 @@ pub enum Pass {
     Sort,
     Surfaces,
     Sprites,
+    Tiles,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 12] = [
+    pub const ALL: [Pass; 13] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -38,13 +40,14 @@ impl Pass {
         Pass::Sort,
         Pass::Surfaces,
         Pass::Sprites,
+        Pass::Tiles,
     ];
 
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
         let names = [
             "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "sort",
-            "surfaces", "sprites",
+            "surfaces", "sprites", "tiles",
         ];
         names[self as usize]
     }
@@ -130,6 +133,8 @@ pub struct Traits {
     /// Some region has a lobe, and so what is seen of it depends on the eye.
     pub glossy: bool,
     pub tensors: Tensors,
+    /// What draws the particles.
+    pub path: DrawPath,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
 }
@@ -168,6 +173,10 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
     let lighting =
         |same: bool, reason| if traits.lit { unless(same, reason) } else { skip("lighting.mode is \"none\"") };
+    let drawing = |path: DrawPath, other| match traits.path == path {
+        true => unless(same_picture, "the picture is the same"),
+        false => skip(other),
+    };
     let mut decisions = [
         if traits.has_boxes { unless(last.is_some(), "the boxes are the same") } else { skip("no boxes to fill") },
         unless(still, "nothing moved"),
@@ -188,7 +197,8 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         },
         unless(same_order, "the order cannot have changed"),
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
-        unless(same_picture, "the picture is the same"),
+        drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
+        drawing(DrawPath::Tiles, "draw.path is \"sprites\""),
     ];
     if traits.n_particles == 0 {
         for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort] {
@@ -243,6 +253,7 @@ mod tests {
         n_surfaces: 0,
         glossy: false,
         tensors: Tensors::Needless,
+        path: DrawPath::Sprites,
         skip: true,
     };
     const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
@@ -280,14 +291,18 @@ mod tests {
     #[test]
     fn the_first_frame_runs_everything_and_a_still_one_nothing() {
         let p = packet();
-        assert_eq!(running(&ALL_TRAITS, None, &p).len(), Pass::ALL.len());
+        // Particles are drawn by one of two passes.
+        let all = Pass::ALL.len() - 1;
+        assert_eq!(running(&ALL_TRAITS, None, &p).len(), all);
         for traits in [TRAITS, KEPT, ALL_TRAITS] {
             assert!(running(&traits, Some(&p), &p).is_empty());
         }
-        assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), Pass::ALL.len());
+        assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), all);
         // Without tensors it is all but `contract`.
         let without = Traits { tensors: Tensors::Needless, ..ALL_TRAITS };
-        assert_eq!(running(&without, None, &p).len(), Pass::ALL.len() - 1);
+        assert_eq!(running(&without, None, &p).len(), all - 1);
+        let tiled = Traits { path: DrawPath::Tiles, ..TRAITS };
+        assert_eq!(running(&tiled, None, &p).last(), Some(&"tiles"));
     }
 
     #[test]

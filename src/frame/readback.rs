@@ -28,8 +28,12 @@ impl Renderer {
     pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
         let _zone = info_span!("read back").entered();
         let (target, readback) = (&mut self.targets[self.i_ended_target], &self.readback);
+        let picture = self.tiling.as_ref().map(|t| &t.pictures[self.i_ended_target]);
         self.host.run(|rec| {
-            rec.copy_image(target, readback);
+            match picture {
+                Some(picture) => rec.copy(picture, readback),
+                None => rec.copy_image(target, readback),
+            }
             Ok(())
         })?;
         readback.read((target.n_pixels() * self.settings.format.bytes_per_pixel()) as usize)

@@ -13,13 +13,14 @@ use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::relay::Relay;
 use super::tensor::{TensorStage, tensor_stage};
+use super::tiling::{Tiling, saturated, variant};
 use super::{limits, ms};
 use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Pending, Place, Recorder, ScopeTime, Target};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
-use crate::model::scene::{LightingMode, Scene, Simulate};
+use crate::model::scene::{DrawPath, LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
 use crate::passes::generate::Generate;
@@ -28,6 +29,7 @@ use crate::passes::place::Place as PlacePass;
 use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
+use crate::passes::tiles::{Division, View, invocations};
 use crate::passes::transmit::Transmit;
 
 // Commands first: they are dropped first, and wait for what is still under way.
@@ -48,6 +50,7 @@ pub struct Renderer {
     tensor: Option<TensorStage>,
     sort: Sort,
     sprites: Sprites,
+    pub(super) tiling: Option<Tiling>,
     pub(super) buffers: Buffers,
     /// A frame that changes the picture draws into the one that the frame before has not.
     pub(super) targets: [Image; IN_FLIGHT],
@@ -89,6 +92,7 @@ pub(super) struct Settings {
     pub forward: f64,
     sort_bits: u32,
     cutoff: f64,
+    saturated: f64,
     pub format: TargetFormat,
 }
 
@@ -150,6 +154,14 @@ impl Renderer {
             second,
             tensor,
             sort: Sort::new(device, compiler, n_particles)?,
+            tiling: match scene.draw.path {
+                DrawPath::Sprites => None,
+                DrawPath::Tiles => {
+                    let division = Division::of(scene.film.width, scene.film.height, invocations(device.limits()))?;
+                    let variant = variant(scene, lit, grouped, format);
+                    Some(Tiling::new(device, compiler, division, n_particles, &variant)?)
+                }
+            },
             sprites: Sprites::new(
                 device,
                 compiler,
@@ -174,6 +186,7 @@ impl Renderer {
                 forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
                 sort_bits: scene.draw.sort_bits,
                 cutoff: scene.draw.cutoff,
+                saturated: saturated(scene.film.format),
                 format,
             },
             traits: Traits {
@@ -186,6 +199,7 @@ impl Renderer {
                 n_surfaces: scene.surfaces.len() as u32,
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
+                path: scene.draw.path,
                 skip,
             },
             last: None,
@@ -224,7 +238,7 @@ impl Renderer {
         let _zone = info_span!("render step").entered();
         let plan = info_span!("plan").in_scope(|| plan(&self.traits, self.last.as_ref(), &packet));
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
-        if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) {
+        if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) || plan.runs(Pass::Tiles) {
             self.i_target = (self.i_target + 1) % IN_FLIGHT;
         }
         info_span!("upload").in_scope(|| self.write(slot, &packet))?;
@@ -297,6 +311,7 @@ impl Renderer {
             tensor,
             sort,
             sprites,
+            tiling,
             scenery,
             buffers: b,
             targets,
@@ -379,11 +394,19 @@ impl Renderer {
                 }
                 None => Ok(()),
             })?;
-            pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, &b.drawn.buffer];
-                let counts = [packet.n_drawn, s.n_surface_facets];
-                sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
-            })
+            let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, &b.drawn.buffer];
+            let counts = [packet.n_drawn, s.n_surface_facets];
+            let has_surfaces = depth.is_some();
+            let on = Target { color: target, depth };
+            match tiling {
+                None => pass(rec, plan, Pass::Sprites, |rec| {
+                    sprites.record(rec, from, on, &packet.camera, s.cutoff, counts)
+                }),
+                Some(tiling) => pass(rec, plan, Pass::Tiles, |rec| {
+                    let view = View { camera: &packet.camera, cutoff: s.cutoff, saturated: s.saturated };
+                    tiling.record(rec, *i_target, has_surfaces.then_some(on), from, &view, counts)
+                }),
+            }
         })
     }
 }

@@ -47,12 +47,25 @@ pub struct Limits {
     pub subgroup_size: u32,
     /// Whether compute shaders may sum and compare over a subgroup.
     pub subgroup_arithmetic: bool,
+    /// Whether they may vote over it, count votes, and read what another invocation has.
+    pub subgroup_shuffle: bool,
+    /// There are no subgroups of another size.
+    pub subgroup_size_fixed: bool,
+    /// A kernel can ask for subgroups of that size.
+    pub subgroup_size_chosen: bool,
     /// 0 where the queue has no timestamps.
     pub timestamp_valid_bits: u32,
     pub timestamp_period_ns: f64,
 }
 
 impl Limits {
+    /// Whether a workgroup of so many invocations can be sure to be one subgroup, and whose invocations know of each other.
+    pub fn is_one_subgroup(&self, n_invocations: u32) -> bool {
+        self.subgroup_shuffle
+            && self.subgroup_size == n_invocations
+            && (self.subgroup_size_fixed || self.subgroup_size_chosen)
+    }
+
     /// Nanoseconds from the device's own zero to a timestamp of its queue.
     pub(super) fn ticks_ns(&self, ticks: u64) -> f64 {
         (ticks & self.tick_mask()) as f64 * self.timestamp_period_ns
@@ -225,8 +238,12 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut id = vk::PhysicalDeviceIDProperties::default();
     let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
-    let mut all =
-        vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut id).push_next(&mut subgroup);
+    let mut sizes = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+    let mut all = vk::PhysicalDeviceProperties2::default()
+        .push_next(&mut driver)
+        .push_next(&mut id)
+        .push_next(&mut subgroup)
+        .push_next(&mut sizes);
     unsafe { instance.get_physical_device_properties2(physical, &mut all) };
     let properties = all.properties;
     let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
@@ -264,6 +281,11 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             subgroup_size: subgroup.subgroup_size,
             subgroup_arithmetic: subgroup.supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC)
                 && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
+            subgroup_shuffle: subgroup.supported_operations.contains(
+                vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::VOTE | vk::SubgroupFeatureFlags::SHUFFLE,
+            ) && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
+            subgroup_size_fixed: sizes.min_subgroup_size == sizes.max_subgroup_size,
+            subgroup_size_chosen: sizes.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
             timestamp_period_ns: f64::from(limits.timestamp_period),
         },
@@ -294,6 +316,8 @@ fn unusable(
         (v13.synchronization2, "synchronization2"),
         (v13.dynamic_rendering, "dynamicRendering"),
         (v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
+        (v13.subgroup_size_control, "subgroupSizeControl"),
+        (v13.compute_full_subgroups, "computeFullSubgroups"),
     ];
     needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
 }
@@ -307,7 +331,9 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
         .synchronization2(true)
         .dynamic_rendering(true)
-        .shader_demote_to_helper_invocation(true);
+        .shader_demote_to_helper_invocation(true)
+        .subgroup_size_control(true)
+        .compute_full_subgroups(true);
     let extensions: Vec<_> = info.calibrated_timestamps.iter().map(|name| name.as_ptr()).collect();
     let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
     let create = create.push_next(&mut v12).push_next(&mut v13);
@@ -346,6 +372,9 @@ mod tests {
             device_memory_bytes: 0,
             subgroup_size: 0,
             subgroup_arithmetic: false,
+            subgroup_shuffle: false,
+            subgroup_size_fixed: false,
+            subgroup_size_chosen: false,
             timestamp_valid_bits: 0,
             timestamp_period_ns: 0.0,
         };

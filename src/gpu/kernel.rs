@@ -82,6 +82,14 @@ impl Kernel {
             .module(module.raw)
             .name(c"main")
             .specialization_info(&specialization);
+        // Where the kernel takes its workgroup for one subgroup it must be one.
+        let is_together = macros.contains(&("ONE_SUBGROUP", 1));
+        let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
+            .required_subgroup_size(device.limits().subgroup_size);
+        let stage = match is_together && device.limits().subgroup_size_chosen {
+            true => stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS).push_next(&mut size),
+            false => stage,
+        };
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(interface.layout)];
         let made = unsafe { interface.shared.raw.create_compute_pipelines(vk::PipelineCache::null(), &info, None) };
         let raw = made.map_err(|(_, e)| Error::vulkan(format!("vkCreateComputePipelines {name}"), e))?[0];

@@ -211,7 +211,7 @@ impl Image {
     /// Depth in the best format that the device has.
     pub fn depth(device: &Device, name: &str, width: u32, height: u32) -> Result<Image> {
         let extent = check_extent(device, name, width, height, DEPTH_BYTES_PER_PIXEL)?;
-        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT;
+        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
         Image::new(device, name, extent, depth_format(device), usage, vk::ImageAspectFlags::DEPTH)
     }
 
@@ -304,6 +304,11 @@ pub(super) fn depth_format(device: &Device) -> vk::Format {
         true => vk::Format::D32_SFLOAT,
         false => vk::Format::X8_D24_UNORM_PACK32,
     }
+}
+
+/// Whether depth is copied as 24 bits of a word, and not as a float.
+pub fn has_depth24(device: &Device) -> bool {
+    depth_format(device) == vk::Format::X8_D24_UNORM_PACK32
 }
 
 /// Blending is guaranteed for rgba16f; rgba32f is probed.

@@ -255,7 +255,7 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    /// Runs `kernel` in as many workgroups as record `i` of `counts` says: [u32; 3], written on the device.
+    /// Runs `kernel` in as many workgroups as the three words from word `i` of `counts` say, written on the device.
     pub fn dispatch_counted<P: Pod>(
         &mut self,
         kernel: &Kernel,
@@ -265,7 +265,7 @@ impl Recorder<'_> {
     ) -> Result<()> {
         self.depend(&[(counts.raw, true, false)]);
         self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
-        let offset = u64::from(i) * size_of::<[u32; 3]>() as u64;
+        let offset = u64::from(i) * size_of::<u32>() as u64;
         unsafe { self.commands.shared.raw.cmd_dispatch_indirect(self.commands.buffer, counts.raw, offset) };
         Ok(())
     }

@@ -12,7 +12,7 @@ use crate::model::count::Count;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::scene::MAX_PAIR_LEVELS;
-use crate::model::scene::{Draw, Gather, Lighting, LightingMode, Pairs, Simulate, Threading, Threads, Time};
+use crate::model::scene::{Draw, DrawPath, Gather, Lighting, LightingMode, Pairs, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -172,7 +172,7 @@ fn read_exponents(s: &mut Section, of_materials: &[f64]) -> Result<[f64; 2]> {
 pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let mut s = root.section("draw")?;
     s.expect_keys(DRAW_KEYS, &[])?;
-    s.choice("path", "sprites", &[("sprites", ())], &["tiles"])?;
+    let path = s.choice("path", "sprites", &DrawPath::NAMES, &[])?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
     if sort_bits != 16 && sort_bits != 32 {
@@ -182,7 +182,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let count = read_count(&mut s)?;
     let n_particles = s.u32("particles", 0, 0, u32::MAX)?;
     root.record("draw", s.finish());
-    Ok(Draw { cutoff, sort_bits, count, n_particles })
+    Ok(Draw { path, cutoff, sort_bits, count, n_particles })
 }
 
 const DRAW_KEYS: &[&str] = &[

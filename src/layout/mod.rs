@@ -5,6 +5,7 @@ pub mod facet;
 pub mod frame;
 pub mod particle;
 pub mod second;
+pub mod tiles;
 
 /// Declares a `repr(C)` record and lists its fields as (name, offset, bytes), for comparison with what the
 /// shaders declare.

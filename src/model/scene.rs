@@ -113,8 +113,22 @@ pub struct Pairs {
     pub steps: u32,
 }
 
+/// What draws the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DrawPath {
+    /// Quads through the graphics pipeline.
+    Sprites,
+    /// Tiles of pixels in compute.
+    Tiles,
+}
+
+impl DrawPath {
+    pub const NAMES: [(&'static str, DrawPath); 2] = [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles)];
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
+    pub path: DrawPath,
     /// Sprites end at this many σ.
     pub cutoff: f64,
     /// Bits of the sort key: 16 or 32.

@@ -12,6 +12,7 @@ pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
+pub mod tiles;
 pub mod transmit;
 
 use crate::gpu::Sources;
@@ -32,6 +33,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "grid_deposit.comp",
     "grid_resolve.comp",
     "include/arriving.glsl",
+    "include/blob.glsl",
     "include/cells.glsl",
     "include/density.glsl",
     "include/each.glsl",
@@ -40,6 +42,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/light.glsl",
     "include/lobe.glsl",
     "include/occlude.glsl",
+    "include/one_subgroup.glsl",
     "include/philox.glsl",
     "include/reach.glsl",
     "include/records.glsl",
@@ -48,6 +51,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/stencil.glsl",
     "include/sort.glsl",
     "include/tensor.glsl",
+    "include/tiles.glsl",
     "include/turns.glsl",
     "include/veil.glsl",
     "include/walk.glsl",
@@ -66,6 +70,12 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "sprites.vert",
     "surfaces.frag",
     "surfaces.vert",
+    "tiles.comp",
+    "tiles_clear.comp",
+    "tiles_pairs.comp",
+    "tiles_ranges.comp",
+    "tiles_rounds.comp",
+    "tiles_splat.comp",
     "transmit.comp",
 ];
 

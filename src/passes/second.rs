@@ -221,6 +221,6 @@ fn of_round<P: Pod>(
 ) -> Result<()> {
     match i_round {
         0 => rec.dispatch_groups(kernel, buffers, push, n_blocks),
-        _ => rec.dispatch_counted(kernel, buffers, push, (buffers[15], i_round)),
+        _ => rec.dispatch_counted(kernel, buffers, push, (buffers[15], 3 * i_round)),
     }
 }

@@ -19,11 +19,13 @@ record! {
 }
 
 record! {
-    pub struct DigitPush { n_entries: u32, n_tiles: u32, shift: u32 }
+    pub struct DigitPush { n_entries: u32, i_count: u32, shift: u32 }
 }
 
+/// The shaders' NO_COUNT.
+const NO_COUNT: u32 = u32::MAX;
 /// Entries a workgroup sorts; the shaders' TILE.
-const TILE: u32 = 1024;
+pub const TILE: u32 = 1024;
 const DIGIT_BITS: u32 = 8;
 const N_DIGITS: u64 = 1 << DIGIT_BITS;
 
@@ -40,7 +42,9 @@ impl Sort {
     /// Room for `n_max` entries.
     pub fn new(device: &Device, compiler: &Compiler, n_max: u32) -> Result<Sort> {
         // One subgroup a tile, and no more than shared memory holds counters for.
-        let macros = [("TILE_INVOCATIONS", device.limits().subgroup_size.clamp(8, 32))];
+        let invocations = device.limits().subgroup_size.clamp(8, 32);
+        let together = device.limits().is_one_subgroup(invocations);
+        let macros = [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", u32::from(together))];
         let kernel = |name, push| Kernel::with_macros(device, compiler, name, push, &[], &macros);
         Ok(Sort {
             key: kernel("sort.key", KeyPush::FIELDS)?,
@@ -71,16 +75,65 @@ impl Sort {
 
     /// Sorts the first `n_entries` of `entries` by the low `n_bits` (16 or 32) of their keys, in place.
     pub fn record(&self, rec: &mut Recorder<'_>, entries: &Buffer, n_entries: u32, n_bits: u32) -> Result<()> {
-        let n_tiles = n_entries.div_ceil(TILE);
-        let (mut from, mut to) = (entries, &self.swapped);
         // Both key widths take an even number of passes, so the result ends in `entries`.
+        self.record_passes(rec, entries, n_bits, Entries::Known(n_entries)).map(|_| ())
+    }
+
+    /// Sorts as many of `entries` as a count on the device says, by the low `n_bits` of their keys. Gives the buffer that
+    /// they then lie in.
+    pub fn record_counted<'a>(
+        &'a self,
+        rec: &mut Recorder<'_>,
+        entries: &'a Buffer,
+        n_bits: u32,
+        counts: Counts<'_>,
+    ) -> Result<&'a Buffer> {
+        self.record_passes(rec, entries, n_bits, Entries::Counted(counts))
+    }
+
+    fn record_passes<'a>(
+        &'a self,
+        rec: &mut Recorder<'_>,
+        entries: &'a Buffer,
+        n_bits: u32,
+        n: Entries<'_>,
+    ) -> Result<&'a Buffer> {
+        let (mut from, mut to) = (entries, &self.swapped);
         for shift in (0..n_bits).step_by(DIGIT_BITS as usize) {
-            let push = DigitPush { n_entries, n_tiles, shift };
-            rec.dispatch_groups(&self.count, &[from, &self.table], &push, n_tiles)?;
-            rec.dispatch_groups(&self.scan, &[&self.table], &push, 1)?;
-            rec.dispatch_groups(&self.scatter, &[from, &self.table, to], &push, n_tiles)?;
+            match n {
+                Entries::Known(n_entries) => {
+                    let push = DigitPush { n_entries, i_count: NO_COUNT, shift };
+                    let n_tiles = n_entries.div_ceil(TILE);
+                    rec.dispatch_groups(&self.count, &[from, from, &self.table], &push, n_tiles)?;
+                    rec.dispatch_groups(&self.scan, &[from, &self.table], &push, n_tiles.min(1))?;
+                    rec.dispatch_groups(&self.scatter, &[from, from, &self.table, to], &push, n_tiles)?;
+                }
+                Entries::Counted(c) => {
+                    let push = DigitPush { n_entries: 0, i_count: c.i_count, shift };
+                    let tiles = (c.buffer, c.i_groups);
+                    rec.dispatch_counted(&self.count, &[c.buffer, from, &self.table], &push, tiles)?;
+                    rec.dispatch_groups(&self.scan, &[c.buffer, &self.table], &push, 1)?;
+                    rec.dispatch_counted(&self.scatter, &[c.buffer, from, &self.table, to], &push, tiles)?;
+                }
+            }
             std::mem::swap(&mut from, &mut to);
         }
-        Ok(())
+        Ok(from)
     }
+}
+
+/// A number of entries that the device knows.
+#[derive(Clone, Copy)]
+pub struct Counts<'a> {
+    pub buffer: &'a Buffer,
+    /// The word of `buffer` that holds the number of entries.
+    pub i_count: u32,
+    /// The first of the three that hold the workgroups: (tiles of them, 1, 1).
+    pub i_groups: u32,
+}
+
+#[derive(Clone, Copy)]
+enum Entries<'a> {
+    Known(u32),
+    Counted(Counts<'a>),
 }

@@ -1,6 +1,6 @@
 //! Running error analysis of an f32 evaluation: a number and a bound on how far its f32 evaluation may lie from it, by
 //! what Vulkan promises of each operation (specification, "Precision and Operation of SPIR-V Instructions"): +, −, ×
-//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp 3 + 2|x| ulp, inversesqrt 2 ulp. An ulp is at most 2u of
+//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp and exp2 3 + 2|x| ulp, inversesqrt 2 ulp. An ulp is at most 2u of
 //! the result, u = 2⁻²⁴; a result below the least normal number may be flushed to zero.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
@@ -87,6 +87,12 @@ impl Bounded {
         let value = self.value.exp();
         let ulps = 3.0 + 2.0 * (self.value.abs() + self.error);
         Bounded::rounded(value, value * self.error.exp_m1(), 2.0 * ulps)
+    }
+
+    pub fn exp2(self) -> Bounded {
+        let value = self.value.exp2();
+        let ulps = 3.0 + 2.0 * (self.value.abs() + self.error);
+        Bounded::rounded(value, value * (self.error * std::f64::consts::LN_2).exp_m1(), 2.0 * ulps)
     }
 }
 

@@ -4,6 +4,7 @@
 
 use glam::DVec3;
 use half::f16;
+use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
@@ -14,6 +15,7 @@ use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
+use nimbus::passes::tiles::{Division, Variant};
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
 use nimbus::reference::sprites::{Behind, Rounding, View, alpha, render_over, render_with_bound};
@@ -27,6 +29,16 @@ const ONE_MINUS_EXP: f64 = 1e-6;
 
 pub const FORMATS: [(TargetFormat, FilmFormat); 2] =
     [(TargetFormat::Rgba16f, FilmFormat::Rgba16f), (TargetFormat::Rgba32f, FilmFormat::Rgba32f)];
+
+/// How `tiles` draws a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tiled {
+    pub invocations: u32,
+    /// Without what subgroups can do.
+    pub portable: bool,
+    pub most_pairs: Option<u64>,
+    pub saturated: f64,
+}
 
 #[derive(Debug, Clone)]
 pub struct Picture {
@@ -82,7 +94,7 @@ impl Picture {
         p.position + x * p.right + y * p.up + z * p.forward
     }
 
-    fn blobs(&self) -> Vec<Blob> {
+    pub fn blobs(&self) -> Vec<Blob> {
         let blob = |(p, q): (&PlacedRecord, &ParticleRecord)| Blob {
             position: double(p.position),
             sigma: f64::from(p.sigma),
@@ -103,7 +115,7 @@ impl Picture {
         }
     }
 
-    fn radiance(&self) -> Vec<DVec3> {
+    pub fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
             // Their f32 sum is rounded alike on both sides.
             Some(lit) => {
@@ -115,7 +127,7 @@ impl Picture {
         }
     }
 
-    fn order(&self) -> Vec<u32> {
+    pub fn order(&self) -> Vec<u32> {
         let positions: Vec<DVec3> = self.placed.iter().map(|p| double(p.position)).collect();
         let keys = depths(self.view.pose.forward, &positions).into_iter().map(|z| key32(z as f32));
         let order = order(&keys.collect::<Vec<_>>());
@@ -124,12 +136,24 @@ impl Picture {
 
     /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
+        self.draw_by(gpu, compiler, format, None)
+    }
+
+    /// The same by `sprites`, or by `tiles` in the way that is given.
+    pub fn draw_by(
+        &self,
+        gpu: &mut Gpu,
+        compiler: Option<&Compiler>,
+        format: TargetFormat,
+        tiled: Option<&Tiled>,
+    ) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
         let pass =
             Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some(), self.drawn.is_some()])
                 .expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
+        let tiling = tiled.map(|t| self.tiling(gpu, compiler, format, t));
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
         // Facets of surfaces come before those of particles.
@@ -168,6 +192,16 @@ impl Picture {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
                 let n = [entries.len() as u32, scenery.lit.len() as u32];
                 let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn];
+                if let (Some(tiling), Some(tiled)) = (&tiling, tiled) {
+                    let view = nimbus::passes::tiles::View {
+                        camera: &camera,
+                        cutoff: self.view.cutoff,
+                        saturated: tiled.saturated,
+                    };
+                    tiling.record(rec, 0, behind.then_some(target), from, &view, n)?;
+                    rec.copy(&tiling.pictures[0], &readback);
+                    return Ok(());
+                }
                 pass.record(rec, from, target, &camera, self.view.cutoff, n)?;
             }
             rec.copy_image(&mut target, &readback);
@@ -181,6 +215,24 @@ impl Picture {
                 readback.read::<f32>(n_numbers).expect("read").into_iter().map(f64::from).collect()
             }
         }
+    }
+
+    fn tiling(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, tiled: &Tiled) -> Tiling {
+        let division = Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
+        let blobs = self.blobs();
+        let tau_most = blobs.iter().map(|b| SQRT_TAU * b.kappa * b.sigma).fold(0.0, f64::max);
+        let variant = Variant {
+            lit: self.lit.is_some(),
+            grouped: self.i_facet.is_some(),
+            weighted: self.drawn.is_some(),
+            format,
+            behind: self.scenery.is_some(),
+            // A rounding above what the blobs are made of in f32.
+            tau_most: tau_most * (1.0 + 8.0 * U),
+            portable: tiled.portable,
+            most_pairs: tiled.most_pairs,
+        };
+        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant).expect("tiles")
     }
 
     /// The reference's picture and its bound for `format`.
@@ -205,7 +257,7 @@ impl Picture {
 
     /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any bound where it is not the
     /// only candidate.
-    fn widened(&self, candidates: &Candidates) -> Behind {
+    pub fn widened(&self, candidates: &Candidates) -> Behind {
         let truth = candidates[0];
         if candidates.len() > 1 {
             return Behind { bound: [f64::INFINITY; 4], ..truth };
@@ -263,7 +315,7 @@ impl Picture {
         [Bounded::once(tan * aspect), Bounded::once(tan)]
     }
 
-    fn ray(&self, i: u32, j: u32) -> [Bounded; 2] {
+    pub fn ray(&self, i: u32, j: u32) -> [Bounded; 2] {
         let [x, y] = self.half_slopes();
         let along = |at: u32, tan: Bounded, n: u32| {
             let pixel = tan.scaled(2.0).over(Bounded::exact(f64::from(n)));
@@ -281,7 +333,7 @@ impl Picture {
         dot(self.view.pose.forward.to_array().map(Bounded::once), self.offset(placed))
     }
 
-    fn sprite(&self, placed: &PlacedRecord, blob: &Blob) -> Sprite {
+    pub fn sprite(&self, placed: &PlacedRecord, blob: &Blob) -> Sprite {
         let pose = &self.view.pose;
         let once = |v: DVec3| v.to_array().map(Bounded::once);
         let (c, z) = (self.offset(placed), self.view_depth(placed));
@@ -296,10 +348,10 @@ impl Picture {
 }
 
 /// What the vertex shader hands on.
-struct Sprite {
-    s: [Bounded; 2],
-    z: Bounded,
-    tau: Bounded,
+pub struct Sprite {
+    pub s: [Bounded; 2],
+    pub z: Bounded,
+    pub tau: Bounded,
 }
 
 impl Sprite {

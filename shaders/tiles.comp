@@ -1,0 +1,254 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+#include "functions.glsl"
+#include "tiles.glsl"
+#include "one_subgroup.glsl"
+#if ONE_SUBGROUP
+#extension GL_KHR_shader_subgroup_ballot : require
+#extension GL_KHR_shader_subgroup_shuffle : require
+#extension GL_KHR_shader_subgroup_vote : require
+#endif
+
+// Composes the splats near to far, a tile a workgroup, a row of pixels an invocation (docs/model.md §11 "tiles").
+
+#ifndef INVOCATIONS
+#define INVOCATIONS 8
+#endif
+// Rows of a tile.
+#ifndef ROWS
+#define ROWS 8
+#endif
+// 1: no blob's optical depth is above 1/8.
+#ifndef THIN
+#define THIN 0
+#endif
+// Words of a pixel: 1 rgba8, 2 rgba16f, 4 rgba32f.
+#ifndef PIXEL_WORDS
+#define PIXEL_WORDS 2
+#endif
+// Surfaces hide what lies behind them; 2: their depth has 24 bits.
+#ifndef BEHIND
+#define BEHIND 0
+#endif
+
+layout(local_size_x = INVOCATIONS) in;
+
+// Pixels of an invocation's row.
+const uint RUN = 8;
+const uint TILE_WIDTH = RUN * (INVOCATIONS / ROWS);
+
+layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; } push;
+layout(binding = 0) uniform usamplerBuffer splats;
+layout(std430, binding = 1) readonly buffer Pairs { uvec2 pairs[]; };
+layout(std430, binding = 2) readonly buffer Rounds { Round rounds[]; };
+layout(std430, binding = 3) readonly buffer Ranges { uvec4 ranges[]; };
+// Colour and opacity of what earlier rounds drew.
+layout(std430, binding = 4) buffer State { vec4 state[]; };
+layout(std430, binding = 5) writeonly buffer Picture { uint picture[]; };
+#if BEHIND
+// The surfaces, as they lie in their target, and their near/z.
+layout(std430, binding = 6) readonly buffer Under { uint under[]; };
+layout(std430, binding = 7) readonly buffer Depths { uint depths[]; };
+#endif
+
+// Splats that reach the tile, gathered before they are composed.
+const uint MOST = 8 * INVOCATIONS;
+shared uint found[MOST];
+
+#if ONE_SUBGROUP
+// Of what this invocation found, appends it in the order of invocations; the new number of found ones.
+uint append(uint n, bool hit, uint r) {
+    uvec4 hits = subgroupBallot(hit);
+    if (hit) {
+        found[n + subgroupBallotExclusiveBitCount(hits)] = r;
+    }
+    return n + subgroupBallotBitCount(hits);
+}
+
+vec4 of_invocation(vec4 v, uint m) { return subgroupShuffle(v, m); }
+
+bool all_agree(bool b) { return subgroupAll(b); }
+#else
+shared uint said[INVOCATIONS];
+shared vec4 given[2][INVOCATIONS];
+
+uint append(uint n, bool hit, uint r) {
+    uint t = gl_LocalInvocationID.x;
+    said[t] = uint(hit);
+    barrier();
+    uint before = 0, all_of = 0;
+    for (uint k = 0; k < INVOCATIONS; ++k) {
+        before += k < t ? said[k] : 0u;
+        all_of += said[k];
+    }
+    if (hit) {
+        found[n + before] = r;
+    }
+    barrier();
+    return n + all_of;
+}
+
+bool all_agree(bool b) {
+    said[gl_LocalInvocationID.x] = uint(b);
+    barrier();
+    uint n = 0;
+    for (uint k = 0; k < INVOCATIONS; ++k) {
+        n += said[k];
+    }
+    barrier();
+    return n == INVOCATIONS;
+}
+#endif
+
+#if THIN
+// 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points, within 1.6e-8 of it.
+float opacity(float t) { return t * (0.999999984752 - t * (0.499996093888 - t * (0.166509869621 - t * 0.039641773912))); }
+#else
+float opacity(float t) { return one_minus_exp(t); }
+#endif
+
+// The row of pixels that an invocation owns, while it is composed.
+float x_of[RUN];
+float inv_norm[RUN];
+vec3 color[RUN];
+float passed[RUN];
+#if BEHIND
+float depth_of[RUN];
+#endif
+
+// place: centre's slopes, scale, tau; light: radiance, near/z.
+void compose(vec4 place, vec4 light, float y) {
+    vec2 s = place.xy;
+    float dy = y - s.y;
+    // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
+    float a = -place.z * (1.0 + s.y * s.y), b = 2.0 * place.z * s.x * s.y * dy, c = -place.z * (1.0 + s.x * s.x) * dy * dy;
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        float dx = x_of[j] - s.x;
+        float e = ((a * dx + b) * dx + c) * inv_norm[j];
+        bool is_seen = e >= -push.cut;
+#if BEHIND
+        is_seen = is_seen && light.w >= depth_of[j];
+#endif
+        float here = passed[j] * opacity(is_seen ? place.w * exp2(e) : 0.0);
+        passed[j] -= here;
+        color[j] += here * light.xyz;
+    }
+}
+
+// Of the n found ones those from k on, one an invocation, each for all of them.
+void compose_some(uint k, uint n, float y) {
+    uint t = gl_LocalInvocationID.x;
+    int r = int(found[min(k + t, n - 1u)]);
+    vec4 place = uintBitsToFloat(texelFetch(splats, 2 * r)), light = uintBitsToFloat(texelFetch(splats, 2 * r + 1));
+    place.w = k + t < n ? place.w : 0.0;
+    uint end = min(n - k, INVOCATIONS);
+#if ONE_SUBGROUP
+    // By twos: what a loop carries is written anew at each turn.
+    for (uint m = 0; m < end; m += 2) {
+        compose(of_invocation(place, m), of_invocation(light, m), y);
+        compose(of_invocation(place, m + 1), of_invocation(light, m + 1), y);
+    }
+#else
+    given[0][t] = place;
+    given[1][t] = light;
+    barrier();
+    for (uint m = 0; m < end; ++m) {
+        compose(given[0][m], given[1][m], y);
+    }
+    barrier();
+#endif
+}
+
+vec4 load(uint p) {
+#if !BEHIND
+    return vec4(0.0);
+#elif PIXEL_WORDS == 1
+    return unpackUnorm4x8(under[p]);
+#elif PIXEL_WORDS == 2
+    return vec4(unpackHalf2x16(under[2 * p]), unpackHalf2x16(under[2 * p + 1]));
+#else
+    return uintBitsToFloat(uvec4(under[4 * p], under[4 * p + 1], under[4 * p + 2], under[4 * p + 3]));
+#endif
+}
+
+void store(uint p, vec4 value) {
+#if PIXEL_WORDS == 1
+    picture[p] = packUnorm4x8(value);
+#elif PIXEL_WORDS == 2
+    picture[2 * p] = packHalf2x16(value.xy);
+    picture[2 * p + 1] = packHalf2x16(value.zw);
+#else
+    picture[4 * p] = floatBitsToUint(value.x);
+    picture[4 * p + 1] = floatBitsToUint(value.y);
+    picture[4 * p + 2] = floatBitsToUint(value.z);
+    picture[4 * p + 3] = floatBitsToUint(value.w);
+#endif
+}
+
+#if BEHIND == 2
+float depth_at(uint p) { return float(depths[p] & 0xffffffu) / 16777215.0; }
+#elif BEHIND
+float depth_at(uint p) { return uintBitsToFloat(depths[p]); }
+#endif
+
+void main() {
+    uint t = gl_LocalInvocationID.x;
+    uint w = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    Round this_round = rounds[push.i_round];
+    if (w >= this_round.tiles.w) {
+        return;
+    }
+    uvec4 range = ranges[w / (TILES_ACROSS * TILES_ACROSS)];
+    uint i_tile = w % (TILES_ACROSS * TILES_ACROSS);
+    uvec2 tile = TILES_ACROSS * uvec2(range.z % push.n_bins_x, range.z / push.n_bins_x)
+               + uvec2(i_tile % TILES_ACROSS, i_tile / TILES_ACROSS);
+    uvec2 at = tile * uvec2(TILE_WIDTH, ROWS) + uvec2(RUN * (t / ROWS), t % ROWS);
+    // Pixels beyond the picture's edge are composed as its last ones are, and not kept.
+    uint row = min(at.y, push.height - 1u) * push.width;
+    float y = push.tangents.y - (float(at.y) + 0.5) * push.pixel.y;
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        float x = (float(at.x + j) + 0.5) * push.pixel.x - push.tangents.x;
+        uint p = row + min(at.x + j, push.width - 1u);
+        x_of[j] = x;
+        inv_norm[j] = 1.0 / (1.0 + x * x + y * y);
+        vec4 before = push.i_round > 0 ? state[p] : vec4(0.0);
+        color[j] = before.xyz;
+        passed[j] = 1.0 - before.w;
+#if BEHIND
+        depth_of[j] = depth_at(p);
+#endif
+    }
+    for (uint first = range.x; first < range.y;) {
+        uint n = 0;
+        while (first < range.y && n + INVOCATIONS <= MOST) {
+            uint i = first + t;
+            uvec2 pair = pairs[min(i, range.y - 1u)];
+            n = append(n, i < range.y && (pair.x >> (BIN_BITS + i_tile) & 1u) != 0, pair.y);
+            first += INVOCATIONS;
+        }
+        wait_for_all();
+        for (uint k = 0; k < n; k += INVOCATIONS) {
+            compose_some(k, n, y);
+        }
+        wait_for_all();
+        float most = 0.0;
+        [[unroll]] for (uint j = 0; j < RUN; ++j) {
+            most = max(most, passed[j]);
+        }
+        if (all_agree(most < push.saturated)) {
+            break;
+        }
+    }
+    bool goes_on = this_round.bins.w != 0;
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        if (at.x + j < push.width && at.y < push.height) {
+            uint p = row + at.x + j;
+            vec4 sum = vec4(color[j], 1.0 - passed[j]);
+            if (goes_on) {
+                state[p] = sum;
+            }
+            store(p, sum + passed[j] * load(p));
+        }
+    }
+}

@@ -1,0 +1,103 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "blob.glsl"
+#include "tiles.glsl"
+
+// Each blob as a splat, near to far: the conic of its optical depth on the screen, and the bins that it can reach
+// (docs/model.md §11 "tiles").
+
+layout(local_size_x = 256) in;
+
+// As in sprites.vert.
+layout(constant_id = 0) const uint LIT = 1;
+layout(constant_id = 2) const uint GROUPED = 0;
+layout(constant_id = 3) const uint WEIGHTED = 0;
+
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint n_splats; uint width; uint height; uint tile_width; uint tile_height; } push;
+layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
+layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
+layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
+layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
+layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
+layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
+layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
+layout(std430, binding = 7) writeonly buffer Splats { Splat splats[]; };
+// Tiles it can reach: (first, end) of columns and of rows, 16 bits each; 0 for none.
+layout(std430, binding = 10) writeonly buffer Reaches { uvec2 reach[]; };
+// Pairs of the splats before it in its block, and of each block.
+layout(std430, binding = 8) writeonly buffer Before { uint n_before[]; };
+layout(std430, binding = 9) writeonly buffer Blocks { uint n_pairs[]; };
+
+shared uint sums[BLOCK];
+
+const float LOG2_E = 1.44269504089;
+// Pixels that rounding may move an edge by; as the rasteriser's snapping may in sprites.vert.
+const float SNAP = 1.0 / 16.0;
+
+// The first pixel and the one after the last whose centres lie within [low, high], in pixels from the first one's edge.
+uvec2 pixels(float low, float high, uint n) {
+    vec2 at = vec2(ceil(low - 0.5 - SNAP), floor(high + 0.5 + SNAP));
+    uvec2 range = uvec2(clamp(at, vec2(0.0), vec2(float(n))));
+    return uvec2(min(range.x, range.y), range.y);
+}
+
+// Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is set.
+uint project(uint i, uint r) {
+    reach[r] = uvec2(0);
+    vec3 v = along_camera(push.camera, placed[i].position - push.camera.eye);
+    float sigma = placed[i].sigma;
+    float tau = SQRT_TAU * particles[i].kappa * sigma;
+    if (WEIGHTED != 0) {
+        Drawn group = drawn[i_group[i]];
+        tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
+    }
+    if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
+        return 0u;
+    }
+    vec2 s = v.xy / v.z;
+    float radius = GROWTH * push.cutoff * sigma;
+    vec2 x = (tangents(v.x, v.z, radius) + push.camera.tan_x) / push.pixel.x;
+    vec2 y = (push.camera.tan_y - tangents(v.y, v.z, radius).yx) / push.pixel.y;
+    uvec2 columns = pixels(x.x, x.y, push.width), rows = pixels(y.x, y.y, push.height);
+    if (columns.x == columns.y || rows.x == rows.y) {
+        return 0u;
+    }
+    // b^2/(2 sigma^2) = scale (d.x^2 + d.y^2 + (s.x d.y - s.y d.x)^2) / (1 + |ray|^2), d = ray - s; in powers of two.
+    float scale = 0.5 * LOG2_E * (v.z / sigma) * (v.z / sigma);
+    uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
+    vec3 radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
+    splats[r] = Splat(s, scale, tau, radiance, push.camera.near / v.z);
+    uvec2 tile = uvec2(push.tile_width, push.tile_height);
+    // In tiles: a rectangle of them, ends included.
+    uvec2 first = uvec2(columns.x, rows.x) / tile, last = (uvec2(columns.y, rows.y) - 1u) / tile;
+    reach[r] = first | (last + 1u) << 16;
+    first /= TILES_ACROSS;
+    last /= TILES_ACROSS;
+    uvec2 n = last - first + 1u;
+    return n.x * n.y;
+}
+
+void main() {
+    uint t = gl_LocalInvocationID.x;
+    uint r = gl_WorkGroupID.x * BLOCK + t;
+    uint n = 0;
+    if (r < push.n_splats) {
+        // Far to near is how they are sorted.
+        n = project(entries[push.n_splats - 1u - r].y, r);
+    }
+    sums[t] = n;
+    barrier();
+    for (uint apart = 1; apart < BLOCK; apart *= 2) {
+        uint left = t >= apart ? sums[t - apart] : 0u;
+        barrier();
+        sums[t] += left;
+        barrier();
+    }
+    if (r < push.n_splats) {
+        n_before[r] = sums[t] - n;
+    }
+    if (t == BLOCK - 1) {
+        n_pairs[gl_WorkGroupID.x] = sums[t];
+    }
+}

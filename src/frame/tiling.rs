@@ -1,0 +1,95 @@
+//! What draws where `draw.path` is "tiles": splats, their pairs sorted by bin, and the picture.
+
+use super::feed::IN_FLIGHT;
+use crate::error::Result;
+use crate::gpu::memory::TargetFormat;
+use crate::gpu::{Buffer, Compiler, Device, Place, Recorder, Target};
+use crate::model::cloud::{Group, SQRT_TAU};
+use crate::model::film::FilmFormat;
+use crate::model::scene::Scene;
+use crate::passes::sort::{Counts, Sort, TILE};
+use crate::passes::tiles::{Division, Tiles, Variant, View};
+
+pub struct Tiling {
+    tiles: Tiles,
+    sort: Sort,
+    /// One is drawn while the other is read.
+    pub pictures: [Buffer; IN_FLIGHT],
+}
+
+impl Tiling {
+    /// For pictures of `division` with at most `n_max` particles.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        division: Division,
+        n_max: u32,
+        variant: &Variant,
+    ) -> Result<Tiling> {
+        let tiles = Tiles::new(device, compiler, division, n_max, variant)?;
+        let bytes = u64::from(division.width) * u64::from(division.height) * variant.format.bytes_per_pixel();
+        let picture = |name| Buffer::new::<u8>(device, name, bytes, Place::Device);
+        let sort = Sort::new(device, compiler, tiles.capacity())?;
+        Ok(Tiling { sort, tiles, pictures: [picture("tiles.even")?, picture("tiles.odd")?] })
+    }
+
+    /// Draws the first `n` of the sorted entries, `counts` [n, first facet of a particle], into picture `i`, over the drawn
+    /// surfaces where there are any. `buffers` as in `sprites`.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        i: usize,
+        under: Option<Target<'_>>,
+        buffers: [&Buffer; 7],
+        view: &View<'_>,
+        counts: [u32; 2],
+    ) -> Result<()> {
+        let (tiles, picture, [n_splats, i_first_facet]) = (&self.tiles, &self.pictures[i], counts);
+        match under {
+            Some(under) => tiles.record_under(rec, under, picture),
+            None => rec.fill(picture, 0),
+        }
+        if n_splats == 0 {
+            return Ok(());
+        }
+        tiles.record_splats(rec, buffers, view, [n_splats, i_first_facet, TILE])?;
+        for i_round in 0..tiles.n_rounds {
+            tiles.record_pairs(rec, i_round, n_splats, view)?;
+            let [i_count, i_groups] = Tiles::i_extent(i_round);
+            let pairs = Counts { buffer: &tiles.round, i_count, i_groups };
+            let sorted = self.sort.record_counted(rec, &tiles.entries, tiles.division.n_bits(), pairs)?;
+            tiles.record_compose(rec, i_round, sorted, picture, view)?;
+        }
+        Ok(())
+    }
+}
+
+/// How a scene is drawn.
+pub fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
+    Variant {
+        lit,
+        grouped,
+        weighted: scene.draw.count.is_some(),
+        format,
+        behind: !scene.surfaces.is_empty(),
+        tau_most: tau_most(scene),
+        portable: false,
+        most_pairs: None,
+    }
+}
+
+/// What may be left out behind a pixel: half a step of the format below 1, where a target shows no less.
+pub fn saturated(format: FilmFormat) -> f64 {
+    0.5 * format.unit_roundoff()
+}
+
+/// No blob of the scene has a greater optical depth at any time.
+fn tau_most(scene: &Scene) -> f64 {
+    let of = |g: &Group| {
+        let growth = scene.clouds[g.i_cloud].growth.to.max(1.0);
+        // One particle stands for all of its group at most.
+        let denser = if scene.draw.count.is_some_and(|c| c.conserve) { f64::from(g.n_particles) } else { 1.0 };
+        SQRT_TAU * g.kappa_max * g.sigma_max * growth * denser
+    };
+    scene.groups().iter().map(of).fold(0.0, f64::max)
+}

@@ -1,0 +1,33 @@
+//! What the kernels of `tiles` hand on (docs/model.md §11 "tiles").
+
+use crate::layout::record;
+
+record! {
+    /// A blob on the screen: its optical depth at the ray (x, y, 1) is tau 2^-e, e = scale (δx² + δy² + (cx δy − cy δx)²)/
+    /// (1 + x² + y²), δ = (x, y) − (cx, cy) (docs/model.md §11 "tiles").
+    pub struct SplatRecord {
+        /// Slopes.
+        center: [f32; 2],
+        /// z²/(2 σ² ln 2).
+        scale: f32,
+        /// Through the centre.
+        tau: f32,
+        radiance: [f32; 3],
+        /// near/z.
+        depth: f32,
+    }
+}
+
+record! {
+    /// As many blocks of splats, near to far, as there is room for the pairs of at once.
+    pub struct RoundRecord {
+        /// Workgroups that sort: [n, 1, 1]; pairs.
+        extent: [u32; 4],
+        /// How many blocks: [n, 1, 1]; the first.
+        blocks: [u32; 4],
+        /// Workgroups that look for the bins' pairs: [n, 1, 1]; 1 where a later round has splats.
+        bins: [u32; 4],
+        /// Workgroups that compose: [x, y, 1]; tiles of bins that have pairs.
+        tiles: [u32; 4],
+    }
+}

@@ -1,0 +1,355 @@
+//! tiles: the blobs as splats, composed in compute, a tile of pixels a workgroup.
+//!
+//! In: drawn particles far to near, their places, facets' light. Out: the picture in a buffer, rows from the top, in the
+//! film's format. Law: that of `sprites` (docs/model.md §9, §11 "sprites", "tiles"), composed near to far in f32 and rounded
+//! once. Error: f32's in each layer and the format's once; what lies behind a pixel that lets less than `saturated` through
+//! is left out.
+
+use crate::error::{Error, Result};
+use crate::gpu::device::Limits;
+use crate::gpu::memory::{TargetFormat, has_depth24};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder, Target};
+use crate::layout::frame::CameraRecord;
+use crate::layout::record;
+use crate::layout::tiles::{RoundRecord, SplatRecord};
+
+record! {
+    pub struct SplatPush {
+        camera: CameraRecord,
+        pixel: [f32; 2],
+        cutoff: f32,
+        i_first_facet: u32,
+        n_splats: u32,
+        width: u32,
+        height: u32,
+        tile_width: u32,
+        tile_height: u32,
+    }
+}
+
+record! {
+    pub struct RoundsPush {
+        n_blocks: u32,
+        n_rounds: u32,
+        capacity: u32,
+        most_blocks: u32,
+        sort_tile: u32,
+        bin_groups: u32,
+    }
+}
+
+record! {
+    pub struct ClearPush { n_pixels: u32, unused: u32 }
+}
+
+record! {
+    pub struct PairsPush { tangents: [f32; 2], tile: [f32; 2], n_splats: u32, n_bins_x: u32, i_round: u32, cut: f32 }
+}
+
+record! {
+    pub struct RangesPush { n_bins: u32, i_round: u32, max_groups: u32, unused: u32 }
+}
+
+record! {
+    pub struct Push {
+        tangents: [f32; 2],
+        pixel: [f32; 2],
+        width: u32,
+        height: u32,
+        n_bins_x: u32,
+        i_round: u32,
+        cut: f32,
+        saturated: f32,
+    }
+}
+
+/// Splats of a block; the shaders' BLOCK.
+const BLOCK: u32 = 256;
+/// Blocks of a round. A tile's loops take up to 0.8 turns a splat, and llvmpipe ends all loops of an invocation after 65 535.
+const MOST_BLOCKS: u32 = 256;
+/// Words of a round.
+const ROUND_WORDS: u32 = (size_of::<RoundRecord>() / 4) as u32;
+/// An invocation's pixels; the shader's RUN.
+const RUN: u32 = 8;
+/// Tiles along a bin's side; the shaders' TILES_ACROSS.
+const TILES_ACROSS: u32 = 4;
+/// Workgroups along x that every device has, and turns that llvmpipe's loops take: most blocks, and most bins of a splat.
+const MOST: u32 = 65_535;
+/// Most pairs that there is room for at once; as many of the sort's tiles as llvmpipe's loops take turns.
+const MOST_PAIRS: u64 = 1 << 24;
+
+/// How the picture is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Division {
+    pub width: u32,
+    pub height: u32,
+    /// Invocations of a workgroup, and pixels of its tile.
+    invocations: u32,
+    tile: [u32; 2],
+    n_bins_x: u32,
+    pub n_bins: u32,
+}
+
+impl Division {
+    /// `width` × `height` pixels by workgroups of so many invocations. An error where there would be too many bins.
+    pub fn of(width: u32, height: u32, invocations: u32) -> Result<Division> {
+        let rows = if invocations <= 16 { 8 } else { 16 };
+        let tile = [RUN * (invocations / rows), rows];
+        let [n_bins_x, n_bins_y] = [width.div_ceil(TILES_ACROSS * tile[0]), height.div_ceil(TILES_ACROSS * tile[1])];
+        match n_bins_x.checked_mul(n_bins_y) {
+            Some(n_bins) if n_bins <= MOST => Ok(Division { width, height, invocations, tile, n_bins_x, n_bins }),
+            _ => Err(Error::limit(format!(
+                "draw.path = \"tiles\": {width} x {height} pixels are more than its {MOST} bins of {} x {}; expected \"sprites\"",
+                TILES_ACROSS * tile[0],
+                TILES_ACROSS * tile[1]
+            ))),
+        }
+    }
+
+    /// Bits of a bin's number.
+    pub fn n_bits(&self) -> u32 {
+        (self.n_bins - 1).max(1).ilog2() + 1
+    }
+
+    fn n_pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
+
+/// How a scene is drawn, constant over a run.
+#[derive(Debug, Clone, Copy)]
+pub struct Variant {
+    pub lit: bool,
+    pub grouped: bool,
+    pub weighted: bool,
+    pub format: TargetFormat,
+    /// Surfaces are drawn, too.
+    pub behind: bool,
+    /// No blob's optical depth is greater.
+    pub tau_most: f64,
+    /// Without what subgroups can do.
+    pub portable: bool,
+    /// Room for no more pairs at once.
+    pub most_pairs: Option<u64>,
+}
+
+/// What is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    pub camera: &'a CameraRecord,
+    /// Sprites end at this many σ.
+    pub cutoff: f64,
+    /// What lies behind a pixel that lets less than this through is left out.
+    pub saturated: f64,
+}
+
+pub struct Tiles {
+    splat: Kernel,
+    rounds: Kernel,
+    clear: Kernel,
+    pairs: Kernel,
+    ranges: Kernel,
+    compose: Kernel,
+    pub division: Division,
+    behind: bool,
+    capacity: u32,
+    pub n_rounds: u32,
+    max_groups: u32,
+    splats: Buffer,
+    before: Buffer,
+    reaches: Buffer,
+    blocks: Buffer,
+    /// Of each round what its dispatches need.
+    pub round: Buffer,
+    /// [bin, splat].
+    pub entries: Buffer,
+    found: Buffer,
+    state: Buffer,
+    /// The surfaces, and their depth.
+    under: Buffer,
+    depths: Buffer,
+}
+
+/// Pairs of a bin and a splat that there is room for at once: of most scenes all. Never less than two blocks may have.
+fn capacity(n_splats: u32, division: &Division, limits: &Limits, most: Option<u64>) -> u64 {
+    let two_blocks = 2 * u64::from(BLOCK) * u64::from(division.n_bins);
+    let all = u64::from(n_splats) * u64::from(division.n_bins);
+    let room = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes / 16) / 8;
+    (all / 4).max(1 << 20).min(all).min(room).min(most.unwrap_or(MOST_PAIRS)).max(two_blocks)
+}
+
+/// Invocations of a workgroup: one subgroup.
+pub fn invocations(limits: &Limits) -> u32 {
+    limits.subgroup_size.clamp(8, 64)
+}
+
+impl Tiles {
+    /// Room for `n_max` splats on a picture divided as `division` says.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        division: Division,
+        n_max: u32,
+        variant: &Variant,
+    ) -> Result<Tiles> {
+        let n_blocks = n_max.div_ceil(BLOCK);
+        if n_blocks > MOST {
+            let most = u64::from(MOST) * u64::from(BLOCK);
+            return Err(Error::limit(format!(
+                "draw.path = \"tiles\" draws {most} particles at most, the scene has {n_max}; expected \"sprites\""
+            )));
+        }
+        let capacity = capacity(n_max, &division, device.limits(), variant.most_pairs);
+        // Every round but the last has less room left than a block may need, or as many blocks as a round may have.
+        let worst = u64::from(n_max) * u64::from(division.n_bins);
+        let by_pairs = worst.div_ceil(capacity - u64::from(BLOCK) * u64::from(division.n_bins)) as u32;
+        let n_rounds = if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
+        let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted)].map(|(k, v)| (k, u32::from(v)));
+        let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
+        let macros = [
+            ("INVOCATIONS", division.invocations),
+            ("ROWS", division.tile[1]),
+            ("ONE_SUBGROUP", u32::from(!variant.portable && device.limits().is_one_subgroup(division.invocations))),
+            ("THIN", u32::from(variant.tau_most <= 0.125)),
+            ("PIXEL_WORDS", (variant.format.bytes_per_pixel() / 4) as u32),
+            ("BEHIND", behind),
+        ];
+        let buffer = |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
+        let n_state = if n_rounds > 1 { division.n_pixels() } else { 1 };
+        let n_under = if variant.behind { division.n_pixels() } else { 1 };
+        Ok(Tiles {
+            splat: Kernel::new(device, compiler, "tiles.splat", SplatPush::FIELDS, &constants)?,
+            rounds: Kernel::new(device, compiler, "tiles.rounds", RoundsPush::FIELDS, &[])?,
+            clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
+            pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[])?,
+            ranges: Kernel::new(device, compiler, "tiles.ranges", RangesPush::FIELDS, &[])?,
+            compose: Kernel::with_macros(device, compiler, "tiles", Push::FIELDS, &[], &macros)?,
+            division,
+            behind: variant.behind,
+            capacity: capacity as u32,
+            n_rounds,
+            max_groups: device.limits().max_workgroups_x,
+            splats: Buffer::new::<SplatRecord>(device, "tiles.splats", u64::from(n_max), Place::Device)?,
+            reaches: buffer("tiles.reaches", n_max.into(), 2)?,
+            before: buffer("tiles.before", n_max.into(), 1)?,
+            blocks: buffer("tiles.blocks", n_blocks.into(), 1)?,
+            round: Buffer::new::<RoundRecord>(device, "tiles.rounds", n_rounds.into(), Place::Device)?,
+            entries: buffer("tiles.entries", capacity, 2)?,
+            found: buffer("tiles.ranges", division.n_bins.into(), 4)?,
+            state: buffer("tiles.state", n_state, 4)?,
+            under: buffer("tiles.under", n_under, variant.format.bytes_per_pixel() / 4)?,
+            depths: buffer("tiles.depths", n_under, 1)?,
+        })
+    }
+
+    /// Room for the pairs of a round.
+    pub fn capacity(&self) -> u32 {
+        self.capacity
+    }
+
+    /// The splats of the first `n_splats` of the sorted entries, and the rounds they are drawn in; `sort_tile`: entries that a
+    /// workgroup of the sort takes. `buffers` as in `sprites`.
+    pub fn record_splats(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 7],
+        view: &View<'_>,
+        [n_splats, i_first_facet, sort_tile]: [u32; 3],
+    ) -> Result<()> {
+        let Division { width, height, tile, .. } = self.division;
+        let (camera, pixel, cutoff) = (*view.camera, self.pixel(view.camera), view.cutoff as f32);
+        let push = SplatPush {
+            camera,
+            pixel,
+            cutoff,
+            i_first_facet,
+            n_splats,
+            width,
+            height,
+            tile_width: tile[0],
+            tile_height: tile[1],
+        };
+        let [entries, placed, particles, lit, i_facet, i_group, drawn] = buffers;
+        let to = [&self.splats, &self.before, &self.blocks, &self.reaches];
+        let buffers = [entries, placed, particles, lit, i_facet, i_group, drawn, to[0], to[1], to[2], to[3]];
+        let n_blocks = n_splats.div_ceil(BLOCK);
+        rec.dispatch_groups(&self.splat, &buffers, &push, n_blocks)?;
+        let push = RoundsPush {
+            n_blocks,
+            n_rounds: self.n_rounds,
+            capacity: self.capacity,
+            most_blocks: MOST_BLOCKS,
+            sort_tile,
+            bin_groups: self.division.n_bins.div_ceil(self.ranges.local_size_x()),
+        };
+        rec.dispatch_groups(&self.rounds, &[&self.blocks, &self.round], &push, 1)?;
+        if self.n_rounds == 1 {
+            return Ok(());
+        }
+        let push = ClearPush { n_pixels: self.division.n_pixels() as u32, unused: 0 };
+        rec.dispatch(&self.clear, &[&self.round, &self.state], &push, push.n_pixels)
+    }
+
+    /// Fetches the drawn surfaces to compose over, and begins `picture` with them.
+    pub fn record_under(&self, rec: &mut Recorder<'_>, target: Target<'_>, picture: &Buffer) {
+        rec.copy_image(target.color, &self.under);
+        if let Some(depth) = target.depth {
+            rec.copy_image(depth, &self.depths);
+        }
+        rec.copy(&self.under, picture);
+    }
+
+    /// The pairs of round `i`; [`Tiles::i_extent`] says where `round` has their number.
+    pub fn record_pairs(&self, rec: &mut Recorder<'_>, i_round: u32, n_splats: u32, view: &View<'_>) -> Result<()> {
+        let Division { n_bins_x, tile, .. } = self.division;
+        let pixel = self.pixel(view.camera);
+        let tile = [pixel[0] * tile[0] as f32, pixel[1] * tile[1] as f32];
+        let tangents = [view.camera.tan_x, view.camera.tan_y];
+        let push = PairsPush { tangents, tile, n_splats, n_bins_x, i_round, cut: cut(view.cutoff) };
+        let buffers = [&self.reaches, &self.before, &self.blocks, &self.round, &self.entries, &self.splats];
+        rec.dispatch_counted(&self.pairs, &buffers, &push, (&self.round, ROUND_WORDS * i_round + 4))
+    }
+
+    /// The words of `round` that hold round `i`'s number of pairs, and, three of them, workgroups that sort them.
+    pub fn i_extent(i_round: u32) -> [u32; 2] {
+        [ROUND_WORDS * i_round + 3, ROUND_WORDS * i_round]
+    }
+
+    /// Composes what `sorted`, round `i`'s pairs by bin, names into `picture`.
+    pub fn record_compose(
+        &self,
+        rec: &mut Recorder<'_>,
+        i_round: u32,
+        sorted: &Buffer,
+        picture: &Buffer,
+        view: &View<'_>,
+    ) -> Result<()> {
+        let Division { width, height, n_bins_x, n_bins, .. } = self.division;
+        let push = RangesPush { n_bins, i_round, max_groups: self.max_groups, unused: 0 };
+        let bins = (&self.round, ROUND_WORDS * i_round + 8);
+        rec.dispatch_counted(&self.ranges, &[sorted, &self.round, &self.found], &push, bins)?;
+        let push = Push {
+            tangents: [view.camera.tan_x, view.camera.tan_y],
+            pixel: self.pixel(view.camera),
+            width,
+            height,
+            n_bins_x,
+            i_round,
+            cut: cut(view.cutoff),
+            saturated: view.saturated as f32,
+        };
+        let buffers = [&self.splats, sorted, &self.round, &self.found, &self.state, picture, &self.under, &self.depths];
+        let buffers = if self.behind { &buffers[..] } else { &buffers[..6] };
+        rec.dispatch_counted(&self.compose, buffers, &push, (&self.round, ROUND_WORDS * i_round + 12))
+    }
+
+    /// Slopes of a pixel's sides.
+    fn pixel(&self, camera: &CameraRecord) -> [f32; 2] {
+        [2.0 * camera.tan_x / self.division.width as f32, 2.0 * camera.tan_y / self.division.height as f32]
+    }
+}
+
+/// b²/(2 σ²) at the cutoff, in powers of two.
+fn cut(cutoff: f64) -> f32 {
+    (0.5 * cutoff * cutoff * std::f64::consts::LOG2_E) as f32
+}

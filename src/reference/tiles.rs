@@ -1,0 +1,138 @@
+//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in that order may differ.
+//! In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of which it is the same picture.
+
+use glam::DVec3;
+
+use super::Blob;
+use super::sprites::{Behind, Rounding, View, alpha};
+
+/// Unit round-off of f32.
+const U: f64 = 1.0 / 16_777_216.0;
+
+/// One pixel while it is composed: true numbers, and what the device's may differ from them.
+struct Composed {
+    color: DVec3,
+    passed: f64,
+    off_color: DVec3,
+    off_passed: f64,
+}
+
+impl Composed {
+    /// A layer of true opacity `alpha`, on the device within `off` of `device_alpha`.
+    fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
+        let here = self.passed * alpha;
+        // (T + dT)(a + da) - T a, rounded once.
+        let inherited = self.off_passed * (alpha + off) + self.passed * off;
+        let off_here = inherited + U * (here + inherited);
+        self.off_color += radiance.abs() * off_here;
+        self.color += here * radiance;
+        // here L and the sum with it.
+        self.off_color += U * (here + off_here) * radiance.abs() + U * (self.color.abs() + self.off_color);
+        self.passed -= here;
+        self.off_passed = self.off_passed * (1.0 - alpha).abs()
+            + self.off_passed * off
+            + (self.passed + here) * off
+            + U * (here + off_here)
+            + U * (self.passed + self.off_passed);
+    }
+
+    /// Over what stands behind: the pixel, and its bound. `most`: the brightest radiance there is.
+    fn over(&self, under: &Behind, r: &Rounding, saturated: f64, most: f64) -> ([f64; 4], [f64; 4]) {
+        // What is left out behind a tile none of whose pixels lets `saturated` through.
+        let skipped = if self.passed - self.off_passed < saturated { saturated } else { 0.0 };
+        let channel = |k: usize| {
+            let (front, off, most) = match k {
+                3 => (1.0 - self.passed, self.off_passed + U, 1.0),
+                _ => (self.color[k], self.off_color[k], 2.0 * most),
+            };
+            let value = front + self.passed * under.color[k];
+            let passed_most = self.passed + self.off_passed;
+            let inherited =
+                off + self.off_passed * under.color[k].abs() + passed_most * under.bound[k] + skipped * most;
+            let inherited = inherited + 2.0 * U * (value.abs() + inherited);
+            (value, inherited + 2.0 * r.unit * (value.abs() + inherited).max(r.least_normal))
+        };
+        let channels = [0, 1, 2, 3].map(channel);
+        (channels.map(|c| c.0), channels.map(|c| c.1))
+    }
+}
+
+/// The picture of `blobs` over `behind`, and per channel a bound on what the device may differ: opacities by `rounding.alpha` of
+/// themselves, edges by `rounding.edge`, the target by `rounding.unit`, and what lies behind less than `saturated`.
+pub fn render_over(
+    view: &View,
+    behind: &[Behind],
+    blobs: &[Blob],
+    radiance: &[DVec3],
+    order: &[u32],
+    (rounding, saturated): (&Rounding, f64),
+) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+    let most = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+    let pixel = |(i_pixel, under): (usize, &Behind)| {
+        let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
+        let composed = compose(view, view.ray(i, j), under, blobs, radiance, order, rounding);
+        composed.over(under, rounding, saturated, most)
+    };
+    behind.iter().enumerate().map(pixel).unzip()
+}
+
+fn compose(
+    view: &View,
+    ray: DVec3,
+    under: &Behind,
+    blobs: &[Blob],
+    radiance: &[DVec3],
+    order: &[u32],
+    r: &Rounding,
+) -> Composed {
+    let mut pixel = Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
+    for &k in order.iter().rev() {
+        let (blob, k) = (&blobs[k as usize], k as usize);
+        let c = blob.position - view.pose.position;
+        let depth = c.dot(view.pose.forward);
+        if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
+            continue;
+        }
+        let (b, cut) = (c.cross(ray).length() / ray.length(), view.cutoff * blob.sigma);
+        let on_edge = (b - cut).abs() <= r.edge * cut;
+        let at_behind = (depth - under.depth).abs() < under.depth_bound;
+        if (b > cut && !on_edge) || (depth > under.depth && !at_behind) {
+            continue;
+        }
+        let alpha = alpha(blob, b);
+        let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+        pixel.under(if b <= cut && depth <= under.depth { alpha } else { 0.0 }, off, radiance[k]);
+    }
+    pixel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::camera::Pose;
+    use crate::model::cloud::SQRT_TAU;
+    use crate::reference::sprites;
+
+    #[test]
+    fn near_to_far_is_the_picture_of_far_to_near() {
+        let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
+        let view = View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0 };
+        let at = |x: f64, z: f64, tau: f64| Blob {
+            position: DVec3::new(x, 0.1, -z),
+            sigma: 0.5,
+            kappa: tau / (SQRT_TAU * 0.5),
+        };
+        let (blobs, colors) = ([at(0.1, 2.0, 0.7), at(-0.2, 4.0, 3.0)], [DVec3::X, DVec3::new(0.2, 1.0, 2.0)]);
+        let under = Behind { color: [0.0, 0.0, 1.0, 1.0], depth: 3.0, ..Behind::NOTHING };
+        for under in [Behind::NOTHING, Behind { depth: 9.0, ..under }, under] {
+            let behind = [under; 6];
+            let none = Rounding::NONE;
+            let (near_first, bound) = render_over(&view, &behind, &blobs, &colors, &[1, 0], (&none, 0.0));
+            let (far_first, _) = sprites::render_over(&view, &behind, &blobs, &colors, &[1, 0], &none);
+            for (a, b) in near_first.concat().iter().zip(far_first.concat()) {
+                assert!((a - b).abs() < 1e-15, "{a} {b}");
+            }
+            assert!(bound.concat().iter().all(|b| *b < 1e-6));
+        }
+    }
+}

@@ -19,6 +19,7 @@ pub mod sort;
 pub mod sprites;
 pub mod surfaces;
 pub mod transmit;
+pub mod volume;
 
 use glam::DVec3;
 

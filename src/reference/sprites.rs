@@ -79,7 +79,7 @@ impl View {
 
     /// Columns and rows (from, to; to excluded) outside which no ray comes within `reach` of offset `c` from the
     /// eye. May be too large, never too small.
-    fn rectangle(&self, c: DVec3, reach: f64) -> [(u32, u32); 2] {
+    pub(super) fn rectangle(&self, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let depth = c.dot(self.pose.forward);
         let (slope_x, slope_y) = self.half_slopes();
         let x = slopes(c.dot(self.pose.right), depth, reach);

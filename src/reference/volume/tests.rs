@@ -120,7 +120,7 @@ fn a_surface_within_a_blob_hides_its_half() {
 fn by_steps(blobs: &[Blob], colors: &[DVec3], ray: DVec3, end: f64, n: u32) -> (DVec3, f64) {
     let (near, length) = (view(1).near, ray.length());
     let step = (end - near) / f64::from(n);
-    let (mut color, mut tau) = (DVec3::ZERO, 0.0);
+    let (mut color, mut tau) = (DVec3::ZERO, 0f64);
     for k in 0..n {
         let x = (near + (f64::from(k) + 0.5) * step) * ray;
         let at = |b: &Blob| b.kappa * (-0.5 * ((x - b.position) / b.sigma).length_squared()).exp() * length * step;
@@ -128,7 +128,7 @@ fn by_steps(blobs: &[Blob], colors: &[DVec3], ray: DVec3, end: f64, n: u32) -> (
             blobs.iter().zip(colors).fold((0.0, DVec3::ZERO), |(t, s), (b, l)| (t + at(b), s + at(b) * *l));
         // Within a step extinction and colour are constant.
         if own > 0.0 {
-            color += (-tau as f64).exp() * -f64::exp_m1(-own) / own * sum;
+            color += (-tau).exp() * -f64::exp_m1(-own) / own * sum;
         }
         tau += own;
     }

@@ -102,6 +102,25 @@ fn the_volume_has_all_particles_and_says_how_exact_it_is() {
 }
 
 #[test]
+fn a_target_of_eight_bits_holds_steps_of_0_to_1() {
+    let dir = temp();
+    // A light that takes the cloud's radiance beyond 1, where the target cuts it.
+    let bright = ["--set", "light.0.irradiance=[9,9,9]", "--validation", "--set", "film.format=\"rgba8\""];
+    render(&dir, "drawn.exr", &CUBES, &bright);
+    let drawn = image::open(path(&dir, "drawn.exr")).expect("a picture").into_rgba32f();
+    assert!(drawn.as_raw().iter().all(|v| (0.0..=1.0).contains(v) && (255.0 * v - (255.0 * v).round()).abs() < 1e-4));
+    assert!(drawn.pixels().any(|p| p.0[0] == 1.0) && drawn.pixels().any(|p| p.0[0] > 0.0 && p.0[0] < 0.5));
+    // Where nothing is cut it is near the truth: 20 layers and more, each off by up to two steps where it covers much.
+    render(&dir, "thin.exr", &CUBES, &["--reference", "thin"]);
+    let dim = ["--set", "light.0.irradiance=[1,1,1]", "--set", "light.1.irradiance=[0.5,0.5,0.5]"];
+    render(&dir, "dim.exr", &CUBES, &[&dim[..], &["--set", "film.format=\"rgba8\""]].concat());
+    render(&dir, "thin.exr", &CUBES, &[&dim[..], &["--reference", "thin"]].concat());
+    let (rmse, max) = differ(&dir, "thin.exr", "dim.exr");
+    println!("rgba8: RMSE {rmse:.1e}, greatest {max:.1e}");
+    assert!((1e-4..2e-2).contains(&rmse) && max < 0.1, "{rmse:e} {max:e}");
+}
+
+#[test]
 fn no_vulkan_is_needed() {
     let dir = temp();
     let out = path(&dir, "thin.png");

@@ -33,9 +33,9 @@ pub enum Command {
     Bench(BenchArgs),
     /// Say whether one bench's results are faster than another's, or how far two pictures are apart
     ///
-    /// Of two results folders: for every loop that both ran, and for frame, game step, render step, GPU and each pass: the medians of A and B,
-    /// their ratio B / A with a 95 % interval, and a verdict. "faster" and "slower" mean that the interval leaves out 1;
-    /// "no difference found" means that it does not, which is not the same as "equal": more frames make it narrower.
+    /// Of two results folders: for every loop that both ran, and for frame, game step, render step, GPU and each pass, the
+    /// medians of A and B, their ratio B / A with a 95 % interval, and a verdict. "faster" and "slower" mean that the
+    /// interval leaves out 1; "no difference found" means that it does not, which is not the same as "equal": more frames make it narrower.
     ///
     /// Only `frame` is the headline. The other rows are not corrected for many comparisons: of twenty that are equal,
     /// one will seem to differ.

@@ -69,7 +69,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
 pub(super) fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
     let hint = match format {
         FilmFormat::Rgba16f => "; film.format = \"rgba32f\" holds more than 65504",
-        FilmFormat::Rgba32f => "",
+        FilmFormat::Rgba8 | FilmFormat::Rgba32f => "",
     };
     format!("{n_bad} of {n} values of the picture are not finite{hint}")
 }

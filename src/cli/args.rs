@@ -35,7 +35,8 @@ pub enum Command {
     ///
     /// Of two results folders: for every loop that both ran, and for frame, game step, render step, GPU and each pass, the
     /// medians of A and B, their ratio B / A with a 95 % interval, and a verdict. "faster" and "slower" mean that the
-    /// interval leaves out 1; "no difference found" means that it does not, which is not the same as "equal": more frames make it narrower.
+    /// interval leaves out 1; "no difference found" means that it does not, which is not the same as "equal": more frames
+    /// make it narrower.
     ///
     /// Only `frame` is the headline. The other rows are not corrected for many comparisons: of twenty that are equal,
     /// one will seem to differ.

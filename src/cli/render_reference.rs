@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use serde_json::json;
 
 use super::args::{ReferenceArg, RenderArgs};
-use super::output::{self, LateProgress};
+use super::output::{self, LateProgress, Spinner};
 use super::render::{image_hash, not_finite};
 use super::say_sizes;
 use crate::error::Result;
@@ -47,24 +47,52 @@ pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f6
     ))
 }
 
-/// The picture, with bars for what takes longer than a second.
-fn draw(scene: &Scene, time_s: f64, reference: ReferenceArg, quiet: bool) -> Result<Picture> {
-    // Lighting is counted, and so is the volume; what lies between them is short.
-    let bar: Mutex<Option<(Work, LateProgress)>> = Mutex::new(None);
-    let on_part = |work: Work, n: usize| {
-        let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
-        if bar.as_ref().is_none_or(|(shown, _)| *shown != work) {
+/// What a person sees of the work.
+enum Shown {
+    Nothing,
+    /// Generating, lighting once, composing: work without a count.
+    Spinner {
+        _spinner: Spinner,
+    },
+    Bar {
+        work: Work,
+        n_left: usize,
+        bar: LateProgress,
+    },
+}
+
+impl Shown {
+    fn spinner(quiet: bool) -> Shown {
+        Shown::Spinner { _spinner: output::spinner("drawing in f64", quiet) }
+    }
+
+    /// One more of `n` parts of `work` is done.
+    fn advance(&mut self, work: Work, n: usize, quiet: bool) {
+        if !matches!(self, Shown::Bar { work: shown, .. } if *shown == work) {
             let what = match work {
                 Work::Lighting => "lighting",
                 Work::Drawing => "drawing",
             };
-            // The old one is cleared before the new one is drawn.
-            drop(bar.take());
-            *bar = Some((work, output::late_progress(n as u64, what, quiet)));
+            // The line is cleared before another is drawn on it.
+            *self = Shown::Nothing;
+            *self = Shown::Bar { work, n_left: n, bar: output::late_progress(n as u64, what, quiet) };
         }
-        if let Some((_, bar)) = &*bar {
+        if let Shown::Bar { n_left, bar, .. } = self {
             bar.advance();
+            *n_left -= 1;
+            if *n_left == 0 {
+                *self = Shown::Nothing;
+                *self = Shown::spinner(quiet);
+            }
         }
+    }
+}
+
+/// The picture, with a bar or a spinner for what takes longer than a second.
+fn draw(scene: &Scene, time_s: f64, reference: ReferenceArg, quiet: bool) -> Result<Picture> {
+    let shown = Mutex::new(Shown::spinner(quiet));
+    let on_part = |work: Work, n: usize| {
+        shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
     };
     let drawing = match reference {
         ReferenceArg::Thin => Drawing::Thin,

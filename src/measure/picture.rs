@@ -73,6 +73,33 @@ mod tests {
     }
 
     #[test]
+    fn the_cases_tell_wrong_metrics_apart() {
+        // The two cases above, and what slips of the formulas would make of them.
+        let cases: [Vec<(f64, f64)>; 2] =
+            [vec![(0.3, 0.4); 100], (0..16).map(|i| (0.0, if i == 3 { -2.0 } else { 0.0 })).collect()];
+        let mean = |of: &[(f64, f64)], f: &dyn Fn(f64, f64) -> f64| {
+            of.iter().map(|(a, b)| f(*a, *b)).sum::<f64>() / of.len() as f64
+        };
+        type Wrong = fn(&Errors, &dyn Fn(&dyn Fn(f64, f64) -> f64) -> f64) -> (f64, f64);
+        let wrong: [(&str, Wrong); 6] = [
+            ("mean difference", |e, m| (e.rmse, m(&|a, b| (b - a).abs()))),
+            ("no root", |e, m| (e.rmse, m(&|a, b| (b - a).powi(2)))),
+            ("greatest with its sign", |e, m| (e.max_abs, 16.0 * m(&|a, b| b - a))),
+            ("relative to b", |e, m| (e.rel_mse, m(&|a, b| (b - a).powi(2) / (b * b + RELATIVE_EPSILON)))),
+            ("no ε", |e, m| (e.rel_mse, m(&|a, b| (b - a).powi(2) / (a * a + 1e-12)))),
+            ("decibels of the root", |e, m| (e.psnr_db, -10.0 * m(&|a, b| (b - a).powi(2)).sqrt().log10())),
+        ];
+        for (what, of) in wrong {
+            let is_told = cases.iter().any(|case| {
+                let e = errors(case.iter().copied()).unwrap();
+                let (right, wrong) = of(&e, &|f| mean(case, f));
+                (right - wrong).abs() > 1e-3 * right.abs()
+            });
+            assert!(is_told, "{what}");
+        }
+    }
+
+    #[test]
     fn equal_pictures_and_none() {
         let e = errors([(0.5, 0.5), (-7.0, -7.0)].into_iter()).unwrap();
         assert_eq!(e, Errors { rmse: 0.0, max_abs: 0.0, rel_mse: 0.0, psnr_db: f64::INFINITY });

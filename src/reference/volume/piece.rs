@@ -89,16 +89,19 @@ impl March {
         let share = tolerance * ((b - a) / length).max(LEAST_SHARE);
         // What the blobs' order can change within the piece, at most.
         let bound = through * self.active.iter().map(|k| k.tau * k.excess.abs().max_element()).sum::<f64>();
-        let narrowest = self.active.iter().map(|k| passed[k.i].width).fold(f64::INFINITY, f64::min);
-        let is_resolved = b - a <= RESOLVED_SIGMAS * narrowest && tau <= RESOLVED_DEPTH;
         let found = if bound <= share {
             Some((DVec3::ZERO, bound))
-        } else if is_resolved || level == MAX_LEVEL {
-            let (value, error) = self.quadrature(passed, (a, b), ray.tau, (bound, share));
-            let known = if is_resolved { error } else { bound };
-            (error <= share || level == MAX_LEVEL).then_some((value, known))
         } else {
-            None
+            let left_out = self.leave_out_faint(through, bound, share);
+            let narrowest = self.active.iter().map(|k| passed[k.i].width).fold(f64::INFINITY, f64::min);
+            let is_resolved = b - a <= RESOLVED_SIGMAS * narrowest && tau <= RESOLVED_DEPTH;
+            if is_resolved || level == MAX_LEVEL {
+                let (value, error) = self.quadrature(passed, (a, b), ray.tau);
+                let error = if is_resolved { error + left_out } else { bound };
+                (error <= share || level == MAX_LEVEL).then_some((value, error))
+            } else {
+                None
+            }
         };
         match found {
             Some((value, error)) => {
@@ -137,17 +140,9 @@ impl March {
         (mean, tau)
     }
 
-    /// ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and its error. `bound` is the most it can be,
-    /// `share` the error that the piece may have.
-    fn quadrature(
-        &mut self,
-        passed: &[Passed],
-        (a, b): (f64, f64),
-        tau: f64,
-        (bound, share): (f64, f64),
-    ) -> (DVec3, f64) {
-        let through = (-tau).exp();
-        // Faint blobs are left out: as light they are their share of the bound, as shadow their optical depth times all of it.
+    /// Takes out of `active` blobs that are faint: as light they are their share of the `bound`, as shadow their optical depth
+    /// times all of it. What that may change.
+    fn leave_out_faint(&mut self, through: f64, bound: f64, share: f64) -> f64 {
         let faint = SHARE_OF_FAINT * share / self.active.len().max(1) as f64;
         let mut left_out = 0.0;
         self.active.retain(|k| {
@@ -156,6 +151,11 @@ impl March {
             left_out += if is_faint { most } else { 0.0 };
             !is_faint
         });
+        left_out
+    }
+
+    /// ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and what the two rules differ by.
+    fn quadrature(&self, passed: &[Passed], (a, b): (f64, f64), tau: f64) -> (DVec3, f64) {
         let half = 0.5 * (b - a);
         let at = |x: f64| self.source(passed, 0.5 * (a + b) + half * x, tau);
         let middle = at(0.0);
@@ -167,7 +167,7 @@ impl March {
                 gauss += GAUSS[i / 2] * both;
             }
         }
-        (half * kronrod, half * (kronrod - gauss).abs().max_element() + left_out)
+        (half * kronrod, half * (kronrod - gauss).abs().max_element())
     }
 
     /// Σ β_j (L_j − L̄) e^{−τ} at view depth z.

@@ -23,14 +23,20 @@ pub struct Args {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Draw one frame to a PNG or EXR file
+    ///
+    /// With --reference the frame is drawn in f64 on the processor, without a Vulkan device: particles, lighting and
+    /// picture from the mathematics (docs/model.md §9) and from no shader. "thin" composes the sprites that nimbus draws,
+    /// sorted by exact depth: what differs from it is arithmetic. "volume" integrates light through the overlapping blobs
+    /// themselves, every pixel to about a millionth of the brightest: what differs from it is what sprites leave out.
     Render(RenderArgs),
     /// Time a scene, one thread against two
     Bench(BenchArgs),
-    /// Say whether one bench's results are faster than another's
+    /// Say whether one bench's results are faster than another's, or how far two pictures are apart
     ///
-    /// For every loop that both ran, and for frame, game step, render step, GPU and each pass: the medians of A and B,
-    /// their ratio B / A with a 95 % interval, and a verdict. "faster" and "slower" mean that the interval leaves out 1;
-    /// "no difference found" means that it does not, which is not the same as "equal": more frames make it narrower.
+    /// Of two results folders: for every loop that both ran, and for frame, game step, render step, GPU and each pass, the
+    /// medians of A and B, their ratio B / A with a 95 % interval, and a verdict. "faster" and "slower" mean that the
+    /// interval leaves out 1; "no difference found" means that it does not, which is not the same as "equal": more frames
+    /// make it narrower.
     ///
     /// Only `frame` is the headline. The other rows are not corrected for many comparisons: of twenty that are equal,
     /// one will seem to differ.
@@ -38,6 +44,11 @@ pub enum Command {
     /// The interval (block bootstrap over the frames of frames.csv, runs of √n neighbours drawn together) knows the
     /// noise within the two runs, not what changes from one start to the next, such as who else uses the machine. Time
     /// A twice and compare the two to see that: what differs there is no difference.
+    ///
+    /// Of two pictures, both .exr or both .png and of one size: RMSE, the greatest difference, relMSE and PSNR of the
+    /// numbers as they are stored (an EXR's are linear, a PNG's are sRGB in 0..1), and SSIM and FLIP of the pictures as they
+    /// are shown: an EXR over black, through the default tone map. A is what is measured by. Pixels that are not finite in
+    /// either picture are counted and left out; SSIM and FLIP take them for black in both.
     Compare(CompareArgs),
     /// Print a stage's buffer, or what f64 says it should be
     Inspect(InspectArgs),
@@ -78,6 +89,13 @@ pub struct SceneArgs {
 }
 
 #[derive(Debug, ClapArgs)]
+#[command(after_help = "How far the sprites are from both truths:\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 -o drawn.exr\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 -o thin.exr --reference thin\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 -o volume.exr --reference volume\n  \
+    nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
+    The second reflection of a reference is integrated over areas: minutes for hundreds of facets. With \
+    --set 'lighting.mode=\"first\"' there is none.")]
 pub struct RenderArgs {
     /// Scene file
     pub scene: PathBuf,
@@ -90,14 +108,26 @@ pub struct RenderArgs {
     /// Time in seconds, in place of a frame number
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub time: Option<f64>,
+    /// Draw the f64 reference in place of the device's picture: the same sprites, or the volume they stand for
+    #[arg(long, value_enum, value_name = "WHICH")]
+    #[arg(conflicts_with_all = ["device", "shaders", "validation", "no_skip"])]
+    pub reference: Option<ReferenceArg>,
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
-    /// Print what was drawn as JSON: hash of the picture, device, passes
+    /// Print what was drawn as JSON: hash of the picture, device and passes, or the reference and its error
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
     pub options: SceneArgs,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ReferenceArg {
+    /// Sorted thin sprites, as nimbus draws them
+    Thin,
+    /// The integral over the overlapping blobs
+    Volume,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -160,15 +190,35 @@ pub enum ThreadingArg {
     nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
     nimbus compare before after --allow scene\n\n\
     Two builds:\n  nimbus compare old new --allow build\n\n\
-    Exit codes: 0 compared, whatever the verdict; 2 not comparable, or not results of nimbus bench.")]
+    Two pictures:\n  \
+    nimbus render scenes/hello.toml --reference thin -o thin.exr\n  \
+    nimbus render scenes/hello.toml -o drawn.exr\n  \
+    nimbus compare thin.exr drawn.exr --fail-above rmse=1e-3 --fail-below ssim=0.99\n\n\
+    Exit codes: 0 compared, whatever the verdict; 1 a metric is beyond --fail-above or --fail-below;\n  \
+    2 not comparable, or neither results of nimbus bench nor pictures.")]
 pub struct CompareArgs {
-    /// Results folder (`nimbus bench --out DIR`) to measure by
+    /// Results folder (`nimbus bench --out DIR`) or picture to measure by
     pub a: PathBuf,
-    /// Results folder that may be faster or slower
+    /// Results folder that may be faster or slower, or picture that may be off
     pub b: PathBuf,
     /// What may differ between A and B; anything else that does is refused
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…")]
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…", help_heading = "Results")]
     pub allow: Vec<SamenessArg>,
+    /// Write every pixel's FLIP error as a picture, dark for none
+    #[arg(short, long, value_name = "FILE.png", help_heading = "Pictures")]
+    pub output: Option<PathBuf>,
+    /// Replace an existing file
+    #[arg(long, requires = "output", help_heading = "Pictures")]
+    pub force: bool,
+    /// Pixels that a degree of the eye's field of view sees, for FLIP [default: 67]
+    #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Pictures")]
+    pub pixels_per_degree: Option<f64>,
+    /// Exit with 1 where a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or not_finite (repeatable)
+    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
+    pub fail_above: Vec<(String, f64)>,
+    /// Exit with 1 where a metric is less: psnr or ssim (repeatable)
+    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
+    pub fail_below: Vec<(String, f64)>,
     /// JSON in place of the table
     #[arg(long)]
     pub json: bool,
@@ -255,6 +305,17 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     let parse = |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
     Ok((parse(w)?, parse(h)?))
+}
+
+fn parse_positive(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0);
+    value.ok_or_else(|| format!("expected a number above 0, found \"{text}\""))
+}
+
+fn parse_limit(text: &str) -> Result<(String, f64), String> {
+    let wrong = || format!("expected METRIC=VALUE such as rmse=1e-3, found \"{text}\"");
+    let (metric, value) = text.split_once('=').ok_or_else(wrong)?;
+    Ok((metric.to_owned(), value.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(wrong)?))
 }
 
 #[cfg(test)]

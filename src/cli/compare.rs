@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::args::{CompareArgs, SamenessArg};
-use super::output;
+use super::{compare_pictures, output};
 use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
 use crate::study::compare::{Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks};
@@ -55,6 +55,9 @@ impl Side {
 }
 
 pub fn run(args: &CompareArgs) -> Result<()> {
+    if compare_pictures::are_meant(args)? {
+        return compare_pictures::run(args);
+    }
     let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
     let found = differences(&a.run, &b.run);
     let is_allowed = |d: &Difference| args.allow.iter().any(|allowed| sameness(*allowed) == d.kind);

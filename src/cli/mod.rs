@@ -5,10 +5,12 @@ mod attach;
 mod bench;
 mod bench_table;
 mod compare;
+mod compare_pictures;
 mod devices;
 mod inspect;
 mod output;
 mod render;
+mod render_reference;
 
 use std::path::Path;
 use std::process::ExitCode;

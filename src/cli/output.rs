@@ -3,7 +3,7 @@
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::ColorChoice;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -74,6 +74,38 @@ pub fn progress(n: u64, what: &str, quiet: bool) -> ProgressBar {
     match ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {eta}") {
         Ok(style) => bar.with_style(style),
         Err(_) => bar,
+    }
+}
+
+/// A bar that is shown once its work has lasted a second, and that any thread may move on. It is gone when it is dropped.
+pub struct LateProgress {
+    bar: ProgressBar,
+    begin: Instant,
+    may_show: bool,
+}
+
+/// For `n` parts; never shown when quiet or when stderr is no terminal.
+pub fn late_progress(n: u64, what: &str, quiet: bool) -> LateProgress {
+    LateProgress {
+        bar: progress(n, what, true),
+        begin: Instant::now(),
+        may_show: !quiet && std::io::stderr().is_terminal(),
+    }
+}
+
+impl LateProgress {
+    /// One more part is done.
+    pub fn advance(&self) {
+        self.bar.inc(1);
+        if self.may_show && self.bar.is_hidden() && self.begin.elapsed() > SPINNER_DELAY {
+            self.bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    }
+}
+
+impl Drop for LateProgress {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
     }
 }
 

@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::args::RenderArgs;
-use super::{check_time, device_choice, load, output, refuse_existing, say_notes, say_sizes};
+use super::{check_time, device_choice, load, output, refuse_existing, render_reference, say_notes, say_sizes};
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
@@ -22,6 +22,9 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     let i_frame = args.time.map_or(args.frame, |time_s| loaded.scene.time.frame_at(time_s));
     let scene = loaded.at_frame(i_frame);
     check_time(&scene, time_s)?;
+    if let Some(reference) = args.reference {
+        return render_reference::run(args, reference, &scene, time_s);
+    }
     let film = scene.film;
     let quiet = args.options.quiet;
 
@@ -63,10 +66,10 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     ))
 }
 
-fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
+pub(super) fn not_finite(n_bad: usize, n: usize, format: FilmFormat) -> String {
     let hint = match format {
         FilmFormat::Rgba16f => "; film.format = \"rgba32f\" holds more than 65504",
-        FilmFormat::Rgba32f => "",
+        FilmFormat::Rgba8 | FilmFormat::Rgba32f => "",
     };
     format!("{n_bad} of {n} values of the picture are not finite{hint}")
 }
@@ -84,7 +87,7 @@ fn pass_ms(rendered: &Rendered, pass: Pass) -> Option<f64> {
 }
 
 /// SHA-256 (hex) over the pixels as little-endian f32, whatever the machine's own order.
-fn image_hash(rgba: &[f32]) -> String {
+pub(super) fn image_hash(rgba: &[f32]) -> String {
     let mut hasher = Sha256::new();
     for part in rgba.chunks(4096) {
         hasher.update(part.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());

@@ -133,6 +133,7 @@ pub fn n_cells_max(scene: &Scene) -> u64 {
 /// The film's format as a render target.
 pub fn target_format(format: FilmFormat) -> TargetFormat {
     match format {
+        FilmFormat::Rgba8 => TargetFormat::Rgba8,
         FilmFormat::Rgba16f => TargetFormat::Rgba16f,
         FilmFormat::Rgba32f => TargetFormat::Rgba32f,
     }

@@ -16,6 +16,7 @@ impl Renderer {
     pub fn image(&mut self) -> Result<Vec<f32>> {
         let bytes = self.image_bytes()?;
         Ok(match self.settings.format {
+            TargetFormat::Rgba8 => bytes.into_iter().map(|b| f32::from(b) / 255.0).collect(),
             TargetFormat::Rgba16f => {
                 let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
                 halves.into_iter().map(half::f16::to_f32).collect()

@@ -180,6 +180,8 @@ pub struct Image {
 /// Formats a colour target can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TargetFormat {
+    /// UNORM, not sRGB: blending is linear.
+    Rgba8,
     Rgba16f,
     Rgba32f,
 }
@@ -187,6 +189,7 @@ pub enum TargetFormat {
 impl TargetFormat {
     pub(super) fn raw(self) -> vk::Format {
         match self {
+            TargetFormat::Rgba8 => vk::Format::R8G8B8A8_UNORM,
             TargetFormat::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
             TargetFormat::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
         }
@@ -194,6 +197,7 @@ impl TargetFormat {
 
     pub fn bytes_per_pixel(self) -> u64 {
         match self {
+            TargetFormat::Rgba8 => 4,
             TargetFormat::Rgba16f => 8,
             TargetFormat::Rgba32f => 16,
         }
@@ -311,7 +315,7 @@ pub fn has_depth24(device: &Device) -> bool {
     depth_format(device) == vk::Format::X8_D24_UNORM_PACK32
 }
 
-/// Blending is guaranteed for rgba16f; rgba32f is probed.
+/// Blending is guaranteed for rgba8 and rgba16f; rgba32f is probed.
 fn check_blendable(device: &Device, format: TargetFormat) -> Result<()> {
     let features = device.format_features(format.raw());
     if features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND) {

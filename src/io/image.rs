@@ -1,11 +1,12 @@
-//! Images: PNG for looking at, EXR for measuring. Pixels are premultiplied linear RGBA, row 0 the top.
+//! Images: PNG for looking at, EXR for measuring. What is written are premultiplied linear RGBA pixels, row 0 the top;
+//! what is read stays what it is.
 
 use std::path::Path;
 
 use glam::DVec3;
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
-use image::{ExtendedColorType, ImageEncoder};
+use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat};
 
 use super::atomic::write_atomic;
 use crate::error::{Error, Result};
@@ -31,6 +32,49 @@ impl ImageKind {
     }
 }
 
+/// A picture as its file has it, row 0 the top: an EXR's numbers; a PNG's code values (of 8 or 16 bits) by the greatest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Image {
+    pub kind: ImageKind,
+    pub width: u32,
+    pub height: u32,
+    pub rgba: Vec<[f64; 4]>,
+    /// Otherwise A is 1 everywhere.
+    pub has_alpha: bool,
+}
+
+/// Reads what the extension says, and nothing else under that name.
+pub fn read(path: &Path) -> Result<Image> {
+    let kind = ImageKind::of(path)?;
+    let format = match kind {
+        ImageKind::Png => ImageFormat::Png,
+        ImageKind::Exr => ImageFormat::OpenExr,
+    };
+    let mut reader = image::ImageReader::open(path).map_err(|e| Error::io(path, e))?;
+    reader.set_format(format);
+    let decoded = reader.decode().map_err(|e| Error::io(path, format!("cannot be read as a picture: {e}")))?;
+    let (width, height, has_alpha) = (decoded.width(), decoded.height(), decoded.color().has_alpha());
+    let rgba = match decoded.color() {
+        ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
+            four(decoded.into_rgba8().as_raw(), |v| f64::from(*v) / f64::from(u8::MAX))
+        }
+        ColorType::L16 | ColorType::La16 | ColorType::Rgb16 | ColorType::Rgba16 => {
+            four(decoded.into_rgba16().as_raw(), |v| f64::from(*v) / f64::from(u16::MAX))
+        }
+        _ => four(DynamicImage::into_rgba32f(decoded).as_raw(), |v| f64::from(*v)),
+    };
+    Ok(Image { kind, width, height, rgba, has_alpha })
+}
+
+fn four<T>(values: &[T], number: impl Fn(&T) -> f64) -> Vec<[f64; 4]> {
+    values.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|i| number(&p[i]))).collect()
+}
+
+/// 8-bit sRGB as it is, three bytes a pixel. Panics where `rgb` is not width × height pixels.
+pub fn write_bytes(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<()> {
+    write_atomic(path, |writer| PngEncoder::new(writer).write_image(rgb, width, height, ExtendedColorType::Rgb8))
+}
+
 /// Writes what the extension asks for.
 pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
     match ImageKind::of(path)? {
@@ -41,8 +85,7 @@ pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) ->
 
 /// Panics where `rgba` is not width × height pixels.
 pub fn write_png(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
-    let bytes = display_bytes(film, width, height, rgba);
-    write_atomic(path, |writer| PngEncoder::new(writer).write_image(&bytes, width, height, ExtendedColorType::Rgb8))
+    write_bytes(path, width, height, &display_bytes(film, width, height, rgba))
 }
 
 /// Panics where `rgba` is not width × height pixels.
@@ -141,6 +184,46 @@ mod tests {
         assert!(display_bytes(&film(8, 8), 8, 8, &white).chunks(3).all(|c| c == [255, 0, 255]));
         let nan: Vec<f32> = [f32::NAN, f32::INFINITY, 0.0, 1.0].repeat(64);
         assert!(display_bytes(&film(8, 8), 8, 8, &nan).chunks(3).all(|c| c == [0, 255, 0]));
+    }
+
+    #[test]
+    fn what_is_read_is_what_the_file_has() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        let rgba: Vec<f32> = vec![-1.5, 0.25, 1e6, 1.0, f32::NAN, f32::INFINITY, 1e-30, 0.5];
+        write(&path("a.exr"), &film(2, 1), 2, 1, &rgba).unwrap();
+        let exr = read(&path("a.exr")).unwrap();
+        assert_eq!((exr.kind, exr.width, exr.height, exr.has_alpha), (ImageKind::Exr, 2, 1, true));
+        assert!(exr.rgba[0] == [-1.5, 0.25, 1e6, 1.0] && exr.rgba[1][0].is_nan() && exr.rgba[1][3] == 0.5);
+
+        write_bytes(&path("a.png"), 2, 1, &[0, 51, 255, 102, 1, 2]).unwrap();
+        let png = read(&path("a.png")).unwrap();
+        assert_eq!((png.kind, png.has_alpha), (ImageKind::Png, false));
+        assert_eq!(png.rgba, [[0.0, 0.2, 1.0, 1.0], [0.4, 1.0 / 255.0, 2.0 / 255.0, 1.0]]);
+        // 16 bits keep what 8 would lose: 258/65535 lies between 1/255 and 2/255.
+        let deep: image::ImageBuffer<image::Rgba<u16>, _> =
+            image::ImageBuffer::from_raw(1, 1, vec![258u16, 65535, 0, 13107]).unwrap();
+        deep.save(path("deep.png")).unwrap();
+        assert_eq!(read(&path("deep.png")).unwrap().rgba, [[258.0 / 65535.0, 1.0, 0.0, 0.2]]);
+    }
+
+    #[test]
+    fn what_is_no_picture_is_one_error_with_its_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = |name: &str| dir.path().join(name);
+        write(&path("whole.png"), &film(8, 8), 8, 8, &[0.5; 256]).unwrap();
+        write(&path("whole.exr"), &film(8, 8), 8, 8, &[0.5; 256]).unwrap();
+        for kind in ["png", "exr"] {
+            let bytes = std::fs::read(path(&format!("whole.{kind}"))).unwrap();
+            for (name, bytes) in [("cut", &bytes[..bytes.len() / 2]), ("text", b"not a picture"), ("empty", b"")] {
+                let file = path(&format!("{name}.{kind}"));
+                std::fs::write(&file, bytes).unwrap();
+                let error = read(&file).unwrap_err().to_string();
+                assert!(error.starts_with(&format!("{}: cannot be read as a picture: ", file.display())), "{error}");
+            }
+        }
+        assert!(read(&path("gone.exr")).unwrap_err().to_string().contains("gone.exr: "));
+        assert_eq!(read(dir.path()).unwrap_err().exit_code(), 2);
     }
 
     #[test]

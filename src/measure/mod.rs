@@ -3,6 +3,7 @@
 pub mod bootstrap;
 pub mod clock;
 pub mod lows;
+pub mod picture;
 pub(crate) mod random;
 pub mod stats;
 pub mod zones;

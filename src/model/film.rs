@@ -4,17 +4,21 @@ use glam::DVec3;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FilmFormat {
+    /// Values 0 to 1 in steps of 1/255, linear: what a layer makes of them is cut there.
+    Rgba8,
     Rgba16f,
     Rgba32f,
 }
 
 impl FilmFormat {
-    pub const NAMES: [(&'static str, FilmFormat); 2] =
-        [("rgba16f", FilmFormat::Rgba16f), ("rgba32f", FilmFormat::Rgba32f)];
+    pub const NAMES: [(&'static str, FilmFormat); 3] =
+        [("rgba8", FilmFormat::Rgba8), ("rgba16f", FilmFormat::Rgba16f), ("rgba32f", FilmFormat::Rgba32f)];
 
-    /// Unit round-off of one stored channel: half of the spacing of numbers in [1, 2).
+    /// Unit round-off of one stored channel: half of the spacing of numbers in [1, 2), which shrinks with them; of rgba8
+    /// half of its step, whatever the number.
     pub fn unit_roundoff(self) -> f64 {
         match self {
+            FilmFormat::Rgba8 => 0.5 / 255.0,
             FilmFormat::Rgba16f => 2f64.powi(-11),
             FilmFormat::Rgba32f => 2f64.powi(-24),
         }

@@ -20,6 +20,7 @@ pub mod sprites;
 pub mod surfaces;
 pub mod tiles;
 pub mod transmit;
+pub mod volume;
 
 use glam::DVec3;
 

@@ -29,6 +29,8 @@ pub struct Rounding {
     pub unit: f64,
     /// Least normal number of the target: below it the error no longer shrinks with the value.
     pub least_normal: f64,
+    /// Of a target that holds 0 to 1 in equal steps, one of them; 0 of floats. What it blends is cut to that range.
+    pub step: f64,
     /// Relative error of each α.
     pub alpha: f64,
     /// Relative error of b: where |b − cut| is below it times the cut, a sprite may end or not.
@@ -53,14 +55,26 @@ impl Behind {
 
 impl Rounding {
     pub fn of(format: FilmFormat, alpha: f64, edge: f64) -> Rounding {
-        let least_normal = match format {
-            FilmFormat::Rgba16f => 2f64.powi(-14),
-            FilmFormat::Rgba32f => 2f64.powi(-126),
+        let unit = format.unit_roundoff();
+        let (unit, least_normal, step) = match format {
+            FilmFormat::Rgba8 => (0.0, 0.0, 2.0 * unit),
+            FilmFormat::Rgba16f => (unit, 2f64.powi(-14), 0.0),
+            FilmFormat::Rgba32f => (unit, 2f64.powi(-126), 0.0),
         };
-        Rounding { unit: format.unit_roundoff(), least_normal, alpha, edge }
+        Rounding { unit, least_normal, step, alpha, edge }
     }
 
-    pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, alpha: 0.0, edge: 0.0 };
+    pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0 };
+
+    /// What the target holds of an opaque colour.
+    pub fn stored(&self, behind: Behind) -> Behind {
+        if self.step == 0.0 {
+            return behind;
+        }
+        let color = behind.color.map(|v| v.clamp(0.0, 1.0));
+        // To one of the two steps beside it.
+        Behind { color, bound: behind.bound.map(|e| e + self.step), ..behind }
+    }
 }
 
 impl View {
@@ -79,7 +93,7 @@ impl View {
 
     /// Columns and rows (from, to; to excluded) outside which no ray comes within `reach` of offset `c` from the
     /// eye. May be too large, never too small.
-    fn rectangle(&self, c: DVec3, reach: f64) -> [(u32, u32); 2] {
+    pub(super) fn rectangle(&self, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let depth = c.dot(self.pose.forward);
         let (slope_x, slope_y) = self.half_slopes();
         let x = slopes(c.dot(self.pose.right), depth, reach);
@@ -130,6 +144,10 @@ impl Layered {
     fn over(&mut self, alpha: f64, off: f64, radiance: DVec3, r: &Rounding) {
         let source = [radiance.x, radiance.y, radiance.z, 1.0];
         for ((v, e), s) in self.value.iter_mut().zip(&mut self.bound).zip(source) {
+            if r.step > 0.0 {
+                [*v, *e] = over_steps([*v, *e], s, alpha, off, r);
+                continue;
+            }
             // C' − C'_t = (1 − α)(C − C_t) + (α − α_t)(L − C_t), |C_t − C| ≤ e.
             let inherited = (1.0 - alpha) * *e + off * ((s - *v).abs() + *e);
             *v = alpha * s + (1.0 - alpha) * *v;
@@ -137,6 +155,18 @@ impl Layered {
             *e = inherited + 2.0 * r.unit * (v.abs() + inherited).max(r.least_normal);
         }
     }
+}
+
+/// The same of a target of equal steps, which cuts source and result to [0, 1]; value and bound. It may blend in its own
+/// few bits (Vulkan, "Blending": no less precise than the target): source, factor, product and sum are then each rounded to
+/// a step, half a step off where rounding is correct.
+fn over_steps([value, bound]: [f64; 2], source: f64, alpha: f64, off: f64, r: &Rounding) -> [f64; 2] {
+    // No difference of source and target as in floats: a source that is cut does not follow α.
+    let inherited = (1.0 - alpha) * bound + off * (source.abs() + value.abs() + bound);
+    let new = ((alpha * source).clamp(0.0, 1.0) + (1.0 - alpha) * value).clamp(0.0, 1.0);
+    let bound = inherited + 2.0 * r.step + 2.0 * r.unit * (alpha * source.abs() + value + inherited);
+    // Both lie in [0, 1]; what has no bound keeps none.
+    [new, if bound.is_finite() { bound.min(1.0) } else { bound }]
 }
 
 /// Picture of `blobs` in the order given (far to near), blob j of radiance `radiance[j]`.

@@ -9,6 +9,7 @@ pub mod inspect;
 pub mod machine;
 pub mod outcome;
 pub mod overlap;
+pub mod picture;
 pub mod recorded;
 pub mod records;
 pub mod stage;

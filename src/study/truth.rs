@@ -39,6 +39,11 @@ pub struct Truth {
 
 impl Truth {
     pub fn of(scene: &Scene, time_s: f64) -> Result<Truth> {
+        Truth::of_with_listener(scene, time_s, &|_| ())
+    }
+
+    /// `on_facet` hears how many facets receive a second reflection each time that one of them has; it may take long.
+    pub fn of_with_listener(scene: &Scene, time_s: f64, on_facet: &(dyn Fn(usize) + Sync)) -> Result<Truth> {
         let groups = scene.groups();
         let setting = Setting::at(scene, &groups, time_s)?;
         let generated: Vec<Generated> = scene.clouds.iter().flat_map(reference::generate::cloud).collect();
@@ -63,12 +68,12 @@ impl Truth {
             second: vec![],
         };
         if scene.lighting.mode != LightingMode::None {
-            truth.light(scene);
+            truth.light(scene, on_facet);
         }
         Ok(truth)
     }
 
-    fn light(&mut self, scene: &Scene) {
+    fn light(&mut self, scene: &Scene, on_facet: &(dyn Fn(usize) + Sync)) {
         let grid = &self.setting.grid;
         let cells = reference::grid::deposit(grid, &self.blobs);
         let centers = reference::place::cloud_centers(&scene.clouds, self.setting.time_s, self.setting.light_origin);
@@ -108,11 +113,11 @@ impl Truth {
             (0..scene.n_regions()).map(|i| scene.region_material(i).at(self.setting.time_s).kd).collect();
         let regions: Vec<u32> = self.facets.iter().map(|f| f.region).collect();
         self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.facet_colors);
-        self.light_surfaces(scene, &lights, &kd);
+        self.light_surfaces(scene, &lights, &kd, on_facet);
     }
 
     /// Puts the surfaces' facets before the clouds', lit by the area reference, and adds the second reflection to both.
-    fn light_surfaces(&mut self, scene: &Scene, lights: &[Light], kd: &[DVec3]) {
+    fn light_surfaces(&mut self, scene: &Scene, lights: &[Light], kd: &[DVec3], on_facet: &(dyn Fn(usize) + Sync)) {
         let origin = self.setting.light_origin;
         let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
         let surfaces: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
@@ -141,10 +146,38 @@ impl Truth {
         self.facets.splice(0..0, flat);
         if scene.lighting.mode == LightingMode::TwoReflection {
             let accuracy = Accuracy::relative(SECOND_ACCURACY);
-            let found = each(receivers.len(), |i| scenery.second(&receivers[i].0, receivers[i].1, &accuracy));
+            let found = each(receivers.len(), |i| {
+                let second = scenery.second(&receivers[i].0, receivers[i].1, &accuracy);
+                on_facet(receivers.len());
+                second
+            });
             self.indirect = found.iter().map(|e| e.irradiance).collect();
             self.second = found.iter().map(|e| e.radiance).collect();
         }
+    }
+
+    /// L1 + L2 of facet `i` toward the eye.
+    pub fn facet_radiance(&self, i: usize) -> DVec3 {
+        self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO)
+    }
+
+    /// What every particle is drawn with: the radiance of its facet, or its own colour where nothing is lit.
+    pub fn particle_radiance(&self, scene: &Scene) -> Vec<DVec3> {
+        if self.facets.is_empty() {
+            return self.colors.clone();
+        }
+        let n_before = scene.n_surface_facets() as usize;
+        if !scene.groups_facets() {
+            return (0..self.blobs.len()).map(|i| self.facet_radiance(n_before + i)).collect();
+        }
+        let order = self.order(scene, &reference::place::regions(&self.groups));
+        let mut found = vec![DVec3::ZERO; self.blobs.len()];
+        for (k, (first, end)) in scene.facet_runs().into_iter().enumerate() {
+            for place in first..end {
+                found[order[place as usize] as usize] = self.facet_radiance(n_before + k);
+            }
+        }
+        found
     }
 
     /// The particles in Morton order, cloud by cloud.

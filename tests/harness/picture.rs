@@ -27,8 +27,11 @@ use crate::scenery::{Candidates, Scenery};
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
 
-pub const FORMATS: [(TargetFormat, FilmFormat); 2] =
-    [(TargetFormat::Rgba16f, FilmFormat::Rgba16f), (TargetFormat::Rgba32f, FilmFormat::Rgba32f)];
+pub const FORMATS: [(TargetFormat, FilmFormat); 3] = [
+    (TargetFormat::Rgba8, FilmFormat::Rgba8),
+    (TargetFormat::Rgba16f, FilmFormat::Rgba16f),
+    (TargetFormat::Rgba32f, FilmFormat::Rgba32f),
+];
 
 /// How `tiles` draws a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -208,6 +211,9 @@ impl Picture {
             Ok(())
         });
         match format {
+            TargetFormat::Rgba8 => {
+                readback.read::<u8>(n_numbers).expect("read").into_iter().map(|v| f64::from(v) / 255.0).collect()
+            }
             TargetFormat::Rgba16f => {
                 readback.read::<f16>(n_numbers).expect("read").iter().map(|v| v.to_f64()).collect()
             }
@@ -252,7 +258,9 @@ impl Picture {
     /// What each pixel may show of the rectangles.
     pub fn behind(&self, format: FilmFormat) -> Vec<Candidates> {
         let scenery = self.scenery.as_ref().expect("rectangles");
-        scenery.candidates(&self.view, |i, j| self.ray(i, j), &Rounding::of(format, 0.0, 0.0))
+        let rounding = Rounding::of(format, 0.0, 0.0);
+        let found = scenery.candidates(&self.view, |i, j| self.ray(i, j), &rounding);
+        found.into_iter().map(|all| all.into_iter().map(|one| rounding.stored(one)).collect()).collect()
     }
 
     /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any bound where it is not the

@@ -1,0 +1,153 @@
+//! A whole frame's picture in f64, from the scene alone: by the thin sprites that nimbus draws, or by the volume that they
+//! stand for.
+
+use glam::DVec3;
+
+use super::truth::Truth;
+use crate::error::{Error, Result};
+use crate::model::count::LEAST_DRAWN;
+use crate::model::scene::{LightingMode, Scene};
+use crate::model::surface::Surface;
+use crate::reference::area::mean::each;
+use crate::reference::sprites::{Behind, Rounding, View};
+use crate::reference::volume::Volume;
+use crate::reference::{Blob, count, place, sort, sprites, surfaces};
+
+/// Which truth a picture is compared to (model.md §9).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drawing {
+    /// Sorted thin sprites, as nimbus draws them.
+    Thin,
+    /// The integral over the overlapping blobs.
+    Volume,
+}
+
+/// What takes time in a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Work {
+    /// The second reflection, facet by facet.
+    Lighting,
+    /// The volume, row by row.
+    Drawing,
+}
+
+/// Hears how much of a piece of work there is each time that one more of it is done, from any thread.
+pub type Listener<'a> = &'a (dyn Fn(Work, usize) + Sync);
+
+/// Premultiplied linear RGBA, row 0 the top.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    pub rgba: Vec<[f64; 4]>,
+    /// Greatest error estimate of a pixel's radiance; of thin sprites none, whose only error is rounding.
+    pub error: Option<f64>,
+    /// Greatest magnitude of a particle's radiance: what the error is small against.
+    pub brightest: f64,
+    /// How many particles it shows, in view or not.
+    pub n_particles: usize,
+}
+
+/// The scene at `time_s`.
+pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener) -> Result<Picture> {
+    check(scene, time_s)?;
+    let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
+    let radiance = truth.particle_radiance(scene);
+    let view = view(scene, &truth);
+    let behind = behind(scene, &truth, &view);
+    let brightest = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+    Ok(match drawing {
+        Drawing::Thin => {
+            let (blobs, order) = drawn(scene, &truth);
+            let (rgba, _) = sprites::render_over(&view, &behind, &blobs, &radiance, &order, &Rounding::NONE);
+            Picture { rgba, error: None, brightest, n_particles: order.len() }
+        }
+        Drawing::Volume => {
+            let volume = Volume::new(&view, &truth.blobs, &radiance);
+            let width = view.width as usize;
+            let rows = each(view.height as usize, |j| {
+                let row = volume.row(j as u32, &behind[j * width..][..width]);
+                listener(Work::Drawing, view.height as usize);
+                row
+            });
+            let pixels = rows.concat();
+            let error = pixels.iter().map(|p| p.error).fold(0.0, f64::max);
+            let rgba = pixels.into_iter().map(|p| p.color).collect();
+            Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len() }
+        }
+    })
+}
+
+/// Refuses what the references do not know.
+fn check(scene: &Scene, time_s: f64) -> Result<()> {
+    if scene.lighting.mode == LightingMode::None {
+        return Ok(());
+    }
+    for (i, cloud) in scene.clouds.iter().enumerate().filter(|(_, c)| c.n_particles() > 0) {
+        let material = &scene.materials[cloud.i_material];
+        if material.at(time_s).ks != DVec3::ZERO {
+            return Err(Error::usage(format!(
+                "cloud {i}: its material \"{}\" has a lobe, and the f64 reference knows clouds that reflect diffusely alone; \
+                 expected ks = [0, 0, 0]",
+                material.name
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn view(scene: &Scene, truth: &Truth) -> View {
+    let setting = &truth.setting;
+    let mut pose = setting.pose;
+    pose.position -= setting.light_origin;
+    View {
+        width: scene.film.width,
+        height: scene.film.height,
+        pose,
+        fov_y_rad: scene.camera.fov_y_rad,
+        near: scene.camera.near,
+        cutoff: scene.draw.cutoff,
+    }
+}
+
+/// The surfaces, a pixel each; where nothing is lit they show their materials' K_d, as particles show their colours.
+fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
+    let origin = truth.setting.light_origin;
+    let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
+    let placed: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
+    let kd = |s: &Surface| scene.materials[s.i_material].at(scene.time.start_s).kd;
+    let facets: Vec<DVec3> = match scene.lighting.mode {
+        LightingMode::None => placed.iter().flat_map(|s| std::iter::repeat_n(kd(s), s.n_facets() as usize)).collect(),
+        _ => (0..scene.n_surface_facets() as usize).map(|i| truth.facet_radiance(i)).collect(),
+    };
+    surfaces::render(view, &placed, &facets)
+}
+
+/// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn are: far to near by exact
+/// view depth, ties by index.
+fn drawn(scene: &Scene, truth: &Truth) -> (Vec<Blob>, Vec<u32>) {
+    let weights = weights(scene, truth);
+    let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
+    let blobs: Vec<Blob> = truth.blobs.iter().zip(&weights).map(weighed).collect();
+    let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
+    let depths = sort::depths(truth.setting.pose.forward, &positions);
+    let mut order: Vec<u32> = (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
+    order.sort_by(|&i, &j| depths[j as usize].total_cmp(&depths[i as usize]));
+    (blobs, order)
+}
+
+/// Factor on every particle's κ, model.md §3.
+fn weights(scene: &Scene, truth: &Truth) -> Vec<f64> {
+    let Some(rule) = scene.draw.count else { return vec![1.0; truth.blobs.len()] };
+    let (setting, clouds) = (&truth.setting, &scene.clouds);
+    let centers = place::cloud_centers(clouds, setting.time_s, DVec3::ZERO);
+    let of_cloud = |(cloud, center): (_, &DVec3)| {
+        let distance = (setting.pose.position - *center).length();
+        count::printed(distance / rule.d0, place::scale(cloud, setting.time_s), rule.a, rule.normalised)
+    };
+    let shares: Vec<f64> = clouds.iter().zip(&centers).map(of_cloud).collect();
+    let of_group = |g: &crate::model::cloud::Group| {
+        let (n, share) = (g.n_particles, shares[g.i_cloud].min(1.0));
+        let is_drawn = f64::from(n) * share >= LEAST_DRAWN;
+        if is_drawn { count::weights(n, share, rule.conserve) } else { vec![0.0; n as usize] }
+    };
+    truth.groups.iter().flat_map(of_group).collect()
+}

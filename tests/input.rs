@@ -191,7 +191,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16,
             },
             "draw": { "path": "sprites", "cutoff": 3.0, "sort_bits": 32, "resolution": 1.0, "count": "all", "count_a": 280.0, "count_d0": 1.0,
-                      "count_normalised": false, "count_conserve": true, "particles": 0 },
+                      "count_normalised": false, "count_conserve": true, "particles": 0, "texture_seed": 1 },
             "threads": { "mode": "parallel", "simulate": "gpu" },
             "light": [
                 { "kind": "directional", "direction": [-0.5, -0.8, -0.3], "irradiance": [3.0, 2.9, 2.7] },
@@ -200,7 +200,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0], "ns": 8.0 }],
             "surface": [],
             "cloud": [{
-                "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none",
+                "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none", "texture_strength": 1.0,
                 "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0],
                 "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "grow_to": 1.0, "grow_time_s": 60.0, "material": "cloud", "seed": 1,
             }],

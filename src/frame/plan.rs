@@ -20,12 +20,13 @@ pub enum Pass {
     Second,
     Contract,
     Sort,
+    Texture,
     Surfaces,
     Sprites,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 12] = [
+    pub const ALL: [Pass; 13] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -36,6 +37,7 @@ impl Pass {
         Pass::Second,
         Pass::Contract,
         Pass::Sort,
+        Pass::Texture,
         Pass::Surfaces,
         Pass::Sprites,
     ];
@@ -44,7 +46,7 @@ impl Pass {
     pub fn name(self) -> &'static str {
         let names = [
             "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "sort",
-            "surfaces", "sprites",
+            "texture", "surfaces", "sprites",
         ];
         names[self as usize]
     }
@@ -125,6 +127,8 @@ pub struct Traits {
     pub two_reflections: bool,
     /// Facets stand for several particles.
     pub grouped: bool,
+    /// Some cloud has a texture.
+    pub textured: bool,
     /// Surfaces to draw.
     pub n_surfaces: u32,
     /// Some region has a lobe, and so what is seen of it depends on the eye.
@@ -187,11 +191,12 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
         unless(same_order, "the order cannot have changed"),
+        if traits.textured { unless(last.is_some(), "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
         unless(same_picture, "the picture is the same"),
     ];
     if traits.n_particles == 0 {
-        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort] {
+        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort, Pass::Texture] {
             decisions[pass as usize] = skip("no particles");
         }
     }
@@ -240,6 +245,7 @@ mod tests {
         lit: true,
         two_reflections: false,
         grouped: false,
+        textured: false,
         n_surfaces: 0,
         glossy: false,
         tensors: Tensors::Needless,
@@ -247,7 +253,7 @@ mod tests {
     };
     const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
     /// With every pass.
-    const ALL_TRAITS: Traits = Traits { grouped: true, n_surfaces: 1, ..KEPT };
+    const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, ..KEPT };
 
     fn packet() -> Packet {
         Packet {

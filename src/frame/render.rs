@@ -28,6 +28,7 @@ use crate::passes::place::Place as PlacePass;
 use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
+use crate::passes::texture::Texture;
 use crate::passes::transmit::Transmit;
 
 // Commands first: they are dropped first, and wait for what is still under way.
@@ -47,6 +48,8 @@ pub struct Renderer {
     second: Option<Relay>,
     tensor: Option<TensorStage>,
     sort: Sort,
+    /// None where no cloud has a texture.
+    texture: Option<Texture>,
     sprites: Sprites,
     pub(super) buffers: Buffers,
     /// A frame that changes the picture draws into the one that the frame before has not.
@@ -88,6 +91,7 @@ pub(super) struct Settings {
     pub step_cells: f64,
     pub forward: f64,
     sort_bits: u32,
+    texture_seed: u32,
     cutoff: f64,
     pub format: TargetFormat,
 }
@@ -135,6 +139,11 @@ impl Renderer {
             true => Some(Grouping::new(device, compiler, &mut host, scene)?),
             false => None,
         };
+        let textured = scene.is_textured();
+        let texture = match textured {
+            true => Some(Texture::new(device, compiler)?),
+            false => None,
+        };
         let target = |name| Image::color_target(device, name, scene.film.width, scene.film.height, format);
         let mut renderer = Renderer {
             frames: [Commands::new(device, "frame.even")?, Commands::new(device, "frame.odd")?],
@@ -150,12 +159,13 @@ impl Renderer {
             second,
             tensor,
             sort: Sort::new(device, compiler, n_particles)?,
+            texture,
             sprites: Sprites::new(
                 device,
                 compiler,
                 format,
                 lit,
-                [scenery.is_some(), grouped, scene.draw.count.is_some()],
+                [scenery.is_some(), grouped, scene.draw.count.is_some(), textured],
             )?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             targets: [target("sprites.even")?, target("sprites.odd")?],
@@ -173,6 +183,7 @@ impl Renderer {
                 // Without particles there is nothing to march through.
                 forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
                 sort_bits: scene.draw.sort_bits,
+                texture_seed: scene.draw.texture_seed,
                 cutoff: scene.draw.cutoff,
                 format,
             },
@@ -183,6 +194,7 @@ impl Renderer {
                 lit,
                 two_reflections,
                 grouped,
+                textured,
                 n_surfaces: scene.surfaces.len() as u32,
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
@@ -296,6 +308,7 @@ impl Renderer {
             second,
             tensor,
             sort,
+            texture,
             sprites,
             scenery,
             buffers: b,
@@ -371,6 +384,10 @@ impl Renderer {
                 sort.record_keys(rec, buffers, packet.camera.forward, n, packet.radius, s.sort_bits)?;
                 sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits)
             })?;
+            pass(rec, plan, Pass::Texture, |rec| match texture {
+                Some(texture) => texture.record(rec, &b.pool, s.texture_seed),
+                None => Ok(()),
+            })?;
             let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
             pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
                 Some(surfaces) => {
@@ -380,7 +397,10 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, &b.drawn.buffer];
+                let drawn = &b.drawn.buffer;
+                let from = [
+                    &b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, drawn, &b.textured, &b.pool,
+                ];
                 let counts = [packet.n_drawn, s.n_surface_facets];
                 sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
             })

@@ -12,6 +12,7 @@ pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
+pub mod texture;
 pub mod transmit;
 
 use crate::gpu::Sources;
@@ -48,6 +49,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/stencil.glsl",
     "include/sort.glsl",
     "include/tensor.glsl",
+    "include/texture.glsl",
     "include/turns.glsl",
     "include/veil.glsl",
     "include/walk.glsl",
@@ -66,6 +68,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "sprites.vert",
     "surfaces.frag",
     "surfaces.vert",
+    "texture_pack.comp",
+    "texture_transform.comp",
     "transmit.comp",
 ];
 

@@ -195,8 +195,7 @@ fn the_factors_mean_is_one() {
                 let n_places = 4000;
                 let factor = |i: u32| {
                     let sheet = Sheet::new(&of, i, 6.0, dense / 256.0);
-                    let n = sheet.n(pool, glam::DVec2::ZERO);
-                    (strength * n - sheet.half_square()).exp()
+                    sheet.factor(pool, glam::DVec2::ZERO)
                 };
                 means.push((0..n_places).map(factor).sum::<f64>() / f64::from(n_places));
             }

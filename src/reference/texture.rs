@@ -256,6 +256,11 @@ impl Sheet {
         0.5 * self.strength.powi(2) * square
     }
 
+    /// exp(s n − s² ⟨n²⟩/2) at `delta`.
+    pub fn factor(&self, pool: &Pool, delta: DVec2) -> f64 {
+        (self.strength * self.n(pool, delta) - self.half_square()).exp()
+    }
+
     /// n at `delta`.
     pub fn n(&self, pool: &Pool, delta: DVec2) -> f64 {
         let (level, at) = (&pool.0[self.i_field][self.level], self.place(delta));

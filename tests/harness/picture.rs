@@ -2,13 +2,15 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use glam::DVec3;
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
 use half::f16;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
-use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
@@ -16,7 +18,8 @@ use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{Behind, Rounding, View, alpha, render_over, render_with_bound};
+use nimbus::reference::sprites::{Behind, Rounding, View, alpha, render_textured};
+use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, Sheet, Textured, side};
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::harness::Gpu;
@@ -24,6 +27,8 @@ use crate::scenery::{Candidates, Scenery};
 
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
+/// What unit_at promises.
+const UNIT_AT: f64 = 10.0 * U;
 
 pub const FORMATS: [(TargetFormat, FilmFormat); 2] =
     [(TargetFormat::Rgba16f, FilmFormat::Rgba16f), (TargetFormat::Rgba32f, FilmFormat::Rgba32f)];
@@ -42,6 +47,8 @@ pub struct Picture {
     pub drawn: Option<(Vec<u32>, Vec<DrawnRecord>)>,
     /// Rectangles under the sprites.
     pub scenery: Option<Scenery>,
+    /// Group of each particle, as in `drawn` where that is there; each group's texture; the pool, as it is rounded.
+    pub textured: Option<(Vec<u32>, Vec<TexturedRecord>, Arc<Pool>)>,
 }
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -63,6 +70,7 @@ impl Picture {
             i_facet: None,
             drawn: None,
             scenery: None,
+            textured: None,
         }
     }
 
@@ -127,7 +135,7 @@ impl Picture {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
         let pass =
-            Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some(), self.drawn.is_some()])
+            Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some()])
                 .expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
         let scenery = self.scenery.clone().unwrap_or_default();
@@ -142,8 +150,14 @@ impl Picture {
         let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
         let i_facet = gpu.upload(&named);
         let regions = gpu.upload(&scenery.regions);
-        let (of_particles, of_groups) = self.drawn.clone().unwrap_or_default();
-        let (i_group, drawn) = (gpu.upload(&of_particles), gpu.upload(&of_groups));
+        let (of_drawn, of_groups) = self.drawn.clone().unwrap_or_default();
+        let (of_textured, textures, words) = match &self.textured {
+            Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), pool.words()),
+            None => Default::default(),
+        };
+        assert!(of_drawn.is_empty() || of_textured.is_empty() || of_drawn == of_textured, "a particle has one group");
+        let i_group = gpu.upload(if of_drawn.is_empty() { &of_textured } else { &of_drawn });
+        let (drawn, textures, pool) = (gpu.upload(&of_groups), gpu.upload(&textures), gpu.upload(&words));
         let (width, height) = (self.view.width, self.view.height);
         let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
         let mut depth = behind.then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
@@ -167,7 +181,7 @@ impl Picture {
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
                 let n = [entries.len() as u32, scenery.lit.len() as u32];
-                let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn];
+                let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
                 pass.record(rec, from, target, &camera, self.view.cutoff, n)?;
             }
             rec.copy_image(&mut target, &readback);
@@ -187,13 +201,17 @@ impl Picture {
     pub fn truth(&self, format: FilmFormat) -> (Vec<f64>, Vec<f64>) {
         let rounding = self.rounding(format);
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
-        let (value, bound) = match &self.scenery {
-            None => render_with_bound(&self.view, &blobs, &radiance, &order, &rounding),
-            Some(_) => {
-                let behind: Vec<Behind> = self.behind(format).iter().map(|c| self.widened(c)).collect();
-                render_over(&self.view, &behind, &blobs, &radiance, &order, &rounding)
-            }
+        let behind: Vec<Behind> = match &self.scenery {
+            None => vec![Behind::NOTHING; (self.view.width * self.view.height) as usize],
+            Some(_) => self.behind(format).iter().map(|c| self.widened(c)).collect(),
         };
+        let sheets = self.sheets();
+        let factor = |j: usize, delta: DVec2| match (&sheets[j], &self.textured) {
+            (Some(sheet), Some((_, _, pool))) => sheet.factor(pool, delta),
+            _ => 1.0,
+        };
+        let (value, bound) =
+            render_textured(&self.view, &behind, &blobs, &radiance, &order, &rounding, Some(&factor));
         (value.concat(), bound.concat())
     }
 
@@ -221,15 +239,30 @@ impl Picture {
         Behind { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
     }
 
+    /// What each particle shows of the pool.
+    pub fn sheets(&self) -> Vec<Option<Sheet>> {
+        let pose = &self.view.pose;
+        let sheet = |(i, p): (usize, &PlacedRecord)| {
+            let (i_group, textures, _) = self.textured.as_ref()?;
+            let of = &textures[i_group[i] as usize];
+            let z = (double(p.position) - pose.position).dot(pose.forward);
+            let strength = f64::from(of.strength);
+            let textured = Textured { i_field: of.i_field, strength, seed: of.seed, i_box: of.i_box };
+            Some(Sheet::new(&textured, i as u32 - of.i_first, z / f64::from(p.sigma), self.view.pixel()))
+        };
+        self.placed.iter().enumerate().map(sheet).collect()
+    }
+
     /// How the shaders' α and edges may be off: the worst of all pixels in all blobs, each by a running bound.
     pub fn rounding(&self, format: FilmFormat) -> Rounding {
         let (mut off_alpha, mut edge) = (ONE_MINUS_EXP, 8.0 * U);
-        for (blob, placed) in self.blobs().iter().zip(&self.placed) {
+        for ((blob, placed), sheet) in self.blobs().iter().zip(&self.placed).zip(self.sheets()) {
             let c = blob.position - self.view.pose.position;
             if !(c.dot(self.view.pose.forward) >= self.view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
                 continue;
             }
             let sprite = self.sprite(placed, blob);
+            let paper = sheet.zip(self.textured.as_ref()).map(|(s, (_, _, pool))| self.paper(s, pool, placed));
             let cut = self.view.cutoff * blob.sigma;
             for j in 0..self.view.height {
                 for i in 0..self.view.width {
@@ -243,8 +276,12 @@ impl Picture {
                     if b > 0.9 * cut {
                         edge = edge.max(0.51 * e.error / e.value + 4.0 * U);
                     }
-                    let true_alpha = alpha(blob, b);
-                    let t = sprite.tau.times(e.scaled(-1.0).exp());
+                    let exponent = match &paper {
+                        Some(paper) => e.scaled(-1.0).plus(paper.exponent(sprite.difference(self.ray(i, j)))),
+                        None => e.scaled(-1.0),
+                    };
+                    let t = sprite.tau.times(exponent.exp());
+                    let true_alpha = -libm::expm1(-t.value);
                     // d(1 − e^{−t})/dt = e^{−t}.
                     let off = (-(t.value - t.error)).exp() * t.error + ONE_MINUS_EXP * true_alpha;
                     off_alpha = off_alpha.max(off / true_alpha);
@@ -281,6 +318,24 @@ impl Picture {
         dot(self.view.pose.forward.to_array().map(Bounded::once), self.offset(placed))
     }
 
+    /// What the vertex shader hands on of a texture.
+    fn paper<'a>(&self, sheet: Sheet, pool: &'a Pool, placed: &PlacedRecord) -> Paper<'a> {
+        let z = self.view_depth(placed).over(Bounded::exact(f64::from(placed.sigma)));
+        let pixel = Bounded::once(self.view.pixel());
+        let dense = Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z.times(pixel));
+        let level = &pool.0[sheet.i_field][sheet.level];
+        // Where the level itself is uncertain the next one's numbers may stand in place of these; they are rounded anew.
+        let near_step = (dense.value.log2() - dense.value.log2().round()).abs() < 2.0 * dense.error / dense.value;
+        let fade = Bounded { value: sheet.fade, error: dense.error / f64::from(1 << sheet.level) + 2.0 * U };
+        let stretch = Bounded::once(side(sheet.level) as f64 / PERIOD_SIGMA).times(z);
+        let unit = |value| Bounded { value, error: UNIT_AT };
+        let turn = [sheet.angle.cos(), sheet.angle.sin()].map(|v| stretch.times(unit(v)));
+        // n is continuous and piecewise bilinear: no steeper anywhere than its neighbours differ.
+        let slope = (1.0 - sheet.fade) * steepest(&level.own, level.side) + sheet.fade * steepest(&level.above, level.side);
+        let heights = [&level.own, &level.above].map(|n| n.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
+        Paper { sheet, pool, level, fade, turn, slope, heights, step: if near_step { QUANTUM } else { 0.0 } }
+    }
+
     fn sprite(&self, placed: &PlacedRecord, blob: &Blob) -> Sprite {
         let pose = &self.view.pose;
         let once = |v: DVec3| v.to_array().map(Bounded::once);
@@ -303,12 +358,65 @@ struct Sprite {
 }
 
 impl Sprite {
+    fn difference(&self, ray: [Bounded; 2]) -> [Bounded; 2] {
+        [ray[0].minus(self.s[0]), ray[1].minus(self.s[1])]
+    }
+
     /// b²/2σ² as the fragment shader evaluates it.
     fn exponent(&self, ray: [Bounded; 2]) -> Bounded {
-        let d = [ray[0].minus(self.s[0]), ray[1].minus(self.s[1])];
+        let d = self.difference(ray);
         let twist = self.s[0].times(d[1]).minus(self.s[1].times(d[0]));
         let above = d[0].squared().plus(d[1].squared()).plus(twist.squared());
         let below = Bounded::exact(1.0).plus(ray[0].squared().plus(ray[1].squared()));
         self.z.times(above).over(below)
     }
+}
+
+/// What the vertex shader hands on of a texture.
+struct Paper<'a> {
+    sheet: Sheet,
+    pool: &'a Pool,
+    level: &'a Level,
+    fade: Bounded,
+    turn: [Bounded; 2],
+    /// Most that n changes from a texel to the next; most that n_l, n_{l+1} are.
+    slope: f64,
+    heights: [f64; 2],
+    /// What n may differ by rounding from one level to the next.
+    step: f64,
+}
+
+impl Paper<'_> {
+    /// s n − s² ⟨n²⟩/2 as the fragment shader evaluates it.
+    fn exponent(&self, d: [Bounded; 2]) -> Bounded {
+        let (sheet, s) = (&self.sheet, self.sheet.strength);
+        let [a, b] = self.turn;
+        let shift = sheet.shift * self.level.side as f64;
+        let x = a.times(d[0]).minus(b.times(d[1])).plus(Bounded::exact(shift.x));
+        let y = b.times(d[0]).plus(a.times(d[1])).plus(Bounded::exact(shift.y));
+        let delta = DVec2::new(d[0].value, d[1].value);
+        let n = sheet.n(self.pool, delta);
+        let [own, above] = self.heights;
+        let height = (1.0 - sheet.fade) * own + sheet.fade * above;
+        // Two gains of three roundings, their products and sum; two interpolations of three roundings, on differences of at
+        // most twice the height; the mean's subtraction.
+        let half = sheet.half_square();
+        let error = s * self.slope * (x.error + y.error)
+            + s * (self.fade.error * (own + above) + self.step)
+            + 24.0 * U * s * height
+            + s * s * self.fade.error
+            + 10.0 * U * half
+            + 2.0 * U * (s * n - half).abs();
+        Bounded { value: s * n - half, error }
+    }
+}
+
+/// Greatest difference between neighbours.
+fn steepest(n: &[f64], side: usize) -> f64 {
+    let at = |i: usize, j: usize| n[i % side + side * (j % side)];
+    let of = |k: usize| {
+        let (i, j) = (k % side, k / side);
+        (at(i + 1, j) - at(i, j)).abs().max((at(i, j + 1) - at(i, j)).abs())
+    };
+    (0..n.len()).map(of).fold(0.0, f64::max)
 }

@@ -117,6 +117,20 @@ fn what_later_versions_bring_is_called_so_and_its_only_present_value_is_accepted
 }
 
 #[test]
+fn textures_are_named() {
+    let scene = |keys: &str| good(&format!("{CLOUD}{keys}")).scene;
+    let plain = scene("");
+    assert!(!plain.is_textured() && plain.clouds[0].texture.of_box(3) == (0, 0.0));
+    let one = scene("texture = '6'\ntexture_strength = 0.5");
+    assert!(one.is_textured() && one.clouds[0].texture.of_box(3) == (6, 0.5));
+    assert_eq!(scene("texture = 'by-box'").clouds[0].texture.of_box(11), (3, 1.0));
+    let wrong = |keys: &str| message(&format!("{CLOUD}{keys}"), &[]);
+    assert!(wrong("texture = '8'").contains("`cloud.0.texture`: unknown value `8`"));
+    assert!(wrong("texture = 'bybox'").contains("did you mean `by-box`?"));
+    assert!(wrong("texture_strength = 5").contains("expected a number from 0 to 4, found 5"));
+}
+
+#[test]
 fn overrides_are_laid_over_the_file() {
     let set = [
         "lighting.grid=32",

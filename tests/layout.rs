@@ -103,7 +103,11 @@ const INTERFACES: [(&str, &[Field], &[Element]); 27] = [
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(4), R("Drawn"), B(8)]),
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4)]),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(8), B(4), B(8)]),
-    ("sprites.frag", sprites::Push::FIELDS, &[Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, T]),
+    (
+        "sprites.frag",
+        sprites::Push::FIELDS,
+        &[Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, T],
+    ),
     (
         "sprites.vert",
         sprites::Push::FIELDS,

@@ -101,7 +101,11 @@ fn wrong_pools_are_noticed() {
         ("texture_transform.comp", "uvec4(of, pair, TEXTURE_STREAM)", "uvec4(of, 0u, TEXTURE_STREAM)"),
         ("texture_transform.comp", "times(roots[jm], p - q)", "times(roots[jm], q - p)"),
         ("texture_transform.comp", "a.x * b.y + a.y * b.x", "a.x * b.y - a.y * b.x"),
-        ("texture_pack.comp", "at + uvec2(0, 1)), field_at(part, level, at + uvec2(1, 1))", "at), field_at(part, level, at)"),
+        (
+            "texture_pack.comp",
+            "at + uvec2(0, 1)), field_at(part, level, at + uvec2(1, 1))",
+            "at), field_at(part, level, at)",
+        ),
         ("texture_pack.comp", "(at.x & 1u) + 1u", "(at.x & 1u)"),
         ("texture_pack.comp", "(i_field & 1u)", "0u"),
     ] {
@@ -147,15 +151,23 @@ fn mean_squares_are_those_of_the_waves() {
                 let cell = |i: usize, j: usize| {
                     let at = |n: &[f64], x: usize, y: usize| {
                         let of = |x: usize, y: usize| n[(i + x) % level.side + level.side * ((j + y) % level.side)];
-                        0.25 * (of(x / 2, y / 2) + of(x.div_ceil(2), y / 2) + of(x / 2, y.div_ceil(2)) + of(x.div_ceil(2), y.div_ceil(2)))
+                        0.25 * (of(x / 2, y / 2)
+                            + of(x.div_ceil(2), y / 2)
+                            + of(x / 2, y.div_ceil(2))
+                            + of(x.div_ceil(2), y.div_ceil(2)))
                     };
                     let weight = [1.0, 4.0, 1.0];
-                    let terms = (0..9).map(|k| weight[k % 3] * weight[k / 3] * at(n, k % 3, k / 3) * at(m, k % 3, k / 3));
+                    let terms =
+                        (0..9).map(|k| weight[k % 3] * weight[k / 3] * at(n, k % 3, k / 3) * at(m, k % 3, k / 3));
                     terms.sum::<f64>() / 36.0
                 };
                 mean(&|k| cell(k % level.side, k / level.side))
             };
-            let found = [between(&level.own, &level.own), between(&level.own, &level.above), between(&level.above, &level.above)];
+            let found = [
+                between(&level.own, &level.own),
+                between(&level.own, &level.above),
+                between(&level.above, &level.above),
+            ];
             for (found, closed) in found.iter().zip(mean_squares(l)) {
                 // Waves whose images meet on the coarser grid add terms of either sign that the closed form, a mean over
                 // phases, has not; there are few.
@@ -203,7 +215,10 @@ fn the_factors_mean_is_one() {
         let n = means.len() as f64;
         let mean = means.iter().sum::<f64>() / n;
         let deviation = (means.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
-        println!("{dense} texels a pixel, s = {strength}: mean {mean:.4} ± {:.4}, a field's {deviation:.4}", deviation / n.sqrt());
+        println!(
+            "{dense} texels a pixel, s = {strength}: mean {mean:.4} ± {:.4}, a field's {deviation:.4}",
+            deviation / n.sqrt()
+        );
         // Four standard errors; and what waves of fixed height are from a Gaussian: below, by their fourth cumulant
         // −⅜ Σ|2F|⁴/24, and bilinear interpolation's spread of ⟨n²⟩ between nodes, above.
         assert!((mean - 1.0).abs() < 4.0 * deviation / n.sqrt() + 0.01, "{mean}");

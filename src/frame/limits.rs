@@ -8,8 +8,8 @@ use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, TargetFormat, storage_bytes};
 use crate::gpu::reflect::BindingKind;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
-use crate::layout::particle::{BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::layout::particle::TexturedRecord;
+use crate::layout::particle::{BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
@@ -89,7 +89,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
-        if let Some(texel) = texel.filter(|texel| (is_lit || name == TEXTURES) && n * bytes / u64::from(*texel) > limits.max_texels) {
+        if let Some(texel) =
+            texel.filter(|texel| (is_lit || name == TEXTURES) && n * bytes / u64::from(*texel) > limits.max_texels)
+        {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
                 n * bytes / u64::from(texel),

@@ -398,9 +398,8 @@ impl Renderer {
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
                 let drawn = &b.drawn.buffer;
-                let from = [
-                    &b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, drawn, &b.textured, &b.pool,
-                ];
+                let from =
+                    [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, drawn, &b.textured, &b.pool];
                 let counts = [packet.n_drawn, s.n_surface_facets];
                 sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
             })

@@ -187,7 +187,16 @@ mod tests {
         let boxes = counts.iter().map(b).collect();
         let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, texture: Texture::NONE, i_material: 0, seed: 1 }
+        Cloud {
+            source,
+            position: DVec3::ZERO,
+            wind: DVec3::ZERO,
+            gust,
+            growth,
+            texture: Texture::NONE,
+            i_material: 0,
+            seed: 1,
+        }
     }
 
     fn counts(clouds: &mut [Cloud]) -> Vec<u32> {

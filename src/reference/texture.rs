@@ -137,7 +137,10 @@ impl Pool {
             [a, b, c, d]
         };
         let of_level = |level: &Level| -> Vec<[u32; 4]> {
-            (0..level.side).flat_map(|j| (0..level.side).map(move |i| (i, j))).map(|(i, j)| texel(level, i, j)).collect()
+            (0..level.side)
+                .flat_map(|j| (0..level.side).map(move |i| (i, j)))
+                .map(|(i, j)| texel(level, i, j))
+                .collect()
         };
         self.0.iter().flatten().flat_map(of_level).collect()
     }

@@ -18,7 +18,7 @@ use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{Behind, Rounding, View, alpha, render_textured};
+use nimbus::reference::sprites::{Behind, Rounding, View, render_textured};
 use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, Sheet, Textured, side};
 
 use crate::bounded::{Bounded, U, dot, exact3};
@@ -134,9 +134,14 @@ impl Picture {
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let pass =
-            Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some()])
-                .expect("sprites");
+        let pass = Sprites::new(
+            &gpu.device,
+            compiler,
+            format,
+            lit,
+            [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some()],
+        )
+        .expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
@@ -210,8 +215,7 @@ impl Picture {
             (Some(sheet), Some((_, _, pool))) => sheet.factor(pool, delta),
             _ => 1.0,
         };
-        let (value, bound) =
-            render_textured(&self.view, &behind, &blobs, &radiance, &order, &rounding, Some(&factor));
+        let (value, bound) = render_textured(&self.view, &behind, &blobs, &radiance, &order, &rounding, Some(&factor));
         (value.concat(), bound.concat())
     }
 
@@ -331,7 +335,8 @@ impl Picture {
         let unit = |value| Bounded { value, error: UNIT_AT };
         let turn = [sheet.angle.cos(), sheet.angle.sin()].map(|v| stretch.times(unit(v)));
         // n is continuous and piecewise bilinear: no steeper anywhere than its neighbours differ.
-        let slope = (1.0 - sheet.fade) * steepest(&level.own, level.side) + sheet.fade * steepest(&level.above, level.side);
+        let slope =
+            (1.0 - sheet.fade) * steepest(&level.own, level.side) + sheet.fade * steepest(&level.above, level.side);
         let heights = [&level.own, &level.above].map(|n| n.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
         Paper { sheet, pool, level, fade, turn, slope, heights, step: if near_step { QUANTUM } else { 0.0 } }
     }

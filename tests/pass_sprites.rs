@@ -7,6 +7,8 @@ mod harness;
 mod picture;
 #[path = "harness/scenery.rs"]
 mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -313,7 +315,7 @@ fn a_nearing_camera_meets_no_step() {
         picture.sheets()[0].expect("a sheet")
     };
     let mut levels = std::collections::BTreeSet::new();
-    let (mut greatest, mut last) = (0f64, None);
+    let (mut greatest, mut last) = (0f64, None::<f64>);
     for k in 0..4000 {
         let z = 0.3 * 1.0015f64.powi(k);
         let sheet = sheet(z);
@@ -321,7 +323,7 @@ fn a_nearing_camera_meets_no_step() {
         // The same place on the blob.
         let exponent = sheet.factor(&pool, glam::DVec2::new(0.13, 0.05) / z).ln();
         if let Some(last) = last {
-            greatest = greatest.max((exponent - last as f64).abs());
+            greatest = greatest.max((exponent - last).abs());
         }
         last = Some(exponent);
     }

@@ -89,6 +89,13 @@ impl Buffers {
         }
     }
 
+    /// What sprites are drawn from, as the pass asks for it.
+    pub fn of_sprites(&self) -> [&Buffer; 9] {
+        let (placed, drawn) = (self.placed.buffer(), &self.drawn.buffer);
+        let Buffers { entries, particles, lit, i_facet, i_group, textured, pool, .. } = self;
+        [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool]
+    }
+
     pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
         let n = scene.n_particles();
         let n_facets = scene.n_facets();

@@ -140,10 +140,7 @@ impl Renderer {
             false => None,
         };
         let textured = scene.is_textured();
-        let texture = match textured {
-            true => Some(Texture::new(device, compiler)?),
-            false => None,
-        };
+        let texture = textured.then(|| Texture::new(device, compiler)).transpose()?;
         let target = |name| Image::color_target(device, name, scene.film.width, scene.film.height, format);
         let mut renderer = Renderer {
             frames: [Commands::new(device, "frame.even")?, Commands::new(device, "frame.odd")?],
@@ -384,9 +381,8 @@ impl Renderer {
                 sort.record_keys(rec, buffers, packet.camera.forward, n, packet.radius, s.sort_bits)?;
                 sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits)
             })?;
-            pass(rec, plan, Pass::Texture, |rec| match texture {
-                Some(texture) => texture.record(rec, &b.pool, s.texture_seed),
-                None => Ok(()),
+            pass(rec, plan, Pass::Texture, |rec| {
+                texture.iter().try_for_each(|t| t.record(rec, &b.pool, s.texture_seed))
             })?;
             let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
             pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
@@ -397,11 +393,8 @@ impl Renderer {
                 None => Ok(()),
             })?;
             pass(rec, plan, Pass::Sprites, |rec| {
-                let drawn = &b.drawn.buffer;
-                let from =
-                    [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, drawn, &b.textured, &b.pool];
-                let counts = [packet.n_drawn, s.n_surface_facets];
-                sprites.record(rec, from, Target { color: target, depth }, &packet.camera, s.cutoff, counts)
+                let (target, counts) = (Target { color: target, depth }, [packet.n_drawn, s.n_surface_facets]);
+                sprites.record(rec, b.of_sprites(), target, &packet.camera, s.cutoff, counts)
             })
         })
     }

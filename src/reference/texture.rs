@@ -271,3 +271,56 @@ impl Sheet {
         (1.0 - self.fade) * of(&level.own) + self.fade * of(&level.above)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_coarsest_level_by_hand() {
+        // Four waves, (±2, 0) and (0, ±2), a quarter turn from node to node: α = 2/3 along the axis, 1 across. With the least
+        // two |k|², 4 and 5, and the rest between integrals over k^−2.4, a² lies near 1/(2π 2^−1.4/1.4).
+        assert_eq!(waves(2).count(), 4);
+        let energy = amplitude().powi(2) * 4f64.powf(-1.7);
+        assert!((mean_squares(5)[0] - 4.0 * energy * 2.0 / 3.0).abs() < 1e-15);
+        assert_eq!(mean_squares(5)[1..], [0.0, 0.0]);
+        // On level 4 they turn by an eighth, cos ϑ = √½: (2 + √½)/3, (1 + √½)(2 + √½)/6, (1 + 2·½)/3.
+        let root = std::f64::consts::FRAC_1_SQRT_2;
+        let [_, both, above] = mean_squares(4);
+        assert!((both - 4.0 * energy * (1.0 + root) * (2.0 + root) / 6.0).abs() < 1e-15);
+        assert!((above - 4.0 * energy * 2.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn between_four_nodes_and_across_the_seam() {
+        let n = [0.0, 1.0, 2.0, 6.0];
+        assert_eq!(bilinear(&n, 2, DVec2::new(0.5, 0.5)), 2.25);
+        assert_eq!(bilinear(&n, 2, DVec2::new(0.25, 0.0)), 0.25);
+        // From node 1 on to node 0 of the next period, and from node −1, which is node 1.
+        assert_eq!(bilinear(&n, 2, DVec2::new(1.25, 1.0)), 5.0);
+        assert_eq!(bilinear(&n, 2, DVec2::new(-0.75, -1.0)), 5.0);
+        assert_eq!(doubled(&n, 2)[..5], [0.0, 0.5, 1.0, 0.5, 1.0]);
+    }
+
+    #[test]
+    fn levels_follow_the_size_on_the_screen() {
+        let of = Textured { i_field: 3, strength: 2.0, seed: 1, i_box: 0 };
+        // A period is 6 σ: at z = 60 σ a slope of 0.1, of 0.1/pixel pixels, 256 texels.
+        let at = |pixels: f64| {
+            let sheet = Sheet::new(&of, 0, 60.0, 0.1 / pixels);
+            (sheet.level, (sheet.fade * 1e9).round() / 1e9)
+        };
+        assert_eq!([at(1000.0), at(256.0), at(128.0)], [(0, 0.0), (0, 0.0), (1, 0.0)]);
+        assert_eq!([at(170.0 + 2.0 / 3.0), at(8.0), at(6.4)], [(0, 0.5), (5, 0.0), (5, 0.25)]);
+        assert_eq!([at(4.0), at(0.01)], [(5, 1.0), (5, 1.0)]);
+        // Nothing is left at the end, and nothing subtracted for it.
+        assert_eq!(Sheet::new(&of, 0, 60.0, 0.1).half_square(), 0.0);
+        let sheet = Sheet {
+            angle: std::f64::consts::FRAC_PI_2,
+            shift: DVec2::new(0.5, 0.25),
+            ..Sheet::new(&of, 0, 60.0, 1e-9)
+        };
+        // A quarter turn: right becomes up; 0.025 · 60/6 = ¼ of a period.
+        assert!((sheet.place(DVec2::new(0.025, 0.0)) - DVec2::new(128.0, 128.0)).length() < 1e-9);
+    }
+}

@@ -19,16 +19,15 @@ use nimbus::passes::surfaces::Surfaces;
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
 use nimbus::reference::sprites::{Behind, Rounding, View, render_textured};
-use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, Sheet, Textured, side};
+use nimbus::reference::texture::{Pool, Sheet, Textured};
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::harness::Gpu;
 use crate::scenery::{Candidates, Scenery};
+use crate::sheets::Paper;
 
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
-/// What unit_at promises.
-const UNIT_AT: f64 = 10.0 * U;
 
 pub const FORMATS: [(TargetFormat, FilmFormat); 2] =
     [(TargetFormat::Rgba16f, FilmFormat::Rgba16f), (TargetFormat::Rgba32f, FilmFormat::Rgba32f)];
@@ -266,7 +265,14 @@ impl Picture {
                 continue;
             }
             let sprite = self.sprite(placed, blob);
-            let paper = sheet.zip(self.textured.as_ref()).map(|(s, (_, _, pool))| self.paper(s, pool, placed));
+            let paper = sheet.zip(self.textured.as_ref()).map(|(s, (_, _, pool))| {
+                Paper::new(
+                    s,
+                    pool,
+                    self.view_depth(placed).over(Bounded::exact(f64::from(placed.sigma))),
+                    self.view.pixel(),
+                )
+            });
             let cut = self.view.cutoff * blob.sigma;
             for j in 0..self.view.height {
                 for i in 0..self.view.width {
@@ -322,25 +328,6 @@ impl Picture {
         dot(self.view.pose.forward.to_array().map(Bounded::once), self.offset(placed))
     }
 
-    /// What the vertex shader hands on of a texture.
-    fn paper<'a>(&self, sheet: Sheet, pool: &'a Pool, placed: &PlacedRecord) -> Paper<'a> {
-        let z = self.view_depth(placed).over(Bounded::exact(f64::from(placed.sigma)));
-        let pixel = Bounded::once(self.view.pixel());
-        let dense = Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z.times(pixel));
-        let level = &pool.0[sheet.i_field][sheet.level];
-        // Where the level itself is uncertain the next one's numbers may stand in place of these; they are rounded anew.
-        let near_step = (dense.value.log2() - dense.value.log2().round()).abs() < 2.0 * dense.error / dense.value;
-        let fade = Bounded { value: sheet.fade, error: dense.error / f64::from(1 << sheet.level) + 2.0 * U };
-        let stretch = Bounded::once(side(sheet.level) as f64 / PERIOD_SIGMA).times(z);
-        let unit = |value| Bounded { value, error: UNIT_AT };
-        let turn = [sheet.angle.cos(), sheet.angle.sin()].map(|v| stretch.times(unit(v)));
-        // n is continuous and piecewise bilinear: no steeper anywhere than its neighbours differ.
-        let slope =
-            (1.0 - sheet.fade) * steepest(&level.own, level.side) + sheet.fade * steepest(&level.above, level.side);
-        let heights = [&level.own, &level.above].map(|n| n.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
-        Paper { sheet, pool, level, fade, turn, slope, heights, step: if near_step { QUANTUM } else { 0.0 } }
-    }
-
     fn sprite(&self, placed: &PlacedRecord, blob: &Blob) -> Sprite {
         let pose = &self.view.pose;
         let once = |v: DVec3| v.to_array().map(Bounded::once);
@@ -375,53 +362,4 @@ impl Sprite {
         let below = Bounded::exact(1.0).plus(ray[0].squared().plus(ray[1].squared()));
         self.z.times(above).over(below)
     }
-}
-
-/// What the vertex shader hands on of a texture.
-struct Paper<'a> {
-    sheet: Sheet,
-    pool: &'a Pool,
-    level: &'a Level,
-    fade: Bounded,
-    turn: [Bounded; 2],
-    /// Most that n changes from a texel to the next; most that n_l, n_{l+1} are.
-    slope: f64,
-    heights: [f64; 2],
-    /// What n may differ by rounding from one level to the next.
-    step: f64,
-}
-
-impl Paper<'_> {
-    /// s n − s² ⟨n²⟩/2 as the fragment shader evaluates it.
-    fn exponent(&self, d: [Bounded; 2]) -> Bounded {
-        let (sheet, s) = (&self.sheet, self.sheet.strength);
-        let [a, b] = self.turn;
-        let shift = sheet.shift * self.level.side as f64;
-        let x = a.times(d[0]).minus(b.times(d[1])).plus(Bounded::exact(shift.x));
-        let y = b.times(d[0]).plus(a.times(d[1])).plus(Bounded::exact(shift.y));
-        let delta = DVec2::new(d[0].value, d[1].value);
-        let n = sheet.n(self.pool, delta);
-        let [own, above] = self.heights;
-        let height = (1.0 - sheet.fade) * own + sheet.fade * above;
-        // Two gains of three roundings, their products and sum; two interpolations of three roundings, on differences of at
-        // most twice the height; the mean's subtraction.
-        let half = sheet.half_square();
-        let error = s * self.slope * (x.error + y.error)
-            + s * (self.fade.error * (own + above) + self.step)
-            + 24.0 * U * s * height
-            + s * s * self.fade.error
-            + 10.0 * U * half
-            + 2.0 * U * (s * n - half).abs();
-        Bounded { value: s * n - half, error }
-    }
-}
-
-/// Greatest difference between neighbours.
-fn steepest(n: &[f64], side: usize) -> f64 {
-    let at = |i: usize, j: usize| n[i % side + side * (j % side)];
-    let of = |k: usize| {
-        let (i, j) = (k % side, k / side);
-        (at(i + 1, j) - at(i, j)).abs().max((at(i, j + 1) - at(i, j)).abs())
-    };
-    (0..n.len()).map(of).fold(0.0, f64::max)
 }

@@ -8,7 +8,11 @@
 // The pool's fields from their waves (docs/model.md §11 "texture"): an inverse DFT, along rows, then along columns. Fields 2t
 // and 2t + 1 are real and imaginary part of one. A workgroup has one row or column of one level.
 
-layout(local_size_x = 128) in;
+// One subgroup wide where the host says how wide that is: barriers are then cheap.
+#ifndef WORKGROUP
+#define WORKGROUP 32
+#endif
+layout(local_size_x = WORKGROUP) in;
 
 layout(push_constant) uniform Push { uint seed; uint along_columns; } push;
 layout(std430, binding = 0) buffer Work { vec2 work[]; };
@@ -64,7 +68,9 @@ void main() {
         barrier();
         // Stockham's form: after a stage with m the transforms of length 2m lie m apart, in order at the end.
         uint from = 0u;
-        for (uint m = 1u; m < n; m *= 2u) {
+        // Half of the rows have no wave: zeros stay zeros.
+        bool empty = push.along_columns == 0u && min(row, n - row) > n / 4u;
+        for (uint m = empty ? n : 1u; m < n; m *= 2u) {
             for (uint b = gl_LocalInvocationID.x; b < half_n; b += gl_WorkGroupSize.x) {
                 uint k = b & (m - 1u), jm = b - k;
                 vec2 p = values[from][b], q = values[from][b + half_n];

@@ -34,8 +34,11 @@ pub struct Texture {
 
 impl Texture {
     pub fn new(device: &Device, compiler: &Compiler) -> Result<Texture> {
+        // A workgroup of one subgroup needs no waiting at its barriers.
+        let macros = [("WORKGROUP", device.limits().subgroup_size.clamp(8, 64))];
+        let name = "texture.transform";
         Ok(Texture {
-            transform: Kernel::new(device, compiler, "texture.transform", TransformPush::FIELDS, &[])?,
+            transform: Kernel::with_macros(device, compiler, name, TransformPush::FIELDS, &[], &macros)?,
             pack: Kernel::new(device, compiler, "texture.pack", PackPush::FIELDS, &[])?,
             work: Buffer::new::<[f32; 2]>(device, "texture.work", u64::from(POOL_TEXELS / 2), Place::Device)?,
         })

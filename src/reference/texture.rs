@@ -278,8 +278,7 @@ mod tests {
 
     #[test]
     fn the_coarsest_level_by_hand() {
-        // Four waves, (±2, 0) and (0, ±2), a quarter turn from node to node: α = 2/3 along the axis, 1 across. With the least
-        // two |k|², 4 and 5, and the rest between integrals over k^−2.4, a² lies near 1/(2π 2^−1.4/1.4).
+        // Four waves, (±2, 0) and (0, ±2), a quarter turn from node to node: α = 2/3 along the axis, 1 across.
         assert_eq!(waves(2).count(), 4);
         let energy = amplitude().powi(2) * 4f64.powf(-1.7);
         assert!((mean_squares(5)[0] - 4.0 * energy * 2.0 / 3.0).abs() < 1e-15);

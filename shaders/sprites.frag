@@ -1,7 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "philox.glsl"
 #include "functions.glsl"
+
+layout(constant_id = 4) const uint TEXTURED = 0;
+
+layout(binding = 8) uniform usamplerBuffer pool;
+#define SHEET_PIXELS
+#include "texture.glsl"
 
 // Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md §9).
 
@@ -9,6 +16,9 @@ layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; ui
 
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;
+layout(location = 2) flat in vec4 in_turn;
+layout(location = 3) flat in uvec2 in_place;
+layout(location = 4) flat in vec3 in_gain;
 layout(location = 0) out vec4 out_color;
 
 void main() {
@@ -22,7 +32,11 @@ void main() {
     float e = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
     float alpha = 0.0;
     if (e <= 0.5 * push.cutoff * push.cutoff) {
-        alpha = one_minus_exp(in_blob.w * exp(-e));
+        float exponent = -e;
+        if (TEXTURED != 0) {
+            exponent += sheet_exponent(delta, in_turn, in_place, in_gain);
+        }
+        alpha = one_minus_exp(in_blob.w * exp(exponent));
     }
     out_color = vec4(in_radiance * alpha, alpha);
 }

@@ -2,6 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "blob.glsl"
+#include "philox.glsl"
+#include "functions.glsl"
+#include "texture.glsl"
 
 // A screen-aligned quad around each blob's silhouette, far to near (docs/model.md §9).
 
@@ -14,6 +17,8 @@ layout(constant_id = 2) const uint GROUPED = 0;
 
 // 1: not all particles of a group are drawn, and those that are have weights.
 layout(constant_id = 3) const uint WEIGHTED = 0;
+// 1: some have textures.
+layout(constant_id = 4) const uint TEXTURED = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
@@ -23,10 +28,14 @@ layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
 layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
 layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
+layout(std430, binding = 7) readonly buffer TexturedGroups { Textured textured[]; };
 
 // Centre's slopes (x/z, y/z), z^2/(2 sigma^2), optical depth through the centre.
 layout(location = 0) flat out vec4 out_blob;
 layout(location = 1) flat out vec3 out_radiance;
+layout(location = 2) flat out vec4 out_turn;
+layout(location = 3) flat out uvec2 out_place;
+layout(location = 4) flat out vec3 out_gain;
 
 // Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is snapped.
 const float SNAP = 1.0 / 16.0;
@@ -42,6 +51,13 @@ void main() {
         tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
     }
     out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
+    Sheet sheet = Sheet(vec4(0.0), uvec2(0), vec3(0.0));
+    if (TEXTURED != 0) {
+        sheet = sheet_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
+    }
+    out_turn = sheet.turn;
+    out_place = sheet.place;
+    out_gain = sheet.gain;
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
     out_radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {

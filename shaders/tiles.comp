@@ -1,6 +1,8 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "records.glsl"
+#include "philox.glsl"
 #include "functions.glsl"
 #include "tiles.glsl"
 #include "one_subgroup.glsl"
@@ -32,6 +34,16 @@
 #define BEHIND 0
 #endif
 
+// Splats have textures.
+#ifndef TEXTURED
+#define TEXTURED 0
+#endif
+#if TEXTURED
+layout(binding = 9) uniform usamplerBuffer pool;
+#define SHEET_PIXELS
+#include "texture.glsl"
+#endif
+
 layout(local_size_x = INVOCATIONS) in;
 
 // Pixels of an invocation's row.
@@ -52,6 +64,10 @@ layout(std430, binding = 6) readonly buffer Under { uint under[]; };
 layout(std430, binding = 7) readonly buffer Depths { uint depths[]; };
 #endif
 
+#if TEXTURED
+layout(binding = 8) uniform usamplerBuffer sheets;
+#endif
+
 // Splats that reach the tile, gathered before they are composed.
 const uint MOST = 8 * INVOCATIONS;
 shared uint found[MOST];
@@ -66,12 +82,10 @@ uint append(uint n, bool hit, uint r) {
     return n + subgroupBallotBitCount(hits);
 }
 
-vec4 of_invocation(vec4 v, uint m) { return subgroupShuffle(v, m); }
-
 bool all_agree(bool b) { return subgroupAll(b); }
 #else
 shared uint said[INVOCATIONS];
-shared vec4 given[2][INVOCATIONS];
+shared vec4 given[2 + 3 * TEXTURED][INVOCATIONS];
 
 uint append(uint n, bool hit, uint r) {
     uint t = gl_LocalInvocationID.x;
@@ -117,8 +131,23 @@ float passed[RUN];
 float depth_of[RUN];
 #endif
 
-// place: centre's slopes, scale, tau; light: radiance, near/z.
-void compose(vec4 place, vec4 light, float y) {
+// A splat as it lies in the buffers.
+struct Loaded {
+    // Centre's slopes, scale, tau.
+    vec4 place;
+    // Radiance, near/z.
+    vec4 light;
+#if TEXTURED
+    vec4 turn;
+    // Gain; first texel.
+    uvec4 gain;
+    // Log2 of its level's side.
+    uint side;
+#endif
+};
+
+void compose(Loaded splat, float y) {
+    vec4 place = splat.place, light = splat.light;
     vec2 s = place.xy;
     float dy = y - s.y;
     // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
@@ -130,31 +159,80 @@ void compose(vec4 place, vec4 light, float y) {
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
 #endif
+#if TEXTURED
+        e += 1.44269504089 * sheet_exponent(vec2(dx, dy), splat.turn, uvec2(splat.gain.w, splat.side), uintBitsToFloat(splat.gain.xyz));
+#endif
         float here = passed[j] * opacity(is_seen ? place.w * exp2(e) : 0.0);
         passed[j] -= here;
         color[j] += here * light.xyz;
     }
 }
 
+Loaded load_splat(int r) {
+    Loaded splat;
+    splat.place = uintBitsToFloat(texelFetch(splats, 2 * r));
+    splat.light = uintBitsToFloat(texelFetch(splats, 2 * r + 1));
+#if TEXTURED
+    splat.turn = uintBitsToFloat(texelFetch(sheets, 3 * r));
+    splat.gain = texelFetch(sheets, 3 * r + 1);
+    splat.side = texelFetch(sheets, 3 * r + 2).x;
+#endif
+    return splat;
+}
+
+#if ONE_SUBGROUP
+// What invocation m has loaded.
+Loaded of_invocation(Loaded splat, uint m) {
+    splat.place = subgroupShuffle(splat.place, m);
+    splat.light = subgroupShuffle(splat.light, m);
+#if TEXTURED
+    splat.turn = subgroupShuffle(splat.turn, m);
+    splat.gain = subgroupShuffle(splat.gain, m);
+    splat.side = subgroupShuffle(splat.side, m);
+#endif
+    return splat;
+}
+#else
+void give(Loaded splat, uint t) {
+    given[0][t] = splat.place;
+    given[1][t] = splat.light;
+#if TEXTURED
+    given[2][t] = splat.turn;
+    given[3][t] = uintBitsToFloat(splat.gain);
+    given[4][t] = uintBitsToFloat(uvec4(splat.side));
+#endif
+    barrier();
+}
+
+Loaded of_invocation(uint m) {
+    Loaded splat;
+    splat.place = given[0][m];
+    splat.light = given[1][m];
+#if TEXTURED
+    splat.turn = given[2][m];
+    splat.gain = floatBitsToUint(given[3][m]);
+    splat.side = floatBitsToUint(given[4][m].x);
+#endif
+    return splat;
+}
+#endif
+
 // Of the n found ones those from k on, one an invocation, each for all of them.
 void compose_some(uint k, uint n, float y) {
     uint t = gl_LocalInvocationID.x;
-    int r = int(found[min(k + t, n - 1u)]);
-    vec4 place = uintBitsToFloat(texelFetch(splats, 2 * r)), light = uintBitsToFloat(texelFetch(splats, 2 * r + 1));
-    place.w = k + t < n ? place.w : 0.0;
+    Loaded splat = load_splat(int(found[min(k + t, n - 1u)]));
+    splat.place.w = k + t < n ? splat.place.w : 0.0;
     uint end = min(n - k, INVOCATIONS);
 #if ONE_SUBGROUP
     // By twos: what a loop carries is written anew at each turn.
     for (uint m = 0; m < end; m += 2) {
-        compose(of_invocation(place, m), of_invocation(light, m), y);
-        compose(of_invocation(place, m + 1), of_invocation(light, m + 1), y);
+        compose(of_invocation(splat, m), y);
+        compose(of_invocation(splat, m + 1), y);
     }
 #else
-    given[0][t] = place;
-    given[1][t] = light;
-    barrier();
+    give(splat, t);
     for (uint m = 0; m < end; ++m) {
-        compose(given[0][m], given[1][m], y);
+        compose(of_invocation(m), y);
     }
     barrier();
 #endif

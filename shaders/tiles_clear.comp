@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
 #include "tiles.glsl"
 #include "each.glsl"
 

@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
 #include "tiles.glsl"
 
 // Where each bin's pairs lie among the sorted ones, and which bins have any. The order of those decides nothing: no two

@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
 #include "tiles.glsl"
 
 // Deals the blocks of splats, near to far, to rounds, each as many as the pairs' buffer has room for. One invocation: there

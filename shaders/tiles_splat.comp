@@ -2,6 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 #include "blob.glsl"
+#include "philox.glsl"
+#include "functions.glsl"
+#include "texture.glsl"
 #include "tiles.glsl"
 
 // Each blob as a splat, near to far: the conic of its optical depth on the screen, and the bins that it can reach
@@ -13,6 +16,7 @@ layout(local_size_x = 256) in;
 layout(constant_id = 0) const uint LIT = 1;
 layout(constant_id = 2) const uint GROUPED = 0;
 layout(constant_id = 3) const uint WEIGHTED = 0;
+layout(constant_id = 4) const uint TEXTURED = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint n_splats; uint width; uint height; uint tile_width; uint tile_height; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
@@ -22,12 +26,15 @@ layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
 layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
 layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
-layout(std430, binding = 7) writeonly buffer Splats { Splat splats[]; };
+layout(std430, binding = 7) readonly buffer TexturedGroups { Textured textured[]; };
+layout(std430, binding = 8) writeonly buffer Splats { Splat splats[]; };
 // Tiles it can reach: (first, end) of columns and of rows, 16 bits each; 0 for none.
-layout(std430, binding = 10) writeonly buffer Reaches { uvec2 reach[]; };
+layout(std430, binding = 9) writeonly buffer Reaches { uvec2 reach[]; };
 // Pairs of the splats before it in its block, and of each block.
-layout(std430, binding = 8) writeonly buffer Before { uint n_before[]; };
-layout(std430, binding = 9) writeonly buffer Blocks { uint n_pairs[]; };
+layout(std430, binding = 10) writeonly buffer Before { uint n_before[]; };
+layout(std430, binding = 11) writeonly buffer Blocks { uint n_pairs[]; };
+// What of it is textured; only where something is.
+layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
 
 shared uint sums[BLOCK];
 
@@ -69,6 +76,10 @@ uint project(uint i, uint r) {
     vec3 radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
     splats[r] = Splat(s, scale, tau, radiance, push.camera.near / v.z);
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
+    if (TEXTURED != 0) {
+        Sheet sheet = sheet_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
+        sheets[r] = SplatSheet(sheet.turn, sheet.gain, sheet.place.x, sheet.place.y, 0u, uvec2(0));
+    }
     // In tiles: a rectangle of them, ends included.
     uvec2 first = uvec2(columns.x, rows.x) / tile, last = (uvec2(columns.y, rows.y) - 1u) / tile;
     reach[r] = first | (last + 1u) << 16;

@@ -8,6 +8,8 @@ mod harness;
 mod picture;
 #[path = "harness/scenery.rs"]
 mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
 
 use std::collections::BTreeSet;
 

@@ -24,7 +24,7 @@ layout(std430, binding = 0) readonly buffer X { float x[]; };
 layout(std430, binding = 1) writeonly buffer Y { float y[]; };
 void main() {
     FOR_EACH(i, push.n) {
-        y[i] = push.which == 0 ? sine(x[i]) : push.which == 1 ? erf_approx(x[i]) : one_minus_exp(x[i]);
+        y[i] = push.which == 0 ? sine(x[i]) : push.which == 1 ? erf_approx(x[i]) : push.which == 2 ? one_minus_exp(x[i]) : unit_at(x[i])[push.which - 3];
     }
 }
 "#;
@@ -61,6 +61,7 @@ const KNOWN: [([u32; 2], [u32; 4], [u32; 4]); 3] = [
 const SINE: u32 = 0;
 const ERF: u32 = 1;
 const ONE_MINUS_EXP: u32 = 2;
+const UNIT_AT: u32 = 3;
 
 fn evaluate(gpu: &mut Gpu, kernel: &Kernel, which: u32, x: &[f32]) -> Vec<f64> {
     let (input, output) = (gpu.upload(x), gpu.buffer::<f32>(x.len()));
@@ -152,6 +153,24 @@ fn sine_is_within_its_documented_error() {
         let wrong = wrong_functions(&gpu, from, to);
         let values = evaluate(&mut gpu, &wrong, SINE, &x);
         assert!(check_within("a wrong sine", &values, &truths, &bounds).is_err(), "{to}");
+    }
+}
+
+#[test]
+fn unit_at_is_within_its_documented_error() {
+    let mut gpu = Gpu::new();
+    let kernel = gpu.test_kernel("functions", FUNCTIONS, Push::FIELDS);
+    // Multiples of 2⁻²⁴ from −½ to ½, both ends and the quarters among them.
+    let mut x: Vec<f32> = (-(1 << 19)..=1 << 19).map(|i| (f64::from(i) / f64::from(1 << 20)) as f32).collect();
+    x.extend((0..1 << 18).map(|i| (f64::from(i * 61 % (1 << 23)) / f64::from(1 << 24)) as f32));
+    let bounds = vec![10.0 * U_F32; x.len()];
+    for (axis, of) in [(0, f64::cos as fn(f64) -> f64), (1, f64::sin)] {
+        let truths: Vec<f64> = x.iter().map(|x| of(std::f64::consts::TAU * f64::from(*x))).collect();
+        let values = evaluate(&mut gpu, &kernel, UNIT_AT + axis, &x);
+        assert_within_and_say("a unit vector", &values, &truths, &bounds);
+        let wrong = wrong_functions(&gpu, "min(a, 0.5 - a)", "min(a, 0.49999 - a)");
+        let values = evaluate(&mut gpu, &wrong, UNIT_AT + axis, &x);
+        assert_eq!(check_within("a wrong sine", &values, &truths, &bounds).is_err(), axis == 1);
     }
 }
 

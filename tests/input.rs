@@ -117,6 +117,20 @@ fn what_later_versions_bring_is_called_so_and_its_only_present_value_is_accepted
 }
 
 #[test]
+fn textures_are_named() {
+    let scene = |keys: &str| good(&format!("{CLOUD}{keys}")).scene;
+    let plain = scene("");
+    assert!(!plain.is_textured() && plain.clouds[0].texture.of_box(3) == (0, 0.0));
+    let one = scene("texture = '6'\ntexture_strength = 0.5");
+    assert!(one.is_textured() && one.clouds[0].texture.of_box(3) == (6, 0.5));
+    assert_eq!(scene("texture = 'by-box'").clouds[0].texture.of_box(11), (3, 1.0));
+    let wrong = |keys: &str| message(&format!("{CLOUD}{keys}"), &[]);
+    assert!(wrong("texture = '8'").contains("`cloud.0.texture`: unknown value `8`"));
+    assert!(wrong("texture = 'bybox'").contains("did you mean `by-box`?"));
+    assert!(wrong("texture_strength = 5").contains("expected a number from 0 to 4, found 5"));
+}
+
+#[test]
 fn overrides_are_laid_over_the_file() {
     let set = [
         "lighting.grid=32",
@@ -191,7 +205,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16,
             },
             "draw": { "path": "sprites", "cutoff": 3.0, "sort_bits": 32, "resolution": 1.0, "count": "all", "count_a": 280.0, "count_d0": 1.0,
-                      "count_normalised": false, "count_conserve": true, "particles": 0 },
+                      "count_normalised": false, "count_conserve": true, "particles": 0, "texture_seed": 1 },
             "threads": { "mode": "parallel", "simulate": "gpu" },
             "light": [
                 { "kind": "directional", "direction": [-0.5, -0.8, -0.3], "irradiance": [3.0, 2.9, 2.7] },
@@ -200,7 +214,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0], "ns": 8.0 }],
             "surface": [],
             "cloud": [{
-                "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none",
+                "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none", "texture_strength": 1.0,
                 "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0],
                 "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "grow_to": 1.0, "grow_time_s": 60.0, "material": "cloud", "seed": 1,
             }],

@@ -21,7 +21,9 @@ fn nimbus(args: &[&str]) -> Command {
 
 fn bench(threading: &str, out: &str) -> Child {
     let (n_frames, n_warm_up) = (N_FRAMES.to_string(), N_WARM_UP.to_string());
-    let scene = ["bench", "scenes/hello.toml", "--size", "64x48", "--set", "lighting.mode=none"];
+    // Short frames: nothing lit, no textures made anew.
+    let plain = ["--set", "lighting.mode=none", "--set", "cloud.0.texture=none"];
+    let scene = [&["bench", "scenes/hello.toml", "--size", "64x48"], &plain[..]].concat();
     let length = [
         "--threading",
         threading,

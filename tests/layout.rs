@@ -15,22 +15,23 @@ use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGIO
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
-use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord};
+use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord, TexturedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
-use nimbus::layout::tiles::{RoundRecord, SplatRecord};
+use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
-use nimbus::passes::{surfaces, tiles, transmit};
+use nimbus::passes::{surfaces, texture, tiles, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 21] = [
+const RECORDS: [Record; 23] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
     ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
+    ("Textured", TexturedRecord::FIELDS, size_of::<TexturedRecord>()),
     ("Drawn", DrawnRecord::FIELDS, size_of::<DrawnRecord>()),
     ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
     ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
@@ -44,6 +45,7 @@ const RECORDS: [Record; 21] = [
     ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
+    ("SplatSheet", SplatSheetRecord::FIELDS, size_of::<SplatSheetRecord>()),
     ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
     ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
@@ -51,7 +53,7 @@ const RECORDS: [Record; 21] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 31] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 33] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
@@ -105,10 +107,20 @@ const INTERFACES: [(&str, &[Field], &[Element]); 31] = [
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(4), R("Drawn"), B(8)]),
     ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4), B(4)]),
     ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(4), B(8), B(4), B(8)]),
-    ("sprites.frag", sprites::Push::FIELDS, &[]),
-    ("sprites.vert", sprites::Push::FIELDS, &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn")]),
+    (
+        "sprites.frag",
+        sprites::Push::FIELDS,
+        &[Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, T],
+    ),
+    (
+        "sprites.vert",
+        sprites::Push::FIELDS,
+        &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Textured")],
+    ),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
+    ("texture_pack.comp", texture::PackPush::FIELDS, &[F, B(16)]),
+    ("texture_transform.comp", texture::TransformPush::FIELDS, &[B(8)]),
     ("tiles.comp", tiles::Push::FIELDS, &[T, B(8), R("Round"), B(16), B(16), B(4)]),
     ("tiles_clear.comp", tiles::ClearPush::FIELDS, &[R("Round"), B(16)]),
     ("tiles_pairs.comp", tiles::PairsPush::FIELDS, &[B(8), B(4), B(4), R("Round"), B(8), R("Splat")]),
@@ -117,7 +129,21 @@ const INTERFACES: [(&str, &[Field], &[Element]); 31] = [
     (
         "tiles_splat.comp",
         tiles::SplatPush::FIELDS,
-        &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Splat"), B(4), B(4), B(8)],
+        &[
+            B(8),
+            R("Placed"),
+            R("Particle"),
+            R("Lit"),
+            B(4),
+            B(4),
+            R("Drawn"),
+            R("Textured"),
+            R("Splat"),
+            B(8),
+            B(4),
+            B(4),
+            R("SplatSheet"),
+        ],
     ),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
 ];
@@ -129,8 +155,10 @@ enum Element {
     /// Read by four words, whatever it holds.
     Texels,
     Floats,
+    /// Read by the pipeline's other shader alone.
+    Elsewhere,
 }
-use Element::{Bytes as B, Floats as F, Record as R, Texels as T};
+use Element::{Bytes as B, Elsewhere, Floats as F, Record as R, Texels as T};
 
 fn compare_fields(what: &str, members: &[Member], fields: &[Field], complaints: &mut Vec<String>) {
     let declared = members.iter().map(|m| (m.name.as_str(), m.offset as usize, m.bytes as usize));
@@ -165,11 +193,12 @@ fn compare(file: &str, found: &Reflection, push: &[Field], elements: &[Element])
     let members = found.push.as_ref().map_or(&[][..], |p| &p.members);
     compare_fields(&format!("{file}: push constants"), members, push, &mut complaints);
     let bindings: Vec<u32> = found.bindings.iter().map(|b| b.binding).collect();
-    if bindings != (0..elements.len() as u32).collect::<Vec<_>>() {
+    let here = (0u32..).zip(elements).filter(|(_, e)| **e != Elsewhere);
+    if bindings != here.clone().map(|(i, _)| i).collect::<Vec<_>>() {
         complaints.push(format!("{file}: bindings {bindings:?}, the host gives {}", elements.len()));
         return complaints;
     }
-    for (binding, element) in found.bindings.iter().zip(elements) {
+    for (binding, (_, element)) in found.bindings.iter().zip(here) {
         match (&binding.element, element) {
             (Some(s), R(expected)) => compare_record(file, s, binding.stride, expected, &mut complaints),
             (None, B(bytes)) if binding.stride == *bytes && binding.kind == BindingKind::Storage => {}
@@ -308,6 +337,17 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "REGION_CLOUD", f64::from(REGION_CLOUD)),
         ("include/records.glsl", "REGION_COLORED", f64::from(REGION_COLORED)),
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
+        ("include/texture.glsl", "TEXTURE_STREAM", f64::from(0x7465_7874u32)),
+        ("include/texture.glsl", "FIELD_TEXELS", f64::from(texture::FIELD_TEXELS)),
+        ("include/texture.glsl", "TEXTURE_SIDE", nimbus::reference::texture::SIDE as f64),
+        ("include/texture.glsl", "LAST_LEVEL", nimbus::reference::texture::N_LEVELS as f64 - 1.0),
+        ("include/texture.glsl", "PERIOD_SIGMA", nimbus::reference::texture::PERIOD_SIGMA),
+        ("include/texture.glsl", "QUANTA", 1.0 / nimbus::reference::texture::QUANTUM),
+        ("include/sort.glsl", "TILE", f64::from(sort::TILE)),
+        ("include/sort.glsl", "NO_COUNT", f64::from(sort::NO_COUNT)),
+        ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),
+        ("include/tiles.glsl", "TILES_ACROSS", f64::from(tiles::TILES_ACROSS)),
+        ("tiles.comp", "RUN", f64::from(tiles::RUN)),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),
@@ -325,13 +365,7 @@ fn shared_constants_have_one_value() {
     assert_eq!(in_plane, Some(nimbus::reference::occlude::IN_PLANE));
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
     assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
-    // The host's TILE is private to its pass: both stand in the text.
-    let sort = text_of("include/sort.glsl");
-    let tile = constant(sort, "TILE").unwrap();
-    let host = std::fs::read_to_string(shaders_folder().join("../src/passes/sort.rs")).unwrap();
-    let host = host.lines().find_map(|l| l.strip_prefix("const TILE: u32 = ")?.strip_suffix(';')).unwrap();
-    assert_eq!(host.parse(), Ok(tile));
-    let bits = constant(sort, "N_DIGITS").unwrap();
+    let bits = constant(text_of("include/sort.glsl"), "N_DIGITS").unwrap();
     assert_eq!(bits, 256.0);
     // FOLDED is a number in an expression.
     assert!(text_of("generate.comp").contains(&format!("{:#x}u", generate::FOLDED)));

@@ -6,6 +6,7 @@ use harness::Gpu;
 use nimbus::frame::limits::{advice, check, n_deposits};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Scene;
+use nimbus::model::texture::Choice;
 
 fn scene(n_particles: u32, grid: u32, mode: &str) -> Scene {
     let dir = tempfile::tempdir().unwrap();
@@ -34,6 +35,12 @@ fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
     limits.max_texels = 1000;
     let refused = check(&scene, &limits).unwrap_err().to_string();
     assert!(refused.contains("the density grid") && refused.contains("takes 1000 at most"), "{refused}");
+    // Without light nothing is read by texels but the pool of textures, where there is one.
+    let mut unlit = self::scene(500, 64, "none");
+    assert!(check(&unlit, &limits).is_ok());
+    unlit.clouds[0].texture.choice = Choice::ByBox;
+    let refused = check(&unlit, &limits).unwrap_err().to_string();
+    assert!(refused.contains("the pool of textures: 698880 texels of 16 bytes"), "{refused}");
 }
 
 #[test]

@@ -9,6 +9,7 @@ use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRe
 use nimbus::model::cloud::{Cloud, CloudSource, Group, Particle};
 use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
+use nimbus::model::texture::Texture;
 use nimbus::passes::place::Place;
 use nimbus::reference::generate::{cloud as generated, uniforms};
 use nimbus::reference::place::{add_gusts, cloud_centers, grown, offsets, place, placed_bound};
@@ -30,6 +31,7 @@ fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
         wind,
         gust,
         growth,
+        texture: Texture::NONE,
         i_material: 0,
         seed: 5,
     };

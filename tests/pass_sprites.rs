@@ -7,8 +7,11 @@ mod harness;
 mod picture;
 #[path = "harness/scenery.rs"]
 mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use bounded::{Random, greatest_ratio};
 use glam::DVec3;
@@ -17,9 +20,10 @@ use nimbus::gpu::Compiler;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::io::scene_file;
 use nimbus::layout::facet::LitRecord;
-use nimbus::layout::particle::{DrawnRecord, ParticleRecord};
+use nimbus::layout::particle::{DrawnRecord, ParticleRecord, TexturedRecord};
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
+use nimbus::reference::texture::Pool;
 use nimbus::reference::{generate, place};
 use picture::{FORMATS, Picture};
 
@@ -186,7 +190,7 @@ fn wrong_pictures_are_noticed() {
         ("sprites.frag", "0.5 * push.cutoff * push.cutoff", "0.45 * push.cutoff * push.cutoff"),
         ("sprites.frag", " + twist * twist", ""),
         ("sprites.frag", " / (1.0 + dot(ray, ray))", ""),
-        ("sprites.frag", "exp(-e)", "(1.0 - e)"),
+        ("sprites.frag", "exp(exponent)", "(1.0 + exponent)"),
         ("include/blob.glsl", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
         ("sprites.vert", "-(top ? y.y : y.x)", "(top ? y.y : y.x)"),
@@ -222,6 +226,90 @@ fn what_is_drawn_in_part_has_weights() {
         let values = picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba32f);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }
+}
+
+#[test]
+fn textures_of_every_size_and_their_mutations() {
+    let mut gpu = Gpu::new();
+    let pool = Arc::new(Pool::new(4).rounded());
+    let picture = sheets::textured(front(), &pool);
+    let levels: std::collections::BTreeSet<usize> = picture.sheets().iter().flatten().map(|s| s.level).collect();
+    assert_eq!(levels.len(), 6, "every level is met: {levels:?}");
+    assert!(compare(&mut gpu, "textured", &picture) > 0.5);
+    let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
+    // Textures are seen.
+    let plain = Picture { textured: None, ..picture.clone() }.draw(&mut gpu, None, TargetFormat::Rgba32f);
+    assert!(greatest_ratio(&plain, &truths, &bounds) > 10.0);
+    for (from, to) in [
+        ("turn.x * delta.x - turn.y * delta.y", "turn.x * delta.x + turn.y * delta.y"),
+        ("+ turn.zw", "+ turn.wz"),
+        ("- gain.z;", ";"),
+        ("share.y * (far - near)", "0.5 * (far - near)"),
+        ("share.x * (along.y - along.x)", "0.0"),
+        ("gain.y * vec2(b)", "gain.x * vec2(b)"),
+        ("i_particle - textured.i_first", "i_particle"),
+        ("textured.i_field * FIELD_TEXELS", "0u * FIELD_TEXELS"),
+        ("squares.x + 2.0 * own", "squares.x + 1.9 * own"),
+        ("1.0, 64.0)", "1.0, 32.0)"),
+        ("PERIOD_SIGMA * z_in_sigma;", "PERIOD_SIGMA * z_in_sigma * 1.001;"),
+        ("(1u << place.y) - 1u", "(1u << place.y) - 2u"),
+        ("int(own << 16) >> 16", "int(own & 0xFFFFu)"),
+    ] {
+        let wrong = Gpu::wrong_compiler("include/texture.glsl", from, to);
+        let values = picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba32f);
+        assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+/// From all sides: around the camera, off axis over a wide field, with what is drawn in part.
+#[test]
+fn textures_of_a_wide_field_and_of_parts() {
+    let mut gpu = Gpu::new();
+    let pool = Arc::new(Pool::new(4).rounded());
+    let wide = wide();
+    let record = |i| TexturedRecord { seed: 3, i_box: 0, i_first: 0, i_field: i, strength: 1.0 };
+    let textured = Some((vec![0, 1, 0, 1], vec![record(2), record(5)], pool.clone()));
+    let part = |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
+    let drawn = Some((vec![0, 1, 0, 1], vec![part(4, 1.5, 1.0), part(4, 1.0, 0.4)]));
+    for drawn in [None, drawn] {
+        assert!(compare(&mut gpu, "wide", &Picture { textured: textured.clone(), drawn, ..wide.clone() }) > 0.3);
+    }
+    let around = front();
+    let at = around.at(0.2, 0.1, 0.5);
+    let around = around.blob(at, 2.0, 1.0);
+    let textured = Some((vec![0], vec![record(7)], pool));
+    assert!(compare(&mut gpu, "around the camera", &Picture { textured, ..around }) > 0.3);
+}
+
+/// As the camera comes nearer a picture changes by what the step moved, at changes of level as elsewhere.
+#[test]
+fn a_nearing_camera_meets_no_step() {
+    let pool = Arc::new(Pool::new(4).rounded());
+    let record = TexturedRecord { seed: 3, i_box: 0, i_first: 0, i_field: 6, strength: 1.0 };
+    let sheet = |z: f64| {
+        let picture = front();
+        let at = picture.at(0.0, 0.0, z);
+        let picture = picture.blob(at, 0.2, 1.0);
+        let picture = Picture { textured: Some((vec![0], vec![record], pool.clone())), ..picture };
+        picture.sheets()[0].expect("a sheet")
+    };
+    let mut levels = std::collections::BTreeSet::new();
+    let (mut greatest, mut last) = (0f64, None::<f64>);
+    for k in 0..4000 {
+        let z = 0.3 * 1.0015f64.powi(k);
+        let sheet = sheet(z);
+        levels.insert(sheet.level);
+        // The same place on the blob.
+        let exponent = sheet.factor(&pool, glam::DVec2::new(0.13, 0.05) / z).ln();
+        if let Some(last) = last {
+            greatest = greatest.max((exponent - last).abs());
+        }
+        last = Some(exponent);
+    }
+    assert_eq!(levels.len(), 6);
+    // A step of 0.15 % changes the fade by at most 0.003 of n, which is below 5, and the mean by a thousandth; pool's rounding.
+    println!("greatest step {greatest:.4}");
+    assert!(greatest < 0.02, "{greatest}");
 }
 
 #[test]

@@ -8,8 +8,12 @@ mod harness;
 mod picture;
 #[path = "harness/scenery.rs"]
 mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
 #[path = "harness/tiled.rs"]
 mod tiled;
+
+use std::sync::Arc;
 
 use bounded::{Random, greatest_ratio};
 use glam::DVec3;
@@ -21,6 +25,7 @@ use nimbus::layout::facet::LitRecord;
 use nimbus::layout::particle::DrawnRecord;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
+use nimbus::reference::texture::Pool;
 use picture::{FORMATS, Picture, Tiled};
 use scenery::Scenery;
 
@@ -140,6 +145,25 @@ fn surfaces_hide_and_shine_through() {
     assert!(compare(&mut gpu, "over surfaces", &picture) > 0.3);
 }
 
+#[test]
+fn textures_of_every_size() {
+    let mut gpu = Gpu::new();
+    let pool = Arc::new(Pool::new(4).rounded());
+    let picture = sheets::textured(front(), &pool);
+    assert!(compare(&mut gpu, "textured", &picture) > 0.5);
+    let v = DVec3::new;
+    let scenery = Scenery::default().rectangle(v(0.2, -0.1, 0.5), v(1.1, 0.2, 0.3), v(-0.18, 0.9, 0.06), [2, 3]);
+    let behind = Picture { scenery: Some(scenery), ..picture.clone() };
+    assert!(compare(&mut gpu, "textured, over a surface", &behind) > 0.5);
+    let tiled = usual(&gpu, FORMATS[2].1);
+    let drawn = |gpu: &mut Gpu, tiled: &Tiled| picture.draw_by(gpu, None, FORMATS[2].0, Some(tiled));
+    assert!(drawn(&mut gpu, &tiled) == drawn(&mut gpu, &Tiled { portable: true, ..tiled }), "without subgroups");
+    let (truths, bounds) = picture.tiled_truth(FORMATS[2].1, tiled.saturated);
+    let wrong = Gpu::wrong_compiler("tiles.comp", "uvec2(splat.gain.w, splat.side)", "uvec2(0u, splat.side)");
+    let values = picture.draw_by(&mut gpu, Some(&wrong), FORMATS[2].0, Some(&tiled));
+    assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "another field");
+}
+
 /// The same numbers whatever the workgroup is made of; and, but for the rounding of what one round hands to the next, in
 /// however many rounds.
 #[test]
@@ -153,7 +177,7 @@ fn workgroups_and_rounds_do_not_show() {
         let at = picture.at(within(-1.0, 1.0), within(-1.0, 1.0), within(4.0, 6.0));
         picture = picture.blob(at, within(1.0, 2.0), 0.004);
     }
-    let (target, format) = FORMATS[1];
+    let (target, format) = FORMATS[2];
     let tiled = usual(&gpu, format);
     let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Some(tiled));
     let once = draw(&tiled);
@@ -186,7 +210,7 @@ fn wrong_pictures_are_noticed() {
         ("tiles.comp", "e >= -push.cut", "e >= -0.9 * push.cut"),
         ("tiles.comp", "* inv_norm[j]", ""),
         ("tiles.comp", "passed[j] -= here;", "passed[j] -= 0.999 * here;"),
-        ("tiles.comp", "k + t < n ? place.w", "k + t <= n ? place.w"),
+        ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),
         ("tiles.comp", "n + subgroupBallotBitCount(hits)", "n + min(subgroupBallotBitCount(hits), 7u)"),
         ("tiles_splat.comp", "push.n_splats - 1u - r", "r"),
         ("tiles_splat.comp", "sums[t] - n;", "sums[t];"),

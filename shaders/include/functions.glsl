@@ -23,6 +23,14 @@ float sine(float x) {
     return k - 2.0 * floor(k * 0.5) == 0.0 ? value : -value;
 }
 
+// (cos, sin) of 2 pi x for |x| <= 1/2, x a multiple of 2^-24, so that the differences are exact and no argument is above
+// pi/2: each within 10 u, u = 2^-24.
+vec2 unit_at(float turns) {
+    float a = abs(turns);
+    float s = sine(2.0 * PI * min(a, 0.5 - a));
+    return vec2(sine(2.0 * PI * (0.25 - a)), turns < 0.0 ? -s : s);
+}
+
 // erf x: Abramowitz and Stegun 7.1.28, whose own error is at most 3e-7; exact sign symmetry. In f32 the 16th power
 // multiplies d's rounding: |error| <= 2.5e-6 near 0, falling to 4e-7 where the result is near 1.
 float erf_approx(float x) {

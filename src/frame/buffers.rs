@@ -4,11 +4,13 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
+use crate::layout::particle::TexturedRecord;
 use crate::layout::particle::{BoxLaw, BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
+use crate::passes::texture::POOL_TEXELS;
 
 use super::feed::Feed;
 use super::grouping::is_grouped;
@@ -45,6 +47,9 @@ pub struct Buffers {
     pub i_facet: Buffer,
     /// [key, particle].
     pub entries: Buffer,
+    /// What each group is textured with, and the pool of textures; empty where nothing is.
+    pub textured: Buffer,
+    pub pool: Buffer,
 }
 
 /// Every particle's place.
@@ -84,12 +89,20 @@ impl Buffers {
         }
     }
 
+    /// What sprites are drawn from, as the pass asks for it.
+    pub fn of_sprites(&self) -> [&Buffer; 9] {
+        let (placed, drawn) = (self.placed.buffer(), &self.drawn.buffer);
+        let Buffers { entries, particles, lit, i_facet, i_group, textured, pool, .. } = self;
+        [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool]
+    }
+
     pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
         let n = scene.n_particles();
         let n_facets = scene.n_facets();
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
+        let (n_textured, n_texels) = if scene.is_textured() { (n_groups, POOL_TEXELS) } else { (0, 0) };
         let n_named = if is_grouped(scene) { n } else { 0 };
         let n_through = if has_second(scene) { n_facets * n_lights } else { 0 };
         // No more vectors than were asked for.
@@ -118,6 +131,8 @@ impl Buffers {
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
+            textured: Buffer::new::<TexturedRecord>(device, "texture.groups", n_textured, Place::Device)?,
+            pool: Buffer::new::<[u32; 4]>(device, "texture.pool", u64::from(n_texels), Place::Device)?,
         })
     }
 
@@ -130,6 +145,9 @@ impl Buffers {
         upload(device, commands, &i_region, &self.i_region)?;
         upload(device, commands, &box_records(scene, groups), &self.boxes)?;
         upload(device, commands, &i_group, &self.i_group)?;
+        if scene.is_textured() {
+            upload(device, commands, &textured_records(scene, groups), &self.textured)?;
+        }
         commands.run(|rec| {
             rec.fill(&self.status, 0);
             // What no pass of this scene writes is zero: L2 where there is a first reflection alone.
@@ -173,6 +191,15 @@ fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
         }
     }
     records
+}
+
+/// A record a group, in order.
+fn textured_records(scene: &Scene, groups: &[Group]) -> Vec<TexturedRecord> {
+    let of_group = |(g, i_box): (&Group, u32)| {
+        let cloud = &scene.clouds[g.i_cloud];
+        TexturedRecord::new(&cloud.texture, cloud.seed, i_box, g.i_first)
+    };
+    groups.chunk_by(|a, b| a.i_cloud == b.i_cloud).flat_map(|boxes| boxes.iter().zip(0u32..).map(of_group)).collect()
 }
 
 /// Every particle that comes from a list at its place; zeros where particles are generated. Empty without lists.

@@ -8,6 +8,7 @@ use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, TargetFormat, storage_bytes};
 use crate::gpu::reflect::BindingKind;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
+use crate::layout::particle::TexturedRecord;
 use crate::layout::particle::{BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::basis::N_NODES;
@@ -16,6 +17,7 @@ use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
+use crate::passes::texture::POOL_TEXELS;
 
 use super::buffers::has_second;
 use super::feed::IN_FLIGHT;
@@ -23,8 +25,11 @@ use super::grouping::is_grouped;
 use super::plan::Tensors;
 use super::tensor::Shape;
 
+const TEXTURES: &str = "the pool of textures";
+
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 6] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 7] = [
+    (TEXTURES, BindingKind::Texels),
     ("the second reflection's sources", BindingKind::Texels),
     ("their flux by light", BindingKind::Texels),
     ("their light by points", BindingKind::Texels),
@@ -46,6 +51,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let is_lit = scene.lighting.mode != LightingMode::None;
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
     let pixel = target_format(scene.film.format).bytes_per_pixel();
+    let n_texels = if scene.is_textured() { u64::from(POOL_TEXELS) } else { 0 };
     let size = |record: usize| record as u64;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     let wishes = [
@@ -73,6 +79,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the density grid's sums", n_cells_max(scene), 8),
         ("the density grid", n_cells_max(scene), 4),
         ("the lobes of materials and basis", n_lobes * N_NODES as u64, 4),
+        ("the groups' textures", if scene.is_textured() { groups } else { 0 }, size(size_of::<TexturedRecord>())),
+        ("the textures, as they are made", n_texels, 4),
+        (TEXTURES, n_texels, 16),
         ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
         ("the film, read back", n_pixels, pixel),
     ];
@@ -80,7 +89,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
-        if let Some(texel) = texel.filter(|texel| is_lit && n * bytes / u64::from(*texel) > limits.max_texels) {
+        if let Some(texel) =
+            texel.filter(|texel| (is_lit || name == TEXTURES) && n * bytes / u64::from(*texel) > limits.max_texels)
+        {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
                 n * bytes / u64::from(texel),

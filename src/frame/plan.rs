@@ -21,13 +21,14 @@ pub enum Pass {
     Second,
     Contract,
     Sort,
+    Texture,
     Surfaces,
     Sprites,
     Tiles,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 13] = [
+    pub const ALL: [Pass; 14] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -38,6 +39,7 @@ impl Pass {
         Pass::Second,
         Pass::Contract,
         Pass::Sort,
+        Pass::Texture,
         Pass::Surfaces,
         Pass::Sprites,
         Pass::Tiles,
@@ -47,7 +49,7 @@ impl Pass {
     pub fn name(self) -> &'static str {
         let names = [
             "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "sort",
-            "surfaces", "sprites", "tiles",
+            "texture", "surfaces", "sprites", "tiles",
         ];
         names[self as usize]
     }
@@ -128,6 +130,8 @@ pub struct Traits {
     pub two_reflections: bool,
     /// Facets stand for several particles.
     pub grouped: bool,
+    /// Some cloud has a texture.
+    pub textured: bool,
     /// Surfaces to draw.
     pub n_surfaces: u32,
     /// Some region has a lobe, and so what is seen of it depends on the eye.
@@ -196,12 +200,13 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
         unless(same_order, "the order cannot have changed"),
+        if traits.textured { unless(last.is_some(), "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
         drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
         drawing(DrawPath::Tiles, "draw.path is \"sprites\""),
     ];
     if traits.n_particles == 0 {
-        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort] {
+        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort, Pass::Texture] {
             decisions[pass as usize] = skip("no particles");
         }
     }
@@ -250,6 +255,7 @@ mod tests {
         lit: true,
         two_reflections: false,
         grouped: false,
+        textured: false,
         n_surfaces: 0,
         glossy: false,
         tensors: Tensors::Needless,
@@ -258,7 +264,7 @@ mod tests {
     };
     const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
     /// With every pass.
-    const ALL_TRAITS: Traits = Traits { grouped: true, n_surfaces: 1, ..KEPT };
+    const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, ..KEPT };
 
     fn packet() -> Packet {
         Packet {

@@ -29,6 +29,7 @@ use crate::passes::place::Place as PlacePass;
 use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
+use crate::passes::texture::Texture;
 use crate::passes::tiles::{Division, View, invocations};
 use crate::passes::transmit::Transmit;
 
@@ -49,6 +50,8 @@ pub struct Renderer {
     second: Option<Relay>,
     tensor: Option<TensorStage>,
     sort: Sort,
+    /// None where no cloud has a texture.
+    texture: Option<Texture>,
     sprites: Sprites,
     pub(super) tiling: Option<Tiling>,
     pub(super) buffers: Buffers,
@@ -91,6 +94,7 @@ pub(super) struct Settings {
     pub step_cells: f64,
     pub forward: f64,
     sort_bits: u32,
+    texture_seed: u32,
     cutoff: f64,
     saturated: f64,
     pub format: TargetFormat,
@@ -139,6 +143,8 @@ impl Renderer {
             true => Some(Grouping::new(device, compiler, &mut host, scene)?),
             false => None,
         };
+        let textured = scene.is_textured();
+        let texture = textured.then(|| Texture::new(device, compiler)).transpose()?;
         let target = |name| Image::color_target(device, name, scene.film.width, scene.film.height, format);
         let mut renderer = Renderer {
             frames: [Commands::new(device, "frame.even")?, Commands::new(device, "frame.odd")?],
@@ -154,6 +160,7 @@ impl Renderer {
             second,
             tensor,
             sort: Sort::new(device, compiler, n_particles)?,
+            texture,
             tiling: match scene.draw.path {
                 DrawPath::Sprites => None,
                 DrawPath::Tiles => {
@@ -167,7 +174,7 @@ impl Renderer {
                 compiler,
                 format,
                 lit,
-                [scenery.is_some(), grouped, scene.draw.count.is_some()],
+                [scenery.is_some(), grouped, scene.draw.count.is_some(), textured],
             )?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             targets: [target("sprites.even")?, target("sprites.odd")?],
@@ -185,6 +192,7 @@ impl Renderer {
                 // Without particles there is nothing to march through.
                 forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
                 sort_bits: scene.draw.sort_bits,
+                texture_seed: scene.draw.texture_seed,
                 cutoff: scene.draw.cutoff,
                 saturated: saturated(scene.film.format),
                 format,
@@ -196,6 +204,7 @@ impl Renderer {
                 lit,
                 two_reflections,
                 grouped,
+                textured,
                 n_surfaces: scene.surfaces.len() as u32,
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
@@ -310,6 +319,7 @@ impl Renderer {
             second,
             tensor,
             sort,
+            texture,
             sprites,
             tiling,
             scenery,
@@ -386,6 +396,9 @@ impl Renderer {
                 sort.record_keys(rec, buffers, packet.camera.forward, n, packet.radius, s.sort_bits)?;
                 sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits)
             })?;
+            pass(rec, plan, Pass::Texture, |rec| {
+                texture.iter().try_for_each(|t| t.record(rec, &b.pool, s.texture_seed))
+            })?;
             let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
             pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
                 Some(surfaces) => {
@@ -394,17 +407,16 @@ impl Renderer {
                 }
                 None => Ok(()),
             })?;
-            let from = [&b.entries, placed, &b.particles, &b.lit, &b.i_facet, &b.i_group, &b.drawn.buffer];
             let counts = [packet.n_drawn, s.n_surface_facets];
             let has_surfaces = depth.is_some();
             let on = Target { color: target, depth };
             match tiling {
                 None => pass(rec, plan, Pass::Sprites, |rec| {
-                    sprites.record(rec, from, on, &packet.camera, s.cutoff, counts)
+                    sprites.record(rec, b.of_sprites(), on, &packet.camera, s.cutoff, counts)
                 }),
                 Some(tiling) => pass(rec, plan, Pass::Tiles, |rec| {
                     let view = View { camera: &packet.camera, cutoff: s.cutoff, saturated: s.saturated };
-                    tiling.record(rec, *i_target, has_surfaces.then_some(on), from, &view, counts)
+                    tiling.record(rec, *i_target, has_surfaces.then_some(on), b.of_sprites(), &view, counts)
                 }),
             }
         })

@@ -40,7 +40,7 @@ impl Tiling {
         rec: &mut Recorder<'_>,
         i: usize,
         under: Option<Target<'_>>,
-        buffers: [&Buffer; 7],
+        buffers: [&Buffer; 9],
         view: &View<'_>,
         counts: [u32; 2],
     ) -> Result<()> {
@@ -58,7 +58,7 @@ impl Tiling {
             let [i_count, i_groups] = Tiles::i_extent(i_round);
             let pairs = Counts { buffer: &tiles.round, i_count, i_groups };
             let sorted = self.sort.record_counted(rec, &tiles.entries, tiles.division.n_bits(), pairs)?;
-            tiles.record_compose(rec, i_round, sorted, picture, view)?;
+            tiles.record_compose(rec, i_round, [sorted, picture, buffers[8]], view)?;
         }
         Ok(())
     }
@@ -67,6 +67,7 @@ impl Tiling {
 /// How a scene is drawn.
 pub fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
     Variant {
+        textured: scene.is_textured(),
         lit,
         grouped,
         weighted: scene.draw.count.is_some(),

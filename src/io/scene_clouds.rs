@@ -17,6 +17,7 @@ use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
+use crate::model::texture::{Choice, GREATEST_STRENGTH, Texture};
 
 /// What a cloud's keys refer to.
 pub struct CloudReader<'a> {
@@ -30,7 +31,7 @@ pub struct CloudReader<'a> {
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
+        &[$($own,)* "material", "texture", "texture_strength", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
     };
 }
 
@@ -84,13 +85,13 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             CloudSource::Particles(particles)
         }
     };
-    s.only("texture", json!("none"), "blobs are drawn plain")?;
     let cloud = Cloud {
         source,
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
         growth: read_growth(s)?,
+        texture: read_texture(s)?,
         i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
@@ -101,6 +102,13 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         Some(what) => Err(s.fault("grow_to", what)),
         None => Ok(cloud),
     }
+}
+
+fn read_texture(s: &mut Section) -> Result<Texture> {
+    Ok(Texture {
+        choice: s.choice("texture", "none", &Choice::NAMES, &[])?,
+        strength: s.f64("texture_strength", Texture::NONE.strength, Bounds::Within(0.0, GREATEST_STRENGTH))?,
+    })
 }
 
 fn read_growth(s: &mut Section) -> Result<Growth> {
@@ -179,7 +187,16 @@ mod tests {
         let boxes = counts.iter().map(b).collect();
         let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 }
+        Cloud {
+            source,
+            position: DVec3::ZERO,
+            wind: DVec3::ZERO,
+            gust,
+            growth,
+            texture: Texture::NONE,
+            i_material: 0,
+            seed: 1,
+        }
     }
 
     fn counts(clouds: &mut [Cloud]) -> Vec<u32> {

@@ -181,8 +181,9 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     s.only("resolution", json!(1.0), "every pixel is drawn")?;
     let count = read_count(&mut s)?;
     let n_particles = s.u32("particles", 0, 0, u32::MAX)?;
+    let texture_seed = s.u32("texture_seed", 1, 0, u32::MAX)?;
     root.record("draw", s.finish());
-    Ok(Draw { path, cutoff, sort_bits, count, n_particles })
+    Ok(Draw { path, cutoff, sort_bits, count, texture_seed, n_particles })
 }
 
 const DRAW_KEYS: &[&str] = &[
@@ -196,6 +197,7 @@ const DRAW_KEYS: &[&str] = &[
     "count_d0",
     "count_normalised",
     "count_conserve",
+    "texture_seed",
 ];
 
 fn read_count(s: &mut Section) -> Result<Option<Count>> {

@@ -7,6 +7,7 @@ use crate::model::boxes::{CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::count::Drawn;
 use crate::model::gust::Mode;
+use crate::model::texture::Texture;
 
 record! {
     /// A Gaussian blob; position relative to its group's origin. Scene units, κ per unit.
@@ -161,6 +162,28 @@ impl DrawnRecord {
             kappa_scale: drawn.kappa_scale as f32,
             last_weight: drawn.last_weight as f32,
         }
+    }
+}
+
+record! {
+    /// What a group's particles are drawn with (docs/model.md §11 "texture").
+    pub struct TexturedRecord {
+        /// Philox key of each particle's turn.
+        seed: u32,
+        i_box: u32,
+        /// The group's first particle.
+        i_first: u32,
+        i_field: u32,
+        /// s; 0: plain.
+        strength: f32,
+    }
+}
+
+impl TexturedRecord {
+    /// Box `i_box` of a cloud of `seed` and `texture`, whose particles start at `i_first`.
+    pub fn new(texture: &Texture, seed: u32, i_box: u32, i_first: u32) -> Self {
+        let (i_field, strength) = texture.of_box(i_box);
+        TexturedRecord { seed, i_box, i_first, i_field, strength: strength as f32 }
     }
 }
 

@@ -19,6 +19,19 @@ record! {
 }
 
 record! {
+    /// What of a splat is textured (docs/model.md §11 "texture"); the shaders' Sheet.
+    pub struct SplatSheetRecord {
+        turn: [f32; 4],
+        gain: [f32; 3],
+        /// Its level's first texel in the pool, and log2 of the level's side.
+        i_texel: u32,
+        log2_side: u32,
+        unused: u32,
+        unused_too: [u32; 2],
+    }
+}
+
+record! {
     /// As many blocks of splats, near to far, as there is room for the pairs of at once.
     pub struct RoundRecord {
         /// Workgroups that sort: [n, 1, 1]; pairs.

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
 use super::growth::Growth;
 use super::gust::Gust;
+use super::texture::Texture;
 
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
 pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
@@ -21,6 +22,7 @@ pub struct Cloud {
     pub wind: DVec3,
     pub gust: Gust,
     pub growth: Growth,
+    pub texture: Texture,
     /// Index into the scene's materials.
     pub i_material: usize,
     pub seed: u32,
@@ -230,7 +232,16 @@ mod tests {
             radius_scale: 1.0,
         };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::X, gust, growth, i_material: 0, seed: 1 };
+        let cloud = Cloud {
+            source,
+            position: DVec3::ZERO,
+            wind: DVec3::X,
+            gust,
+            growth,
+            texture: Texture::NONE,
+            i_material: 0,
+            seed: 1,
+        };
         let firsts: Vec<u32> = cloud.groups(0, 10).iter().map(|g| g.i_first).collect();
         assert_eq!(firsts, [10, 13, 13]);
         assert_eq!(cloud.center(), DVec3::X);
@@ -243,7 +254,16 @@ mod tests {
         // Mean position 2, bounds from 0 to 5.
         let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
         let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
-        let cloud = Cloud { source, position: DVec3::Y, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 };
+        let cloud = Cloud {
+            source,
+            position: DVec3::Y,
+            wind: DVec3::ZERO,
+            gust,
+            growth,
+            texture: Texture::NONE,
+            i_material: 0,
+            seed: 1,
+        };
         let group = cloud.groups(0, 0)[0];
         let grown = group.grown(3.0);
         assert_eq!((group.center.x, group.cloud_center.x), (2.5, 2.0));
@@ -260,7 +280,16 @@ mod tests {
         let blob = |sigma, kappa| Particle { position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
         let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        let cloud = Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, i_material: 0, seed: 1 };
+        let cloud = Cloud {
+            source,
+            position: DVec3::ZERO,
+            wind: DVec3::ZERO,
+            gust,
+            growth,
+            texture: Texture::NONE,
+            i_material: 0,
+            seed: 1,
+        };
         assert_eq!(heaviest_blob(&cloud.groups(0, 0)), mass(2.0, 1.0));
     }
 }

@@ -17,5 +17,6 @@ pub mod pairings;
 pub mod philox;
 pub mod scene;
 pub mod surface;
+pub mod texture;
 pub mod tree;
 pub mod visibility;

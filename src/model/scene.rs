@@ -135,6 +135,8 @@ pub struct Draw {
     pub sort_bits: u32,
     /// How many particles are drawn of a cloud; `None`: all.
     pub count: Option<Count>,
+    /// Of the pool of textures.
+    pub texture_seed: u32,
     /// The clouds made from boxes have so many particles together; 0: as many as their files say.
     pub n_particles: u32,
 }
@@ -184,6 +186,11 @@ impl Scene {
             i_first = groups.last().map_or(i_first, |g| g.i_first + g.n_particles);
         }
         groups
+    }
+
+    /// Whether some cloud's particles have textures.
+    pub fn is_textured(&self) -> bool {
+        self.clouds.iter().any(|c| !c.texture.is_none())
     }
 
     /// `groups` as they have grown at `time_s`.

@@ -12,6 +12,7 @@ pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
+pub mod texture;
 pub mod tiles;
 pub mod transmit;
 
@@ -51,6 +52,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/stencil.glsl",
     "include/sort.glsl",
     "include/tensor.glsl",
+    "include/texture.glsl",
     "include/tiles.glsl",
     "include/turns.glsl",
     "include/veil.glsl",
@@ -70,6 +72,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "sprites.vert",
     "surfaces.frag",
     "surfaces.vert",
+    "texture_pack.comp",
+    "texture_transform.comp",
     "tiles.comp",
     "tiles_clear.comp",
     "tiles_pairs.comp",

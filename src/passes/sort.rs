@@ -23,7 +23,7 @@ record! {
 }
 
 /// The shaders' NO_COUNT.
-const NO_COUNT: u32 = u32::MAX;
+pub const NO_COUNT: u32 = u32::MAX;
 /// Entries a workgroup sorts; the shaders' TILE.
 pub const TILE: u32 = 1024;
 const DIGIT_BITS: u32 = 8;

@@ -1,6 +1,7 @@
 //! sprites: the particles as thin Gaussian sprites, blended far to near.
 //!
-//! In: sorted entries, placed particles, particles (κ, colour), lit facets, the depth of surfaces drawn before. Out:
+//! In: sorted entries, placed particles, particles (κ, colour), lit facets, what is drawn of each group, its texture, the pool of
+//! textures, the depth of surfaces drawn before. Out:
 //! premultiplied linear RGBA in the film's format. Of groups that are drawn in part, what is drawn of them, and weights on κ. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
 //! §9, §11. Error: α to a few 1e-6 relative, and the target's rounding at each layer.
 
@@ -21,14 +22,15 @@ pub struct Sprites {
 impl Sprites {
     /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
     /// depth; else the target is cleared. `grouped`: facets stand for several particles. `weighted`: κ has factors.
+    /// `textured`: some groups have textures.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
         lit: bool,
-        [behind, grouped, weighted]: [bool; 3],
+        [behind, grouped, weighted, textured]: [bool; 4],
     ) -> Result<Sprites> {
-        let constants = [lit, behind, grouped, weighted].map(u32::from);
+        let constants = [lit, behind, grouped, weighted, textured].map(u32::from);
         let constants: Vec<(u32, u32)> = (0..).zip(constants).collect();
         let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
         Ok(Sprites { pipeline })
@@ -36,11 +38,11 @@ impl Sprites {
 
     /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
     /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped; `i_group`: u32 by particle, and
-    /// `drawn`: DrawnRecord, read where κ has factors. `target` has depth where surfaces have been drawn.
+    /// `drawn`: DrawnRecord, read where κ has factors; `textured`: TexturedRecord, and `pool`: [u32; 4], read where some have textures. `target` has depth where surfaces have been drawn.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 7],
+        buffers: [&Buffer; 9],
         target: Target<'_>,
         camera: &CameraRecord,
         cutoff: f64,

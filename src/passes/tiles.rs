@@ -11,7 +11,7 @@ use crate::gpu::memory::{TargetFormat, has_depth24};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder, Target};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
-use crate::layout::tiles::{RoundRecord, SplatRecord};
+use crate::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 
 record! {
     pub struct SplatPush {
@@ -64,15 +64,15 @@ record! {
 }
 
 /// Splats of a block; the shaders' BLOCK.
-const BLOCK: u32 = 256;
+pub const BLOCK: u32 = 256;
 /// Blocks of a round. A tile's loops take up to 0.8 turns a splat, and llvmpipe ends all loops of an invocation after 65 535.
 const MOST_BLOCKS: u32 = 256;
 /// Words of a round.
 const ROUND_WORDS: u32 = (size_of::<RoundRecord>() / 4) as u32;
 /// An invocation's pixels; the shader's RUN.
-const RUN: u32 = 8;
+pub const RUN: u32 = 8;
 /// Tiles along a bin's side; the shaders' TILES_ACROSS.
-const TILES_ACROSS: u32 = 4;
+pub const TILES_ACROSS: u32 = 4;
 /// Workgroups along x that every device has, and turns that llvmpipe's loops take: most blocks, and most bins of a splat.
 const MOST: u32 = 65_535;
 /// Most pairs that there is room for at once; as many of the sort's tiles as llvmpipe's loops take turns.
@@ -121,6 +121,8 @@ impl Division {
 pub struct Variant {
     pub lit: bool,
     pub grouped: bool,
+    /// Some splats have textures.
+    pub textured: bool,
     pub weighted: bool,
     pub format: TargetFormat,
     /// Surfaces are drawn, too.
@@ -151,11 +153,14 @@ pub struct Tiles {
     ranges: Kernel,
     compose: Kernel,
     pub division: Division,
-    behind: bool,
+    /// Of the compose kernel.
+    n_bindings: usize,
     capacity: u32,
     pub n_rounds: u32,
     max_groups: u32,
     splats: Buffer,
+    /// What of them is textured.
+    sheets: Buffer,
     before: Buffer,
     reaches: Buffer,
     blocks: Buffer,
@@ -204,18 +209,21 @@ impl Tiles {
         let worst = u64::from(n_max) * u64::from(division.n_bins);
         let by_pairs = worst.div_ceil(capacity - u64::from(BLOCK) * u64::from(division.n_bins)) as u32;
         let n_rounds = if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
-        let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted)].map(|(k, v)| (k, u32::from(v)));
+        let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
+            .map(|(k, v)| (k, u32::from(v)));
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
         let macros = [
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
             ("ONE_SUBGROUP", u32::from(!variant.portable && device.limits().is_one_subgroup(division.invocations))),
-            ("THIN", u32::from(variant.tau_most <= 0.125)),
+            ("THIN", u32::from(variant.tau_most <= 0.125 && !variant.textured)),
+            ("TEXTURED", u32::from(variant.textured)),
             ("PIXEL_WORDS", (variant.format.bytes_per_pixel() / 4) as u32),
             ("BEHIND", behind),
         ];
         let buffer = |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
         let n_state = if n_rounds > 1 { division.n_pixels() } else { 1 };
+        let n_sheets = if variant.textured { u64::from(n_max) } else { 1 };
         let n_under = if variant.behind { division.n_pixels() } else { 1 };
         Ok(Tiles {
             splat: Kernel::new(device, compiler, "tiles.splat", SplatPush::FIELDS, &constants)?,
@@ -225,11 +233,18 @@ impl Tiles {
             ranges: Kernel::new(device, compiler, "tiles.ranges", RangesPush::FIELDS, &[])?,
             compose: Kernel::with_macros(device, compiler, "tiles", Push::FIELDS, &[], &macros)?,
             division,
-            behind: variant.behind,
+            n_bindings: if variant.textured {
+                10
+            } else if variant.behind {
+                8
+            } else {
+                6
+            },
             capacity: capacity as u32,
             n_rounds,
             max_groups: device.limits().max_workgroups_x,
             splats: Buffer::new::<SplatRecord>(device, "tiles.splats", u64::from(n_max), Place::Device)?,
+            sheets: Buffer::new::<SplatSheetRecord>(device, "tiles.sheets", n_sheets, Place::Device)?,
             reaches: buffer("tiles.reaches", n_max.into(), 2)?,
             before: buffer("tiles.before", n_max.into(), 1)?,
             blocks: buffer("tiles.blocks", n_blocks.into(), 1)?,
@@ -252,7 +267,7 @@ impl Tiles {
     pub fn record_splats(
         &self,
         rec: &mut Recorder<'_>,
-        buffers: [&Buffer; 7],
+        buffers: [&Buffer; 9],
         view: &View<'_>,
         [n_splats, i_first_facet, sort_tile]: [u32; 3],
     ) -> Result<()> {
@@ -269,9 +284,10 @@ impl Tiles {
             tile_width: tile[0],
             tile_height: tile[1],
         };
-        let [entries, placed, particles, lit, i_facet, i_group, drawn] = buffers;
-        let to = [&self.splats, &self.before, &self.blocks, &self.reaches];
-        let buffers = [entries, placed, particles, lit, i_facet, i_group, drawn, to[0], to[1], to[2], to[3]];
+        let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, _] = buffers;
+        let Tiles { splats, reaches, before, blocks, sheets, .. } = self;
+        let from = [entries, placed, particles, lit, i_facet, i_group, drawn, textured];
+        let buffers = [&from[..], &[splats, reaches, before, blocks, sheets]].concat();
         let n_blocks = n_splats.div_ceil(BLOCK);
         rec.dispatch_groups(&self.splat, &buffers, &push, n_blocks)?;
         let push = RoundsPush {
@@ -315,13 +331,12 @@ impl Tiles {
         [ROUND_WORDS * i_round + 3, ROUND_WORDS * i_round]
     }
 
-    /// Composes what `sorted`, round `i`'s pairs by bin, names into `picture`.
+    /// Composes what `sorted`, round `i`'s pairs by bin, names into `picture`; `pool`: the textures.
     pub fn record_compose(
         &self,
         rec: &mut Recorder<'_>,
         i_round: u32,
-        sorted: &Buffer,
-        picture: &Buffer,
+        [sorted, picture, pool]: [&Buffer; 3],
         view: &View<'_>,
     ) -> Result<()> {
         let Division { width, height, n_bins_x, n_bins, .. } = self.division;
@@ -338,9 +353,24 @@ impl Tiles {
             cut: cut(view.cutoff),
             saturated: view.saturated as f32,
         };
-        let buffers = [&self.splats, sorted, &self.round, &self.found, &self.state, picture, &self.under, &self.depths];
-        let buffers = if self.behind { &buffers[..] } else { &buffers[..6] };
-        rec.dispatch_counted(&self.compose, buffers, &push, (&self.round, ROUND_WORDS * i_round + 12))
+        let buffers = [
+            &self.splats,
+            sorted,
+            &self.round,
+            &self.found,
+            &self.state,
+            picture,
+            &self.under,
+            &self.depths,
+            &self.sheets,
+            pool,
+        ];
+        rec.dispatch_counted(
+            &self.compose,
+            &buffers[..self.n_bindings],
+            &push,
+            (&self.round, ROUND_WORDS * i_round + 12),
+        )
     }
 
     /// Slopes of a pixel's sides.

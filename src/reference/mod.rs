@@ -18,6 +18,7 @@ pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
+pub mod texture;
 pub mod tiles;
 pub mod transmit;
 pub mod volume;

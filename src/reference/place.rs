@@ -101,6 +101,7 @@ mod tests {
     use crate::model::cloud::{CloudSource, Particle};
     use crate::model::growth::Growth;
     use crate::model::gust::Gust;
+    use crate::model::texture::Texture;
 
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
@@ -111,6 +112,7 @@ mod tests {
             wind,
             gust: Gust::CALM,
             growth: Growth::NONE,
+            texture: Texture::NONE,
             i_material: 0,
             seed: 0,
         };
@@ -144,6 +146,7 @@ mod tests {
             wind: DVec3::Z,
             gust: Gust::CALM,
             growth: Growth { to: 3.0, time_s: 1.0 / std::f64::consts::LN_2 },
+            texture: Texture::NONE,
             i_material: 0,
             seed: 0,
         };

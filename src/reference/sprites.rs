@@ -2,7 +2,7 @@
 //! beside it a bound on what a target of few bits may differ.
 //! In: blobs and eye relative to O, an order. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::Blob;
 use crate::model::camera::Pose;
@@ -89,6 +89,16 @@ impl View {
         let x = 2.0 * (f64::from(i) + 0.5) / f64::from(self.width) - 1.0;
         let y = 1.0 - 2.0 * (f64::from(j) + 0.5) / f64::from(self.height);
         self.pose.forward + x * slope_x * self.pose.right + y * slope_y * self.pose.up
+    }
+
+    /// Slopes of the way `offset` from the eye.
+    pub fn slopes_of(&self, offset: DVec3) -> DVec2 {
+        DVec2::new(offset.dot(self.pose.right), offset.dot(self.pose.up)) / offset.dot(self.pose.forward)
+    }
+
+    /// Difference of slopes from a pixel to the next.
+    pub fn pixel(&self) -> f64 {
+        2.0 * self.half_slopes().1 / f64::from(self.height)
     }
 
     /// Columns and rows (from, to; to excluded) outside which no ray comes within `reach` of offset `c` from the
@@ -195,6 +205,22 @@ pub fn render_over(
     order: &[u32],
     rounding: &Rounding,
 ) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+    render_textured(view, behind, blobs, radiance, order, rounding, None)
+}
+
+/// Factor on τ of blob j where the ray's slopes from the eye are those of its centre and a difference.
+pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
+
+/// The same with a factor on each blob's τ.
+pub fn render_textured(
+    view: &View,
+    behind: &[Behind],
+    blobs: &[Blob],
+    radiance: &[DVec3],
+    order: &[u32],
+    rounding: &Rounding,
+    factor: Option<Factor<'_>>,
+) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
     let mut pixels: Vec<Layered> = behind.iter().map(Layered::from).collect();
     let width = view.width as usize;
     let n_rows = view.height.div_ceil(N_THREADS).max(1);
@@ -203,7 +229,8 @@ pub fn render_over(
             scope.spawn(move || {
                 for &j in order {
                     let j = j as usize;
-                    draw(view, &blobs[j], radiance[j], band, i * n_rows, rounding);
+                    let of_blob = |delta: DVec2| factor.map_or(1.0, |f| f(j, delta));
+                    draw(view, &blobs[j], radiance[j], &of_blob, (&mut *band, i * n_rows), rounding);
                 }
             });
         }
@@ -214,8 +241,15 @@ pub fn render_over(
 /// Bands of rows that are drawn side by side; the result does not depend on it.
 const N_THREADS: u32 = 2;
 
-/// One blob over the rows from `first_row` that `band` holds.
-fn draw(view: &View, blob: &Blob, radiance: DVec3, band: &mut [Layered], first_row: u32, r: &Rounding) {
+/// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference of slopes.
+fn draw(
+    view: &View,
+    blob: &Blob,
+    radiance: DVec3,
+    factor: &dyn Fn(DVec2) -> f64,
+    (band, first_row): (&mut [Layered], u32),
+    r: &Rounding,
+) {
     let c = blob.position - view.pose.position;
     let depth = c.dot(view.pose.forward);
     if !(depth >= view.near && blob.sigma > 0.0) {
@@ -229,7 +263,8 @@ fn draw(view: &View, blob: &Blob, radiance: DVec3, band: &mut [Layered], first_r
             let pixel = &mut band[((row - first_row) * view.width + column) as usize];
             let d = view.ray(column, row);
             let b = c.cross(d).length() / d.length();
-            let alpha = alpha(blob, b);
+            let delta = view.slopes_of(d) - view.slopes_of(c);
+            let alpha = alpha(&Blob { kappa: factor(delta) * blob.kappa, ..*blob }, b);
             let (behind, behind_bound) = pixel.behind;
             // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
             // stands behind decides likewise.

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::{Behind, Rounding, View, alpha};
+use super::sprites::{Behind, Factor, Rounding, View, alpha};
 
 /// Unit round-off of f32.
 const U: f64 = 1.0 / 16_777_216.0;
@@ -50,6 +50,10 @@ impl Composed {
             let inherited =
                 off + self.off_passed * under.color[k].abs() + passed_most * under.bound[k] + skipped * most;
             let inherited = inherited + 2.0 * U * (value.abs() + inherited);
+            if r.step > 0.0 {
+                // Cut to its range at the end alone, to one of the two steps beside it.
+                return (value.clamp(0.0, 1.0), inherited + r.step);
+            }
             (value, inherited + 2.0 * r.unit * (value.abs() + inherited).max(r.least_normal))
         };
         let channels = [0, 1, 2, 3].map(channel);
@@ -57,34 +61,32 @@ impl Composed {
     }
 }
 
-/// The picture of `blobs` over `behind`, and per channel a bound on what the device may differ: opacities by `rounding.alpha` of
-/// themselves, edges by `rounding.edge`, the target by `rounding.unit`, and what lies behind less than `saturated`.
-pub fn render_over(
-    view: &View,
-    behind: &[Behind],
-    blobs: &[Blob],
-    radiance: &[DVec3],
-    order: &[u32],
-    (rounding, saturated): (&Rounding, f64),
-) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    let most = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+/// What is composed.
+#[derive(Clone, Copy)]
+pub struct Composition<'a> {
+    pub view: &'a View,
+    pub blobs: &'a [Blob],
+    pub radiance: &'a [DVec3],
+    pub order: &'a [u32],
+    pub factor: Option<Factor<'a>>,
+    /// How the device may depart: opacities by `alpha` of themselves, edges by `edge`, the target by `unit`.
+    pub rounding: Rounding,
+    /// What lies behind less than this may be left out.
+    pub saturated: f64,
+}
+
+/// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
+pub fn render_over(of: &Composition<'_>, behind: &[Behind]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+    let (view, most) = (of.view, of.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
     let pixel = |(i_pixel, under): (usize, &Behind)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
-        let composed = compose(view, view.ray(i, j), under, blobs, radiance, order, rounding);
-        composed.over(under, rounding, saturated, most)
+        compose(of, view.ray(i, j), under).over(under, &of.rounding, of.saturated, most)
     };
     behind.iter().enumerate().map(pixel).unzip()
 }
 
-fn compose(
-    view: &View,
-    ray: DVec3,
-    under: &Behind,
-    blobs: &[Blob],
-    radiance: &[DVec3],
-    order: &[u32],
-    r: &Rounding,
-) -> Composed {
+fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind) -> Composed {
+    let Composition { view, blobs, radiance, order, factor, rounding: r, .. } = of;
     let mut pixel = Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
     for &k in order.iter().rev() {
         let (blob, k) = (&blobs[k as usize], k as usize);
@@ -99,7 +101,9 @@ fn compose(
         if (b > cut && !on_edge) || (depth > under.depth && !at_behind) {
             continue;
         }
-        let alpha = alpha(blob, b);
+        let delta = view.slopes_of(ray) - view.slopes_of(c);
+        let factor = factor.map_or(1.0, |f| f(k, delta));
+        let alpha = alpha(&Blob { kappa: factor * blob.kappa, ..*blob }, b);
         let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
         pixel.under(if b <= cut && depth <= under.depth { alpha } else { 0.0 }, off, radiance[k]);
     }
@@ -127,7 +131,16 @@ mod tests {
         for under in [Behind::NOTHING, Behind { depth: 9.0, ..under }, under] {
             let behind = [under; 6];
             let none = Rounding::NONE;
-            let (near_first, bound) = render_over(&view, &behind, &blobs, &colors, &[1, 0], (&none, 0.0));
+            let of = Composition {
+                view: &view,
+                blobs: &blobs,
+                radiance: &colors,
+                order: &[1, 0],
+                factor: None,
+                rounding: none,
+                saturated: 0.0,
+            };
+            let (near_first, bound) = render_over(&of, &behind);
             let (far_first, _) = sprites::render_over(&view, &behind, &blobs, &colors, &[1, 0], &none);
             for (a, b) in near_first.concat().iter().zip(far_first.concat()) {
                 assert!((a - b).abs() < 1e-15, "{a} {b}");

@@ -2,14 +2,16 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-use glam::DVec3;
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
 use half::f16;
 use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
-use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord};
+use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
@@ -18,11 +20,13 @@ use nimbus::passes::surfaces::Surfaces;
 use nimbus::passes::tiles::{Division, Variant};
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{Behind, Rounding, View, alpha, render_over, render_with_bound};
+use nimbus::reference::sprites::{Behind, Rounding, View, render_textured};
+use nimbus::reference::texture::{Pool, Sheet, Textured};
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::harness::Gpu;
 use crate::scenery::{Candidates, Scenery};
+use crate::sheets::Paper;
 
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
@@ -57,6 +61,8 @@ pub struct Picture {
     pub drawn: Option<(Vec<u32>, Vec<DrawnRecord>)>,
     /// Rectangles under the sprites.
     pub scenery: Option<Scenery>,
+    /// Group of each particle, as in `drawn` where that is there; each group's texture; the pool, as it is rounded.
+    pub textured: Option<(Vec<u32>, Vec<TexturedRecord>, Arc<Pool>)>,
 }
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -78,6 +84,7 @@ impl Picture {
             i_facet: None,
             drawn: None,
             scenery: None,
+            textured: None,
         }
     }
 
@@ -152,9 +159,14 @@ impl Picture {
     ) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let pass =
-            Sprites::new(&gpu.device, compiler, format, lit, [behind, self.i_facet.is_some(), self.drawn.is_some()])
-                .expect("sprites");
+        let pass = Sprites::new(
+            &gpu.device,
+            compiler,
+            format,
+            lit,
+            [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some()],
+        )
+        .expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
         let tiling = tiled.map(|t| self.tiling(gpu, compiler, format, t));
         let scenery = self.scenery.clone().unwrap_or_default();
@@ -169,8 +181,14 @@ impl Picture {
         let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
         let i_facet = gpu.upload(&named);
         let regions = gpu.upload(&scenery.regions);
-        let (of_particles, of_groups) = self.drawn.clone().unwrap_or_default();
-        let (i_group, drawn) = (gpu.upload(&of_particles), gpu.upload(&of_groups));
+        let (of_drawn, of_groups) = self.drawn.clone().unwrap_or_default();
+        let (of_textured, textures, words) = match &self.textured {
+            Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), pool.words()),
+            None => Default::default(),
+        };
+        assert!(of_drawn.is_empty() || of_textured.is_empty() || of_drawn == of_textured, "a particle has one group");
+        let i_group = gpu.upload(if of_drawn.is_empty() { &of_textured } else { &of_drawn });
+        let (drawn, textures, pool) = (gpu.upload(&of_groups), gpu.upload(&textures), gpu.upload(&words));
         let (width, height) = (self.view.width, self.view.height);
         let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
         let mut depth = behind.then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
@@ -194,7 +212,7 @@ impl Picture {
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
                 let n = [entries.len() as u32, scenery.lit.len() as u32];
-                let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn];
+                let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
                 if let (Some(tiling), Some(tiled)) = (&tiling, tiled) {
                     let view = nimbus::passes::tiles::View {
                         camera: &camera,
@@ -230,6 +248,7 @@ impl Picture {
         let variant = Variant {
             lit: self.lit.is_some(),
             grouped: self.i_facet.is_some(),
+            textured: self.textured.is_some(),
             weighted: self.drawn.is_some(),
             format,
             behind: self.scenery.is_some(),
@@ -245,14 +264,22 @@ impl Picture {
     pub fn truth(&self, format: FilmFormat) -> (Vec<f64>, Vec<f64>) {
         let rounding = self.rounding(format);
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
-        let (value, bound) = match &self.scenery {
-            None => render_with_bound(&self.view, &blobs, &radiance, &order, &rounding),
-            Some(_) => {
-                let behind: Vec<Behind> = self.behind(format).iter().map(|c| self.widened(c)).collect();
-                render_over(&self.view, &behind, &blobs, &radiance, &order, &rounding)
-            }
+        let behind: Vec<Behind> = match &self.scenery {
+            None => vec![Behind::NOTHING; (self.view.width * self.view.height) as usize],
+            Some(_) => self.behind(format).iter().map(|c| self.widened(c)).collect(),
         };
+        let sheets = self.sheets();
+        let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
+        let (value, bound) = render_textured(&self.view, &behind, &blobs, &radiance, &order, &rounding, Some(&factor));
         (value.concat(), bound.concat())
+    }
+
+    /// The texture's factor on particle `j`'s τ.
+    pub fn factor(&self, sheets: &[Option<Sheet>], j: usize, delta: DVec2) -> f64 {
+        match (&sheets[j], &self.textured) {
+            (Some(sheet), Some((_, _, pool))) => sheet.factor(pool, delta),
+            _ => 1.0,
+        }
     }
 
     /// What each pixel may show of the rectangles.
@@ -281,15 +308,46 @@ impl Picture {
         Behind { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
     }
 
+    /// What each particle shows of the pool.
+    pub fn sheets(&self) -> Vec<Option<Sheet>> {
+        let pose = &self.view.pose;
+        let sheet = |(i, p): (usize, &PlacedRecord)| {
+            let (i_group, textures, _) = self.textured.as_ref()?;
+            let of = &textures[i_group[i] as usize];
+            let z = (double(p.position) - pose.position).dot(pose.forward);
+            let strength = f64::from(of.strength);
+            let textured = Textured { i_field: of.i_field, strength, seed: of.seed, i_box: of.i_box };
+            Some(Sheet::new(&textured, i as u32 - of.i_first, z / f64::from(p.sigma), self.view.pixel()))
+        };
+        self.placed.iter().enumerate().map(sheet).collect()
+    }
+
     /// How the shaders' α and edges may be off: the worst of all pixels in all blobs, each by a running bound.
     pub fn rounding(&self, format: FilmFormat) -> Rounding {
+        let (off_alpha, edge) = self.worst(false);
+        let mut rounding = Rounding::of(format, off_alpha, edge);
+        // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C and their sum.
+        rounding.unit += 2.0 * U;
+        rounding
+    }
+
+    /// Relative error of an opacity, and of a sprite's edge, as `tiles` evaluates them or `sprites`.
+    pub fn worst(&self, tiled: bool) -> (f64, f64) {
         let (mut off_alpha, mut edge) = (ONE_MINUS_EXP, 8.0 * U);
-        for (blob, placed) in self.blobs().iter().zip(&self.placed) {
+        for ((blob, placed), sheet) in self.blobs().iter().zip(&self.placed).zip(self.sheets()) {
             let c = blob.position - self.view.pose.position;
             if !(c.dot(self.view.pose.forward) >= self.view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
                 continue;
             }
             let sprite = self.sprite(placed, blob);
+            let paper = sheet.zip(self.textured.as_ref()).map(|(s, (_, _, pool))| {
+                Paper::new(
+                    s,
+                    pool,
+                    self.view_depth(placed).over(Bounded::exact(f64::from(placed.sigma))),
+                    self.view.pixel(),
+                )
+            });
             let cut = self.view.cutoff * blob.sigma;
             for j in 0..self.view.height {
                 for i in 0..self.view.width {
@@ -298,23 +356,31 @@ impl Picture {
                     if b > 1.1 * cut {
                         continue;
                     }
-                    let e = sprite.exponent(self.ray(i, j));
+                    let e = match tiled {
+                        true => sprite.tiled_exponent(self.ray(i, j)),
+                        false => sprite.exponent(self.ray(i, j)),
+                    };
                     // The cut: e <= cutoff²/2, three roundings; b ∝ √e.
                     if b > 0.9 * cut {
                         edge = edge.max(0.51 * e.error / e.value + 4.0 * U);
                     }
-                    let true_alpha = alpha(blob, b);
-                    let t = sprite.tau.times(e.scaled(-1.0).exp());
+                    let sheet = paper.as_ref().map(|p| p.exponent(sprite.difference(self.ray(i, j))));
+                    let log2_e = Bounded::once(std::f64::consts::LOG2_E);
+                    let factor = match (sheet, tiled) {
+                        (None, false) => e.scaled(-1.0).exp(),
+                        (Some(sheet), false) => e.scaled(-1.0).plus(sheet).exp(),
+                        (None, true) => e.scaled(-1.0).exp2(),
+                        (Some(sheet), true) => e.scaled(-1.0).plus(log2_e.times(sheet)).exp2(),
+                    };
+                    let t = sprite.tau.times(factor);
+                    let true_alpha = -libm::expm1(-t.value);
                     // d(1 − e^{−t})/dt = e^{−t}.
                     let off = (-(t.value - t.error)).exp() * t.error + ONE_MINUS_EXP * true_alpha;
                     off_alpha = off_alpha.max(off / true_alpha);
                 }
             }
         }
-        let mut rounding = Rounding::of(format, off_alpha, edge);
-        // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C and their sum.
-        rounding.unit += 2.0 * U;
-        rounding
+        (off_alpha, edge)
     }
 
     fn half_slopes(&self) -> [Bounded; 2] {
@@ -363,9 +429,26 @@ pub struct Sprite {
 }
 
 impl Sprite {
+    fn difference(&self, ray: [Bounded; 2]) -> [Bounded; 2] {
+        [ray[0].minus(self.s[0]), ray[1].minus(self.s[1])]
+    }
+
+    /// The same in powers of two, as `tiles` evaluates it: a polynomial along the row over the norm.
+    fn tiled_exponent(&self, ray: [Bounded; 2]) -> Bounded {
+        let (one, s) = (Bounded::exact(1.0), &self.s);
+        // log2 e is one more factor.
+        let scale = self.z.times(Bounded::once(std::f64::consts::LOG2_E));
+        let [dx, dy] = [ray[0].minus(s[0]), ray[1].minus(s[1])];
+        let a = scale.times(one.plus(s[1].squared()));
+        let b = scale.scaled(-2.0).times(s[0]).times(s[1]).times(dy);
+        let c = scale.times(one.plus(s[0].squared())).times(dy).times(dy);
+        let norm = one.plus(ray[0].squared()).plus(ray[1].squared());
+        a.times(dx).plus(b).times(dx).plus(c).times(one.over(norm))
+    }
+
     /// b²/2σ² as the fragment shader evaluates it.
     fn exponent(&self, ray: [Bounded; 2]) -> Bounded {
-        let d = [ray[0].minus(self.s[0]), ray[1].minus(self.s[1])];
+        let d = self.difference(ray);
         let twist = self.s[0].times(d[1]).minus(self.s[1].times(d[0]));
         let above = d[0].squared().plus(d[1].squared()).plus(twist.squared());
         let below = Bounded::exact(1.0).plus(ray[0].squared().plus(ray[1].squared()));

@@ -1,0 +1,101 @@
+//! How far the shaders' evaluation of a texture may lie from the law: a running bound.
+
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use std::sync::Arc;
+
+use glam::DVec2;
+use nimbus::layout::particle::TexturedRecord;
+use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, Sheet, side};
+
+use crate::bounded::{Bounded, U};
+use crate::picture::Picture;
+
+/// What unit_at promises.
+const UNIT_AT: f64 = 10.0 * U;
+
+/// What the vertex shader hands on of a texture.
+pub struct Paper<'a> {
+    sheet: Sheet,
+    pool: &'a Pool,
+    level: &'a Level,
+    fade: Bounded,
+    turn: [Bounded; 2],
+    /// Most that n changes from a texel to the next; most that n_l, n_{l+1} are.
+    slope: f64,
+    heights: [f64; 2],
+    /// What n may differ by rounding from one level to the next.
+    step: f64,
+}
+
+impl Paper<'_> {
+    /// `z_in_sigma`: view depth over σ; `pixel`: the slopes' difference from a pixel to the next.
+    pub fn new(sheet: Sheet, pool: &Pool, z_in_sigma: Bounded, pixel: f64) -> Paper<'_> {
+        let dense = Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z_in_sigma.times(Bounded::once(pixel)));
+        let level = &pool.0[sheet.i_field][sheet.level];
+        // Where the level itself is uncertain the next one's numbers may stand in place of these; they are rounded anew.
+        let near_step = (dense.value.log2() - dense.value.log2().round()).abs() < 2.0 * dense.error / dense.value;
+        let fade = Bounded { value: sheet.fade, error: dense.error / f64::from(1 << sheet.level) + 2.0 * U };
+        let stretch = Bounded::once(side(sheet.level) as f64 / PERIOD_SIGMA).times(z_in_sigma);
+        let unit = |value| Bounded { value, error: UNIT_AT };
+        let turn = [sheet.angle.cos(), sheet.angle.sin()].map(|v| stretch.times(unit(v)));
+        // n is continuous and piecewise bilinear: no steeper anywhere than its neighbours differ.
+        let slope =
+            (1.0 - sheet.fade) * steepest(&level.own, level.side) + sheet.fade * steepest(&level.above, level.side);
+        let heights = [&level.own, &level.above].map(|n| n.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
+        Paper { sheet, pool, level, fade, turn, slope, heights, step: if near_step { QUANTUM } else { 0.0 } }
+    }
+
+    /// s n − s² ⟨n²⟩/2 as the fragment shader evaluates it.
+    pub fn exponent(&self, d: [Bounded; 2]) -> Bounded {
+        let (sheet, s) = (&self.sheet, self.sheet.strength);
+        let [a, b] = self.turn;
+        let shift = sheet.shift * self.level.side as f64;
+        let x = a.times(d[0]).minus(b.times(d[1])).plus(Bounded::exact(shift.x));
+        let y = b.times(d[0]).plus(a.times(d[1])).plus(Bounded::exact(shift.y));
+        let delta = DVec2::new(d[0].value, d[1].value);
+        let n = sheet.n(self.pool, delta);
+        let [own, above] = self.heights;
+        let height = (1.0 - sheet.fade) * own + sheet.fade * above;
+        // Two gains of three roundings, their products and sum; two interpolations of three roundings, on differences of at
+        // most twice the height; the mean's subtraction.
+        let half = sheet.half_square();
+        let error = s * self.slope * (x.error + y.error)
+            + s * (self.fade.error * (own + above) + self.step)
+            + 24.0 * U * s * height
+            + s * s * self.fade.error
+            + 10.0 * U * half
+            + 2.0 * U * (s * n - half).abs();
+        Bounded { value: s * n - half, error }
+    }
+}
+
+/// Greatest difference between neighbours.
+fn steepest(n: &[f64], side: usize) -> f64 {
+    let at = |i: usize, j: usize| n[i % side + side * (j % side)];
+    let of = |k: usize| {
+        let (i, j) = (k % side, k / side);
+        (at(i + 1, j) - at(i, j)).abs().max((at(i, j + 1) - at(i, j)).abs())
+    };
+    (0..n.len()).map(of).fold(0.0, f64::max)
+}
+
+/// Blobs of one texture each, from larger than the picture to smaller than a pixel, so that every level and what lies between
+/// two is met; a plain one among them.
+pub fn textured(mut picture: Picture, pool: &Arc<Pool>) -> Picture {
+    let sizes = [1.3, 0.6, 0.41, 0.3, 0.2, 0.13, 0.1, 0.07, 0.05, 0.035, 0.02, 0.012, 0.006];
+    for (k, sigma) in sizes.into_iter().enumerate() {
+        let turn = 0.5 * k as f64;
+        let at = picture.at(1.8 * turn.cos(), 1.3 * turn.sin(), 5.0 + 0.2 * turn);
+        picture = picture.blob(at, sigma, 0.9);
+    }
+    let record = |i: u32| TexturedRecord {
+        seed: 9,
+        i_box: i,
+        i_first: i / 2,
+        i_field: i % 8,
+        strength: if i == 4 { 0.0 } else { 0.5 + 0.1 * i as f32 },
+    };
+    let n = picture.placed.len() as u32;
+    Picture { textured: Some(((0..n).collect(), (0..n).map(record).collect(), pool.clone())), ..picture }
+}

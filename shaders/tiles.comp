@@ -44,6 +44,15 @@ layout(binding = 9) uniform usamplerBuffer pool;
 #include "texture.glsl"
 #endif
 
+// 0: the round is the only one, and no state is kept.
+#ifndef ROUNDS
+#define ROUNDS 0
+#endif
+// 1: rows have an even number of pixels.
+#ifndef EVEN
+#define EVEN 0
+#endif
+
 layout(local_size_x = INVOCATIONS) in;
 
 // Pixels of an invocation's row.
@@ -57,7 +66,12 @@ layout(std430, binding = 2) readonly buffer Rounds { Round rounds[]; };
 layout(std430, binding = 3) readonly buffer Ranges { uvec4 ranges[]; };
 // Colour and opacity of what earlier rounds drew.
 layout(std430, binding = 4) buffer State { vec4 state[]; };
+#if EVEN && PIXEL_WORDS == 2
+// By fours, and so loops of stores that a device without vector stores makes of one.
+layout(std430, binding = 5) writeonly buffer Picture { uvec4 picture[]; };
+#else
 layout(std430, binding = 5) writeonly buffer Picture { uint picture[]; };
+#endif
 #if BEHIND
 // The surfaces, as they lie in their target, and their near/z.
 layout(std430, binding = 6) readonly buffer Under { uint under[]; };
@@ -117,7 +131,7 @@ bool all_agree(bool b) {
 
 #if THIN
 // 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points, within 1.6e-8 of it.
-float opacity(float t) { return t * (0.999999984752 - t * (0.499996093888 - t * (0.166509869621 - t * 0.039641773912))); }
+float opacity(float t) { return t * ((0.999999984752 - t * 0.499996093888) + t * t * (0.166509869621 - t * 0.039641773912)); }
 #else
 float opacity(float t) { return one_minus_exp(t); }
 #endif
@@ -125,6 +139,8 @@ float opacity(float t) { return one_minus_exp(t); }
 // The row of pixels that an invocation owns, while it is composed.
 float x_of[RUN];
 float inv_norm[RUN];
+// -cut: a push constant would be fetched anew for every splat.
+float least;
 vec3 color[RUN];
 float passed[RUN];
 #if BEHIND
@@ -152,17 +168,27 @@ void compose(Loaded splat, float y) {
     float dy = y - s.y;
     // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
     float a = -place.z * (1.0 + s.y * s.y), b = 2.0 * place.z * s.x * s.y * dy, c = -place.z * (1.0 + s.x * s.x) * dy * dy;
+    // Step by step for all pixels, so that what waits for a result stands apart from it.
+    float dx[RUN], e[RUN], tau[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
-        float dx = x_of[j] - s.x;
-        float e = ((a * dx + b) * dx + c) * inv_norm[j];
-        bool is_seen = e >= -push.cut;
+        dx[j] = x_of[j] - s.x;
+        e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_norm[j];
+    }
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        bool is_seen = e[j] >= least;
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
 #endif
 #if TEXTURED
-        e += 1.44269504089 * sheet_exponent(vec2(dx, dy), splat.turn, uvec2(splat.gain.w, splat.side), uintBitsToFloat(splat.gain.xyz));
+        e[j] += 1.44269504089 * sheet_exponent(vec2(dx[j], dy), splat.turn, uvec2(splat.gain.w, splat.side), uintBitsToFloat(splat.gain.xyz));
 #endif
-        float here = passed[j] * opacity(is_seen ? place.w * exp2(e) : 0.0);
+        tau[j] = is_seen ? place.w * exp2(e[j]) : 0.0;
+    }
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        tau[j] = opacity(tau[j]);
+    }
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        float here = passed[j] * tau[j];
         passed[j] -= here;
         color[j] += here * light.xyz;
     }
@@ -250,6 +276,12 @@ vec4 load(uint p) {
 #endif
 }
 
+#if EVEN && PIXEL_WORDS == 2
+// Pixels p and p + 1, p even.
+void store(uint p, vec4 a, vec4 b) {
+    picture[p / 2] = uvec4(packHalf2x16(a.xy), packHalf2x16(a.zw), packHalf2x16(b.xy), packHalf2x16(b.zw));
+}
+#else
 void store(uint p, vec4 value) {
 #if PIXEL_WORDS == 1
     picture[p] = packUnorm4x8(value);
@@ -263,6 +295,7 @@ void store(uint p, vec4 value) {
     picture[4 * p + 3] = floatBitsToUint(value.w);
 #endif
 }
+#endif
 
 #if BEHIND == 2
 float depth_at(uint p) { return float(depths[p] & 0xffffffu) / 16777215.0; }
@@ -270,11 +303,13 @@ float depth_at(uint p) { return float(depths[p] & 0xffffffu) / 16777215.0; }
 float depth_at(uint p) { return uintBitsToFloat(depths[p]); }
 #endif
 
+// Pixel j of the row over what stands behind it.
+vec4 seen(uint j, uint p) { return vec4(color[j], 1.0 - passed[j]) + passed[j] * load(p); }
+
 void main() {
     uint t = gl_LocalInvocationID.x;
     uint w = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    Round this_round = rounds[push.i_round];
-    if (w >= this_round.tiles.w) {
+    if (w >= (ROUNDS != 0 ? rounds[push.i_round].tiles.w : rounds[push.i_round].alone.w)) {
         return;
     }
     uvec4 range = ranges[w / (TILES_ACROSS * TILES_ACROSS)];
@@ -284,15 +319,21 @@ void main() {
     uvec2 at = tile * uvec2(TILE_WIDTH, ROWS) + uvec2(RUN * (t / ROWS), t % ROWS);
     // Pixels beyond the picture's edge are composed as its last ones are, and not kept.
     uint row = min(at.y, push.height - 1u) * push.width;
+    least = -push.cut;
     float y = push.tangents.y - (float(at.y) + 0.5) * push.pixel.y;
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float x = (float(at.x + j) + 0.5) * push.pixel.x - push.tangents.x;
         uint p = row + min(at.x + j, push.width - 1u);
         x_of[j] = x;
         inv_norm[j] = 1.0 / (1.0 + x * x + y * y);
-        vec4 before = push.i_round > 0 ? state[p] : vec4(0.0);
+#if ROUNDS
+        vec4 before = state[p];
         color[j] = before.xyz;
         passed[j] = 1.0 - before.w;
+#else
+        color[j] = vec3(0.0);
+        passed[j] = 1.0;
+#endif
 #if BEHIND
         depth_of[j] = depth_at(p);
 #endif
@@ -318,15 +359,26 @@ void main() {
             break;
         }
     }
-    bool goes_on = this_round.bins.w != 0;
+#if ROUNDS
+    [[unroll]] for (uint j = 0; j < RUN; ++j) {
+        if (at.x + j < push.width && at.y < push.height) {
+            state[row + at.x + j] = vec4(color[j], 1.0 - passed[j]);
+        }
+    }
+#endif
+#if EVEN && PIXEL_WORDS == 2
+    [[unroll]] for (uint j = 0; j < RUN; j += 2) {
+        if (at.x + j < push.width && at.y < push.height) {
+            uint p = row + at.x + j;
+            store(p, seen(j, p), seen(j + 1, p + 1));
+        }
+    }
+#else
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         if (at.x + j < push.width && at.y < push.height) {
             uint p = row + at.x + j;
-            vec4 sum = vec4(color[j], 1.0 - passed[j]);
-            if (goes_on) {
-                state[p] = sum;
-            }
-            store(p, sum + passed[j] * load(p));
+            store(p, seen(j, p));
         }
     }
+#endif
 }

@@ -39,7 +39,14 @@ void main() {
     if (first < end) {
         uint before = atomicAdd(rounds[push.i_round].tiles.w, TILES);
         ranges[before / TILES] = uvec4(first, end, bin, 0);
-        atomicMax(rounds[push.i_round].tiles.x, min(before + TILES, push.max_groups));
-        atomicMax(rounds[push.i_round].tiles.y, (before + TILES + push.max_groups - 1u) / push.max_groups);
+        uvec2 groups = uvec2(min(before + TILES, push.max_groups), (before + TILES + push.max_groups - 1u) / push.max_groups);
+        if (push.i_round == 0 && rounds[0].bins.w == 0) {
+            atomicAdd(rounds[0].alone.w, TILES);
+            atomicMax(rounds[0].alone.x, groups.x);
+            atomicMax(rounds[0].alone.y, groups.y);
+        } else {
+            atomicMax(rounds[push.i_round].tiles.x, groups.x);
+            atomicMax(rounds[push.i_round].tiles.y, groups.y);
+        }
     }
 }

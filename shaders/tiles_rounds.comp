@@ -18,6 +18,7 @@ void close(uint k, uint first, uint end, uint n, bool is_last) {
     rounds[k].blocks = uvec4(end - first, 1, 1, first);
     rounds[k].bins = uvec4(n > 0u ? push.bin_groups : 0u, 1, 1, uint(!is_last));
     rounds[k].tiles = uvec4(0, 0, 1, 0);
+    rounds[k].alone = uvec4(0, 0, 1, 0);
 }
 
 void main() {

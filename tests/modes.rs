@@ -11,7 +11,7 @@ use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::camera::CameraKey;
-use nimbus::model::scene::{Scene, Simulate, Threading};
+use nimbus::model::scene::{DrawPath, Scene, Simulate, Threading};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -98,6 +98,44 @@ fn three_hundred_frames_are_the_same_in_both_loops() {
     let serial = images(serial);
     assert!(serial == images(run_for(300, scene(), Threading::Parallel, true)), "the loops differ");
     assert_ne!(serial[0], serial[150]);
+}
+
+#[test]
+fn tiles_give_the_same_bytes_in_every_mode() {
+    let tiled = || scene(&["draw.path='tiles'"]);
+    let frames = run(tiled(), Threading::Serial, true);
+    assert!(frames.iter().all(|f| f.1.plan.runs(Pass::Tiles) && !f.1.plan.runs(Pass::Sprites)));
+    let first = images(frames);
+    assert!(first == images(run(tiled(), Threading::Serial, true)), "twice");
+    assert!(first == images(run(tiled(), Threading::Parallel, true)), "parallel");
+    assert!(first == images(run(tiled(), Threading::Serial, false)), "no skip");
+    assert!(first.windows(2).all(|w| w[0] != w[1]));
+    // Another way to draw, and so other roundings.
+    assert!(first != images(run(scene(&[]), Threading::Serial, true)));
+}
+
+/// "auto" draws what the path that it took draws, and says which.
+#[test]
+fn the_faster_way_is_taken_and_named() {
+    let stage = |path: &str| {
+        let choice = nimbus::study::stage::DeviceChoice { validation: true, ..Default::default() };
+        nimbus::study::stage::Stage::new(scene(&[path]), &choice, true).expect("a stage")
+    };
+    let mut auto = stage("draw.path='auto'");
+    let choice = auto.choice.take().expect("a choice");
+    let tiles_ms = choice.tiles_ms.expect("tiles can draw it");
+    let faster = if tiles_ms < choice.sprites_ms { ("tiles", DrawPath::Tiles) } else { ("sprites", DrawPath::Sprites) };
+    assert_eq!((choice.path, auto.scene.draw.path), (faster.1, faster.1));
+    assert!(choice.text().contains(&format!("took \"{}\"", faster.0)), "{}", choice.text());
+    let mut named = stage(&format!("draw.path='{}'", faster.0));
+    assert_eq!(named.choice, None);
+    let images = [&mut auto, &mut named].map(|stage| {
+        let packet = stage.game.step(3).expect("a packet");
+        stage.renderer.step(packet).expect("a frame");
+        stage.renderer.image_bytes().expect("a picture")
+    });
+    assert!(images[0] == images[1]);
+    [auto, named].into_iter().for_each(|stage| stage.close().expect("no message"));
 }
 
 #[test]

@@ -218,6 +218,9 @@ fn bench_one(
         let zones = zones.map(Zones::take);
         trace::write(file, &outcome.samples, &Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
     }
+    for chosen in outcome.chosen.iter().filter(|_| !args.options.quiet) {
+        eprintln!("note: {chosen}");
+    }
     for note in outcome.notes.iter().filter(|_| !args.options.quiet) {
         eprintln!("warning: {note}");
     }

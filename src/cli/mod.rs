@@ -120,9 +120,12 @@ fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
     }))
 }
 
-/// What is odd about the last frame's light, on stderr.
+/// What "auto" took, and what is odd about the last frame's light, on stderr.
 fn say_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
     if !args.quiet {
+        if let Some(choice) = &stage.choice {
+            eprintln!("note: {}", choice.text());
+        }
         for note in light_notes(stage)? {
             eprintln!("warning: {note}");
         }

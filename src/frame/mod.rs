@@ -2,6 +2,8 @@
 //! [`parallel`] are two loops around these two; [`plan`] says what a frame can leave out.
 
 pub mod buffers;
+pub mod choice;
+mod drawing;
 mod drawn;
 pub mod exchange;
 pub mod feed;

@@ -6,6 +6,7 @@ use std::time::Instant;
 use tracing::info_span;
 
 use super::buffers::{Buffers, Placed, has_second};
+use super::drawing::{draw_sprites, draw_tiles};
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::feed::IN_FLIGHT;
 use super::grouping::{Grouping, is_grouped};
@@ -13,7 +14,7 @@ use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, plan};
 use super::relay::Relay;
 use super::tensor::{TensorStage, tensor_stage};
-use super::tiling::{Tiling, saturated, variant};
+use super::tiling::{Tiling, saturated};
 use super::{limits, ms};
 use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
@@ -30,7 +31,6 @@ use crate::passes::sort::Sort;
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
 use crate::passes::texture::Texture;
-use crate::passes::tiles::{Division, View, invocations};
 use crate::passes::transmit::Transmit;
 
 // Commands first: they are dropped first, and wait for what is still under way.
@@ -52,17 +52,17 @@ pub struct Renderer {
     sort: Sort,
     /// None where no cloud has a texture.
     texture: Option<Texture>,
-    sprites: Sprites,
+    pub(super) sprites: Sprites,
     pub(super) tiling: Option<Tiling>,
     pub(super) buffers: Buffers,
     /// A frame that changes the picture draws into the one that the frame before has not.
     pub(super) targets: [Image; IN_FLIGHT],
     /// The last submitted frame's target.
-    i_target: usize,
+    pub(super) i_target: usize,
     /// The last ended frame's.
     pub(super) i_ended_target: usize,
     /// What draws the surfaces, and their depth; none where there are none.
-    scenery: Option<(Surfaces, Image)>,
+    pub(super) scenery: Option<(Surfaces, Image)>,
     pub(super) readback: Buffer,
     pub(super) settings: Settings,
     pub(super) traits: Traits,
@@ -87,7 +87,7 @@ pub(super) struct InFlight {
 /// What of the scene the passes are told and that is constant over a run.
 pub(super) struct Settings {
     pub n_particles: u32,
-    n_surface_facets: u32,
+    pub n_surface_facets: u32,
     pub n_facets: u32,
     pub n_lights: u32,
     n_surfaces: u32,
@@ -95,8 +95,8 @@ pub(super) struct Settings {
     pub forward: f64,
     sort_bits: u32,
     texture_seed: u32,
-    cutoff: f64,
-    saturated: f64,
+    pub cutoff: f64,
+    pub saturated: f64,
     pub format: TargetFormat,
 }
 
@@ -163,11 +163,9 @@ impl Renderer {
             texture,
             tiling: match scene.draw.path {
                 DrawPath::Sprites => None,
-                DrawPath::Tiles => {
-                    let division = Division::of(scene.film.width, scene.film.height, invocations(device.limits()))?;
-                    let variant = variant(scene, lit, grouped, format);
-                    Some(Tiling::new(device, compiler, division, n_particles, &variant)?)
-                }
+                DrawPath::Tiles => Some(Tiling::of_scene(device, compiler, scene, lit, grouped, format)?),
+                // What they cannot draw sprites will.
+                DrawPath::Auto => Tiling::of_scene(device, compiler, scene, lit, grouped, format).ok(),
             },
             sprites: Sprites::new(
                 device,
@@ -208,7 +206,8 @@ impl Renderer {
                 n_surfaces: scene.surfaces.len() as u32,
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
-                path: scene.draw.path,
+                // Until it is chosen.
+                path: if scene.draw.path == DrawPath::Tiles { DrawPath::Tiles } else { DrawPath::Sprites },
                 skip,
             },
             last: None,
@@ -327,10 +326,11 @@ impl Renderer {
             targets,
             i_target,
             settings: s,
+            traits,
             frames,
             ..
         } = self;
-        let (n, target) = (s.n_particles, &mut targets[*i_target]);
+        let (n, target, path) = (s.n_particles, &mut targets[*i_target], traits.path);
         frames[slot].record(Barriers::Placed, |rec| {
             b.record_feeds(rec, slot);
             grouping.iter().for_each(|g| g.record_feeds(rec, slot));
@@ -407,17 +407,12 @@ impl Renderer {
                 }
                 None => Ok(()),
             })?;
-            let counts = [packet.n_drawn, s.n_surface_facets];
-            let has_surfaces = depth.is_some();
             let on = Target { color: target, depth };
-            match tiling {
-                None => pass(rec, plan, Pass::Sprites, |rec| {
-                    sprites.record(rec, b.of_sprites(), on, &packet.camera, s.cutoff, counts)
-                }),
-                Some(tiling) => pass(rec, plan, Pass::Tiles, |rec| {
-                    let view = View { camera: &packet.camera, cutoff: s.cutoff, saturated: s.saturated };
-                    tiling.record(rec, *i_target, has_surfaces.then_some(on), b.of_sprites(), &view, counts)
-                }),
+            match tiling.as_ref().filter(|_| path == DrawPath::Tiles) {
+                None => pass(rec, plan, Pass::Sprites, |rec| draw_sprites(rec, sprites, b, on, packet, s)),
+                Some(tiling) => {
+                    pass(rec, plan, Pass::Tiles, |rec| draw_tiles(rec, tiling, *i_target, b, on, packet, s))
+                }
             }
         })
     }

@@ -8,7 +8,7 @@ use crate::model::cloud::{Group, SQRT_TAU};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
 use crate::passes::sort::{Counts, Sort, TILE};
-use crate::passes::tiles::{Division, Tiles, Variant, View};
+use crate::passes::tiles::{Division, Tiles, Variant, View, invocations};
 
 pub struct Tiling {
     tiles: Tiles,
@@ -31,6 +31,20 @@ impl Tiling {
         let picture = |name| Buffer::new::<u8>(device, name, bytes, Place::Device);
         let sort = Sort::new(device, compiler, tiles.capacity())?;
         Ok(Tiling { sort, tiles, pictures: [picture("tiles.even")?, picture("tiles.odd")?] })
+    }
+
+    /// For the pictures of `scene`.
+    pub fn of_scene(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        lit: bool,
+        grouped: bool,
+        format: TargetFormat,
+    ) -> Result<Tiling> {
+        let division = Division::of(scene.film.width, scene.film.height, invocations(device.limits()))?;
+        let variant = variant(scene, lit, grouped, format);
+        Tiling::new(device, compiler, division, scene.n_particles() as u32, &variant)
     }
 
     /// Draws the first `n` of the sorted entries, `counts` [n, first facet of a particle], into picture `i`, over the drawn
@@ -65,7 +79,7 @@ impl Tiling {
 }
 
 /// How a scene is drawn.
-pub fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
+fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
         lit,

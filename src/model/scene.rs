@@ -120,10 +120,13 @@ pub enum DrawPath {
     Sprites,
     /// Tiles of pixels in compute.
     Tiles,
+    /// Whichever is faster at the scene's first frame.
+    Auto,
 }
 
 impl DrawPath {
-    pub const NAMES: [(&'static str, DrawPath); 2] = [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles)];
+    pub const NAMES: [(&'static str, DrawPath); 3] =
+        [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles), ("auto", DrawPath::Auto)];
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

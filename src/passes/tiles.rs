@@ -151,7 +151,9 @@ pub struct Tiles {
     clear: Kernel,
     pairs: Kernel,
     ranges: Kernel,
-    compose: Kernel,
+    /// Composes the only round of a frame; and one of several.
+    alone: Kernel,
+    compose: Option<Kernel>,
     pub division: Division,
     /// Of the compose kernel.
     n_bindings: usize,
@@ -212,6 +214,7 @@ impl Tiles {
         let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
             .map(|(k, v)| (k, u32::from(v)));
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
+        let even = u32::from(division.width % 2 == 0);
         let macros = [
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
@@ -220,7 +223,12 @@ impl Tiles {
             ("TEXTURED", u32::from(variant.textured)),
             ("PIXEL_WORDS", (variant.format.bytes_per_pixel() / 4) as u32),
             ("BEHIND", behind),
+            ("EVEN", even),
         ];
+        let compose = |rounds: u32| {
+            let macros = [&macros[..], &[("ROUNDS", rounds)]].concat();
+            Kernel::with_macros(device, compiler, "tiles", Push::FIELDS, &[], &macros)
+        };
         let buffer = |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
         let n_state = if n_rounds > 1 { division.n_pixels() } else { 1 };
         let n_sheets = if variant.textured { u64::from(n_max) } else { 1 };
@@ -231,7 +239,8 @@ impl Tiles {
             clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
             pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[])?,
             ranges: Kernel::new(device, compiler, "tiles.ranges", RangesPush::FIELDS, &[])?,
-            compose: Kernel::with_macros(device, compiler, "tiles", Push::FIELDS, &[], &macros)?,
+            alone: compose(0)?,
+            compose: if n_rounds > 1 { Some(compose(1)?) } else { None },
             division,
             n_bindings: if variant.textured {
                 10
@@ -365,12 +374,14 @@ impl Tiles {
             &self.sheets,
             pool,
         ];
-        rec.dispatch_counted(
-            &self.compose,
-            &buffers[..self.n_bindings],
-            &push,
-            (&self.round, ROUND_WORDS * i_round + 12),
-        )
+        let buffers = &buffers[..self.n_bindings];
+        if i_round == 0 {
+            rec.dispatch_counted(&self.alone, buffers, &push, (&self.round, 16))?;
+        }
+        match &self.compose {
+            Some(compose) => rec.dispatch_counted(compose, buffers, &push, (&self.round, ROUND_WORDS * i_round + 12)),
+            None => Ok(()),
+        }
     }
 
     /// Slopes of a pixel's sides.

@@ -1,5 +1,6 @@
 //! Frames of a scene, timed: each case in each of its loops, in interleaved blocks.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use sha2::{Digest, Sha256};
@@ -11,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
+use crate::model::scene::{DrawPath, Scene};
 
 /// How long and how often.
 #[derive(Debug, Clone, Copy)]
@@ -52,6 +54,8 @@ pub struct Outcome {
     pub blocks: Vec<Block>,
     /// What is odd about the light of a case's last frame.
     pub notes: Vec<String>,
+    /// What draws, where `draw.path` is "auto", and why.
+    pub chosen: Vec<String>,
     pub interrupted: bool,
 }
 
@@ -90,18 +94,23 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
     let mut ran = Ran { stage: Some(stage), outcome: Outcome::default(), failure: None };
     let order = block_order(cases, plan.n_rounds);
     let mut i_staged = 0;
+    // What "auto" came to at a case's first block holds for all of them.
+    let mut paths: Vec<Option<DrawPath>> = vec![None; cases.len()];
     for (i_block, (i_case, of)) in (0u32..).zip(order.iter().copied()) {
         let case = &cases[i_case];
         let is_staged = std::mem::replace(&mut i_staged, i_case) == i_case;
         let is_last = !order[i_block as usize + 1..].iter().any(|(i, _)| *i == i_case);
         let mut block = || -> Result<()> {
             let stage = ran.stage.take().ok_or_else(|| Error::usage("the stage before this block has failed"))?;
-            let stage = if is_staged { stage } else { stage.again(case.scene.clone(), of.skip)? };
+            let stage = if is_staged { stage } else { stage.again(with_path(&case.scene, paths[i_case]), of.skip)? };
             let stage = ran.stage.insert(stage);
+            paths[i_case] = Some(stage.scene.draw.path);
+            if let Some(choice) = stage.choice.take() {
+                ran.outcome.chosen.push(named(cases, case, &choice.text()));
+            }
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
             if is_last {
-                let name = if cases.len() > 1 { format!("{}: ", case.name()) } else { String::new() };
-                ran.outcome.notes.extend(light_notes(stage)?.into_iter().map(|note| name.clone() + &note));
+                ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
             }
             Ok(())
         };
@@ -115,6 +124,23 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
         }
     }
     ran
+}
+
+/// A note, with its case's name where there are several.
+fn named(cases: &[Case], case: &Case, note: &str) -> String {
+    if cases.len() > 1 { format!("{}: {note}", case.name()) } else { note.to_owned() }
+}
+
+/// The scene drawn by `path` where that is known.
+fn with_path(scene: &Arc<Scene>, path: Option<DrawPath>) -> Arc<Scene> {
+    match path {
+        Some(path) if path != scene.draw.path => {
+            let mut scene = Scene::clone(scene);
+            scene.draw.path = path;
+            Arc::new(scene)
+        }
+        _ => scene.clone(),
+    }
 }
 
 fn run_block(

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
+use crate::frame::choice::Choice;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::{OnFrame, parallel, serial};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
-use crate::model::scene::{Scene, Simulate, Threading};
+use crate::model::scene::{DrawPath, Scene, Simulate, Threading};
 use crate::passes;
 
 /// How to open a device.
@@ -25,7 +26,10 @@ pub struct DeviceChoice {
 pub struct Stage {
     pub renderer: Renderer,
     pub game: Game,
+    /// Its `draw.path` is what is drawn by.
     pub scene: Arc<Scene>,
+    /// What "auto" came to, where the scene asks for it.
+    pub choice: Option<Choice>,
     compiler: Compiler,
     pub device: Device,
     instance: Arc<Instance>,
@@ -46,7 +50,7 @@ impl Stage {
 
     /// Another scene on the same device; what was there for this one is given back first.
     pub fn again(self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Stage> {
-        let Stage { renderer, game, scene: _, compiler, device, instance } = self;
+        let Stage { renderer, game, compiler, device, instance, .. } = self;
         drop((renderer, game));
         Stage::build(scene.into(), skip, compiler, device, instance)
     }
@@ -63,8 +67,15 @@ impl Stage {
             Simulate::Gpu => None,
             Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
         };
-        let game = Game::new(scene.clone(), rest).culling(skip);
-        Ok(Stage { renderer, game, scene, compiler, device, instance })
+        let mut game = Game::new(scene.clone(), rest).culling(skip);
+        let (mut scene, mut choice) = (scene, None);
+        if scene.draw.path == DrawPath::Auto {
+            let packet = game.step(0)?;
+            let chosen = renderer.choose_path(&packet)?;
+            Arc::make_mut(&mut scene).draw.path = chosen.path;
+            choice = Some(chosen);
+        }
+        Ok(Stage { renderer, game, scene, choice, compiler, device, instance })
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
@@ -93,7 +104,7 @@ impl Stage {
 
     /// Ends the stage; an error where validation or the leak report had anything to say.
     pub fn close(self) -> Result<()> {
-        let Stage { renderer, game, scene: _, compiler: _, device, instance } = self;
+        let Stage { renderer, game, device, instance, .. } = self;
         drop((renderer, game));
         drop(device);
         let said = instance.messages().take();

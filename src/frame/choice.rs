@@ -1,0 +1,90 @@
+//! What `draw.path = "auto"` takes: the scene's first frame is drawn in both ways, and timed.
+
+use std::time::Instant;
+
+use super::drawing::{draw_sprites, draw_tiles};
+use super::ms;
+use super::packet::Packet;
+use super::render::Renderer;
+use crate::error::Result;
+use crate::gpu::Target;
+use crate::model::scene::DrawPath;
+
+/// Timed turns of each way; before them one that is not, in which a driver may compile.
+const N_TURNS: usize = 3;
+
+/// The way that was the faster, and the medians of both, ms of device time (of wall time without timestamps).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Choice {
+    pub path: DrawPath,
+    pub sprites_ms: f64,
+    /// None where tiles cannot draw the scene on this device.
+    pub tiles_ms: Option<f64>,
+}
+
+impl Choice {
+    /// As users are told.
+    pub fn text(&self) -> String {
+        let sprites = format!("{:.2} ms of sprites", self.sprites_ms);
+        match (self.path, self.tiles_ms) {
+            (DrawPath::Tiles, Some(ms)) => {
+                format!("draw.path = \"auto\" took \"tiles\": {ms:.2} ms against {sprites} at the first frame")
+            }
+            (_, Some(ms)) => {
+                format!(
+                    "draw.path = \"auto\" took \"sprites\": {sprites} against {ms:.2} ms of tiles at the first frame"
+                )
+            }
+            (_, None) => {
+                "draw.path = \"auto\" took \"sprites\": tiles cannot draw this scene on this device".to_owned()
+            }
+        }
+    }
+}
+
+impl Renderer {
+    /// Draws `packet`'s frame in both ways, and from now on in the faster one. What the other needs is given back. The next
+    /// frame is like a first one.
+    pub fn choose_path(&mut self, packet: &Packet) -> Result<Choice> {
+        self.step(packet.clone())?;
+        let mut times = [vec![], vec![]];
+        let has_tiles = self.tiling.is_some();
+        for i in 0..=N_TURNS {
+            for (k, path) in [DrawPath::Sprites, DrawPath::Tiles].into_iter().enumerate() {
+                if path == DrawPath::Sprites || has_tiles {
+                    let time = self.time_drawing(path, packet)?;
+                    if i > 0 {
+                        times[k].push(time);
+                    }
+                }
+            }
+        }
+        let [sprites_ms, tiles_ms] = times.map(|mut of| {
+            of.sort_by(f64::total_cmp);
+            of.get(of.len() / 2).copied()
+        });
+        let sprites_ms = sprites_ms.unwrap_or(f64::NAN);
+        let path = if tiles_ms.is_some_and(|t| t < sprites_ms) { DrawPath::Tiles } else { DrawPath::Sprites };
+        if path == DrawPath::Sprites {
+            self.tiling = None;
+        }
+        self.traits.path = path;
+        self.reset();
+        Ok(Choice { path, sprites_ms, tiles_ms })
+    }
+
+    /// Draws what is sorted once more, ms.
+    fn time_drawing(&mut self, path: DrawPath, packet: &Packet) -> Result<f64> {
+        let Renderer { host, sprites, tiling, buffers, targets, i_target, scenery, settings, .. } = self;
+        let begin = Instant::now();
+        let scopes = host.run(|rec| {
+            let depth = scenery.as_mut().map(|(_, depth)| depth);
+            let on = Target { color: &mut targets[*i_target], depth };
+            rec.scope("draw", |rec| match tiling.as_ref().filter(|_| path == DrawPath::Tiles) {
+                None => draw_sprites(rec, sprites, buffers, on, packet, settings),
+                Some(tiling) => draw_tiles(rec, tiling, *i_target, buffers, on, packet, settings),
+            })
+        })?;
+        Ok(scopes.first().map_or(ms(begin, Instant::now()), |scope| scope.ms()))
+    }
+}

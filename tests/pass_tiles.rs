@@ -51,9 +51,26 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
         let (truths, bounds) = picture.tiled_truth(format, tiled.saturated);
         println!("{what}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
         assert_within(&what, &values, &truths, &bounds);
+        assert_small(&what, format, [&values, &truths], picture.most_layers());
         greatest = truths.iter().fold(greatest, |a, b| a.max(*b));
     }
     greatest
+}
+
+/// What users are promised: the root mean square over the picture, of full scale. Half floats round once to 2^-11 of a value at
+/// most; f32 errs by some units of 2^-24 a layer, and where rounding decides on an edge by the step there, in few pixels.
+fn assert_small(what: &str, format: FilmFormat, [values, truths]: [&[f64]; 2], n_layers: usize) {
+    let scale = truths.iter().fold(1.0, |a: f64, b| a.max(b.abs()));
+    let sum: f64 = values.iter().zip(truths).map(|(a, b)| ((a - b) / scale).powi(2)).sum();
+    let rms = (sum / values.len() as f64).sqrt();
+    let most = match format {
+        // Half a step, evenly spread: 1/(255 sqrt 12).
+        FilmFormat::Rgba8 => 1.2 / (255.0 * 12f64.sqrt()),
+        FilmFormat::Rgba16f => 1e-3,
+        FilmFormat::Rgba32f => 2e-6 * n_layers.max(1) as f64,
+    };
+    println!("{what}: rms {rms:.2e} of full scale, {n_layers} layers at most");
+    assert!(rms <= most, "{what}: rms {rms:e}, more than {most:e}");
 }
 
 /// Blobs thin and opaque, some in one place, before and behind the eye, of sigma from 10^`least` to 1.

@@ -2,12 +2,28 @@
 
 use glam::DVec2;
 use nimbus::model::film::FilmFormat;
+use nimbus::reference::Blob;
 use nimbus::reference::sprites::{Behind, Rounding};
 use nimbus::reference::tiles::{self, Composition};
 
 use crate::picture::Picture;
 
 impl Picture {
+    /// The most blobs that are seen in one pixel.
+    pub fn most_layers(&self) -> usize {
+        let (view, blobs) = (&self.view, self.blobs());
+        let pixels = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
+        let layers = |(i, j): (u32, u32)| {
+            let d = view.ray(i, j);
+            let covers = |b: &&Blob| {
+                let c = b.position - view.pose.position;
+                c.dot(view.pose.forward) >= view.near && c.cross(d).length() <= view.cutoff * b.sigma * d.length()
+            };
+            blobs.iter().filter(covers).count()
+        };
+        pixels.map(layers).max().unwrap_or(0)
+    }
+
     pub fn tiled_truth(&self, format: FilmFormat, saturated: f64) -> (Vec<f64>, Vec<f64>) {
         let (off_alpha, edge) = self.worst(true);
         let rounding = Rounding::of(format, off_alpha, edge);

@@ -164,8 +164,11 @@ impl Renderer {
             tiling: match scene.draw.path {
                 DrawPath::Sprites => None,
                 DrawPath::Tiles => Some(Tiling::of_scene(device, compiler, scene, lit, grouped, format)?),
-                // What they cannot draw sprites will.
-                DrawPath::Auto => Tiling::of_scene(device, compiler, scene, lit, grouped, format).ok(),
+                DrawPath::Auto => match Tiling::of_scene(device, compiler, scene, lit, grouped, format) {
+                    // What is too large for them sprites will draw.
+                    Err(Error::Limit { .. }) => None,
+                    tiling => Some(tiling?),
+                },
             },
             sprites: Sprites::new(
                 device,

@@ -214,7 +214,7 @@ impl Tiles {
         let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
             .map(|(k, v)| (k, u32::from(v)));
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
-        let even = u32::from(division.width % 2 == 0);
+        let even = u32::from(division.width.is_multiple_of(2));
         let macros = [
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),

@@ -34,6 +34,10 @@
 #define BEHIND 0
 #endif
 
+// A splat ends where its optical depth falls under a threshold.
+#ifndef THRESHOLD
+#define THRESHOLD 0
+#endif
 // Splats have textures.
 #ifndef TEXTURED
 #define TEXTURED 0
@@ -50,7 +54,7 @@ layout(local_size_x = INVOCATIONS) in;
 const uint RUN = 8;
 const uint TILE_WIDTH = RUN * (INVOCATIONS / ROWS);
 
-layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; } push;
+layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; float inv_threshold; } push;
 layout(binding = 0) uniform usamplerBuffer splats;
 layout(std430, binding = 1) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 2) readonly buffer Rounds { Round rounds[]; };
@@ -152,10 +156,14 @@ void compose(Loaded splat, float y) {
     float dy = y - s.y;
     // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
     float a = -place.z * (1.0 + s.y * s.y), b = 2.0 * place.z * s.x * s.y * dy, c = -place.z * (1.0 + s.x * s.x) * dy * dy;
+    float cut = push.cut;
+#if THRESHOLD
+    cut = min(cut, log2(place.w * push.inv_threshold));
+#endif
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float dx = x_of[j] - s.x;
         float e = ((a * dx + b) * dx + c) * inv_norm[j];
-        bool is_seen = e >= -push.cut;
+        bool is_seen = e >= -cut;
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
 #endif

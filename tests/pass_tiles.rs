@@ -207,7 +207,7 @@ fn wrong_pictures_are_noticed() {
     values[i] -= 2.0 * bounds[i];
     assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "one corrupted number");
     for (file, from, to) in [
-        ("tiles.comp", "e >= -push.cut", "e >= -0.9 * push.cut"),
+        ("tiles.comp", "e >= -cut", "e >= -0.9 * cut"),
         ("tiles.comp", "* inv_norm[j]", ""),
         ("tiles.comp", "passed[j] -= here;", "passed[j] -= 0.999 * here;"),
         ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),

@@ -96,6 +96,7 @@ pub(super) struct Settings {
     sort_bits: u32,
     texture_seed: u32,
     cutoff: f64,
+    threshold: f64,
     saturated: f64,
     pub format: TargetFormat,
 }
@@ -174,7 +175,7 @@ impl Renderer {
                 compiler,
                 format,
                 lit,
-                [scenery.is_some(), grouped, scene.draw.count.is_some(), textured],
+                [scenery.is_some(), grouped, scene.draw.count.is_some(), textured, scene.draw.threshold > 0.0],
             )?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             targets: [target("sprites.even")?, target("sprites.odd")?],
@@ -194,6 +195,7 @@ impl Renderer {
                 sort_bits: scene.draw.sort_bits,
                 texture_seed: scene.draw.texture_seed,
                 cutoff: scene.draw.cutoff,
+                threshold: scene.draw.threshold,
                 saturated: saturated(scene.film.format),
                 format,
             },
@@ -412,10 +414,11 @@ impl Renderer {
             let on = Target { color: target, depth };
             match tiling {
                 None => pass(rec, plan, Pass::Sprites, |rec| {
-                    sprites.record(rec, b.of_sprites(), on, &packet.camera, s.cutoff, counts)
+                    sprites.record(rec, b.of_sprites(), on, &packet.camera, [s.cutoff, s.threshold], counts)
                 }),
                 Some(tiling) => pass(rec, plan, Pass::Tiles, |rec| {
-                    let view = View { camera: &packet.camera, cutoff: s.cutoff, saturated: s.saturated };
+                    let Settings { cutoff, threshold, saturated, .. } = *s;
+                    let view = View { camera: &packet.camera, cutoff, threshold, saturated };
                     tiling.record(rec, *i_target, has_surfaces.then_some(on), b.of_sprites(), &view, counts)
                 }),
             }

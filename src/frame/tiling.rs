@@ -68,6 +68,7 @@ impl Tiling {
 pub fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
+        threshold: scene.draw.threshold > 0.0,
         lit,
         grouped,
         weighted: scene.draw.count.is_some(),

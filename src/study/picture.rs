@@ -10,6 +10,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
 use crate::reference::sprites::{Behind, Rounding, View};
+use crate::reference::threshold::{self, Cut};
 use crate::reference::volume::Volume;
 use crate::reference::{Blob, count, place, sort, sprites, surfaces};
 
@@ -44,6 +45,8 @@ pub struct Picture {
     pub brightest: f64,
     /// How many particles it shows, in view or not.
     pub n_particles: usize,
+    /// Most that `draw.threshold` cuts of a pixel; of the volume, which knows none, nothing.
+    pub cut: Cut,
 }
 
 /// The scene at `time_s`.
@@ -58,7 +61,8 @@ pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener)
         Drawing::Thin => {
             let (blobs, order) = drawn(scene, &truth);
             let (rgba, _) = sprites::render_over(&view, &behind, &blobs, &radiance, &order, &Rounding::NONE);
-            Picture { rgba, error: None, brightest, n_particles: order.len() }
+            let cut = threshold::cut(&view, &behind, &blobs, None).into_iter().fold(Cut::default(), Cut::most);
+            Picture { rgba, error: None, brightest, n_particles: order.len(), cut }
         }
         Drawing::Volume => {
             let volume = Volume::new(&view, &truth.blobs, &radiance);
@@ -71,7 +75,7 @@ pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener)
             let pixels = rows.concat();
             let error = pixels.iter().map(|p| p.error).fold(0.0, f64::max);
             let rgba = pixels.into_iter().map(|p| p.color).collect();
-            Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len() }
+            Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len(), cut: Cut::default() }
         }
     })
 }
@@ -105,6 +109,7 @@ fn view(scene: &Scene, truth: &Truth) -> View {
         fov_y_rad: scene.camera.fov_y_rad,
         near: scene.camera.near,
         cutoff: scene.draw.cutoff,
+        threshold: scene.draw.threshold,
     }
 }
 

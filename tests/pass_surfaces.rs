@@ -345,7 +345,7 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut record = |pass: Option<&Sprites>, depth: Option<&mut Image>| {
         let target = Target { color: &mut color, depth };
         gpu.commands.record(Barriers::Placed, |rec| match pass {
-            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, 3.0, [0, 0]),
+            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], [0, 0]),
             None => surfaces.record(rec, [&buffer; 2], target, &camera, 0),
         })
     };

@@ -272,7 +272,7 @@ fn draw(
     }
     let cut = view.cut(blob);
     let slack = r.slack(cut);
-    if !(cut + slack > 0.0) {
+    if cut + slack <= 0.0 {
         return;
     }
     let n_rows = (band.len() / view.width as usize) as u32;

@@ -46,13 +46,13 @@ fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
     }
     let threshold = 2f64.powf(within(-13.0, -2.0));
     let view = View { width: 60, height: 45, cutoff: within(1.0, 5.0), threshold, ..picture.view };
-    if seed % 2 == 0 {
+    if seed.is_multiple_of(2) {
         let record =
             |i: u32| TexturedRecord { seed: 9, i_box: i, i_first: 0, i_field: i % 8, strength: 0.2 * i as f32 };
         let i_group = (0..n).map(|i| i / 10).collect();
         picture.textured = Some((i_group, (0..6).map(record).collect(), pool.clone()));
     }
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         let part =
             |i: u32| DrawnRecord { shift: 0, end: 10 * i + 7, kappa_scale: 1.0 + 0.2 * i as f32, last_weight: 0.3 };
         picture.drawn = Some(((0..n).map(|i| i / 10).collect(), (0..6).map(part).collect()));

@@ -5,6 +5,7 @@
 #include "functions.glsl"
 
 layout(constant_id = 4) const uint TEXTURED = 0;
+layout(constant_id = 5) const uint THRESHOLD = 0;
 
 layout(binding = 8) uniform usamplerBuffer pool;
 #define SHEET_PIXELS
@@ -12,13 +13,14 @@ layout(binding = 8) uniform usamplerBuffer pool;
 
 // Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md §9).
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; } push;
 
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;
 layout(location = 2) flat in vec4 in_turn;
 layout(location = 3) flat in uvec2 in_place;
 layout(location = 4) flat in vec3 in_gain;
+layout(location = 5) flat in float in_cut;
 layout(location = 0) out vec4 out_color;
 
 void main() {
@@ -30,8 +32,9 @@ void main() {
     float twist = s.x * delta.y - s.y * delta.x;
     // b^2/(2 sigma^2)
     float e = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
+    float cut = THRESHOLD != 0 ? in_cut : 0.5 * push.cutoff * push.cutoff;
     float alpha = 0.0;
-    if (e <= 0.5 * push.cutoff * push.cutoff) {
+    if (e <= cut) {
         float exponent = -e;
         if (TEXTURED != 0) {
             exponent += sheet_exponent(delta, in_turn, in_place, in_gain);

@@ -19,8 +19,10 @@ layout(constant_id = 2) const uint GROUPED = 0;
 layout(constant_id = 3) const uint WEIGHTED = 0;
 // 1: some have textures.
 layout(constant_id = 4) const uint TEXTURED = 0;
+// 1: a sprite ends where its optical depth falls under a threshold.
+layout(constant_id = 5) const uint THRESHOLD = 0;
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
@@ -36,6 +38,8 @@ layout(location = 1) flat out vec3 out_radiance;
 layout(location = 2) flat out vec4 out_turn;
 layout(location = 3) flat out uvec2 out_place;
 layout(location = 4) flat out vec3 out_gain;
+// b^2/(2 sigma^2) where it ends; only where there is a threshold.
+layout(location = 5) flat out float out_cut;
 
 // Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is snapped.
 const float SNAP = 1.0 / 16.0;
@@ -60,12 +64,19 @@ void main() {
     out_gain = sheet.gain;
     uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
     out_radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
-    if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
+    float reach = push.cutoff;
+    bool empty = !(tau > 0.0);
+    if (THRESHOLD != 0) {
+        out_cut = min(0.5 * push.cutoff * push.cutoff, log(tau * push.inv_threshold));
+        empty = empty || !(out_cut > 0.0);
+        reach = sqrt(2.0 * max(out_cut, 0.0));
+    }
+    if (!(v.z >= push.camera.near) || empty) {
         // Nothing to draw: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
         return;
     }
-    float r = GROWTH * push.cutoff * sigma;
+    float r = GROWTH * reach * sigma;
     vec2 x = (tangents(v.x, v.z, r) + vec2(-SNAP, SNAP) * push.pixel.x) / push.camera.tan_x;
     vec2 y = (tangents(v.y, v.z, r) + vec2(-SNAP, SNAP) * push.pixel.y) / push.camera.tan_y;
     // Only what lies on the screen: huge quads cost the rasteriser its accuracy.

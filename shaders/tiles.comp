@@ -34,6 +34,10 @@
 #define BEHIND 0
 #endif
 
+// A splat ends where its optical depth falls under a threshold.
+#ifndef THRESHOLD
+#define THRESHOLD 0
+#endif
 // Splats have textures.
 #ifndef TEXTURED
 #define TEXTURED 0
@@ -59,7 +63,7 @@ layout(local_size_x = INVOCATIONS) in;
 const uint RUN = 8;
 const uint TILE_WIDTH = RUN * (INVOCATIONS / ROWS);
 
-layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; } push;
+layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; float inv_threshold; } push;
 layout(binding = 0) uniform usamplerBuffer splats;
 layout(std430, binding = 1) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 2) readonly buffer Rounds { Round rounds[]; };
@@ -141,6 +145,9 @@ float x_of[RUN];
 float inv_norm[RUN];
 // -cut: a push constant would be fetched anew for every splat.
 float least;
+#if THRESHOLD
+float inv_threshold;
+#endif
 vec3 color[RUN];
 float passed[RUN];
 #if BEHIND
@@ -168,6 +175,11 @@ void compose(Loaded splat, float y) {
     float dy = y - s.y;
     // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
     float a = -place.z * (1.0 + s.y * s.y), b = 2.0 * place.z * s.x * s.y * dy, c = -place.z * (1.0 + s.x * s.x) * dy * dy;
+#if THRESHOLD
+    float lowest = max(least, -log2(place.w * inv_threshold));
+#else
+    float lowest = least;
+#endif
     // Step by step for all pixels, so that what waits for a result stands apart from it.
     float dx[RUN], e[RUN], tau[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
@@ -175,7 +187,7 @@ void compose(Loaded splat, float y) {
         e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_norm[j];
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
-        bool is_seen = e[j] >= least;
+        bool is_seen = e[j] >= lowest;
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
 #endif
@@ -320,6 +332,9 @@ void main() {
     // Pixels beyond the picture's edge are composed as its last ones are, and not kept.
     uint row = min(at.y, push.height - 1u) * push.width;
     least = -push.cut;
+#if THRESHOLD
+    inv_threshold = push.inv_threshold;
+#endif
     float y = push.tangents.y - (float(at.y) + 0.5) * push.pixel.y;
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float x = (float(at.x + j) + 0.5) * push.pixel.x - push.tangents.x;

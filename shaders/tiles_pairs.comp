@@ -9,7 +9,10 @@
 
 layout(local_size_x = 256) in;
 
-layout(push_constant) uniform Push { vec2 tangents; vec2 tile; uint n_splats; uint n_bins_x; uint i_round; float cut; } push;
+// As in sprites.vert.
+layout(constant_id = 5) const uint THRESHOLD = 0;
+
+layout(push_constant) uniform Push { vec2 tangents; vec2 tile; uint n_splats; uint n_bins_x; uint i_round; float cut; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Reaches { uvec2 reach[]; };
 layout(std430, binding = 1) readonly buffer Before { uint n_before[]; };
 layout(std430, binding = 2) readonly buffer Blocks { uint n_pairs[]; };
@@ -33,11 +36,11 @@ vec4 apart(float c, float low, float width) {
 
 // A bit for each tile of the bin at `low` (slopes, y upward from the bin's last row) that is near enough to the splat. On
 // the screen b^2/(2 sigma^2) is at least scale d^2/(1 + |ray|^2), d the distance in slopes.
-uint near(vec2 center, float scale, vec2 low) {
+uint near(vec2 center, float scale, float cut, vec2 low) {
     vec2 high = low + 4.0 * push.tile;
     vec2 far = max(abs(low), abs(high));
     // 2^-10: far more than what rounding makes of it.
-    float most = push.cut * (1.0 + 1.0 / 1024.0) * (1.0 + dot(far, far)) / scale;
+    float most = cut * (1.0 + 1.0 / 1024.0) * (1.0 + dot(far, far)) / scale;
     vec4 x = apart(center.x, low.x, push.tile.x), y = apart(center.y, low.y, push.tile.y);
     uint bits = 0;
     [[unroll]] for (uint j = 0; j < 4; ++j) {
@@ -59,7 +62,10 @@ void main() {
         return;
     }
     vec2 center = splats[r].center;
-    float scale = splats[r].scale;
+    float scale = splats[r].scale, cut = push.cut;
+    if (THRESHOLD != 0) {
+        cut = min(cut, log2(splats[r].tau * push.inv_threshold));
+    }
     uvec2 first = low / TILES_ACROSS, last = (high - 1u) / TILES_ACROSS;
     uint n_x = last.x - first.x + 1u;
     uint n = n_x * (last.y - first.y + 1u);
@@ -69,7 +75,7 @@ void main() {
         // A bit each of four rows, spread to the first bits of four groups of four.
         uint spread = (rows & 1u) | (rows & 2u) << 3 | (rows & 4u) << 6 | (rows & 8u) << 9;
         vec2 corner = vec2(float(4 * bin.x) * push.tile.x - push.tangents.x, push.tangents.y - float(4 * bin.y + 4) * push.tile.y);
-        uint tiles = spread * columns & near(center, scale, corner);
+        uint tiles = spread * columns & near(center, scale, cut, corner);
         pairs[at + k] = uvec2(bin.y * push.n_bins_x + bin.x | tiles << BIN_BITS, r);
         bool wraps = bin.x == last.x;
         bin = wraps ? uvec2(first.x, bin.y + 1u) : uvec2(bin.x + 1u, bin.y);

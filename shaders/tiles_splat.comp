@@ -17,8 +17,9 @@ layout(constant_id = 0) const uint LIT = 1;
 layout(constant_id = 2) const uint GROUPED = 0;
 layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 4) const uint TEXTURED = 0;
+layout(constant_id = 5) const uint THRESHOLD = 0;
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint n_splats; uint width; uint height; uint tile_width; uint tile_height; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint n_splats; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
@@ -62,8 +63,16 @@ uint project(uint i, uint r) {
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
         return 0u;
     }
+    float reach_in_sigma = push.cutoff;
+    if (THRESHOLD != 0) {
+        float cut = min(0.5 * push.cutoff * push.cutoff, log(tau * push.inv_threshold));
+        if (!(cut > 0.0)) {
+            return 0u;
+        }
+        reach_in_sigma = sqrt(2.0 * cut);
+    }
     vec2 s = v.xy / v.z;
-    float radius = GROWTH * push.cutoff * sigma;
+    float radius = GROWTH * reach_in_sigma * sigma;
     vec2 x = (tangents(v.x, v.z, radius) + push.camera.tan_x) / push.pixel.x;
     vec2 y = (push.camera.tan_y - tangents(v.y, v.z, radius).yx) / push.pixel.y;
     uvec2 columns = pixels(x.x, x.y, push.width), rows = pixels(y.x, y.y, push.height);

@@ -21,7 +21,7 @@ pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f6
     if args.options.verbose {
         say_sizes(scene, None);
     }
-    let Picture { rgba, error, brightest, n_particles } = draw(scene, time_s, reference, quiet)?;
+    let Picture { rgba, error, brightest, n_particles, cut } = draw(scene, time_s, reference, quiet)?;
     let rgba: Vec<f32> = rgba.iter().flatten().map(|v| *v as f32).collect();
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     if n_bad > 0 && !quiet {
@@ -31,6 +31,13 @@ pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f6
     let film = scene.film;
     if let Some(error) = error.filter(|_| args.options.verbose) {
         eprintln!("error of the integral: at most about {error:.1e}; the brightest particle has {brightest:.3e}");
+    }
+    let share = (reference == ReferenceArg::Thin).then(|| cut.share());
+    if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold > 0.0) {
+        let n = cut.n_layers;
+        eprintln!(
+            "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most {share:.1e} of the radiances"
+        );
     }
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
     if !args.json {
@@ -43,6 +50,7 @@ pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f6
             "image_hash": image_hash(&rgba), "reference": name(reference),
             "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad,
             "particles": n_particles, "error": error, "brightest": brightest,
+            "layers_cut": share.map(|_| cut.n_layers), "cut_changes": share,
         })
     ))
 }

@@ -18,7 +18,7 @@ pub(super) fn draw_sprites(
     s: &Settings,
 ) -> Result<()> {
     let counts = [packet.n_drawn, s.n_surface_facets];
-    sprites.record(rec, b.of_sprites(), on, &packet.camera, s.cutoff, counts)
+    sprites.record(rec, b.of_sprites(), on, &packet.camera, [s.cutoff, s.threshold], counts)
 }
 
 pub(super) fn draw_tiles(
@@ -30,7 +30,8 @@ pub(super) fn draw_tiles(
     packet: &Packet,
     s: &Settings,
 ) -> Result<()> {
-    let view = View { camera: &packet.camera, cutoff: s.cutoff, saturated: s.saturated };
+    let Settings { cutoff, threshold, saturated, .. } = *s;
+    let view = View { camera: &packet.camera, cutoff, threshold, saturated };
     let under = on.depth.is_some().then_some(on);
     tiling.record(rec, i_target, under, b.of_sprites(), &view, [packet.n_drawn, s.n_surface_facets])
 }

@@ -82,6 +82,7 @@ impl Tiling {
 fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
+        threshold: scene.draw.threshold > 0.0,
         lit,
         grouped,
         weighted: scene.draw.count.is_some(),

@@ -17,6 +17,8 @@ pub enum Bounds {
     Any,
     /// Both ends allowed.
     Within(f64, f64),
+    /// The first end allowed, the second not.
+    From(f64, f64),
     /// Neither end allowed.
     Between(f64, f64),
 }
@@ -27,6 +29,7 @@ impl Bounds {
             && match self {
                 Bounds::Any => true,
                 Bounds::Within(low, high) => (low..=high).contains(&v),
+                Bounds::From(low, high) => (low..high).contains(&v),
                 Bounds::Between(low, high) => v > low && v < high,
             }
     }
@@ -37,6 +40,7 @@ impl fmt::Display for Bounds {
         match self {
             Bounds::Any => write!(f, "a finite number"),
             Bounds::Within(low, high) => write!(f, "a number from {} to {}", shortest(*low), shortest(*high)),
+            Bounds::From(low, high) => write!(f, "a number from {} to below {}", shortest(*low), shortest(*high)),
             Bounds::Between(low, high) => write!(f, "a number above {} and below {}", shortest(*low), shortest(*high)),
         }
     }

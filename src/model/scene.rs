@@ -134,6 +134,8 @@ pub struct Draw {
     pub path: DrawPath,
     /// Sprites end at this many σ.
     pub cutoff: f64,
+    /// And where their optical depth falls under this; 0: nowhere.
+    pub threshold: f64,
     /// Bits of the sort key: 16 or 32.
     pub sort_bits: u32,
     /// How many particles are drawn of a cloud; `None`: all.

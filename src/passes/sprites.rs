@@ -12,7 +12,7 @@ use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
-    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, i_first_facet: u32 }
+    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, i_first_facet: u32, inv_threshold: f32 }
 }
 
 pub struct Sprites {
@@ -22,15 +22,15 @@ pub struct Sprites {
 impl Sprites {
     /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
     /// depth; else the target is cleared. `grouped`: facets stand for several particles. `weighted`: κ has factors.
-    /// `textured`: some groups have textures.
+    /// `textured`: some groups have textures. `threshold`: there is one.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
         lit: bool,
-        [behind, grouped, weighted, textured]: [bool; 4],
+        [behind, grouped, weighted, textured, threshold]: [bool; 5],
     ) -> Result<Sprites> {
-        let constants = [lit, behind, grouped, weighted, textured].map(u32::from);
+        let constants = [lit, behind, grouped, weighted, textured, threshold].map(u32::from);
         let constants: Vec<(u32, u32)> = (0..).zip(constants).collect();
         let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
         Ok(Sprites { pipeline })
@@ -38,19 +38,20 @@ impl Sprites {
 
     /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
     /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped; `i_group`: u32 by particle, and
-    /// `drawn`: DrawnRecord, read where κ has factors; `textured`: TexturedRecord, and `pool`: [u32; 4], read where some have textures. `target` has depth where surfaces have been drawn.
+    /// `drawn`: DrawnRecord, read where κ has factors; `textured`: TexturedRecord, and `pool`: [u32; 4], read where some have textures. A sprite ends at `cutoff` σ, and where its optical depth falls under `threshold`. `target` has depth where surfaces have been drawn.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 9],
         target: Target<'_>,
         camera: &CameraRecord,
-        cutoff: f64,
+        [cutoff, threshold]: [f64; 2],
         [n_drawn, i_first_facet]: [u32; 2],
     ) -> Result<()> {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
-        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet };
+        let inv_threshold = (1.0 / threshold) as f32;
+        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet, inv_threshold };
         let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
         rec.draw(&self.pipeline, target, start, &buffers, &push, n_drawn)
     }

@@ -24,6 +24,7 @@ record! {
         height: u32,
         tile_width: u32,
         tile_height: u32,
+        inv_threshold: f32,
     }
 }
 
@@ -43,7 +44,15 @@ record! {
 }
 
 record! {
-    pub struct PairsPush { tangents: [f32; 2], tile: [f32; 2], n_splats: u32, n_bins_x: u32, i_round: u32, cut: f32 }
+    pub struct PairsPush {
+        tangents: [f32; 2],
+        tile: [f32; 2],
+        n_splats: u32,
+        n_bins_x: u32,
+        i_round: u32,
+        cut: f32,
+        inv_threshold: f32,
+    }
 }
 
 record! {
@@ -60,6 +69,7 @@ record! {
         i_round: u32,
         cut: f32,
         saturated: f32,
+        inv_threshold: f32,
     }
 }
 
@@ -127,6 +137,8 @@ pub struct Variant {
     pub format: TargetFormat,
     /// Surfaces are drawn, too.
     pub behind: bool,
+    /// Splats end where their optical depth falls under a threshold.
+    pub threshold: bool,
     /// No blob's optical depth is greater.
     pub tau_most: f64,
     /// Without what subgroups can do.
@@ -141,6 +153,8 @@ pub struct View<'a> {
     pub camera: &'a CameraRecord,
     /// Sprites end at this many σ.
     pub cutoff: f64,
+    /// And where their optical depth falls under this.
+    pub threshold: f64,
     /// What lies behind a pixel that lets less than this through is left out.
     pub saturated: f64,
 }
@@ -213,6 +227,8 @@ impl Tiles {
         let n_rounds = if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
         let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
             .map(|(k, v)| (k, u32::from(v)));
+        let threshold = u32::from(variant.threshold);
+        let of_splat = [&constants[..], &[(5, threshold)]].concat();
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
         let even = u32::from(division.width.is_multiple_of(2));
         let macros = [
@@ -221,6 +237,7 @@ impl Tiles {
             ("ONE_SUBGROUP", u32::from(!variant.portable && device.limits().is_one_subgroup(division.invocations))),
             ("THIN", u32::from(variant.tau_most <= 0.125 && !variant.textured)),
             ("TEXTURED", u32::from(variant.textured)),
+            ("THRESHOLD", threshold),
             ("PIXEL_WORDS", (variant.format.bytes_per_pixel() / 4) as u32),
             ("BEHIND", behind),
             ("EVEN", even),
@@ -234,10 +251,10 @@ impl Tiles {
         let n_sheets = if variant.textured { u64::from(n_max) } else { 1 };
         let n_under = if variant.behind { division.n_pixels() } else { 1 };
         Ok(Tiles {
-            splat: Kernel::new(device, compiler, "tiles.splat", SplatPush::FIELDS, &constants)?,
+            splat: Kernel::new(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat)?,
             rounds: Kernel::new(device, compiler, "tiles.rounds", RoundsPush::FIELDS, &[])?,
             clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
-            pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[])?,
+            pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[(5, threshold)])?,
             ranges: Kernel::new(device, compiler, "tiles.ranges", RangesPush::FIELDS, &[])?,
             alone: compose(0)?,
             compose: if n_rounds > 1 { Some(compose(1)?) } else { None },
@@ -292,6 +309,7 @@ impl Tiles {
             height,
             tile_width: tile[0],
             tile_height: tile[1],
+            inv_threshold: inverse(view.threshold),
         };
         let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, _] = buffers;
         let Tiles { splats, reaches, before, blocks, sheets, .. } = self;
@@ -330,7 +348,8 @@ impl Tiles {
         let pixel = self.pixel(view.camera);
         let tile = [pixel[0] * tile[0] as f32, pixel[1] * tile[1] as f32];
         let tangents = [view.camera.tan_x, view.camera.tan_y];
-        let push = PairsPush { tangents, tile, n_splats, n_bins_x, i_round, cut: cut(view.cutoff) };
+        let (cut, inv_threshold) = (cut(view.cutoff), inverse(view.threshold));
+        let push = PairsPush { tangents, tile, n_splats, n_bins_x, i_round, cut, inv_threshold };
         let buffers = [&self.reaches, &self.before, &self.blocks, &self.round, &self.entries, &self.splats];
         rec.dispatch_counted(&self.pairs, &buffers, &push, (&self.round, ROUND_WORDS * i_round + 4))
     }
@@ -361,6 +380,7 @@ impl Tiles {
             i_round,
             cut: cut(view.cutoff),
             saturated: view.saturated as f32,
+            inv_threshold: inverse(view.threshold),
         };
         let buffers = [
             &self.splats,
@@ -393,4 +413,9 @@ impl Tiles {
 /// b²/(2 σ²) at the cutoff, in powers of two.
 fn cut(cutoff: f64) -> f32 {
     (0.5 * cutoff * cutoff * std::f64::consts::LOG2_E) as f32
+}
+
+/// Of a threshold so small that f32 has no inverse of it, infinity: it cuts nothing.
+fn inverse(threshold: f64) -> f32 {
+    (1.0 / threshold) as f32
 }

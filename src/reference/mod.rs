@@ -19,6 +19,7 @@ pub mod sort;
 pub mod sprites;
 pub mod surfaces;
 pub mod texture;
+pub mod threshold;
 pub mod tiles;
 pub mod transmit;
 pub mod volume;

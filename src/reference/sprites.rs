@@ -20,6 +20,8 @@ pub struct View {
     pub near: f64,
     /// Sprites end at this many σ.
     pub cutoff: f64,
+    /// And where their optical depth falls under this.
+    pub threshold: f64,
 }
 
 /// How a GPU may depart from the mathematics while drawing.
@@ -33,7 +35,8 @@ pub struct Rounding {
     pub step: f64,
     /// Relative error of each α.
     pub alpha: f64,
-    /// Relative error of b: where |b − cut| is below it times the cut, a sprite may end or not.
+    /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there (so a relative error of b).
+    /// Nearer to the cut a sprite may end or not.
     pub edge: f64,
 }
 
@@ -64,6 +67,11 @@ impl Rounding {
         Rounding { unit, least_normal, step, alpha, edge }
     }
 
+    /// How far from the cut b²/2σ² is sure to lie on its side of it.
+    pub(super) fn slack(&self, cut: f64) -> f64 {
+        (2.0 + self.edge) * self.edge * cut.max(1.0)
+    }
+
     pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0 };
 
     /// What the target holds of an opaque colour.
@@ -81,6 +89,13 @@ impl View {
     fn half_slopes(&self) -> (f64, f64) {
         let tan = (0.5 * self.fov_y_rad).tan();
         (tan * f64::from(self.width) / f64::from(self.height), tan)
+    }
+
+    /// b²/2σ² where a sprite ends (model.md §11 "threshold"); where it is not above 0 nothing is drawn.
+    pub fn cut(&self, blob: &Blob) -> f64 {
+        let tau = SQRT_TAU * blob.kappa * blob.sigma;
+        // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves out.
+        (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
     }
 
     /// Direction through the centre of pixel (column `i`, row `j` from the top); its view depth is 1.
@@ -255,9 +270,13 @@ fn draw(
     if !(depth >= view.near && blob.sigma > 0.0) {
         return;
     }
-    let cut = view.cutoff * blob.sigma;
+    let cut = view.cut(blob);
+    let slack = r.slack(cut);
+    if cut + slack <= 0.0 {
+        return;
+    }
     let n_rows = (band.len() / view.width as usize) as u32;
-    let [columns, rows] = view.rectangle(c, cut * (1.0 + r.edge));
+    let [columns, rows] = view.rectangle(c, (2.0 * (cut + slack)).sqrt() * blob.sigma);
     for row in rows.0.max(first_row)..rows.1.min(first_row + n_rows) {
         for column in columns.0..columns.1 {
             let pixel = &mut band[((row - first_row) * view.width + column) as usize];
@@ -268,12 +287,14 @@ fn draw(
             let (behind, behind_bound) = pixel.behind;
             // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
             // stands behind decides likewise.
-            let (on_edge, at_behind) = ((b - cut).abs() <= r.edge * cut, (depth - behind).abs() < behind_bound);
-            if (b > cut && !on_edge) || (depth > behind && !at_behind) {
+            let beyond = 0.5 * (b / blob.sigma).powi(2) - cut;
+            let (on_edge, at_behind) = (beyond.abs() <= slack, (depth - behind).abs() < behind_bound);
+            let is_in = beyond <= 0.0 && cut > 0.0;
+            if (!is_in && !on_edge) || (depth > behind && !at_behind) {
                 continue;
             }
             let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-            pixel.over(if b <= cut && depth <= behind { alpha } else { 0.0 }, off, radiance, r);
+            pixel.over(if is_in && depth <= behind { alpha } else { 0.0 }, off, radiance, r);
         }
     }
 }
@@ -296,6 +317,7 @@ mod tests {
         fov_y_rad: 1.0,
         near: 0.5,
         cutoff: 3.0,
+        threshold: 0.0,
     };
 
     #[test]

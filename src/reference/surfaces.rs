@@ -92,6 +92,7 @@ mod tests {
         fov_y_rad: std::f64::consts::FRAC_PI_2,
         near: 0.5,
         cutoff: 3.0,
+        threshold: 0.0,
     };
 
     /// At depth `z`, facing the eye: u right, v up, 2 wide and high.

@@ -95,17 +95,18 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind) -> Composed {
         if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
             continue;
         }
-        let (b, cut) = (c.cross(ray).length() / ray.length(), view.cutoff * blob.sigma);
-        let on_edge = (b - cut).abs() <= r.edge * cut;
+        let (b, cut) = (c.cross(ray).length() / ray.length(), view.cut(blob));
+        let beyond = 0.5 * (b / blob.sigma).powi(2) - cut;
+        let (is_in, on_edge) = (beyond <= 0.0 && cut > 0.0, beyond.abs() <= r.slack(cut));
         let at_behind = (depth - under.depth).abs() < under.depth_bound;
-        if (b > cut && !on_edge) || (depth > under.depth && !at_behind) {
+        if (!is_in && !on_edge) || (depth > under.depth && !at_behind) {
             continue;
         }
         let delta = view.slopes_of(ray) - view.slopes_of(c);
         let factor = factor.map_or(1.0, |f| f(k, delta));
         let alpha = alpha(&Blob { kappa: factor * blob.kappa, ..*blob }, b);
         let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-        pixel.under(if b <= cut && depth <= under.depth { alpha } else { 0.0 }, off, radiance[k]);
+        pixel.under(if is_in && depth <= under.depth { alpha } else { 0.0 }, off, radiance[k]);
     }
     pixel
 }
@@ -120,7 +121,7 @@ mod tests {
     #[test]
     fn near_to_far_is_the_picture_of_far_to_near() {
         let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
-        let view = View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0 };
+        let view = View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0, threshold: 0.0 };
         let at = |x: f64, z: f64, tau: f64| Blob {
             position: DVec3::new(x, 0.1, -z),
             sigma: 0.5,

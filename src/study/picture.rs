@@ -1,15 +1,18 @@
 //! A whole frame's picture in f64, from the scene alone: by the thin sprites that nimbus draws, or by the volume that they
 //! stand for.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::truth::Truth;
 use crate::error::{Error, Result};
+use crate::model::cloud::Group;
 use crate::model::count::LEAST_DRAWN;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
-use crate::reference::sprites::{Behind, Rounding, View};
+use crate::reference::sprites::{Behind, Factor, Rounding, View};
+use crate::reference::texture::{Pool, Sheet, Textured};
+use crate::reference::threshold::{self, Cut};
 use crate::reference::volume::Volume;
 use crate::reference::{Blob, count, place, sort, sprites, surfaces};
 
@@ -44,11 +47,13 @@ pub struct Picture {
     pub brightest: f64,
     /// How many particles it shows, in view or not.
     pub n_particles: usize,
+    /// Most that `draw.threshold` cuts of a pixel; of the volume, which knows none, nothing.
+    pub cut: Cut,
 }
 
 /// The scene at `time_s`.
 pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener) -> Result<Picture> {
-    check(scene, time_s)?;
+    check(scene, time_s, drawing)?;
     let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
     let radiance = truth.particle_radiance(scene);
     let view = view(scene, &truth);
@@ -57,8 +62,16 @@ pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener)
     Ok(match drawing {
         Drawing::Thin => {
             let (blobs, order) = drawn(scene, &truth);
-            let (rgba, _) = sprites::render_over(&view, &behind, &blobs, &radiance, &order, &Rounding::NONE);
-            Picture { rgba, error: None, brightest, n_particles: order.len() }
+            let (pool, sheets) = sheets(scene, &truth, &view).unzip();
+            let factor = |j: usize, delta: DVec2| match (&pool, &sheets) {
+                (Some(pool), Some(sheets)) => sheets[j].factor(pool, delta),
+                _ => 1.0,
+            };
+            let factor: Option<Factor> = if pool.is_some() { Some(&factor) } else { None };
+            let none = Rounding::NONE;
+            let (rgba, _) = sprites::render_textured(&view, &behind, &blobs, &radiance, &order, &none, factor);
+            let cut = threshold::cut(&view, &behind, &blobs, factor).into_iter().fold(Cut::default(), Cut::most);
+            Picture { rgba, error: None, brightest, n_particles: order.len(), cut }
         }
         Drawing::Volume => {
             let volume = Volume::new(&view, &truth.blobs, &radiance);
@@ -71,13 +84,19 @@ pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener)
             let pixels = rows.concat();
             let error = pixels.iter().map(|p| p.error).fold(0.0, f64::max);
             let rgba = pixels.into_iter().map(|p| p.color).collect();
-            Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len() }
+            Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len(), cut: Cut::default() }
         }
     })
 }
 
 /// Refuses what the references do not know.
-fn check(scene: &Scene, time_s: f64) -> Result<()> {
+fn check(scene: &Scene, time_s: f64, drawing: Drawing) -> Result<()> {
+    let textured = scene.clouds.iter().position(|c| !c.texture.is_none());
+    if let Some(i) = textured.filter(|_| drawing == Drawing::Volume) {
+        return Err(Error::usage(format!(
+            "cloud {i} is textured, and the volume knows plain blobs alone; expected --set 'cloud.{i}.texture=\"none\"'"
+        )));
+    }
     if scene.lighting.mode == LightingMode::None {
         return Ok(());
     }
@@ -105,6 +124,7 @@ fn view(scene: &Scene, truth: &Truth) -> View {
         fov_y_rad: scene.camera.fov_y_rad,
         near: scene.camera.near,
         cutoff: scene.draw.cutoff,
+        threshold: scene.draw.threshold,
     }
 }
 
@@ -119,6 +139,29 @@ fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
         _ => (0..scene.n_surface_facets() as usize).map(|i| truth.facet_radiance(i)).collect(),
     };
     surfaces::render(view, &placed, &facets)
+}
+
+/// The pool, and what every particle shows of it; nothing where the scene is plain.
+fn sheets(scene: &Scene, truth: &Truth, view: &View) -> Option<(Pool, Vec<Sheet>)> {
+    if !scene.is_textured() {
+        return None;
+    }
+    let of_box = |(g, i_box): (&Group, u32)| {
+        let cloud = &scene.clouds[g.i_cloud];
+        let (i_field, strength) = cloud.texture.of_box(i_box);
+        let of = Textured { i_field, strength, seed: cloud.seed, i_box };
+        let first = g.i_first as usize;
+        let blobs = &truth.blobs[first..first + g.n_particles as usize];
+        let sheet = |(b, i): (&Blob, u32)| {
+            let z = (b.position - view.pose.position).dot(view.pose.forward);
+            Sheet::new(&of, i, z / b.sigma, view.pixel())
+        };
+        blobs.iter().zip(0u32..).map(sheet).collect::<Vec<Sheet>>()
+    };
+    let boxes = truth.groups.chunk_by(|a, b| a.i_cloud == b.i_cloud);
+    let sheets = boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(of_box)).collect();
+    // As the device keeps it.
+    Some((Pool::new(scene.draw.texture_seed).rounded(), sheets))
 }
 
 /// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn are: far to near by exact
@@ -144,7 +187,7 @@ fn weights(scene: &Scene, truth: &Truth) -> Vec<f64> {
         count::printed(distance / rule.d0, place::scale(cloud, setting.time_s), rule.a, rule.normalised)
     };
     let shares: Vec<f64> = clouds.iter().zip(&centers).map(of_cloud).collect();
-    let of_group = |g: &crate::model::cloud::Group| {
+    let of_group = |g: &Group| {
         let (n, share) = (g.n_particles, shares[g.i_cloud].min(1.0));
         let is_drawn = f64::from(n) * share >= LEAST_DRAWN;
         if is_drawn { count::weights(n, share, rule.conserve) } else { vec![0.0; n as usize] }

@@ -1,6 +1,6 @@
 //! Running error analysis of an f32 evaluation: a number and a bound on how far its f32 evaluation may lie from it, by
 //! what Vulkan promises of each operation (specification, "Precision and Operation of SPIR-V Instructions"): +, −, ×
-//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp and exp2 3 + 2|x| ulp, inversesqrt 2 ulp. An ulp is at most 2u of
+//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp and exp2 3 + 2|x| ulp, log and log2 3 ulp or 2⁻²¹ near 1, inversesqrt 2 ulp. An ulp is at most 2u of
 //! the result, u = 2⁻²⁴; a result below the least normal number may be flushed to zero.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
@@ -87,6 +87,15 @@ impl Bounded {
         let value = self.value.exp();
         let ulps = 3.0 + 2.0 * (self.value.abs() + self.error);
         Bounded::rounded(value, value * self.error.exp_m1(), 2.0 * ulps)
+    }
+
+    /// ln, or log2 in units of ln 2: 3 ulp, or 2⁻²¹ from ½ to 2; infinite where the number may be 0.
+    pub fn log(self) -> Bounded {
+        let value = self.value.ln();
+        let inherited = if self.error < self.value { -(-self.error / self.value).ln_1p() } else { f64::INFINITY };
+        let near_1 = self.value - self.error < 2.0 && self.value + self.error > 0.5;
+        let promised = if near_1 { 2f64.powi(-21) } else { 0.0 };
+        Bounded::rounded(value, inherited + promised, 6.0)
     }
 
     pub fn exp2(self) -> Bounded {

@@ -74,7 +74,8 @@ impl Picture {
         let keys = vec![CameraKey { time_s: 0.0, position: eye, target }];
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
-        let view = View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0 };
+        let view =
+            View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0, threshold: 0.0 };
         Picture {
             camera,
             view,
@@ -164,7 +165,7 @@ impl Picture {
             compiler,
             format,
             lit,
-            [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some()],
+            [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some(), self.view.threshold > 0.0],
         )
         .expect("sprites");
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
@@ -217,13 +218,14 @@ impl Picture {
                     let view = nimbus::passes::tiles::View {
                         camera: &camera,
                         cutoff: self.view.cutoff,
+                        threshold: self.view.threshold,
                         saturated: tiled.saturated,
                     };
                     tiling.record(rec, 0, behind.then_some(target), from, &view, n)?;
                     rec.copy(&tiling.pictures[0], &readback);
                     return Ok(());
                 }
-                pass.record(rec, from, target, &camera, self.view.cutoff, n)?;
+                pass.record(rec, from, target, &camera, [self.view.cutoff, self.view.threshold], n)?;
             }
             rec.copy_image(&mut target, &readback);
             Ok(())
@@ -249,6 +251,7 @@ impl Picture {
             lit: self.lit.is_some(),
             grouped: self.i_facet.is_some(),
             textured: self.textured.is_some(),
+            threshold: self.view.threshold > 0.0,
             weighted: self.drawn.is_some(),
             format,
             behind: self.scenery.is_some(),
@@ -348,21 +351,24 @@ impl Picture {
                     self.view.pixel(),
                 )
             });
-            let cut = self.view.cutoff * blob.sigma;
+            let cut = self.view.cut(blob);
+            let cut_error = self.cut_error(sprite.tau);
             for j in 0..self.view.height {
                 for i in 0..self.view.width {
                     let d = self.view.ray(i, j);
                     let b = c.cross(d).length() / d.length();
-                    if b > 1.1 * cut {
+                    let at_cut = 0.5 * (b / blob.sigma).powi(2) - cut;
+                    if at_cut > 0.2 * cut.max(1.0) {
                         continue;
                     }
                     let e = match tiled {
                         true => sprite.tiled_exponent(self.ray(i, j)),
                         false => sprite.exponent(self.ray(i, j)),
                     };
-                    // The cut: e <= cutoff²/2, three roundings; b ∝ √e.
-                    if b > 0.9 * cut {
-                        edge = edge.max(0.51 * e.error / e.value + 4.0 * U);
+                    // The cut: e <= cutoff²/2, three roundings; or the threshold's.
+                    if at_cut > -0.2 * cut.max(1.0) {
+                        let error = if tiled { std::f64::consts::LN_2 * e.error } else { e.error };
+                        edge = edge.max(0.51 * (error + cut_error) / cut.max(1.0) + 4.0 * U);
                     }
                     let sheet = paper.as_ref().map(|p| p.exponent(sprite.difference(self.ray(i, j))));
                     let log2_e = Bounded::once(std::f64::consts::LOG2_E);
@@ -381,6 +387,12 @@ impl Picture {
             }
         }
         (off_alpha, edge)
+    }
+
+    /// What the shaders' ln(τ₀/threshold) is off, or their log2 of it.
+    fn cut_error(&self, tau: Bounded) -> f64 {
+        let inverse = Bounded::once(1.0 / self.view.threshold);
+        if self.view.threshold > 0.0 { tau.times(inverse).log().error } else { 0.0 }
     }
 
     fn half_slopes(&self) -> [Bounded; 2] {

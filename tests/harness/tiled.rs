@@ -1,5 +1,7 @@
 //! The truth of a picture that `tiles` draws, and the bound on it.
 
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
 use glam::DVec2;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;

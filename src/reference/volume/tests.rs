@@ -15,6 +15,7 @@ fn view(n: u32) -> View {
         fov_y_rad: 0.9,
         near: 1e-3,
         cutoff: 9.0,
+        threshold: 0.0,
     }
 }
 

@@ -1,0 +1,95 @@
+//! What a threshold leaves out of a picture, model.md §11 "threshold", in f64.
+//! In: blobs and eye relative to O. Out: of every pixel the layers that are cut, and their optical depth.
+
+use glam::DVec3;
+
+use super::Blob;
+use super::sprites::{Behind, Factor, View};
+use crate::model::cloud::SQRT_TAU;
+
+/// What is cut of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cut {
+    /// Sprites that would be drawn there without the threshold.
+    pub n_layers: u32,
+    /// Their optical depth together.
+    pub tau: f64,
+}
+
+impl Cut {
+    /// A pixel's channel changes by at most this share of the greatest difference between two radiances that it can meet.
+    pub fn share(&self) -> f64 {
+        -libm::expm1(-self.tau)
+    }
+
+    /// The same of the number of layers alone, where no texture makes a layer denser.
+    pub fn share_of_layers(&self, threshold: f64) -> f64 {
+        -libm::expm1(-f64::from(self.n_layers) * threshold)
+    }
+
+    /// No pixel of either has more layers or a greater depth.
+    pub fn most(self, other: Cut) -> Cut {
+        Cut { n_layers: self.n_layers.max(other.n_layers), tau: self.tau.max(other.tau) }
+    }
+}
+
+/// The picture's pixels before `behind`. `factor` on each blob's τ, as its texture has it.
+pub fn cut(view: &View, behind: &[Behind], blobs: &[Blob], factor: Option<Factor<'_>>) -> Vec<Cut> {
+    let mut pixels = vec![Cut::default(); behind.len()];
+    let whole = View { threshold: 0.0, ..*view };
+    for (k, blob) in blobs.iter().enumerate() {
+        let c = blob.position - view.pose.position;
+        let depth = c.dot(view.pose.forward);
+        if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
+            continue;
+        }
+        let (from, to) = (view.cut(blob), whole.cut(blob));
+        let [columns, rows] = view.rectangle(c, (2.0 * to).sqrt() * blob.sigma);
+        for row in rows.0..rows.1 {
+            for column in columns.0..columns.1 {
+                let i = (row * view.width + column) as usize;
+                let ray = view.ray(column, row);
+                let e = exponent(blob, c, ray);
+                if (e > from || from <= 0.0) && e <= to && depth <= behind[i].depth {
+                    let delta = view.slopes_of(ray) - view.slopes_of(c);
+                    let factor = factor.map_or(1.0, |f| f(k, delta));
+                    pixels[i].n_layers += 1;
+                    pixels[i].tau += factor * SQRT_TAU * blob.kappa * blob.sigma * (-e).exp();
+                }
+            }
+        }
+    }
+    pixels
+}
+
+/// b²/2σ² of the ray along `d` from an eye that the blob is `c` off.
+fn exponent(blob: &Blob, c: DVec3, d: DVec3) -> f64 {
+    0.5 * (c.cross(d).length() / (d.length() * blob.sigma)).powi(2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::camera::Pose;
+
+    #[test]
+    fn what_lies_between_the_threshold_and_the_cutoff_is_counted() {
+        let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
+        // Three pixels at slopes −1, 0 and 1.
+        let view =
+            View { width: 3, height: 1, pose, fov_y_rad: 2.0 * 0.5f64.atan(), near: 0.5, cutoff: 3.0, threshold: 0.1 };
+        // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.
+        let blob = |tau: f64| Blob { position: DVec3::NEG_Z * 2.0, sigma: 1.0, kappa: tau / SQRT_TAU };
+        let of = |blobs: &[Blob], depth: f64| cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None);
+        let nothing = Cut::default();
+        // τ = 0.2/e there: below the threshold. 0.3/e: not. 0.09: nowhere above it.
+        let [left, middle, right] = of(&[blob(0.2), blob(0.3), blob(0.09)], 9.0)[..] else { panic!("three pixels") };
+        assert_eq!((left.n_layers, middle.n_layers, right.n_layers), (2, 1, 2));
+        assert!(
+            (left.tau - 0.29 / std::f64::consts::E).abs() < 1e-15 && left == right && (middle.tau - 0.09).abs() < 1e-15
+        );
+        assert!((left.share() - (1.0 - (-left.tau).exp())).abs() < 1e-15);
+        assert!(left.share() < left.share_of_layers(0.1) && left.most(nothing) == left);
+        assert_eq!(of(&[blob(0.2)], 1.9), [nothing; 3], "hidden");
+    }
+}

@@ -1,0 +1,198 @@
+//! `draw.threshold`: on random scenes and cameras both draw paths end sprites where the f64 reference does, and the picture
+//! changes by no more than what is cut can.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+#[path = "harness/picture.rs"]
+mod picture;
+#[path = "harness/scenery.rs"]
+mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
+#[path = "harness/tiled.rs"]
+mod tiled;
+
+use std::sync::Arc;
+
+use bounded::{Random, greatest_ratio};
+use glam::{DVec2, DVec3};
+use harness::{Gpu, assert_within};
+use nimbus::frame::tiling::saturated;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::layout::particle::{DrawnRecord, TexturedRecord};
+use nimbus::model::film::FilmFormat;
+use nimbus::passes;
+use nimbus::reference::sprites::{Behind, View};
+use nimbus::reference::texture::Pool;
+use nimbus::reference::threshold::{Cut, cut};
+use picture::{Picture, Tiled};
+use scenery::Scenery;
+
+const FORMAT: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
+
+/// Blobs all around the eye, of optical depths from 10^-4.5 to 3; textured, in part, before a rectangle or not.
+fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
+    let mut random = Random(seed);
+    let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
+    let mut point = |reach: f64| DVec3::new(within(-reach, reach), within(-reach, reach), within(-reach, reach));
+    let (eye, target) = (point(2.0), point(2.0));
+    let mut picture = Picture::new(eye, target, within(15.0, 130.0), within(0.01, 0.3));
+    let n = 60;
+    for _ in 0..n {
+        let v = |w: &mut dyn FnMut(f64, f64) -> f64| DVec3::new(w(-3.0, 3.0), w(-3.0, 3.0), w(-3.0, 3.0));
+        let at = v(&mut within);
+        picture = picture.blob(at, 10f64.powf(within(-2.5, 0.0)), 10f64.powf(within(-4.5, 0.5)));
+    }
+    let threshold = 2f64.powf(within(-13.0, -2.0));
+    let view = View { width: 60, height: 45, cutoff: within(1.0, 5.0), threshold, ..picture.view };
+    if seed.is_multiple_of(2) {
+        let record =
+            |i: u32| TexturedRecord { seed: 9, i_box: i, i_first: 0, i_field: i % 8, strength: 0.2 * i as f32 };
+        let i_group = (0..n).map(|i| i / 10).collect();
+        picture.textured = Some((i_group, (0..6).map(record).collect(), pool.clone()));
+    }
+    if seed.is_multiple_of(3) {
+        let part =
+            |i: u32| DrawnRecord { shift: 0, end: 10 * i + 7, kappa_scale: 1.0 + 0.2 * i as f32, last_weight: 0.3 };
+        picture.drawn = Some(((0..n).map(|i| i / 10).collect(), (0..6).map(part).collect()));
+    }
+    if seed % 4 == 1 {
+        let (u, v) = (0.8 * view.pose.right, 0.7 * view.pose.up);
+        let rectangle = Scenery::default().rectangle(picture.at(0.1, 0.0, 1.5), u, v, [2, 1]);
+        picture.scenery = Some(rectangle);
+    }
+    Picture { view, ..picture }
+}
+
+fn without(picture: &Picture) -> Picture {
+    Picture { view: View { threshold: 0.0, ..picture.view }, ..picture.clone() }
+}
+
+fn usual(gpu: &Gpu) -> Tiled {
+    let invocations = passes::tiles::invocations(gpu.device.limits());
+    Tiled { invocations, portable: false, most_pairs: None, saturated: saturated(FORMAT.1) }
+}
+
+/// The reference's picture and its bound, by `sprites` or by `tiles`.
+fn truth(picture: &Picture, tiled: Option<&Tiled>) -> (Vec<f64>, Vec<f64>) {
+    tiled.map_or_else(|| picture.truth(FORMAT.1), |t| picture.tiled_truth(FORMAT.1, t.saturated))
+}
+
+fn cut_of(picture: &Picture) -> Vec<Cut> {
+    let behind: Vec<Behind> = match &picture.scenery {
+        None => vec![Behind::NOTHING; (picture.view.width * picture.view.height) as usize],
+        Some(_) => picture.behind(FORMAT.1).iter().map(|c| picture.widened(c)).collect(),
+    };
+    let sheets = picture.sheets();
+    let factor = |j: usize, delta: DVec2| picture.factor(&sheets, j, delta);
+    // What stands behind in doubt has no bound.
+    cut(&picture.view, &behind, &picture.blobs(), Some(&factor))
+}
+
+/// Of each of a pixel's four numbers how much the cut may change it: what is met is of radiances and of nothing, or of what
+/// the rectangle shows.
+fn changes(picture: &Picture) -> Vec<f64> {
+    let mut met = picture.radiance();
+    met.push(DVec3::ZERO);
+    if picture.scenery.is_some() {
+        met.extend(picture.behind(FORMAT.1).iter().flatten().map(|b| DVec3::from_slice(&b.color[..3])));
+    }
+    let high = met.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    let low = met.iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let spread = (high - low).to_array();
+    cut_of(picture).iter().flat_map(|c| [spread[0], spread[1], spread[2], 1.0].map(|s| c.share() * s)).collect()
+}
+
+#[test]
+fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
+    let mut gpu = Gpu::new();
+    let pool = Arc::new(Pool::new(4).rounded());
+    let (mut n_cut, mut closest, mut greatest) = (0, 0f64, 0f64);
+    for seed in 1..=12 {
+        let picture = random(seed, &pool);
+        let (whole, changes) = (without(&picture), changes(&picture));
+        for tiled in [None, Some(usual(&gpu))] {
+            let what = format!("{seed}, {}", if tiled.is_some() { "tiles" } else { "sprites" });
+            let [on, off] = [&picture, &whole].map(|p| {
+                let values = p.draw_by(&mut gpu, None, FORMAT.0, tiled.as_ref());
+                let (truths, bounds) = truth(p, tiled.as_ref());
+                assert_within(&what, &values, &truths, &bounds);
+                greatest = greatest.max(greatest_ratio(&values, &truths, &bounds));
+                (values, truths, bounds)
+            });
+            // In true numbers, and as drawn.
+            let exact: Vec<f64> = changes.iter().map(|c| c + 1e-13).collect();
+            assert_within(&format!("{what}, true numbers"), &on.1, &off.1, &exact);
+            let allowed: Vec<f64> = (0..changes.len()).map(|i| changes[i] + on.2[i] + off.2[i]).collect();
+            assert_within(&format!("{what}, as drawn"), &on.0, &off.0, &allowed);
+            let cut: Vec<usize> = (0..changes.len()).filter(|i| changes[*i] > 1e-6).collect();
+            closest = cut.iter().map(|&i| (on.1[i] - off.1[i]).abs() / changes[i]).fold(closest, f64::max);
+            n_cut += cut.len();
+        }
+    }
+    println!("{n_cut} numbers cut, up to {closest:.3} of what may be; rounding up to {greatest:.3} of its bound");
+    // The bound is met: a single layer is cut before black.
+    assert!(n_cut > 10_000 && closest > 0.5 && closest <= 1.0 + 1e-6, "{n_cut} {closest}");
+}
+
+#[test]
+fn the_number_of_layers_bounds_what_is_cut() {
+    let pool = Arc::new(Pool::new(4).rounded());
+    let mut most = Cut::default();
+    for seed in [1, 3, 5, 7, 9] {
+        let picture = random(seed, &pool);
+        assert!(picture.textured.is_none());
+        for pixel in cut_of(&picture) {
+            assert!(pixel.share() <= pixel.share_of_layers(picture.view.threshold));
+            most = most.most(pixel);
+        }
+        assert!(cut_of(&without(&picture)).iter().all(|c| *c == Cut::default()));
+    }
+    assert!(most.n_layers > 3 && most.tau > 0.01, "{most:?}");
+}
+
+#[test]
+fn wrong_cuts_are_noticed() {
+    let mut gpu = Gpu::new();
+    let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1);
+    for k in 0..12 {
+        let at = picture.at(0.4 * f64::from(k) - 2.2, 0.2 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
+        picture = picture.blob(at, 0.1 + 0.04 * f64::from(k), 0.5 * 0.5f64.powi(k % 6));
+    }
+    picture.view.threshold = 1.0 / 40.0;
+    let tiled = usual(&gpu);
+    for (tiled, file, from, to) in [
+        (None, "sprites.vert", "log(tau * push.inv_threshold)", "0.98 * log(tau * push.inv_threshold)"),
+        (None, "sprites.vert", "sqrt(2.0 * max", "sqrt(1.8 * max"),
+        (None, "sprites.vert", "if (THRESHOLD != 0) {", "if (THRESHOLD > 1) {"),
+        (None, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
+        (Some(&tiled), "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
+        (Some(&tiled), "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
+        (Some(&tiled), "tiles.comp", "log2(place.w", "0.98 * log2(place.w"),
+        (Some(&tiled), "tiles.comp", "min(cut, log2", "max(cut, log2"),
+    ] {
+        let (truths, bounds) = truth(&picture, tiled);
+        let values = picture.draw_by(&mut gpu, None, FORMAT.0, tiled);
+        assert!(greatest_ratio(&values, &truths, &bounds) <= 1.0);
+        let wrong = Gpu::wrong_compiler(file, from, to);
+        let values = picture.draw_by(&mut gpu, Some(&wrong), FORMAT.0, tiled);
+        assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+#[test]
+fn what_is_below_the_threshold_everywhere_is_not_drawn() {
+    let mut gpu = Gpu::new();
+    let tiled = usual(&gpu);
+    let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1).blob(DVec3::ZERO, 0.5, 0.0099);
+    picture.view.threshold = 0.01;
+    for tiled in [None, Some(&tiled)] {
+        let drawn = |p: &Picture, gpu: &mut Gpu| p.draw_by(gpu, None, FORMAT.0, tiled);
+        assert!(drawn(&picture, &mut gpu).iter().all(|v| *v == 0.0));
+        assert!(drawn(&without(&picture), &mut gpu).iter().any(|v| *v > 0.0));
+        // So small a one that f32 has no inverse of it: the same bytes as without.
+        let least = Picture { view: View { threshold: 1e-300, ..picture.view }, ..picture.clone() };
+        assert!(drawn(&least, &mut gpu) == drawn(&without(&picture), &mut gpu));
+    }
+}

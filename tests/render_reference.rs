@@ -41,6 +41,8 @@ fn differ(dir: &tempfile::TempDir, a: &str, b: &str) -> (f64, f64) {
     (of("rmse"), of("max"))
 }
 
+/// The volume knows no textures.
+const PLAIN: &str = "cloud.0.texture=\"none\"";
 const CUBES: [&str; 3] = ["scenes/cubes-554.toml", "--size", "100x75"];
 
 /// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one way. A pixel on a sprite's
@@ -77,7 +79,7 @@ fn the_thin_reference_is_what_the_device_draws() {
 #[test]
 fn the_volume_has_all_particles_and_says_how_exact_it_is() {
     let dir = temp();
-    let size = ["scenes/cubes-554.toml", "--size", "40x30"];
+    let size = ["scenes/cubes-554.toml", "--size", "40x30", "--set", PLAIN];
     let fewer = ["--set", "draw.count=\"distance\"", "--set", "draw.count_a=20"];
     let [all, counted] = [&[][..], &fewer].map(|more| {
         let volume = render(&dir, "volume.exr", &size, &[&["--reference", "volume"], more].concat());
@@ -147,7 +149,8 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
             &["--reference", "thin", "--set", "material.0.ks=[0.01,0,0]"],
             "cloud 0: its material \"cloud\" has a lobe, and the f64 reference knows clouds that reflect diffusely alone",
         ),
-        (&["--reference", "volume", "--time", "nan"], "finite"),
+        (&["--reference", "volume"], "cloud 0 is textured"),
+        (&["--reference", "volume", "--set", PLAIN, "--time", "nan"], "finite"),
     ] {
         let output = run(&[&["render", "-o", &out], &CUBES[..], args].concat());
         let stderr = String::from_utf8_lossy(&output.stderr);
@@ -165,7 +168,8 @@ fn ctrl_c_leaves_nothing_half_written() {
     let dir = temp();
     let out = path(&dir, "late.exr");
     // Minutes of work; begun when its process is.
-    let args = ["render", "scenes/cubes-554.toml", "--size", "1600x1200", "--reference", "volume", "-o", &out];
+    let args =
+        ["render", "scenes/cubes-554.toml", "--size", "1600x1200", "--set", PLAIN, "--reference", "volume", "-o", &out];
     let child = nimbus(&args).spawn().expect("a child");
     std::thread::sleep(Duration::from_millis(700));
     let begin = Instant::now();

@@ -170,7 +170,7 @@ fn wrong_cuts_are_noticed() {
         (Some(&tiled), "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
         (Some(&tiled), "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
         (Some(&tiled), "tiles.comp", "log2(place.w", "0.98 * log2(place.w"),
-        (Some(&tiled), "tiles.comp", "min(cut, log2", "max(cut, log2"),
+        (Some(&tiled), "tiles.comp", "max(least, -log2", "min(least, -log2"),
     ] {
         let (truths, bounds) = truth(&picture, tiled);
         let values = picture.draw_by(&mut gpu, None, FORMAT.0, tiled);

@@ -92,7 +92,7 @@ pub struct SceneArgs {
 #[command(after_help = "How far the sprites are from both truths:\n  \
     nimbus render scenes/cubes-554.toml --size 200x150 -o drawn.exr\n  \
     nimbus render scenes/cubes-554.toml --size 200x150 -o thin.exr --reference thin\n  \
-    nimbus render scenes/cubes-554.toml --size 200x150 -o volume.exr --reference volume\n  \
+    nimbus render scenes/cubes-554.toml --size 200x150 --set 'cloud.0.texture=\"none\"' -o volume.exr --reference volume\n  \
     nimbus compare thin.exr drawn.exr\n  nimbus compare volume.exr thin.exr\n\n\
     The second reflection of a reference is integrated over areas: minutes for hundreds of facets. With \
     --set 'lighting.mode=\"first\"' there is none.")]

@@ -103,7 +103,8 @@ uint append(uint n, bool hit, uint r) {
 bool all_agree(bool b) { return subgroupAll(b); }
 #else
 shared uint said[INVOCATIONS];
-shared vec4 given[2 + 3 * TEXTURED][INVOCATIONS];
+// As words: what is no float stays what it is.
+shared uvec4 given[2 + 3 * TEXTURED][INVOCATIONS];
 
 uint append(uint n, bool hit, uint r) {
     uint t = gl_LocalInvocationID.x;
@@ -232,24 +233,24 @@ Loaded of_invocation(Loaded splat, uint m) {
 }
 #else
 void give(Loaded splat, uint t) {
-    given[0][t] = splat.place;
-    given[1][t] = splat.light;
+    given[0][t] = floatBitsToUint(splat.place);
+    given[1][t] = floatBitsToUint(splat.light);
 #if TEXTURED
-    given[2][t] = splat.turn;
-    given[3][t] = uintBitsToFloat(splat.gain);
-    given[4][t] = uintBitsToFloat(uvec4(splat.side));
+    given[2][t] = floatBitsToUint(splat.turn);
+    given[3][t] = splat.gain;
+    given[4][t] = uvec4(splat.side);
 #endif
     barrier();
 }
 
 Loaded of_invocation(uint m) {
     Loaded splat;
-    splat.place = given[0][m];
-    splat.light = given[1][m];
+    splat.place = uintBitsToFloat(given[0][m]);
+    splat.light = uintBitsToFloat(given[1][m]);
 #if TEXTURED
-    splat.turn = given[2][m];
-    splat.gain = floatBitsToUint(given[3][m]);
-    splat.side = floatBitsToUint(given[4][m].x);
+    splat.turn = uintBitsToFloat(given[2][m]);
+    splat.gain = given[3][m];
+    splat.side = given[4][m].x;
 #endif
     return splat;
 }

@@ -10,6 +10,7 @@ use crate::gpu::memory::TargetFormat;
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
+use crate::model::scene::DrawPath;
 
 impl Renderer {
     /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
@@ -29,7 +30,11 @@ impl Renderer {
     pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
         let _zone = info_span!("read back").entered();
         let (target, readback) = (&mut self.targets[self.i_ended_target], &self.readback);
-        let picture = self.tiling.as_ref().map(|t| &t.pictures[self.i_ended_target]);
+        let picture = self
+            .tiling
+            .as_ref()
+            .filter(|_| self.traits.path == DrawPath::Tiles)
+            .map(|t| &t.pictures[self.i_ended_target]);
         self.host.run(|rec| {
             match picture {
                 Some(picture) => rec.copy(picture, readback),

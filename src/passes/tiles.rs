@@ -83,9 +83,12 @@ const ROUND_WORDS: u32 = (size_of::<RoundRecord>() / 4) as u32;
 pub const RUN: u32 = 8;
 /// Tiles along a bin's side; the shaders' TILES_ACROSS.
 pub const TILES_ACROSS: u32 = 4;
-/// Workgroups along x that every device has, and turns that llvmpipe's loops take: most blocks, and most bins of a splat.
+/// Blocks: workgroups along x that every device has.
 const MOST: u32 = 65_535;
-/// Most pairs that there is room for at once; as many of the sort's tiles as llvmpipe's loops take turns.
+/// Bins: twice a block's worst pairs are [`MOST_PAIRS`] then.
+const MOST_BINS: u32 = 1 << 15;
+/// Most pairs that there is room for at once; the sort goes through its tiles of 1024 twice in one invocation, and
+/// llvmpipe's loops take 65 535 turns.
 const MOST_PAIRS: u64 = 1 << 24;
 
 /// How the picture is divided.
@@ -107,9 +110,9 @@ impl Division {
         let tile = [RUN * (invocations / rows), rows];
         let [n_bins_x, n_bins_y] = [width.div_ceil(TILES_ACROSS * tile[0]), height.div_ceil(TILES_ACROSS * tile[1])];
         match n_bins_x.checked_mul(n_bins_y) {
-            Some(n_bins) if n_bins <= MOST => Ok(Division { width, height, invocations, tile, n_bins_x, n_bins }),
+            Some(n_bins) if n_bins <= MOST_BINS => Ok(Division { width, height, invocations, tile, n_bins_x, n_bins }),
             _ => Err(Error::limit(format!(
-                "draw.path = \"tiles\": {width} x {height} pixels are more than its {MOST} bins of {} x {}; expected \"sprites\"",
+                "draw.path = \"tiles\": {width} x {height} pixels are more than its {MOST_BINS} bins of {} x {}; expected \"sprites\"",
                 TILES_ACROSS * tile[0],
                 TILES_ACROSS * tile[1]
             ))),

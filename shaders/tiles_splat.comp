@@ -53,6 +53,9 @@ uvec2 pixels(float low, float high, uint n) {
 // Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is set.
 uint project(uint i, uint r) {
     reach[r] = uvec2(0);
+    if (i == NO_PARTICLE) {
+        return 0u;
+    }
     vec3 v = along_camera(push.camera, placed[i].position - push.camera.eye);
     float sigma = placed[i].sigma;
     float tau = SQRT_TAU * particles[i].kappa * sigma;

@@ -19,8 +19,8 @@ use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord, TexturedRe
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
-use nimbus::passes::{surfaces, texture, tiles, transmit};
+use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, impostors, morton, place, second};
+use nimbus::passes::{sort, sprites, surfaces, texture, tiles, transmit};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -53,7 +53,7 @@ const RECORDS: [Record; 23] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 33] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 36] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
@@ -95,6 +95,9 @@ const INTERFACES: [(&str, &[Field], &[Element]); 33] = [
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
+    ("impostors.frag", impostors::Push::FIELDS, &[T]),
+    ("impostors.vert", impostors::Push::FIELDS, &[]),
+    ("impostors_part.comp", impostors::PartPush::FIELDS, &[B(8), B(4), B(8), B(8)]),
     ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
     ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),

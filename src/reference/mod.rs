@@ -10,6 +10,7 @@ pub mod facets;
 pub mod first;
 pub mod generate;
 pub mod grid;
+pub mod impostors;
 pub mod morton;
 pub mod occlude;
 pub mod place;

@@ -15,7 +15,7 @@ use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{Impostors, LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
@@ -23,13 +23,16 @@ use super::buffers::has_second;
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
+use super::shells::shell_size;
 use super::tensor::Shape;
 
 const TEXTURES: &str = "the pool of textures";
+const SHELL: &str = "the shell's picture (draw.impostors)";
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 7] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 8] = [
     (TEXTURES, BindingKind::Texels),
+    (SHELL, BindingKind::Texels),
     ("the second reflection's sources", BindingKind::Texels),
     ("their flux by light", BindingKind::Texels),
     ("their light by points", BindingKind::Texels),
@@ -52,6 +55,11 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
     let pixel = target_format(scene.film.format).bytes_per_pixel();
     let n_texels = if scene.is_textured() { u64::from(POOL_TEXELS) } else { 0 };
+    let shells = scene.draw.impostors != Impostors::Off;
+    let n_shell_texels = match shells {
+        true => shell_size([scene.film.width, scene.film.height]).map(u64::from).iter().product(),
+        false => 0,
+    };
     let size = |record: usize| record as u64;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     let wishes = [
@@ -84,13 +92,17 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         (TEXTURES, n_texels, 16),
         ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
         ("the film, read back", n_pixels, pixel),
+        (SHELL, n_shell_texels, 16),
+        ("the shell, as it is drawn", n_shell_texels, 16),
+        ("who is in the shell", if shells { n } else { 0 }, 4),
+        ("what is far, and what is near", if shells { 2 * n } else { 0 }, 8),
     ];
     let mut total = 0;
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
         if let Some(texel) =
-            texel.filter(|texel| (is_lit || name == TEXTURES) && n * bytes / u64::from(*texel) > limits.max_texels)
+            texel.filter(|texel| (is_lit || name == TEXTURES || name == SHELL) && n * bytes / u64::from(*texel) > limits.max_texels)
         {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",

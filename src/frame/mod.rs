@@ -9,6 +9,7 @@ pub mod exchange;
 pub mod feed;
 pub mod game;
 pub mod grouping;
+mod impostors;
 pub mod limits;
 pub mod packet;
 pub mod parallel;
@@ -18,6 +19,7 @@ pub mod relay;
 pub mod render;
 pub mod serial;
 mod settings;
+mod shells;
 pub mod tensor;
 pub mod tiling;
 

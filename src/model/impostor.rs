@@ -46,6 +46,8 @@ pub struct Predicted {
     pub growth: f64,
     /// Greatest σ that is seen, in slopes.
     pub sigma: f64,
+    /// Least view depth of a centre now over what it was.
+    pub depth_ratio: f64,
 }
 
 impl Predicted {
@@ -127,6 +129,6 @@ impl Shell {
         let slant = (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt();
         let stretch = plane * spread * along;
         let growth = stretch * slant + shift + (1.0 + stretch) * w * across;
-        Some(Predicted { shift, growth, sigma: sigma * slant / (nearest * depth_ratio) })
+        Some(Predicted { shift, growth, sigma: sigma * slant / (nearest * depth_ratio), depth_ratio })
     }
 }

@@ -138,7 +138,7 @@ pub struct Variant {
     pub textured: bool,
     pub weighted: bool,
     pub format: TargetFormat,
-    /// Surfaces are drawn, too.
+    /// Surfaces are drawn, too, or what is far.
     pub behind: bool,
     /// Splats end where their optical depth falls under a threshold.
     pub threshold: bool,
@@ -189,7 +189,8 @@ pub struct Tiles {
     pub entries: Buffer,
     found: Buffer,
     state: Buffer,
-    /// The surfaces, and their depth.
+    /// Whether there may be something to compose over: that, and its depth.
+    behind: bool,
     under: Buffer,
     depths: Buffer,
 }
@@ -281,6 +282,7 @@ impl Tiles {
             entries: buffer("tiles.entries", capacity, 2)?,
             found: buffer("tiles.ranges", division.n_bins.into(), 4)?,
             state: buffer("tiles.state", n_state, 4)?,
+            behind: variant.behind,
             under: buffer("tiles.under", n_under, variant.format.bytes_per_pixel() / 4)?,
             depths: buffer("tiles.depths", n_under, 1)?,
         })
@@ -339,10 +341,21 @@ impl Tiles {
     /// Fetches the drawn surfaces to compose over, and begins `picture` with them.
     pub fn record_under(&self, rec: &mut Recorder<'_>, target: Target<'_>, picture: &Buffer) {
         rec.copy_image(target.color, &self.under);
-        if let Some(depth) = target.depth {
-            rec.copy_image(depth, &self.depths);
+        match target.depth {
+            Some(depth) => rec.copy_image(depth, &self.depths),
+            // Infinitely far.
+            None => rec.fill(&self.depths, 0),
         }
         rec.copy(&self.under, picture);
+    }
+
+    /// Begins `picture` with nothing to compose over.
+    pub fn record_nothing(&self, rec: &mut Recorder<'_>, picture: &Buffer) {
+        if self.behind {
+            rec.fill(&self.under, 0);
+            rec.fill(&self.depths, 0);
+        }
+        rec.fill(picture, 0);
     }
 
     /// The pairs of round `i`; [`Tiles::i_extent`] says where `round` has their number.

@@ -101,9 +101,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
-        if let Some(texel) =
-            texel.filter(|texel| (is_lit || name == TEXTURES || name == SHELL) && n * bytes / u64::from(*texel) > limits.max_texels)
-        {
+        if let Some(texel) = texel.filter(|texel| {
+            (is_lit || name == TEXTURES || name == SHELL) && n * bytes / u64::from(*texel) > limits.max_texels
+        }) {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
                 n * bytes / u64::from(texel),

@@ -7,7 +7,7 @@
 // (docs/model.md §11 "impostors").
 
 // From pixels off the middle of the picture to texels off the middle of the shell's: (column, row) over under.
-layout(push_constant) uniform Push { vec3 column; float depth; vec3 row; uint width; vec3 under; uint height; vec2 middle; vec2 unused; } push;
+layout(push_constant) uniform Push { vec3 column; float depth; vec3 row; uint width; vec3 under; uint height; vec2 middle; vec2 low; vec2 high; } push;
 // Four floats a texel, rows from the top.
 layout(binding = 0) uniform usamplerBuffer shell;
 

@@ -2,10 +2,11 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 
-// The whole picture, as far off as what the shell shows (docs/model.md §11 "impostors").
+// Where the shell shows anything, as far off as that is (docs/model.md §11 "impostors").
 
-layout(push_constant) uniform Push { vec3 column; float depth; vec3 row; uint width; vec3 under; uint height; vec2 middle; vec2 unused; } push;
+layout(push_constant) uniform Push { vec3 column; float depth; vec3 row; uint width; vec3 under; uint height; vec2 middle; vec2 low; vec2 high; } push;
 
 void main() {
-    gl_Position = vec4((gl_VertexIndex & 1) != 0 ? 1.0 : -1.0, (gl_VertexIndex & 2) != 0 ? 1.0 : -1.0, push.depth, 1.0);
+    bvec2 end = bvec2((gl_VertexIndex & 1) != 0, (gl_VertexIndex & 2) != 0);
+    gl_Position = vec4(mix(push.low, push.high, end), push.depth, 1.0);
 }

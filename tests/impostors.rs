@@ -14,8 +14,9 @@ use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::scene::{Scene, Threading};
+use nimbus::study::picture::{Drawing, picture};
 
-const N_FRAMES: u32 = 64;
+const N_FRAMES: u32 = 40;
 const N_PIXELS: usize = 160 * 120;
 
 fn scene(overrides: &[&str]) -> Arc<Scene> {
@@ -104,19 +105,98 @@ fn compare(with: &[(Vec<f32>, Plan)], without: &[(Vec<f32>, Plan)]) -> Flight {
     flight
 }
 
+/// Without impostors, and with them.
+fn both(gpu: &Gpu, overrides: &[&str], first: u32) -> [Vec<(Vec<f32>, Plan)>; 2] {
+    ["draw.impostors='off'", "draw.impostors='on'"]
+        .map(|key| fly(gpu, &[overrides, &[key]].concat(), first, Threading::Serial))
+}
+
+/// Popping is in proportion to the knob: what a pixel changes by where a shell is a pixel off, in this cloud; and what a new
+/// picture's rounding and the cubic leave of it.
+const POP_A_PIXEL: f32 = 0.6;
+const POP_AT_LEAST: f32 = 0.03;
+
 #[test]
 fn a_flight_does_not_pop() {
     let gpu = Gpu::new();
-    for path in ["draw.path='sprites'", "draw.path='tiles'"] {
-        // From afar, and into the cloud.
-        for first in [0, 150, 205] {
-            let [off, on] = ["draw.impostors='off'", "draw.impostors='on'"]
-                .map(|key| fly(&gpu, &[key, path], first, Threading::Serial));
-            let f = compare(&on, &off);
+    // From afar, near, and into the cloud.
+    for first in [0, 280, 400] {
+        let off = fly(&gpu, &["draw.impostors='off'"], first, Threading::Serial);
+        for error in [0.5, 0.25, 0.1] {
+            let key = format!("draw.impostor_error={error}");
+            let f = compare(&fly(&gpu, &["draw.impostors='on'", &key], first, Threading::Serial), &off);
             println!(
-                "{path}, from {first}: {} made, {} used again; rmse {:.2e}, most {:.3}, new {:.1e}, pop {:.3}; change {:.3}",
+                "from {first}, {error} px: {} made, {} used again; rmse {:.2e}, most {:.3}, new {:.1e}, pop {:.3}; change {:.3}",
                 f.n_made, f.n_reused, f.rmse, f.most, f.most_new, f.pop, f.change
             );
+            assert!(f.n_reused > 0 && f.n_made > 0);
+            assert!(f.pop <= POP_A_PIXEL * error as f32 + POP_AT_LEAST, "{first} {error}: {}", f.pop);
+            // Of layers that end within a rounding of a pixel's centre one may be there or not: e^-4.5 of an optical depth.
+            assert!(f.most_new < 0.02, "{first} {error}: {}", f.most_new);
         }
     }
+    let [off, on] = both(&gpu, &["draw.path='tiles'"], 280);
+    let f = compare(&on, &off);
+    assert!(f.n_reused > 0 && f.pop <= POP_A_PIXEL * 0.5 + POP_AT_LEAST && f.most_new < 0.02, "{}", f.pop);
+}
+
+/// What the flights are compared with is the truth in f64, which impostors are as near to.
+#[test]
+fn the_f64_picture_agrees() {
+    let gpu = Gpu::new();
+    let [off, on] = both(&gpu, &[], 280);
+    let k = 20;
+    assert!(off_by(&on[k].1).is_some_and(|px| px > 0));
+    let scene = scene(&[]);
+    let time_s = scene.time.at(280 + k as u32);
+    let truth = picture(&scene, time_s, Drawing::Thin, &|_, _| {}).expect("a picture").rgba.concat();
+    let most = |a: &[f32]| a.iter().zip(&truth).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
+    let [without, with] = [most(&off[k].0), most(&on[k].0)];
+    println!("against f64: {without:.1e} without, {with:.3} with");
+    assert!(without < 0.02 && with < f64::from(POP_A_PIXEL) * 0.5 + f64::from(POP_AT_LEAST));
+}
+
+#[test]
+fn both_loops_give_the_same_bytes_and_no_skip_those_without_impostors() {
+    let gpu = Gpu::new();
+    for path in ["draw.path='sprites'", "draw.path='tiles'"] {
+        let on = &["draw.impostors='on'", path, "film.format='rgba16f'"];
+        let serial = fly(&gpu, on, 0, Threading::Serial);
+        assert!(serial.iter().any(|(_, plan)| off_by(plan).is_some_and(|px| px > 0)));
+        for threading in [Threading::Serial, Threading::Parallel] {
+            let again = fly(&gpu, on, 0, threading);
+            for (k, (a, b)) in serial.iter().zip(&again).enumerate() {
+                assert!(a.0 == b.0, "{path}, {threading:?}: frame {k}");
+                assert_eq!(a.1.decision(Pass::Impostors), b.1.decision(Pass::Impostors));
+            }
+        }
+        // Alone a frame knows no shell, and without skipping none does.
+        let scene_on = scene(on);
+        let scene_off = scene(&["draw.impostors='off'", path, "film.format='rgba16f'"]);
+        let draw = |scene: &Arc<Scene>, skip: bool, frames: &[u32]| {
+            let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, scene, skip).expect("a renderer");
+            let mut game = Game::new(scene.clone(), None);
+            let one = |i: &u32| renderer.step(game.step(*i).expect("a packet")).expect("a frame").plan;
+            let plans: Vec<Plan> = frames.iter().map(one).collect();
+            (renderer.image_bytes().expect("bytes"), plans)
+        };
+        let wanted = draw(&scene_off, true, &[20]).0;
+        assert!(wanted == draw(&scene_on, true, &[20]).0, "{path}: alone");
+        let (unskipped, plans) = draw(&scene_on, false, &[17, 18, 19, 20]);
+        assert!(wanted == unskipped && plans.iter().all(|p| !p.runs(Pass::Impostors)), "{path}: no skip");
+        let (reused, plans) = draw(&scene_on, true, &[17, 18, 19, 20]);
+        assert!(off_by(plans.last().expect("a plan")).is_some_and(|px| px > 0) && wanted != reused);
+    }
+}
+
+#[test]
+fn what_moves_or_grows_denser_is_drawn() {
+    let gpu = Gpu::new();
+    for change in ["cloud.0.gust=0.1", "draw.count='distance'"] {
+        let frames = fly(&gpu, &["draw.impostors='on'", change], 0, Threading::Serial);
+        assert!(frames.iter().all(|(_, plan)| off_by(plan).is_none()), "{change}");
+    }
+    // All coordinates go with a cloud that drifts alone, and it is only the eye that moves.
+    let frames = fly(&gpu, &["draw.impostors='on'", "cloud.0.wind=[0.1,0,0]"], 0, Threading::Serial);
+    assert!(frames.iter().any(|(_, plan)| off_by(plan).is_some_and(|px| px > 0)));
 }

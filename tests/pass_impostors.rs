@@ -65,7 +65,13 @@ fn views() -> Vec<(&'static str, View)> {
 }
 
 fn shown(shell: &Shell, now: &View, depth: f32) -> Shown {
-    Shown { to_shell: shell.homography(now), tangents: [now.tangents, shell.view.tangents], size: SHELL, depth }
+    Shown {
+        to_shell: shell.homography(now),
+        tangents: [now.tangents, shell.view.tangents],
+        size: SHELL,
+        bounds: [-now.tangents, now.tangents],
+        depth,
+    }
 }
 
 /// What each pixel should be, and the bound.
@@ -138,6 +144,21 @@ fn shells_seen_from_elsewhere() {
             let values = draw(&mut gpu, None, format, &shown(&shell, &now, 0.0));
             assert_within_and_say(&format!("{what}, {format:?}"), &values, &truths, &bounds);
         }
+    }
+}
+
+#[test]
+fn nothing_is_drawn_beyond_the_bounds() {
+    let mut gpu = Gpu::new();
+    let (shell, now) = (shell(), views().swap_remove(0).1);
+    let whole = draw(&mut gpu, None, TargetFormat::Rgba32f, &shown(&shell, &now, 0.0));
+    // Slopes of pixel edges: 24 to 72 of 96 columns, and 8 to 32 of 64 rows from the top.
+    let bounds = [DVec2::new(-0.3, 0.0), DVec2::new(0.3, 0.3)];
+    let part = draw(&mut gpu, None, TargetFormat::Rgba32f, &Shown { bounds, ..shown(&shell, &now, 0.0) });
+    for (p, (a, b)) in part.chunks(4).zip(whole.chunks(4)).enumerate() {
+        let (i, j) = (p as u32 % SIZE[0], p as u32 / SIZE[0]);
+        let within = (24..72).contains(&i) && (8..32).contains(&j);
+        assert_eq!(a, if within { b } else { &[0.0; 4] }, "{i} {j}");
     }
 }
 

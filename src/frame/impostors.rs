@@ -154,6 +154,7 @@ impl Impostors {
             to_shell: kept.shell.homography(&now),
             tangents: [now.tangents, kept.shell.view.tangents],
             size: self.keeper.rules.shell_size,
+            bounds: kept.bounds,
             depth: (f64::from(packet.camera.near) / kept.depth) as f32,
         };
         self.pass.record_show(rec, texels, target, &shown)

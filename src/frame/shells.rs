@@ -77,6 +77,8 @@ pub struct Kept {
     pub last_key: u32,
     /// Nearer than this are no centres of it that the view shows.
     pub depth: f64,
+    /// Slopes of the view that it shows anything at, least and greatest.
+    pub bounds: [DVec2; 2],
 }
 
 #[derive(Debug)]
@@ -106,7 +108,7 @@ impl Keeper {
         }
         let why = match kept.map(|kept| (kept, self.usable(&kept, &now, packet))) {
             Some((kept, Ok((pixels, depth)))) => {
-                let kept = Kept { depth, ..kept };
+                let kept = Kept { depth, bounds: self.bounds(&kept, &now, packet), ..kept };
                 self.kept = Some(kept);
                 return Step::Reused { kept, pixels };
             }
@@ -132,11 +134,14 @@ impl Keeper {
         let far = &kept.shell.far;
         let ratio = kept.shell.predict(now).map_or(0.0, |p| p.depth_ratio);
         let nearest = ratio * far.nearest;
-        let farthest = packet.extents.iter().map(|e| depths(e, now)[1]).fold(0.0, f64::max);
-        match packet.regions.iter().any(|r| is_among(r, now, [nearest, farthest])) {
-            true => Err("a surface is among what is far"),
-            false => Ok((pixels, nearest)),
+        let mut surfaces = packet.regions.iter().filter(|r| r.kind == REGION_SURFACE).peekable();
+        if surfaces.peek().is_some() {
+            let farthest = packet.extents.iter().map(|e| depths(e, now)[1]).fold(0.0, f64::max);
+            if surfaces.any(|r| is_among(r, now, [nearest, farthest])) {
+                return Err("a surface is among what is far");
+            }
         }
+        Ok((pixels, nearest))
     }
 
     /// Pixels that a shell is off by in `now`'s view, or why it is not to be shown.
@@ -153,15 +158,20 @@ impl Keeper {
 
     /// The shell that saves the most if the eye goes on as it came from `last` to `now`.
     fn best(&self, packet: &Packet, last: &View, now: &View) -> Option<Kept> {
-        let costs: Vec<f64> = packet.extents.iter().map(|e| self.cost(e, now)).collect();
-        let show = SHOW_LAYERS * f64::from(self.rules.size[0]) * f64::from(self.rules.size[1]);
-        let wider = (1.0 + 2.0 * MARGIN) * (1.0 + 2.0 * MARGIN);
+        let pixel = self.pixel(now);
+        let costs: Vec<f64> = packet.extents.iter().map(|e| self.cost(e, now, pixel)).collect();
+        let sum = |costs: &[f64], cut: f64| -> f64 {
+            packet.extents.iter().zip(costs).map(|(e, c)| c * share_beyond(e, now, cut)).sum()
+        };
         let mut best: Option<(f64, Kept)> = None;
         for cut in cuts(&packet.extents, &costs, now) {
             let Some(kept) = self.shell(packet, now, cut) else { continue };
-            let far: f64 = packet.extents.iter().zip(&costs).map(|(e, c)| c * share_beyond(e, now, cut)).sum();
+            let wide = View { tangents: kept.shell.view.tangents, ..*now };
+            let in_shell: Vec<f64> = packet.extents.iter().map(|e| self.cost(e, &wide, pixel)).collect();
+            let shown = (kept.bounds[1] - kept.bounds[0]) / pixel;
             let n = self.life(&kept, packet, last, now);
-            let saved = far * (1.0 - wider / f64::from(n)) - show;
+            let anew = sum(&in_shell, cut) / f64::from(n);
+            let saved = sum(&costs, cut) - anew - SHOW_LAYERS * shown.x * shown.y;
             if n >= LEAST_LIFE && saved > best.as_ref().map_or(0.0, |(s, _)| *s) {
                 best = Some((saved, kept));
             }
@@ -203,14 +213,45 @@ impl Keeper {
         let wider = |k: usize| f64::from(shell_size[k]) / f64::from(size[k]);
         let tangents = now.tangents * DVec2::new(wider(0), wider(1));
         let camera = CameraRecord { tan_x: tangents.x as f32, tan_y: tangents.y as f32, ..packet.camera };
-        let kept = Kept { shell: Shell { view: view_of(&camera), far }, camera, last_key, depth: nearest };
+        let kept = Kept {
+            shell: Shell { view: view_of(&camera), far },
+            camera,
+            last_key,
+            depth: nearest,
+            bounds: [-now.tangents, now.tangents],
+        };
+        let kept = Kept { bounds: self.bounds(&kept, now, packet), ..kept };
         self.usable(&kept, now, packet).is_ok().then_some(kept)
     }
 
-    /// Pixels of the layers that a group's particles make.
-    fn cost(&self, extent: &Extent, now: &View) -> f64 {
-        let pixel = self.pixel(now);
-        let [width, height] = self.rules.size.map(f64::from);
+    /// Slopes of `now`'s view that a shell shows anything at, least and greatest.
+    fn bounds(&self, kept: &Kept, now: &View, packet: &Packet) -> [DVec2; 2] {
+        let then = &kept.shell.view;
+        let far = packet.extents.iter().filter(|e| depths(e, then)[1] >= kept.shell.far.nearest);
+        let (mut low, mut high) = (now.tangents, -now.tangents);
+        for extent in far {
+            let c = extent.center - now.eye;
+            let reach = self.rules.cutoff * extent.sigma_max;
+            let along = |axis: DVec3| (c.dot(axis), axis.abs().dot(extent.half) + reach);
+            let (z, deep) = along(now.forward);
+            if z - deep <= 0.0 {
+                return [-now.tangents, now.tangents];
+            }
+            for (k, axis) in [now.right, now.up].into_iter().enumerate() {
+                let (x, wide) = along(axis);
+                let slope = |x: f64, z: f64| x / z;
+                low[k] = low[k].min(slope(x - wide, z - deep)).min(slope(x - wide, z + deep));
+                high[k] = high[k].max(slope(x + wide, z - deep)).max(slope(x + wide, z + deep));
+            }
+        }
+        // Off by the error, the cubic's footprint, and a pixel for the rounding of both.
+        let slack = (self.rules.error + FOOTPRINT + 1.0) * self.pixel(now);
+        let (low, high) = ((low - slack).max(-now.tangents), (high + slack).min(now.tangents));
+        [low.min(high), high]
+    }
+
+    /// Pixels, `pixel` slopes wide, of the layers that a group's particles make in a view.
+    fn cost(&self, extent: &Extent, now: &View, pixel: f64) -> f64 {
         let c = extent.center - now.eye;
         let z = c.dot(now.forward).max(1e-3 * self.rules.cutoff * extent.sigma_mean);
         let reach = extent.half.length() + self.rules.cutoff * extent.sigma_max;
@@ -218,8 +259,9 @@ impl Keeper {
         if c.dot(now.forward) < -reach || beside(now.right, now.tangents.x) || beside(now.up, now.tangents.y) {
             return 0.0;
         }
-        let radius = self.rules.cutoff * extent.sigma_mean / (z * pixel);
-        f64::from(extent.n_particles) * (std::f64::consts::PI * radius * radius).min(width * height)
+        let radius = self.rules.cutoff * extent.sigma_mean / z;
+        let all = 4.0 * now.tangents.x * now.tangents.y;
+        f64::from(extent.n_particles) * (std::f64::consts::PI * radius * radius).min(all) / (pixel * pixel)
     }
 }
 
@@ -282,9 +324,6 @@ fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
 
 /// Whether a surface is neither nearer nor farther than all of some depths.
 fn is_among(region: &RegionRecord, view: &View, [nearest, farthest]: [f64; 2]) -> bool {
-    if region.kind != REGION_SURFACE {
-        return false;
-    }
     let f64s = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let z = (f64s(region.center) - view.eye).dot(view.forward);
     let half = f64s(region.u).dot(view.forward).abs() + f64s(region.v).dot(view.forward).abs();

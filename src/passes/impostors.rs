@@ -25,7 +25,8 @@ record! {
         under: [f32; 3],
         height: u32,
         middle: [f32; 2],
-        unused: [f32; 2],
+        low: [f32; 2],
+        high: [f32; 2],
     }
 }
 
@@ -43,6 +44,8 @@ pub struct Shown {
     pub tangents: [DVec2; 2],
     /// The shell's texels.
     pub size: [u32; 2],
+    /// The slopes that it shows anything at, least and greatest; rounded outward by whoever gives them.
+    pub bounds: [DVec2; 2],
     /// near/z of what stands for all of it; surfaces that are nearer hide it.
     pub depth: f32,
 }
@@ -91,6 +94,10 @@ fn push(shown: &Shown, [width, height]: [u32; 2]) -> Push {
     let texels = 0.5 * DVec2::new(shown.size[0].into(), shown.size[1].into()) / shell;
     let texels = DMat3::from_diagonal(DVec3::new(texels.x, -texels.y, 1.0));
     let of = (texels * shown.to_shell * slopes).transpose();
+    // Rows count downward, in slopes and on the screen.
+    let down = DVec2::new(1.0, -1.0);
+    let on_screen = shown.bounds.map(|slopes| (down * slopes / view).clamp(DVec2::NEG_ONE, DVec2::ONE));
+    let (low, high) = (on_screen[0].min(on_screen[1]), on_screen[0].max(on_screen[1]));
     let f32s = |v: DVec3| v.as_vec3().to_array();
     Push {
         column: f32s(of.x_axis),
@@ -100,6 +107,7 @@ fn push(shown: &Shown, [width, height]: [u32; 2]) -> Push {
         under: f32s(of.z_axis),
         height: shown.size[1],
         middle: middle.as_vec2().to_array(),
-        unused: [0.0; 2],
+        low: low.as_vec2().to_array(),
+        high: high.as_vec2().to_array(),
     }
 }

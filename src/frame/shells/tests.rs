@@ -87,8 +87,8 @@ fn nothing_is_made_where_it_would_not_live_or_not_pay() {
         }
         steps.pop().expect("a step")
     };
-    // Half a unit a frame: a pixel is 0.1 at depth 10, and the clouds are 10 deep.
-    assert_eq!(run(0.5, &|_| {}, 3), Step::Nothing("none would save anything"));
+    // Three units a frame: a pixel is 0.1 at depth 10, and the clouds are 10 deep.
+    assert_eq!(run(3.0, &|_| {}, 3), Step::Nothing("none would save anything"));
     // A few small blobs cost less than showing a picture.
     let few = |p: &mut Packet| p.extents.iter_mut().for_each(|e| e.n_particles = 1);
     assert_eq!(run(0.02, &few, 3), Step::Nothing("none would save anything"));

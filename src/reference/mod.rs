@@ -22,6 +22,7 @@ pub mod texture;
 pub mod threshold;
 pub mod tiles;
 pub mod transmit;
+pub mod upsample;
 pub mod volume;
 
 use glam::DVec3;

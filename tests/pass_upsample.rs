@@ -100,8 +100,8 @@ impl Case {
         let to_full = |k: u32, small: u32, full: f64| (f64::from(k) + 0.5 - 0.5 * f64::from(small)) * n + 0.5 * full;
         let [sw, sh] = small.size;
         let small_depths = (0..sw * sh).map(|i| depth_at(to_full(i % sw, sw, w), to_full(i / sw, sh, h)));
-        let depths = (0..size[0] * size[1])
-            .map(|p| depth_at(f64::from(p % size[0]) + 0.5, f64::from(p / size[0]) + 0.5));
+        let depths =
+            (0..size[0] * size[1]).map(|p| depth_at(f64::from(p % size[0]) + 0.5, f64::from(p / size[0]) + 0.5));
         let surfaces = Surfaces { picture, depths: depths.collect(), small_depths: small_depths.collect() };
         Case { small, format, blobs, surfaces: behind.then_some(surfaces) }
     }
@@ -159,7 +159,13 @@ impl Case {
     }
 
     fn compare(&self, gpu: &mut Gpu) {
-        let what = format!("{:?} by {}, {:?}, surfaces {}", self.small.full, self.small.n, self.format, self.surfaces.is_some());
+        let what = format!(
+            "{:?} by {}, {:?}, surfaces {}",
+            self.small.full,
+            self.small.n,
+            self.format,
+            self.surfaces.is_some()
+        );
         let (truths, bounds) = self.truth();
         assert_within_and_say(&what, &self.draw(gpu, None), &truths, &bounds);
     }

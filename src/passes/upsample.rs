@@ -68,8 +68,7 @@ impl Upsample {
         let n_runs = width.div_ceil(4 * n);
         let n_small = u64::from(small_width) * u64::from(small_height);
         let last_texel = (n_small * format.bytes_per_pixel() / 16) as u32 - 1;
-        let push =
-            Push { width, height, small_width, small_height, offset_x, offset_y, n_runs, last_texel };
+        let push = Push { width, height, small_width, small_height, offset_x, offset_y, n_runs, last_texel };
         Ok(Upsample { kernel, push, n_invocations: n_runs * height, behind })
     }
 

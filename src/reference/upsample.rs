@@ -38,12 +38,7 @@ pub fn render(small: &SmallPicture, blobs: &[[f64; 4]], under: Option<&Under<'_>
 }
 
 /// The same where depths are of one surface up to another share.
-pub fn render_alike(
-    small: &SmallPicture,
-    blobs: &[[f64; 4]],
-    under: Option<&Under<'_>>,
-    alike: f64,
-) -> Vec<Summed> {
+pub fn render_alike(small: &SmallPicture, blobs: &[[f64; 4]], under: Option<&Under<'_>>, alike: f64) -> Vec<Summed> {
     let rows = (0..small.full[1]).flat_map(|j| (0..small.full[0]).map(move |i| [i, j]));
     rows.map(|pixel| {
         let (mut sum, mut of_terms) = interpolated(small, blobs, under, pixel, alike);

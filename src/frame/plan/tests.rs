@@ -16,11 +16,12 @@ const TRAITS: Traits = Traits {
     glossy: false,
     tensors: Tensors::Needless,
     path: DrawPath::Sprites,
+    shrunk: false,
     skip: true,
 };
 const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
 /// With every pass.
-const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, ..KEPT };
+const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, shrunk: true, ..KEPT };
 
 fn packet() -> Packet {
     Packet {

@@ -20,7 +20,7 @@ use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecor
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, impostors, morton, place, second};
-use nimbus::passes::{sort, sprites, surfaces, texture, tiles, transmit};
+use nimbus::passes::{sort, sprites, surfaces, texture, tiles, transmit, upsample};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -53,7 +53,7 @@ const RECORDS: [Record; 23] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 36] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 37] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
@@ -149,6 +149,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 36] = [
         ],
     ),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
+    ("upsample.comp", upsample::Push::FIELDS, &[T, B(4)]),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -352,6 +353,7 @@ fn shared_constants_have_one_value() {
         ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),
         ("include/tiles.glsl", "TILES_ACROSS", f64::from(tiles::TILES_ACROSS)),
         ("tiles.comp", "RUN", f64::from(tiles::RUN)),
+        ("include/upsample.glsl", "ALIKE", nimbus::model::resolution::ALIKE),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),

@@ -15,6 +15,7 @@ use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
+use crate::model::resolution::{Resolution, SmallPicture};
 use crate::model::scene::{Impostors, LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
@@ -28,11 +29,17 @@ use super::tensor::Shape;
 
 const TEXTURES: &str = "the pool of textures";
 const SHELL: &str = "the shell's picture (draw.impostors)";
+const BLOBS: &str = "the blobs' smaller picture";
+const UNDER: &str = "the surfaces under it";
+/// Not of light: read in every scene that has them.
+const ALWAYS_READ: [&str; 4] = [TEXTURES, SHELL, BLOBS, UNDER];
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 8] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 10] = [
     (TEXTURES, BindingKind::Texels),
     (SHELL, BindingKind::Texels),
+    (BLOBS, BindingKind::Texels),
+    (UNDER, BindingKind::Texels),
     ("the second reflection's sources", BindingKind::Texels),
     ("their flux by light", BindingKind::Texels),
     ("their light by points", BindingKind::Texels),
@@ -62,6 +69,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     };
     let size = |record: usize| record as u64;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
+    let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
+    let n_behind = if n_small > 0 && !scene.surfaces.is_empty() { n_pixels } else { 0 };
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
@@ -96,13 +105,19 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the shell, as it is drawn", n_shell_texels, 16),
         ("who is in the shell", if shells { n } else { 0 }, 4),
         ("what is far, and what is near", if shells { 2 * n } else { 0 }, 8),
+        (BLOBS, n_small, pixel),
+        // With "auto" the half one beside the quarter, the larger one counted twice.
+        ("what is drawn in a smaller size", n_small * (if is_auto { 6 } else { 3 }), pixel + DEPTH_BYTES_PER_PIXEL),
+        (UNDER, n_behind, pixel),
+        ("the depths under it", 2 * n_behind, DEPTH_BYTES_PER_PIXEL),
+        ("what comes of the two", if n_small > 0 { IN_FLIGHT as u64 * n_pixels } else { 0 }, pixel),
     ];
     let mut total = 0;
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
         if let Some(texel) = texel.filter(|texel| {
-            (is_lit || name == TEXTURES || name == SHELL) && n * bytes / u64::from(*texel) > limits.max_texels
+            (is_lit || ALWAYS_READ.contains(&name)) && n * bytes / u64::from(*texel) > limits.max_texels
         }) {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
@@ -127,6 +142,16 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         )));
     }
     Ok(total)
+}
+
+/// Pixels of the smaller picture that blobs are drawn into, the largest that may be tried; 0 where there is none.
+fn n_small_pixels(scene: &Scene) -> u64 {
+    let n = match scene.draw.resolution {
+        Resolution::Full => return 0,
+        Resolution::Auto => Resolution::Half.divisor(),
+        resolution => resolution.divisor(),
+    };
+    SmallPicture::of([scene.film.width, scene.film.height], n).n_pixels()
 }
 
 /// Whether T1 and T2 fit into `free` bytes, and T2, the greater by far, into one binding.

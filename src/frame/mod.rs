@@ -3,6 +3,7 @@
 
 pub mod buffers;
 pub mod choice;
+pub mod choice_resolution;
 mod drawing;
 mod drawn;
 pub mod exchange;
@@ -20,6 +21,7 @@ pub mod render;
 pub mod serial;
 mod settings;
 mod shells;
+mod shrunk;
 pub mod tensor;
 pub mod tiling;
 

@@ -28,10 +28,11 @@ pub enum Pass {
     Impostors,
     Sprites,
     Tiles,
+    Upsample,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 15] = [
+    pub const ALL: [Pass; 16] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -47,6 +48,7 @@ impl Pass {
         Pass::Impostors,
         Pass::Sprites,
         Pass::Tiles,
+        Pass::Upsample,
     ];
 
     /// The room's name: timer label and column in the results.
@@ -67,6 +69,7 @@ impl Pass {
             "impostors",
             "sprites",
             "tiles",
+            "upsample",
         ];
         names[self as usize]
     }
@@ -180,6 +183,8 @@ pub struct Traits {
     pub impostors: bool,
     /// What draws the particles.
     pub path: DrawPath,
+    /// Blobs are drawn into a smaller picture.
+    pub shrunk: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
 }
@@ -260,6 +265,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         },
         drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
         drawing(DrawPath::Tiles, "draw.path is \"sprites\""),
+        if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
     ];
     if traits.n_particles == 0 {
         for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort, Pass::Texture, Pass::Impostors]

@@ -20,6 +20,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, ScopeTime};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
+use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Impostors, LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
@@ -144,6 +145,7 @@ impl Renderer {
                 tensors,
                 impostors: scene.draw.impostors != Impostors::Off,
                 // Until it is chosen.
+                shrunk: !matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto),
                 path: if scene.draw.path == DrawPath::Tiles { DrawPath::Tiles } else { DrawPath::Sprites },
                 skip,
             },

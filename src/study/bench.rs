@@ -108,6 +108,9 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
             if let Some(choice) = stage.choice.take() {
                 ran.outcome.chosen.push(named(cases, case, &choice.text()));
             }
+            if let Some(choice) = stage.size_choice.take() {
+                ran.outcome.chosen.push(named(cases, case, &choice.text()));
+            }
             if let Some(choice) = stage.impostor_choice.take() {
                 ran.outcome.chosen.push(named(cases, case, &choice.text()));
             }

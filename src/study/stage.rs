@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::frame::choice::{Choice, ImpostorChoice};
+use crate::frame::choice_resolution::SizeChoice;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::{OnFrame, parallel, serial};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
+use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Impostors, Scene, Simulate, Threading};
 use crate::passes;
 
@@ -26,11 +28,13 @@ pub struct DeviceChoice {
 pub struct Stage {
     pub renderer: Renderer,
     pub game: Game,
-    /// Its `draw.path` and `draw.impostors` are what is drawn by.
+    /// Its `draw.path`, `draw.resolution` and `draw.impostors` are what is drawn by.
     pub scene: Arc<Scene>,
     /// What `draw.path = "auto"` came to, where the scene asks for it.
     pub choice: Option<Choice>,
-    /// What `draw.impostors = "auto"` came to, likewise.
+    /// The same of its `draw.resolution`.
+    pub size_choice: Option<SizeChoice>,
+    /// And of its `draw.impostors`.
     pub impostor_choice: Option<ImpostorChoice>,
     compiler: Compiler,
     pub device: Device,
@@ -68,8 +72,8 @@ impl Stage {
             Impostors::Auto => faster(&device, &compiler, &scene, skip)?,
             _ => (make(&device, &compiler, scene, skip)?, None),
         };
-        let Made { renderer, game, scene, choice } = made;
-        Ok(Stage { renderer, game, scene, choice, impostor_choice, compiler, device, instance })
+        let Made { renderer, game, scene, choice, size_choice } = made;
+        Ok(Stage { renderer, game, scene, choice, size_choice, impostor_choice, compiler, device, instance })
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
@@ -115,6 +119,7 @@ struct Made {
     game: Game,
     scene: Arc<Scene>,
     choice: Option<Choice>,
+    size_choice: Option<SizeChoice>,
 }
 
 /// Everything that `scene`, whose impostors are decided, needs on a device.
@@ -125,14 +130,19 @@ fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool)
         Simulate::Cpu => Some(renderer.generate_now(device)?.0),
     };
     let mut game = Game::new(scene.clone(), rest).culling(skip);
-    let mut choice = None;
+    let (mut choice, mut size_choice) = (None, None);
     if scene.draw.path == DrawPath::Auto {
         let packet = game.step(0)?;
         let chosen = renderer.choose_path(&packet)?;
         Arc::make_mut(&mut scene).draw.path = chosen.path;
         choice = Some(chosen);
     }
-    Ok(Made { renderer, game, scene, choice })
+    if scene.draw.resolution == Resolution::Auto {
+        let chosen = renderer.choose_resolution(&game.step(0)?, scene.draw.error)?;
+        Arc::make_mut(&mut scene).draw.resolution = chosen.resolution;
+        size_choice = Some(chosen);
+    }
+    Ok(Made { renderer, game, scene, choice, size_choice })
 }
 
 /// `scene` with impostors or without, whichever draws its first frames faster.

@@ -40,15 +40,6 @@ layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
 shared uint sums[BLOCK];
 
 const float LOG2_E = 1.44269504089;
-// Pixels that rounding may move an edge by; as the rasteriser's snapping may in sprites.vert.
-const float SNAP = 1.0 / 16.0;
-
-// The first pixel and the one after the last whose centres lie within [low, high], in pixels from the first one's edge.
-uvec2 pixels(float low, float high, uint n) {
-    vec2 at = vec2(ceil(low - 0.5 - SNAP), floor(high + 0.5 + SNAP));
-    uvec2 range = uvec2(clamp(at, vec2(0.0), vec2(float(n))));
-    return uvec2(min(range.x, range.y), range.y);
-}
 
 // Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is set.
 uint project(uint i, uint r) {
@@ -72,10 +63,8 @@ uint project(uint i, uint r) {
         reach_in_sigma = sqrt(2.0 * cut);
     }
     vec2 s = v.xy / v.z;
-    float radius = GROWTH * reach_in_sigma * sigma;
-    vec2 x = (tangents(v.x, v.z, radius) + push.camera.tan_x) / push.pixel.x;
-    vec2 y = (push.camera.tan_y - tangents(v.y, v.z, radius).yx) / push.pixel.y;
-    uvec2 columns = pixels(x.x, x.y, push.width), rows = pixels(y.x, y.y, push.height);
+    uvec4 pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, uvec2(push.width, push.height));
+    uvec2 columns = pixels.xy, rows = pixels.zw;
     if (columns.x == columns.y || rows.x == rows.y) {
         return 0u;
     }

@@ -74,8 +74,16 @@ impl Picture {
         let keys = vec![CameraKey { time_s: 0.0, position: eye, target }];
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
-        let view =
-            View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0, threshold: 0.0 };
+        let view = View {
+            width: 160,
+            height: 120,
+            pose,
+            fov_y_rad: camera.fov_y_rad,
+            near,
+            cutoff: 3.0,
+            threshold: 0.0,
+            smallest: 0.0,
+        };
         Picture {
             camera,
             view,

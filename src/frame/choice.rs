@@ -2,12 +2,10 @@
 
 use std::time::Instant;
 
-use super::drawing::{draw_sprites, draw_tiles};
 use super::ms;
 use super::packet::Packet;
 use super::render::Renderer;
 use crate::error::Result;
-use crate::gpu::Target;
 use crate::model::scene::DrawPath;
 
 /// Timed turns of each way; before them one that is not, in which a driver may compile.
@@ -48,7 +46,7 @@ impl Renderer {
     pub fn choose_path(&mut self, packet: &Packet) -> Result<Choice> {
         self.step(packet.clone())?;
         let mut times = [vec![], vec![]];
-        let has_tiles = self.tiling.is_some();
+        let has_tiles = self.drawing.has_tiles();
         for i in 0..=N_TURNS {
             for (k, path) in [DrawPath::Sprites, DrawPath::Tiles].into_iter().enumerate() {
                 if path == DrawPath::Sprites || has_tiles {
@@ -65,9 +63,7 @@ impl Renderer {
         });
         let sprites_ms = sprites_ms.unwrap_or(f64::NAN);
         let path = if tiles_ms.is_some_and(|t| t < sprites_ms) { DrawPath::Tiles } else { DrawPath::Sprites };
-        if path == DrawPath::Sprites {
-            self.tiling = None;
-        }
+        self.drawing.keep_only(path);
         self.traits.path = path;
         self.reset();
         Ok(Choice { path, sprites_ms, tiles_ms })
@@ -75,16 +71,10 @@ impl Renderer {
 
     /// Draws what is sorted once more, ms.
     fn time_drawing(&mut self, path: DrawPath, packet: &Packet) -> Result<f64> {
-        let Renderer { host, sprites, tiling, buffers, targets, i_target, scenery, settings, .. } = self;
+        let Renderer { host, drawing, buffers, settings, .. } = self;
         let begin = Instant::now();
-        let scopes = host.run(|rec| {
-            let depth = scenery.as_mut().map(|(_, depth)| depth);
-            let on = Target { color: &mut targets[*i_target], depth };
-            rec.scope("draw", |rec| match tiling.as_ref().filter(|_| path == DrawPath::Tiles) {
-                None => draw_sprites(rec, sprites, buffers, on, packet, settings),
-                Some(tiling) => draw_tiles(rec, tiling, *i_target, buffers, on, packet, settings),
-            })
-        })?;
+        let scopes =
+            host.run(|rec| rec.scope("draw", |rec| drawing.record_blobs(rec, path, buffers, packet, settings)))?;
         Ok(scopes.first().map_or(ms(begin, Instant::now()), |scope| scope.ms()))
     }
 }

@@ -17,6 +17,7 @@ mod readback;
 pub mod relay;
 pub mod render;
 pub mod serial;
+mod settings;
 pub mod tensor;
 pub mod tiling;
 

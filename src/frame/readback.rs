@@ -10,7 +10,6 @@ use crate::gpu::memory::TargetFormat;
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
-use crate::model::scene::DrawPath;
 
 impl Renderer {
     /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
@@ -29,20 +28,12 @@ impl Renderer {
     /// The last frame as it lies in the target: what "the same bytes" means.
     pub fn image_bytes(&mut self) -> Result<Vec<u8>> {
         let _zone = info_span!("read back").entered();
-        let (target, readback) = (&mut self.targets[self.i_ended_target], &self.readback);
-        let picture = self
-            .tiling
-            .as_ref()
-            .filter(|_| self.traits.path == DrawPath::Tiles)
-            .map(|t| &t.pictures[self.i_ended_target]);
-        self.host.run(|rec| {
-            match picture {
-                Some(picture) => rec.copy(picture, readback),
-                None => rec.copy_image(target, readback),
-            }
+        let Renderer { host, drawing, readback, traits, i_ended_picture, settings, .. } = self;
+        host.run(|rec| {
+            drawing.record_copy(rec, traits.path, *i_ended_picture, readback);
             Ok(())
         })?;
-        readback.read((target.n_pixels() * self.settings.format.bytes_per_pixel()) as usize)
+        readback.read(settings.n_bytes() as usize)
     }
 
     /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.

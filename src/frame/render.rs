@@ -6,19 +6,18 @@ use std::time::Instant;
 use tracing::info_span;
 
 use super::buffers::{Buffers, Placed, has_second};
-use super::drawing::{draw_sprites, draw_tiles};
+use super::drawing::Drawing;
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::feed::IN_FLIGHT;
 use super::grouping::{Grouping, is_grouped};
 use super::packet::Packet;
-use super::plan::{Pass, Plan, Traits, plan};
+use super::plan::{Pass, Plan, Traits, pass, plan};
 use super::relay::Relay;
+use super::settings::Settings;
 use super::tensor::{TensorStage, tensor_stage};
-use super::tiling::{Tiling, saturated};
 use super::{limits, ms};
 use crate::error::{Error, Result};
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Image, Pending, Place, Recorder, ScopeTime, Target};
+use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, ScopeTime};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
 use crate::model::scene::{DrawPath, LightingMode, Scene, Simulate};
@@ -28,8 +27,6 @@ use crate::passes::generate::Generate;
 use crate::passes::grid::Grid;
 use crate::passes::place::Place as PlacePass;
 use crate::passes::sort::Sort;
-use crate::passes::sprites::Sprites;
-use crate::passes::surfaces::Surfaces;
 use crate::passes::texture::Texture;
 use crate::passes::transmit::Transmit;
 
@@ -52,17 +49,10 @@ pub struct Renderer {
     sort: Sort,
     /// None where no cloud has a texture.
     texture: Option<Texture>,
-    pub(super) sprites: Sprites,
-    pub(super) tiling: Option<Tiling>,
     pub(super) buffers: Buffers,
-    /// A frame that changes the picture draws into the one that the frame before has not.
-    pub(super) targets: [Image; IN_FLIGHT],
-    /// The last submitted frame's target.
-    pub(super) i_target: usize,
-    /// The last ended frame's.
-    pub(super) i_ended_target: usize,
-    /// What draws the surfaces, and their depth; none where there are none.
-    pub(super) scenery: Option<(Surfaces, Image)>,
+    pub(super) drawing: Drawing,
+    /// Which picture the last ended frame drew.
+    pub(super) i_ended_picture: usize,
     pub(super) readback: Buffer,
     pub(super) settings: Settings,
     pub(super) traits: Traits,
@@ -78,27 +68,10 @@ pub struct Renderer {
 /// A frame that was submitted and has not been waited for.
 pub(super) struct InFlight {
     slot: usize,
-    i_target: usize,
+    i_picture: usize,
     plan: Plan,
     recorded: [Instant; 2],
     submitted: Instant,
-}
-
-/// What of the scene the passes are told and that is constant over a run.
-pub(super) struct Settings {
-    pub n_particles: u32,
-    pub n_surface_facets: u32,
-    pub n_facets: u32,
-    pub n_lights: u32,
-    n_surfaces: u32,
-    pub step_cells: f64,
-    pub forward: f64,
-    sort_bits: u32,
-    texture_seed: u32,
-    pub cutoff: f64,
-    pub threshold: f64,
-    pub saturated: f64,
-    pub format: TargetFormat,
 }
 
 /// What a render step tells of itself.
@@ -120,8 +93,7 @@ impl Renderer {
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
-        let format = limits::target_format(scene.film.format);
-        let n_bytes = u64::from(scene.film.width) * u64::from(scene.film.height) * format.bytes_per_pixel();
+        let settings = Settings::of(scene);
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut host = Commands::new(device, "frame.host")?;
         let (tensors, tensor) = tensor_stage(device, compiler, &mut host, scene, free)?;
@@ -132,13 +104,6 @@ impl Renderer {
             true => Some(Relay::new(device, compiler, &mut host, scene, tree)?),
             false => None,
         };
-        let scenery = match scene.surfaces.is_empty() {
-            true => None,
-            false => {
-                let depth = Image::depth(device, "surfaces.depth", scene.film.width, scene.film.height)?;
-                Some((Surfaces::new(device, compiler, format)?, depth))
-            }
-        };
         let grouped = is_grouped(scene);
         let grouping = match grouped {
             true => Some(Grouping::new(device, compiler, &mut host, scene)?),
@@ -146,7 +111,6 @@ impl Renderer {
         };
         let textured = scene.is_textured();
         let texture = textured.then(|| Texture::new(device, compiler)).transpose()?;
-        let target = |name| Image::color_target(device, name, scene.film.width, scene.film.height, format);
         let mut renderer = Renderer {
             frames: [Commands::new(device, "frame.even")?, Commands::new(device, "frame.odd")?],
             host,
@@ -162,44 +126,11 @@ impl Renderer {
             tensor,
             sort: Sort::new(device, compiler, n_particles)?,
             texture,
-            tiling: match scene.draw.path {
-                DrawPath::Sprites => None,
-                DrawPath::Tiles => Some(Tiling::of_scene(device, compiler, scene, lit, grouped, format)?),
-                DrawPath::Auto => match Tiling::of_scene(device, compiler, scene, lit, grouped, format) {
-                    // What is too large for them sprites will draw.
-                    Err(Error::Limit { .. }) => None,
-                    tiling => Some(tiling?),
-                },
-            },
-            sprites: Sprites::new(
-                device,
-                compiler,
-                format,
-                lit,
-                [scenery.is_some(), grouped, scene.draw.count.is_some(), textured, scene.draw.threshold > 0.0],
-            )?,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
-            targets: [target("sprites.even")?, target("sprites.odd")?],
-            i_target: 0,
-            i_ended_target: 0,
-            scenery,
-            readback: Buffer::new::<u8>(device, "sprites.readback", n_bytes, Place::Readback)?,
-            settings: Settings {
-                n_particles,
-                n_surface_facets: scene.n_surface_facets() as u32,
-                n_facets: scene.n_facets() as u32,
-                n_lights: scene.lights.len() as u32,
-                n_surfaces: scene.surfaces.len() as u32,
-                step_cells: scene.lighting.step,
-                // Without particles there is nothing to march through.
-                forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
-                sort_bits: scene.draw.sort_bits,
-                texture_seed: scene.draw.texture_seed,
-                cutoff: scene.draw.cutoff,
-                threshold: scene.draw.threshold,
-                saturated: saturated(scene.film.format),
-                format,
-            },
+            drawing: Drawing::new(device, compiler, scene, settings.format)?,
+            i_ended_picture: 0,
+            readback: Buffer::new::<u8>(device, "film.readback", settings.n_bytes(), Place::Readback)?,
+            settings,
             traits: Traits {
                 has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
                 n_particles,
@@ -252,14 +183,14 @@ impl Renderer {
         let plan = info_span!("plan").in_scope(|| plan(&self.traits, self.last.as_ref(), &packet));
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
         if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) || plan.runs(Pass::Tiles) {
-            self.i_target = (self.i_target + 1) % IN_FLIGHT;
+            self.drawing.turn();
         }
         info_span!("upload").in_scope(|| self.write(slot, &packet))?;
         self.record(slot, &packet, &plan)?;
         let recorded = [begin, Instant::now()];
         let pending = self.frames[slot].submit()?;
-        let (i_target, submitted) = (self.i_target, Instant::now());
-        self.in_flight.push_back(InFlight { slot, i_target, plan, recorded, submitted });
+        let (i_picture, submitted) = (self.drawing.i_picture(), Instant::now());
+        self.in_flight.push_back(InFlight { slot, i_picture, plan, recorded, submitted });
         self.n_begun += 1;
         self.last = Some(packet);
         Ok(pending)
@@ -271,7 +202,7 @@ impl Renderer {
         self.failed = true;
         let passes = self.frames[frame.slot].wait()?;
         self.failed = false;
-        self.i_ended_target = frame.i_target;
+        self.i_ended_picture = frame.i_picture;
         let now = Instant::now();
         // What was waited for the frame before is that one's.
         let wait_ms = ms(frame.submitted.max(std::mem::replace(&mut self.last_end, now)), now);
@@ -324,18 +255,13 @@ impl Renderer {
             tensor,
             sort,
             texture,
-            sprites,
-            tiling,
-            scenery,
             buffers: b,
-            targets,
-            i_target,
+            drawing,
             settings: s,
-            traits,
             frames,
             ..
         } = self;
-        let (n, target, path) = (s.n_particles, &mut targets[*i_target], traits.path);
+        let n = s.n_particles;
         frames[slot].record(Barriers::Placed, |rec| {
             b.record_feeds(rec, slot);
             grouping.iter().for_each(|g| g.record_feeds(rec, slot));
@@ -404,31 +330,7 @@ impl Renderer {
             pass(rec, plan, Pass::Texture, |rec| {
                 texture.iter().try_for_each(|t| t.record(rec, &b.pool, s.texture_seed))
             })?;
-            let (surfaces, mut depth) = scenery.as_mut().map(|(surfaces, depth)| (&*surfaces, depth)).unzip();
-            pass(rec, plan, Pass::Surfaces, |rec| match surfaces {
-                Some(surfaces) => {
-                    let target = Target { color: &mut *target, depth: depth.as_deref_mut() };
-                    surfaces.record(rec, [&b.regions.buffer, &b.lit], target, &packet.camera, s.n_surfaces)
-                }
-                None => Ok(()),
-            })?;
-            let on = Target { color: target, depth };
-            match tiling.as_ref().filter(|_| path == DrawPath::Tiles) {
-                None => pass(rec, plan, Pass::Sprites, |rec| draw_sprites(rec, sprites, b, on, packet, s)),
-                Some(tiling) => {
-                    pass(rec, plan, Pass::Tiles, |rec| draw_tiles(rec, tiling, *i_target, b, on, packet, s))
-                }
-            }
+            drawing.record(rec, plan, b, packet, s)
         })
     }
-}
-
-/// Runs `f` under the pass's timer label where the plan has it run.
-fn pass(
-    rec: &mut Recorder<'_>,
-    plan: &Plan,
-    pass: Pass,
-    f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
-) -> Result<()> {
-    if plan.runs(pass) { rec.scope(pass.name(), f) } else { Ok(()) }
 }

@@ -7,7 +7,7 @@ use super::feed::Feed;
 use super::limits;
 use super::packet::Packet;
 use super::plan::Tensors;
-use super::render::Settings;
+use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
 use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE};

@@ -1,12 +1,13 @@
 //! What draws where `draw.path` is "tiles": splats, their pairs sorted by bin, and the picture.
 
 use super::feed::IN_FLIGHT;
+use super::grouping::is_grouped;
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Place, Recorder, Target};
 use crate::model::cloud::{Group, SQRT_TAU};
 use crate::model::film::FilmFormat;
-use crate::model::scene::Scene;
+use crate::model::scene::{LightingMode, Scene};
 use crate::passes::sort::{Counts, Sort, TILE};
 use crate::passes::tiles::{Division, Tiles, Variant, View, invocations};
 
@@ -34,16 +35,9 @@ impl Tiling {
     }
 
     /// For the pictures of `scene`.
-    pub fn of_scene(
-        device: &Device,
-        compiler: &Compiler,
-        scene: &Scene,
-        lit: bool,
-        grouped: bool,
-        format: TargetFormat,
-    ) -> Result<Tiling> {
+    pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Tiling> {
         let division = Division::of(scene.film.width, scene.film.height, invocations(device.limits()))?;
-        let variant = variant(scene, lit, grouped, format);
+        let variant = variant(scene, format);
         Tiling::new(device, compiler, division, scene.n_particles() as u32, &variant)
     }
 
@@ -79,12 +73,12 @@ impl Tiling {
 }
 
 /// How a scene is drawn.
-fn variant(scene: &Scene, lit: bool, grouped: bool, format: TargetFormat) -> Variant {
+fn variant(scene: &Scene, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
         threshold: scene.draw.threshold > 0.0,
-        lit,
-        grouped,
+        lit: scene.lighting.mode != LightingMode::None,
+        grouped: is_grouped(scene),
         weighted: scene.draw.count.is_some(),
         format,
         behind: !scene.surfaces.is_empty(),

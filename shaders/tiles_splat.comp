@@ -19,7 +19,7 @@ layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 4) const uint TEXTURED = 0;
 layout(constant_id = 5) const uint THRESHOLD = 0;
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint n_splats; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
@@ -36,6 +36,8 @@ layout(std430, binding = 10) writeonly buffer Before { uint n_before[]; };
 layout(std430, binding = 11) writeonly buffer Blocks { uint n_pairs[]; };
 // What of it is textured; only where something is.
 layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
+
+layout(std430, binding = 13) readonly buffer KeptOnes { Kept kept[]; };
 
 shared uint sums[BLOCK];
 
@@ -90,10 +92,11 @@ uint project(uint i, uint r) {
 void main() {
     uint t = gl_LocalInvocationID.x;
     uint r = gl_WorkGroupID.x * BLOCK + t;
+    uint n_splats = kept[0].sort.w;
     uint n = 0;
-    if (r < push.n_splats) {
+    if (r < n_splats) {
         // Far to near is how they are sorted.
-        n = project(entries[push.n_splats - 1u - r].y, r);
+        n = project(entries[n_splats - 1u - r].y, r);
     }
     sums[t] = n;
     barrier();
@@ -103,7 +106,7 @@ void main() {
         sums[t] += left;
         barrier();
     }
-    if (r < push.n_splats) {
+    if (r < n_splats) {
         n_before[r] = sums[t] - n;
     }
     if (t == BLOCK - 1) {

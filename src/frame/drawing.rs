@@ -122,7 +122,7 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        let counts = [packet.n_drawn, s.n_surface_facets];
+        let (n, i_first_facet) = (b.amount(packet.n_drawn), s.n_surface_facets);
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {
@@ -131,13 +131,13 @@ impl Drawing {
                 let Settings { cutoff, threshold, saturated, .. } = *s;
                 let view = View { camera: &packet.camera, cutoff, threshold, saturated };
                 let under = target.filter(|target| target.depth.is_some());
-                tiling.record(rec, i, under, b.of_sprites(), &view, counts)
+                tiling.record(rec, i, under, b.of_sprites(), &view, n, i_first_facet)
             }
             _ => {
                 let (Some(sprites), Some(target)) = (&self.sprites, target) else {
                     return Err(Error::usage("sprites were given back"));
                 };
-                sprites.record(rec, b.of_sprites(), target, &packet.camera, [s.cutoff, s.threshold], counts)
+                sprites.record(rec, b.of_sprites(), target, &packet.camera, [s.cutoff, s.threshold], n, i_first_facet)
             }
         }
     }

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use half::f16;
 use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
+use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
@@ -220,7 +220,7 @@ impl Picture {
             }
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
-                let n = [entries.len() as u32, scenery.lit.len() as u32];
+                let (n, i_first_facet) = (Amount::Known(entries.len() as u32), scenery.lit.len() as u32);
                 let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
                 if let (Some(tiling), Some(tiled)) = (&tiling, tiled) {
                     let view = nimbus::passes::tiles::View {
@@ -229,11 +229,11 @@ impl Picture {
                         threshold: self.view.threshold,
                         saturated: tiled.saturated,
                     };
-                    tiling.record(rec, 0, behind.then_some(target), from, &view, n)?;
+                    tiling.record(rec, 0, behind.then_some(target), from, &view, n, i_first_facet)?;
                     rec.copy(&tiling.pictures[0], &readback);
                     return Ok(());
                 }
-                pass.record(rec, from, target, &camera, [self.view.cutoff, self.view.threshold], n)?;
+                pass.record(rec, from, target, &camera, [self.view.cutoff, self.view.threshold], n, i_first_facet)?;
             }
             rec.copy_image(&mut target, &readback);
             Ok(())

@@ -15,6 +15,7 @@ const TRAITS: Traits = Traits {
     n_surfaces: 0,
     glossy: false,
     tensors: Tensors::Needless,
+    culls: false,
     path: DrawPath::Sprites,
     skip: true,
 };

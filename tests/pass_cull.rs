@@ -199,10 +199,10 @@ fn random(seed: u64, n: usize) -> Scene {
         scene = scene.with(at, sigma as f32, tau);
     }
     if seed.is_multiple_of(4) {
-        let part = |k: u32| DrawnRecord { shift: 0, end: 100 * k + 70, kappa_scale: 1.2, last_weight: 0.1 };
+        let part = |k: u32| DrawnRecord { shift: 0, end: 10 * k + 7, kappa_scale: 1.2, last_weight: 0.1 };
         scene.weighted = true;
-        scene.drawn = (0..n.div_ceil(100) as u32).map(part).collect();
-        scene.i_group = (0..n as u32).map(|i| i / 100).collect();
+        scene.drawn = (0..n.div_ceil(10) as u32).map(part).collect();
+        scene.i_group = (0..n as u32).map(|i| i / 10).collect();
     }
     scene.seen()
 }
@@ -341,7 +341,7 @@ fn wrong_shaders_are_noticed() {
         ("cull_test.comp", "pixels.z < pixels.w", "true"),
         ("cull_test.comp", "before += bitCount(bits[k])", "before += 1u"),
         ("cull_scan.comp", "uint before = sums[t] - total;", "uint before = sums[t];"),
-        ("cull_scan.comp", "groups(n, push.splat_block), 1", "groups(n, push.sort_tile), 1"),
+        ("cull_scan.comp", "push.splat_block), 1, 1, 0)", "push.splat_block), 1, 1, 1)"),
         ("cull_write.comp", "(bit - 1u)", "bit"),
         ("cull_write.comp", "uvec2(key, i)", "uvec2(key, at)"),
         ("include/blob.glsl", "ceil(low - 0.5 - SNAP)", "ceil(low)"),

@@ -28,6 +28,9 @@ use crate::harness::Gpu;
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
 
+/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term, three products and two sums.
+pub const DEPTH: f64 = 16.0 * U;
+
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
 
@@ -53,6 +56,8 @@ pub struct Picture {
     pub view: View,
     pub placed: Vec<PlacedRecord>,
     pub particles: Vec<ParticleRecord>,
+    /// Far to near, where that is not the depths' own order.
+    pub in_order: Option<Vec<u32>>,
     /// Radiance of the particles' facets; without it they are drawn in their own colours.
     pub lit: Option<Vec<LitRecord>>,
     /// Facet of each particle, where they are not in the particles' order.
@@ -89,6 +94,7 @@ impl Picture {
             view,
             placed: vec![],
             particles: vec![],
+            in_order: None,
             lit: None,
             i_facet: None,
             drawn: None,
@@ -147,6 +153,9 @@ impl Picture {
     }
 
     pub fn order(&self) -> Vec<u32> {
+        if let Some(order) = &self.in_order {
+            return order.clone();
+        }
         let positions: Vec<DVec3> = self.placed.iter().map(|p| double(p.position)).collect();
         let keys = depths(self.view.pose.forward, &positions).into_iter().map(|z| key32(z as f32));
         let order = order(&keys.collect::<Vec<_>>());
@@ -339,6 +348,7 @@ impl Picture {
         let mut rounding = Rounding::of(format, off_alpha, edge);
         // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C and their sum.
         rounding.unit += 2.0 * U;
+        rounding.depth = DEPTH;
         rounding
     }
 

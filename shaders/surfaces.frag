@@ -2,6 +2,9 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 
+// Surfaces that hide and are not seen.
+layout(constant_id = 0) const uint DEPTH_ONLY = 0;
+
 // Where the pixel's ray meets a rectangle: its depth, and the radiance there (docs/model.md §11 "surfaces").
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; vec2 unused; } push;
@@ -46,6 +49,10 @@ void main() {
     }
     gl_FragDepth = min(push.camera.near * size / q, 1.0);
     // (right, up, forward) is left-handed: the triple product of the front side, which faces the eye, is positive.
+    if (DEPTH_ONLY != 0) {
+        out_color = vec4(0.0);
+        return;
+    }
     vec3 radiance = vec3(0.0);
     if (in_plane.w > 0.0) {
         radiance = interpolated(regions[in_i], vec2(s, t) / (vec2(in_s.w, in_t.w) * d));

@@ -143,6 +143,22 @@ fn culled_frames_are_the_references_and_the_same_bytes() {
     }
 }
 
+/// Blobs in the margin of a smaller picture belong to it.
+#[test]
+fn smaller_pictures_keep_what_their_own_pixels_show() {
+    let gpu = Gpu::new();
+    let list = around(3);
+    for name in ["'sprites'", "'tiles'"] {
+        let of = |cull: &str, resolution: &str| {
+            let overrides = set(&[("path", name), ("cull", cull), ("resolution", resolution)]);
+            frame(&gpu, &gpu.compiler, &scene(&list, [DVec3::ZERO, DVec3::NEG_Z], &overrides))
+        };
+        let (full, small) = (of("'on'", "1.0"), of("'on'", "0.25"));
+        assert!(small.bytes == of("'off'", "0.25").bytes, "{name}: not the same bytes");
+        assert!(small.bytes != full.bytes && small.n_kept != full.n_kept, "{:?} {:?}", small.n_kept, full.n_kept);
+    }
+}
+
 #[test]
 fn wrong_frames_are_noticed() {
     let gpu = Gpu::new();

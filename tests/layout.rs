@@ -23,7 +23,7 @@ use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{
     self, SHADERS, contract, cull, facets, first, generate, grid, morton, place, second, sort, sprites,
 };
-use nimbus::passes::{surfaces, texture, tiles, transmit};
+use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -57,7 +57,7 @@ const RECORDS: [Record; 24] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 36] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 37] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -154,6 +154,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 36] = [
         ],
     ),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
+    ("upsample.comp", upsample::Push::FIELDS, &[T, B(4)]),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -358,6 +359,7 @@ fn shared_constants_have_one_value() {
         ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),
         ("include/tiles.glsl", "TILES_ACROSS", f64::from(tiles::TILES_ACROSS)),
         ("tiles.comp", "RUN", f64::from(tiles::RUN)),
+        ("include/upsample.glsl", "ALIKE", nimbus::model::resolution::ALIKE),
         ("grid_deposit.comp", "MAX_CELLS", f64::from(MAX_CELLS)),
         ("grid_deposit.comp", "CUT_SIGMA", DEPOSIT_CUT_SIGMA),
         ("include/shell.glsl", "SHELL_SIGMA", nimbus::reference::facets::SHELL_SIGMA),

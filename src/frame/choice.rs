@@ -74,7 +74,7 @@ impl Renderer {
         let Renderer { host, drawing, buffers, settings, .. } = self;
         let begin = Instant::now();
         let scopes =
-            host.run(|rec| rec.scope("draw", |rec| drawing.record_blobs(rec, path, buffers, packet, settings)))?;
+            host.run(|rec| rec.scope("draw", |rec| drawing.record_over(rec, path, buffers, packet, settings)))?;
         Ok(scopes.first().map_or(ms(begin, Instant::now()), |scope| scope.ms()))
     }
 }

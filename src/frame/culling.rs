@@ -1,6 +1,7 @@
 //! Which particles the device keeps of those that are drawn, and how many they were.
 
 use super::buffers::Buffers;
+use super::drawing::Drawing;
 use super::feed::IN_FLIGHT;
 use super::packet::Packet;
 use super::settings::Settings;
@@ -36,10 +37,21 @@ impl Culling {
     }
 
     /// Keeps what can show of `packet`'s particles.
-    pub fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        b: &Buffers,
+        (packet, drawing): (&Packet, &Drawing),
+        s: &Settings,
+    ) -> Result<()> {
         let Some(kept) = &b.kept else { return Ok(()) };
-        let Settings { cutoff, threshold, smallest, size: [width, height], .. } = *s;
-        let view = View { camera: &packet.camera, width, height, cutoff, threshold, smallest };
+        let (camera, [width, height]) = drawing.seen(&packet.camera, s);
+        let Settings { cutoff, threshold, size, .. } = *s;
+        // Pixels of the film; the blobs' are as many times as wide as fewer of them cover a slope.
+        let pixels =
+            f64::from(height) * f64::from(packet.camera.tan_y) / (f64::from(size[1]) * f64::from(camera.tan_y));
+        let smallest = s.smallest * pixels;
+        let view = View { camera: &camera, width, height, cutoff, threshold, smallest };
         let order = Order { radius: packet.radius, n_bits: s.sort_bits, sort_tile: TILE, splat_block: BLOCK };
         let buffers = [b.placed.buffer(), &b.particles, &b.i_group, &b.drawn.buffer, &b.entries, kept];
         self.cull.record(rec, buffers, &view, &order, s.n_particles)

@@ -5,10 +5,13 @@ use super::feed::IN_FLIGHT;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, pass};
 use super::settings::Settings;
+use super::shrunk::Shrunk;
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Target};
+use crate::layout::frame::CameraRecord;
+use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, LightingMode, Scene};
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
@@ -26,16 +29,57 @@ pub(super) struct Drawing {
     targets: Option<[Image; IN_FLIGHT]>,
     /// What draws the surfaces, and their depth; none where there are none.
     scenery: Option<(Surfaces, Image)>,
+    /// Smaller pictures that the blobs may be drawn into.
+    shrunk: Vec<Shrunk>,
+    /// The one that they are; None where it is the full one.
+    i_shrunk: Option<usize>,
     /// Which of two pictures the last submitted frame draws.
     i_picture: usize,
 }
 
 impl Drawing {
-    /// What `scene` is drawn with. With path "auto" both ways, where tiles can draw it on this device.
+    /// What `scene` is drawn with. With path "auto" both ways, where tiles can draw it on this device; with resolution "auto"
+    /// every size, to begin with the full one.
     pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Drawing> {
+        let resolution = scene.draw.resolution;
+        let mut drawing = Drawing::of_size(device, compiler, scene, format, false)?;
+        for (_, smaller) in Resolution::ALL.into_iter().filter(|(_, r)| *r != Resolution::Full) {
+            if smaller == resolution {
+                drawing.shrunk.push(Shrunk::new(device, compiler, scene, format, smaller)?);
+                drawing.i_shrunk = Some(0);
+            } else if resolution == Resolution::Auto {
+                match Shrunk::new(device, compiler, scene, format, smaller) {
+                    // What is too large for it is drawn at full size.
+                    Err(Error::Limit { .. }) => {}
+                    shrunk => drawing.shrunk.push(shrunk?),
+                }
+            }
+        }
+        Ok(drawing)
+    }
+
+    /// The same of surfaces that are drawn as depth alone, of the scene's film whatever its resolution.
+    pub fn without_colors(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        format: TargetFormat,
+    ) -> Result<Drawing> {
+        Drawing::of_size(device, compiler, scene, format, true)
+    }
+
+    fn of_size(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        format: TargetFormat,
+        depth_only: bool,
+    ) -> Result<Drawing> {
         let (path, film) = (scene.draw.path, &scene.film);
         let lit = scene.lighting.mode != LightingMode::None;
+        let has_blobs = matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto);
         let tiling = match path {
+            _ if !has_blobs => None,
             DrawPath::Sprites => None,
             DrawPath::Tiles => Some(Tiling::of_scene(device, compiler, scene, format)?),
             DrawPath::Auto => match Tiling::of_scene(device, compiler, scene, format) {
@@ -47,11 +91,11 @@ impl Drawing {
         let behind = !scene.surfaces.is_empty();
         let counted = scene.draw.count.is_some();
         let variant = [behind, is_grouped(scene), counted, scene.is_textured(), scene.draw.threshold > 0.0];
-        let has_sprites = path != DrawPath::Tiles;
+        let has_sprites = has_blobs && path != DrawPath::Tiles;
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
         let scenery = || -> Result<(Surfaces, Image)> {
             let depth = Image::depth(device, "surfaces.depth", film.width, film.height)?;
-            Ok((Surfaces::new(device, compiler, format)?, depth))
+            Ok((Surfaces::new(device, compiler, format, depth_only)?, depth))
         };
         Ok(Drawing {
             sprites: has_sprites.then(|| Sprites::new(device, compiler, format, lit, variant)).transpose()?,
@@ -61,6 +105,8 @@ impl Drawing {
                 false => None,
             },
             scenery: behind.then(scenery).transpose()?,
+            shrunk: Vec::new(),
+            i_shrunk: None,
             i_picture: 0,
         })
     }
@@ -77,7 +123,15 @@ impl Drawing {
 
     /// Whether tiles can draw.
     pub fn has_tiles(&self) -> bool {
-        self.tiling.is_some()
+        self.i_shrunk.map_or(self, |i| &self.shrunk[i].drawing).tiling.is_some()
+    }
+
+    /// What sees the blobs, and the columns and rows of the picture that they are drawn into.
+    pub fn seen(&self, camera: &CameraRecord, s: &Settings) -> (CameraRecord, [u32; 2]) {
+        match self.i_shrunk {
+            Some(i) => (self.shrunk[i].camera(camera), self.shrunk[i].size()),
+            None => (*camera, s.size),
+        }
     }
 
     /// Gives back what the other way needs.
@@ -91,6 +145,32 @@ impl Drawing {
             }
             _ => self.tiling = None,
         }
+        self.shrunk.iter_mut().for_each(|s| s.drawing.keep_only(path));
+    }
+
+    /// The sizes that the blobs can be drawn in.
+    pub fn resolutions(&self) -> Vec<Resolution> {
+        let full = (self.sprites.is_some() || self.tiling.is_some()).then_some(Resolution::Full);
+        full.into_iter().chain(self.shrunk.iter().map(|s| s.resolution)).collect()
+    }
+
+    /// Draws in one of them from now on.
+    pub fn take(&mut self, resolution: Resolution) {
+        self.i_shrunk = self.shrunk.iter().position(|s| s.resolution == resolution);
+    }
+
+    /// Gives back what the others need.
+    pub fn keep_taken(&mut self) {
+        if let Some(i) = self.i_shrunk {
+            self.shrunk = vec![self.shrunk.swap_remove(i)];
+            self.i_shrunk = Some(0);
+            (self.sprites, self.tiling) = (None, None);
+            if self.scenery.is_none() {
+                self.targets = None;
+            }
+        } else {
+            self.shrunk.clear();
+        }
     }
 
     /// The drawing passes that `plan` runs.
@@ -102,19 +182,16 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        pass(rec, plan, Pass::Surfaces, |rec| self.record_surfaces(rec, b, packet, s))?;
-        pass(rec, plan, Pass::Sprites, |rec| self.record_blobs(rec, DrawPath::Sprites, b, packet, s))?;
-        pass(rec, plan, Pass::Tiles, |rec| self.record_blobs(rec, DrawPath::Tiles, b, packet, s))
+        let path = if plan.runs(Pass::Tiles) { DrawPath::Tiles } else { DrawPath::Sprites };
+        pass(rec, plan, Pass::Surfaces, |rec| self.record_behind(rec, b, packet, s))?;
+        for (of, path) in [(Pass::Sprites, DrawPath::Sprites), (Pass::Tiles, DrawPath::Tiles)] {
+            pass(rec, plan, of, |rec| self.record_over(rec, path, b, packet, s))?;
+        }
+        pass(rec, plan, Pass::Upsample, |rec| self.record_upsample(rec, path))
     }
 
-    fn record_surfaces(&mut self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
-        let (Some((surfaces, depth)), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(()) };
-        let target = Target { color: &mut targets[self.i_picture], depth: Some(depth) };
-        surfaces.record(rec, [&b.regions.buffer, &b.lit], target, &packet.camera, s.n_surfaces)
-    }
-
-    /// Draws what is sorted, in one of the ways that there are.
-    pub fn record_blobs(
+    /// The whole picture by `path`.
+    pub fn record_all(
         &mut self,
         rec: &mut Recorder<'_>,
         path: DrawPath,
@@ -122,32 +199,104 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        let (n, i_first_facet) = (b.amount(packet.n_drawn), s.n_surface_facets);
+        self.record_behind(rec, b, packet, s)?;
+        self.record_over(rec, path, b, packet, s)?;
+        self.record_upsample(rec, path)
+    }
+
+    /// The surfaces, and what the blobs' picture needs of them.
+    fn record_behind(&mut self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
+        self.record_surfaces(rec, b, &packet.camera, s)?;
+        match self.i_shrunk {
+            Some(i) => self.shrunk[i].record_surfaces(rec, b, packet, s),
+            None => Ok(()),
+        }
+    }
+
+    /// Draws what is sorted, in one of the ways that there are.
+    pub fn record_over(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        path: DrawPath,
+        b: &Buffers,
+        packet: &Packet,
+        s: &Settings,
+    ) -> Result<()> {
+        match self.i_shrunk {
+            Some(i) => self.shrunk[i].record_blobs(rec, path, b, packet, s),
+            None => self.record_blobs(rec, path, b, (packet.n_drawn, &packet.camera), s),
+        }
+    }
+
+    fn record_upsample(&mut self, rec: &mut Recorder<'_>, path: DrawPath) -> Result<()> {
+        let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
+        let under = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
+        match self.i_shrunk {
+            Some(of) => self.shrunk[of].record(rec, path, i, under.filter(|under| under.depth.is_some())),
+            None => Ok(()),
+        }
+    }
+
+    pub fn record_surfaces(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        b: &Buffers,
+        camera: &CameraRecord,
+        s: &Settings,
+    ) -> Result<()> {
+        let (Some((surfaces, depth)), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(()) };
+        let target = Target { color: &mut targets[self.i_picture], depth: Some(depth) };
+        surfaces.record(rec, [&b.regions.buffer, &b.lit], target, camera, s.n_surfaces)
+    }
+
+    /// Draws the first `n_drawn` of what is sorted into the picture itself.
+    pub fn record_blobs(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        path: DrawPath,
+        b: &Buffers,
+        (n_drawn, camera): (u32, &CameraRecord),
+        s: &Settings,
+    ) -> Result<()> {
+        let counts = (b.amount(n_drawn), s.n_surface_facets);
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {
             DrawPath::Tiles => {
                 let Some(tiling) = &self.tiling else { return Err(Error::usage("tiles were given back")) };
                 let Settings { cutoff, threshold, saturated, .. } = *s;
-                let view = View { camera: &packet.camera, cutoff, threshold, saturated };
+                let view = View { camera, cutoff, threshold, saturated };
                 let under = target.filter(|target| target.depth.is_some());
-                tiling.record(rec, i, under, b.of_sprites(), &view, n, i_first_facet)
+                tiling.record(rec, i, under, b.of_sprites(), &view, counts)
             }
             _ => {
                 let (Some(sprites), Some(target)) = (&self.sprites, target) else {
                     return Err(Error::usage("sprites were given back"));
                 };
-                sprites.record(rec, b.of_sprites(), target, &packet.camera, [s.cutoff, s.threshold], n, i_first_facet)
+                sprites.record(rec, b.of_sprites(), target, camera, [s.cutoff, s.threshold], counts)
             }
         }
     }
 
     /// Copies picture `i` as `path` has drawn it.
-    pub fn record_copy(&mut self, rec: &mut Recorder<'_>, path: DrawPath, i: usize, to: &Buffer) {
-        match (path, &self.tiling, &mut self.targets) {
-            (DrawPath::Tiles, Some(tiling), _) => rec.copy(&tiling.pictures[i], to),
-            (_, _, Some(targets)) => rec.copy_image(&mut targets[i], to),
+    pub fn record_read(&mut self, rec: &mut Recorder<'_>, path: DrawPath, i: usize, to: &Buffer) {
+        match (self.i_shrunk, path, &self.tiling, &mut self.targets) {
+            (Some(of), ..) => rec.copy(&self.shrunk[of].pictures[i], to),
+            (_, DrawPath::Tiles, Some(tiling), _) => rec.copy(&tiling.pictures[i], to),
+            (.., Some(targets)) => rec.copy_image(&mut targets[i], to),
             _ => {}
+        }
+    }
+
+    /// Copies the blobs that `path` has drawn into this picture.
+    pub fn record_copy(&mut self, rec: &mut Recorder<'_>, path: DrawPath, to: &Buffer) {
+        self.record_read(rec, path, self.i_picture, to);
+    }
+
+    /// Copies the surfaces' depth.
+    pub fn record_copy_depth(&mut self, rec: &mut Recorder<'_>, to: &Buffer) {
+        if let Some((_, depth)) = &mut self.scenery {
+            rec.copy_image(depth, to);
         }
     }
 }

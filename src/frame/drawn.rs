@@ -13,7 +13,7 @@ use crate::model::visibility::Frustum;
 /// A record for each of `groups`, as they have grown, and how many particles they name together. `culls`: leave out groups
 /// that cannot be in the picture.
 pub fn drawn(scene: &Scene, groups: &[Group], setting: &Setting, culls: bool) -> (Vec<DrawnRecord>, u32) {
-    let frustum = Frustum::of(&scene.camera, &setting.pose, &scene.film);
+    let frustum = Frustum::of(&scene.camera, &setting.pose, &scene.film, scene.widening());
     let eye = setting.pose.position;
     // Coordinates are relative to the lighting origin, the eye's too.
     let lengths = (eye - setting.light_origin).abs().element_sum() + setting.radius;

@@ -15,21 +15,29 @@ use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
+use crate::model::resolution::{Resolution, SmallPicture};
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
 use super::buffers::has_second;
+use super::culling::culls;
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
 use super::tensor::Shape;
 
 const TEXTURES: &str = "the pool of textures";
+const BLOBS: &str = "the blobs' smaller picture";
+const UNDER: &str = "the surfaces under it";
+/// Not of light: read in every scene that has them.
+const ALWAYS_READ: [&str; 3] = [TEXTURES, BLOBS, UNDER];
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 7] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 9] = [
     (TEXTURES, BindingKind::Texels),
+    (BLOBS, BindingKind::Texels),
+    (UNDER, BindingKind::Texels),
     ("the second reflection's sources", BindingKind::Texels),
     ("their flux by light", BindingKind::Texels),
     ("their light by points", BindingKind::Texels),
@@ -54,6 +62,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let n_texels = if scene.is_textured() { u64::from(POOL_TEXELS) } else { 0 };
     let size = |record: usize| record as u64;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
+    let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
+    let n_behind = if n_small > 0 && !scene.surfaces.is_empty() { n_pixels } else { 0 };
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
@@ -69,6 +79,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("their light by points", n_sources * scene.lights.len() as u64, size(size_of::<PackedRecord>())),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
+        ("the bits of kept particles", if culls(scene) { n.div_ceil(32) } else { 0 }, 8),
         ("the Morton order's entries", if is_grouped(scene) { 2 * n } else { 0 }, 8),
         ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),
@@ -84,14 +95,20 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         (TEXTURES, n_texels, 16),
         ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
         ("the film, read back", n_pixels, pixel),
+        (BLOBS, n_small, pixel),
+        // With "auto" the half one beside the quarter, the larger one counted twice.
+        ("what is drawn in a smaller size", n_small * (if is_auto { 6 } else { 3 }), pixel + DEPTH_BYTES_PER_PIXEL),
+        (UNDER, n_behind, pixel),
+        ("the depths under it", 2 * n_behind, DEPTH_BYTES_PER_PIXEL),
+        ("what comes of the two", if n_small > 0 { IN_FLIGHT as u64 * n_pixels } else { 0 }, pixel),
     ];
     let mut total = 0;
     for (name, n, bytes) in wishes {
         total += storage_bytes(limits, name, n, bytes)?;
         let texel = READ_BY_TEXELS.iter().find(|(of, _)| *of == name).map(|(_, kind)| kind.texel_bytes());
-        if let Some(texel) =
-            texel.filter(|texel| (is_lit || name == TEXTURES) && n * bytes / u64::from(*texel) > limits.max_texels)
-        {
+        if let Some(texel) = texel.filter(|texel| {
+            (is_lit || ALWAYS_READ.contains(&name)) && n * bytes / u64::from(*texel) > limits.max_texels
+        }) {
             return Err(Error::limit(format!(
                 "{name}: {} texels of {texel} bytes are wanted, this device takes {} at most (maxTexelBufferElements)",
                 n * bytes / u64::from(texel),
@@ -115,6 +132,16 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         )));
     }
     Ok(total)
+}
+
+/// Pixels of the smaller picture that blobs are drawn into, the largest that may be tried; 0 where there is none.
+fn n_small_pixels(scene: &Scene) -> u64 {
+    let n = match scene.draw.resolution {
+        Resolution::Full => return 0,
+        Resolution::Auto => Resolution::Half.divisor(),
+        resolution => resolution.divisor(),
+    };
+    SmallPicture::of([scene.film.width, scene.film.height], n).n_pixels()
 }
 
 /// Whether T1 and T2 fit into `free` bytes, and T2, the greater by far, into one binding.

@@ -3,6 +3,7 @@
 
 pub mod buffers;
 pub mod choice;
+pub mod choice_resolution;
 mod culling;
 mod drawing;
 mod drawn;
@@ -19,6 +20,7 @@ pub mod relay;
 pub mod render;
 pub mod serial;
 mod settings;
+mod shrunk;
 pub mod tensor;
 pub mod tiling;
 

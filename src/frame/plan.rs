@@ -28,10 +28,11 @@ pub enum Pass {
     Surfaces,
     Sprites,
     Tiles,
+    Upsample,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 15] = [
+    pub const ALL: [Pass; 16] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -47,13 +48,14 @@ impl Pass {
         Pass::Surfaces,
         Pass::Sprites,
         Pass::Tiles,
+        Pass::Upsample,
     ];
 
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
         let names = [
             "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "cull", "sort",
-            "texture", "surfaces", "sprites", "tiles",
+            "texture", "surfaces", "sprites", "tiles", "upsample",
         ];
         names[self as usize]
     }
@@ -145,6 +147,8 @@ pub struct Traits {
     pub culls: bool,
     /// What draws the particles.
     pub path: DrawPath,
+    /// Blobs are drawn into a smaller picture.
+    pub shrunk: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
 }
@@ -226,6 +230,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
         drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
         drawing(DrawPath::Tiles, "draw.path is \"sprites\""),
+        if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
     ];
     if traits.n_particles == 0 {
         for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort, Pass::Texture] {

@@ -11,18 +11,22 @@ use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
 
+/// The numbers of a picture as it lies in a target.
+pub(super) fn floats(format: TargetFormat, bytes: Vec<u8>) -> Vec<f32> {
+    match format {
+        TargetFormat::Rgba8 => bytes.into_iter().map(|b| f32::from(b) / 255.0).collect(),
+        TargetFormat::Rgba16f => {
+            let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
+            halves.into_iter().map(half::f16::to_f32).collect()
+        }
+        TargetFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
+    }
+}
+
 impl Renderer {
     /// The last frame's pixels: premultiplied linear RGBA, rows from the top.
     pub fn image(&mut self) -> Result<Vec<f32>> {
-        let bytes = self.image_bytes()?;
-        Ok(match self.settings.format {
-            TargetFormat::Rgba8 => bytes.into_iter().map(|b| f32::from(b) / 255.0).collect(),
-            TargetFormat::Rgba16f => {
-                let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
-                halves.into_iter().map(half::f16::to_f32).collect()
-            }
-            TargetFormat::Rgba32f => bytemuck::pod_collect_to_vec(&bytes),
-        })
+        Ok(floats(self.settings.format, self.image_bytes()?))
     }
 
     /// The last frame as it lies in the target: what "the same bytes" means.
@@ -30,7 +34,7 @@ impl Renderer {
         let _zone = info_span!("read back").entered();
         let Renderer { host, drawing, readback, traits, i_ended_picture, settings, .. } = self;
         host.run(|rec| {
-            drawing.record_copy(rec, traits.path, *i_ended_picture, readback);
+            drawing.record_read(rec, traits.path, *i_ended_picture, readback);
             Ok(())
         })?;
         readback.read(settings.n_bytes() as usize)

@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, ScopeTime};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
+use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
@@ -48,8 +49,8 @@ pub struct Renderer {
     second: Option<Relay>,
     tensor: Option<TensorStage>,
     /// None where nothing is left out.
-    culling: Option<Culling>,
-    sort: Sort,
+    pub(super) culling: Option<Culling>,
+    pub(super) sort: Sort,
     /// None where no cloud has a texture.
     texture: Option<Texture>,
     pub(super) buffers: Buffers,
@@ -149,6 +150,7 @@ impl Renderer {
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
                 // Until it is chosen.
+                shrunk: !matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto),
                 culls: scene.draw.cull,
                 path: if scene.draw.path == DrawPath::Tiles { DrawPath::Tiles } else { DrawPath::Sprites },
                 skip,
@@ -331,7 +333,9 @@ impl Renderer {
                 Some(tensor) => tensor.record_contract(rec, b, s),
                 None => Ok(()),
             })?;
-            pass(rec, plan, Pass::Cull, |rec| culling.as_ref().map_or(Ok(()), |c| c.record(rec, b, packet, s)))?;
+            pass(rec, plan, Pass::Cull, |rec| {
+                culling.as_ref().map_or(Ok(()), |c| c.record(rec, b, (packet, drawing), s))
+            })?;
             culling.iter().for_each(|c| c.record_count(rec, b, slot));
             pass(rec, plan, Pass::Sort, |rec| record_sort(rec, sort, b, packet, s))?;
             pass(rec, plan, Pass::Texture, |rec| {

@@ -50,8 +50,7 @@ impl Tiling {
         under: Option<Target<'_>>,
         buffers: [&Buffer; 9],
         view: &View<'_>,
-        n: Amount<'_>,
-        i_first_facet: u32,
+        (n, i_first_facet): (Amount<'_>, u32),
     ) -> Result<()> {
         let (tiles, picture) = (&self.tiles, &self.pictures[i]);
         match under {

@@ -5,12 +5,14 @@ use serde_json::json;
 
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, GREATEST_EXPONENT, shortest};
 use super::toml_section::{Bounds, Section};
+use super::toml_tree::Value;
 use crate::error::Result;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::count::Count;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
+use crate::model::resolution::Resolution;
 use crate::model::scene::MAX_PAIR_LEVELS;
 use crate::model::scene::{Draw, DrawPath, Gather, Lighting, LightingMode, Pairs, Simulate, Threading, Threads, Time};
 
@@ -184,12 +186,13 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     if sort_bits != 16 && sort_bits != 32 {
         return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
     }
-    s.only("resolution", json!(1.0), "every pixel is drawn")?;
+    let resolution = read_resolution(&mut s)?;
+    let error = s.f64("error", 1.0 / 1020.0, Bounds::From(0.0, 1.0))?;
     let count = read_count(&mut s)?;
     let n_particles = s.u32("particles", 0, 0, u32::MAX)?;
     let texture_seed = s.u32("texture_seed", 1, 0, u32::MAX)?;
     root.record("draw", s.finish());
-    Ok(Draw { path, cutoff, threshold, cull, smallest, sort_bits, count, texture_seed, n_particles })
+    Ok(Draw { path, resolution, error, cutoff, threshold, cull, smallest, sort_bits, count, texture_seed, n_particles })
 }
 
 const DRAW_KEYS: &[&str] = &[
@@ -200,6 +203,7 @@ const DRAW_KEYS: &[&str] = &[
     "smallest",
     "sort_bits",
     "resolution",
+    "error",
     "particles",
     "count",
     "count_a",
@@ -208,6 +212,28 @@ const DRAW_KEYS: &[&str] = &[
     "count_conserve",
     "texture_seed",
 ];
+
+/// A number that there is a way to draw in, or "auto".
+fn read_resolution(s: &mut Section) -> Result<Resolution> {
+    let Some(node) = s.value("resolution") else {
+        s.record("resolution", json!(1.0));
+        return Ok(Resolution::Full);
+    };
+    if matches!(&node.value, Value::String(s) if s == "auto") {
+        s.record("resolution", json!("auto"));
+        return Ok(Resolution::Auto);
+    }
+    let given = node.value.as_f64();
+    match Resolution::ALL.into_iter().find(|(of, _)| Some(*of) == given) {
+        Some((of, resolution)) => {
+            s.record("resolution", json!(of));
+            Ok(resolution)
+        }
+        None => {
+            Err(s.fault("resolution", format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe())))
+        }
+    }
+}
 
 fn read_count(s: &mut Section) -> Result<Option<Count>> {
     let by_distance = s.choice("count", "all", &[("all", false), ("distance", true)], &[])?;

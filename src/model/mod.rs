@@ -15,6 +15,7 @@ pub mod light;
 pub mod material;
 pub mod pairings;
 pub mod philox;
+pub mod resolution;
 pub mod scene;
 pub mod surface;
 pub mod texture;

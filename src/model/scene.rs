@@ -1,6 +1,6 @@
 //! A scene: everything a run is made of, checked and complete (defaults filled in, references resolved).
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::basis::Sampling;
 use super::camera::Camera;
@@ -9,6 +9,7 @@ use super::count::Count;
 use super::film::Film;
 use super::light::Light;
 use super::material::Material;
+use super::resolution::{Resolution, SmallPicture};
 use super::surface::Surface;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -132,6 +133,10 @@ impl DrawPath {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     pub path: DrawPath,
+    /// Of the picture that they are drawn into.
+    pub resolution: Resolution,
+    /// What "auto" may take differs from the full picture by no more than this, root mean square.
+    pub error: f64,
     /// Sprites end at this many σ.
     pub cutoff: f64,
     /// And where their optical depth falls under this; 0: nowhere.
@@ -195,6 +200,14 @@ impl Scene {
             i_first = groups.last().map_or(i_first, |g| g.i_first + g.n_particles);
         }
         groups
+    }
+
+    /// What the half widths of the camera's view grow by, at most, where blobs are drawn into a smaller picture.
+    pub fn widening(&self) -> DVec2 {
+        match self.draw.resolution.divisor() {
+            1 => DVec2::ONE,
+            n => SmallPicture::of([self.film.width, self.film.height], n).widening(),
+        }
     }
 
     /// Whether some cloud's particles have textures.

@@ -22,9 +22,10 @@ pub struct Frustum {
 }
 
 impl Frustum {
-    pub fn of(camera: &Camera, pose: &Pose, film: &Film) -> Frustum {
+    /// `widening`: factors on the view's width and height.
+    pub fn of(camera: &Camera, pose: &Pose, film: &Film, widening: DVec2) -> Frustum {
         let tan_y = (0.5 * camera.fov_y_rad).tan();
-        let tan = DVec2::new(tan_y * f64::from(film.width) / f64::from(film.height), tan_y);
+        let tan = widening * DVec2::new(tan_y * f64::from(film.width) / f64::from(film.height), tan_y);
         let (f, right, up) = (pose.forward, pose.right, pose.up);
         let inward = [f, tan.x * f - right, tan.x * f + right, tan.y * f - up, tan.y * f + up];
         Frustum { forward: f, near: camera.near, inward }
@@ -59,7 +60,7 @@ mod tests {
         let camera = Camera { keys: vec![key], up: DVec3::Y, fov_y_rad: std::f64::consts::FRAC_PI_2, near: 0.5 };
         let (format, tone_map) = (FilmFormat::Rgba16f, ToneMap::Clip);
         let film = Film { width: 400, height: 300, format, background: DVec3::ZERO, exposure: 1.0, tone_map };
-        Frustum::of(&camera, &camera.pose(0.0).unwrap(), &film)
+        Frustum::of(&camera, &camera.pose(0.0).unwrap(), &film, DVec2::ONE)
     }
 
     #[test]

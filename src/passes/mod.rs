@@ -16,6 +16,7 @@ pub mod surfaces;
 pub mod texture;
 pub mod tiles;
 pub mod transmit;
+pub mod upsample;
 
 use crate::gpu::Sources;
 
@@ -61,6 +62,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/texture.glsl",
     "include/tiles.glsl",
     "include/turns.glsl",
+    "include/upsample.glsl",
     "include/veil.glsl",
     "include/walk.glsl",
     "morton_key.comp",
@@ -87,6 +89,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "tiles_rounds.comp",
     "tiles_splat.comp",
     "transmit.comp",
+    "upsample.comp",
 ];
 
 pub fn sources() -> Sources {

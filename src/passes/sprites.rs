@@ -48,8 +48,7 @@ impl Sprites {
         target: Target<'_>,
         camera: &CameraRecord,
         [cutoff, threshold]: [f64; 2],
-        n_drawn: Amount<'_>,
-        i_first_facet: u32,
+        (n_drawn, i_first_facet): (Amount<'_>, u32),
     ) -> Result<()> {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];

@@ -19,8 +19,11 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat) -> Result<Surfaces> {
-        Ok(Surfaces { pipeline: DrawPipeline::opaque(device, compiler, "surfaces", Push::FIELDS, &[], format)? })
+    /// `depth_only`: of no colour and no alpha.
+    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, depth_only: bool) -> Result<Surfaces> {
+        let constants = [(0, u32::from(depth_only))];
+        let pipeline = DrawPipeline::opaque(device, compiler, "surfaces", Push::FIELDS, &constants, format)?;
+        Ok(Surfaces { pipeline })
     }
 
     /// Clears `target`, which has depth, and draws the first `n_surfaces` regions. `regions`: RegionRecord; `lit`:

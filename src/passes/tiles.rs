@@ -431,7 +431,7 @@ impl Tiles {
     }
 }
 
-/// b²/(2 σ²) at the cutoff, in powers of two.
+/// b²/(2 σ²) at the cutoff, in powers of two: at most 46, at 8 σ; the shader's power of two goes to 125.
 fn cut(cutoff: f64) -> f32 {
     (0.5 * cutoff * cutoff * std::f64::consts::LOG2_E) as f32
 }

@@ -23,6 +23,8 @@ pub mod texture;
 pub mod threshold;
 pub mod tiles;
 pub mod transmit;
+pub mod upsample;
+pub mod upsample_bound;
 pub mod volume;
 
 use glam::DVec3;

@@ -108,6 +108,9 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
             if let Some(choice) = stage.choice.take() {
                 ran.outcome.chosen.push(named(cases, case, &choice.text()));
             }
+            if let Some(choice) = stage.size_choice.take() {
+                ran.outcome.chosen.push(named(cases, case, &choice.text()));
+            }
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
             if is_last {
                 ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));

@@ -5,10 +5,12 @@ use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use crate::frame::choice::Choice;
+use crate::frame::choice_resolution::SizeChoice;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::{OnFrame, parallel, serial};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
+use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Scene, Simulate, Threading};
 use crate::passes;
 
@@ -26,10 +28,12 @@ pub struct DeviceChoice {
 pub struct Stage {
     pub renderer: Renderer,
     pub game: Game,
-    /// Its `draw.path` is what is drawn by.
+    /// Its `draw.path` and `draw.resolution` are what is drawn by.
     pub scene: Arc<Scene>,
     /// What "auto" came to, where the scene asks for it.
     pub choice: Option<Choice>,
+    /// The same of its `draw.resolution`.
+    pub size_choice: Option<SizeChoice>,
     compiler: Compiler,
     pub device: Device,
     instance: Arc<Instance>,
@@ -68,14 +72,19 @@ impl Stage {
             Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
         };
         let mut game = Game::new(scene.clone(), rest).culling(skip);
-        let (mut scene, mut choice) = (scene, None);
+        let (mut scene, mut choice, mut size_choice) = (scene, None, None);
         if scene.draw.path == DrawPath::Auto {
             let packet = game.step(0)?;
             let chosen = renderer.choose_path(&packet)?;
             Arc::make_mut(&mut scene).draw.path = chosen.path;
             choice = Some(chosen);
         }
-        Ok(Stage { renderer, game, scene, choice, compiler, device, instance })
+        if scene.draw.resolution == Resolution::Auto {
+            let chosen = renderer.choose_resolution(&game.step(0)?, scene.draw.error)?;
+            Arc::make_mut(&mut scene).draw.resolution = chosen.resolution;
+            size_choice = Some(chosen);
+        }
+        Ok(Stage { renderer, game, scene, choice, size_choice, compiler, device, instance })
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.

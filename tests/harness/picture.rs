@@ -185,7 +185,7 @@ impl Picture {
             [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some(), self.view.threshold > 0.0],
         )
         .expect("sprites");
-        let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
+        let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
         let tiling = tiled.map(|t| self.tiling(gpu, compiler, format, t));
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
@@ -229,7 +229,7 @@ impl Picture {
             }
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
-                let (n, i_first_facet) = (Amount::Known(entries.len() as u32), scenery.lit.len() as u32);
+                let n = (Amount::Known(entries.len() as u32), scenery.lit.len() as u32);
                 let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
                 if let (Some(tiling), Some(tiled)) = (&tiling, tiled) {
                     let view = nimbus::passes::tiles::View {
@@ -238,11 +238,11 @@ impl Picture {
                         threshold: self.view.threshold,
                         saturated: tiled.saturated,
                     };
-                    tiling.record(rec, 0, behind.then_some(target), from, &view, n, i_first_facet)?;
+                    tiling.record(rec, 0, behind.then_some(target), from, &view, n)?;
                     rec.copy(&tiling.pictures[0], &readback);
                     return Ok(());
                 }
-                pass.record(rec, from, target, &camera, [self.view.cutoff, self.view.threshold], n, i_first_facet)?;
+                pass.record(rec, from, target, &camera, [self.view.cutoff, self.view.threshold], n)?;
             }
             rec.copy_image(&mut target, &readback);
             Ok(())

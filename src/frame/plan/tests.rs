@@ -17,11 +17,12 @@ const TRAITS: Traits = Traits {
     tensors: Tensors::Needless,
     culls: false,
     path: DrawPath::Sprites,
+    shrunk: false,
     skip: true,
 };
 const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
 /// With every pass.
-const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, culls: true, ..KEPT };
+const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, culls: true, shrunk: true, ..KEPT };
 
 fn packet() -> Packet {
     Packet {

@@ -16,7 +16,7 @@ use glam::DVec3;
 use harness::{Gpu, assert_within};
 use nimbus::error::Error;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Barriers, Image, Target};
+use nimbus::gpu::{Amount, Barriers, Image, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::FilmFormat;
@@ -336,7 +336,7 @@ fn a_target_that_does_not_fit_is_refused() {
     let format = TargetFormat::Rgba16f;
     let over = |behind| Sprites::new(&gpu.device, &gpu.compiler, format, false, behind).expect("sprites");
     let (alone, behind) = (over([false; 5]), over([true, false, false, false, false]));
-    let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format).expect("surfaces");
+    let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format, false).expect("surfaces");
     let mut color = Image::color_target(&gpu.device, "test.target", 8, 4, format).expect("a target");
     let mut depth = Image::depth(&gpu.device, "test.depth", 8, 4).expect("depth");
     let mut other = Image::depth(&gpu.device, "test.depth", 8, 5).expect("depth");
@@ -345,7 +345,7 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut record = |pass: Option<&Sprites>, depth: Option<&mut Image>| {
         let target = Target { color: &mut color, depth };
         gpu.commands.record(Barriers::Placed, |rec| match pass {
-            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], [0, 0]),
+            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], (Amount::Known(0), 0)),
             None => surfaces.record(rec, [&buffer; 2], target, &camera, 0),
         })
     };

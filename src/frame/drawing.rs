@@ -133,6 +133,14 @@ impl Drawing {
         self.i_shrunk.map_or(self, |i| &self.shrunk[i].drawing).tiling.is_some()
     }
 
+    /// What sees the blobs, and the columns and rows of the picture that they are drawn into.
+    pub fn seen(&self, camera: &CameraRecord, s: &Settings) -> (CameraRecord, [u32; 2]) {
+        match self.i_shrunk {
+            Some(i) => (self.shrunk[i].camera(camera), self.shrunk[i].size()),
+            None => (*camera, s.size),
+        }
+    }
+
     /// Gives back what the other way needs.
     pub fn keep_only(&mut self, path: DrawPath) {
         if let Some(impostors) = &mut self.impostors {
@@ -283,7 +291,7 @@ impl Drawing {
         (n_drawn, camera): (u32, &CameraRecord),
         s: &Settings,
     ) -> Result<()> {
-        let counts = [n_drawn, s.n_surface_facets];
+        let counts = (b.amount(n_drawn), s.n_surface_facets);
         let near = self.impostors.as_ref().and_then(Impostors::near);
         let buffers = near.map_or(b.of_sprites(), |near| b.of_sprites_from(near));
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));

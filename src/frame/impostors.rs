@@ -8,7 +8,7 @@ use super::shells::{Keeper, Kept, Rules, Step, view_of};
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, Image, Place, Recorder, Target};
+use crate::gpu::{Amount, Buffer, Compiler, Device, Image, Place, Recorder, Target};
 use crate::model::film::FilmFormat;
 use crate::model::scene::{DrawPath, Scene};
 use crate::passes;
@@ -142,7 +142,7 @@ impl Impostors {
         let lists = [&b.entries, &self.members, &self.far, &self.near];
         self.pass.record_part(rec, lists, packet.n_drawn, is_new.then_some(kept.last_key))?;
         if is_new {
-            self.record_shell(rec, path, b, &kept, [packet.n_drawn, s.n_surface_facets], s)?;
+            self.record_shell(rec, path, b, &kept, (Amount::Known(packet.n_drawn), s.n_surface_facets), s)?;
         }
         let texels = match (&self.tiling, &self.sprites) {
             (Some(tiling), _) if path == DrawPath::Tiles => &tiling.pictures[0],
@@ -167,7 +167,7 @@ impl Impostors {
         path: DrawPath,
         b: &Buffers,
         kept: &Kept,
-        counts: [u32; 2],
+        counts: (Amount<'_>, u32),
         s: &Settings,
     ) -> Result<()> {
         let buffers = b.of_sprites_from(&self.far);

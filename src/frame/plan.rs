@@ -22,6 +22,7 @@ pub enum Pass {
     First,
     Second,
     Contract,
+    Cull,
     Sort,
     Texture,
     Surfaces,
@@ -32,7 +33,7 @@ pub enum Pass {
 }
 
 impl Pass {
-    pub const ALL: [Pass; 16] = [
+    pub const ALL: [Pass; 17] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -42,6 +43,7 @@ impl Pass {
         Pass::First,
         Pass::Second,
         Pass::Contract,
+        Pass::Cull,
         Pass::Sort,
         Pass::Texture,
         Pass::Surfaces,
@@ -63,6 +65,7 @@ impl Pass {
             "first",
             "second",
             "contract",
+            "cull",
             "sort",
             "texture",
             "surfaces",
@@ -181,6 +184,8 @@ pub struct Traits {
     pub tensors: Tensors,
     /// What is far may be shown from a picture of it.
     pub impostors: bool,
+    /// Particles that can show in no pixel are left out.
+    pub culls: bool,
     /// What draws the particles.
     pub path: DrawPath,
     /// Blobs are drawn into a smaller picture.
@@ -228,6 +233,8 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         same(&|a, b| a.drawn.iter().map(|d| (d.shift, d.end)).eq(b.drawn.iter().map(|d| (d.shift, d.end))));
     let same_order = still && same_names && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
+    // What is kept depends on all of the camera, and on how dense particles are.
+    let same_kept = same_order && same_drawn && same_view;
     let same_picture = same_order && same_drawn && same_view && (same_light || !traits.lit);
 
     let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
@@ -255,7 +262,15 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             Tensors::Needless => skip("no material is edited: light is gathered at once"),
             Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
-        unless(same_order, "the order cannot have changed"),
+        match traits.culls {
+            true => unless(same_kept, "the same can be seen"),
+            false if traits.impostors => skip("who is in a shell must not depend on the view"),
+            false => skip("draw.cull is \"off\""),
+        },
+        match traits.culls {
+            true => unless(same_kept, "the same can be seen"),
+            false => unless(same_order, "the order cannot have changed"),
+        },
         if traits.textured { unless(last.is_some(), "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
         match traits.impostors {
@@ -268,8 +283,8 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
     ];
     if traits.n_particles == 0 {
-        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort, Pass::Texture, Pass::Impostors]
-        {
+        let of_particles = [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort];
+        for pass in of_particles.into_iter().chain([Pass::Texture, Pass::Impostors]) {
             decisions[pass as usize] = skip("no particles");
         }
     }

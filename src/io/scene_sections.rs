@@ -180,13 +180,18 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let impostor_error = s.f64("impostor_error", 0.5, Bounds::Within(0.01, 100.0))?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let threshold = s.f64("threshold", 0.0, Bounds::From(0.0, 1.0))?;
+    let cull = s.choice("cull", "on", &[("on", true), ("off", false)], &[])?;
+    let smallest = s.f64("smallest", 0.0, Bounds::Within(0.0, 1000.0))?;
+    if smallest > 0.0 && !cull {
+        return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {smallest}")));
+    }
     let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
     if sort_bits != 16 && sort_bits != 32 {
         return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
     }
     let resolution = read_resolution(&mut s)?;
-    if impostors != Impostors::Off && resolution != Resolution::Full {
-        let what = "goes with draw.resolution = 1 alone; expected \"off\", or draw.resolution = 1";
+    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest > 0.0) {
+        let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
         return Err(s.fault("impostors", what.to_owned()));
     }
     let error = s.f64("error", 1.0 / 1020.0, Bounds::From(0.0, 1.0))?;
@@ -202,6 +207,8 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         error,
         cutoff,
         threshold,
+        cull,
+        smallest,
         sort_bits,
         count,
         texture_seed,
@@ -215,6 +222,8 @@ const DRAW_KEYS: &[&str] = &[
     "impostor_error",
     "cutoff",
     "threshold",
+    "cull",
+    "smallest",
     "sort_bits",
     "resolution",
     "error",

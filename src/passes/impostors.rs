@@ -9,7 +9,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Kernel, Recorder, Start, Target};
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Recorder, Start, Target};
 use crate::layout::record;
 
 record! {
@@ -82,7 +82,7 @@ impl Impostors {
         let (width, height) = target.color.size();
         let push = push(shown, [width, height]);
         let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
-        rec.draw(&self.show, target, start, &[shell], &push, 1)
+        rec.draw(&self.show, target, start, &[shell], &push, Instances::Known(1))
     }
 }
 

@@ -200,7 +200,7 @@ fn a_surface_shows_before_the_shell_and_under_it() {
     let (_, now) = views().swap_remove(1);
     let (truths, bounds) = truth(&picture, &shell, &now, 0.0);
     let pass = Impostors::new(&gpu.device, &gpu.compiler, format, true).expect("the pass");
-    let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format).expect("surfaces");
+    let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format, false).expect("surfaces");
     let f32s = |v: DVec3| v.as_vec3().to_array();
     // A wall across the whole view at depth 5, near 0.1.
     let camera = CameraRecord {

@@ -168,7 +168,7 @@ impl Picture {
             [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some(), self.view.threshold > 0.0],
         )
         .expect("sprites");
-        let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format).expect("surfaces"));
+        let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
         let tiling = tiled.map(|t| self.tiling(gpu, compiler, format, t));
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();

@@ -1,6 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "key.glsl"
 #include "each.glsl"
 
 // Sort keys of the drawn particles from view depth relative to the lighting origin; far to near is ascending
@@ -17,14 +18,7 @@ layout(std430, binding = 3) writeonly buffer Entries { uvec2 entries[]; };
 
 void main() {
     FOR_EACH(i, push.n_particles) {
-        float z = dot(push.forward, placed[i].position);
-        uint key;
-        if (push.n_bits == 16) {
-            key = uint(clamp((push.depth_high - z) * push.steps_per_depth, 0.0, 65535.0));
-        } else {
-            uint bits = floatBitsToUint(z);
-            key = ~((bits & 0x80000000u) != 0 ? ~bits : bits | 0x80000000u);
-        }
+        uint key = key_of(dot(push.forward, placed[i].position), push.n_bits, push.depth_high, push.steps_per_depth);
         Drawn group = drawn[i_group[i]];
         if (i < group.end) {
             entries[i + group.shift] = uvec2(key, i);

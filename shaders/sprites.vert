@@ -41,9 +41,6 @@ layout(location = 4) flat out vec3 out_gain;
 // b^2/(2 sigma^2) where it ends; only where there is a threshold.
 layout(location = 5) flat out float out_cut;
 
-// Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is snapped.
-const float SNAP = 1.0 / 16.0;
-
 void main() {
     uint i = entries[gl_InstanceIndex].y;
     vec3 c = placed[i].position - push.camera.eye;

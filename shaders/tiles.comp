@@ -194,8 +194,10 @@ void compose(Loaded splat, float y) {
 #endif
 #if TEXTURED
         e[j] += 1.44269504089 * sheet_exponent(vec2(dx[j], dy), splat.turn, uvec2(splat.gain.w, splat.side), uintBitsToFloat(splat.gain.xyz));
+        e[j] = clamp(e[j], -125.0, 125.0);
 #endif
-        tau[j] = is_seen ? place.w * exp2(e[j]) : 0.0;
+        // By its bits: llvmpipe takes twice as long to choose between two floats.
+        tau[j] = uintBitsToFloat(floatBitsToUint(place.w * power_of_two(e[j])) & (is_seen ? ~0u : 0u));
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         tau[j] = opacity(tau[j]);

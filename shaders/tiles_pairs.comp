@@ -12,13 +12,14 @@ layout(local_size_x = 256) in;
 // As in sprites.vert.
 layout(constant_id = 5) const uint THRESHOLD = 0;
 
-layout(push_constant) uniform Push { vec2 tangents; vec2 tile; uint n_splats; uint n_bins_x; uint i_round; float cut; float inv_threshold; } push;
+layout(push_constant) uniform Push { vec2 tangents; vec2 tile; uint n_bins_x; uint i_round; float cut; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Reaches { uvec2 reach[]; };
 layout(std430, binding = 1) readonly buffer Before { uint n_before[]; };
 layout(std430, binding = 2) readonly buffer Blocks { uint n_pairs[]; };
 layout(std430, binding = 3) readonly buffer Rounds { Round rounds[]; };
 layout(std430, binding = 5) readonly buffer Splats { Splat splats[]; };
 layout(std430, binding = 4) writeonly buffer Pairs { uvec2 pairs[]; };
+layout(std430, binding = 6) readonly buffer KeptOnes { Kept kept[]; };
 
 // Which of a bin's four tiles along one axis lie in [low, high).
 uint within(uint low, uint high, uint bin) {
@@ -53,7 +54,7 @@ uint near(vec2 center, float scale, float cut, vec2 low) {
 void main() {
     uint block = rounds[push.i_round].blocks.w + gl_WorkGroupID.x;
     uint r = block * BLOCK + gl_LocalInvocationID.x;
-    if (r >= push.n_splats) {
+    if (r >= kept[0].sort.w) {
         return;
     }
     uint at = n_pairs[block] + n_before[r];

@@ -8,10 +8,11 @@
 
 layout(local_size_x = 1) in;
 
-layout(push_constant) uniform Push { uint n_blocks; uint n_rounds; uint capacity; uint most_blocks; uint sort_tile; uint bin_groups; } push;
+layout(push_constant) uniform Push { uint n_rounds; uint capacity; uint most_blocks; uint sort_tile; uint bin_groups; } push;
 // In: pairs of each block. Out: pairs of the blocks before it in its round.
 layout(std430, binding = 0) buffer Blocks { uint n_pairs[]; };
 layout(std430, binding = 1) writeonly buffer Rounds { Round rounds[]; };
+layout(std430, binding = 2) readonly buffer KeptOnes { Kept kept[]; };
 
 void close(uint k, uint first, uint end, uint n, bool is_last) {
     rounds[k].extent = uvec4((n + push.sort_tile - 1u) / push.sort_tile, 1, 1, n);
@@ -22,8 +23,9 @@ void close(uint k, uint first, uint end, uint n, bool is_last) {
 }
 
 void main() {
+    uint n_blocks = (kept[0].sort.w + BLOCK - 1u) / BLOCK;
     uint k = 0, first = 0, n = 0;
-    for (uint i = 0; i < push.n_blocks; ++i) {
+    for (uint i = 0; i < n_blocks; ++i) {
         uint of_block = n_pairs[i];
         if (n + of_block > push.capacity || i - first == push.most_blocks) {
             close(k, first, i, n, false);
@@ -34,7 +36,7 @@ void main() {
         n_pairs[i] = n;
         n += of_block;
     }
-    close(k, first, push.n_blocks, n, true);
+    close(k, first, n_blocks, n, true);
     for (++k; k < push.n_rounds; ++k) {
         close(k, 0, 0, 0, true);
     }

@@ -19,7 +19,7 @@ layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 4) const uint TEXTURED = 0;
 layout(constant_id = 5) const uint THRESHOLD = 0;
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint n_splats; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
@@ -37,18 +37,11 @@ layout(std430, binding = 11) writeonly buffer Blocks { uint n_pairs[]; };
 // What of it is textured; only where something is.
 layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
 
+layout(std430, binding = 13) readonly buffer KeptOnes { Kept kept[]; };
+
 shared uint sums[BLOCK];
 
 const float LOG2_E = 1.44269504089;
-// Pixels that rounding may move an edge by; as the rasteriser's snapping may in sprites.vert.
-const float SNAP = 1.0 / 16.0;
-
-// The first pixel and the one after the last whose centres lie within [low, high], in pixels from the first one's edge.
-uvec2 pixels(float low, float high, uint n) {
-    vec2 at = vec2(ceil(low - 0.5 - SNAP), floor(high + 0.5 + SNAP));
-    uvec2 range = uvec2(clamp(at, vec2(0.0), vec2(float(n))));
-    return uvec2(min(range.x, range.y), range.y);
-}
 
 // Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is set.
 uint project(uint i, uint r) {
@@ -72,10 +65,8 @@ uint project(uint i, uint r) {
         reach_in_sigma = sqrt(2.0 * cut);
     }
     vec2 s = v.xy / v.z;
-    float radius = GROWTH * reach_in_sigma * sigma;
-    vec2 x = (tangents(v.x, v.z, radius) + push.camera.tan_x) / push.pixel.x;
-    vec2 y = (push.camera.tan_y - tangents(v.y, v.z, radius).yx) / push.pixel.y;
-    uvec2 columns = pixels(x.x, x.y, push.width), rows = pixels(y.x, y.y, push.height);
+    uvec4 pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, uvec2(push.width, push.height));
+    uvec2 columns = pixels.xy, rows = pixels.zw;
     if (columns.x == columns.y || rows.x == rows.y) {
         return 0u;
     }
@@ -101,10 +92,11 @@ uint project(uint i, uint r) {
 void main() {
     uint t = gl_LocalInvocationID.x;
     uint r = gl_WorkGroupID.x * BLOCK + t;
+    uint n_splats = kept[0].sort.w;
     uint n = 0;
-    if (r < push.n_splats) {
+    if (r < n_splats) {
         // Far to near is how they are sorted.
-        n = project(entries[push.n_splats - 1u - r].y, r);
+        n = project(entries[n_splats - 1u - r].y, r);
     }
     sums[t] = n;
     barrier();
@@ -114,7 +106,7 @@ void main() {
         sums[t] += left;
         barrier();
     }
-    if (r < push.n_splats) {
+    if (r < n_splats) {
         n_before[r] = sums[t] - n;
     }
     if (t == BLOCK - 1) {

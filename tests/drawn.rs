@@ -102,7 +102,7 @@ fn looking_away_draws_nothing_and_lights_nothing_anew() {
     assert!(packet.n_drawn > 0 && bytes.iter().any(|b| *b != 0));
     let (packet, bytes, ran) = frame(&mut renderer, &mut game, 1);
     assert!(packet.n_drawn == 0 && bytes.iter().all(|b| *b == 0));
-    assert_eq!(ran, ["sort", "sprites"]);
+    assert_eq!(ran, ["cull", "sort", "sprites"]);
 }
 
 #[test]

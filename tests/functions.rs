@@ -24,7 +24,7 @@ layout(std430, binding = 0) readonly buffer X { float x[]; };
 layout(std430, binding = 1) writeonly buffer Y { float y[]; };
 void main() {
     FOR_EACH(i, push.n) {
-        y[i] = push.which == 0 ? sine(x[i]) : push.which == 1 ? erf_approx(x[i]) : push.which == 2 ? one_minus_exp(x[i]) : unit_at(x[i])[push.which - 3];
+        y[i] = push.which == 0 ? sine(x[i]) : push.which == 1 ? erf_approx(x[i]) : push.which == 2 ? one_minus_exp(x[i]) : push.which == 5 ? power_of_two(x[i]) : unit_at(x[i])[push.which - 3];
     }
 }
 "#;
@@ -62,6 +62,7 @@ const SINE: u32 = 0;
 const ERF: u32 = 1;
 const ONE_MINUS_EXP: u32 = 2;
 const UNIT_AT: u32 = 3;
+const POWER_OF_TWO: u32 = 5;
 
 fn evaluate(gpu: &mut Gpu, kernel: &Kernel, which: u32, x: &[f32]) -> Vec<f64> {
     let (input, output) = (gpu.upload(x), gpu.buffer::<f32>(x.len()));
@@ -192,6 +193,27 @@ fn erf_is_within_the_formulas_error_and_its_rounding() {
     let wrong = wrong_functions(&gpu, "0.0092705272", "0.0092805272");
     let values = evaluate(&mut gpu, &wrong, ERF, &x);
     assert!(check_within("a wrong erf", &values, &truths, &bounds).is_err());
+}
+
+#[test]
+fn powers_of_two_are_within_their_documented_error() {
+    let mut gpu = Gpu::new();
+    let kernel = gpu.test_kernel("functions", FUNCTIONS, Push::FIELDS);
+    let mut x = sweep(1e-20, 125.0, 400_000);
+    // Integers, and where the reduction goes from one to the next.
+    x.extend((-249..250).flat_map(|k| {
+        let at = 0.5 * k as f32;
+        [at.next_down(), at, at.next_up()]
+    }));
+    let values = evaluate(&mut gpu, &kernel, POWER_OF_TWO, &x);
+    let truths: Vec<f64> = x.iter().map(|x| f64::from(*x).exp2()).collect();
+    // The polynomial's 7.5e-8; and rounding, e_k <= u |p_k| + u |c_k| + |f| (u |p_k+1| + e_k+1) down to k = 0 at |f| = 1/2,
+    // where it is the greatest: 3.7 u.
+    let bounds: Vec<f64> = truths.iter().map(|t| (7.5e-8 + 3.7 * U_F32) * t).collect();
+    assert_within_and_say("a power of two", &values, &truths, &bounds);
+    let wrong = wrong_functions(&gpu, "0.0555071327386", "0.0555171327386");
+    let values = evaluate(&mut gpu, &wrong, POWER_OF_TWO, &x);
+    assert!(check_within("a wrong power", &values, &truths, &bounds).is_err());
 }
 
 /// The relative error that functions.glsl promises. From t = 1/2 on exp's 3 + 2t ulp (2 u each, of e^−t) are at most

@@ -11,6 +11,7 @@ use nimbus::gpu::kernel::Field;
 use nimbus::gpu::reflect::{BindingKind, Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
 use nimbus::gpu::{Buffer, Compiler, Place};
+use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
@@ -19,13 +20,15 @@ use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord, TexturedRe
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{self, SHADERS, contract, facets, first, generate, grid, morton, place, second, sort, sprites};
+use nimbus::passes::{
+    self, SHADERS, contract, cull, facets, first, generate, grid, morton, place, second, sort, sprites,
+};
 use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 23] = [
+const RECORDS: [Record; 24] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
@@ -45,6 +48,7 @@ const RECORDS: [Record; 23] = [
     ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
+    ("Kept", KeptRecord::FIELDS, size_of::<KeptRecord>()),
     ("SplatSheet", SplatSheetRecord::FIELDS, size_of::<SplatSheetRecord>()),
     ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
     ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
@@ -53,8 +57,11 @@ const RECORDS: [Record; 23] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 34] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 37] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
+    ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
+    ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
+    ("cull_write.comp", cull::WritePush::FIELDS, &[R("Placed"), B(8), B(4), B(8)]),
     ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
     ("first_tensor.comp", first::TensorPush::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, B(4), R("Lit")]),
@@ -123,9 +130,9 @@ const INTERFACES: [(&str, &[Field], &[Element]); 34] = [
     ("texture_transform.comp", texture::TransformPush::FIELDS, &[B(8)]),
     ("tiles.comp", tiles::Push::FIELDS, &[T, B(8), R("Round"), B(16), B(16), B(4)]),
     ("tiles_clear.comp", tiles::ClearPush::FIELDS, &[R("Round"), B(16)]),
-    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, &[B(8), B(4), B(4), R("Round"), B(8), R("Splat")]),
+    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, &[B(8), B(4), B(4), R("Round"), B(8), R("Splat"), R("Kept")]),
     ("tiles_ranges.comp", tiles::RangesPush::FIELDS, &[B(8), R("Round"), B(16)]),
-    ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, &[B(4), R("Round")]),
+    ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, &[B(4), R("Round"), R("Kept")]),
     (
         "tiles_splat.comp",
         tiles::SplatPush::FIELDS,
@@ -143,6 +150,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 34] = [
             B(4),
             B(4),
             R("SplatSheet"),
+            R("Kept"),
         ],
     ),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
@@ -344,6 +352,8 @@ fn shared_constants_have_one_value() {
         ("include/texture.glsl", "LAST_LEVEL", nimbus::reference::texture::N_LEVELS as f64 - 1.0),
         ("include/texture.glsl", "PERIOD_SIGMA", nimbus::reference::texture::PERIOD_SIGMA),
         ("include/texture.glsl", "QUANTA", 1.0 / nimbus::reference::texture::QUANTUM),
+        ("include/cull.glsl", "TILE", f64::from(cull::TILE)),
+        ("include/cull.glsl", "WORDS", f64::from(cull::WORDS)),
         ("include/sort.glsl", "TILE", f64::from(sort::TILE)),
         ("include/sort.glsl", "NO_COUNT", f64::from(sort::NO_COUNT)),
         ("include/tiles.glsl", "BLOCK", f64::from(tiles::BLOCK)),

@@ -220,9 +220,9 @@ fn wrong_keys_are_noticed() {
     assert_eq!(wrong_step(&found, &bounds, RADIUS), Some(78));
 
     // Near to far, and negative depths the wrong way round.
-    for (from, to) in [("key = ~(", "key = ("), ("? ~bits :", "? bits :")] {
+    for (from, to) in [("return ~(", "return ("), ("? ~bits :", "? bits :")] {
         let mut sources = passes::sources();
-        assert!(sources.replace("sort_key.comp", from, to));
+        assert!(sources.replace("include/key.glsl", from, to));
         let compiler = Compiler::new(sources, None).expect("shaderc");
         let wrong = Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort");
         let found = keys(&mut gpu, &wrong, &placed, forward, RADIUS, 32);

@@ -16,7 +16,7 @@ use glam::DVec3;
 use harness::{Gpu, assert_within};
 use nimbus::error::Error;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Barriers, Image, Target};
+use nimbus::gpu::{Amount, Barriers, Image, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::FilmFormat;
@@ -345,7 +345,7 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut record = |pass: Option<&Sprites>, depth: Option<&mut Image>| {
         let target = Target { color: &mut color, depth };
         gpu.commands.record(Barriers::Placed, |rec| match pass {
-            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], [0, 0]),
+            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], (Amount::Known(0), 0)),
             None => surfaces.record(rec, [&buffer; 2], target, &camera, 0),
         })
     };

@@ -5,6 +5,7 @@ struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uin
 struct Placed { vec3 position; float sigma; };
 struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 center; uint i_mode; uint n_modes; float scale; uvec2 unused; };
 struct Drawn { uint shift; uint end; float kappa_scale; float last_weight; };
+struct Kept { uvec4 sort; uvec4 draw; uvec4 splat; };
 struct SplatSheet { vec4 turn; vec3 gain; uint i_texel; uint log2_side; uint unused; uvec2 unused_too; };
 struct Round { uvec4 extent; uvec4 blocks; uvec4 bins; uvec4 tiles; uvec4 alone; };
 struct Splat { vec2 center; float scale; float tau; vec3 radiance; float depth; };

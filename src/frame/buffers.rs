@@ -1,7 +1,8 @@
 //! The buffers that the passes hand to each other, and what they are filled with once.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
+use crate::gpu::{Amount, Buffer, Commands, Device, Place, Recorder};
+use crate::layout::cull::KeptRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::TexturedRecord;
@@ -12,6 +13,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::passes::texture::POOL_TEXELS;
 
+use super::culling::culls;
 use super::feed::Feed;
 use super::grouping::is_grouped;
 use super::limits::n_cells_max;
@@ -47,6 +49,8 @@ pub struct Buffers {
     pub i_facet: Buffer,
     /// [key, particle].
     pub entries: Buffer,
+    /// How many of them there are (KeptRecord), where the device counts them.
+    pub kept: Option<Buffer>,
     /// What each group is textured with, and the pool of textures; empty where nothing is.
     pub textured: Buffer,
     pub pool: Buffer,
@@ -96,6 +100,11 @@ impl Buffers {
         [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool]
     }
 
+    /// How many entries are drawn, of `n_drawn` at most.
+    pub fn amount(&self, n_drawn: u32) -> Amount<'_> {
+        self.kept.as_ref().map_or(Amount::Known(n_drawn), Amount::Counted)
+    }
+
     pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
         let n = scene.n_particles();
         let n_facets = scene.n_facets();
@@ -129,6 +138,10 @@ impl Buffers {
             table: Feed::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64)?,
             through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
+            kept: match culls(scene) {
+                true => Some(Buffer::new::<KeptRecord>(device, "cull.kept", 1, Place::Device)?),
+                false => None,
+            },
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
             textured: Buffer::new::<TexturedRecord>(device, "texture.groups", n_textured, Place::Device)?,

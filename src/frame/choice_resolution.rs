@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use super::culling::record_sort;
 use super::ms;
 use super::packet::Packet;
 use super::readback::floats;
@@ -64,6 +65,7 @@ impl Renderer {
         let mut tried = Vec::new();
         for resolution in self.drawing.resolutions() {
             self.drawing.take(resolution);
+            self.keep_and_sort(packet)?;
             let ms = self.time_size(packet)?;
             let picture = self.drawn_now()?;
             if full.is_empty() {
@@ -77,6 +79,17 @@ impl Renderer {
         self.traits.shrunk = choice.resolution != Resolution::Full;
         self.reset();
         Ok(choice)
+    }
+
+    /// What is kept depends on the picture that it is drawn into.
+    fn keep_and_sort(&mut self, packet: &Packet) -> Result<()> {
+        let Renderer { host, drawing, buffers: b, settings: s, culling, sort, .. } = self;
+        let Some(culling) = culling else { return Ok(()) };
+        host.run(|rec| {
+            culling.record(rec, b, (packet, drawing), s)?;
+            record_sort(rec, sort, b, packet, s)
+        })?;
+        Ok(())
     }
 
     /// Draws what is sorted, with all that belongs to its picture, several times; the median of the times, ms.

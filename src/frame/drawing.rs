@@ -126,6 +126,14 @@ impl Drawing {
         self.i_shrunk.map_or(self, |i| &self.shrunk[i].drawing).tiling.is_some()
     }
 
+    /// What sees the blobs, and the columns and rows of the picture that they are drawn into.
+    pub fn seen(&self, camera: &CameraRecord, s: &Settings) -> (CameraRecord, [u32; 2]) {
+        match self.i_shrunk {
+            Some(i) => (self.shrunk[i].camera(camera), self.shrunk[i].size()),
+            None => (*camera, s.size),
+        }
+    }
+
     /// Gives back what the other way needs.
     pub fn keep_only(&mut self, path: DrawPath) {
         match path {
@@ -250,7 +258,7 @@ impl Drawing {
         (n_drawn, camera): (u32, &CameraRecord),
         s: &Settings,
     ) -> Result<()> {
-        let counts = [n_drawn, s.n_surface_facets];
+        let counts = (b.amount(n_drawn), s.n_surface_facets);
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {

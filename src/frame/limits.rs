@@ -21,6 +21,7 @@ use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
 use super::buffers::has_second;
+use super::culling::culls;
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
@@ -78,6 +79,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("their light by points", n_sources * scene.lights.len() as u64, size(size_of::<PackedRecord>())),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
+        ("the bits of kept particles", if culls(scene) { n.div_ceil(32) } else { 0 }, 8),
         ("the Morton order's entries", if is_grouped(scene) { 2 * n } else { 0 }, 8),
         ("the Morton order and the particles' facets", if is_grouped(scene) { 2 * n } else { 0 }, 4),
         ("the boxes", groups, size(size_of::<BoxRecord>())),

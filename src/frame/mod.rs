@@ -4,6 +4,7 @@
 pub mod buffers;
 pub mod choice;
 pub mod choice_resolution;
+mod culling;
 mod drawing;
 mod drawn;
 pub mod exchange;
@@ -51,6 +52,8 @@ pub struct FrameTimes {
     pub queue_depth: u32,
     /// Particles that were drawn: those of clouds in view, as many as `draw.count` asks for.
     pub n_drawn: u32,
+    /// Those of them that can show in a pixel, where `draw.cull` is on.
+    pub n_kept: Option<u32>,
     pub marks: Marks,
     pub plan: Plan,
     /// GPU time of every pass that ran; empty where the device has no timestamps.
@@ -58,6 +61,11 @@ pub struct FrameTimes {
 }
 
 impl FrameTimes {
+    /// Particles that the drawing pass was given.
+    pub fn n_shown(&self) -> u32 {
+        self.n_kept.unwrap_or(self.n_drawn)
+    }
+
     /// Recording, submission and the wait for the device.
     pub fn render_ms(&self) -> f64 {
         self.record_ms + self.submit_ms + self.wait_ms
@@ -106,6 +114,7 @@ impl Started {
             latency_ms: ms(self.begin, end),
             queue_depth: self.queue_depth,
             n_drawn: self.n_drawn,
+            n_kept: done.n_kept,
             marks: Marks {
                 game: [self.begin, self.begin + Duration::from_secs_f64(1e-3 * self.game_ms)],
                 record: done.recorded,

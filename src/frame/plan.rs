@@ -22,6 +22,7 @@ pub enum Pass {
     First,
     Second,
     Contract,
+    Cull,
     Sort,
     Texture,
     Surfaces,
@@ -31,7 +32,7 @@ pub enum Pass {
 }
 
 impl Pass {
-    pub const ALL: [Pass; 15] = [
+    pub const ALL: [Pass; 16] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -41,6 +42,7 @@ impl Pass {
         Pass::First,
         Pass::Second,
         Pass::Contract,
+        Pass::Cull,
         Pass::Sort,
         Pass::Texture,
         Pass::Surfaces,
@@ -52,7 +54,7 @@ impl Pass {
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
         let names = [
-            "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "sort",
+            "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "cull", "sort",
             "texture", "surfaces", "sprites", "tiles", "upsample",
         ];
         names[self as usize]
@@ -141,6 +143,8 @@ pub struct Traits {
     /// Some region has a lobe, and so what is seen of it depends on the eye.
     pub glossy: bool,
     pub tensors: Tensors,
+    /// Particles that can show in no pixel are left out.
+    pub culls: bool,
     /// What draws the particles.
     pub path: DrawPath,
     /// Blobs are drawn into a smaller picture.
@@ -188,6 +192,8 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         same(&|a, b| a.drawn.iter().map(|d| (d.shift, d.end)).eq(b.drawn.iter().map(|d| (d.shift, d.end))));
     let same_order = still && same_names && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
     let same_view = same(&|a, b| a.camera == b.camera);
+    // What is kept depends on all of the camera, and on how dense particles are.
+    let same_kept = same_order && same_drawn && same_view;
     let same_picture = same_order && same_drawn && same_view && (same_light || !traits.lit);
 
     let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
@@ -215,7 +221,11 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             Tensors::Needless => skip("no material is edited: light is gathered at once"),
             Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
-        unless(same_order, "the order cannot have changed"),
+        if traits.culls { unless(same_kept, "the same can be seen") } else { skip("draw.cull is \"off\"") },
+        match traits.culls {
+            true => unless(same_kept, "the same can be seen"),
+            false => unless(same_order, "the order cannot have changed"),
+        },
         if traits.textured { unless(last.is_some(), "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
         drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
@@ -223,7 +233,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
     ];
     if traits.n_particles == 0 {
-        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Sort, Pass::Texture] {
+        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort, Pass::Texture] {
             decisions[pass as usize] = skip("no particles");
         }
     }

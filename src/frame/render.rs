@@ -6,6 +6,7 @@ use std::time::Instant;
 use tracing::info_span;
 
 use super::buffers::{Buffers, Placed, has_second};
+use super::culling::{Culling, record_sort};
 use super::drawing::Drawing;
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::feed::IN_FLIGHT;
@@ -47,7 +48,9 @@ pub struct Renderer {
     first: First,
     second: Option<Relay>,
     tensor: Option<TensorStage>,
-    sort: Sort,
+    /// None where nothing is left out.
+    pub(super) culling: Option<Culling>,
+    pub(super) sort: Sort,
     /// None where no cloud has a texture.
     texture: Option<Texture>,
     pub(super) buffers: Buffers,
@@ -84,6 +87,8 @@ pub struct Rendered {
     pub submitted: Instant,
     pub wait_ms: f64,
     pub passes: Vec<ScopeTime>,
+    /// Particles that the device kept, where it was asked to.
+    pub n_kept: Option<u32>,
 }
 
 impl Renderer {
@@ -125,6 +130,7 @@ impl Renderer {
             first: First::new(device, compiler)?,
             second,
             tensor,
+            culling: Culling::of_scene(device, compiler, scene)?,
             sort: Sort::new(device, compiler, n_particles)?,
             texture,
             buffers: Buffers::new(device, scene, &groups, host_places)?,
@@ -145,6 +151,7 @@ impl Renderer {
                 tensors,
                 // Until it is chosen.
                 shrunk: !matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto),
+                culls: scene.draw.cull,
                 path: if scene.draw.path == DrawPath::Tiles { DrawPath::Tiles } else { DrawPath::Sprites },
                 skip,
             },
@@ -209,7 +216,8 @@ impl Renderer {
         // What was waited for the frame before is that one's.
         let wait_ms = ms(frame.submitted.max(std::mem::replace(&mut self.last_end, now)), now);
         let InFlight { plan, recorded, submitted, .. } = frame;
-        Ok(Rendered { plan, recorded, submitted, wait_ms, passes })
+        let n_kept = self.culling.as_ref().map(|c| c.n_kept(frame.slot)).transpose()?;
+        Ok(Rendered { plan, recorded, submitted, wait_ms, passes, n_kept })
     }
 
     /// Waits for every frame in flight, of which nothing is wanted.
@@ -255,6 +263,7 @@ impl Renderer {
             first,
             second,
             tensor,
+            culling,
             sort,
             texture,
             buffers: b,
@@ -324,11 +333,11 @@ impl Renderer {
                 Some(tensor) => tensor.record_contract(rec, b, s),
                 None => Ok(()),
             })?;
-            pass(rec, plan, Pass::Sort, |rec| {
-                let buffers = [placed, &b.i_group, &b.drawn.buffer, &b.entries];
-                sort.record_keys(rec, buffers, packet.camera.forward, n, packet.radius, s.sort_bits)?;
-                sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits)
+            pass(rec, plan, Pass::Cull, |rec| {
+                culling.as_ref().map_or(Ok(()), |c| c.record(rec, b, (packet, drawing), s))
             })?;
+            culling.iter().for_each(|c| c.record_count(rec, b, slot));
+            pass(rec, plan, Pass::Sort, |rec| record_sort(rec, sort, b, packet, s))?;
             pass(rec, plan, Pass::Texture, |rec| {
                 texture.iter().try_for_each(|t| t.record(rec, &b.pool, s.texture_seed))
             })?;

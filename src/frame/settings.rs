@@ -17,9 +17,11 @@ pub(super) struct Settings {
     pub texture_seed: u32,
     pub cutoff: f64,
     pub threshold: f64,
+    pub smallest: f64,
     /// What lies behind a pixel that lets less through is left out, where the way of drawing knows.
     pub saturated: f64,
     pub format: TargetFormat,
+    pub size: [u32; 2],
     pub n_pixels: u64,
 }
 
@@ -39,8 +41,10 @@ impl Settings {
             texture_seed: scene.draw.texture_seed,
             cutoff: scene.draw.cutoff,
             threshold: scene.draw.threshold,
+            smallest: scene.draw.smallest,
             saturated: saturated(scene.film.format),
             format: limits::target_format(scene.film.format),
+            size: [scene.film.width, scene.film.height],
             n_pixels: u64::from(scene.film.width) * u64::from(scene.film.height),
         }
     }

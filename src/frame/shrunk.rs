@@ -72,6 +72,11 @@ impl Shrunk {
         CameraRecord { tan_x: wider(camera.tan_x, by.x), tan_y: wider(camera.tan_y, by.y), ..*camera }
     }
 
+    /// Columns and rows of the blobs' picture.
+    pub fn size(&self) -> [u32; 2] {
+        self.small.size
+    }
+
     /// What the small pixels see of the surfaces, for the blobs to be hidden by.
     pub fn record_surfaces(
         &mut self,

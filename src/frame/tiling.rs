@@ -4,7 +4,7 @@ use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, Place, Recorder, Target};
+use crate::gpu::{Amount, Buffer, Compiler, Device, Place, Recorder, Target};
 use crate::model::cloud::{Group, SQRT_TAU};
 use crate::model::film::FilmFormat;
 use crate::model::scene::{LightingMode, Scene};
@@ -41,7 +41,7 @@ impl Tiling {
         Tiling::new(device, compiler, division, scene.n_particles() as u32, &variant)
     }
 
-    /// Draws the first `n` of the sorted entries, `counts` [n, first facet of a particle], into picture `i`, over the drawn
+    /// Draws the first `n` of the sorted entries, the particles' facets from `i_first_facet` on, into picture `i`, over the drawn
     /// surfaces where there are any. `buffers` as in `sprites`.
     pub fn record(
         &self,
@@ -50,19 +50,19 @@ impl Tiling {
         under: Option<Target<'_>>,
         buffers: [&Buffer; 9],
         view: &View<'_>,
-        counts: [u32; 2],
+        (n, i_first_facet): (Amount<'_>, u32),
     ) -> Result<()> {
-        let (tiles, picture, [n_splats, i_first_facet]) = (&self.tiles, &self.pictures[i], counts);
+        let (tiles, picture) = (&self.tiles, &self.pictures[i]);
         match under {
             Some(under) => tiles.record_under(rec, under, picture),
             None => rec.fill(picture, 0),
         }
-        if n_splats == 0 {
+        if matches!(n, Amount::Known(0)) {
             return Ok(());
         }
-        tiles.record_splats(rec, buffers, view, [n_splats, i_first_facet, TILE])?;
+        tiles.record_splats(rec, buffers, view, n, [i_first_facet, TILE])?;
         for i_round in 0..tiles.n_rounds {
-            tiles.record_pairs(rec, i_round, n_splats, view)?;
+            tiles.record_pairs(rec, i_round, n, view)?;
             let [i_count, i_groups] = Tiles::i_extent(i_round);
             let pairs = Counts { buffer: &tiles.round, i_count, i_groups };
             let sorted = self.sort.record_counted(rec, &tiles.entries, tiles.division.n_bits(), pairs)?;

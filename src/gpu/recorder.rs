@@ -190,6 +190,14 @@ impl Drop for Commands {
     }
 }
 
+/// How many records there are.
+#[derive(Clone, Copy)]
+pub enum Amount<'a> {
+    Known(u32),
+    /// As the buffer says, written on the device.
+    Counted(&'a Buffer),
+}
+
 /// How a buffer was used since the last barrier.
 #[derive(Default, Clone, Copy)]
 struct Use {
@@ -274,6 +282,13 @@ impl Recorder<'_> {
     pub fn fill(&mut self, buffer: &Buffer, word: u32) {
         self.depend(&[(buffer.raw, false, true)]);
         unsafe { self.commands.shared.raw.cmd_fill_buffer(self.commands.buffer, buffer.raw, 0, vk::WHOLE_SIZE, word) };
+    }
+
+    /// Writes `record`, of 65 536 bytes at most, to the start of `buffer`.
+    pub fn update<T: Pod>(&mut self, buffer: &Buffer, record: &T) {
+        self.depend(&[(buffer.raw, false, true)]);
+        let bytes = bytemuck::bytes_of(record);
+        unsafe { self.commands.shared.raw.cmd_update_buffer(self.commands.buffer, buffer.raw, 0, bytes) };
     }
 
     /// Copies the first bytes of `from` that fit into `to`.

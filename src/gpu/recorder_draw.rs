@@ -15,6 +15,14 @@ pub struct Target<'a> {
     pub depth: Option<&'a mut Image>,
 }
 
+/// How many strips of four vertices are drawn.
+#[derive(Clone, Copy)]
+pub enum Instances<'a> {
+    Known(u32),
+    /// By the four words from this word of a buffer (vertices, instances, first vertex, first instance), written on the device.
+    Counted(&'a Buffer, u32),
+}
+
 /// What a target holds when drawing starts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Start {
@@ -36,7 +44,7 @@ const DEPTH_STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
 );
 
 impl Recorder<'_> {
-    /// Draws `n_instances` strips of four vertices into `target`.
+    /// Draws strips of four vertices into `target`.
     pub fn draw<P: Pod>(
         &mut self,
         pipeline: &DrawPipeline,
@@ -44,7 +52,7 @@ impl Recorder<'_> {
         start: Start,
         buffers: &[&Buffer],
         push: &P,
-        n_instances: u32,
+        instances: Instances<'_>,
     ) -> Result<()> {
         let Target { color, depth } = target;
         check(pipeline, color, depth.as_deref())?;
@@ -61,6 +69,9 @@ impl Recorder<'_> {
             }
             None => info,
         };
+        if let Instances::Counted(counts, _) = instances {
+            self.depend(&[(counts.raw, true, false)]);
+        }
         self.bind(vk::PipelineBindPoint::GRAPHICS, pipeline.raw, &pipeline.interface, &pipeline.name, buffers, push)?;
         let (width, height) = (color.extent.width as f32, color.extent.height as f32);
         let viewport = vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
@@ -69,7 +80,12 @@ impl Recorder<'_> {
             raw.cmd_begin_rendering(commands, &info);
             raw.cmd_set_viewport(commands, 0, &[viewport]);
             raw.cmd_set_scissor(commands, 0, &[area]);
-            raw.cmd_draw(commands, 4, n_instances, 0, 0);
+            match instances {
+                Instances::Known(n) => raw.cmd_draw(commands, 4, n, 0, 0),
+                Instances::Counted(counts, word) => {
+                    raw.cmd_draw_indirect(commands, counts.raw, 4 * u64::from(word), 1, 0)
+                }
+            }
             raw.cmd_end_rendering(commands);
         }
         Ok(())

@@ -177,6 +177,11 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let path = s.choice("path", "sprites", &DrawPath::NAMES, &[])?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let threshold = s.f64("threshold", 0.0, Bounds::From(0.0, 1.0))?;
+    let cull = s.choice("cull", "on", &[("on", true), ("off", false)], &[])?;
+    let smallest = s.f64("smallest", 0.0, Bounds::Within(0.0, 1000.0))?;
+    if smallest > 0.0 && !cull {
+        return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {smallest}")));
+    }
     let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
     if sort_bits != 16 && sort_bits != 32 {
         return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
@@ -187,13 +192,15 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let n_particles = s.u32("particles", 0, 0, u32::MAX)?;
     let texture_seed = s.u32("texture_seed", 1, 0, u32::MAX)?;
     root.record("draw", s.finish());
-    Ok(Draw { path, resolution, error, cutoff, threshold, sort_bits, count, texture_seed, n_particles })
+    Ok(Draw { path, resolution, error, cutoff, threshold, cull, smallest, sort_bits, count, texture_seed, n_particles })
 }
 
 const DRAW_KEYS: &[&str] = &[
     "path",
     "cutoff",
     "threshold",
+    "cull",
+    "smallest",
     "sort_bits",
     "resolution",
     "error",

@@ -1,6 +1,7 @@
 //! The f32 records that shaders read, from the f64 model. Declared once, here; a test reflects every shader and
 //! compares names, offsets and sizes.
 
+pub mod cull;
 pub mod facet;
 pub mod frame;
 pub mod particle;

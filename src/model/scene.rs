@@ -141,6 +141,10 @@ pub struct Draw {
     pub cutoff: f64,
     /// And where their optical depth falls under this; 0: nowhere.
     pub threshold: f64,
+    /// Whether particles that show in no pixel are left out before the sort.
+    pub cull: bool,
+    /// And those whose σ is narrower than so many pixels; 0: none.
+    pub smallest: f64,
     /// Bits of the sort key: 16 or 32.
     pub sort_bits: u32,
     /// How many particles are drawn of a cloud; `None`: all.

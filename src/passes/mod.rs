@@ -2,6 +2,7 @@
 //! results share one name. `new` allocates and can fail; `record` only records. No pass knows another.
 
 pub mod contract;
+pub mod cull;
 pub mod facets;
 pub mod first;
 pub mod generate;
@@ -26,6 +27,9 @@ macro_rules! shader_texts {
 /// Every shader and include, as built into the binary.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
     "contract.comp",
+    "cull_scan.comp",
+    "cull_test.comp",
+    "cull_write.comp",
     "facets.comp",
     "facets_groups.comp",
     "facets_surfaces.comp",
@@ -37,10 +41,12 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/arriving.glsl",
     "include/blob.glsl",
     "include/cells.glsl",
+    "include/cull.glsl",
     "include/density.glsl",
     "include/each.glsl",
     "include/functions.glsl",
     "include/gather.glsl",
+    "include/key.glsl",
     "include/light.glsl",
     "include/lobe.glsl",
     "include/occlude.glsl",

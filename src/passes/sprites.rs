@@ -7,7 +7,8 @@
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Recorder, Start, Target};
+use crate::gpu::{Amount, Buffer, Compiler, Device, DrawPipeline, Instances, Recorder, Start, Target};
+use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
@@ -39,6 +40,7 @@ impl Sprites {
     /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
     /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped; `i_group`: u32 by particle, and
     /// `drawn`: DrawnRecord, read where κ has factors; `textured`: TexturedRecord, and `pool`: [u32; 4], read where some have textures. A sprite ends at `cutoff` σ, and where its optical depth falls under `threshold`. `target` has depth where surfaces have been drawn.
+    /// `n_drawn`: entries; the device's count is a KeptRecord.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -46,13 +48,17 @@ impl Sprites {
         target: Target<'_>,
         camera: &CameraRecord,
         [cutoff, threshold]: [f64; 2],
-        [n_drawn, i_first_facet]: [u32; 2],
+        (n_drawn, i_first_facet): (Amount<'_>, u32),
     ) -> Result<()> {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let inv_threshold = (1.0 / threshold) as f32;
         let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet, inv_threshold };
         let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
-        rec.draw(&self.pipeline, target, start, &buffers, &push, n_drawn)
+        let instances = match n_drawn {
+            Amount::Known(n) => Instances::Known(n),
+            Amount::Counted(kept) => Instances::Counted(kept, KeptRecord::I_DRAW),
+        };
+        rec.draw(&self.pipeline, target, start, &buffers, &push, instances)
     }
 }

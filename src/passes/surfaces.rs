@@ -6,7 +6,7 @@
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Recorder, Start, Target};
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
@@ -39,6 +39,6 @@ impl Surfaces {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let push = Push { camera: *camera, pixel, unused: [0.0; 2] };
-        rec.draw(&self.pipeline, target, Start::Clear, &buffers, &push, n_surfaces)
+        rec.draw(&self.pipeline, target, Start::Clear, &buffers, &push, Instances::Known(n_surfaces))
     }
 }

@@ -8,7 +8,8 @@
 use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
 use crate::gpu::memory::{TargetFormat, has_depth24};
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder, Target};
+use crate::gpu::{Amount, Buffer, Compiler, Device, Kernel, Place, Recorder, Target};
+use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
@@ -19,7 +20,6 @@ record! {
         pixel: [f32; 2],
         cutoff: f32,
         i_first_facet: u32,
-        n_splats: u32,
         width: u32,
         height: u32,
         tile_width: u32,
@@ -30,7 +30,6 @@ record! {
 
 record! {
     pub struct RoundsPush {
-        n_blocks: u32,
         n_rounds: u32,
         capacity: u32,
         most_blocks: u32,
@@ -47,7 +46,6 @@ record! {
     pub struct PairsPush {
         tangents: [f32; 2],
         tile: [f32; 2],
-        n_splats: u32,
         n_bins_x: u32,
         i_round: u32,
         cut: f32,
@@ -177,6 +175,8 @@ pub struct Tiles {
     capacity: u32,
     pub n_rounds: u32,
     max_groups: u32,
+    /// What the host knows of the number of splats, where it does (KeptRecord).
+    known: Buffer,
     splats: Buffer,
     /// What of them is textured.
     sheets: Buffer,
@@ -272,6 +272,7 @@ impl Tiles {
             capacity: capacity as u32,
             n_rounds,
             max_groups: device.limits().max_workgroups_x,
+            known: Buffer::new::<KeptRecord>(device, "tiles.known", 1, Place::Device)?,
             splats: Buffer::new::<SplatRecord>(device, "tiles.splats", u64::from(n_max), Place::Device)?,
             sheets: Buffer::new::<SplatSheetRecord>(device, "tiles.sheets", n_sheets, Place::Device)?,
             reaches: buffer("tiles.reaches", n_max.into(), 2)?,
@@ -291,14 +292,23 @@ impl Tiles {
         self.capacity
     }
 
+    /// Where the device has the number of splats.
+    fn kept<'a>(&'a self, n_splats: Amount<'a>) -> &'a Buffer {
+        match n_splats {
+            Amount::Known(_) => &self.known,
+            Amount::Counted(kept) => kept,
+        }
+    }
+
     /// The splats of the first `n_splats` of the sorted entries, and the rounds they are drawn in; `sort_tile`: entries that a
-    /// workgroup of the sort takes. `buffers` as in `sprites`.
+    /// workgroup of the sort takes. `buffers` as in `sprites`; the device's count is a KeptRecord.
     pub fn record_splats(
         &self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 9],
         view: &View<'_>,
-        [n_splats, i_first_facet, sort_tile]: [u32; 3],
+        n_splats: Amount<'_>,
+        [i_first_facet, sort_tile]: [u32; 2],
     ) -> Result<()> {
         let Division { width, height, tile, .. } = self.division;
         let (camera, pixel, cutoff) = (*view.camera, self.pixel(view.camera), view.cutoff as f32);
@@ -307,7 +317,6 @@ impl Tiles {
             pixel,
             cutoff,
             i_first_facet,
-            n_splats,
             width,
             height,
             tile_width: tile[0],
@@ -315,20 +324,22 @@ impl Tiles {
             inv_threshold: inverse(view.threshold),
         };
         let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, _] = buffers;
+        if let Amount::Known(n) = n_splats {
+            rec.update(&self.known, &KeptRecord::of(n, BLOCK));
+        }
+        let kept = self.kept(n_splats);
         let Tiles { splats, reaches, before, blocks, sheets, .. } = self;
         let from = [entries, placed, particles, lit, i_facet, i_group, drawn, textured];
-        let buffers = [&from[..], &[splats, reaches, before, blocks, sheets]].concat();
-        let n_blocks = n_splats.div_ceil(BLOCK);
-        rec.dispatch_groups(&self.splat, &buffers, &push, n_blocks)?;
+        let buffers = [&from[..], &[splats, reaches, before, blocks, sheets, kept]].concat();
+        rec.dispatch_counted(&self.splat, &buffers, &push, (kept, KeptRecord::I_SPLAT))?;
         let push = RoundsPush {
-            n_blocks,
             n_rounds: self.n_rounds,
             capacity: self.capacity,
             most_blocks: MOST_BLOCKS,
             sort_tile,
             bin_groups: self.division.n_bins.div_ceil(self.ranges.local_size_x()),
         };
-        rec.dispatch_groups(&self.rounds, &[&self.blocks, &self.round], &push, 1)?;
+        rec.dispatch_groups(&self.rounds, &[&self.blocks, &self.round, kept], &push, 1)?;
         if self.n_rounds == 1 {
             return Ok(());
         }
@@ -346,14 +357,21 @@ impl Tiles {
     }
 
     /// The pairs of round `i`; [`Tiles::i_extent`] says where `round` has their number.
-    pub fn record_pairs(&self, rec: &mut Recorder<'_>, i_round: u32, n_splats: u32, view: &View<'_>) -> Result<()> {
+    pub fn record_pairs(
+        &self,
+        rec: &mut Recorder<'_>,
+        i_round: u32,
+        n_splats: Amount<'_>,
+        view: &View<'_>,
+    ) -> Result<()> {
         let Division { n_bins_x, tile, .. } = self.division;
         let pixel = self.pixel(view.camera);
         let tile = [pixel[0] * tile[0] as f32, pixel[1] * tile[1] as f32];
         let tangents = [view.camera.tan_x, view.camera.tan_y];
         let (cut, inv_threshold) = (cut(view.cutoff), inverse(view.threshold));
-        let push = PairsPush { tangents, tile, n_splats, n_bins_x, i_round, cut, inv_threshold };
-        let buffers = [&self.reaches, &self.before, &self.blocks, &self.round, &self.entries, &self.splats];
+        let push = PairsPush { tangents, tile, n_bins_x, i_round, cut, inv_threshold };
+        let buffers =
+            [&self.reaches, &self.before, &self.blocks, &self.round, &self.entries, &self.splats, self.kept(n_splats)];
         rec.dispatch_counted(&self.pairs, &buffers, &push, (&self.round, ROUND_WORDS * i_round + 4))
     }
 
@@ -413,7 +431,7 @@ impl Tiles {
     }
 }
 
-/// b²/(2 σ²) at the cutoff, in powers of two.
+/// b²/(2 σ²) at the cutoff, in powers of two: at most 46, at 8 σ; the shader's power of two goes to 125.
 fn cut(cutoff: f64) -> f32 {
     (0.5 * cutoff * cutoff * std::f64::consts::LOG2_E) as f32
 }

@@ -6,6 +6,7 @@
 pub mod area;
 pub mod contract;
 pub mod count;
+pub mod cull;
 pub mod facets;
 pub mod first;
 pub mod generate;

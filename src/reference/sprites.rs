@@ -22,6 +22,8 @@ pub struct View {
     pub cutoff: f64,
     /// And where their optical depth falls under this.
     pub threshold: f64,
+    /// Blobs whose σ is narrower than so many pixels are left out; 0: none.
+    pub smallest: f64,
 }
 
 /// How a GPU may depart from the mathematics while drawing.
@@ -38,6 +40,8 @@ pub struct Rounding {
     /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there (so a relative error of b).
     /// Nearer to the cut a sprite may end or not.
     pub edge: f64,
+    /// What a view depth may be off, as a share of the distance, where it decides on a size.
+    pub depth: f64,
 }
 
 /// What stands behind the sprites in a pixel.
@@ -64,7 +68,7 @@ impl Rounding {
             FilmFormat::Rgba16f => (unit, 2f64.powi(-14), 0.0),
             FilmFormat::Rgba32f => (unit, 2f64.powi(-126), 0.0),
         };
-        Rounding { unit, least_normal, step, alpha, edge }
+        Rounding { unit, least_normal, step, alpha, edge, depth: 0.0 }
     }
 
     /// How far from the cut b²/2σ² is sure to lie on its side of it.
@@ -72,7 +76,7 @@ impl Rounding {
         (2.0 + self.edge) * self.edge * cut.max(1.0)
     }
 
-    pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0 };
+    pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
 
     /// What the target holds of an opaque colour.
     pub fn stored(&self, behind: Behind) -> Behind {
@@ -86,7 +90,7 @@ impl Rounding {
 }
 
 impl View {
-    fn half_slopes(&self) -> (f64, f64) {
+    pub(super) fn half_slopes(&self) -> (f64, f64) {
         let tan = (0.5 * self.fov_y_rad).tan();
         (tan * f64::from(self.width) / f64::from(self.height), tan)
     }
@@ -96,6 +100,13 @@ impl View {
         let tau = SQRT_TAU * blob.kappa * blob.sigma;
         // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves out.
         (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
+    }
+
+    /// How much wider than the smallest one, over the eye's offset `c` from it, a blob's σ is: where that is below 0 nothing of it
+    /// is drawn (model.md §11 "cull"). And how far a GPU's answer may lie from it, `depth` as in [`Rounding`].
+    pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
+        let width = self.smallest * self.pixel();
+        (blob.sigma - width * c.dot(self.pose.forward), width * depth * c.length())
     }
 
     /// Direction through the centre of pixel (column `i`, row `j` from the top); its view depth is 1.
@@ -135,7 +146,7 @@ impl View {
 }
 
 /// Slopes between which lines through the eye can touch a disc of radius `reach` at (`side`, `depth`).
-fn slopes(side: f64, depth: f64, reach: f64) -> (f64, f64) {
+pub(super) fn slopes(side: f64, depth: f64, reach: f64) -> (f64, f64) {
     const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
     let sine = reach / side.hypot(depth);
     if sine.is_nan() || sine >= 1.0 {
@@ -275,6 +286,11 @@ fn draw(
     if cut + slack <= 0.0 {
         return;
     }
+    let (above, off_size) = view.above_smallest(blob, c, r.depth);
+    if above < -off_size {
+        return;
+    }
+    let of_size = above.abs() < off_size;
     let n_rows = (band.len() / view.width as usize) as u32;
     let [columns, rows] = view.rectangle(c, (2.0 * (cut + slack)).sqrt() * blob.sigma);
     for row in rows.0.max(first_row)..rows.1.min(first_row + n_rows) {
@@ -293,8 +309,8 @@ fn draw(
             if (!is_in && !on_edge) || (depth > behind && !at_behind) {
                 continue;
             }
-            let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-            pixel.over(if is_in && depth <= behind { alpha } else { 0.0 }, off, radiance, r);
+            let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+            pixel.over(if is_in && depth <= behind && above >= 0.0 { alpha } else { 0.0 }, off, radiance, r);
         }
     }
 }
@@ -318,6 +334,7 @@ mod tests {
         near: 0.5,
         cutoff: 3.0,
         threshold: 0.0,
+        smallest: 0.0,
     };
 
     #[test]

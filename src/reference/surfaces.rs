@@ -93,6 +93,7 @@ mod tests {
         near: 0.5,
         cutoff: 3.0,
         threshold: 0.0,
+        smallest: 0.0,
     };
 
     /// At depth `z`, facing the eye: u right, v up, 2 wide and high.

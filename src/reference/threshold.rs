@@ -1,4 +1,4 @@
-//! What a threshold leaves out of a picture, model.md §11 "threshold", in f64.
+//! What a threshold and a smallest size leave out of a picture, model.md §11 "threshold" and "cull", in f64.
 //! In: blobs and eye relative to O. Out: of every pixel the layers that are cut, and their optical depth.
 
 use glam::DVec3;
@@ -10,7 +10,7 @@ use crate::model::cloud::SQRT_TAU;
 /// What is cut of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cut {
-    /// Sprites that would be drawn there without the threshold.
+    /// Sprites that would be drawn there without the threshold and whatever their size.
     pub n_layers: u32,
     /// Their optical depth together.
     pub tau: f64,
@@ -36,14 +36,16 @@ impl Cut {
 /// The picture's pixels before `behind`. `factor` on each blob's τ, as its texture has it.
 pub fn cut(view: &View, behind: &[Behind], blobs: &[Blob], factor: Option<Factor<'_>>) -> Vec<Cut> {
     let mut pixels = vec![Cut::default(); behind.len()];
-    let whole = View { threshold: 0.0, ..*view };
+    let whole = View { threshold: 0.0, smallest: 0.0, ..*view };
     for (k, blob) in blobs.iter().enumerate() {
         let c = blob.position - view.pose.position;
         let depth = c.dot(view.pose.forward);
         if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
             continue;
         }
-        let (from, to) = (view.cut(blob), whole.cut(blob));
+        // Nothing is left of what is too small.
+        let is_large = view.above_smallest(blob, c, 0.0).0 >= 0.0;
+        let (from, to) = (if is_large { view.cut(blob) } else { 0.0 }, whole.cut(blob));
         let [columns, rows] = view.rectangle(c, (2.0 * to).sqrt() * blob.sigma);
         for row in rows.0..rows.1 {
             for column in columns.0..columns.1 {
@@ -76,8 +78,8 @@ mod tests {
     fn what_lies_between_the_threshold_and_the_cutoff_is_counted() {
         let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         // Three pixels at slopes −1, 0 and 1.
-        let view =
-            View { width: 3, height: 1, pose, fov_y_rad: 2.0 * 0.5f64.atan(), near: 0.5, cutoff: 3.0, threshold: 0.1 };
+        let (fov_y_rad, smallest) = (2.0 * 0.5f64.atan(), 0.0);
+        let view = View { width: 3, height: 1, pose, fov_y_rad, near: 0.5, cutoff: 3.0, threshold: 0.1, smallest };
         // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.
         let blob = |tau: f64| Blob { position: DVec3::NEG_Z * 2.0, sigma: 1.0, kappa: tau / SQRT_TAU };
         let of = |blobs: &[Blob], depth: f64| cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None);
@@ -91,5 +93,11 @@ mod tests {
         assert!((left.share() - (1.0 - (-left.tau).exp())).abs() < 1e-15);
         assert!(left.share() < left.share_of_layers(0.1) && left.most(nothing) == left);
         assert_eq!(of(&[blob(0.2)], 1.9), [nothing; 3], "hidden");
+        // Pixels are one slope wide, σ = 1 at depth 2 half of one.
+        let of = |smallest: f64| {
+            let view = View { threshold: 0.0, smallest, ..view };
+            cut(&view, &[Behind::NOTHING; 3], &[blob(0.2)], None).iter().map(|c| c.n_layers).sum::<u32>()
+        };
+        assert_eq!([of(0.0), of(0.499), of(0.501)], [0, 0, 3]);
     }
 }

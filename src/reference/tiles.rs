@@ -95,6 +95,11 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind) -> Composed {
         if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
             continue;
         }
+        let (above, off_size) = view.above_smallest(blob, c, r.depth);
+        if above < -off_size {
+            continue;
+        }
+        let of_size = above.abs() < off_size;
         let (b, cut) = (c.cross(ray).length() / ray.length(), view.cut(blob));
         let beyond = 0.5 * (b / blob.sigma).powi(2) - cut;
         let (is_in, on_edge) = (beyond <= 0.0 && cut > 0.0, beyond.abs() <= r.slack(cut));
@@ -105,8 +110,8 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind) -> Composed {
         let delta = view.slopes_of(ray) - view.slopes_of(c);
         let factor = factor.map_or(1.0, |f| f(k, delta));
         let alpha = alpha(&Blob { kappa: factor * blob.kappa, ..*blob }, b);
-        let off = if on_edge || at_behind { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-        pixel.under(if is_in && depth <= under.depth { alpha } else { 0.0 }, off, radiance[k]);
+        let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+        pixel.under(if is_in && depth <= under.depth && above >= 0.0 { alpha } else { 0.0 }, off, radiance[k]);
     }
     pixel
 }
@@ -121,7 +126,8 @@ mod tests {
     #[test]
     fn near_to_far_is_the_picture_of_far_to_near() {
         let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
-        let view = View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0, threshold: 0.0 };
+        let view =
+            View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0, threshold: 0.0, smallest: 0.0 };
         let at = |x: f64, z: f64, tau: f64| Blob {
             position: DVec3::new(x, 0.1, -z),
             sigma: 0.5,

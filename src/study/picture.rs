@@ -125,6 +125,7 @@ fn view(scene: &Scene, truth: &Truth) -> View {
         near: scene.camera.near,
         cutoff: scene.draw.cutoff,
         threshold: scene.draw.threshold,
+        smallest: scene.draw.smallest,
     }
 }
 

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use half::f16;
 use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
+use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
@@ -27,6 +27,9 @@ use crate::bounded::{Bounded, U, dot, exact3};
 use crate::harness::Gpu;
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
+
+/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term, three products and two sums.
+pub const DEPTH: f64 = 16.0 * U;
 
 /// What one_minus_exp promises.
 const ONE_MINUS_EXP: f64 = 1e-6;
@@ -53,6 +56,8 @@ pub struct Picture {
     pub view: View,
     pub placed: Vec<PlacedRecord>,
     pub particles: Vec<ParticleRecord>,
+    /// Far to near, where that is not the depths' own order.
+    pub in_order: Option<Vec<u32>>,
     /// Radiance of the particles' facets; without it they are drawn in their own colours.
     pub lit: Option<Vec<LitRecord>>,
     /// Facet of each particle, where they are not in the particles' order.
@@ -74,13 +79,22 @@ impl Picture {
         let keys = vec![CameraKey { time_s: 0.0, position: eye, target }];
         let camera = Camera { keys, up: DVec3::Y, fov_y_rad: fov_y_deg.to_radians(), near };
         let pose = camera.pose(0.0).expect("a pose");
-        let view =
-            View { width: 160, height: 120, pose, fov_y_rad: camera.fov_y_rad, near, cutoff: 3.0, threshold: 0.0 };
+        let view = View {
+            width: 160,
+            height: 120,
+            pose,
+            fov_y_rad: camera.fov_y_rad,
+            near,
+            cutoff: 3.0,
+            threshold: 0.0,
+            smallest: 0.0,
+        };
         Picture {
             camera,
             view,
             placed: vec![],
             particles: vec![],
+            in_order: None,
             lit: None,
             i_facet: None,
             drawn: None,
@@ -139,6 +153,9 @@ impl Picture {
     }
 
     pub fn order(&self) -> Vec<u32> {
+        if let Some(order) = &self.in_order {
+            return order.clone();
+        }
         let positions: Vec<DVec3> = self.placed.iter().map(|p| double(p.position)).collect();
         let keys = depths(self.view.pose.forward, &positions).into_iter().map(|z| key32(z as f32));
         let order = order(&keys.collect::<Vec<_>>());
@@ -212,7 +229,7 @@ impl Picture {
             }
             if under.is_none() || !entries.is_empty() {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
-                let n = [entries.len() as u32, scenery.lit.len() as u32];
+                let n = (Amount::Known(entries.len() as u32), scenery.lit.len() as u32);
                 let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
                 if let (Some(tiling), Some(tiled)) = (&tiling, tiled) {
                     let view = nimbus::passes::tiles::View {
@@ -331,6 +348,7 @@ impl Picture {
         let mut rounding = Rounding::of(format, off_alpha, edge);
         // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C and their sum.
         rounding.unit += 2.0 * U;
+        rounding.depth = DEPTH;
         rounding
     }
 

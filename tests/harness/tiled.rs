@@ -28,7 +28,7 @@ impl Picture {
 
     pub fn tiled_truth(&self, format: FilmFormat, saturated: f64) -> (Vec<f64>, Vec<f64>) {
         let (off_alpha, edge) = self.worst(true);
-        let rounding = Rounding::of(format, off_alpha, edge);
+        let rounding = Rounding { depth: crate::picture::DEPTH, ..Rounding::of(format, off_alpha, edge) };
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
         let behind: Vec<Behind> = match &self.scenery {
             None => vec![Behind::NOTHING; self.view.width as usize * self.view.height as usize],

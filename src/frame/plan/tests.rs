@@ -15,13 +15,14 @@ const TRAITS: Traits = Traits {
     n_surfaces: 0,
     glossy: false,
     tensors: Tensors::Needless,
+    culls: false,
     path: DrawPath::Sprites,
     shrunk: false,
     skip: true,
 };
 const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
 /// With every pass.
-const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, shrunk: true, ..KEPT };
+const ALL_TRAITS: Traits = Traits { grouped: true, textured: true, n_surfaces: 1, culls: true, shrunk: true, ..KEPT };
 
 fn packet() -> Packet {
     Packet {
@@ -95,6 +96,29 @@ fn each_change_runs_what_depends_on_it_and_no_more() {
     let gust = |p: &mut Packet| p.modes.push(ModeRecord::default());
     assert_eq!(after(&gust), all_but_generate);
     assert_eq!(after(&|p| p.grid.cell = 0.5), ["grid", "facets", "transmit", "first", "sprites"]);
+}
+
+#[test]
+fn what_is_kept_is_kept_and_sorted_anew_where_the_camera_or_a_density_changes() {
+    let last = packet();
+    let culls = Traits { culls: true, ..TRAITS };
+    let after = |change: &dyn Fn(&mut Packet)| {
+        let mut next = packet();
+        change(&mut next);
+        running(&culls, Some(&last), &next)
+    };
+    assert!(after(&|_| {}).is_empty());
+    let changes: [&dyn Fn(&mut Packet); 4] =
+        [&|p| p.camera.eye[0] = 1.0, &|p| p.camera.tan_x = 2.0, &|p| p.drawn[0].end = 5, &|p| {
+            p.drawn[0].kappa_scale = 0.5
+        }];
+    for change in changes {
+        assert_eq!(after(change), ["cull", "sort", "sprites"]);
+    }
+    assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
+    assert_eq!(running(&Traits { n_particles: 0, n_facets: 0, ..culls }, None, &last), ["sprites"]);
+    let reason = plan(&TRAITS, None, &last).decision(Pass::Cull).reason.to_string();
+    assert_eq!(reason, "draw.cull is \"off\"");
 }
 
 #[test]

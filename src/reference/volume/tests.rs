@@ -16,6 +16,7 @@ fn view(n: u32) -> View {
         near: 1e-3,
         cutoff: 9.0,
         threshold: 0.0,
+        smallest: 0.0,
     }
 }
 

@@ -1,0 +1,49 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "cull.glsl"
+
+// Where each tile's kept particles begin, and what those that come after need of their number. One workgroup: an invocation
+// a run of tiles.
+
+layout(local_size_x = 256) in;
+
+layout(push_constant) uniform Push { uint n_tiles; uint sort_tile; uint splat_block; uint max_groups; } push;
+// In: kept ones of each tile. Out: of the tiles before it.
+layout(std430, binding = 0) buffer Totals { uint n_kept[]; };
+layout(std430, binding = 1) writeonly buffer KeptOnes { Kept kept[]; };
+
+shared uint sums[256];
+
+uint groups(uint n, uint size) { return min((n + size - 1u) / size, push.max_groups); }
+
+void main() {
+    uint t = gl_LocalInvocationID.x;
+    uint run = (push.n_tiles + 255u) / 256u;
+    uint first = min(t * run, push.n_tiles), end = min(first + run, push.n_tiles);
+    uint total = 0;
+    for (uint tile = first; tile < end; ++tile) {
+        total += n_kept[tile];
+    }
+    sums[t] = total;
+    barrier();
+    // Hillis-Steele over the 256 runs.
+    for (uint apart = 1; apart < 256; apart *= 2) {
+        uint left = t >= apart ? sums[t - apart] : 0u;
+        barrier();
+        sums[t] += left;
+        barrier();
+    }
+    uint before = sums[t] - total;
+    for (uint tile = first; tile < end; ++tile) {
+        uint n = n_kept[tile];
+        n_kept[tile] = before;
+        before += n;
+    }
+    if (t == 255u) {
+        uint n = sums[t];
+        kept[0].sort = uvec4(groups(n, push.sort_tile), 1, 1, n);
+        kept[0].draw = uvec4(4, n, 0, 0);
+        kept[0].splat = uvec4(groups(n, push.splat_block), 1, 1, 0);
+    }
+}

@@ -1,0 +1,81 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "records.glsl"
+#include "blob.glsl"
+#include "cull.glsl"
+#include "one_subgroup.glsl"
+
+// Which of the drawn particles can show in a pixel, a bit each (docs/model.md §11 "cull").
+
+#ifndef TILE_INVOCATIONS
+#define TILE_INVOCATIONS 32
+#endif
+
+layout(local_size_x = TILE_INVOCATIONS) in;
+
+// As in sprites.vert.
+layout(constant_id = 3) const uint WEIGHTED = 0;
+layout(constant_id = 5) const uint THRESHOLD = 0;
+
+// `smallest`: slopes that sigma must span from the eye.
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float inv_threshold; float smallest; uint n_particles; uint width; uint height; } push;
+layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
+layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
+layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
+layout(std430, binding = 3) readonly buffer DrawnGroups { Drawn drawn[]; };
+// Bits of 32 particles, and how many of the tile are kept before them.
+layout(std430, binding = 4) writeonly buffer Masks { uvec2 masks[]; };
+// Kept ones of each tile.
+layout(std430, binding = 5) writeonly buffer Totals { uint n_kept[]; };
+
+shared uint bits[WORDS];
+
+bool is_kept(uint i) {
+    Drawn group = drawn[i_group[i]];
+    vec3 v = along_camera(push.camera, placed[i].position - push.camera.eye);
+    float sigma = placed[i].sigma;
+    float tau = SQRT_TAU * particles[i].kappa * sigma;
+    if (WEIGHTED != 0) {
+        tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
+    }
+    float reach = push.cutoff;
+    bool is_dense = tau > 0.0;
+    if (THRESHOLD != 0) {
+        float cut = min(0.5 * push.cutoff * push.cutoff, log(tau * push.inv_threshold));
+        is_dense = is_dense && cut > 0.0;
+        reach = sqrt(2.0 * max(cut, 0.0));
+    }
+    uvec4 pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach * sigma, uvec2(push.width, push.height));
+    bool is_in = pixels.x < pixels.y && pixels.z < pixels.w;
+    return i < group.end && v.z >= push.camera.near && is_dense && sigma >= push.smallest * v.z && is_in;
+}
+
+void main() {
+    uint t = gl_LocalInvocationID.x;
+    uint n_tiles = (push.n_particles + TILE - 1u) / TILE;
+    for (uint tile = gl_WorkGroupID.x; tile < n_tiles; tile += gl_NumWorkGroups.x) {
+        for (uint w = t; w < WORDS; w += TILE_INVOCATIONS) {
+            bits[w] = 0;
+        }
+        wait_for_all();
+        for (uint k = t; k < TILE; k += TILE_INVOCATIONS) {
+            uint i = tile * TILE + k;
+            if (i < push.n_particles && is_kept(i)) {
+                // Whatever the order, the bits are the same.
+                atomicOr(bits[k / 32], 1u << (k % 32));
+            }
+        }
+        wait_for_all();
+        for (uint w = t; w < WORDS; w += TILE_INVOCATIONS) {
+            uint before = 0;
+            for (uint k = 0; k < w; ++k) {
+                before += bitCount(bits[k]);
+            }
+            masks[tile * WORDS + w] = uvec2(bits[w], before);
+            if (w == WORDS - 1u) {
+                n_kept[tile] = before + bitCount(bits[w]);
+            }
+        }
+        wait_for_all();
+    }
+}

@@ -1,0 +1,5 @@
+// What the kernels of `cull` share (docs/model.md §11 "cull").
+
+// Particles of a tile: eight words of a bit each.
+const uint TILE = 256;
+const uint WORDS = 8;

@@ -254,7 +254,7 @@ impl Tiles {
         let n_sheets = if variant.textured { u64::from(n_max) } else { 1 };
         let n_under = if variant.behind { division.n_pixels() } else { 1 };
         Ok(Tiles {
-            splat: Kernel::new(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat)?,
+            splat: Kernel::with_macros(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat, &macros[..3])?,
             rounds: Kernel::new(device, compiler, "tiles.rounds", RoundsPush::FIELDS, &[])?,
             clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
             pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[(5, threshold)])?,

@@ -1,16 +1,25 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "blob.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 #include "texture.glsl"
 #include "tiles.glsl"
+#include "one_subgroup.glsl"
+#if ONE_SUBGROUP
+#extension GL_KHR_shader_subgroup_shuffle : require
+#endif
 
 // Each blob as a splat, near to far: the conic of its optical depth on the screen, and the bins that it can reach
-// (docs/model.md §11 "tiles").
+// (docs/model.md §11 "tiles"). A workgroup goes through a block.
 
-layout(local_size_x = 256) in;
+#ifndef INVOCATIONS
+#define INVOCATIONS 8
+#endif
+
+layout(local_size_x = INVOCATIONS) in;
 
 // As in sprites.vert.
 layout(constant_id = 0) const uint LIT = 1;
@@ -21,14 +30,15 @@ layout(constant_id = 5) const uint THRESHOLD = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
-layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
-layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
-layout(std430, binding = 3) readonly buffer LitFacets { Lit lit[]; };
+// By texels, which llvmpipe fetches for all invocations at once: a Placed is one, a Particle two, a Lit four.
+layout(binding = 1) uniform usamplerBuffer placed;
+layout(binding = 2) uniform usamplerBuffer particles;
+layout(binding = 3) uniform usamplerBuffer lit;
 layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
 layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
 layout(std430, binding = 7) readonly buffer TexturedGroups { Textured textured[]; };
-layout(std430, binding = 8) writeonly buffer Splats { Splat splats[]; };
+layout(std430, binding = 8) writeonly buffer Splats { uvec4 splats[]; };
 // Tiles it can reach: (first, end) of columns and of rows, 16 bits each; 0 for none.
 layout(std430, binding = 9) writeonly buffer Reaches { uvec2 reach[]; };
 // Pairs of the splats before it in its block, and of each block.
@@ -39,7 +49,9 @@ layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
 
 layout(std430, binding = 13) readonly buffer KeptOnes { Kept kept[]; };
 
-shared uint sums[BLOCK];
+#if !ONE_SUBGROUP
+shared uint sums[INVOCATIONS];
+#endif
 
 const float LOG2_E = 1.44269504089;
 
@@ -49,9 +61,10 @@ uint project(uint i, uint r) {
     if (i == NO_PARTICLE) {
         return 0u;
     }
-    vec3 v = along_camera(push.camera, placed[i].position - push.camera.eye);
-    float sigma = placed[i].sigma;
-    float tau = SQRT_TAU * particles[i].kappa * sigma;
+    vec4 place = uintBitsToFloat(texelFetch(placed, int(i))), shade = uintBitsToFloat(texelFetch(particles, int(2 * i + 1)));
+    vec3 v = along_camera(push.camera, place.xyz - push.camera.eye);
+    float sigma = place.w;
+    float tau = SQRT_TAU * shade.w * sigma;
     if (WEIGHTED != 0) {
         Drawn group = drawn[i_group[i]];
         tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
@@ -75,9 +88,14 @@ uint project(uint i, uint r) {
     }
     // b^2/(2 sigma^2) = scale (d.x^2 + d.y^2 + (s.x d.y - s.y d.x)^2) / (1 + |ray|^2), d = ray - s; in powers of two.
     float scale = 0.5 * LOG2_E * (v.z / sigma) * (v.z / sigma);
-    uint facet = GROUPED != 0 ? i_facet[i] : push.i_first_facet + i;
-    vec3 radiance = LIT != 0 ? lit[facet].first + lit[facet].second : particles[i].color;
-    splats[r] = Splat(s, scale, tau, radiance, push.camera.near / v.z);
+    vec3 radiance = shade.xyz;
+    if (LIT != 0) {
+        int facet = int(GROUPED != 0 ? i_facet[i] : push.i_first_facet + i);
+        radiance = uintBitsToFloat(texelFetch(lit, 4 * facet + 2).xyz) + uintBitsToFloat(texelFetch(lit, 4 * facet + 3).xyz);
+    }
+    // A Splat, by fours.
+    splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));
+    splats[2 * r + 1] = floatBitsToUint(vec4(radiance, push.camera.near / v.z));
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
     if (TEXTURED != 0) {
         Sheet sheet = sheet_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
@@ -92,27 +110,46 @@ uint project(uint i, uint r) {
     return n.x * n.y;
 }
 
-void main() {
+// (sum of n over the invocations up to this one, over all)
+uvec2 sums_of(uint n) {
     uint t = gl_LocalInvocationID.x;
-    uint r = gl_WorkGroupID.x * BLOCK + t;
-    uint n_splats = kept[0].sort.w;
-    uint n = 0;
-    if (r < n_splats) {
-        // Far to near is how they are sorted.
-        n = project(entries[n_splats - 1u - r].y, r);
+#if ONE_SUBGROUP
+    uint sum = n;
+    [[unroll]] for (uint apart = 1; apart < INVOCATIONS; apart *= 2) {
+        uint left = subgroupShuffle(sum, max(t, apart) - apart);
+        sum += t >= apart ? left : 0u;
     }
+    return uvec2(sum, subgroupShuffle(sum, INVOCATIONS - 1));
+#else
     sums[t] = n;
     barrier();
-    for (uint apart = 1; apart < BLOCK; apart *= 2) {
-        uint left = t >= apart ? sums[t - apart] : 0u;
-        barrier();
-        sums[t] += left;
-        barrier();
+    uvec2 found = uvec2(0);
+    for (uint k = 0; k < INVOCATIONS; ++k) {
+        found += sums[k] * uvec2(uint(k <= t), 1u);
     }
-    if (r < n_splats) {
-        n_before[r] = sums[t] - n;
+    barrier();
+    return found;
+#endif
+}
+
+void main() {
+    uint t = gl_LocalInvocationID.x;
+    uint n_splats = kept[0].sort.w;
+    uint before = 0;
+    for (uint k = 0; k < BLOCK; k += INVOCATIONS) {
+        uint r = gl_WorkGroupID.x * BLOCK + k + t;
+        uint n = 0;
+        if (r < n_splats) {
+            // Far to near is how they are sorted.
+            n = project(entries[n_splats - 1u - r].y, r);
+        }
+        uvec2 here = sums_of(n);
+        if (r < n_splats) {
+            n_before[r] = before + here.x - n;
+        }
+        before += here.y;
     }
-    if (t == BLOCK - 1) {
-        n_pairs[gl_WorkGroupID.x] = sums[t];
+    if (t == 0) {
+        n_pairs[gl_WorkGroupID.x] = before;
     }
 }

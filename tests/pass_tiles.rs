@@ -230,7 +230,7 @@ fn wrong_pictures_are_noticed() {
         ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),
         ("tiles.comp", "n + subgroupBallotBitCount(hits)", "n + min(subgroupBallotBitCount(hits), 7u)"),
         ("tiles_splat.comp", "n_splats - 1u - r", "r"),
-        ("tiles_splat.comp", "sums[t] - n;", "sums[t];"),
+        ("tiles_splat.comp", "before + here.x - n;", "before + here.x;"),
         ("tiles_pairs.comp", "y[3 - j]", "y[j]"),
         ("tiles_pairs.comp", "clamp(int(high) - first, 0, 4)", "clamp(int(high) - first, 0, 3)"),
         ("tiles_ranges.comp", "lower_bound(n, bin + 1u)", "lower_bound(n, bin + 1u) - 1u"),

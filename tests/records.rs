@@ -83,6 +83,7 @@ fn sample() -> Run {
         date: utc_now(),
         cpu: cpu(),
         cases: vec![case],
+        chosen: vec!["draw.path = \"auto\" took \"tiles\"".to_owned()],
         ..blank
     }
 }

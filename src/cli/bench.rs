@@ -202,6 +202,7 @@ fn bench_one(
         clocks,
         block_order: outcome.block_order(),
         cases: outcome.cases(&cases, &plan),
+        chosen: outcome.chosen.clone(),
         interrupted: outcome.interrupted || failure.is_some(),
     };
     if let Some(dir) = out {

@@ -2,7 +2,7 @@
 
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Amount, Buffer, Compiler, Device, Place, Recorder, Target};
 use crate::model::cloud::{Group, SQRT_TAU};
@@ -48,6 +48,15 @@ impl Tiling {
         [width, height]: [u32; 2],
         (format, behind): (TargetFormat, bool),
     ) -> Result<Tiling> {
+        // A particle is two texels, the light of a facet four.
+        let n_texels = (2 * scene.n_particles()).max(4 * scene.n_facets());
+        if n_texels > device.limits().max_texels {
+            return Err(Error::limit(format!(
+                "draw.path = \"tiles\": {n_texels} texels of particles or facets are wanted, this device takes {} at most \
+                 (maxTexelBufferElements); expected \"sprites\"",
+                device.limits().max_texels
+            )));
+        }
         let division = Division::of(width, height, invocations(device.limits()))?;
         let variant = Variant { behind, ..variant(scene, format) };
         Tiling::new(device, compiler, division, scene.n_particles() as u32, &variant)

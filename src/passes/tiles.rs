@@ -189,8 +189,7 @@ pub struct Tiles {
     pub entries: Buffer,
     found: Buffer,
     state: Buffer,
-    /// Whether there may be something to compose over: that, and its depth.
-    behind: bool,
+    /// What is composed over, and its depth.
     under: Buffer,
     depths: Buffer,
 }
@@ -255,7 +254,7 @@ impl Tiles {
         let n_sheets = if variant.textured { u64::from(n_max) } else { 1 };
         let n_under = if variant.behind { division.n_pixels() } else { 1 };
         Ok(Tiles {
-            splat: Kernel::new(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat)?,
+            splat: Kernel::with_macros(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat, &macros[..3])?,
             rounds: Kernel::new(device, compiler, "tiles.rounds", RoundsPush::FIELDS, &[])?,
             clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
             pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[(5, threshold)])?,
@@ -283,7 +282,6 @@ impl Tiles {
             entries: buffer("tiles.entries", capacity, 2)?,
             found: buffer("tiles.ranges", division.n_bins.into(), 4)?,
             state: buffer("tiles.state", n_state, 4)?,
-            behind: variant.behind,
             under: buffer("tiles.under", n_under, variant.format.bytes_per_pixel() / 4)?,
             depths: buffer("tiles.depths", n_under, 1)?,
         })
@@ -362,11 +360,7 @@ impl Tiles {
 
     /// Begins `picture` with nothing to compose over.
     pub fn record_nothing(&self, rec: &mut Recorder<'_>, picture: &Buffer) {
-        if self.behind {
-            rec.fill(&self.under, 0);
-            rec.fill(&self.depths, 0);
-        }
-        rec.fill(picture, 0);
+        [&self.under, &self.depths, picture].into_iter().for_each(|of| rec.fill(of, 0));
     }
 
     /// The pairs of round `i`; [`Tiles::i_extent`] says where `round` has their number.

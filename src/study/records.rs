@@ -47,6 +47,9 @@ pub struct Run {
     pub block_order: Vec<Block>,
     /// One a phase and point of a sweep, in their order; a scene with neither has one.
     pub cases: Vec<Case>,
+    /// What each case's "auto" came to, and by what: times and errors at its first frame.
+    #[serde(default)]
+    pub chosen: Vec<String>,
     /// Ctrl-C, or an error, came before the end; what is here was finished.
     pub interrupted: bool,
 }

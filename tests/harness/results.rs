@@ -72,6 +72,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
             overlap: None,
             skipping: None,
         }],
+        chosen: Vec::new(),
         interrupted: false,
     }
 }

@@ -64,9 +64,9 @@ pub fn sample(picture: &Picture<'_>, at: DVec2, place: f64, rounding: f64) -> ([
 }
 
 /// What the cubic changes along one axis over a texel, at most, per difference of the greatest and the least of the texels it
-/// meets: half of Σ|w'|, where the weights' slopes sum to nothing. Σ|w'| is 1 at the texels and up to 2.8 between;
+/// meets: half of Σ|w'|, where the weights' slopes sum to nothing. Σ|w'| is 1 at the texels and 3 between two of them;
 /// times 1.25, the most that Σ|w| of the other axis comes to.
-const STEEPEST: f64 = 0.5 * 2.8 * 1.25;
+const STEEPEST: f64 = 0.5 * 3.0 * 1.25;
 
 /// From pixel centres of a picture of `size` with `tangents` to places in `shell`'s picture, in texels from the first one's
 /// centre, by the homography of slopes.
@@ -106,7 +106,7 @@ mod tests {
             assert!((-w[0] + w[2] + 2.0 * w[3] - t).abs() < 1e-15);
             let h = 1e-6;
             let slope = |k: usize| (weights(t + h)[k] - weights(t - h)[k]) / (2.0 * h);
-            assert!((0..4).map(|k| slope(k).abs()).sum::<f64>() <= 2.8 + 1e-6, "{t}");
+            assert!((0..4).map(|k| slope(k).abs()).sum::<f64>() <= 3.0 + 1e-6, "{t}");
             assert!(w.iter().map(|w| w.abs()).sum::<f64>() <= 1.25 + 1e-12, "{t}");
         }
     }

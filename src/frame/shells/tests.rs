@@ -9,8 +9,8 @@ fn packet(x: f64, z: f64) -> Packet {
     let extent = |k: i32| Extent {
         center: DVec3::new(f64::from(k % 5) - 2.0, f64::from(k % 3) - 1.0, -0.5 * f64::from(k)),
         half: DVec3::splat(0.5),
-        sigma_max: 0.4,
-        sigma_mean: 0.3,
+        sigma_max: 0.6,
+        sigma_mean: 0.5,
         n_particles: 400,
     };
     Packet {

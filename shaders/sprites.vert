@@ -43,6 +43,11 @@ layout(location = 5) flat out float out_cut;
 
 void main() {
     uint i = entries[gl_InstanceIndex].y;
+    if (i == NO_PARTICLE) {
+        // Nothing to draw: a quad without area.
+        gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
+        return;
+    }
     vec3 c = placed[i].position - push.camera.eye;
     float sigma = placed[i].sigma;
     vec3 v = along_camera(push.camera, c);

@@ -58,6 +58,9 @@ const float LOG2_E = 1.44269504089;
 // Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is set.
 uint project(uint i, uint r) {
     reach[r] = uvec2(0);
+    if (i == NO_PARTICLE) {
+        return 0u;
+    }
     vec4 place = uintBitsToFloat(texelFetch(placed, int(i))), shade = uintBitsToFloat(texelFetch(particles, int(2 * i + 1)));
     vec3 v = along_camera(push.camera, place.xyz - push.camera.eye);
     float sigma = place.w;

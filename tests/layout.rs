@@ -21,7 +21,7 @@ use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecor
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{
-    self, SHADERS, contract, cull, facets, first, generate, grid, morton, place, second, sort, sprites,
+    self, SHADERS, contract, cull, facets, first, generate, grid, impostors, morton, place, second, sort, sprites,
 };
 use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
 
@@ -57,7 +57,7 @@ const RECORDS: [Record; 24] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 37] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 40] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -102,6 +102,9 @@ const INTERFACES: [(&str, &[Field], &[Element]); 37] = [
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
+    ("impostors.frag", impostors::Push::FIELDS, &[T]),
+    ("impostors.vert", impostors::Push::FIELDS, &[]),
+    ("impostors_part.comp", impostors::PartPush::FIELDS, &[B(8), B(4), B(8), B(8)]),
     ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
     ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
@@ -336,6 +339,7 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "REGION_CLOUD", f64::from(REGION_CLOUD)),
         ("include/records.glsl", "REGION_COLORED", f64::from(REGION_COLORED)),
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
+        ("include/records.glsl", "NO_PARTICLE", f64::from(nimbus::layout::particle::NO_PARTICLE)),
         ("include/texture.glsl", "TEXTURE_STREAM", f64::from(0x7465_7874u32)),
         ("include/texture.glsl", "FIELD_TEXELS", f64::from(texture::FIELD_TEXELS)),
         ("include/texture.glsl", "TEXTURE_SIDE", nimbus::reference::texture::SIDE as f64),

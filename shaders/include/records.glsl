@@ -25,6 +25,9 @@ struct Light { vec3 toward; uint kind; vec3 energy; float constant; vec3 positio
 struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; };
 struct Camera { vec3 eye; float tan_x; vec3 right; float tan_y; vec3 up; float near; vec3 forward; float unused; };
 
+// In place of a particle's number: an entry that draws nothing.
+const uint NO_PARTICLE = 0xFFFFFFFFu;
+
 const uint FORM_CENTRED = 0;
 const uint FORM_PRINTED = 1;
 const uint FORM_GIVEN = 2;

@@ -209,7 +209,8 @@ fn bench_one(
         records::write_results(dir, &run, &pass_names(), &outcome.rows(&cases))?;
     }
     if !args.json {
-        let same: Vec<Option<bool>> = (0..cases.len()).map(|i| outcome.is_same_picture(i)).collect();
+        let same: Vec<Option<bool>> =
+            cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case)).collect();
         output::text(&bench_table::report(path, &run, &same, args.options.verbose))?;
     }
     if let Some(file) = &args.trace {

@@ -129,6 +129,9 @@ fn say_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
         if let Some(choice) = &stage.size_choice {
             eprintln!("note: {}", choice.text());
         }
+        if let Some(choice) = &stage.impostor_choice {
+            eprintln!("note: {}", choice.text());
+        }
         for note in light_notes(stage)? {
             eprintln!("warning: {note}");
         }

@@ -95,8 +95,13 @@ impl Buffers {
 
     /// What sprites are drawn from, as the pass asks for it.
     pub fn of_sprites(&self) -> [&Buffer; 9] {
+        self.of_sprites_from(&self.entries)
+    }
+
+    /// The same with other entries.
+    pub fn of_sprites_from<'a>(&'a self, entries: &'a Buffer) -> [&'a Buffer; 9] {
         let (placed, drawn) = (self.placed.buffer(), &self.drawn.buffer);
-        let Buffers { entries, particles, lit, i_facet, i_group, textured, pool, .. } = self;
+        let Buffers { particles, lit, i_facet, i_group, textured, pool, .. } = self;
         [entries, placed, particles, lit, i_facet, i_group, drawn, textured, pool]
     }
 

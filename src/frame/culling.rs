@@ -8,14 +8,15 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Place, Recorder};
 use crate::layout::cull::KeptRecord;
-use crate::model::scene::Scene;
+use crate::model::scene::{Impostors, Scene};
 use crate::passes::cull::{Cull, Order, View};
 use crate::passes::sort::{Counts, Sort, TILE};
 use crate::passes::tiles::BLOCK;
 
 /// Whether the device leaves out particles of `scene`.
 pub fn culls(scene: &Scene) -> bool {
-    scene.draw.cull && scene.n_particles() > 0
+    // Who is in a shell must not depend on the view.
+    scene.draw.cull && scene.draw.impostors == Impostors::Off && scene.n_particles() > 0
 }
 
 pub(super) struct Culling {

@@ -2,6 +2,7 @@
 
 use super::buffers::Buffers;
 use super::feed::IN_FLIGHT;
+use super::impostors::Impostors;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, pass};
 use super::settings::Settings;
@@ -9,10 +10,10 @@ use super::shrunk::Shrunk;
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Target};
+use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, LightingMode, Scene};
+use crate::model::scene::{DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
 use crate::passes::tiles::View;
@@ -29,6 +30,8 @@ pub(super) struct Drawing {
     targets: Option<[Image; IN_FLIGHT]>,
     /// What draws the surfaces, and their depth; none where there are none.
     scenery: Option<(Surfaces, Image)>,
+    /// What is far, shown from a picture of it.
+    impostors: Option<Impostors>,
     /// Smaller pictures that the blobs may be drawn into.
     shrunk: Vec<Shrunk>,
     /// The one that they are; None where it is the full one.
@@ -91,6 +94,9 @@ impl Drawing {
         let behind = !scene.surfaces.is_empty();
         let counted = scene.draw.count.is_some();
         let variant = [behind, is_grouped(scene), counted, scene.is_textured(), scene.draw.threshold > 0.0];
+        let shells = scene.draw.impostors != ImpostorMode::Off;
+        let [_, of_shells @ ..] = variant;
+        let impostors = || Impostors::new(device, compiler, scene, format, (lit, of_shells));
         let has_sprites = has_blobs && path != DrawPath::Tiles;
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
         let scenery = || -> Result<(Surfaces, Image)> {
@@ -100,11 +106,12 @@ impl Drawing {
         Ok(Drawing {
             sprites: has_sprites.then(|| Sprites::new(device, compiler, format, lit, variant)).transpose()?,
             tiling,
-            targets: match has_sprites || behind {
+            targets: match has_sprites || behind || shells {
                 true => Some([target("picture.even")?, target("picture.odd")?]),
                 false => None,
             },
             scenery: behind.then(scenery).transpose()?,
+            impostors: shells.then(impostors).transpose()?,
             shrunk: Vec::new(),
             i_shrunk: None,
             i_picture: 0,
@@ -136,10 +143,13 @@ impl Drawing {
 
     /// Gives back what the other way needs.
     pub fn keep_only(&mut self, path: DrawPath) {
+        if let Some(impostors) = &mut self.impostors {
+            impostors.keep_only(path);
+        }
         match path {
             DrawPath::Tiles => {
                 self.sprites = None;
-                if self.scenery.is_none() {
+                if self.scenery.is_none() && self.impostors.is_none() {
                     self.targets = None;
                 }
             }
@@ -173,6 +183,14 @@ impl Drawing {
         }
     }
 
+    /// `plan` with what becomes of the impostors.
+    pub fn decide(&mut self, plan: Plan, packet: &Packet) -> Plan {
+        match &mut self.impostors {
+            Some(impostors) => impostors.decide(plan, packet),
+            None => plan,
+        }
+    }
+
     /// The drawing passes that `plan` runs.
     pub fn record(
         &mut self,
@@ -184,10 +202,25 @@ impl Drawing {
     ) -> Result<()> {
         let path = if plan.runs(Pass::Tiles) { DrawPath::Tiles } else { DrawPath::Sprites };
         pass(rec, plan, Pass::Surfaces, |rec| self.record_behind(rec, b, packet, s))?;
+        pass(rec, plan, Pass::Impostors, |rec| self.record_impostors(rec, path, b, packet, s))?;
         for (of, path) in [(Pass::Sprites, DrawPath::Sprites), (Pass::Tiles, DrawPath::Tiles)] {
             pass(rec, plan, of, |rec| self.record_over(rec, path, b, packet, s))?;
         }
         pass(rec, plan, Pass::Upsample, |rec| self.record_upsample(rec, path))
+    }
+
+    fn record_impostors(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        path: DrawPath,
+        b: &Buffers,
+        packet: &Packet,
+        s: &Settings,
+    ) -> Result<()> {
+        let (Some(impostors), Some(targets)) = (&mut self.impostors, &mut self.targets) else { return Ok(()) };
+        let depth = self.scenery.as_mut().map(|(_, depth)| depth);
+        let target = Target { color: &mut targets[self.i_picture], depth };
+        impostors.record(rec, path, b, target, packet, s)
     }
 
     /// The whole picture by `path`.
@@ -249,7 +282,7 @@ impl Drawing {
         surfaces.record(rec, [&b.regions.buffer, &b.lit], target, camera, s.n_surfaces)
     }
 
-    /// Draws the first `n_drawn` of what is sorted into the picture itself.
+    /// Draws the first `n_drawn` of what is sorted into the picture itself, over the shell where there is one.
     pub fn record_blobs(
         &mut self,
         rec: &mut Recorder<'_>,
@@ -259,6 +292,8 @@ impl Drawing {
         s: &Settings,
     ) -> Result<()> {
         let counts = (b.amount(n_drawn), s.n_surface_facets);
+        let near = self.impostors.as_ref().and_then(Impostors::near);
+        let buffers = near.map_or(b.of_sprites(), |near| b.of_sprites_from(near));
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {
@@ -266,14 +301,16 @@ impl Drawing {
                 let Some(tiling) = &self.tiling else { return Err(Error::usage("tiles were given back")) };
                 let Settings { cutoff, threshold, saturated, .. } = *s;
                 let view = View { camera, cutoff, threshold, saturated };
-                let under = target.filter(|target| target.depth.is_some());
-                tiling.record(rec, i, under, b.of_sprites(), &view, counts)
+                let under = target.filter(|target| target.depth.is_some() || near.is_some());
+                tiling.record(rec, i, under, buffers, &view, counts)
             }
             _ => {
                 let (Some(sprites), Some(target)) = (&self.sprites, target) else {
                     return Err(Error::usage("sprites were given back"));
                 };
-                sprites.record(rec, b.of_sprites(), target, camera, [s.cutoff, s.threshold], counts)
+                let is_under = target.depth.is_some() || near.is_some();
+                let start = if is_under { Start::Load } else { Start::Clear };
+                sprites.record_from(rec, buffers, (target, start), camera, [s.cutoff, s.threshold], counts)
             }
         }
     }

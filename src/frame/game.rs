@@ -8,7 +8,7 @@ use tracing::info_span;
 
 use super::drawn::drawn;
 use super::exchange::is_glossy;
-use super::packet::Packet;
+use super::packet::{Extent, Packet};
 use super::tensor::{Shape, basis_of, is_edited, kind_of};
 use crate::error::{Error, Place, Result};
 use crate::layout::facet::{KeyBits, NO_LOBE, RegionBoundsRecord, RegionRecord, lobe_width};
@@ -21,7 +21,7 @@ use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
 use crate::model::material::{Brdf, Material};
-use crate::model::scene::Scene;
+use crate::model::scene::{Impostors, Scene};
 
 pub struct Game {
     scene: Arc<Scene>,
@@ -111,7 +111,9 @@ impl Game {
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let grown = self.scene.grown(&self.groups, time_s);
-        let (drawn, n_drawn) = info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, self.culls));
+        // What a shell has must not depend on where the camera looks.
+        let culls = self.culls && self.scene.draw.impostors == Impostors::Off;
+        let (drawn, n_drawn) = info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, culls));
         let placed = self
             .rest
             .as_ref()
@@ -139,8 +141,24 @@ impl Game {
             grid: GridRecord::from(&setting.grid),
             heaviest: heaviest_blob(&grown),
             radius: setting.radius,
+            extents: self.extents(&grown, &origins),
             game_ms: super::ms(begin, Instant::now()),
         })
+    }
+
+    /// Where the groups are that a shell may show.
+    fn extents(&self, groups: &[Group], origins: &[DVec3]) -> Vec<Extent> {
+        if self.scene.draw.impostors == Impostors::Off {
+            return vec![];
+        }
+        let of = |g: &Group| Extent {
+            center: origins[g.i_cloud] + g.center,
+            half: g.half_extent + DVec3::splat(g.gust_reach),
+            sigma_max: g.sigma_max,
+            sigma_mean: g.sigma_mean,
+            n_particles: g.n_particles,
+        };
+        groups.iter().filter(|g| g.n_particles > 0).map(of).collect()
     }
 
     /// Where each region's Morton cells lie.

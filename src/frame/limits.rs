@@ -16,7 +16,7 @@ use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::resolution::{Resolution, SmallPicture};
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{Impostors, LightingMode, Scene};
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
@@ -25,17 +25,20 @@ use super::culling::culls;
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use super::plan::Tensors;
+use super::shells::shell_size;
 use super::tensor::Shape;
 
 const TEXTURES: &str = "the pool of textures";
+const SHELL: &str = "the shell's picture (draw.impostors)";
 const BLOBS: &str = "the blobs' smaller picture";
 const UNDER: &str = "the surfaces under it";
 /// Not of light: read in every scene that has them.
-const ALWAYS_READ: [&str; 3] = [TEXTURES, BLOBS, UNDER];
+const ALWAYS_READ: [&str; 4] = [TEXTURES, SHELL, BLOBS, UNDER];
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 9] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 10] = [
     (TEXTURES, BindingKind::Texels),
+    (SHELL, BindingKind::Texels),
     (BLOBS, BindingKind::Texels),
     (UNDER, BindingKind::Texels),
     ("the second reflection's sources", BindingKind::Texels),
@@ -60,6 +63,11 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let groups: u64 = scene.clouds.iter().map(|c| c.n_groups()).sum();
     let pixel = target_format(scene.film.format).bytes_per_pixel();
     let n_texels = if scene.is_textured() { u64::from(POOL_TEXELS) } else { 0 };
+    let shells = scene.draw.impostors != Impostors::Off;
+    let n_shell_texels = match shells {
+        true => shell_size([scene.film.width, scene.film.height]).map(u64::from).iter().product(),
+        false => 0,
+    };
     let size = |record: usize| record as u64;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
@@ -95,6 +103,10 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         (TEXTURES, n_texels, 16),
         ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
         ("the film, read back", n_pixels, pixel),
+        (SHELL, n_shell_texels, 16),
+        ("the shell, as it is drawn", n_shell_texels, 16),
+        ("who is in the shell", if shells { n } else { 0 }, 4),
+        ("what is far, and what is near", if shells { 2 * n } else { 0 }, 8),
         (BLOBS, n_small, pixel),
         // With "auto" the half one beside the quarter, the larger one counted twice.
         ("what is drawn in a smaller size", n_small * (if is_auto { 6 } else { 3 }), pixel + DEPTH_BYTES_PER_PIXEL),

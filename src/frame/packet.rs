@@ -3,6 +3,8 @@
 use std::sync::Arc;
 use std::time::Instant;
 
+use glam::DVec3;
+
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, PlacedRecord};
@@ -39,4 +41,17 @@ pub struct Packet {
     pub heaviest: f64,
     /// Bounds |view depth| relative to the lighting origin.
     pub radius: f64,
+    /// Where each group's particles are, where what is far may be shown from a picture of it; else none.
+    pub extents: Vec<Extent>,
+}
+
+/// Where a group's particles are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extent {
+    /// Relative to the lighting origin; their centres are within ± half of it.
+    pub center: DVec3,
+    pub half: DVec3,
+    pub sigma_max: f64,
+    pub sigma_mean: f64,
+    pub n_particles: u32,
 }

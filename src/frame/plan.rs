@@ -26,13 +26,14 @@ pub enum Pass {
     Sort,
     Texture,
     Surfaces,
+    Impostors,
     Sprites,
     Tiles,
     Upsample,
 }
 
 impl Pass {
-    pub const ALL: [Pass; 16] = [
+    pub const ALL: [Pass; 17] = [
         Pass::Generate,
         Pass::Place,
         Pass::Grid,
@@ -46,6 +47,7 @@ impl Pass {
         Pass::Sort,
         Pass::Texture,
         Pass::Surfaces,
+        Pass::Impostors,
         Pass::Sprites,
         Pass::Tiles,
         Pass::Upsample,
@@ -54,8 +56,23 @@ impl Pass {
     /// The room's name: timer label and column in the results.
     pub fn name(self) -> &'static str {
         let names = [
-            "generate", "place", "grid", "morton", "facets", "transmit", "first", "second", "contract", "cull", "sort",
-            "texture", "surfaces", "sprites", "tiles", "upsample",
+            "generate",
+            "place",
+            "grid",
+            "morton",
+            "facets",
+            "transmit",
+            "first",
+            "second",
+            "contract",
+            "cull",
+            "sort",
+            "texture",
+            "surfaces",
+            "impostors",
+            "sprites",
+            "tiles",
+            "upsample",
         ];
         names[self as usize]
     }
@@ -76,12 +93,22 @@ pub enum Reason {
         bytes: u64,
         most: u64,
     },
+    /// A shell is made.
+    Made(&'static str),
+    /// The shell is shown again, and is off by so many thousandths of a pixel at most.
+    Reused {
+        milli_px: u32,
+    },
 }
 
 impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Reason::Of(text) => f.write_str(text),
+            Reason::Made(why) => write!(f, "made anew: {why}"),
+            Reason::Reused { milli_px } => {
+                write!(f, "used again: off by {:.3} pixels at most", f64::from(*milli_px) * 1e-3)
+            }
             Reason::TooLarge { bytes, most } => write!(
                 f,
                 "T2 would take {bytes} bytes and this device has {most} for it: light is gathered at once, anew at every edit"
@@ -106,6 +133,7 @@ pub enum Tensors {
 pub struct Plan {
     decisions: [Decision; Pass::ALL.len()],
     view_only: bool,
+    changed: Option<&'static str>,
 }
 
 impl Plan {
@@ -116,6 +144,17 @@ impl Plan {
     /// Of the light nothing changed but where it is seen from: receivers without a lobe keep what they have.
     pub fn view_only(&self) -> bool {
         self.view_only
+    }
+
+    /// What of the picture changed but for where it is seen from; none where nothing did.
+    pub fn changed(&self) -> Option<&'static str> {
+        self.changed
+    }
+
+    /// The same plan with another decision for `impostors`, which depends on more frames than the last.
+    pub fn with_impostors(mut self, decision: Decision) -> Plan {
+        self.decisions[Pass::Impostors as usize] = decision;
+        self
     }
 
     pub fn runs(&self, pass: Pass) -> bool {
@@ -143,6 +182,8 @@ pub struct Traits {
     /// Some region has a lobe, and so what is seen of it depends on the eye.
     pub glossy: bool,
     pub tensors: Tensors,
+    /// What is far may be shown from a picture of it.
+    pub impostors: bool,
     /// Particles that can show in no pixel are left out.
     pub culls: bool,
     /// What draws the particles.
@@ -221,19 +262,29 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             Tensors::Needless => skip("no material is edited: light is gathered at once"),
             Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
         },
-        if traits.culls { unless(same_kept, "the same can be seen") } else { skip("draw.cull is \"off\"") },
+        match traits.culls {
+            true => unless(same_kept, "the same can be seen"),
+            false if traits.impostors => skip("who is in a shell must not depend on the view"),
+            false => skip("draw.cull is \"off\""),
+        },
         match traits.culls {
             true => unless(same_kept, "the same can be seen"),
             false => unless(same_order, "the order cannot have changed"),
         },
         if traits.textured { unless(last.is_some(), "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
+        match traits.impostors {
+            false => skip("draw.impostors is \"off\""),
+            true if !traits.skip => skip("nothing is used again with --no-skip"),
+            true => unless(same_picture, "the picture is the same"),
+        },
         drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
         drawing(DrawPath::Tiles, "draw.path is \"sprites\""),
         if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
     ];
     if traits.n_particles == 0 {
-        for pass in [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort, Pass::Texture] {
+        let of_particles = [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort];
+        for pass in of_particles.into_iter().chain([Pass::Texture, Pass::Impostors]) {
             decisions[pass as usize] = skip("no particles");
         }
     }
@@ -242,7 +293,15 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             decisions[pass as usize] = skip("no facets");
         }
     }
-    Plan { decisions, view_only: same_response }
+    let changed = [
+        (last.is_some(), "there is no frame before"),
+        (still, "particles moved"),
+        (same_drawn, "other particles are drawn"),
+        (same_geometry, "surfaces moved"),
+        ((same_light && same_eye) || !traits.lit, "light changed"),
+    ];
+    let changed = changed.into_iter().find(|(same, _)| !same).map(|(_, what)| what);
+    Plan { decisions, view_only: same_response, changed }
 }
 
 /// Whether the ways from the facets to the lights, and what hides them, are the same; a light without energy has none.
@@ -263,7 +322,7 @@ fn shine_alike(last: &[LightRecord], next: &[LightRecord]) -> bool {
 
 const RUN: Decision = Decision { run: true, reason: Reason::Of("needed") };
 
-fn skip(reason: &'static str) -> Decision {
+pub(super) fn skip(reason: &'static str) -> Decision {
     Decision { run: false, reason: Reason::Of(reason) }
 }
 

@@ -22,7 +22,7 @@ use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, S
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, LightingMode, Scene, Simulate};
+use crate::model::scene::{DrawPath, Impostors, LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
 use crate::passes::generate::Generate;
@@ -149,9 +149,10 @@ impl Renderer {
                 n_surfaces: scene.surfaces.len() as u32,
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
+                impostors: scene.draw.impostors != Impostors::Off,
                 // Until it is chosen.
                 shrunk: !matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto),
-                culls: scene.draw.cull,
+                culls: scene.draw.cull && scene.draw.impostors == Impostors::Off,
                 path: if scene.draw.path == DrawPath::Tiles { DrawPath::Tiles } else { DrawPath::Sprites },
                 skip,
             },
@@ -189,7 +190,10 @@ impl Renderer {
     fn submit(&mut self, packet: Packet) -> Result<Pending> {
         let begin = Instant::now();
         let _zone = info_span!("render step").entered();
-        let plan = info_span!("plan").in_scope(|| plan(&self.traits, self.last.as_ref(), &packet));
+        let plan = info_span!("plan").in_scope(|| {
+            let plan = plan(&self.traits, self.last.as_ref(), &packet);
+            self.drawing.decide(plan, &packet)
+        });
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
         if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) || plan.runs(Pass::Tiles) {
             self.drawing.turn();

@@ -7,7 +7,7 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Amount, Buffer, Compiler, Device, Place, Recorder, Target};
 use crate::model::cloud::{Group, SQRT_TAU};
 use crate::model::film::FilmFormat;
-use crate::model::scene::{LightingMode, Scene};
+use crate::model::scene::{Impostors, LightingMode, Scene};
 use crate::passes::sort::{Counts, Sort, TILE};
 use crate::passes::tiles::{Division, Tiles, Variant, View, invocations};
 
@@ -36,6 +36,18 @@ impl Tiling {
 
     /// For the pictures of `scene`.
     pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Tiling> {
+        let behind = !scene.surfaces.is_empty() || scene.draw.impostors != Impostors::Off;
+        Tiling::of_size(device, compiler, scene, [scene.film.width, scene.film.height], (format, behind))
+    }
+
+    /// For pictures of the scene of another size; `behind`: over what has been drawn.
+    pub fn of_size(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        [width, height]: [u32; 2],
+        (format, behind): (TargetFormat, bool),
+    ) -> Result<Tiling> {
         // A particle is two texels, the light of a facet four.
         let n_texels = (2 * scene.n_particles()).max(4 * scene.n_facets());
         if n_texels > device.limits().max_texels {
@@ -45,8 +57,8 @@ impl Tiling {
                 device.limits().max_texels
             )));
         }
-        let division = Division::of(scene.film.width, scene.film.height, invocations(device.limits()))?;
-        let variant = variant(scene, format);
+        let division = Division::of(width, height, invocations(device.limits()))?;
+        let variant = Variant { behind, ..variant(scene, format) };
         Tiling::new(device, compiler, division, scene.n_particles() as u32, &variant)
     }
 
@@ -64,7 +76,7 @@ impl Tiling {
         let (tiles, picture) = (&self.tiles, &self.pictures[i]);
         match under {
             Some(under) => tiles.record_under(rec, under, picture),
-            None => rec.fill(picture, 0),
+            None => tiles.record_nothing(rec, picture),
         }
         if matches!(n, Amount::Known(0)) {
             return Ok(());

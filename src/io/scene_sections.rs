@@ -14,7 +14,8 @@ use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::resolution::Resolution;
 use crate::model::scene::MAX_PAIR_LEVELS;
-use crate::model::scene::{Draw, DrawPath, Gather, Lighting, LightingMode, Pairs, Simulate, Threading, Threads, Time};
+use crate::model::scene::{Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
+use crate::model::scene::{Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -175,6 +176,8 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let mut s = root.section("draw")?;
     s.expect_keys(DRAW_KEYS, &[])?;
     let path = s.choice("path", "sprites", &DrawPath::NAMES, &[])?;
+    let impostors = s.choice("impostors", "off", &Impostors::NAMES, &[])?;
+    let impostor_error = s.f64("impostor_error", 0.5, Bounds::Within(0.01, 100.0))?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let threshold = s.f64("threshold", 0.0, Bounds::From(0.0, 1.0))?;
     let cull = s.choice("cull", "on", &[("on", true), ("off", false)], &[])?;
@@ -187,16 +190,36 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
     }
     let resolution = read_resolution(&mut s)?;
+    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest > 0.0) {
+        let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
+        return Err(s.fault("impostors", what.to_owned()));
+    }
     let error = s.f64("error", 1.0 / 1020.0, Bounds::From(0.0, 1.0))?;
     let count = read_count(&mut s)?;
     let n_particles = s.u32("particles", 0, 0, u32::MAX)?;
     let texture_seed = s.u32("texture_seed", 1, 0, u32::MAX)?;
     root.record("draw", s.finish());
-    Ok(Draw { path, resolution, error, cutoff, threshold, cull, smallest, sort_bits, count, texture_seed, n_particles })
+    Ok(Draw {
+        path,
+        impostors,
+        impostor_error,
+        resolution,
+        error,
+        cutoff,
+        threshold,
+        cull,
+        smallest,
+        sort_bits,
+        count,
+        texture_seed,
+        n_particles,
+    })
 }
 
 const DRAW_KEYS: &[&str] = &[
     "path",
+    "impostors",
+    "impostor_error",
     "cutoff",
     "threshold",
     "cull",

@@ -41,6 +41,9 @@ record! {
     }
 }
 
+/// In place of a particle's number: an entry that draws nothing; the shaders' NO_PARTICLE.
+pub const NO_PARTICLE: u32 = u32::MAX;
+
 /// Values of [`BoxRecord::form`]; the shaders' `FORM_*`.
 pub const FORM_CENTRED: u32 = 0;
 pub const FORM_PRINTED: u32 = 1;

@@ -11,6 +11,7 @@ pub mod grid;
 pub mod growth;
 pub mod gust;
 pub mod gust_lanes;
+pub mod impostor;
 pub mod light;
 pub mod material;
 pub mod pairings;

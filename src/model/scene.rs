@@ -130,9 +130,26 @@ impl DrawPath {
         [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles), ("auto", DrawPath::Auto)];
 }
 
+/// Whether what is far is shown again from a picture of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Impostors {
+    Off,
+    On,
+    /// Whichever is faster over the scene's first frames.
+    Auto,
+}
+
+impl Impostors {
+    pub const NAMES: [(&'static str, Impostors); 3] =
+        [("off", Impostors::Off), ("on", Impostors::On), ("auto", Impostors::Auto)];
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     pub path: DrawPath,
+    pub impostors: Impostors,
+    /// Pixels that an impostor may be predicted to be off by.
+    pub impostor_error: f64,
     /// Of the picture that they are drawn into.
     pub resolution: Resolution,
     /// What "auto" may take differs from the full picture by no more than this, root mean square.

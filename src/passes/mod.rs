@@ -7,6 +7,7 @@ pub mod facets;
 pub mod first;
 pub mod generate;
 pub mod grid;
+pub mod impostors;
 pub mod morton;
 pub mod place;
 pub mod second;
@@ -38,6 +39,9 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "generate.comp",
     "grid_deposit.comp",
     "grid_resolve.comp",
+    "impostors.frag",
+    "impostors.vert",
+    "impostors_part.comp",
     "include/arriving.glsl",
     "include/blob.glsl",
     "include/cells.glsl",

@@ -48,13 +48,26 @@ impl Sprites {
         target: Target<'_>,
         camera: &CameraRecord,
         [cutoff, threshold]: [f64; 2],
+        counts: (Amount<'_>, u32),
+    ) -> Result<()> {
+        let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
+        self.record_from(rec, buffers, (target, start), camera, [cutoff, threshold], counts)
+    }
+
+    /// The same over what the target holds where `start` says so.
+    pub fn record_from(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 9],
+        (target, start): (Target<'_>, Start),
+        camera: &CameraRecord,
+        [cutoff, threshold]: [f64; 2],
         (n_drawn, i_first_facet): (Amount<'_>, u32),
     ) -> Result<()> {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let inv_threshold = (1.0 / threshold) as f32;
         let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet, inv_threshold };
-        let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
         let instances = match n_drawn {
             Amount::Known(n) => Instances::Known(n),
             Amount::Counted(kept) => Instances::Counted(kept, KeptRecord::I_DRAW),

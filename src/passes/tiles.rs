@@ -136,7 +136,7 @@ pub struct Variant {
     pub textured: bool,
     pub weighted: bool,
     pub format: TargetFormat,
-    /// Surfaces are drawn, too.
+    /// Surfaces are drawn, too, or what is far.
     pub behind: bool,
     /// Splats end where their optical depth falls under a threshold.
     pub threshold: bool,
@@ -189,7 +189,7 @@ pub struct Tiles {
     pub entries: Buffer,
     found: Buffer,
     state: Buffer,
-    /// The surfaces, and their depth.
+    /// What is composed over, and its depth.
     under: Buffer,
     depths: Buffer,
 }
@@ -350,10 +350,17 @@ impl Tiles {
     /// Fetches the drawn surfaces to compose over, and begins `picture` with them.
     pub fn record_under(&self, rec: &mut Recorder<'_>, target: Target<'_>, picture: &Buffer) {
         rec.copy_image(target.color, &self.under);
-        if let Some(depth) = target.depth {
-            rec.copy_image(depth, &self.depths);
+        match target.depth {
+            Some(depth) => rec.copy_image(depth, &self.depths),
+            // Infinitely far.
+            None => rec.fill(&self.depths, 0),
         }
         rec.copy(&self.under, picture);
+    }
+
+    /// Begins `picture` with nothing to compose over.
+    pub fn record_nothing(&self, rec: &mut Recorder<'_>, picture: &Buffer) {
+        [&self.under, &self.depths, picture].into_iter().for_each(|of| rec.fill(of, 0));
     }
 
     /// The pairs of round `i`; [`Tiles::i_extent`] says where `round` has their number.

@@ -11,6 +11,7 @@ pub mod facets;
 pub mod first;
 pub mod generate;
 pub mod grid;
+pub mod impostors;
 pub mod morton;
 pub mod occlude;
 pub mod place;

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
-use crate::model::scene::{DrawPath, Scene};
+use crate::model::scene::{DrawPath, Impostors, Scene};
 
 /// How long and how often.
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +54,7 @@ pub struct Outcome {
     pub blocks: Vec<Block>,
     /// What is odd about the light of a case's last frame.
     pub notes: Vec<String>,
-    /// What draws, where `draw.path` is "auto", and why.
+    /// What draws, where `draw.path` or `draw.impostors` is "auto", and why.
     pub chosen: Vec<String>,
     pub interrupted: bool,
 }
@@ -95,20 +95,23 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
     let order = block_order(cases, plan.n_rounds);
     let mut i_staged = 0;
     // What "auto" came to at a case's first block holds for all of them.
-    let mut paths: Vec<Option<DrawPath>> = vec![None; cases.len()];
+    let mut taken: Vec<Option<(DrawPath, Impostors)>> = vec![None; cases.len()];
     for (i_block, (i_case, of)) in (0u32..).zip(order.iter().copied()) {
         let case = &cases[i_case];
         let is_staged = std::mem::replace(&mut i_staged, i_case) == i_case;
         let is_last = !order[i_block as usize + 1..].iter().any(|(i, _)| *i == i_case);
         let mut block = || -> Result<()> {
             let stage = ran.stage.take().ok_or_else(|| Error::usage("the stage before this block has failed"))?;
-            let stage = if is_staged { stage } else { stage.again(with_path(&case.scene, paths[i_case]), of.skip)? };
+            let stage = if is_staged { stage } else { stage.again(with_taken(&case.scene, taken[i_case]), of.skip)? };
             let stage = ran.stage.insert(stage);
-            paths[i_case] = Some(stage.scene.draw.path);
+            taken[i_case] = Some((stage.scene.draw.path, stage.scene.draw.impostors));
             if let Some(choice) = stage.choice.take() {
                 ran.outcome.chosen.push(named(cases, case, &choice.text()));
             }
             if let Some(choice) = stage.size_choice.take() {
+                ran.outcome.chosen.push(named(cases, case, &choice.text()));
+            }
+            if let Some(choice) = stage.impostor_choice.take() {
                 ran.outcome.chosen.push(named(cases, case, &choice.text()));
             }
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
@@ -134,12 +137,12 @@ fn named(cases: &[Case], case: &Case, note: &str) -> String {
     if cases.len() > 1 { format!("{}: {note}", case.name()) } else { note.to_owned() }
 }
 
-/// The scene drawn by `path` where that is known.
-fn with_path(scene: &Arc<Scene>, path: Option<DrawPath>) -> Arc<Scene> {
-    match path {
-        Some(path) if path != scene.draw.path => {
+/// The scene with what "auto" took where that is known.
+fn with_taken(scene: &Arc<Scene>, taken: Option<(DrawPath, Impostors)>) -> Arc<Scene> {
+    match taken {
+        Some((path, impostors)) if (path, impostors) != (scene.draw.path, scene.draw.impostors) => {
             let mut scene = Scene::clone(scene);
-            scene.draw.path = path;
+            (scene.draw.path, scene.draw.impostors) = (path, impostors);
             Arc::new(scene)
         }
         _ => scene.clone(),

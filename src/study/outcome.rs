@@ -8,11 +8,11 @@ use super::compare::{N_FRAMES_NEEDED, spread_of_blocks};
 use super::overlap::{Overlap, SerialFrame};
 use super::records::{self, FrameRow, Measured, Mode, Pass as PassRecord, Ratio, Reason, Skipping};
 use crate::frame::FrameTimes;
-use crate::frame::plan::Pass;
+use crate::frame::plan::{Pass, Reason as PlanReason};
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::lows::Lows;
 use crate::measure::stats::{Summary, mean, median};
-use crate::model::scene::{Simulate, Threading};
+use crate::model::scene::{Impostors, Simulate, Threading};
 
 pub fn name_of(threading: Threading) -> &'static str {
     match threading {
@@ -85,7 +85,8 @@ impl Outcome {
             modes,
             ratio: pair.and_then(|(serial, parallel)| self.ratio(i, serial, parallel)),
             overlap: serial.and_then(|serial| self.overlap(i, serial, pair.map(|p| p.1))),
-            skipping: unskipped.and_then(|unskipped| self.skipping(i, Loop { skip: true, ..unskipped }, unskipped)),
+            skipping: unskipped
+                .and_then(|unskipped| self.skipping(i, case, [Loop { skip: true, ..unskipped }, unskipped])),
         }
     }
 
@@ -108,12 +109,14 @@ impl Outcome {
         Overlap::of(&serial, &parallel.map_or(vec![], |of| self.timed(i, of).frame_ms()))
     }
 
-    fn skipping(&self, i: usize, skipped: Loop, unskipped: Loop) -> Option<Skipping> {
+    fn skipping(&self, i: usize, case: &Case, [skipped, unskipped]: [Loop; 2]) -> Option<Skipping> {
         let [gpu, all] = [skipped, unskipped].map(|of| self.timed(i, of).column(|t| t.gpu_ms()));
         if gpu.is_empty() || all.is_empty() {
             return None;
         }
-        let hashes = [skipped, unskipped].map(|of| self.image_hash(i, of));
+        // Without skipping no impostor is used.
+        let exact = case.scene.draw.impostors == Impostors::Off;
+        let hashes = [skipped, unskipped].map(|of| self.image_hash(i, of).filter(|_| exact));
         let same_bytes = if let [Some(a), Some(b)] = hashes { Some(a == b) } else { None };
         Some(Skipping { gpu_ms: mean(&gpu), gpu_no_skip_ms: mean(&all), same_bytes })
     }
@@ -124,10 +127,12 @@ impl Outcome {
         blocks.find_map(|b| b.image_hash.as_deref())
     }
 
-    /// Whether the last frames of all blocks of a case are the same, to the byte; none of fewer than two.
-    pub fn is_same_picture(&self, i_case: usize) -> Option<bool> {
-        let hashes: Vec<&str> =
-            self.blocks.iter().filter(|b| b.i_case == i_case).filter_map(|b| b.image_hash.as_deref()).collect();
+    /// Whether the last frames of all blocks of a case are the same, to the byte; none of fewer than two. With impostors of
+    /// those that skip: without skipping there are none.
+    pub fn is_same_picture(&self, i_case: usize, case: &Case) -> Option<bool> {
+        let exact = case.scene.draw.impostors == Impostors::Off;
+        let blocks = self.blocks.iter().filter(|b| b.i_case == i_case && (exact || b.of.skip));
+        let hashes: Vec<&str> = blocks.filter_map(|b| b.image_hash.as_deref()).collect();
         (hashes.len() > 1).then(|| hashes.windows(2).all(|w| w[0] == w[1]))
     }
 
@@ -165,6 +170,7 @@ impl Outcome {
             latency_ms: timed.measured(|t| Some(t.latency_ms)),
             queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
             drawn: Summary::of(&timed.column(|t| Some(f64::from(t.n_shown())))).map(|s| [s.min, s.mean, s.max]),
+            impostors_reused: timed.0.iter().filter(|t| is_reused(t)).count(),
             passes: pass_records(&timed, against.as_ref()),
             image_hash: self.image_hash(i, of).map(str::to_owned),
             block_spread: self.block_spread(i, of),
@@ -207,6 +213,11 @@ impl Outcome {
         };
         self.samples.iter().map(row).collect()
     }
+}
+
+/// Whether what is far was shown from a picture that an earlier frame made.
+fn is_reused(times: &FrameTimes) -> bool {
+    matches!(times.plan.decision(Pass::Impostors).reason, PlanReason::Reused { .. })
 }
 
 /// "sort+sprites".

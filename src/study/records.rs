@@ -149,6 +149,8 @@ pub struct Mode {
     pub queue_depth: Option<f64>,
     /// Particles that were drawn in a frame, which distance and view make fewer: least, mean and most.
     pub drawn: Option<[f64; 3]>,
+    /// Frames that showed what is far from a picture that an earlier one made.
+    pub impostors_reused: usize,
     pub passes: Vec<Pass>,
     /// SHA-256 of the last frame's pixels, where it was taken.
     pub image_hash: Option<String>,

@@ -4,14 +4,14 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::frame::choice::Choice;
+use crate::frame::choice::{Choice, ImpostorChoice};
 use crate::frame::choice_resolution::SizeChoice;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::{OnFrame, parallel, serial};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, Scene, Simulate, Threading};
+use crate::model::scene::{DrawPath, Impostors, Scene, Simulate, Threading};
 use crate::passes;
 
 /// How to open a device.
@@ -28,12 +28,14 @@ pub struct DeviceChoice {
 pub struct Stage {
     pub renderer: Renderer,
     pub game: Game,
-    /// Its `draw.path` and `draw.resolution` are what is drawn by.
+    /// Its `draw.path`, `draw.resolution` and `draw.impostors` are what is drawn by.
     pub scene: Arc<Scene>,
-    /// What "auto" came to, where the scene asks for it.
+    /// What `draw.path = "auto"` came to, where the scene asks for it.
     pub choice: Option<Choice>,
     /// The same of its `draw.resolution`.
     pub size_choice: Option<SizeChoice>,
+    /// And of its `draw.impostors`.
+    pub impostor_choice: Option<ImpostorChoice>,
     compiler: Compiler,
     pub device: Device,
     instance: Arc<Instance>,
@@ -66,25 +68,12 @@ impl Stage {
         device: Device,
         instance: Arc<Instance>,
     ) -> Result<Stage> {
-        let mut renderer = Renderer::new(&device, &compiler, &scene, skip)?;
-        let rest = match scene.threads.simulate {
-            Simulate::Gpu => None,
-            Simulate::Cpu => Some(renderer.generate_now(&device)?.0),
+        let (made, impostor_choice) = match scene.draw.impostors {
+            Impostors::Auto => faster(&device, &compiler, &scene, skip)?,
+            _ => (make(&device, &compiler, scene, skip)?, None),
         };
-        let mut game = Game::new(scene.clone(), rest).culling(skip);
-        let (mut scene, mut choice, mut size_choice) = (scene, None, None);
-        if scene.draw.path == DrawPath::Auto {
-            let packet = game.step(0)?;
-            let chosen = renderer.choose_path(&packet)?;
-            Arc::make_mut(&mut scene).draw.path = chosen.path;
-            choice = Some(chosen);
-        }
-        if scene.draw.resolution == Resolution::Auto {
-            let chosen = renderer.choose_resolution(&game.step(0)?, scene.draw.error)?;
-            Arc::make_mut(&mut scene).draw.resolution = chosen.resolution;
-            size_choice = Some(chosen);
-        }
-        Ok(Stage { renderer, game, scene, choice, size_choice, compiler, device, instance })
+        let Made { renderer, game, scene, choice, size_choice } = made;
+        Ok(Stage { renderer, game, scene, choice, size_choice, impostor_choice, compiler, device, instance })
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
@@ -122,4 +111,74 @@ impl Stage {
         }
         Err(Error::Check { what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")) })
     }
+}
+
+/// What a stage holds of one scene.
+struct Made {
+    renderer: Renderer,
+    game: Game,
+    scene: Arc<Scene>,
+    choice: Option<Choice>,
+    size_choice: Option<SizeChoice>,
+}
+
+/// Everything that `scene`, whose impostors are decided, needs on a device.
+fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool) -> Result<Made> {
+    let mut renderer = Renderer::new(device, compiler, &scene, skip)?;
+    let rest = match scene.threads.simulate {
+        Simulate::Gpu => None,
+        Simulate::Cpu => Some(renderer.generate_now(device)?.0),
+    };
+    let mut game = Game::new(scene.clone(), rest).culling(skip);
+    let (mut choice, mut size_choice) = (None, None);
+    if scene.draw.path == DrawPath::Auto {
+        let packet = game.step(0)?;
+        let chosen = renderer.choose_path(&packet)?;
+        Arc::make_mut(&mut scene).draw.path = chosen.path;
+        choice = Some(chosen);
+    }
+    if scene.draw.resolution == Resolution::Auto {
+        let chosen = renderer.choose_resolution(&game.step(0)?, scene.draw.error)?;
+        Arc::make_mut(&mut scene).draw.resolution = chosen.resolution;
+        size_choice = Some(chosen);
+    }
+    Ok(Made { renderer, game, scene, choice, size_choice })
+}
+
+/// `scene` with impostors or without, whichever draws its first frames faster.
+fn faster(
+    device: &Device,
+    compiler: &Compiler,
+    scene: &Arc<Scene>,
+    skip: bool,
+) -> Result<(Made, Option<ImpostorChoice>)> {
+    let with = |scene: &Arc<Scene>, impostors| {
+        let mut scene = Scene::clone(scene);
+        scene.draw.impostors = impostors;
+        Arc::new(scene)
+    };
+    let mut off = make(device, compiler, with(scene, Impostors::Off), skip)?;
+    if !skip {
+        // Where nothing is skipped there are none.
+        return Ok((off, None));
+    }
+    let off_ms = off.renderer.time_frames(&mut off.game)?;
+    // One at a time: both may not fit. What draws stays the same.
+    let Made { scene, choice, .. } = off;
+    let made = make(device, compiler, with(&scene, Impostors::On), skip).and_then(|mut on| {
+        let ms = on.renderer.time_frames(&mut on.game)?;
+        Ok((on, ms))
+    });
+    let (on, on_ms) = match made {
+        Ok((on, ms)) => (Some(on), Some(ms)),
+        // What does not fit is not used.
+        Err(Error::Limit { .. }) => (None, None),
+        Err(error) => return Err(error),
+    };
+    let chosen = ImpostorChoice { on: on_ms.is_some_and(|ms| ms < off_ms), off_ms, on_ms };
+    let made = match on.filter(|_| chosen.on) {
+        Some(on) => on,
+        None => make(device, compiler, scene, skip)?,
+    };
+    Ok((Made { choice, ..made }, Some(chosen)))
 }

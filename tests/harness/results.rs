@@ -25,6 +25,7 @@ pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {
         gpu_ms: None,
         latency_ms: None,
         queue_depth: None,
+        impostors_reused: 0,
         drawn: None,
         passes: Vec::new(),
         image_hash: None,

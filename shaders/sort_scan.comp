@@ -4,7 +4,7 @@
 
 // Exclusive prefix sum of table[digit][tile] in one workgroup: an invocation a digit.
 
-layout(local_size_x = 256) in;
+layout(local_size_x = 1 << DIGIT_BITS) in;
 
 layout(std430, binding = 1) buffer Table { uint table[]; };
 
@@ -20,7 +20,7 @@ void main() {
     }
     sums[d] = total;
     barrier();
-    // Hillis-Steele over the 256 digits.
+    // Hillis-Steele over the digits.
     for (uint reach = 1; reach < N_DIGITS; reach *= 2) {
         uint left = d >= reach ? sums[d - reach] : 0u;
         barrier();

@@ -9,7 +9,8 @@ use glam::DVec3;
 use harness::Gpu;
 use nimbus::gpu::Compiler;
 use nimbus::layout::particle::{DrawnRecord, PlacedRecord};
-use nimbus::passes::{self, sort::Sort};
+use nimbus::passes;
+use nimbus::passes::sort::{Counts, Sort, TILE};
 use nimbus::reference::sort::{depths, key32, order};
 
 type Entry = [u32; 2];
@@ -24,7 +25,7 @@ fn sorted(gpu: &mut Gpu, sort: &Sort, keys: &[u32], n_bits: u32) -> Vec<Entry> {
 
 /// The first place where `found` is not the stable order of the keys' low `n_bits`.
 fn misplaced(found: &[Entry], keys: &[u32], n_bits: u32) -> Option<usize> {
-    let low = |&key: &u32| if n_bits == 16 { key & 0xffff } else { key };
+    let low = |&key: &u32| if n_bits < 32 { key & ((1 << n_bits) - 1) } else { key };
     let expected = order(&keys.iter().map(low).collect::<Vec<_>>());
     assert_eq!(found.len(), expected.len());
     (0..found.len()).find(|&k| found[k] != [keys[expected[k] as usize], expected[k]])
@@ -53,6 +54,31 @@ fn entries_come_out_in_the_stable_order_of_their_keys() {
                 let found = sorted(&mut gpu, &sort, &keys, n_bits);
                 assert_eq!(misplaced(&found, &keys, n_bits), None, "{n} {kind} keys of {n_bits} bits");
             }
+        }
+    }
+}
+
+#[test]
+fn keys_of_any_width_come_out_in_order_counted_by_the_device() {
+    let mut gpu = Gpu::new();
+    let n = 5000u32;
+    let mut random = Random(4);
+    for n_bits in [1, 5, 8, 9, 10, 15, 18, 27] {
+        let sort = Sort::for_bits(&gpu.device, &gpu.compiler, n, n_bits).expect("sort");
+        // Above the key nothing, as above the number of a bin there is nothing up to the next multiple of any digits.
+        let entries: Vec<Entry> = (0..n).map(|i| [random.word() as u32 & ((1 << n_bits) - 1), i]).collect();
+        for n_counted in [0, 1, 1025, n] {
+            let (buffer, out) = (gpu.upload(&entries), gpu.buffer::<Entry>(n as usize));
+            let counts = gpu.upload(&[7, n_counted, n_counted.div_ceil(TILE), 1, 1]);
+            gpu.run(|rec| {
+                let counts = Counts { buffer: &counts, i_count: 1, i_groups: 2 };
+                let sorted = sort.record_counted(rec, &buffer, n_bits, counts)?;
+                rec.copy(sorted, &out);
+                Ok(())
+            });
+            let found: Vec<Entry> = gpu.download(&out, n_counted as usize);
+            let keys: Vec<u32> = entries[..n_counted as usize].iter().map(|e| e[0]).collect();
+            assert_eq!(misplaced(&found, &keys, n_bits), None, "{n_counted} keys of {n_bits} bits");
         }
     }
 }

@@ -1,4 +1,4 @@
-// Stable radix sort, 8 bits a pass. A workgroup owns a tile of 1024 entries, each invocation a run of consecutive ones, so
+// Stable radix sort, DIGIT_BITS bits a pass. A workgroup owns a tile of 1024 entries, each invocation a run of consecutive ones, so
 // that order inside a tile is the order of (invocation, turn). The fewer invocations, the fewer counters to clear and sum:
 // the host asks for one subgroup, 32 at most.
 
@@ -6,9 +6,13 @@
 #define TILE_INVOCATIONS 32
 #endif
 
+#ifndef DIGIT_BITS
+#define DIGIT_BITS 8
+#endif
+
 const uint TILE = 1024;
 const uint RUN = TILE / TILE_INVOCATIONS;
-const uint N_DIGITS = 256;
+const uint N_DIGITS = 1 << DIGIT_BITS;
 
 // `i_count`: the word of `n_counted` that holds the number of entries; NO_COUNT where the host knows it.
 layout(push_constant) uniform Push { uint n_entries; uint i_count; uint shift; } push;

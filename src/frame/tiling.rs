@@ -30,7 +30,7 @@ impl Tiling {
         let tiles = Tiles::new(device, compiler, division, n_max, variant)?;
         let bytes = u64::from(division.width) * u64::from(division.height) * variant.format.bytes_per_pixel();
         let picture = |name| Buffer::new::<u8>(device, name, bytes, Place::Device);
-        let sort = Sort::new(device, compiler, tiles.capacity())?;
+        let sort = Sort::for_bits(device, compiler, tiles.capacity(), division.n_bits())?;
         Ok(Tiling { sort, tiles, pictures: [picture("tiles.even")?, picture("tiles.odd")?] })
     }
 

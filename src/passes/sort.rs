@@ -1,7 +1,7 @@
 //! sort: the drawn particles far to near.
 //!
 //! In: placed particles, group of each, what is drawn of the groups, the camera's forward. Out: (key, particle) in ascending key, ties in ascending index. Law:
-//! stable least-significant-digit radix sort, 8 bits a pass, keys of 16 or 32 bits. Source: docs/model.md §9, §11.
+//! stable least-significant-digit radix sort, 8 or 9 bits a pass at most, keys of 16 or 32 bits. Source: docs/model.md §9, §11.
 //! Error: none in the sort; a key holds the depth to an ulp (32 bits) or to 2⁻¹⁶ of the scene (16 bits).
 
 use crate::error::Result;
@@ -26,8 +26,9 @@ record! {
 pub const NO_COUNT: u32 = u32::MAX;
 /// Entries a workgroup sorts; the shaders' TILE.
 pub const TILE: u32 = 1024;
+/// Bits of a pass, the shaders' DIGIT_BITS: as many everywhere, and where a pass fewer is to be had by it.
 const DIGIT_BITS: u32 = 8;
-const N_DIGITS: u64 = 1 << DIGIT_BITS;
+const MOST_DIGIT_BITS: u32 = 9;
 
 pub struct Sort {
     key: Kernel,
@@ -36,23 +37,47 @@ pub struct Sort {
     scatter: Kernel,
     table: Buffer,
     swapped: Buffer,
+    digit_bits: u32,
 }
 
 impl Sort {
-    /// Room for `n_max` entries.
+    /// Room for `n_max` entries, for keys of whole bytes.
     pub fn new(device: &Device, compiler: &Compiler, n_max: u32) -> Result<Sort> {
+        Sort::by_digits(device, compiler, n_max, DIGIT_BITS)
+    }
+
+    /// Room for `n_max` entries, for keys of `n_bits`: in as few passes as may be, of as few bits.
+    pub fn for_bits(device: &Device, compiler: &Compiler, n_max: u32, n_bits: u32) -> Result<Sort> {
+        let limits = device.limits();
+        // Counters of a tile, two a word, for every invocation; and an invocation a digit.
+        let words = (1 << MOST_DIGIT_BITS) / 2 * limits.subgroup_size.clamp(8, 32);
+        let fits =
+            4 * words <= limits.max_shared_memory_bytes && 1 << MOST_DIGIT_BITS <= limits.max_workgroup_invocations;
+        let n_passes = n_bits.div_ceil(if fits { MOST_DIGIT_BITS } else { DIGIT_BITS });
+        Sort::by_digits(device, compiler, n_max, n_bits.div_ceil(n_passes.max(1)).max(1))
+    }
+
+    fn by_digits(device: &Device, compiler: &Compiler, n_max: u32, digit_bits: u32) -> Result<Sort> {
         // One subgroup a tile, and no more than shared memory holds counters for.
         let invocations = device.limits().subgroup_size.clamp(8, 32);
         let together = device.limits().is_one_subgroup(invocations);
-        let macros = [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", u32::from(together))];
+        let macros =
+            [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", u32::from(together)), ("DIGIT_BITS", digit_bits)];
         let kernel = |name, push| Kernel::with_macros(device, compiler, name, push, &[], &macros);
         Ok(Sort {
-            key: kernel("sort.key", KeyPush::FIELDS)?,
+            key: Kernel::new(device, compiler, "sort.key", KeyPush::FIELDS, &[])?,
             count: kernel("sort.count", DigitPush::FIELDS)?,
-            scan: kernel("sort.scan", DigitPush::FIELDS)?,
+            // An invocation a digit: as many as that takes, in whatever subgroups.
+            scan: Kernel::with_macros(device, compiler, "sort.scan", DigitPush::FIELDS, &[], &macros[2..])?,
             scatter: kernel("sort.scatter", DigitPush::FIELDS)?,
-            table: Buffer::new::<u32>(device, "sort.table", N_DIGITS * u64::from(n_max.div_ceil(TILE)), Place::Device)?,
+            table: Buffer::new::<u32>(
+                device,
+                "sort.table",
+                u64::from(n_max.div_ceil(TILE)) << digit_bits,
+                Place::Device,
+            )?,
             swapped: Buffer::new::<[u32; 2]>(device, "sort.swapped", u64::from(n_max), Place::Device)?,
+            digit_bits,
         })
     }
 
@@ -99,7 +124,7 @@ impl Sort {
         n: Entries<'_>,
     ) -> Result<&'a Buffer> {
         let (mut from, mut to) = (entries, &self.swapped);
-        for shift in (0..n_bits).step_by(DIGIT_BITS as usize) {
+        for shift in (0..n_bits).step_by(self.digit_bits as usize) {
             match n {
                 Entries::Known(n_entries) => {
                     let push = DigitPush { n_entries, i_count: NO_COUNT, shift };

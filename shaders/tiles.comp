@@ -327,8 +327,8 @@ void main() {
     if (w >= (ROUNDS != 0 ? rounds[push.i_round].tiles.w : rounds[push.i_round].alone.w)) {
         return;
     }
-    uvec4 range = ranges[w / (TILES_ACROSS * TILES_ACROSS)];
-    uint i_tile = w % (TILES_ACROSS * TILES_ACROSS);
+    uvec4 range = ranges[w];
+    uint i_tile = range.w;
     uvec2 tile = TILES_ACROSS * uvec2(range.z % push.n_bins_x, range.z / push.n_bins_x)
                + uvec2(i_tile % TILES_ACROSS, i_tile / TILES_ACROSS);
     uvec2 at = tile * uvec2(TILE_WIDTH, ROWS) + uvec2(RUN * (t / ROWS), t % ROWS);

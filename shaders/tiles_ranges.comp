@@ -3,15 +3,15 @@
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Where each bin's pairs lie among the sorted ones, and which bins have any. The order of those decides nothing: no two
-// share a pixel.
+// Where each bin's pairs lie among the sorted ones, and the tiles of it that any of them reaches. Their order decides nothing:
+// no two share a pixel.
 
 layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push { uint n_bins; uint i_round; uint max_groups; uint unused; } push;
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) buffer Rounds { Round rounds[]; };
-// (first pair, end, bin)
+// (first pair, end, bin, tile of it)
 layout(std430, binding = 2) writeonly buffer Ranges { uvec4 ranges[]; };
 
 // The first of n pairs whose bin is not below `bin`.
@@ -36,17 +36,28 @@ void main() {
     }
     uint n = rounds[push.i_round].extent.w;
     uint first = lower_bound(n, bin), end = lower_bound(n, bin + 1u);
-    if (first < end) {
-        uint before = atomicAdd(rounds[push.i_round].tiles.w, TILES);
-        ranges[before / TILES] = uvec4(first, end, bin, 0);
-        uvec2 groups = uvec2(min(before + TILES, push.max_groups), (before + TILES + push.max_groups - 1u) / push.max_groups);
-        if (push.i_round == 0 && rounds[0].bins.w == 0) {
-            atomicAdd(rounds[0].alone.w, TILES);
-            atomicMax(rounds[0].alone.x, groups.x);
-            atomicMax(rounds[0].alone.y, groups.y);
-        } else {
-            atomicMax(rounds[push.i_round].tiles.x, groups.x);
-            atomicMax(rounds[push.i_round].tiles.y, groups.y);
+    uint reached = 0;
+    for (uint i = first; i < end; ++i) {
+        reached |= pairs[i].x >> BIN_BITS;
+    }
+    uint n_tiles = bitCount(reached);
+    if (n_tiles == 0) {
+        return;
+    }
+    uint before = atomicAdd(rounds[push.i_round].tiles.w, n_tiles);
+    uint n_before = before;
+    for (uint i = 0; i < TILES; ++i) {
+        if ((reached >> i & 1u) != 0) {
+            ranges[n_before++] = uvec4(first, end, bin, i);
         }
+    }
+    uvec2 groups = uvec2(min(n_before, push.max_groups), (n_before + push.max_groups - 1u) / push.max_groups);
+    if (push.i_round == 0 && rounds[0].bins.w == 0) {
+        atomicAdd(rounds[0].alone.w, n_tiles);
+        atomicMax(rounds[0].alone.x, groups.x);
+        atomicMax(rounds[0].alone.y, groups.y);
+    } else {
+        atomicMax(rounds[push.i_round].tiles.x, groups.x);
+        atomicMax(rounds[push.i_round].tiles.y, groups.y);
     }
 }

@@ -280,7 +280,7 @@ impl Tiles {
             blocks: buffer("tiles.blocks", n_blocks.into(), 1)?,
             round: Buffer::new::<RoundRecord>(device, "tiles.rounds", n_rounds.into(), Place::Device)?,
             entries: buffer("tiles.entries", capacity, 2)?,
-            found: buffer("tiles.ranges", division.n_bins.into(), 4)?,
+            found: buffer("tiles.ranges", u64::from(division.n_bins * TILES_ACROSS * TILES_ACROSS), 4)?,
             state: buffer("tiles.state", n_state, 4)?,
             under: buffer("tiles.under", n_under, variant.format.bytes_per_pixel() / 4)?,
             depths: buffer("tiles.depths", n_under, 1)?,

@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "tiles.glsl"
 
@@ -37,8 +38,11 @@ void main() {
     uint n = rounds[push.i_round].extent.w;
     uint first = lower_bound(n, bin), end = lower_bound(n, bin + 1u);
     uint reached = 0;
-    for (uint i = first; i < end; ++i) {
-        reached |= pairs[i].x >> BIN_BITS;
+    // By eights: llvmpipe ends all loops of an invocation after 65 535 turns, and a bin may have as many pairs.
+    for (uint i = first; i < end; i += 8) {
+        [[unroll]] for (uint k = 0; k < 8; ++k) {
+            reached |= pairs[min(i + k, end - 1u)].x >> BIN_BITS;
+        }
     }
     uint n_tiles = bitCount(reached);
     if (n_tiles == 0) {

@@ -211,6 +211,30 @@ fn workgroups_and_rounds_do_not_show() {
     assert_within("rounds", &rounds, &truths, &bounds);
 }
 
+/// As many splats as a round may have, all in one bin, of which the last ones alone reach another of its tiles: loops over
+/// a bin's pairs take fewer turns than a device may end them after.
+#[test]
+fn a_bin_of_all_splats_keeps_the_last_ones() {
+    let mut gpu = Gpu::new();
+    let mut picture = front();
+    let side = 2.0 * (22.5f64).to_radians().tan() / 120.0;
+    // Of a pixel's centre, at a depth.
+    let at = |picture: &Picture, i: f64, j: f64, z: f64| {
+        let slopes = [(i + 0.5 - 80.0) * side, (60.0 - j - 0.5) * side];
+        picture.at(slopes[0] * z, slopes[1] * z, z)
+    };
+    let [near, far] = [at(&picture, 66.0, 34.0, 4.0), at(&picture, 92.0, 60.0, 5.0)];
+    for i in 0..65_536 {
+        picture = if i < 65_520 { picture.blob(near, 1.2 * side, 1e-7) } else { picture.blob(far, 10.0 * side, 0.5) };
+    }
+    let (target, format) = FORMATS[2];
+    let tiled = usual(&gpu, format);
+    let values = picture.draw_by(&mut gpu, None, target, Some(&tiled));
+    let alpha = values[4 * (60 * 160 + 92) + 3];
+    // Sixteen layers of tau = 1/2 through their centres: 1 - e^-8.
+    assert!((alpha - (1.0 - (-8f64).exp())).abs() < 1e-5, "{alpha}");
+}
+
 #[test]
 fn wrong_pictures_are_noticed() {
     let mut gpu = Gpu::new();

@@ -14,6 +14,9 @@ use crate::model::scene::DrawPath;
 /// Timed turns of each way; before them one that is not, in which a driver may compile.
 const N_TURNS: usize = 3;
 
+/// Ways whose first timed turns are this many times apart need no second one.
+const FAR_APART: f64 = 4.0;
+
 /// The way that was the faster, and the medians of both, ms of device time (of wall time without timestamps).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Choice {
@@ -102,6 +105,11 @@ impl Renderer {
                         times[k].push(time);
                     }
                 }
+            }
+            if let [[.., sprites], [.., tiles]] = times.each_ref().map(Vec::as_slice)
+                && (*sprites > FAR_APART * tiles || *tiles > FAR_APART * sprites)
+            {
+                break;
             }
         }
         let [sprites_ms, tiles_ms] = times.map(|mut of| {

@@ -5,6 +5,8 @@
 //! once. Error: f32's in each layer and the format's once; what lies behind a pixel that lets less than `saturated` through
 //! is left out.
 
+mod division;
+
 use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
 use crate::gpu::memory::{TargetFormat, has_depth24};
@@ -13,6 +15,8 @@ use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
+
+pub use division::{Division, RUN, TILES_ACROSS, invocations};
 
 record! {
     pub struct SplatPush {
@@ -77,55 +81,11 @@ pub const BLOCK: u32 = 256;
 const MOST_BLOCKS: u32 = 256;
 /// Words of a round.
 const ROUND_WORDS: u32 = (size_of::<RoundRecord>() / 4) as u32;
-/// An invocation's pixels; the shader's RUN.
-pub const RUN: u32 = 8;
-/// Tiles along a bin's side; the shaders' TILES_ACROSS.
-pub const TILES_ACROSS: u32 = 4;
 /// Blocks: workgroups along x that every device has.
 const MOST: u32 = 65_535;
-/// Bins: twice a block's worst pairs are [`MOST_PAIRS`] then.
-const MOST_BINS: u32 = 1 << 15;
 /// Most pairs that there is room for at once; the sort goes through its tiles of 1024 twice in one invocation, and
 /// llvmpipe's loops take 65 535 turns.
 const MOST_PAIRS: u64 = 1 << 24;
-
-/// How the picture is divided.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Division {
-    pub width: u32,
-    pub height: u32,
-    /// Invocations of a workgroup, and pixels of its tile.
-    invocations: u32,
-    tile: [u32; 2],
-    n_bins_x: u32,
-    pub n_bins: u32,
-}
-
-impl Division {
-    /// `width` × `height` pixels by workgroups of so many invocations. An error where there would be too many bins.
-    pub fn of(width: u32, height: u32, invocations: u32) -> Result<Division> {
-        let rows = if invocations <= 16 { 8 } else { 16 };
-        let tile = [RUN * (invocations / rows), rows];
-        let [n_bins_x, n_bins_y] = [width.div_ceil(TILES_ACROSS * tile[0]), height.div_ceil(TILES_ACROSS * tile[1])];
-        match n_bins_x.checked_mul(n_bins_y) {
-            Some(n_bins) if n_bins <= MOST_BINS => Ok(Division { width, height, invocations, tile, n_bins_x, n_bins }),
-            _ => Err(Error::limit(format!(
-                "draw.path = \"tiles\": {width} x {height} pixels are more than its {MOST_BINS} bins of {} x {}; expected \"sprites\"",
-                TILES_ACROSS * tile[0],
-                TILES_ACROSS * tile[1]
-            ))),
-        }
-    }
-
-    /// Bits of a bin's number.
-    pub fn n_bits(&self) -> u32 {
-        (self.n_bins - 1).max(1).ilog2() + 1
-    }
-
-    fn n_pixels(&self) -> u64 {
-        u64::from(self.width) * u64::from(self.height)
-    }
-}
 
 /// How a scene is drawn, constant over a run.
 #[derive(Debug, Clone, Copy)]
@@ -202,11 +162,6 @@ fn capacity(n_splats: u32, division: &Division, limits: &Limits, most: Option<u6
     (all / 4).max(1 << 20).min(all).min(room).min(most.unwrap_or(MOST_PAIRS)).max(two_blocks)
 }
 
-/// Invocations of a workgroup: one subgroup.
-pub fn invocations(limits: &Limits) -> u32 {
-    limits.subgroup_size.clamp(8, 64)
-}
-
 impl Tiles {
     /// Room for `n_max` splats on a picture divided as `division` says.
     pub fn new(
@@ -280,7 +235,7 @@ impl Tiles {
             blocks: buffer("tiles.blocks", n_blocks.into(), 1)?,
             round: Buffer::new::<RoundRecord>(device, "tiles.rounds", n_rounds.into(), Place::Device)?,
             entries: buffer("tiles.entries", capacity, 2)?,
-            found: buffer("tiles.ranges", u64::from(division.n_bins * TILES_ACROSS * TILES_ACROSS), 4)?,
+            found: buffer("tiles.ranges", division.n_tiles(), 4)?,
             state: buffer("tiles.state", n_state, 4)?,
             under: buffer("tiles.under", n_under, variant.format.bytes_per_pixel() / 4)?,
             depths: buffer("tiles.depths", n_under, 1)?,

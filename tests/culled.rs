@@ -185,28 +185,30 @@ fn changes(picture: &Picture) -> Vec<f64> {
     cut.iter().flat_map(|c| [most[0], most[1], most[2], 1.0].map(|s| c.share() * s)).collect()
 }
 
-#[test]
-fn a_smallest_size_changes_no_more_than_it_leaves_out() {
-    let gpu = Gpu::new();
+/// Random scenes and cameras drawn with what `on` and with what `off` says, which draws all that `on` does: no number differs by
+/// more than what is left out may change. How many particles are left out, how many numbers change, and by how much of that
+/// bound at most.
+fn compare(gpu: &Gpu, sets: impl Fn(&mut Random) -> [Vec<(&'static str, String)>; 2]) -> (u32, usize, f64) {
     let (mut n_changed, mut closest, mut n_left) = (0, 0f64, 0);
     for seed in 1..=5 {
         let mut random = Random(100 + seed);
         let mut point = |reach: f64| DVec3::from([0; 3].map(|_| f64::from(random.within(-reach, reach))));
         let (seen, list) = ([point(1.0), point(4.0)], around(seed));
-        let smallest = format!("{}", random.within(0.3, 6.0));
+        let sets = sets(&mut random);
         for (path, name) in [(DrawPath::Sprites, "'sprites'"), (DrawPath::Tiles, "'tiles'")] {
-            let what = format!("{seed}, {name}, {smallest} pixels");
-            let of = |smallest: &str| {
-                let overrides = set(&[("path", name), ("smallest", smallest), ("threshold", "0.0005")]);
-                let frame = frame(&gpu, &gpu.compiler, &scene(&list, seen, &overrides));
+            let what = format!("{seed}, {name}, {:?}", sets[0]);
+            let of = |keys: &[(&str, String)]| {
+                let keys: Vec<(&str, &str)> = keys.iter().map(|(key, value)| (*key, value.as_str())).collect();
+                let overrides = [set(&[("path", name)]), set(&keys)].concat();
+                let frame = frame(gpu, &gpu.compiler, &scene(&list, seen, &overrides));
                 let (truths, bounds) = truth(&frame.picture, path);
                 assert_within(&what, &frame.values, &truths, &bounds);
                 (frame, truths, bounds)
             };
-            let (on, off) = (of(&smallest), of("0"));
-            n_left += off.0.n_kept.expect("a count") - on.0.n_kept.expect("a count");
+            let (on, off) = (of(&sets[0]), of(&sets[1]));
+            let n_kept = |frame: &Frame| frame.n_kept.unwrap_or(list.len() as u32);
+            n_left += n_kept(&off.0) - n_kept(&on.0);
             let changes = changes(&on.0.picture);
-            // The threshold cuts both.
             let exact: Vec<f64> = changes.iter().map(|c| c + 1e-13).collect();
             assert_within(&format!("{what}, true numbers"), &on.1, &off.1, &exact);
             let allowed: Vec<f64> = (0..changes.len()).map(|i| changes[i] + on.2[i] + off.2[i]).collect();
@@ -217,6 +219,27 @@ fn a_smallest_size_changes_no_more_than_it_leaves_out() {
         }
     }
     println!("{n_left} left out, {n_changed} numbers changed, up to {closest:.3} of what may be");
+    (n_left, n_changed, closest)
+}
+
+#[test]
+fn a_smallest_size_changes_no_more_than_it_leaves_out() {
+    let (n_left, n_changed, closest) = compare(&Gpu::new(), |random| {
+        let smallest = random.within(0.3, 6.0).to_string();
+        // The threshold cuts both.
+        let of = |smallest: String| vec![("smallest", smallest), ("threshold", "0.0005".to_owned())];
+        [of(smallest), of("0".to_owned())]
+    });
     // The bound is met: a single layer before nothing.
     assert!(n_left > 60 && n_changed > 1000 && closest > 0.5 && closest <= 1.0 + 1e-6);
+}
+
+#[test]
+fn all_that_leaves_out_together_changes_no_more_than_it_says() {
+    let (n_left, n_changed, closest) = compare(&Gpu::new(), |random| {
+        let [smallest, threshold] = [random.within(0.3, 4.0), random.within(0.001, 0.02)].map(|v| v.to_string());
+        let on = vec![("cull", "'on'".to_owned()), ("smallest", smallest), ("threshold", threshold)];
+        [on, vec![("cull", "'off'".to_owned())]]
+    });
+    assert!(n_left > 60 && n_changed > 10_000 && closest > 0.5 && closest <= 1.0 + 1e-6);
 }

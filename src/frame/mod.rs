@@ -3,7 +3,6 @@
 
 pub mod buffers;
 pub mod choice;
-pub mod choice_resolution;
 mod culling;
 mod drawing;
 mod drawn;

@@ -20,7 +20,7 @@ use crate::model::scene::{Cull, Draw, Scene};
 /// Timed turns of each value; more of frames that are so short that all turns take less than [`ENOUGH_MS`].
 const LEAST_TURNS: usize = 3;
 const MOST_TURNS: usize = 9;
-const ENOUGH_MS: f64 = 200.0;
+const ENOUGH_MS: f64 = 1000.0;
 
 /// What draws one way and waits for its turn.
 struct Spare<K, T> {

@@ -47,7 +47,7 @@ impl Choice {
     /// As users are told.
     pub fn text(&self) -> String {
         let of = |t: &Tried| match (t.ms(), t.rmse) {
-            (Some(ms), Some(rmse)) if rmse == 0.0 => format!("{} takes {ms:.2} ms (RMSE 0)", t.value),
+            (Some(ms), Some(0.0)) => format!("{} takes {ms:.2} ms (RMSE 0)", t.value),
             (Some(ms), Some(rmse)) => format!("{} takes {ms:.2} ms (RMSE {rmse:.2e})", t.value),
             _ => format!("{} does not fit this device", t.value),
         };

@@ -13,9 +13,8 @@ use crate::model::count::Count;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::resolution::Resolution;
-use crate::model::scene::MAX_PAIR_LEVELS;
-use crate::model::scene::{Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
-use crate::model::scene::{Simulate, Threading, Threads, Time};
+use crate::model::scene::{Chunks, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
+use crate::model::scene::{MAX_CHUNKS, MAX_PAIR_LEVELS, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -181,6 +180,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let threshold = s.f64("threshold", 0.0, Bounds::From(0.0, 1.0))?;
     let cull = s.choice("cull", "on", &[("on", true), ("off", false)], &[])?;
+    let chunks = read_chunks(&mut s)?;
     let smallest = s.f64("smallest", 0.0, Bounds::Within(0.0, 1000.0))?;
     if smallest > 0.0 && !cull {
         return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {smallest}")));
@@ -207,6 +207,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         error,
         cutoff,
         threshold,
+        chunks,
         cull,
         smallest,
         sort_bits,
@@ -222,6 +223,7 @@ const DRAW_KEYS: &[&str] = &[
     "impostor_error",
     "cutoff",
     "threshold",
+    "chunks",
     "cull",
     "smallest",
     "sort_bits",
@@ -256,6 +258,16 @@ fn read_resolution(s: &mut Section) -> Result<Resolution> {
             Err(s.fault("resolution", format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe())))
         }
     }
+}
+
+/// A number of chunks, or "auto".
+fn read_chunks(s: &mut Section) -> Result<Chunks> {
+    let is_auto = s.value("chunks").is_some_and(|node| matches!(&node.value, Value::String(s) if s == "auto"));
+    if is_auto {
+        s.record("chunks", json!("auto"));
+        return Ok(Chunks::Auto);
+    }
+    Ok(Chunks::Of(s.u32("chunks", 0, 0, MAX_CHUNKS)?))
 }
 
 fn read_count(s: &mut Section) -> Result<Option<Count>> {

@@ -144,6 +144,18 @@ impl Impostors {
         [("off", Impostors::Off), ("on", Impostors::On), ("auto", Impostors::Auto)];
 }
 
+/// Most chunks that sprites are drawn in.
+pub const MAX_CHUNKS: u32 = 256;
+
+/// In what order sprites are drawn, and what becomes of pixels that are full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chunks {
+    /// So many, near to far, and after each the pixels that let nothing more through are left out; 0: far to near, all of it.
+    Of(u32),
+    /// Whichever is the fastest at the scene's first frame.
+    Auto,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     pub path: DrawPath,
@@ -158,6 +170,8 @@ pub struct Draw {
     pub cutoff: f64,
     /// And where their optical depth falls under this; 0: nowhere.
     pub threshold: f64,
+    /// Of path "sprites".
+    pub chunks: Chunks,
     /// Whether particles that show in no pixel are left out before the sort.
     pub cull: bool,
     /// And those whose σ is narrower than so many pixels; 0: none.

@@ -10,8 +10,14 @@ use nimbus::model::resolution::Resolution;
 use nimbus::model::scene::{Cull, Draw, DrawPath, Scene};
 use nimbus::study::stage::{DeviceChoice, Stage};
 
-const ALL: [&str; 5] =
-    ["draw.path='auto'", "draw.cull='auto'", "draw.threshold='auto'", "draw.smallest='auto'", "draw.resolution='auto'"];
+const ALL: [&str; 6] = [
+    "draw.path='auto'",
+    "draw.chunks='auto'",
+    "draw.cull='auto'",
+    "draw.threshold='auto'",
+    "draw.smallest='auto'",
+    "draw.resolution='auto'",
+];
 
 /// Blobs in a list as (place, σ, optical depth), seen by 96 × 72 pixels.
 fn scene(blobs: &[([f64; 3], f64, f64)], overrides: &[&str]) -> Scene {
@@ -69,10 +75,11 @@ fn rmse(a: &[f32], b: &[f32]) -> f64 {
     (sum / a.len() as f64).sqrt()
 }
 
-/// The scene with what was taken, and the exact one by the path that was taken.
+/// The scene with what was taken, and the exact one by the path and the chunks that were taken.
 fn named(scene: &Scene, taken: &Frame) -> [Scene; 2] {
     let draw = scene.draw.exact();
-    [taken.draw, Draw { path: taken.draw.path, ..draw }].map(|draw| Scene { draw, ..scene.clone() })
+    [taken.draw, Draw { path: taken.draw.path, chunks: taken.draw.chunks, ..draw }]
+        .map(|draw| Scene { draw, ..scene.clone() })
 }
 
 /// Draws with everything "auto" and checks what has to hold whatever was the fastest.
@@ -89,7 +96,9 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
     assert!(exact.values.iter().any(|v| *v > 0.1), "something is drawn");
     // What the last one says of all together is what is found, and every value was tried.
     let n_tried: Vec<(&str, usize)> = auto.choices.iter().map(|c| (c.key, c.tried.len())).collect();
-    assert_eq!(n_tried, [("path", 2), ("cull", 2), ("threshold", 4), ("smallest", 4), ("resolution", 3)]);
+    let of_sprites = if auto.draw.path == DrawPath::Sprites { &[("chunks", 4)][..] } else { &[] };
+    let of_all = [("cull", 2), ("threshold", 4), ("smallest", 4), ("resolution", 3)];
+    assert_eq!(n_tried, [&[("path", 2)], of_sprites, &of_all].concat());
     let last = auto.choices.last().map(|c| &c.tried[c.taken]).and_then(|t| t.rmse).expect("an error");
     assert!((last - found).abs() <= 1e-6 * (1.0 + found), "told {last:e}, found {found:e}");
     assert!(auto.choices.iter().flat_map(|c| &c.tried).all(|t| t.ms().is_some_and(|ms| ms > 0.0)));
@@ -97,6 +106,21 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
         assert!(auto.bytes == exact.bytes);
     }
     auto
+}
+
+#[test]
+fn with_sprites_chunks_are_chosen_too() {
+    let layers = blobs(600, [0.8, 1.2], [0.5, 1.0]);
+    let set = ["draw.path='sprites'", "draw.chunks='auto'", "draw.threshold='auto'", "film.format='rgba16f'"];
+    let asked = scene(&layers, &set);
+    let auto = frame(asked.clone());
+    auto.choices.iter().for_each(|choice| println!("{}", choice.text()));
+    let keys: Vec<(&str, usize)> = auto.choices.iter().map(|c| (c.key, c.tried.len())).collect();
+    assert_eq!(keys, [("chunks", 4), ("threshold", 4)]);
+    // They round otherwise than half floats do layer by layer, which is no error of theirs.
+    assert!(auto.choices[0].tried[1..].iter().all(|t| t.rmse.is_some_and(|rmse| rmse > 0.0)));
+    let [named, exact] = named(&asked, &auto).map(frame);
+    assert!(auto.bytes == named.bytes && rmse(&auto.values, &exact.values) <= asked.draw.error);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What draws a frame's picture, and into what: surfaces first, over them the blobs, in one of two ways.
 
 use super::buffers::Buffers;
+use super::chunks::{self, Chunks};
 use super::feed::IN_FLIGHT;
 use super::impostors::Impostors;
 use super::packet::Packet;
@@ -13,7 +14,7 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
+use crate::model::scene::{Chunks as ChunkMode, DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
 use crate::passes::tiles::View;
@@ -21,8 +22,10 @@ use crate::passes::tiles::View;
 use super::grouping::is_grouped;
 
 pub(super) struct Drawing {
-    /// None where only tiles draw.
+    /// Far to near; None where chunks draw them, or only tiles.
     sprites: Option<Sprites>,
+    /// Near to far.
+    chunks: Option<Chunks>,
     /// None where only sprites draw.
     tiling: Option<Tiling>,
     /// A frame that changes the picture draws into the one that the frame before has not. None where nothing is drawn by
@@ -76,13 +79,25 @@ impl Drawing {
         let [_, of_shells @ ..] = variant;
         let impostors = || Impostors::new(device, compiler, scene, format, (lit, of_shells));
         let has_sprites = has_blobs && path != DrawPath::Tiles;
+        let n_chunks = match scene.draw.chunks {
+            ChunkMode::Of(n) if has_sprites => n,
+            _ => 0,
+        };
+        let chunks = || {
+            let [grouped, counted, textured, threshold] = of_shells;
+            let (size, n) = ([film.width, film.height], [scene.n_particles() as u32, n_chunks]);
+            Chunks::new(device, compiler, size, format, n, [lit, grouped, counted, textured, threshold])
+        };
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
         let scenery = || -> Result<(Surfaces, Image)> {
             let depth = Image::depth(device, "surfaces.depth", film.width, film.height)?;
             Ok((Surfaces::new(device, compiler, format, depth_only)?, depth))
         };
         Ok(Drawing {
-            sprites: has_sprites.then(|| Sprites::new(device, compiler, format, lit, variant)).transpose()?,
+            sprites: (has_sprites && n_chunks == 0)
+                .then(|| Sprites::new(device, compiler, format, lit, variant))
+                .transpose()?,
+            chunks: (n_chunks > 0).then(chunks).transpose()?,
             tiling: has_tiles.then(|| Tiling::of_scene(device, compiler, scene, format)).transpose()?,
             targets: match has_sprites || behind || shells {
                 true => Some([target("picture.even")?, target("picture.odd")?]),
@@ -235,12 +250,18 @@ impl Drawing {
                 tiling.record(rec, i, under, buffers, &view, counts)
             }
             _ => {
-                let (Some(sprites), Some(target)) = (&self.sprites, target) else {
-                    return Err(Error::usage("sprites were given back"));
-                };
+                let Some(target) = target else { return Err(given_back()) };
                 let is_under = target.depth.is_some() || near.is_some();
                 let start = if is_under { Start::Load } else { Start::Clear };
-                sprites.record_from(rec, buffers, (target, start), camera, [s.cutoff, s.threshold], counts)
+                let cuts = [s.cutoff, s.threshold];
+                match (&self.sprites, &mut self.chunks) {
+                    (Some(sprites), _) => sprites.record_from(rec, buffers, (target, start), camera, cuts, counts),
+                    (_, Some(chunks)) => {
+                        let view = chunks::View { camera, cuts, saturated: s.saturated };
+                        chunks.record(rec, buffers, (target, start), &view, counts)
+                    }
+                    _ => Err(given_back()),
+                }
             }
         }
     }
@@ -266,4 +287,8 @@ impl Drawing {
             rec.copy_image(depth, to);
         }
     }
+}
+
+fn given_back() -> Error {
+    Error::usage("what draws the sprites was given back")
 }

@@ -3,6 +3,7 @@
 
 pub mod buffers;
 pub mod choice;
+pub mod chunks;
 mod culling;
 mod drawing;
 mod drawn;

@@ -78,7 +78,12 @@ impl Shrunk {
         s: &Settings,
     ) -> Result<()> {
         let camera = self.camera(&packet.camera);
-        self.drawing.record_surfaces(rec, b, &camera, s)
+        self.drawing.record_surfaces(rec, b, &camera, s)?;
+        // The blobs may spend it.
+        if let Some([_, small_depths, _]) = &self.surfaces {
+            self.drawing.record_copy_depth(rec, small_depths);
+        }
+        Ok(())
     }
 
     pub fn record_blobs(
@@ -102,12 +107,11 @@ impl Shrunk {
         under: Option<Target<'_>>,
     ) -> Result<()> {
         self.drawing.record_copy(rec, path, &self.blobs);
-        if let (Some([picture, small_depths, depths]), Some(under)) = (&self.surfaces, under) {
+        if let (Some([picture, _, depths]), Some(under)) = (&self.surfaces, under) {
             rec.copy_image(under.color, picture);
             if let Some(depth) = under.depth {
                 rec.copy_image(depth, depths);
             }
-            self.drawing.record_copy_depth(rec, small_depths);
         }
         let surfaces = self.surfaces.as_ref().map(|s| [&s[0], &s[1], &s[2]]);
         self.upsample.record(rec, [&self.blobs, &self.pictures[i]], surfaces)

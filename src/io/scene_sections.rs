@@ -14,9 +14,8 @@ use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
-use crate::model::scene::MAX_PAIR_LEVELS;
-use crate::model::scene::{Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
-use crate::model::scene::{Simulate, Threading, Threads, Time};
+use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
+use crate::model::scene::{MAX_CHUNKS, MAX_PAIR_LEVELS, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -180,6 +179,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let impostors = s.choice("impostors", "off", &Impostors::NAMES, &[])?;
     let impostor_error = s.f64("impostor_error", 0.5, Bounds::Within(0.01, 100.0))?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
+    let chunks = read_chunks(&mut s)?;
     let threshold = read_least(&mut s, "threshold", Bounds::From(0.0, 1.0))?;
     let cull = s.choice("cull", "on", &Cull::NAMES, &[])?;
     let smallest = read_least(&mut s, "smallest", Bounds::Within(0.0, 1000.0))?;
@@ -209,6 +209,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         error,
         cutoff,
         threshold,
+        chunks,
         cull,
         smallest,
         sort_bits,
@@ -224,6 +225,7 @@ const DRAW_KEYS: &[&str] = &[
     "impostor_error",
     "cutoff",
     "threshold",
+    "chunks",
     "cull",
     "smallest",
     "sort_bits",
@@ -277,6 +279,14 @@ fn read_resolution(s: &mut Section) -> Result<Resolution> {
             Err(s.fault("resolution", format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe())))
         }
     }
+}
+
+/// A number of chunks, or "auto".
+fn read_chunks(s: &mut Section) -> Result<Chunks> {
+    if is_auto(s, "chunks") {
+        return Ok(Chunks::Auto);
+    }
+    Ok(Chunks::Of(s.u32("chunks", 0, 0, MAX_CHUNKS)?))
 }
 
 fn read_count(s: &mut Section) -> Result<Option<Count>> {

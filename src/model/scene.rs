@@ -160,6 +160,18 @@ impl Cull {
     pub const NAMES: [(&'static str, Cull); 3] = [("on", Cull::On), ("off", Cull::Off), ("auto", Cull::Auto)];
 }
 
+/// Most chunks that sprites are drawn in.
+pub const MAX_CHUNKS: u32 = 256;
+
+/// In what order sprites are drawn, and what becomes of pixels that are full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chunks {
+    /// So many, near to far, and after each the pixels that let nothing more through are left out; 0: far to near, all of it.
+    Of(u32),
+    /// Whichever is the fastest at the scene's first frame.
+    Auto,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     pub path: DrawPath,
@@ -170,6 +182,8 @@ pub struct Draw {
     pub resolution: Resolution,
     /// What "auto" takes, all together, differs from the picture without by no more than this, root mean square.
     pub error: f64,
+    /// Of path "sprites".
+    pub chunks: Chunks,
     /// Sprites end at this many σ.
     pub cutoff: f64,
     /// And where their optical depth falls under this.
@@ -193,6 +207,7 @@ impl Draw {
         let least = |l: Least| Least::Of(l.bound());
         Draw {
             path: if self.path == DrawPath::Auto { DrawPath::Sprites } else { self.path },
+            chunks: if self.chunks == Chunks::Auto { Chunks::Of(0) } else { self.chunks },
             cull: if self.cull == Cull::Auto { Cull::On } else { self.cull },
             threshold: least(self.threshold),
             smallest: least(self.smallest),

@@ -3,7 +3,7 @@
 use super::rule::Tried;
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Cull, Draw, DrawPath, Impostors};
+use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors};
 
 /// What a knob's values make other than the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,18 +28,30 @@ pub struct Knob {
     pub name: fn(&Draw) -> String,
 }
 
+/// Chunks; in more the pixels that are full are looked for more often.
+const CHUNKS: [u32; 4] = [0, 4, 16, 64];
 /// Optical depths; a quarter of a step of 8 bits is 0.001.
 const THRESHOLDS: [f64; 4] = [0.0, 1e-5, 1e-4, 1e-3];
 /// Pixels.
 const SMALLEST: [f64; 4] = [0.0, 0.25, 0.5, 1.0];
 
-pub const KNOBS: [Knob; 5] = [
+pub const KNOBS: [Knob; 6] = [
     Knob {
         key: "path",
         changes: Changes::Rounding,
         is_auto: |draw| draw.path == DrawPath::Auto,
         values: |draw| [DrawPath::Sprites, DrawPath::Tiles].map(|path| Draw { path, ..*draw }).to_vec(),
         name: |draw| named(&DrawPath::NAMES, draw.path),
+    },
+    Knob {
+        key: "chunks",
+        changes: Changes::Rounding,
+        is_auto: |draw| draw.chunks == Chunks::Auto,
+        values: |draw| match draw.path {
+            DrawPath::Tiles => vec![*draw],
+            _ => CHUNKS.map(|n| Draw { chunks: Chunks::Of(n), ..*draw }).to_vec(),
+        },
+        name: |draw| if let Chunks::Of(n) = draw.chunks { n.to_string() } else { "\"auto\"".to_owned() },
     },
     Knob {
         key: "cull",

@@ -37,6 +37,9 @@ impl Renderer {
         let mut trial = Trial::new(device, compiler, scene, &packet);
         for knob in knobs {
             let values = (knob.values)(&draw);
+            if values.len() < 2 {
+                continue;
+            }
             let (tried, mut pictures) = trial.of(self, knob, &values, &mut exact)?;
             let taken = rule::taken(&tried, |t| knob.allows(t, scene.draw.error));
             if knob.changes == Changes::Rounding {

@@ -75,7 +75,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
     let n_behind = if n_small > 0 && !scene.surfaces.is_empty() { n_pixels } else { 0 };
     // What does not fit is not tried by "auto".
-    let in_chunks = matches!(scene.draw.chunks, Chunks::Of(1..)) && scene.draw.path == DrawPath::Sprites;
+    let in_chunks = matches!(scene.draw.chunks, Chunks::Of(1..)) && scene.draw.path != DrawPath::Tiles;
     let n_composed = if in_chunks { n_pixels } else { 0 };
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),

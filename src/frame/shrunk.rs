@@ -15,7 +15,6 @@ use crate::model::scene::{Draw, DrawPath, Scene};
 use crate::passes::upsample::{Extents, Upsample};
 
 pub(super) struct Shrunk {
-    pub resolution: Resolution,
     small: SmallPicture,
     /// A picture of its own, smaller, whose surfaces are black, let nothing through and are nowhere in its alpha.
     pub drawing: Drawing,
@@ -29,15 +28,9 @@ pub(super) struct Shrunk {
 }
 
 impl Shrunk {
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        scene: &Scene,
-        format: TargetFormat,
-        resolution: Resolution,
-    ) -> Result<Shrunk> {
+    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Shrunk> {
         let full = [scene.film.width, scene.film.height];
-        let small = SmallPicture::of(full, resolution.divisor());
+        let small = SmallPicture::of(full, scene.draw.resolution.divisor());
         let film = Film { width: small.size[0], height: small.size[1], ..scene.film };
         let draw = Draw { resolution: Resolution::Full, ..scene.draw };
         let smaller = Scene { film, draw, ..scene.clone() };
@@ -55,7 +48,6 @@ impl Shrunk {
         };
         let picture = |name| texels(name, n_full, pixel);
         Ok(Shrunk {
-            resolution,
             small,
             drawing: Drawing::without_colors(device, compiler, &smaller, format)?,
             upsample: Upsample::new(device, compiler, &extents, format, behind)?,

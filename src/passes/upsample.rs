@@ -62,6 +62,8 @@ impl Upsample {
             ("SHIFT", (offset_x / (2 * n) - 2) % 4),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if width.is_multiple_of(together) { together } else { 1 }),
+            // Beside edges of depth pixels are stored one by one.
+            ("WORDS_64", u32::from(!behind && device.limits().words_64)),
             ("BEHIND", if behind { 1 + u32::from(has_depth24(device)) } else { 0 }),
         ];
         let kernel = Kernel::with_macros(device, compiler, "upsample", Push::FIELDS, &[], &macros)?;

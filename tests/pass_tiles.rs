@@ -205,7 +205,10 @@ fn workgroups_and_rounds_do_not_show() {
     }
     for most_tiles in [1, 3, 16].map(Some) {
         assert!(draw(&Tiled { most_tiles, ..tiled }) == once, "{most_tiles:?} tiles a workgroup");
-        assert!(draw(&Tiled { invocations: 32, portable: true, most_tiles, ..tiled }) == once, "{most_tiles:?}, portable");
+        assert!(
+            draw(&Tiled { invocations: 32, portable: true, most_tiles, ..tiled }) == once,
+            "{most_tiles:?}, portable"
+        );
     }
     let rounds = draw(&Tiled { most_pairs: Some(1), ..tiled });
     assert!(rounds != once, "several rounds");

@@ -19,7 +19,7 @@
 #define PICTURE 1
 #include "pixels.glsl"
 
-layout(push_constant) uniform Push { uint width; uint height; uint small_width; uint small_height; uint offset_x; uint offset_y; uint n_runs; uint last_texel; } push;
+layout(push_constant) uniform Push { uint width; uint height; uint small_width; uint small_height; uint offset_x; uint offset_y; uint n_runs; uint n_pairs; uint last_texel; } push;
 layout(binding = 0) uniform usamplerBuffer small;
 
 // Depths that differ by no more than this share of the nearer one are those of one surface.

@@ -13,7 +13,7 @@ layout(binding = 8) uniform usamplerBuffer pool;
 
 // Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md §9).
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; uint i_first; } push;
 
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;

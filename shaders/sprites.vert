@@ -22,7 +22,7 @@ layout(constant_id = 4) const uint TEXTURED = 0;
 // 1: a sprite ends where its optical depth falls under a threshold.
 layout(constant_id = 5) const uint THRESHOLD = 0;
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; } push;
+layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; uint i_first; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
 layout(std430, binding = 1) readonly buffer PlacedParticles { Placed placed[]; };
 layout(std430, binding = 2) readonly buffer Particles { Particle particles[]; };
@@ -42,7 +42,7 @@ layout(location = 4) flat out vec3 out_gain;
 layout(location = 5) flat out float out_cut;
 
 void main() {
-    uint i = entries[gl_InstanceIndex].y;
+    uint i = entries[push.i_first + gl_InstanceIndex].y;
     if (i == NO_PARTICLE) {
         // Nothing to draw: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);

@@ -70,7 +70,8 @@ fn frame(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Frame {
     let key = scene.camera.keys[0];
     let fov_y_deg = scene.camera.fov_y_rad.to_degrees();
     let mut picture = Picture::new(eye, eye + key.target - key.position, fov_y_deg, scene.camera.near);
-    let (cutoff, threshold, smallest) = (scene.draw.cutoff, scene.draw.threshold, scene.draw.smallest);
+    let draw = &scene.draw;
+    let (cutoff, threshold, smallest) = (draw.cutoff, draw.threshold.bound(), draw.smallest.bound());
     picture.view =
         View { width: scene.film.width, height: scene.film.height, cutoff, threshold, smallest, ..picture.view };
     picture.placed = renderer.placed(&gpu.device).expect("places");

@@ -21,7 +21,8 @@ use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecor
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{
-    self, SHADERS, contract, cull, facets, first, generate, grid, impostors, morton, place, second, sort, sprites,
+    self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, morton, place, second, sort,
+    sprites,
 };
 use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
 
@@ -57,7 +58,7 @@ const RECORDS: [Record; 24] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 40] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 43] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -102,6 +103,9 @@ const INTERFACES: [(&str, &[Field], &[Element]); 40] = [
     ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
     ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
     ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
+    ("chunks.frag", chunks::Push::FIELDS, &[T]),
+    ("chunks.vert", &[], &[]),
+    ("chunks_order.comp", chunks::OrderPush::FIELDS, &[B(8), R("Kept"), B(8), B(16)]),
     ("impostors.frag", impostors::Push::FIELDS, &[T]),
     ("impostors.vert", impostors::Push::FIELDS, &[]),
     ("impostors_part.comp", impostors::PartPush::FIELDS, &[B(8), B(4), B(8), B(8)]),

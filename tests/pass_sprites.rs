@@ -194,7 +194,7 @@ fn wrong_pictures_are_noticed() {
         ("include/blob.glsl", "GROWTH = 1.0 + 1e-4", "GROWTH = 0.97"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
         ("sprites.vert", "-(top ? y.y : y.x)", "(top ? y.y : y.x)"),
-        ("sprites.vert", "entries[gl_InstanceIndex].y", "gl_InstanceIndex"),
+        ("sprites.vert", "entries[push.i_first + gl_InstanceIndex].y", "gl_InstanceIndex"),
     ] {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");

@@ -4,6 +4,8 @@
 #[path = "harness/bounded.rs"]
 mod bounded;
 mod harness;
+#[path = "harness/mixed.rs"]
+mod mixed;
 #[path = "harness/picture.rs"]
 mod picture;
 #[path = "harness/scenery.rs"]
@@ -18,6 +20,7 @@ use std::sync::Arc;
 use bounded::{Random, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within};
+use mixed::{EYE, assert_small, front, mixed};
 use nimbus::frame::tiling::saturated;
 use nimbus::gpu::Compiler;
 use nimbus::gpu::memory::TargetFormat;
@@ -26,14 +29,8 @@ use nimbus::layout::particle::DrawnRecord;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::texture::Pool;
-use picture::{FORMATS, Picture, Tiled};
+use picture::{FORMATS, Picture, Tiled, Way};
 use scenery::Scenery;
-
-const EYE: DVec3 = DVec3::new(0.3, -0.2, 5.0);
-
-fn front() -> Picture {
-    Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 0.1)
-}
 
 /// As the device does it by default.
 fn usual(gpu: &Gpu, format: FilmFormat) -> Tiled {
@@ -47,7 +44,7 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     for (target, format) in FORMATS {
         let what = format!("{what}, {format:?}");
         let tiled = usual(gpu, format);
-        let values = picture.draw_by(gpu, None, target, Some(&tiled));
+        let values = picture.draw_by(gpu, None, target, Way::Tiles(tiled));
         let (truths, bounds) = picture.tiled_truth(format, tiled.saturated);
         println!("{what}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
         assert_within(&what, &values, &truths, &bounds);
@@ -55,38 +52,6 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
         greatest = truths.iter().fold(greatest, |a, b| a.max(*b));
     }
     greatest
-}
-
-/// What users are promised: the root mean square over the picture, of full scale. Half floats round once to 2^-11 of a value at
-/// most; f32 errs by some units of 2^-24 a layer, and where rounding decides on an edge by the step there, in few pixels.
-fn assert_small(what: &str, format: FilmFormat, [values, truths]: [&[f64]; 2], n_layers: usize) {
-    let scale = truths.iter().fold(1.0, |a: f64, b| a.max(b.abs()));
-    let sum: f64 = values.iter().zip(truths).map(|(a, b)| ((a - b) / scale).powi(2)).sum();
-    let rms = (sum / values.len() as f64).sqrt();
-    let most = match format {
-        // Half a step, evenly spread: 1/(255 sqrt 12).
-        FilmFormat::Rgba8 => 1.2 / (255.0 * 12f64.sqrt()),
-        FilmFormat::Rgba16f => 1e-3,
-        FilmFormat::Rgba32f => 2e-6 * n_layers.max(1) as f64,
-    };
-    println!("{what}: rms {rms:.2e} of full scale, {n_layers} layers at most");
-    assert!(rms <= most, "{what}: rms {rms:e}, more than {most:e}");
-}
-
-/// Blobs thin and opaque, some in one place, before and behind the eye, of sigma from 10^`least` to 1.
-fn mixed(n: usize, seed: u64, tau_most: f64, least: f64) -> Picture {
-    let mut random = Random(seed);
-    let mut picture = front();
-    let mut last = picture.at(0.0, 0.0, 5.0);
-    for k in 0..n {
-        let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
-        let at = picture.at(within(-3.0, 3.0), within(-2.5, 2.5), within(-1.0, 9.0));
-        // Every fifth lies where the one before does.
-        last = if k % 5 == 4 { last } else { at };
-        let sigma = 10f64.powf(within(least, 0.0));
-        picture = picture.blob(last, sigma, tau_most * within(0.0, 1.0).powi(3));
-    }
-    picture
 }
 
 #[test]
@@ -173,11 +138,11 @@ fn textures_of_every_size() {
     let behind = Picture { scenery: Some(scenery), ..picture.clone() };
     assert!(compare(&mut gpu, "textured, over a surface", &behind) > 0.5);
     let tiled = usual(&gpu, FORMATS[2].1);
-    let drawn = |gpu: &mut Gpu, tiled: &Tiled| picture.draw_by(gpu, None, FORMATS[2].0, Some(tiled));
+    let drawn = |gpu: &mut Gpu, tiled: &Tiled| picture.draw_by(gpu, None, FORMATS[2].0, Way::Tiles(*tiled));
     assert!(drawn(&mut gpu, &tiled) == drawn(&mut gpu, &Tiled { portable: true, ..tiled }), "without subgroups");
     let (truths, bounds) = picture.tiled_truth(FORMATS[2].1, tiled.saturated);
     let wrong = Gpu::wrong_compiler("tiles.comp", "uvec2(splat.gain.w, splat.side)", "uvec2(0u, splat.side)");
-    let values = picture.draw_by(&mut gpu, Some(&wrong), FORMATS[2].0, Some(&tiled));
+    let values = picture.draw_by(&mut gpu, Some(&wrong), FORMATS[2].0, Way::Tiles(tiled));
     assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "another field");
 }
 
@@ -196,7 +161,7 @@ fn workgroups_and_rounds_do_not_show() {
     }
     let (target, format) = FORMATS[2];
     let tiled = usual(&gpu, format);
-    let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Some(tiled));
+    let mut draw = |tiled: &Tiled| picture.draw_by(&mut gpu, None, target, Way::Tiles(*tiled));
     let once = draw(&tiled);
     assert!(draw(&tiled) == once, "drawn twice");
     for invocations in [8, 16, 32, 64] {
@@ -236,7 +201,7 @@ fn a_bin_of_all_splats_keeps_the_last_ones() {
     }
     let (target, format) = FORMATS[2];
     let tiled = usual(&gpu, format);
-    let values = picture.draw_by(&mut gpu, None, target, Some(&tiled));
+    let values = picture.draw_by(&mut gpu, None, target, Way::Tiles(tiled));
     let alpha = values[4 * (60 * 160 + 92) + 3];
     // Sixteen layers of tau = 1/2 through their centres: 1 - e^-8.
     assert!((alpha - (1.0 - (-8f64).exp())).abs() < 1e-5, "{alpha}");
@@ -249,7 +214,7 @@ fn wrong_pictures_are_noticed() {
     let format = FilmFormat::Rgba32f;
     let tiled = usual(&gpu, format);
     let (truths, bounds) = picture.tiled_truth(format, tiled.saturated);
-    let mut values = picture.draw_by(&mut gpu, None, TargetFormat::Rgba32f, Some(&tiled));
+    let mut values = picture.draw_by(&mut gpu, None, TargetFormat::Rgba32f, Way::Tiles(tiled));
     assert!(greatest_ratio(&values, &truths, &bounds) <= 1.0);
     let i = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).expect("pixels");
     values[i] -= 2.0 * bounds[i];
@@ -270,7 +235,7 @@ fn wrong_pictures_are_noticed() {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");
         let compiler = Compiler::new(sources, None).expect("shaderc");
-        let values = picture.draw_by(&mut gpu, Some(&compiler), TargetFormat::Rgba32f, Some(&tiled));
+        let values = picture.draw_by(&mut gpu, Some(&compiler), TargetFormat::Rgba32f, Way::Tiles(tiled));
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }
 }

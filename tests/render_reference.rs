@@ -1,20 +1,14 @@
 //! `nimbus render --reference`: the whole picture in f64 against the device's, and what the volume shows in its place.
 
+#[path = "harness/program.rs"]
+mod program;
+
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Command;
 use std::time::{Duration, Instant};
 
+use program::{differ, nimbus, path, run};
 use serde_json::Value;
-
-fn nimbus(args: &[&str]) -> Command {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped());
-    command
-}
-
-fn run(args: &[&str]) -> Output {
-    nimbus(args).output().expect("the program runs")
-}
 
 /// Renders `scene` to `name` in `dir` and gives what `--json` says.
 fn render(dir: &tempfile::TempDir, name: &str, scene: &[&str], more: &[&str]) -> Value {
@@ -24,21 +18,8 @@ fn render(dir: &tempfile::TempDir, name: &str, scene: &[&str], more: &[&str]) ->
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
-fn path(dir: &tempfile::TempDir, name: &str) -> String {
-    dir.path().join(name).to_str().expect("UTF-8").to_owned()
-}
-
 fn temp() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
-}
-
-/// RMSE and greatest difference of two pictures.
-fn differ(dir: &tempfile::TempDir, a: &str, b: &str) -> (f64, f64) {
-    let output = run(&["compare", &path(dir, a), &path(dir, b), "--json"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let of = |name: &str| json["metrics"][name].as_f64().expect("a number");
-    (of("rmse"), of("max"))
 }
 
 /// The volume knows no textures.

@@ -1,18 +1,10 @@
 //! `draw.resolution`: whole frames drawn in a smaller size against the f64 picture at full size; over surfaces; the same bytes
 //! in every mode; and "auto", which takes one and says which.
 
-use std::process::{Command, Output, Stdio};
+#[path = "harness/program.rs"]
+mod program;
 
-use serde_json::Value;
-
-fn run(args: &[&str]) -> Output {
-    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).output().expect("the program runs")
-}
-
-fn path(dir: &tempfile::TempDir, name: &str) -> String {
-    dir.path().join(name).to_str().expect("UTF-8").to_owned()
-}
+use program::{differ, path, run};
 
 /// Renders to `name` in `dir` and gives what was said on stderr.
 fn render(dir: &tempfile::TempDir, name: &str, args: &[&str]) -> String {
@@ -21,15 +13,6 @@ fn render(dir: &tempfile::TempDir, name: &str, args: &[&str]) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{args:?}: {said}");
     said
-}
-
-/// RMSE and greatest difference of two pictures.
-fn differ(dir: &tempfile::TempDir, a: &str, b: &str) -> (f64, f64) {
-    let output = run(&["compare", &path(dir, a), &path(dir, b), "--json"]);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    let json: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-    let of = |name: &str| json["metrics"][name].as_f64().expect("a number");
-    (of("rmse"), of("max"))
 }
 
 /// 300 thin Gaussians, seen by 160 × 120 pixels with a sigma of about 3.6 of them.

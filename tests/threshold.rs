@@ -26,7 +26,7 @@ use nimbus::passes;
 use nimbus::reference::sprites::{Behind, View};
 use nimbus::reference::texture::Pool;
 use nimbus::reference::threshold::{Cut, cut};
-use picture::{Picture, Tiled};
+use picture::{Picture, Tiled, Way};
 use scenery::Scenery;
 
 const FORMAT: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
@@ -75,8 +75,12 @@ fn usual(gpu: &Gpu) -> Tiled {
 }
 
 /// The reference's picture and its bound, by `sprites` or by `tiles`.
-fn truth(picture: &Picture, tiled: Option<&Tiled>) -> (Vec<f64>, Vec<f64>) {
-    tiled.map_or_else(|| picture.truth(FORMAT.1), |t| picture.tiled_truth(FORMAT.1, t.saturated))
+fn truth(picture: &Picture, way: Way) -> (Vec<f64>, Vec<f64>) {
+    match way {
+        Way::Sprites => picture.truth(FORMAT.1),
+        Way::Tiles(tiled) => picture.tiled_truth(FORMAT.1, tiled.saturated),
+        Way::Chunks(_, saturated) => picture.chunked_truth(FORMAT.1, saturated),
+    }
 }
 
 fn cut_of(picture: &Picture) -> Vec<Cut> {
@@ -112,11 +116,12 @@ fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
     for seed in 1..=12 {
         let picture = random(seed, &pool);
         let (whole, changes) = (without(&picture), changes(&picture));
-        for tiled in [None, Some(usual(&gpu))] {
-            let what = format!("{seed}, {}", if tiled.is_some() { "tiles" } else { "sprites" });
+        let tiled = usual(&gpu);
+        for way in [Way::Sprites, Way::Tiles(tiled), Way::Chunks(3, tiled.saturated)] {
+            let what = format!("{seed}, {way:?}");
             let [on, off] = [&picture, &whole].map(|p| {
-                let values = p.draw_by(&mut gpu, None, FORMAT.0, tiled.as_ref());
-                let (truths, bounds) = truth(p, tiled.as_ref());
+                let values = p.draw_by(&mut gpu, None, FORMAT.0, way);
+                let (truths, bounds) = truth(p, way);
                 assert_within(&what, &values, &truths, &bounds);
                 greatest = greatest.max(greatest_ratio(&values, &truths, &bounds));
                 (values, truths, bounds)
@@ -161,22 +166,22 @@ fn wrong_cuts_are_noticed() {
         picture = picture.blob(at, 0.1 + 0.04 * f64::from(k), 0.5 * 0.5f64.powi(k % 6));
     }
     picture.view.threshold = 1.0 / 40.0;
-    let tiled = usual(&gpu);
-    for (tiled, file, from, to) in [
-        (None, "sprites.vert", "log(tau * push.inv_threshold)", "0.98 * log(tau * push.inv_threshold)"),
-        (None, "sprites.vert", "sqrt(2.0 * max", "sqrt(1.8 * max"),
-        (None, "sprites.vert", "if (THRESHOLD != 0) {", "if (THRESHOLD > 1) {"),
-        (None, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
-        (Some(&tiled), "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
-        (Some(&tiled), "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
-        (Some(&tiled), "tiles.comp", "log2(place.w", "0.98 * log2(place.w"),
-        (Some(&tiled), "tiles.comp", "max(least, -log2", "min(least, -log2"),
+    let tiled = Way::Tiles(usual(&gpu));
+    for (way, file, from, to) in [
+        (Way::Sprites, "sprites.vert", "log(tau * push.inv_threshold)", "0.98 * log(tau * push.inv_threshold)"),
+        (Way::Sprites, "sprites.vert", "sqrt(2.0 * max", "sqrt(1.8 * max"),
+        (Way::Sprites, "sprites.vert", "if (THRESHOLD != 0) {", "if (THRESHOLD > 1) {"),
+        (Way::Sprites, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
+        (tiled, "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
+        (tiled, "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
+        (tiled, "tiles.comp", "log2(place.w", "0.98 * log2(place.w"),
+        (tiled, "tiles.comp", "max(least, -log2", "min(least, -log2"),
     ] {
-        let (truths, bounds) = truth(&picture, tiled);
-        let values = picture.draw_by(&mut gpu, None, FORMAT.0, tiled);
+        let (truths, bounds) = truth(&picture, way);
+        let values = picture.draw_by(&mut gpu, None, FORMAT.0, way);
         assert!(greatest_ratio(&values, &truths, &bounds) <= 1.0);
         let wrong = Gpu::wrong_compiler(file, from, to);
-        let values = picture.draw_by(&mut gpu, Some(&wrong), FORMAT.0, tiled);
+        let values = picture.draw_by(&mut gpu, Some(&wrong), FORMAT.0, way);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }
 }
@@ -187,8 +192,8 @@ fn what_is_below_the_threshold_everywhere_is_not_drawn() {
     let tiled = usual(&gpu);
     let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1).blob(DVec3::ZERO, 0.5, 0.0099);
     picture.view.threshold = 0.01;
-    for tiled in [None, Some(&tiled)] {
-        let drawn = |p: &Picture, gpu: &mut Gpu| p.draw_by(gpu, None, FORMAT.0, tiled);
+    for way in [Way::Sprites, Way::Tiles(tiled), Way::Chunks(2, tiled.saturated)] {
+        let drawn = |p: &Picture, gpu: &mut Gpu| p.draw_by(gpu, None, FORMAT.0, way);
         assert!(drawn(&picture, &mut gpu).iter().all(|v| *v == 0.0));
         assert!(drawn(&without(&picture), &mut gpu).iter().any(|v| *v > 0.0));
         // So small a one that f32 has no inverse of it: the same bytes as without.

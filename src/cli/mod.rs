@@ -123,14 +123,8 @@ fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
 /// What "auto" took, and what is odd about the last frame's light, on stderr.
 fn say_notes(stage: &mut Stage, args: &SceneArgs) -> Result<()> {
     if !args.quiet {
-        if let Some(choice) = &stage.choice {
-            eprintln!("note: {}", choice.text());
-        }
-        if let Some(choice) = &stage.size_choice {
-            eprintln!("note: {}", choice.text());
-        }
-        if let Some(choice) = &stage.impostor_choice {
-            eprintln!("note: {}", choice.text());
+        for chosen in stage.take_chosen() {
+            eprintln!("note: {chosen}");
         }
         for note in light_notes(stage)? {
             eprintln!("warning: {note}");

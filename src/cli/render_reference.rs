@@ -33,7 +33,7 @@ pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f6
         eprintln!("error of the integral: at most about {error:.1e}; the brightest particle has {brightest:.3e}");
     }
     let share = (reference == ReferenceArg::Thin).then(|| cut.share());
-    if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold > 0.0) {
+    if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_some()) {
         let n = cut.n_layers;
         eprintln!(
             "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most {share:.1e} of the radiances"

@@ -143,10 +143,7 @@ impl Buffers {
             table: Feed::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64)?,
             through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
-            kept: match culls(scene) {
-                true => Some(Buffer::new::<KeptRecord>(device, "cull.kept", 1, Place::Device)?),
-                false => None,
-            },
+            kept: kept(device, scene)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
             textured: Buffer::new::<TexturedRecord>(device, "texture.groups", n_textured, Place::Device)?,
@@ -177,6 +174,11 @@ impl Buffers {
         }
         upload(device, commands, &given_particles(scene, groups), &self.particles)
     }
+}
+
+/// Where the number of kept particles is; none where all are drawn.
+pub(super) fn kept(device: &Device, scene: &Scene) -> Result<Option<Buffer>> {
+    culls(scene).then(|| Buffer::new::<KeptRecord>(device, "cull.kept", 1, Place::Device)).transpose()
 }
 
 /// Whether there is a second reflection: it asks for what clouds alone let through.

@@ -8,7 +8,7 @@ use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Place, Recorder};
 use crate::layout::cull::KeptRecord;
-use crate::model::scene::{Impostors, Scene};
+use crate::model::scene::{Cull as CullMode, Impostors, Scene};
 use crate::passes::cull::{Cull, Order, View};
 use crate::passes::sort::{Counts, Sort, TILE};
 use crate::passes::tiles::BLOCK;
@@ -16,7 +16,7 @@ use crate::passes::tiles::BLOCK;
 /// Whether the device leaves out particles of `scene`.
 pub fn culls(scene: &Scene) -> bool {
     // Who is in a shell must not depend on the view.
-    scene.draw.cull && scene.draw.impostors == Impostors::Off && scene.n_particles() > 0
+    scene.draw.cull != CullMode::Off && scene.draw.impostors == Impostors::Off && scene.n_particles() > 0
 }
 
 pub(super) struct Culling {
@@ -31,7 +31,7 @@ impl Culling {
         if !culls(scene) {
             return Ok(None);
         }
-        let (n, variant) = (scene.n_particles() as u32, [scene.draw.count.is_some(), scene.draw.threshold > 0.0]);
+        let (n, variant) = (scene.n_particles() as u32, [scene.draw.count.is_some(), scene.draw.threshold.is_some()]);
         let count = |name| Buffer::new::<KeptRecord>(device, name, 1, Place::Readback);
         let counts = [count("cull.count.even")?, count("cull.count.odd")?];
         Ok(Some(Culling { cull: Cull::new(device, compiler, n, variant)?, counts }))

@@ -1,6 +1,7 @@
 //! What draws a frame's picture, and into what: surfaces first, over them the blobs, in one of two ways.
 
 use super::buffers::Buffers;
+use super::chunks::{self, Chunks};
 use super::feed::IN_FLIGHT;
 use super::impostors::Impostors;
 use super::packet::Packet;
@@ -13,7 +14,7 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
+use crate::model::scene::{Chunks as ChunkMode, DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
 use crate::passes::sprites::Sprites;
 use crate::passes::surfaces::Surfaces;
 use crate::passes::tiles::View;
@@ -21,8 +22,10 @@ use crate::passes::tiles::View;
 use super::grouping::is_grouped;
 
 pub(super) struct Drawing {
-    /// None where only tiles draw.
+    /// Far to near; None where chunks draw them, or only tiles.
     sprites: Option<Sprites>,
+    /// Near to far.
+    chunks: Option<Chunks>,
     /// None where only sprites draw.
     tiling: Option<Tiling>,
     /// A frame that changes the picture draws into the one that the frame before has not. None where nothing is drawn by
@@ -32,31 +35,18 @@ pub(super) struct Drawing {
     scenery: Option<(Surfaces, Image)>,
     /// What is far, shown from a picture of it.
     impostors: Option<Impostors>,
-    /// Smaller pictures that the blobs may be drawn into.
-    shrunk: Vec<Shrunk>,
-    /// The one that they are; None where it is the full one.
-    i_shrunk: Option<usize>,
+    /// The smaller picture that the blobs are drawn into; None where it is the full one.
+    shrunk: Option<Box<Shrunk>>,
     /// Which of two pictures the last submitted frame draws.
     i_picture: usize,
 }
 
 impl Drawing {
-    /// What `scene` is drawn with. With path "auto" both ways, where tiles can draw it on this device; with resolution "auto"
-    /// every size, to begin with the full one.
+    /// What `scene`, in which nothing is "auto", is drawn with.
     pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Drawing> {
-        let resolution = scene.draw.resolution;
         let mut drawing = Drawing::of_size(device, compiler, scene, format, false)?;
-        for (_, smaller) in Resolution::ALL.into_iter().filter(|(_, r)| *r != Resolution::Full) {
-            if smaller == resolution {
-                drawing.shrunk.push(Shrunk::new(device, compiler, scene, format, smaller)?);
-                drawing.i_shrunk = Some(0);
-            } else if resolution == Resolution::Auto {
-                match Shrunk::new(device, compiler, scene, format, smaller) {
-                    // What is too large for it is drawn at full size.
-                    Err(Error::Limit { .. }) => {}
-                    shrunk => drawing.shrunk.push(shrunk?),
-                }
-            }
+        if scene.draw.resolution != Resolution::Full {
+            drawing.shrunk = Some(Box::new(Shrunk::new(device, compiler, scene, format)?));
         }
         Ok(drawing)
     }
@@ -80,40 +70,42 @@ impl Drawing {
     ) -> Result<Drawing> {
         let (path, film) = (scene.draw.path, &scene.film);
         let lit = scene.lighting.mode != LightingMode::None;
-        let has_blobs = matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto);
-        let tiling = match path {
-            _ if !has_blobs => None,
-            DrawPath::Sprites => None,
-            DrawPath::Tiles => Some(Tiling::of_scene(device, compiler, scene, format)?),
-            DrawPath::Auto => match Tiling::of_scene(device, compiler, scene, format) {
-                // What is too large for them sprites will draw.
-                Err(Error::Limit { .. }) => None,
-                tiling => Some(tiling?),
-            },
-        };
+        let has_blobs = scene.draw.resolution == Resolution::Full;
+        let has_tiles = has_blobs && path == DrawPath::Tiles;
         let behind = !scene.surfaces.is_empty();
         let counted = scene.draw.count.is_some();
-        let variant = [behind, is_grouped(scene), counted, scene.is_textured(), scene.draw.threshold > 0.0];
+        let variant = [behind, is_grouped(scene), counted, scene.is_textured(), scene.draw.threshold.is_some()];
         let shells = scene.draw.impostors != ImpostorMode::Off;
         let [_, of_shells @ ..] = variant;
         let impostors = || Impostors::new(device, compiler, scene, format, (lit, of_shells));
         let has_sprites = has_blobs && path != DrawPath::Tiles;
+        let n_chunks = match scene.draw.chunks {
+            ChunkMode::Of(n) if has_sprites => n,
+            _ => 0,
+        };
+        let chunks = || {
+            let [grouped, counted, textured, threshold] = of_shells;
+            let (size, n) = ([film.width, film.height], [scene.n_particles() as u32, n_chunks]);
+            Chunks::new(device, compiler, size, format, n, [lit, grouped, counted, textured, threshold])
+        };
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
         let scenery = || -> Result<(Surfaces, Image)> {
             let depth = Image::depth(device, "surfaces.depth", film.width, film.height)?;
             Ok((Surfaces::new(device, compiler, format, depth_only)?, depth))
         };
         Ok(Drawing {
-            sprites: has_sprites.then(|| Sprites::new(device, compiler, format, lit, variant)).transpose()?,
-            tiling,
+            sprites: (has_sprites && n_chunks == 0)
+                .then(|| Sprites::new(device, compiler, format, lit, variant))
+                .transpose()?,
+            chunks: (n_chunks > 0).then(chunks).transpose()?,
+            tiling: has_tiles.then(|| Tiling::of_scene(device, compiler, scene, format)).transpose()?,
             targets: match has_sprites || behind || shells {
                 true => Some([target("picture.even")?, target("picture.odd")?]),
                 false => None,
             },
             scenery: behind.then(scenery).transpose()?,
             impostors: shells.then(impostors).transpose()?,
-            shrunk: Vec::new(),
-            i_shrunk: None,
+            shrunk: None,
             i_picture: 0,
         })
     }
@@ -128,58 +120,11 @@ impl Drawing {
         self.i_picture
     }
 
-    /// Whether tiles can draw.
-    pub fn has_tiles(&self) -> bool {
-        self.i_shrunk.map_or(self, |i| &self.shrunk[i].drawing).tiling.is_some()
-    }
-
     /// What sees the blobs, and the columns and rows of the picture that they are drawn into.
     pub fn seen(&self, camera: &CameraRecord, s: &Settings) -> (CameraRecord, [u32; 2]) {
-        match self.i_shrunk {
-            Some(i) => (self.shrunk[i].camera(camera), self.shrunk[i].size()),
+        match &self.shrunk {
+            Some(shrunk) => (shrunk.camera(camera), shrunk.size()),
             None => (*camera, s.size),
-        }
-    }
-
-    /// Gives back what the other way needs.
-    pub fn keep_only(&mut self, path: DrawPath) {
-        if let Some(impostors) = &mut self.impostors {
-            impostors.keep_only(path);
-        }
-        match path {
-            DrawPath::Tiles => {
-                self.sprites = None;
-                if self.scenery.is_none() && self.impostors.is_none() {
-                    self.targets = None;
-                }
-            }
-            _ => self.tiling = None,
-        }
-        self.shrunk.iter_mut().for_each(|s| s.drawing.keep_only(path));
-    }
-
-    /// The sizes that the blobs can be drawn in.
-    pub fn resolutions(&self) -> Vec<Resolution> {
-        let full = (self.sprites.is_some() || self.tiling.is_some()).then_some(Resolution::Full);
-        full.into_iter().chain(self.shrunk.iter().map(|s| s.resolution)).collect()
-    }
-
-    /// Draws in one of them from now on.
-    pub fn take(&mut self, resolution: Resolution) {
-        self.i_shrunk = self.shrunk.iter().position(|s| s.resolution == resolution);
-    }
-
-    /// Gives back what the others need.
-    pub fn keep_taken(&mut self) {
-        if let Some(i) = self.i_shrunk {
-            self.shrunk = vec![self.shrunk.swap_remove(i)];
-            self.i_shrunk = Some(0);
-            (self.sprites, self.tiling) = (None, None);
-            if self.scenery.is_none() {
-                self.targets = None;
-            }
-        } else {
-            self.shrunk.clear();
         }
     }
 
@@ -240,8 +185,8 @@ impl Drawing {
     /// The surfaces, and what the blobs' picture needs of them.
     fn record_behind(&mut self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
         self.record_surfaces(rec, b, &packet.camera, s)?;
-        match self.i_shrunk {
-            Some(i) => self.shrunk[i].record_surfaces(rec, b, packet, s),
+        match &mut self.shrunk {
+            Some(shrunk) => shrunk.record_surfaces(rec, b, packet, s),
             None => Ok(()),
         }
     }
@@ -255,8 +200,8 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        match self.i_shrunk {
-            Some(i) => self.shrunk[i].record_blobs(rec, path, b, packet, s),
+        match &mut self.shrunk {
+            Some(shrunk) => shrunk.record_blobs(rec, path, b, packet, s),
             None => self.record_blobs(rec, path, b, (packet.n_drawn, &packet.camera), s),
         }
     }
@@ -264,8 +209,8 @@ impl Drawing {
     fn record_upsample(&mut self, rec: &mut Recorder<'_>, path: DrawPath) -> Result<()> {
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
         let under = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
-        match self.i_shrunk {
-            Some(of) => self.shrunk[of].record(rec, path, i, under.filter(|under| under.depth.is_some())),
+        match &mut self.shrunk {
+            Some(shrunk) => shrunk.record(rec, path, i, under.filter(|under| under.depth.is_some())),
             None => Ok(()),
         }
     }
@@ -305,20 +250,26 @@ impl Drawing {
                 tiling.record(rec, i, under, buffers, &view, counts)
             }
             _ => {
-                let (Some(sprites), Some(target)) = (&self.sprites, target) else {
-                    return Err(Error::usage("sprites were given back"));
-                };
+                let Some(target) = target else { return Err(given_back()) };
                 let is_under = target.depth.is_some() || near.is_some();
                 let start = if is_under { Start::Load } else { Start::Clear };
-                sprites.record_from(rec, buffers, (target, start), camera, [s.cutoff, s.threshold], counts)
+                let cuts = [s.cutoff, s.threshold];
+                match (&self.sprites, &mut self.chunks) {
+                    (Some(sprites), _) => sprites.record_from(rec, buffers, (target, start), camera, cuts, counts),
+                    (_, Some(chunks)) => {
+                        let view = chunks::View { camera, cuts, saturated: s.saturated };
+                        chunks.record(rec, buffers, (target, start), &view, counts)
+                    }
+                    _ => Err(given_back()),
+                }
             }
         }
     }
 
     /// Copies picture `i` as `path` has drawn it.
     pub fn record_read(&mut self, rec: &mut Recorder<'_>, path: DrawPath, i: usize, to: &Buffer) {
-        match (self.i_shrunk, path, &self.tiling, &mut self.targets) {
-            (Some(of), ..) => rec.copy(&self.shrunk[of].pictures[i], to),
+        match (&self.shrunk, path, &self.tiling, &mut self.targets) {
+            (Some(shrunk), ..) => rec.copy(&shrunk.pictures[i], to),
             (_, DrawPath::Tiles, Some(tiling), _) => rec.copy(&tiling.pictures[i], to),
             (.., Some(targets)) => rec.copy_image(&mut targets[i], to),
             _ => {}
@@ -336,4 +287,8 @@ impl Drawing {
             rec.copy_image(depth, to);
         }
     }
+}
+
+fn given_back() -> Error {
+    Error::usage("what draws the sprites was given back")
 }

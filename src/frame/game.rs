@@ -98,6 +98,11 @@ impl Game {
         self.culls = culls;
     }
 
+    /// The same scene, drawn otherwise.
+    pub fn drawn_by(self, scene: Arc<Scene>) -> Game {
+        Game { scene, ..self }
+    }
+
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
     pub fn step(&mut self, i_frame: u32) -> Result<Packet> {
         self.step_at(i_frame, self.scene.time.at(i_frame))

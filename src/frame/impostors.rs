@@ -69,12 +69,8 @@ impl Impostors {
         };
         let path = scene.draw.path;
         let tiling = match path {
-            DrawPath::Sprites => None,
-            _ => match Tiling::of_size(device, compiler, scene, rules.shell_size, (FORMAT, false)) {
-                // Nor will tiles draw the scene then.
-                Err(Error::Limit { .. }) if path == DrawPath::Auto => None,
-                tiling => Some(tiling?),
-            },
+            DrawPath::Tiles => Some(Tiling::of_size(device, compiler, scene, rules.shell_size, (FORMAT, false))?),
+            _ => None,
         };
         let entries = |name| Buffer::new::<[u32; 2]>(device, name, n, Place::Device);
         Ok(Impostors {
@@ -87,14 +83,6 @@ impl Impostors {
             far: entries("impostors.far")?,
             near: entries("impostors.near")?,
         })
-    }
-
-    /// Gives back what the other way needs.
-    pub fn keep_only(&mut self, path: DrawPath) {
-        match path {
-            DrawPath::Tiles => self.sprites = None,
-            _ => self.tiling = None,
-        }
     }
 
     /// Settles what `packet`'s frame shows; `plan` as it comes out of that.

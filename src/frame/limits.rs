@@ -16,7 +16,7 @@ use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::resolution::{Resolution, SmallPicture};
-use crate::model::scene::{Impostors, LightingMode, Scene};
+use crate::model::scene::{Chunks, DrawPath, Impostors, LightingMode, MAX_CHUNKS, Scene};
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
@@ -32,15 +32,17 @@ const TEXTURES: &str = "the pool of textures";
 const SHELL: &str = "the shell's picture (draw.impostors)";
 const BLOBS: &str = "the blobs' smaller picture";
 const UNDER: &str = "the surfaces under it";
+const COMPOSED: &str = "what is composed in chunks (draw.chunks)";
 /// Not of light: read in every scene that has them.
-const ALWAYS_READ: [&str; 4] = [TEXTURES, SHELL, BLOBS, UNDER];
+const ALWAYS_READ: [&str; 5] = [TEXTURES, SHELL, BLOBS, UNDER, COMPOSED];
 
 /// Of the buffers that grow with the scene those that shaders read by texels.
-const READ_BY_TEXELS: [(&str, BindingKind); 10] = [
+const READ_BY_TEXELS: [(&str, BindingKind); 11] = [
     (TEXTURES, BindingKind::Texels),
     (SHELL, BindingKind::Texels),
     (BLOBS, BindingKind::Texels),
     (UNDER, BindingKind::Texels),
+    (COMPOSED, BindingKind::Texels),
     ("the second reflection's sources", BindingKind::Texels),
     ("their flux by light", BindingKind::Texels),
     ("their light by points", BindingKind::Texels),
@@ -72,6 +74,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
     let n_behind = if n_small > 0 && !scene.surfaces.is_empty() { n_pixels } else { 0 };
+    // What does not fit is not tried by "auto".
+    let in_chunks = matches!(scene.draw.chunks, Chunks::Of(1..)) && scene.draw.path != DrawPath::Tiles;
+    let n_composed = if in_chunks { n_pixels } else { 0 };
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
@@ -107,6 +112,9 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the shell, as it is drawn", n_shell_texels, 16),
         ("who is in the shell", if shells { n } else { 0 }, 4),
         ("what is far, and what is near", if shells { 2 * n } else { 0 }, 8),
+        (COMPOSED, n_composed, 16),
+        ("the picture of chunks and its depth", n_composed, 16 + DEPTH_BYTES_PER_PIXEL),
+        ("the entries of chunks", if in_chunks { n + u64::from(MAX_CHUNKS) } else { 0 }, 8),
         (BLOBS, n_small, pixel),
         // With "auto" the half one beside the quarter, the larger one counted twice.
         ("what is drawn in a smaller size", n_small * (if is_auto { 6 } else { 3 }), pixel + DEPTH_BYTES_PER_PIXEL),

@@ -3,7 +3,7 @@
 
 pub mod buffers;
 pub mod choice;
-pub mod choice_resolution;
+pub mod chunks;
 mod culling;
 mod drawing;
 mod drawn;

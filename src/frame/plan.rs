@@ -3,12 +3,14 @@
 
 use std::fmt;
 
+use super::culling::culls;
 use super::packet::Packet;
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::layout::facet::RegionRecord;
 use crate::layout::frame::LightRecord;
-use crate::model::scene::DrawPath;
+use crate::model::resolution::Resolution;
+use crate::model::scene::{DrawPath, Scene};
 
 /// The passes in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -192,6 +194,13 @@ pub struct Traits {
     pub shrunk: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
+}
+
+impl Traits {
+    /// The same where `scene`, in which nothing is "auto", is drawn as its `draw` says.
+    pub fn drawn_by(self, scene: &Scene) -> Traits {
+        Traits { culls: culls(scene), path: scene.draw.path, shrunk: scene.draw.resolution != Resolution::Full, ..self }
+    }
 }
 
 /// Runs `f` under the pass's timer label where the plan has it run.

@@ -21,7 +21,6 @@ use crate::error::{Error, Result};
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, ScopeTime};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::CloudSource;
-use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Impostors, LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
@@ -93,9 +92,10 @@ pub struct Rendered {
 
 impl Renderer {
     /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs. `skip`: leave out
-    /// what a frame does not need.
+    /// what a frame does not need. What is "auto" changes nothing until it is chosen.
     pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, skip: bool) -> Result<Renderer> {
         let free = device.limits().device_memory_bytes - limits::check(scene, device.limits())?;
+        let scene = &*scene.exact();
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
         let lit = scene.lighting.mode != LightingMode::None;
@@ -150,12 +150,12 @@ impl Renderer {
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
                 impostors: scene.draw.impostors != Impostors::Off,
-                // Until it is chosen.
-                shrunk: !matches!(scene.draw.resolution, Resolution::Full | Resolution::Auto),
-                culls: scene.draw.cull && scene.draw.impostors == Impostors::Off,
-                path: if scene.draw.path == DrawPath::Tiles { DrawPath::Tiles } else { DrawPath::Sprites },
+                shrunk: false,
+                culls: false,
+                path: DrawPath::Sprites,
                 skip,
-            },
+            }
+            .drawn_by(scene),
             last: None,
             n_begun: 0,
             last_end: Instant::now(),

@@ -15,7 +15,6 @@ use crate::model::scene::{Draw, DrawPath, Scene};
 use crate::passes::upsample::{Extents, Upsample};
 
 pub(super) struct Shrunk {
-    pub resolution: Resolution,
     small: SmallPicture,
     /// A picture of its own, smaller, whose surfaces are black, let nothing through and are nowhere in its alpha.
     pub drawing: Drawing,
@@ -29,15 +28,9 @@ pub(super) struct Shrunk {
 }
 
 impl Shrunk {
-    pub fn new(
-        device: &Device,
-        compiler: &Compiler,
-        scene: &Scene,
-        format: TargetFormat,
-        resolution: Resolution,
-    ) -> Result<Shrunk> {
+    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Shrunk> {
         let full = [scene.film.width, scene.film.height];
-        let small = SmallPicture::of(full, resolution.divisor());
+        let small = SmallPicture::of(full, scene.draw.resolution.divisor());
         let film = Film { width: small.size[0], height: small.size[1], ..scene.film };
         let draw = Draw { resolution: Resolution::Full, ..scene.draw };
         let smaller = Scene { film, draw, ..scene.clone() };
@@ -55,7 +48,6 @@ impl Shrunk {
         };
         let picture = |name| texels(name, n_full, pixel);
         Ok(Shrunk {
-            resolution,
             small,
             drawing: Drawing::without_colors(device, compiler, &smaller, format)?,
             upsample: Upsample::new(device, compiler, &extents, format, behind)?,
@@ -86,7 +78,12 @@ impl Shrunk {
         s: &Settings,
     ) -> Result<()> {
         let camera = self.camera(&packet.camera);
-        self.drawing.record_surfaces(rec, b, &camera, s)
+        self.drawing.record_surfaces(rec, b, &camera, s)?;
+        // The blobs may spend it.
+        if let Some([_, small_depths, _]) = &self.surfaces {
+            self.drawing.record_copy_depth(rec, small_depths);
+        }
+        Ok(())
     }
 
     pub fn record_blobs(
@@ -110,12 +107,11 @@ impl Shrunk {
         under: Option<Target<'_>>,
     ) -> Result<()> {
         self.drawing.record_copy(rec, path, &self.blobs);
-        if let (Some([picture, small_depths, depths]), Some(under)) = (&self.surfaces, under) {
+        if let (Some([picture, _, depths]), Some(under)) = (&self.surfaces, under) {
             rec.copy_image(under.color, picture);
             if let Some(depth) = under.depth {
                 rec.copy_image(depth, depths);
             }
-            self.drawing.record_copy_depth(rec, small_depths);
         }
         let surfaces = self.surfaces.as_ref().map(|s| [&s[0], &s[1], &s[2]]);
         self.upsample.record(rec, [&self.blobs, &self.pictures[i]], surfaces)

@@ -97,7 +97,7 @@ impl Tiling {
 fn variant(scene: &Scene, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
-        threshold: scene.draw.threshold > 0.0,
+        threshold: scene.draw.threshold.is_some(),
         lit: scene.lighting.mode != LightingMode::None,
         grouped: is_grouped(scene),
         weighted: scene.draw.count.is_some(),

@@ -1,5 +1,5 @@
-//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers; premultiplied "over", or
-//! opaque with depth.
+//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers; premultiplied "over" or
+//! "under", opaque with depth, or depth alone.
 
 use std::sync::Arc;
 
@@ -28,8 +28,12 @@ enum Meet {
     Over,
     /// Blended over it where it is as near as what wrote depth, which it does not.
     OverNearer,
+    /// Blended under it where it is as near as what wrote depth, which it does not.
+    UnderNearer,
     /// In its place, with its depth, where it is as near.
     Replace,
+    /// Not seen, and hides what is behind its depth.
+    Hide,
 }
 
 impl DrawPipeline {
@@ -60,6 +64,30 @@ impl DrawPipeline {
         Self::new(device, compiler, name, push, constants, (format, Meet::Replace))
     }
 
+    /// The same, blended under what the target holds, where they are as near as its depth.
+    pub fn under(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        format: TargetFormat,
+    ) -> Result<DrawPipeline> {
+        Self::new(device, compiler, name, push, constants, (format, Meet::UnderNearer))
+    }
+
+    /// The same, not seen: what it covers is as near as it is from then on.
+    pub fn hiding(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        format: TargetFormat,
+    ) -> Result<DrawPipeline> {
+        Self::new(device, compiler, name, push, constants, (format, Meet::Hide))
+    }
+
     fn new(
         device: &Device,
         compiler: &Compiler,
@@ -72,9 +100,11 @@ impl DrawPipeline {
         let vert = compiler.compile(&vert_file, Optimize::Yes)?;
         let frag = compiler.compile(&frag_file, Optimize::Yes)?;
         let (in_vert, in_frag) = (reflect(&vert_file, &vert)?, reflect(&frag_file, &frag)?);
-        check_push(&vert_file, &in_vert, push)?;
-        if in_frag.push.is_some() {
-            check_push(&frag_file, &in_frag, push)?;
+        // One of the two may ask for none of them.
+        for (file, found) in [(&vert_file, &in_vert), (&frag_file, &in_frag)] {
+            if found.push.is_some() || in_vert.push.is_none() && in_frag.push.is_none() {
+                check_push(file, found, push)?;
+            }
         }
         let stages = [(&in_vert, vk::ShaderStageFlags::VERTEX), (&in_frag, vk::ShaderStageFlags::FRAGMENT)];
         let interface = Interface::new(device, name, &stages, push)?;
@@ -141,21 +171,28 @@ fn create(
 }
 
 fn blending(meet: Meet) -> vk::PipelineColorBlendAttachmentState {
+    let (src, dst) = match meet {
+        Meet::UnderNearer => (vk::BlendFactor::ONE_MINUS_DST_ALPHA, vk::BlendFactor::ONE),
+        _ => (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA),
+    };
     vk::PipelineColorBlendAttachmentState {
-        blend_enable: vk::Bool32::from(meet != Meet::Replace),
-        src_color_blend_factor: vk::BlendFactor::ONE,
-        dst_color_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        blend_enable: vk::Bool32::from(!matches!(meet, Meet::Replace | Meet::Hide)),
+        src_color_blend_factor: src,
+        dst_color_blend_factor: dst,
         color_blend_op: vk::BlendOp::ADD,
-        src_alpha_blend_factor: vk::BlendFactor::ONE,
-        dst_alpha_blend_factor: vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+        src_alpha_blend_factor: src,
+        dst_alpha_blend_factor: dst,
         alpha_blend_op: vk::BlendOp::ADD,
-        color_write_mask: vk::ColorComponentFlags::RGBA,
+        color_write_mask: match meet {
+            Meet::Hide => vk::ColorComponentFlags::empty(),
+            _ => vk::ColorComponentFlags::RGBA,
+        },
     }
 }
 
 fn depth_test(meet: Meet) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
     vk::PipelineDepthStencilStateCreateInfo::default()
         .depth_test_enable(meet != Meet::Over)
-        .depth_write_enable(meet == Meet::Replace)
+        .depth_write_enable(matches!(meet, Meet::Replace | Meet::Hide))
         .depth_compare_op(vk::CompareOp::GREATER_OR_EQUAL)
 }

@@ -28,6 +28,8 @@ pub enum Instances<'a> {
 pub enum Start {
     /// Zeros: black, infinitely far.
     Clear,
+    /// Black; the depth of what was drawn before.
+    ClearColor,
     /// What was drawn before.
     Load,
 }
@@ -64,7 +66,7 @@ impl Recorder<'_> {
         let info = match depth {
             Some(depth) => {
                 self.transition(depth, vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL);
-                on_depth = attachment(depth, start);
+                on_depth = attachment(depth, if start == Start::ClearColor { Start::Load } else { start });
                 info.depth_attachment(&on_depth)
             }
             None => info,
@@ -147,7 +149,7 @@ impl Recorder<'_> {
 /// Clears to zeros, which is what a clear value defaults to.
 fn attachment(image: &Image, start: Start) -> vk::RenderingAttachmentInfo<'static> {
     let load = match start {
-        Start::Clear => vk::AttachmentLoadOp::CLEAR,
+        Start::Clear | Start::ClearColor => vk::AttachmentLoadOp::CLEAR,
         Start::Load => vk::AttachmentLoadOp::LOAD,
     };
     vk::RenderingAttachmentInfo::default()

@@ -12,10 +12,10 @@ use crate::model::camera::{Camera, CameraKey};
 use crate::model::count::Count;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
+use crate::model::least::Least;
 use crate::model::resolution::Resolution;
-use crate::model::scene::MAX_PAIR_LEVELS;
-use crate::model::scene::{Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
-use crate::model::scene::{Simulate, Threading, Threads, Time};
+use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
+use crate::model::scene::{MAX_CHUNKS, MAX_PAIR_LEVELS, Simulate, Threading, Threads, Time};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -179,18 +179,20 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let impostors = s.choice("impostors", "off", &Impostors::NAMES, &[])?;
     let impostor_error = s.f64("impostor_error", 0.5, Bounds::Within(0.01, 100.0))?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
-    let threshold = s.f64("threshold", 0.0, Bounds::From(0.0, 1.0))?;
-    let cull = s.choice("cull", "on", &[("on", true), ("off", false)], &[])?;
-    let smallest = s.f64("smallest", 0.0, Bounds::Within(0.0, 1000.0))?;
-    if smallest > 0.0 && !cull {
-        return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {smallest}")));
+    let chunks = read_chunks(&mut s)?;
+    let threshold = read_least(&mut s, "threshold", Bounds::From(0.0, 1.0))?;
+    let cull = s.choice("cull", "on", &Cull::NAMES, &[])?;
+    let smallest = read_least(&mut s, "smallest", Bounds::Within(0.0, 1000.0))?;
+    if smallest != Least::NOTHING && cull == Cull::Off {
+        let found = if let Least::Of(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
+        return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {found}")));
     }
     let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
     if sort_bits != 16 && sort_bits != 32 {
         return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
     }
     let resolution = read_resolution(&mut s)?;
-    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest > 0.0) {
+    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Least::NOTHING) {
         let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
         return Err(s.fault("impostors", what.to_owned()));
     }
@@ -207,6 +209,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         error,
         cutoff,
         threshold,
+        chunks,
         cull,
         smallest,
         sort_bits,
@@ -222,6 +225,7 @@ const DRAW_KEYS: &[&str] = &[
     "impostor_error",
     "cutoff",
     "threshold",
+    "chunks",
     "cull",
     "smallest",
     "sort_bits",
@@ -236,16 +240,35 @@ const DRAW_KEYS: &[&str] = &[
     "texture_seed",
 ];
 
+/// Whether a key's value is "auto", which is written down then.
+fn is_auto(s: &mut Section, key: &str) -> bool {
+    let is_auto = s.value(key).is_some_and(|node| matches!(&node.value, Value::String(s) if s == "auto"));
+    if is_auto {
+        s.record(key, json!("auto"));
+    }
+    is_auto
+}
+
+/// A bound, 0 where there is none, or "auto".
+fn read_least(s: &mut Section, key: &str, bounds: Bounds) -> Result<Least> {
+    if is_auto(s, key) {
+        return Ok(Least::Auto);
+    }
+    if let Some(text) = s.value(key).filter(|node| matches!(&node.value, Value::String(_))) {
+        return Err(s.fault(key, format!("expected {bounds} or \"auto\", found {}", text.value.describe())));
+    }
+    Ok(Least::Of(s.f64(key, 0.0, bounds)?))
+}
+
 /// A number that there is a way to draw in, or "auto".
 fn read_resolution(s: &mut Section) -> Result<Resolution> {
+    if is_auto(s, "resolution") {
+        return Ok(Resolution::Auto);
+    }
     let Some(node) = s.value("resolution") else {
         s.record("resolution", json!(1.0));
         return Ok(Resolution::Full);
     };
-    if matches!(&node.value, Value::String(s) if s == "auto") {
-        s.record("resolution", json!("auto"));
-        return Ok(Resolution::Auto);
-    }
     let given = node.value.as_f64();
     match Resolution::ALL.into_iter().find(|(of, _)| Some(*of) == given) {
         Some((of, resolution)) => {
@@ -256,6 +279,14 @@ fn read_resolution(s: &mut Section) -> Result<Resolution> {
             Err(s.fault("resolution", format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe())))
         }
     }
+}
+
+/// A number of chunks, or "auto".
+fn read_chunks(s: &mut Section) -> Result<Chunks> {
+    if is_auto(s, "chunks") {
+        return Ok(Chunks::Auto);
+    }
+    Ok(Chunks::Of(s.u32("chunks", 0, 0, MAX_CHUNKS)?))
 }
 
 fn read_count(s: &mut Section) -> Result<Option<Count>> {

@@ -12,6 +12,7 @@ pub mod growth;
 pub mod gust;
 pub mod gust_lanes;
 pub mod impostor;
+pub mod least;
 pub mod light;
 pub mod material;
 pub mod pairings;

@@ -1,5 +1,7 @@
 //! A scene: everything a run is made of, checked and complete (defaults filled in, references resolved).
 
+use std::borrow::Cow;
+
 use glam::{DVec2, DVec3};
 
 use super::basis::Sampling;
@@ -7,6 +9,7 @@ use super::camera::Camera;
 use super::cloud::{Cloud, Group, runs};
 use super::count::Count;
 use super::film::Film;
+use super::least::Least;
 use super::light::Light;
 use super::material::Material;
 use super::resolution::{Resolution, SmallPicture};
@@ -144,6 +147,31 @@ impl Impostors {
         [("off", Impostors::Off), ("on", Impostors::On), ("auto", Impostors::Auto)];
 }
 
+/// Whether particles that show in no pixel are left out before the sort, which changes none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cull {
+    Off,
+    On,
+    /// Whichever is faster at the scene's first frame.
+    Auto,
+}
+
+impl Cull {
+    pub const NAMES: [(&'static str, Cull); 3] = [("on", Cull::On), ("off", Cull::Off), ("auto", Cull::Auto)];
+}
+
+/// Most chunks that sprites are drawn in.
+pub const MAX_CHUNKS: u32 = 256;
+
+/// In what order sprites are drawn, and what becomes of pixels that are full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Chunks {
+    /// So many, near to far, and after each the pixels that let nothing more through are left out; 0: far to near, all of it.
+    Of(u32),
+    /// Whichever is the fastest at the scene's first frame.
+    Auto,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Draw {
     pub path: DrawPath,
@@ -152,16 +180,17 @@ pub struct Draw {
     pub impostor_error: f64,
     /// Of the picture that they are drawn into.
     pub resolution: Resolution,
-    /// What "auto" may take differs from the full picture by no more than this, root mean square.
+    /// What "auto" takes, all together, differs from the picture without by no more than this, root mean square.
     pub error: f64,
+    /// Of path "sprites".
+    pub chunks: Chunks,
     /// Sprites end at this many σ.
     pub cutoff: f64,
-    /// And where their optical depth falls under this; 0: nowhere.
-    pub threshold: f64,
-    /// Whether particles that show in no pixel are left out before the sort.
-    pub cull: bool,
-    /// And those whose σ is narrower than so many pixels; 0: none.
-    pub smallest: f64,
+    /// And where their optical depth falls under this.
+    pub threshold: Least,
+    pub cull: Cull,
+    /// Where particles are left out, also those whose σ is narrower than so many pixels.
+    pub smallest: Least,
     /// Bits of the sort key: 16 or 32.
     pub sort_bits: u32,
     /// How many particles are drawn of a cloud; `None`: all.
@@ -170,6 +199,23 @@ pub struct Draw {
     pub texture_seed: u32,
     /// The clouds made from boxes have so many particles together; 0: as many as their files say.
     pub n_particles: u32,
+}
+
+impl Draw {
+    /// With what changes nothing in place of every "auto".
+    pub fn exact(self) -> Draw {
+        let least = |l: Least| Least::Of(l.bound());
+        Draw {
+            path: if self.path == DrawPath::Auto { DrawPath::Sprites } else { self.path },
+            chunks: if self.chunks == Chunks::Auto { Chunks::Of(0) } else { self.chunks },
+            cull: if self.cull == Cull::Auto { Cull::On } else { self.cull },
+            threshold: least(self.threshold),
+            smallest: least(self.smallest),
+            resolution: if self.resolution == Resolution::Auto { Resolution::Full } else { self.resolution },
+            impostors: if self.impostors == Impostors::Auto { Impostors::Off } else { self.impostors },
+            ..self
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -202,6 +248,12 @@ pub struct Threads {
 }
 
 impl Scene {
+    /// With what changes nothing in place of every "auto" of its drawing.
+    pub fn exact(&self) -> Cow<'_, Scene> {
+        let draw = self.draw.exact();
+        if draw == self.draw { Cow::Borrowed(self) } else { Cow::Owned(Scene { draw, ..self.clone() }) }
+    }
+
     /// Particles of all clouds.
     pub fn n_particles(&self) -> u64 {
         self.clouds.iter().map(Cloud::n_particles).sum()

@@ -1,6 +1,7 @@
 //! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label and its column in the
 //! results share one name. `new` allocates and can fail; `record` only records. No pass knows another.
 
+pub mod chunks;
 pub mod contract;
 pub mod cull;
 pub mod facets;
@@ -27,6 +28,9 @@ macro_rules! shader_texts {
 
 /// Every shader and include, as built into the binary.
 pub const SHADERS: &[(&str, &str)] = shader_texts![
+    "chunks.frag",
+    "chunks.vert",
+    "chunks_order.comp",
     "contract.comp",
     "cull_scan.comp",
     "cull_test.comp",

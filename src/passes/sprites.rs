@@ -13,11 +13,19 @@ use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
 record! {
-    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, i_first_facet: u32, inv_threshold: f32 }
+    pub struct Push { camera: CameraRecord, pixel: [f32; 2], cutoff: f32, i_first_facet: u32, inv_threshold: f32, i_first: u32 }
 }
 
 pub struct Sprites {
     pipeline: DrawPipeline,
+}
+
+/// A part of the entries: so many, from the first one on; and the particles' first facet.
+#[derive(Clone, Copy)]
+pub struct Chunk<'a> {
+    pub instances: Instances<'a>,
+    pub i_first: u32,
+    pub i_first_facet: u32,
 }
 
 impl Sprites {
@@ -31,9 +39,20 @@ impl Sprites {
         lit: bool,
         [behind, grouped, weighted, textured, threshold]: [bool; 5],
     ) -> Result<Sprites> {
-        let constants = [lit, behind, grouped, weighted, textured, threshold].map(u32::from);
-        let constants: Vec<(u32, u32)> = (0..).zip(constants).collect();
+        let constants = constants([lit, behind, grouped, weighted, textured, threshold]);
         let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
+        Ok(Sprites { pipeline })
+    }
+
+    /// The same blended under what is nearer, near to far, into a target with depth.
+    pub fn under(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        [lit, grouped, weighted, textured, threshold]: [bool; 5],
+    ) -> Result<Sprites> {
+        let constants = constants([lit, true, grouped, weighted, textured, threshold]);
+        let pipeline = DrawPipeline::under(device, compiler, "sprites", Push::FIELDS, &constants, format)?;
         Ok(Sprites { pipeline })
     }
 
@@ -64,14 +83,32 @@ impl Sprites {
         [cutoff, threshold]: [f64; 2],
         (n_drawn, i_first_facet): (Amount<'_>, u32),
     ) -> Result<()> {
-        let (width, height) = target.color.size();
-        let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
-        let inv_threshold = (1.0 / threshold) as f32;
-        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet, inv_threshold };
         let instances = match n_drawn {
             Amount::Known(n) => Instances::Known(n),
             Amount::Counted(kept) => Instances::Counted(kept, KeptRecord::I_DRAW),
         };
+        let all = Chunk { instances, i_first: 0, i_first_facet };
+        self.record_chunk(rec, buffers, (target, start), camera, [cutoff, threshold], all)
+    }
+
+    /// The same of a part of the entries.
+    pub fn record_chunk(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 9],
+        (target, start): (Target<'_>, Start),
+        camera: &CameraRecord,
+        [cutoff, threshold]: [f64; 2],
+        Chunk { instances, i_first, i_first_facet }: Chunk<'_>,
+    ) -> Result<()> {
+        let (width, height) = target.color.size();
+        let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
+        let inv_threshold = (1.0 / threshold) as f32;
+        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet, inv_threshold, i_first };
         rec.draw(&self.pipeline, target, start, &buffers, &push, instances)
     }
+}
+
+fn constants(of: [bool; 6]) -> Vec<(u32, u32)> {
+    (0..).zip(of.map(u32::from)).collect()
 }

@@ -4,6 +4,7 @@
 //! it exactly what the GPU had and so measure one stage alone.
 
 pub mod area;
+pub mod chunks;
 pub mod contract;
 pub mod count;
 pub mod cull;

@@ -7,15 +7,18 @@ use super::Blob;
 use super::sprites::{Behind, Factor, Rounding, View, alpha};
 
 /// Unit round-off of f32.
-const U: f64 = 1.0 / 16_777_216.0;
+pub(super) const U: f64 = 1.0 / 16_777_216.0;
 
 /// One pixel while it is composed: true numbers, and what the device's may differ from them.
-struct Composed {
-    color: DVec3,
-    passed: f64,
-    off_color: DVec3,
-    off_passed: f64,
+pub(super) struct Composed {
+    pub color: DVec3,
+    pub passed: f64,
+    pub off_color: DVec3,
+    pub off_passed: f64,
 }
+
+/// Puts a layer of true opacity, on the device within the second number of the device's, under what is composed.
+pub(super) type Layer = fn(&mut Composed, f64, f64, DVec3);
 
 impl Composed {
     /// A layer of true opacity `alpha`, on the device within `off` of `device_alpha`.
@@ -77,15 +80,20 @@ pub struct Composition<'a> {
 
 /// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
 pub fn render_over(of: &Composition<'_>, behind: &[Behind]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+    render_by(of, behind, Composed::under)
+}
+
+/// The same where a device composes by another form of the law, with errors of its own.
+pub(super) fn render_by(of: &Composition<'_>, behind: &[Behind], layer: Layer) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
     let (view, most) = (of.view, of.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
     let pixel = |(i_pixel, under): (usize, &Behind)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
-        compose(of, view.ray(i, j), under).over(under, &of.rounding, of.saturated, most)
+        compose(of, view.ray(i, j), under, layer).over(under, &of.rounding, of.saturated, most)
     };
     behind.iter().enumerate().map(pixel).unzip()
 }
 
-fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind) -> Composed {
+fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind, layer: Layer) -> Composed {
     let Composition { view, blobs, radiance, order, factor, rounding: r, .. } = of;
     let mut pixel = Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
     for &k in order.iter().rev() {
@@ -111,7 +119,8 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind) -> Composed {
         let factor = factor.map_or(1.0, |f| f(k, delta));
         let alpha = alpha(&Blob { kappa: factor * blob.kappa, ..*blob }, b);
         let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-        pixel.under(if is_in && depth <= under.depth && above >= 0.0 { alpha } else { 0.0 }, off, radiance[k]);
+        let drawn = if is_in && depth <= under.depth && above >= 0.0 { alpha } else { 0.0 };
+        layer(&mut pixel, drawn, off, radiance[k]);
     }
     pixel
 }

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
-use crate::model::scene::{DrawPath, Impostors, Scene};
+use crate::model::scene::{Draw, Scene};
 
 /// How long and how often.
 #[derive(Debug, Clone, Copy)]
@@ -54,7 +54,7 @@ pub struct Outcome {
     pub blocks: Vec<Block>,
     /// What is odd about the light of a case's last frame.
     pub notes: Vec<String>,
-    /// What draws, where `draw.path` or `draw.impostors` is "auto", and why.
+    /// What every "auto" of what draws came to, and why.
     pub chosen: Vec<String>,
     pub interrupted: bool,
 }
@@ -95,7 +95,7 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
     let order = block_order(cases, plan.n_rounds);
     let mut i_staged = 0;
     // What "auto" came to at a case's first block holds for all of them.
-    let mut taken: Vec<Option<(DrawPath, Impostors)>> = vec![None; cases.len()];
+    let mut taken: Vec<Option<Draw>> = vec![None; cases.len()];
     for (i_block, (i_case, of)) in (0u32..).zip(order.iter().copied()) {
         let case = &cases[i_case];
         let is_staged = std::mem::replace(&mut i_staged, i_case) == i_case;
@@ -104,16 +104,8 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
             let stage = ran.stage.take().ok_or_else(|| Error::usage("the stage before this block has failed"))?;
             let stage = if is_staged { stage } else { stage.again(with_taken(&case.scene, taken[i_case]), of.skip)? };
             let stage = ran.stage.insert(stage);
-            taken[i_case] = Some((stage.scene.draw.path, stage.scene.draw.impostors));
-            if let Some(choice) = stage.choice.take() {
-                ran.outcome.chosen.push(named(cases, case, &choice.text()));
-            }
-            if let Some(choice) = stage.size_choice.take() {
-                ran.outcome.chosen.push(named(cases, case, &choice.text()));
-            }
-            if let Some(choice) = stage.impostor_choice.take() {
-                ran.outcome.chosen.push(named(cases, case, &choice.text()));
-            }
+            taken[i_case] = Some(stage.scene.draw);
+            ran.outcome.chosen.extend(stage.take_chosen().iter().map(|text| named(cases, case, text)));
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
             if is_last {
                 ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
@@ -138,13 +130,9 @@ fn named(cases: &[Case], case: &Case, note: &str) -> String {
 }
 
 /// The scene with what "auto" took where that is known.
-fn with_taken(scene: &Arc<Scene>, taken: Option<(DrawPath, Impostors)>) -> Arc<Scene> {
+fn with_taken(scene: &Arc<Scene>, taken: Option<Draw>) -> Arc<Scene> {
     match taken {
-        Some((path, impostors)) if (path, impostors) != (scene.draw.path, scene.draw.impostors) => {
-            let mut scene = Scene::clone(scene);
-            (scene.draw.path, scene.draw.impostors) = (path, impostors);
-            Arc::new(scene)
-        }
+        Some(draw) if draw != scene.draw => Arc::new(Scene { draw, ..Scene::clone(scene) }),
         _ => scene.clone(),
     }
 }

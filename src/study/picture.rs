@@ -124,8 +124,8 @@ fn view(scene: &Scene, truth: &Truth) -> View {
         fov_y_rad: scene.camera.fov_y_rad,
         near: scene.camera.near,
         cutoff: scene.draw.cutoff,
-        threshold: scene.draw.threshold,
-        smallest: scene.draw.smallest,
+        threshold: scene.draw.threshold.bound(),
+        smallest: scene.draw.smallest.bound(),
     }
 }
 

@@ -4,14 +4,13 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use crate::frame::choice::{Choice, ImpostorChoice};
-use crate::frame::choice_resolution::SizeChoice;
+use crate::frame::choice::Choice;
+use crate::frame::choice::impostors::ImpostorChoice;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::{OnFrame, parallel, serial};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
-use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, Impostors, Scene, Simulate, Threading};
+use crate::model::scene::{Impostors, Scene, Simulate, Threading};
 use crate::passes;
 
 /// How to open a device.
@@ -28,13 +27,11 @@ pub struct DeviceChoice {
 pub struct Stage {
     pub renderer: Renderer,
     pub game: Game,
-    /// Its `draw.path`, `draw.resolution` and `draw.impostors` are what is drawn by.
+    /// Its `draw` is what is drawn by: nothing in it is "auto".
     pub scene: Arc<Scene>,
-    /// What `draw.path = "auto"` came to, where the scene asks for it.
-    pub choice: Option<Choice>,
-    /// The same of its `draw.resolution`.
-    pub size_choice: Option<SizeChoice>,
-    /// And of its `draw.impostors`.
+    /// What every "auto" of the scene's `draw` came to.
+    pub choices: Vec<Choice>,
+    /// The same of its `draw.impostors`.
     pub impostor_choice: Option<ImpostorChoice>,
     compiler: Compiler,
     pub device: Device,
@@ -72,8 +69,14 @@ impl Stage {
             Impostors::Auto => faster(&device, &compiler, &scene, skip)?,
             _ => (make(&device, &compiler, scene, skip)?, None),
         };
-        let Made { renderer, game, scene, choice, size_choice } = made;
-        Ok(Stage { renderer, game, scene, choice, size_choice, impostor_choice, compiler, device, instance })
+        let Made { renderer, game, scene, choices } = made;
+        Ok(Stage { renderer, game, scene, choices, impostor_choice, compiler, device, instance })
+    }
+
+    /// What every "auto" came to, as users are told, once.
+    pub fn take_chosen(&mut self) -> Vec<String> {
+        let choices = std::mem::take(&mut self.choices);
+        choices.iter().map(Choice::text).chain(self.impostor_choice.take().map(|c| c.text())).collect()
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
@@ -118,8 +121,7 @@ struct Made {
     renderer: Renderer,
     game: Game,
     scene: Arc<Scene>,
-    choice: Option<Choice>,
-    size_choice: Option<SizeChoice>,
+    choices: Vec<Choice>,
 }
 
 /// Everything that `scene`, whose impostors are decided, needs on a device.
@@ -130,19 +132,12 @@ fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool)
         Simulate::Cpu => Some(renderer.generate_now(device)?.0),
     };
     let mut game = Game::new(scene.clone(), rest).culling(skip);
-    let (mut choice, mut size_choice) = (None, None);
-    if scene.draw.path == DrawPath::Auto {
-        let packet = game.step(0)?;
-        let chosen = renderer.choose_path(&packet)?;
-        Arc::make_mut(&mut scene).draw.path = chosen.path;
-        choice = Some(chosen);
+    let (draw, choices) = renderer.choose(device, compiler, &scene, &mut game)?;
+    if draw != scene.draw {
+        Arc::make_mut(&mut scene).draw = draw;
+        game = game.drawn_by(scene.clone());
     }
-    if scene.draw.resolution == Resolution::Auto {
-        let chosen = renderer.choose_resolution(&game.step(0)?, scene.draw.error)?;
-        Arc::make_mut(&mut scene).draw.resolution = chosen.resolution;
-        size_choice = Some(chosen);
-    }
-    Ok(Made { renderer, game, scene, choice, size_choice })
+    Ok(Made { renderer, game, scene, choices })
 }
 
 /// `scene` with impostors or without, whichever draws its first frames faster.
@@ -164,7 +159,7 @@ fn faster(
     }
     let off_ms = off.renderer.time_frames(&mut off.game)?;
     // One at a time: both may not fit. What draws stays the same.
-    let Made { scene, choice, .. } = off;
+    let Made { scene, choices, .. } = off;
     let made = make(device, compiler, with(&scene, Impostors::On), skip).and_then(|mut on| {
         let ms = on.renderer.time_frames(&mut on.game)?;
         Ok((on, ms))
@@ -180,5 +175,5 @@ fn faster(
         Some(on) => on,
         None => make(device, compiler, scene, skip)?,
     };
-    Ok((Made { choice, ..made }, Some(chosen)))
+    Ok((Made { choices, ..made }, Some(chosen)))
 }

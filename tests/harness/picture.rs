@@ -6,9 +6,10 @@ use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use half::f16;
+use nimbus::frame::chunks::{self, Chunks};
 use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Target};
+use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Start, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
@@ -49,6 +50,15 @@ pub struct Tiled {
     pub most_pairs: Option<u64>,
     pub most_tiles: Option<u32>,
     pub saturated: f64,
+}
+
+/// What draws a picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Way {
+    Sprites,
+    Tiles(Tiled),
+    /// So many; and what may be left out.
+    Chunks(u32, f64),
 }
 
 #[derive(Debug, Clone)]
@@ -165,29 +175,29 @@ impl Picture {
 
     /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
     pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
-        self.draw_by(gpu, compiler, format, None)
+        self.draw_by(gpu, compiler, format, Way::Sprites)
     }
 
-    /// The same by `sprites`, or by `tiles` in the way that is given.
-    pub fn draw_by(
-        &self,
-        gpu: &mut Gpu,
-        compiler: Option<&Compiler>,
-        format: TargetFormat,
-        tiled: Option<&Tiled>,
-    ) -> Vec<f64> {
+    /// The same in the way that is given.
+    pub fn draw_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat, way: Way) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let pass = Sprites::new(
-            &gpu.device,
-            compiler,
-            format,
-            lit,
-            [behind, self.i_facet.is_some(), self.drawn.is_some(), self.textured.is_some(), self.view.threshold > 0.0],
-        )
-        .expect("sprites");
+        let [grouped, weighted] = [self.i_facet.is_some(), self.drawn.is_some()];
+        let [textured, threshold] = [self.textured.is_some(), self.view.threshold > 0.0];
+        let variant = [behind, grouped, weighted, textured, threshold];
+        let pass = Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites");
+        let of_chunks = if let Way::Chunks(n_chunks, _) = way { Some(n_chunks) } else { None };
+        let mut chunks = of_chunks.map(|n_chunks| {
+            // Room for more than there are, as where some are culled.
+            let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
+            let variant = [lit, grouped, weighted, textured, threshold];
+            Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant).expect("chunks")
+        });
         let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
-        let tiling = tiled.map(|t| self.tiling(gpu, compiler, format, t));
+        let tiling = match &way {
+            Way::Tiles(tiled) => Some((self.tiling(gpu, compiler, format, tiled), tiled)),
+            _ => None,
+        };
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
         // Facets of surfaces come before those of particles.
@@ -232,7 +242,7 @@ impl Picture {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
                 let n = (Amount::Known(entries.len() as u32), scenery.lit.len() as u32);
                 let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
-                if let (Some(tiling), Some(tiled)) = (&tiling, tiled) {
+                if let Some((tiling, tiled)) = &tiling {
                     let view = nimbus::passes::tiles::View {
                         camera: &camera,
                         cutoff: self.view.cutoff,
@@ -243,7 +253,15 @@ impl Picture {
                     rec.copy(&tiling.pictures[0], &readback);
                     return Ok(());
                 }
-                pass.record(rec, from, target, &camera, [self.view.cutoff, self.view.threshold], n)?;
+                let cuts = [self.view.cutoff, self.view.threshold];
+                match (way, &mut chunks) {
+                    (Way::Chunks(_, saturated), Some(chunks)) => {
+                        let start = if behind { Start::Load } else { Start::Clear };
+                        let view = chunks::View { camera: &camera, cuts, saturated };
+                        chunks.record(rec, from, (target, start), &view, n)?;
+                    }
+                    _ => pass.record(rec, from, target, &camera, cuts, n)?,
+                }
             }
             rec.copy_image(&mut target, &readback);
             Ok(())

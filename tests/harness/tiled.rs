@@ -1,12 +1,12 @@
-//! The truth of a picture that `tiles` draws, and the bound on it.
+//! The truth of a picture that `tiles` or `chunks` draw, and the bound on it.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use glam::DVec2;
 use nimbus::model::film::FilmFormat;
-use nimbus::reference::Blob;
 use nimbus::reference::sprites::{Behind, Rounding};
 use nimbus::reference::tiles::{self, Composition};
+use nimbus::reference::{Blob, chunks};
 
 use crate::picture::Picture;
 
@@ -27,7 +27,16 @@ impl Picture {
     }
 
     pub fn tiled_truth(&self, format: FilmFormat, saturated: f64) -> (Vec<f64>, Vec<f64>) {
-        let (off_alpha, edge) = self.worst(true);
+        self.near_first(format, saturated, true)
+    }
+
+    /// The same of `chunks`.
+    pub fn chunked_truth(&self, format: FilmFormat, saturated: f64) -> (Vec<f64>, Vec<f64>) {
+        self.near_first(format, saturated, false)
+    }
+
+    fn near_first(&self, format: FilmFormat, saturated: f64, by_tiles: bool) -> (Vec<f64>, Vec<f64>) {
+        let (off_alpha, edge) = self.worst(by_tiles);
         let rounding = Rounding { depth: crate::picture::DEPTH, ..Rounding::of(format, off_alpha, edge) };
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
         let behind: Vec<Behind> = match &self.scenery {
@@ -45,7 +54,8 @@ impl Picture {
             rounding,
             saturated,
         };
-        let (value, bound) = tiles::render_over(&of, &behind);
+        let render = if by_tiles { tiles::render_over } else { chunks::render_over };
+        let (value, bound) = render(&of, &behind);
         (value.concat(), bound.concat())
     }
 }

@@ -1,0 +1,247 @@
+//! chunks: whole pictures, in however many chunks, against the f64 reference within a bound that follows f32 blending near to
+//! far, in every format; what is left out behind full pixels; and whole frames, with culling, surfaces and smaller pictures.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+#[path = "harness/mixed.rs"]
+mod mixed;
+#[path = "harness/picture.rs"]
+mod picture;
+#[path = "harness/scenery.rs"]
+mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
+#[path = "harness/tiled.rs"]
+mod tiled;
+
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+use bounded::{Random, greatest_ratio};
+use glam::DVec3;
+use harness::{Gpu, assert_within};
+use mixed::{EYE, assert_small, front, mixed};
+use nimbus::frame::game::Game;
+use nimbus::frame::plan::Pass;
+use nimbus::frame::render::Renderer;
+use nimbus::frame::tiling::saturated;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::io::scene_file;
+use nimbus::layout::facet::LitRecord;
+use nimbus::layout::particle::DrawnRecord;
+use nimbus::model::film::FilmFormat;
+use nimbus::reference::texture::Pool;
+use picture::{FORMATS, Picture, Way};
+use scenery::Scenery;
+
+const F32: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
+
+/// Draws `picture` in every format and in several numbers of chunks and compares every number of every pixel. The greatest
+/// value seen.
+fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
+    let mut greatest = 0f64;
+    for ((target, format), n_chunks) in FORMATS.into_iter().zip([1, 3, 16]).chain([(F32, 256)]) {
+        let what = format!("{what}, {format:?}, {n_chunks} chunks");
+        let saturated = saturated(format);
+        let values = picture.draw_by(gpu, None, target, Way::Chunks(n_chunks, saturated));
+        let (truths, bounds) = picture.chunked_truth(format, saturated);
+        println!("{what}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
+        assert_within(&what, &values, &truths, &bounds);
+        assert_small(&what, format, [&values, &truths], picture.most_layers());
+        greatest = truths.iter().fold(greatest, |a, b| a.max(*b));
+    }
+    greatest
+}
+
+#[test]
+fn blobs_of_all_kinds() {
+    let mut gpu = Gpu::new();
+    for (seed, tau_most) in [(1, 0.125), (2, 3.0), (3, 30.0)] {
+        let what = format!("tau up to {tau_most}");
+        assert!(compare(&mut gpu, &what, &mixed(150, seed, tau_most, -4.0)) > 0.1);
+    }
+    assert_eq!(compare(&mut gpu, "no particles", &front()), 0.0);
+    let eye = DVec3::new(1e6, -1e6, 5e5);
+    let mut far = Picture::new(eye, eye - DVec3::Z, 60.0, 0.1);
+    for k in 0..20 {
+        let at = far.at(f64::from(k % 5) - 2.0, f64::from(k / 5) - 1.5, 4.0 + f64::from(k % 3));
+        far = far.blob(at, 0.5, 0.8);
+    }
+    assert!(compare(&mut gpu, "coordinates of a million", &far) > 0.3);
+    let around = front();
+    let (near, beside) = (around.at(0.2, 0.1, 0.5), around.at(1.5, 0.0, 0.3));
+    assert!(compare(&mut gpu, "around the eye", &around.blob(near, 2.0, 1.0).blob(beside, 0.8, 0.5)) > 0.5);
+}
+
+#[test]
+fn light_weights_textures_and_surfaces() {
+    let mut gpu = Gpu::new();
+    let mut random = Random(77);
+    let picture = mixed(40, 9, 1.0, -2.0);
+    let mut lit = || {
+        let first = [random.within(0.0, 4.0), random.within(0.0, 1.0), random.within(0.0, 0.01)];
+        LitRecord { first, second: [0.25, 0.0, random.within(-0.001, 0.1)], ..LitRecord::default() }
+    };
+    let i_facet = Some((0..40).map(|i| (7 * i) % 11).collect());
+    let shared = Picture { lit: Some((0..11).map(|_| lit()).collect()), i_facet, ..picture.clone() };
+    assert!(compare(&mut gpu, "shared facets", &shared) > 0.3);
+    let part = |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
+    let i_group = (0..40).map(|i| i / 10).collect();
+    let drawn = vec![part(8, 1.6, 0.25), part(20, 1.0, 1.0), part(20, 1.0, 1.0), part(39, 2.0, 0.5)];
+    assert!(compare(&mut gpu, "weights", &Picture { drawn: Some((i_group, drawn)), ..picture }) > 0.3);
+    let pool = Arc::new(Pool::new(4).rounded());
+    let textured = sheets::textured(front(), &pool);
+    assert!(compare(&mut gpu, "textured", &textured) > 0.5);
+    let v = DVec3::new;
+    let scenery = Scenery::default()
+        .rectangle(v(0.2, -0.1, 0.5), v(1.1, 0.2, 0.3), v(-0.18, 0.9, 0.06), [2, 3])
+        .rectangle(v(-0.9, 0.3, 2.0), v(0.4, 0.0, 0.0), v(0.0, 0.4, 0.0), [1, 1]);
+    let over = Picture { scenery: Some(scenery), ..mixed(60, 5, 1.0, -2.0) };
+    assert!(compare(&mut gpu, "over surfaces", &over) > 0.3);
+}
+
+/// Where nothing may be left out the same operations are done in the same order.
+#[test]
+fn chunks_do_not_show() {
+    let mut gpu = Gpu::new();
+    let picture = mixed(100, 21, 0.5, -1.0);
+    let mut draw = |n| picture.draw_by(&mut gpu, None, F32.0, Way::Chunks(n, 0.0));
+    let once = draw(1);
+    for n in [2, 7, 99, 256] {
+        assert!(draw(n) == once, "{n} chunks");
+    }
+}
+
+/// Pixels that the near half fills show that half alone; the others all of it.
+#[test]
+fn full_pixels_leave_the_rest_out() {
+    let mut gpu = Gpu::new();
+    let mut picture = front();
+    for k in 0..20 {
+        let at = picture.at(0.2 * f64::from(k % 5) - 0.4, 0.1 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
+        picture = picture.blob(at, 0.3, 0.6);
+    }
+    // The depths grow with the number.
+    let near =
+        Picture { placed: picture.placed[..10].to_vec(), particles: picture.particles[..10].to_vec(), ..front() };
+    let mut draw = |p: &Picture, way| p.draw_by(&mut gpu, None, F32.0, way);
+    let half = draw(&near, Way::Chunks(1, 0.0));
+    let (whole, cut) = (draw(&picture, Way::Chunks(2, 0.0)), draw(&picture, Way::Chunks(2, 0.25)));
+    let (mut n_full, mut n_open) = (0, 0);
+    for (i, near) in half.chunks(4).enumerate() {
+        let (shown, all) = (&cut[4 * i..4 * i + 4], &whole[4 * i..4 * i + 4]);
+        // As the device sees it: 1 − A in f32.
+        if 1.0 - (near[3] as f32) < 0.25 {
+            assert!(shown == near, "pixel {i}: {shown:?}, of the near half {near:?}");
+            n_full += usize::from(shown != all);
+        } else {
+            assert!(shown == all, "pixel {i}: {shown:?}, of all {all:?}");
+            n_open += usize::from(near[3] > 0.0);
+        }
+    }
+    assert!(n_full > 500 && n_open > 500, "{n_full} full pixels, {n_open} open ones");
+    let (truths, bounds) = picture.chunked_truth(F32.1, 0.25);
+    assert_within("a quarter left out", &cut, &truths, &bounds);
+}
+
+#[test]
+fn wrong_pictures_are_noticed() {
+    let mut gpu = Gpu::new();
+    let picture = mixed(150, 2, 3.0, -1.0);
+    // Bounds of what leaves nothing out.
+    let (truths, bounds) = picture.chunked_truth(F32.1, 0.0);
+    let way = Way::Chunks(5, saturated(F32.1));
+    let mut values = picture.draw_by(&mut gpu, None, F32.0, way);
+    assert!(greatest_ratio(&values, &truths, &bounds) <= 1.0);
+    let i = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).expect("pixels");
+    values[i] -= 2.0 * bounds[i];
+    assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "one corrupted number");
+    for (file, from, to) in [
+        ("chunks_order.comp", "n - 1u - i", "i"),
+        ("chunks_order.comp", "i / size * push.stride + i % size", "i"),
+        ("chunks_order.comp", "min(size, n - before)", "size - 1u"),
+        ("chunks.frag", "!(1.0 - pixel.w < push.saturated)", "1.0 - pixel.w < push.saturated"),
+        ("chunks.frag", "!(1.0 - pixel.w < push.saturated)", "!(1.0 - pixel.w < 0.1)"),
+        ("chunks.frag", "at.y * int(push.width) + at.x", "at.x"),
+        ("sprites.vert", "push.i_first + gl_InstanceIndex", "gl_InstanceIndex"),
+    ] {
+        let wrong = Gpu::wrong_compiler(file, from, to);
+        let values = picture.draw_by(&mut gpu, Some(&wrong), F32.0, way);
+        assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
+    }
+}
+
+/// Layers so thin that half floats would lose them far to near: once is rounded, and not ten thousand times.
+#[test]
+fn ten_thousand_thin_layers_in_half_floats() {
+    let mut gpu = Gpu::new();
+    let mut picture = Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 0.1);
+    (picture.view.width, picture.view.height) = (40, 30);
+    let at = picture.at(0.0, 0.0, 5.0);
+    for _ in 0..10_000 {
+        picture = picture.blob(at, 0.6, 1e-4);
+    }
+    let (target, format) = (TargetFormat::Rgba16f, FilmFormat::Rgba16f);
+    let truths = picture.truth(FilmFormat::Rgba32f).0;
+    let off = |values: &[f64]| values.iter().zip(&truths).map(|(v, t)| (v - t).abs()).fold(0.0, f64::max);
+    let chunked = off(&picture.draw_by(&mut gpu, None, target, Way::Chunks(4, saturated(format))));
+    let layered = off(&picture.draw(&mut gpu, None, target));
+    println!("greatest error near to far {chunked:.2e}, far to near {layered:.2e}");
+    // Half a step of half floats below 1 is left out, half a step is rounded off, and 10 000 sums in f32 err by 2^-24 each to
+    // either side.
+    assert!(chunked < 2.0 * 2f64.powi(-12) + 100.0 * 2f64.powi(-24) && layered > 0.1, "{chunked:e}, {layered:e}");
+}
+
+/// The numbers of some of a scene's frames, and what is said of the last one's impostors.
+fn frames(gpu: &Gpu, file: &str, range: Range<u32>, overrides: &[&str]) -> (Vec<f64>, bool) {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
+    let all = ["film.format='rgba32f'", "lighting.mode='first'", "lighting.grid=24"];
+    let overrides: Vec<String> = all.iter().chain(overrides).map(|o| (*o).to_owned()).collect();
+    let scene = Arc::new(scene_file::load(&file, &overrides, None).expect("the scene").scene);
+    let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+    let mut game = Game::new(scene.clone(), None);
+    let (mut values, mut shown) = (vec![], false);
+    for i in range {
+        let done = renderer.step(game.step(i).expect("a packet")).expect("a frame");
+        shown = done.plan.runs(Pass::Impostors);
+        values.extend(renderer.image().expect("pixels").into_iter().map(f64::from));
+    }
+    (values, shown)
+}
+
+/// The greatest difference, as a share of the greatest number.
+fn apart(a: &[f64], b: &[f64]) -> f64 {
+    let most = a.iter().copied().fold(0.0, f64::max);
+    assert!(a.len() == b.len() && most > 0.1);
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / most
+}
+
+/// A cloud over surfaces, and one seen through impostors, through the whole frame: the picture of other ways but for rounding,
+/// with culling or without, whole or smaller. Some hundred layers of f32.
+#[test]
+fn frames_are_those_of_other_ways() {
+    let gpu = Gpu::new();
+    for resolution in ["draw.resolution=1.0", "draw.resolution=0.5"] {
+        let of = |more: &[&str]| {
+            frames(&gpu, "ground.toml", 0..1, &[&["film.width=96", "film.height=72", resolution], more].concat()).0
+        };
+        let sprites = of(&[]);
+        assert!(apart(&sprites, &of(&["draw.cutoff=0.5"])) > 0.01, "there is a cloud");
+        for more in
+            [&["draw.path='tiles'"][..], &["draw.chunks=1"], &["draw.chunks=6"], &["draw.chunks=6", "draw.cull='off'"]]
+        {
+            let off = apart(&sprites, &of(more));
+            println!("{resolution}, {more:?}: {off:.1e}");
+            assert!(off < 1e-5, "{resolution} {more:?}: {off:e}");
+        }
+    }
+    // In a smaller one a shell would save nothing.
+    let large = ["film.width=320", "film.height=240", "draw.impostors='on'", "draw.impostor_error=2"];
+    let of = |chunks| frames(&gpu, "through-615.toml", 217..221, &[&large[..], &[chunks]].concat());
+    let ((sprites, _), (chunks, shown)) = (of("draw.chunks=0"), of("draw.chunks=4"));
+    let off = apart(&sprites, &chunks);
+    println!("over a shell: {off:.1e}");
+    assert!(shown && off < 1e-5, "{shown} {off:e}");
+}

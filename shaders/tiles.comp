@@ -25,10 +25,6 @@
 #ifndef THIN
 #define THIN 0
 #endif
-// Words of a pixel: 1 rgba8, 2 rgba16f, 4 rgba32f.
-#ifndef PIXEL_WORDS
-#define PIXEL_WORDS 2
-#endif
 // Surfaces hide what lies behind them; 2: their depth has 24 bits.
 #ifndef BEHIND
 #define BEHIND 0
@@ -52,11 +48,6 @@ layout(binding = 9) uniform usamplerBuffer pool;
 #ifndef ROUNDS
 #define ROUNDS 0
 #endif
-// 1: rows have an even number of pixels.
-#ifndef EVEN
-#define EVEN 0
-#endif
-
 layout(local_size_x = INVOCATIONS) in;
 
 // Pixels of an invocation's row.
@@ -70,12 +61,8 @@ layout(std430, binding = 2) readonly buffer Rounds { Round rounds[]; };
 layout(std430, binding = 3) readonly buffer Ranges { uvec4 ranges[]; };
 // Colour and opacity of what earlier rounds drew.
 layout(std430, binding = 4) buffer State { vec4 state[]; };
-#if EVEN && PIXEL_WORDS == 2
-// By fours, and so loops of stores that a device without vector stores makes of one.
-layout(std430, binding = 5) writeonly buffer Picture { uvec4 picture[]; };
-#else
-layout(std430, binding = 5) writeonly buffer Picture { uint picture[]; };
-#endif
+#define PICTURE 5
+#include "pixels.glsl"
 #if BEHIND
 // The surfaces, as they lie in their target, and their near/z.
 layout(std430, binding = 6) readonly buffer Under { uint under[]; };
@@ -258,23 +245,29 @@ Loaded of_invocation(uint m) {
 }
 #endif
 
-// Of the n found ones those from k on, one an invocation, each for all of them.
-void compose_some(uint k, uint n, float y) {
+// Of the n found ones those from k on, one an invocation, each for all of them. Invocations without one have `spare`, any
+// splat, without depth and light.
+void compose_some(uint k, uint n, uint spare, float y) {
     uint t = gl_LocalInvocationID.x;
-    Loaded splat = load_splat(int(found[min(k + t, n - 1u)]));
+    Loaded splat = load_splat(int(k + t < n ? found[k + t] : spare));
     splat.place.w = k + t < n ? splat.place.w : 0.0;
+    splat.light.xyz = k + t < n ? splat.light.xyz : vec3(0.0);
     uint end = min(n - k, INVOCATIONS);
 #if ONE_SUBGROUP
     // By twos: what a loop carries is written anew at each turn.
-    for (uint m = 0; m < end; m += 2) {
+    uint m = 0;
+    do {
         compose(of_invocation(splat, m), y);
         compose(of_invocation(splat, m + 1), y);
-    }
+        m += 2;
+    } while (m < end);
 #else
     give(splat, t);
-    for (uint m = 0; m < end; ++m) {
+    uint m = 0;
+    do {
         compose(of_invocation(m), y);
-    }
+        ++m;
+    } while (m < end);
     barrier();
 #endif
 }
@@ -291,27 +284,6 @@ vec4 load(uint p) {
 #endif
 }
 
-#if EVEN && PIXEL_WORDS == 2
-// Pixels p and p + 1, p even.
-void store(uint p, vec4 a, vec4 b) {
-    picture[p / 2] = uvec4(packHalf2x16(a.xy), packHalf2x16(a.zw), packHalf2x16(b.xy), packHalf2x16(b.zw));
-}
-#else
-void store(uint p, vec4 value) {
-#if PIXEL_WORDS == 1
-    picture[p] = packUnorm4x8(value);
-#elif PIXEL_WORDS == 2
-    picture[2 * p] = packHalf2x16(value.xy);
-    picture[2 * p + 1] = packHalf2x16(value.zw);
-#else
-    picture[4 * p] = floatBitsToUint(value.x);
-    picture[4 * p + 1] = floatBitsToUint(value.y);
-    picture[4 * p + 2] = floatBitsToUint(value.z);
-    picture[4 * p + 3] = floatBitsToUint(value.w);
-#endif
-}
-#endif
-
 #if BEHIND == 2
 float depth_at(uint p) { return float(depths[p] & 0xffffffu) / 16777215.0; }
 #elif BEHIND
@@ -321,14 +293,9 @@ float depth_at(uint p) { return uintBitsToFloat(depths[p]); }
 // Pixel j of the row over what stands behind it.
 vec4 seen(uint j, uint p) { return vec4(color[j], 1.0 - passed[j]) + passed[j] * load(p); }
 
-void main() {
+// Tile i_tile of the bin whose pairs are those of the range.
+void draw_tile(uvec4 range, uint i_tile) {
     uint t = gl_LocalInvocationID.x;
-    uint w = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    if (w >= (ROUNDS != 0 ? rounds[push.i_round].tiles.w : rounds[push.i_round].alone.w)) {
-        return;
-    }
-    uvec4 range = ranges[w];
-    uint i_tile = range.w;
     uvec2 tile = TILES_ACROSS * uvec2(range.z % push.n_bins_x, range.z / push.n_bins_x)
                + uvec2(i_tile % TILES_ACROSS, i_tile / TILES_ACROSS);
     uvec2 at = tile * uvec2(TILE_WIDTH, ROWS) + uvec2(RUN * (t / ROWS), t % ROWS);
@@ -356,27 +323,32 @@ void main() {
         depth_of[j] = depth_at(p);
 #endif
     }
-    for (uint first = range.x; first < range.y;) {
+    // These loops test at their ends, as do those within: llvmpipe goes through a loop once more, with nothing to do, where the
+    // test comes first. Each has something to do at its first turn.
+    uint first = range.x;
+    bool is_done;
+    do {
         uint n = 0;
-        while (first < range.y && n + INVOCATIONS <= MOST) {
+        uvec2 pair;
+        do {
             uint i = first + t;
-            uvec2 pair = pairs[min(i, range.y - 1u)];
+            pair = pairs[min(i, range.y - 1u)];
             n = append(n, i < range.y && (pair.x >> (BIN_BITS + i_tile) & 1u) != 0, pair.y);
             first += INVOCATIONS;
-        }
+        } while (first < range.y && n + INVOCATIONS <= MOST);
         wait_for_all();
-        for (uint k = 0; k < n; k += INVOCATIONS) {
-            compose_some(k, n, y);
-        }
+        uint k = 0;
+        do {
+            compose_some(k, n, pair.y, y);
+            k += INVOCATIONS;
+        } while (k < n);
         wait_for_all();
         float most = 0.0;
         [[unroll]] for (uint j = 0; j < RUN; ++j) {
             most = max(most, passed[j]);
         }
-        if (all_agree(most < push.saturated)) {
-            break;
-        }
-    }
+        is_done = all_agree(most < push.saturated) || first >= range.y;
+    } while (!is_done);
 #if ROUNDS
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         if (at.x + j < push.width && at.y < push.height) {
@@ -384,19 +356,27 @@ void main() {
         }
     }
 #endif
-#if EVEN && PIXEL_WORDS == 2
-    [[unroll]] for (uint j = 0; j < RUN; j += 2) {
+    [[unroll]] for (uint j = 0; j < RUN; j += TOGETHER) {
         if (at.x + j < push.width && at.y < push.height) {
             uint p = row + at.x + j;
-            store(p, seen(j, p), seen(j + 1, p + 1));
+            vec4 values[TOGETHER];
+            [[unroll]] for (uint m = 0; m < TOGETHER; ++m) {
+                values[m] = seen(j + m, p + m);
+            }
+            store_together(p, values);
         }
     }
-#else
-    [[unroll]] for (uint j = 0; j < RUN; ++j) {
-        if (at.x + j < push.width && at.y < push.height) {
-            uint p = row + at.x + j;
-            store(p, seen(j, p));
-        }
+}
+
+void main() {
+    uint w = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
+    if (w >= (ROUNDS != 0 ? rounds[push.i_round].tiles.w : rounds[push.i_round].alone.w)) {
+        return;
     }
-#endif
+    uvec4 range = ranges[w];
+    uint left = range.w;
+    do {
+        draw_tile(range, uint(findLSB(left)));
+        left &= left - 1u;
+    } while (left != 0);
 }

@@ -71,7 +71,9 @@ void main() {
     uint n_x = last.x - first.x + 1u;
     uint n = n_x * (last.y - first.y + 1u);
     uvec2 bin = first;
-    for (uint k = 0; k < n; ++k) {
+    // At least one, and tested at the end: see tiles.comp.
+    uint k = 0;
+    do {
         uint columns = within(low.x, high.x, bin.x), rows = within(low.y, high.y, bin.y);
         // A bit each of four rows, spread to the first bits of four groups of four.
         uint spread = (rows & 1u) | (rows & 2u) << 3 | (rows & 4u) << 6 | (rows & 8u) << 9;
@@ -80,5 +82,5 @@ void main() {
         pairs[at + k] = uvec2(bin.y * push.n_bins_x + bin.x | tiles << BIN_BITS, r);
         bool wraps = bin.x == last.x;
         bin = wraps ? uvec2(first.x, bin.y + 1u) : uvec2(bin.x + 1u, bin.y);
-    }
+    } while (++k < n);
 }

@@ -4,15 +4,18 @@
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Where each bin's pairs lie among the sorted ones, and the tiles of it that any of them reaches. Their order decides nothing:
-// no two share a pixel.
+// Where each bin's pairs lie among the sorted ones, and the tiles of it that any of them reaches, dealt to workgroups. Their order
+// decides nothing: no two share a pixel.
 
 layout(local_size_x = 64) in;
 
-layout(push_constant) uniform Push { uint n_bins; uint i_round; uint max_groups; uint unused; } push;
+layout(push_constant) uniform Push { uint n_bins; uint i_round; uint max_groups; uint most_tiles; } push;
+// Pairs that a workgroup goes through: once for each of its tiles, 0.8 turns of its loops a pair, of 65 535.
+const uint MOST_PAIRS = 16384;
+
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 1) buffer Rounds { Round rounds[]; };
-// (first pair, end, bin, tile of it)
+// (first pair, end, bin, a bit for each tile of it)
 layout(std430, binding = 2) writeonly buffer Ranges { uvec4 ranges[]; };
 
 // The first of n pairs whose bin is not below `bin`.
@@ -44,20 +47,25 @@ void main() {
             reached |= pairs[min(i + k, end - 1u)].x >> BIN_BITS;
         }
     }
-    uint n_tiles = bitCount(reached);
-    if (n_tiles == 0) {
+    if (reached == 0) {
         return;
     }
-    uint before = atomicAdd(rounds[push.i_round].tiles.w, n_tiles);
+    // As many tiles a workgroup as it has turns for.
+    uint most = clamp(MOST_PAIRS / (end - first), 1u, push.most_tiles);
+    uint n_ranges = (bitCount(reached) + most - 1u) / most;
+    uint before = atomicAdd(rounds[push.i_round].tiles.w, n_ranges);
     uint n_before = before;
-    for (uint i = 0; i < TILES; ++i) {
-        if ((reached >> i & 1u) != 0) {
-            ranges[n_before++] = uvec4(first, end, bin, i);
+    uint tiles = 0;
+    [[unroll]] for (uint i = 0; i < TILES; ++i) {
+        tiles |= reached & 1u << i;
+        if (tiles != 0 && (bitCount(tiles) == most || i == TILES - 1u)) {
+            ranges[n_before++] = uvec4(first, end, bin, tiles);
+            tiles = 0;
         }
     }
     uvec2 groups = uvec2(min(n_before, push.max_groups), (n_before + push.max_groups - 1u) / push.max_groups);
     if (push.i_round == 0 && rounds[0].bins.w == 0) {
-        atomicAdd(rounds[0].alone.w, n_tiles);
+        atomicAdd(rounds[0].alone.w, n_ranges);
         atomicMax(rounds[0].alone.x, groups.x);
         atomicMax(rounds[0].alone.y, groups.y);
     } else {

@@ -4,14 +4,15 @@
 #include "each.glsl"
 #include "upsample.glsl"
 
-// Puts the blobs' smaller picture over the full one, a run of 4 N pixels of a row an invocation (docs/model.md §11
-// "upsample").
+// Puts the blobs' smaller picture over the full one, a run of 4 N pixels of two rows an invocation: two that have their taps in
+// the same six rows of small pixels (docs/model.md §11 "upsample").
 
 layout(local_size_x = 64) in;
 
 // Pixels of a run, and columns of small pixels that it has taps in.
 const uint ACROSS = 4 * N;
 const uint COLUMNS = 10;
+const uint ROWS = 2;
 // Pixels of the first texel that come before them.
 const uint AHEAD = SHIFT % TEXEL_PIXELS;
 
@@ -42,28 +43,9 @@ bool is_plain(uvec2 first, uvec2 at) {
 }
 #endif
 
-void draw_run(uvec2 at) {
-    // The first tap of the run's first pixel.
-    uvec2 q = uvec2(push.offset_x, push.offset_y) + 2u * at;
-    uvec2 first = q / (2u * N) - 2u;
-    float t = float(q.y % (2u * N)) / float(2u * N);
-    vec4 sums[COLUMNS];
-    [[unroll]] for (uint c = 0; c < COLUMNS; ++c) {
-        sums[c] = vec4(0.0);
-    }
-    [[dont_unroll]] for (uint r = 0; r < 6; ++r) {
-        float w = weight(r, t);
-        uint texel = ((first.y + r) * push.small_width + first.x) / TEXEL_PIXELS;
-        [[unroll]] for (uint k = 0; k < AHEAD + COLUMNS; k += TEXEL_PIXELS) {
-            uvec4 words = texelFetch(small, int(min(texel + k / TEXEL_PIXELS, push.last_texel)));
-            [[unroll]] for (uint m = 0; m < TEXEL_PIXELS; ++m) {
-                if (k + m >= AHEAD && k + m < AHEAD + COLUMNS) {
-                    sums[k + m - AHEAD] += w * pixel_of(words, m);
-                }
-            }
-        }
-    }
-    uint p = at.y * push.width + at.x;
+// Pixels (x, y) and on, of which the columns of small pixels have `sums`.
+void draw_run(uint x, uint y, vec4 sums[COLUMNS]) {
+    uint p = y * push.width + x;
     [[unroll]] for (uint i = 0; i < ACROSS; i += TOGETHER) {
         vec4 seen[TOGETHER];
         [[unroll]] for (uint m = 0; m < TOGETHER; ++m) {
@@ -73,22 +55,69 @@ void draw_run(uvec2 at) {
                 seen[m] += weight(k, float(step % (2 * N)) / float(2 * N)) * sums[step / (2 * N) + k];
             }
         }
-        if (at.x + i < push.width) {
+        if (x + i < push.width && y < push.height) {
             store_all(p + i, seen);
         }
     }
+}
+
 #if BEHIND
+// Those of them again that may be beside an edge of depth.
+void draw_edges(uint x, uint y, uvec2 first) {
     // A loop, which devices that go through both sides of a branch leave at once.
-    uint end = min(at.x + ACROSS, push.width);
-    [[dont_unroll]] for (uint x = is_plain(first, at) ? end : at.x; x < end; ++x) {
-        p = at.y * push.width + x;
-        store(p, over(beside_edges(uvec2(x, at.y), p), p));
+    uint end = y < push.height && !is_plain(first, uvec2(x, y)) ? min(x + ACROSS, push.width) : x;
+    [[dont_unroll]] for (uint at = x; at < end; ++at) {
+        uint p = y * push.width + at;
+        store(p, over(beside_edges(uvec2(at, y), p), p));
     }
+}
+#endif
+
+// Both rows lie between the same small ones: o + 2 y is 4 i, or one more, and that and two.
+void draw_pair(uint x, uint i) {
+    uint q = 4u * i + (push.offset_y & 1u);
+    uvec2 first = uvec2(push.offset_x + 2u * x, q) / (2u * N) - 2u;
+    vec4 sums[ROWS][COLUMNS];
+    float t[ROWS];
+    [[unroll]] for (uint j = 0; j < ROWS; ++j) {
+        t[j] = float((q + 2u * j) % (2u * N)) / float(2u * N);
+        [[unroll]] for (uint c = 0; c < COLUMNS; ++c) {
+            sums[j][c] = vec4(0.0);
+        }
+    }
+    [[unroll]] for (uint r = 0; r < 6; ++r) {
+        float w[ROWS];
+        [[unroll]] for (uint j = 0; j < ROWS; ++j) {
+            w[j] = weight(r, t[j]);
+        }
+        uint texel = ((first.y + r) * push.small_width + first.x) / TEXEL_PIXELS;
+        [[unroll]] for (uint k = 0; k < AHEAD + COLUMNS; k += TEXEL_PIXELS) {
+            uvec4 words = texelFetch(small, int(min(texel + k / TEXEL_PIXELS, push.last_texel)));
+            [[unroll]] for (uint m = 0; m < TEXEL_PIXELS; ++m) {
+                if (k + m >= AHEAD && k + m < AHEAD + COLUMNS) {
+                    vec4 value = pixel_of(words, m);
+                    [[unroll]] for (uint j = 0; j < ROWS; ++j) {
+                        sums[j][k + m - AHEAD] += w[j] * value;
+                    }
+                }
+            }
+        }
+    }
+    // Before the first row and after the last one there may be one that is none: far below, or at the height.
+    uint y = 2u * i - push.offset_y / 2u;
+    [[unroll]] for (uint j = 0; j < ROWS; ++j) {
+        draw_run(x, y + j, sums[j]);
+    }
+#if BEHIND
+    uint j = 0;
+    [[dont_unroll]] do {
+        draw_edges(x, y + j, first);
+    } while (++j < ROWS);
 #endif
 }
 
 void main() {
-    FOR_EACH(run, push.n_runs * push.height) {
-        draw_run(uvec2(ACROSS * (run % push.n_runs), run / push.n_runs));
+    FOR_EACH(run, push.n_runs * push.n_pairs) {
+        draw_pair(ACROSS * (run % push.n_runs), push.offset_y / 4u + run / push.n_runs);
     }
 }

@@ -193,6 +193,27 @@ fn what_does_not_fit_the_shader_is_refused() {
 }
 
 #[test]
+fn records_beyond_one_row_of_workgroups_are_all_done() {
+    let mut gpu = Gpu::new();
+    let kernel = Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[]).unwrap();
+    // Two rows and a bit, and no whole number of workgroups.
+    let in_a_row = u64::from(gpu.device.limits().max_workgroups_x) * u64::from(kernel.local_size_x());
+    if in_a_row > 1 << 23 {
+        println!("a row of this device's holds {in_a_row} records: not tested");
+        return;
+    }
+    let n = 2 * in_a_row as u32 + 77;
+    let (sums, density) = (gpu.buffer::<[u32; 2]>(n as usize), gpu.buffer::<f32>(n as usize));
+    let push = grid::ResolvePush { n_cells: n, density_per_quantum: 1.0 };
+    gpu.run(|rec| {
+        rec.fill(&sums, 0);
+        rec.fill(&density, 0xffff_ffff);
+        rec.dispatch(&kernel, &[&sums, &density], &push, n)
+    });
+    assert!(gpu.download::<f32>(&density, n as usize).iter().all(|d| *d == 0.0));
+}
+
+#[test]
 fn host_memory_is_checked_against_its_size() {
     let gpu = Gpu::new();
     let mut upload = Buffer::new::<u32>(&gpu.device, "test.upload", 4, Place::Upload).unwrap();

@@ -35,7 +35,7 @@ use scenery::Scenery;
 /// As the device does it by default.
 fn usual(gpu: &Gpu, format: FilmFormat) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
-    Tiled { invocations, portable: false, most_pairs: None, saturated: saturated(format) }
+    Tiled { invocations, portable: false, most_pairs: None, most_tiles: None, saturated: saturated(format) }
 }
 
 /// Draws `picture` in every format and compares every number of every pixel. The greatest value seen.
@@ -167,6 +167,13 @@ fn workgroups_and_rounds_do_not_show() {
     for invocations in [8, 16, 32, 64] {
         let other = Tiled { invocations, portable: true, ..tiled };
         assert!(draw(&other) == once, "{invocations} invocations without subgroups");
+    }
+    for most_tiles in [1, 3, 16].map(Some) {
+        assert!(draw(&Tiled { most_tiles, ..tiled }) == once, "{most_tiles:?} tiles a workgroup");
+        assert!(
+            draw(&Tiled { invocations: 32, portable: true, most_tiles, ..tiled }) == once,
+            "{most_tiles:?}, portable"
+        );
     }
     let rounds = draw(&Tiled { most_pairs: Some(1), ..tiled });
     assert!(rounds != once, "several rounds");

@@ -71,7 +71,7 @@ fn without(picture: &Picture) -> Picture {
 
 fn usual(gpu: &Gpu) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
-    Tiled { invocations, portable: false, most_pairs: None, saturated: saturated(FORMAT.1) }
+    Tiled { invocations, portable: false, most_pairs: None, most_tiles: None, saturated: saturated(FORMAT.1) }
 }
 
 /// The reference's picture and its bound, by `sprites` or by `tiles`.

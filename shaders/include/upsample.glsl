@@ -11,29 +11,16 @@
 #ifndef SHIFT
 #define SHIFT 0
 #endif
-// Words of a pixel: 1 rgba8, 2 rgba16f, 4 rgba32f.
-#ifndef PIXEL_WORDS
-#define PIXEL_WORDS 2
-#endif
-// Pixels that are stored together, as four words: where rows have a whole number of them.
-#ifndef TOGETHER
-#define TOGETHER 1
-#endif
 // There are surfaces; 2: their depth has 24 bits.
 #ifndef BEHIND
 #define BEHIND 0
 #endif
 
-#define TEXEL_PIXELS (4 / PIXEL_WORDS)
-#define FOURS (TOGETHER * PIXEL_WORDS == 4)
+#define PICTURE 1
+#include "pixels.glsl"
 
-layout(push_constant) uniform Push { uint width; uint height; uint small_width; uint small_height; uint offset_x; uint offset_y; uint n_runs; uint last_texel; } push;
+layout(push_constant) uniform Push { uint width; uint height; uint small_width; uint small_height; uint offset_x; uint offset_y; uint n_runs; uint n_pairs; uint last_texel; } push;
 layout(binding = 0) uniform usamplerBuffer small;
-#if FOURS
-layout(std430, binding = 1) writeonly buffer Picture { uvec4 picture[]; };
-#else
-layout(std430, binding = 1) writeonly buffer Picture { uint picture[]; };
-#endif
 
 // Depths that differ by no more than this share of the nearer one are those of one surface.
 const float ALIKE = 0.0625;
@@ -45,42 +32,6 @@ float weight(uint k, float t) {
         w *= m == int(k) ? 1.0 : (2.0 + t - float(m)) / float(int(k) - m + int(m == int(k)));
     }
     return w;
-}
-
-vec4 pixel_of(uvec4 words, uint m) {
-#if PIXEL_WORDS == 1
-    return unpackUnorm4x8(words[m]);
-#elif PIXEL_WORDS == 2
-    return vec4(unpackHalf2x16(words[2 * m]), unpackHalf2x16(words[2 * m + 1]));
-#else
-    return uintBitsToFloat(words);
-#endif
-}
-
-uvec4 packed(vec4 value) {
-#if PIXEL_WORDS == 1
-    return uvec4(packUnorm4x8(value));
-#elif PIXEL_WORDS == 2
-    return uvec2(packHalf2x16(value.xy), packHalf2x16(value.zw)).xyxy;
-#else
-    return floatBitsToUint(value);
-#endif
-}
-
-void store(uint p, vec4 value) {
-    uvec4 words = packed(value);
-#if FOURS && PIXEL_WORDS == 4
-    picture[p] = words;
-#else
-    [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) {
-        uint i = PIXEL_WORDS * p + k;
-#if FOURS
-        picture[i / 4][i % 4] = words[k];
-#else
-        picture[i] = words[k];
-#endif
-    }
-#endif
 }
 
 #if BEHIND
@@ -99,6 +50,19 @@ vec4 depths_of(uvec4 words) {
 
 vec4 small_depths_at(uint texel) {
     return depths_of(texelFetch(small_depths, int(min(texel, push.small_width * push.small_height / 4 - 1u))));
+}
+
+// Pixel p alone.
+void store(uint p, vec4 value) {
+    uvec4 words = packed(value);
+    [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) {
+        uint i = PIXEL_WORDS * p + k;
+#if FOURS
+        picture[i / 4][i % 4] = words[k];
+#else
+        picture[i] = words[k];
+#endif
+    }
 }
 
 float depth_at(uint p) { return depths_of(texelFetch(depths, int(p / 4)))[p % 4]; }
@@ -131,13 +95,7 @@ void store_all(uint p, vec4 sums[TOGETHER]) {
         sums[m] = over(sums[m], p + m);
     }
 #endif
-#if TOGETHER == 4
-    picture[p / 4] = uvec4(packed(sums[0]).x, packed(sums[1]).x, packed(sums[2]).x, packed(sums[3]).x);
-#elif TOGETHER == 2
-    picture[p / 2] = uvec4(packed(sums[0]).xy, packed(sums[1]).xy);
-#else
-    store(p, sums[0]);
-#endif
+    store_together(p, sums);
 }
 
 #if BEHIND

@@ -106,6 +106,7 @@ fn variant(scene: &Scene, format: TargetFormat) -> Variant {
         tau_most: tau_most(scene),
         portable: false,
         most_pairs: None,
+        most_tiles: None,
     }
 }
 

@@ -53,6 +53,8 @@ pub struct Limits {
     pub subgroup_size_fixed: bool,
     /// A kernel can ask for subgroups of that size.
     pub subgroup_size_chosen: bool,
+    /// Shaders may have words of 64 bits.
+    pub words_64: bool,
     /// 0 where the queue has no timestamps.
     pub timestamp_valid_bits: u32,
     pub timestamp_period_ns: f64,
@@ -258,6 +260,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
         .max();
     let version = properties.api_version;
     let limits = properties.limits;
+    let features = unsafe { instance.get_physical_device_features(physical) };
     DeviceInfo {
         index,
         name: text(&properties.device_name),
@@ -286,6 +289,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             ) && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
             subgroup_size_fixed: sizes.min_subgroup_size == sizes.max_subgroup_size,
             subgroup_size_chosen: sizes.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
+            words_64: features.shader_int64 == vk::TRUE,
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
             timestamp_period_ns: f64::from(limits.timestamp_period),
         },
@@ -336,7 +340,8 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .compute_full_subgroups(true);
     let extensions: Vec<_> = info.calibrated_timestamps.iter().map(|name| name.as_ptr()).collect();
     let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
-    let create = create.push_next(&mut v12).push_next(&mut v13);
+    let features = vk::PhysicalDeviceFeatures::default().shader_int64(info.limits.words_64);
+    let create = create.enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
     unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
 }
 
@@ -375,6 +380,7 @@ mod tests {
             subgroup_shuffle: false,
             subgroup_size_fixed: false,
             subgroup_size_chosen: false,
+            words_64: false,
             timestamp_valid_bits: 0,
             timestamp_period_ns: 0.0,
         };

@@ -240,13 +240,16 @@ impl Recorder<'_> {
         done
     }
 
-    /// Runs `kernel` with one invocation a record; kernels stride, so that more records than the device has
-    /// invocations are still all done. `buffers` by binding number.
+    /// Runs `kernel` with one invocation a record (each.glsl), in rows of workgroups where the device takes fewer along x than
+    /// that are. `buffers` by binding number.
     pub fn dispatch<P: Pod>(&mut self, kernel: &Kernel, buffers: &[&Buffer], push: &P, n_records: u32) -> Result<()> {
-        self.dispatch_groups(kernel, buffers, push, n_records.div_ceil(kernel.local_size_x()))
+        let n_groups = n_records.div_ceil(kernel.local_size_x());
+        // Every device takes 65 535 along y, too: more than any number of records needs.
+        let n_rows = n_groups.div_ceil(self.commands.shared.limits.max_workgroups_x);
+        self.dispatch_rows(kernel, buffers, push, [n_groups.div_ceil(n_rows.max(1)), n_rows])
     }
 
-    /// Runs `kernel` in `n_groups` workgroups, or as many as the device takes.
+    /// Runs `kernel` in `n_groups` workgroups, or as many as the device takes; it goes on from there by itself.
     pub fn dispatch_groups<P: Pod>(
         &mut self,
         kernel: &Kernel,
@@ -254,12 +257,22 @@ impl Recorder<'_> {
         push: &P,
         n_groups: u32,
     ) -> Result<()> {
-        if n_groups == 0 {
+        let n_groups = n_groups.min(self.commands.shared.limits.max_workgroups_x);
+        self.dispatch_rows(kernel, buffers, push, [n_groups, 1])
+    }
+
+    fn dispatch_rows<P: Pod>(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[&Buffer],
+        push: &P,
+        [x, y]: [u32; 2],
+    ) -> Result<()> {
+        if x == 0 {
             return Ok(());
         }
-        let n_groups = n_groups.min(self.commands.shared.limits.max_workgroups_x);
         self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
-        unsafe { self.commands.shared.raw.cmd_dispatch(self.commands.buffer, n_groups, 1, 1) };
+        unsafe { self.commands.shared.raw.cmd_dispatch(self.commands.buffer, x, y, 1) };
         Ok(())
     }
 

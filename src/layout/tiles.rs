@@ -40,7 +40,7 @@ record! {
         blocks: [u32; 4],
         /// Workgroups that look for the bins' pairs: [n, 1, 1]; 1 where a later round has splats.
         bins: [u32; 4],
-        /// Workgroups that compose where there are several rounds: [x, y, 1]; tiles of bins that have pairs.
+        /// Workgroups that compose where there are several rounds: [x, y, 1]; how many have tiles.
         tiles: [u32; 4],
         /// The same where this is the only round.
         alone: [u32; 4],

@@ -47,6 +47,7 @@ impl Generate {
         }
         let push = Push { n_particles, max_attempts };
         let n_invocations = n_particles.div_ceil(PARTICLES_PER_INVOCATION);
-        rec.dispatch(&self.kernel, &[boxes, i_group, particles, status], &push, n_invocations)
+        let n_groups = n_invocations.div_ceil(self.kernel.local_size_x());
+        rec.dispatch_groups(&self.kernel, &[boxes, i_group, particles, status], &push, n_groups)
     }
 }

@@ -60,6 +60,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/occlude.glsl",
     "include/one_subgroup.glsl",
     "include/philox.glsl",
+    "include/pixels.glsl",
     "include/reach.glsl",
     "include/records.glsl",
     "include/regions.glsl",

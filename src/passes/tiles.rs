@@ -58,7 +58,7 @@ record! {
 }
 
 record! {
-    pub struct RangesPush { n_bins: u32, i_round: u32, max_groups: u32, unused: u32 }
+    pub struct RangesPush { n_bins: u32, i_round: u32, max_groups: u32, most_tiles: u32 }
 }
 
 record! {
@@ -106,6 +106,8 @@ pub struct Variant {
     pub portable: bool,
     /// Room for no more pairs at once.
     pub most_pairs: Option<u64>,
+    /// Tiles that a workgroup draws at most, up to all of a bin; else as suits the device.
+    pub most_tiles: Option<u32>,
 }
 
 /// What is drawn.
@@ -135,6 +137,7 @@ pub struct Tiles {
     capacity: u32,
     pub n_rounds: u32,
     max_groups: u32,
+    most_tiles: u32,
     /// What the host knows of the number of splats, where it does (KeptRecord).
     known: Buffer,
     splats: Buffer,
@@ -160,6 +163,12 @@ fn capacity(n_splats: u32, division: &Division, limits: &Limits, most: Option<u6
     let all = u64::from(n_splats) * u64::from(division.n_bins);
     let room = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes / 16) / 8;
     (all / 4).max(1 << 20).min(all).min(room).min(most.unwrap_or(MOST_PAIRS)).max(two_blocks)
+}
+
+/// Tiles that a workgroup draws where they have few pairs. A processor has few workgroups at once, and beginning one costs it as
+/// much as a tile; a GPU wants them all.
+fn most_tiles(device: &Device) -> u32 {
+    if device.info().kind == "cpu" { TILES_ACROSS * TILES_ACROSS } else { 1 }
 }
 
 impl Tiles {
@@ -188,7 +197,8 @@ impl Tiles {
         let threshold = u32::from(variant.threshold);
         let of_splat = [&constants[..], &[(5, threshold)]].concat();
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
-        let even = u32::from(division.width.is_multiple_of(2));
+        let pixel_words = (variant.format.bytes_per_pixel() / 4) as u32;
+        let together = if division.width.is_multiple_of(4 / pixel_words) { 4 / pixel_words } else { 1 };
         let macros = [
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
@@ -196,9 +206,10 @@ impl Tiles {
             ("THIN", u32::from(variant.tau_most <= 0.125 && !variant.textured)),
             ("TEXTURED", u32::from(variant.textured)),
             ("THRESHOLD", threshold),
-            ("PIXEL_WORDS", (variant.format.bytes_per_pixel() / 4) as u32),
+            ("PIXEL_WORDS", pixel_words),
+            ("TOGETHER", together),
+            ("WORDS_64", u32::from(device.limits().words_64)),
             ("BEHIND", behind),
-            ("EVEN", even),
         ];
         let compose = |rounds: u32| {
             let macros = [&macros[..], &[("ROUNDS", rounds)]].concat();
@@ -227,6 +238,7 @@ impl Tiles {
             capacity: capacity as u32,
             n_rounds,
             max_groups: device.limits().max_workgroups_x,
+            most_tiles: variant.most_tiles.unwrap_or(most_tiles(device)),
             known: Buffer::new::<KeptRecord>(device, "tiles.known", 1, Place::Device)?,
             splats: Buffer::new::<SplatRecord>(device, "tiles.splats", u64::from(n_max), Place::Device)?,
             sheets: Buffer::new::<SplatSheetRecord>(device, "tiles.sheets", n_sheets, Place::Device)?,
@@ -351,7 +363,7 @@ impl Tiles {
         view: &View<'_>,
     ) -> Result<()> {
         let Division { width, height, n_bins_x, n_bins, .. } = self.division;
-        let push = RangesPush { n_bins, i_round, max_groups: self.max_groups, unused: 0 };
+        let push = RangesPush { n_bins, i_round, max_groups: self.max_groups, most_tiles: self.most_tiles };
         let bins = (&self.round, ROUND_WORDS * i_round + 8);
         rec.dispatch_counted(&self.ranges, &[sorted, &self.round, &self.found], &push, bins)?;
         let push = Push {

@@ -19,6 +19,7 @@ record! {
         offset_x: u32,
         offset_y: u32,
         n_runs: u32,
+        n_pairs: u32,
         last_texel: u32,
     }
 }
@@ -62,14 +63,18 @@ impl Upsample {
             ("SHIFT", (offset_x / (2 * n) - 2) % 4),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if width.is_multiple_of(together) { together } else { 1 }),
+            // Beside edges of depth pixels are stored one by one.
+            ("WORDS_64", u32::from(!behind && device.limits().words_64)),
             ("BEHIND", if behind { 1 + u32::from(has_depth24(device)) } else { 0 }),
         ];
         let kernel = Kernel::with_macros(device, compiler, "upsample", Push::FIELDS, &[], &macros)?;
         let n_runs = width.div_ceil(4 * n);
         let n_small = u64::from(small_width) * u64::from(small_height);
         let last_texel = (n_small * format.bytes_per_pixel() / 16) as u32 - 1;
-        let push = Push { width, height, small_width, small_height, offset_x, offset_y, n_runs, last_texel };
-        Ok(Upsample { kernel, push, n_invocations: n_runs * height, behind })
+        // Rows by twos that lie between the same small ones: o + 2 y from a multiple of four on.
+        let n_pairs = if height > 0 { (offset_y + 2 * (height - 1)) / 4 - offset_y / 4 + 1 } else { 0 };
+        let push = Push { width, height, small_width, small_height, offset_x, offset_y, n_runs, n_pairs, last_texel };
+        Ok(Upsample { kernel, push, n_invocations: n_runs * n_pairs, behind })
     }
 
     /// `small`: the blobs; `picture`: what becomes of them; with surfaces `under`: theirs, [near/z of the small pixels, of

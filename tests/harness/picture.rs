@@ -48,6 +48,7 @@ pub struct Tiled {
     /// Without what subgroups can do.
     pub portable: bool,
     pub most_pairs: Option<u64>,
+    pub most_tiles: Option<u32>,
     pub saturated: f64,
 }
 
@@ -294,6 +295,7 @@ impl Picture {
             tau_most: tau_most * (1.0 + 8.0 * U),
             portable: tiled.portable,
             most_pairs: tiled.most_pairs,
+            most_tiles: tiled.most_tiles,
         };
         Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant).expect("tiles")
     }

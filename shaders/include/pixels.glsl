@@ -1,0 +1,67 @@
+// A picture's pixels as they lie in buffers, in rows, and how they are stored. Who includes it says PICTURE, the binding that
+// they go to.
+
+// Words of a pixel: 1 rgba8, 2 rgba16f, 4 rgba32f.
+#ifndef PIXEL_WORDS
+#define PIXEL_WORDS 2
+#endif
+// Pixels that are stored together, as four words: where rows have a whole number of them.
+#ifndef TOGETHER
+#define TOGETHER 1
+#endif
+// 1: the device has words of 64 bits.
+#ifndef WORDS_64
+#define WORDS_64 0
+#endif
+
+#define TEXEL_PIXELS (4 / PIXEL_WORDS)
+#define FOURS (TOGETHER * PIXEL_WORDS == 4)
+
+// A device without vector stores takes one for every element: as few as may be.
+#if FOURS && WORDS_64
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+layout(std430, binding = PICTURE) writeonly buffer Picture { u64vec2 picture[]; };
+void store_words(uint i, uvec4 words) { picture[i] = u64vec2(pack64(words.xy), pack64(words.zw)); }
+#elif FOURS
+layout(std430, binding = PICTURE) writeonly buffer Picture { uvec4 picture[]; };
+void store_words(uint i, uvec4 words) { picture[i] = words; }
+#else
+layout(std430, binding = PICTURE) writeonly buffer Picture { uint picture[]; };
+#endif
+
+// Pixel m of a texel's.
+vec4 pixel_of(uvec4 words, uint m) {
+#if PIXEL_WORDS == 1
+    return unpackUnorm4x8(words[m]);
+#elif PIXEL_WORDS == 2
+    return vec4(unpackHalf2x16(words[2 * m]), unpackHalf2x16(words[2 * m + 1]));
+#else
+    return uintBitsToFloat(words);
+#endif
+}
+
+uvec4 packed(vec4 value) {
+#if PIXEL_WORDS == 1
+    return uvec4(packUnorm4x8(value));
+#elif PIXEL_WORDS == 2
+    return uvec2(packHalf2x16(value.xy), packHalf2x16(value.zw)).xyxy;
+#else
+    return floatBitsToUint(value);
+#endif
+}
+
+// Pixels p and on, TOGETHER of them.
+void store_together(uint p, vec4 values[TOGETHER]) {
+#if TOGETHER == 4
+    store_words(p / 4, uvec4(packed(values[0]).x, packed(values[1]).x, packed(values[2]).x, packed(values[3]).x));
+#elif TOGETHER == 2
+    store_words(p / 2, uvec4(packed(values[0]).xy, packed(values[1]).xy));
+#elif FOURS
+    store_words(p, packed(values[0]));
+#else
+    uvec4 words = packed(values[0]);
+    [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) {
+        picture[PIXEL_WORDS * p + k] = words[k];
+    }
+#endif
+}

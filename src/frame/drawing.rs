@@ -243,14 +243,14 @@ impl Drawing {
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {
             DrawPath::Tiles => {
-                let Some(tiling) = &self.tiling else { return Err(Error::usage("tiles were given back")) };
+                let Some(tiling) = &self.tiling else { return Err(Error::usage("no tiles were made")) };
                 let Settings { cutoff, threshold, saturated, .. } = *s;
                 let view = View { camera, cutoff, threshold, saturated };
                 let under = target.filter(|target| target.depth.is_some() || near.is_some());
                 tiling.record(rec, i, under, buffers, &view, counts)
             }
             _ => {
-                let Some(target) = target else { return Err(given_back()) };
+                let Some(target) = target else { return Err(no_sprites()) };
                 let is_under = target.depth.is_some() || near.is_some();
                 let start = if is_under { Start::Load } else { Start::Clear };
                 let cuts = [s.cutoff, s.threshold];
@@ -260,7 +260,7 @@ impl Drawing {
                         let view = chunks::View { camera, cuts, saturated: s.saturated };
                         chunks.record(rec, buffers, (target, start), &view, counts)
                     }
-                    _ => Err(given_back()),
+                    _ => Err(no_sprites()),
                 }
             }
         }
@@ -289,6 +289,6 @@ impl Drawing {
     }
 }
 
-fn given_back() -> Error {
-    Error::usage("what draws the sprites was given back")
+fn no_sprites() -> Error {
+    Error::usage("no sprites were made")
 }

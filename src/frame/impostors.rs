@@ -135,7 +135,7 @@ impl Impostors {
         let texels = match (&self.tiling, &self.sprites) {
             (Some(tiling), _) if path == DrawPath::Tiles => &tiling.pictures[0],
             (_, Some(of)) => &of.texels,
-            _ => return Err(given_back()),
+            _ => return Err(no_shells()),
         };
         let now = view_of(&packet.camera);
         let shown = Shown {
@@ -170,11 +170,11 @@ impl Impostors {
                 rec.copy_image(image, texels);
                 Ok(())
             }
-            _ => Err(given_back()),
+            _ => Err(no_shells()),
         }
     }
 }
 
-fn given_back() -> Error {
-    Error::usage("what draws the shells was given back")
+fn no_shells() -> Error {
+    Error::usage("nothing that draws the shells was made")
 }

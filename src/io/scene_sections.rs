@@ -175,7 +175,7 @@ fn read_exponents(s: &mut Section, of_materials: &[f64]) -> Result<[f64; 2]> {
 pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let mut s = root.section("draw")?;
     s.expect_keys(DRAW_KEYS, &[])?;
-    let path = s.choice("path", "sprites", &DrawPath::NAMES, &[])?;
+    let path = s.choice("path", "tiles", &DrawPath::NAMES, &[])?;
     let impostors = s.choice("impostors", "off", &Impostors::NAMES, &[])?;
     let impostor_error = s.f64("impostor_error", 0.5, Bounds::Within(0.01, 100.0))?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;

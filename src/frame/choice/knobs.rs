@@ -115,3 +115,63 @@ fn named<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
     let name = names.iter().find(|(_, of)| *of == value).map_or("", |(name, _)| name);
     format!("\"{name}\"")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Everything that can be "auto" is.
+    const ASKED: Draw = Draw {
+        path: DrawPath::Auto,
+        impostors: Impostors::Off,
+        impostor_error: 0.5,
+        resolution: Resolution::Auto,
+        error: 1e-3,
+        chunks: Chunks::Auto,
+        cutoff: 3.0,
+        threshold: Least::Auto,
+        cull: Cull::Auto,
+        smallest: Least::Auto,
+        sort_bits: 32,
+        count: None,
+        texture_seed: 1,
+        n_particles: 0,
+    };
+
+    #[test]
+    fn every_knob_begins_with_what_changes_nothing_and_names_its_values() {
+        let exact = ASKED.exact();
+        for knob in &KNOBS {
+            assert!((knob.is_auto)(&ASKED) && !(knob.is_auto)(&exact), "{}", knob.key);
+            let values = (knob.values)(&exact);
+            assert_eq!(values[0], exact, "{}", knob.key);
+            let mut names: Vec<String> = values.iter().map(|v| knob.told(v, &exact)).collect();
+            assert!(names.iter().all(|name| !name.contains("auto") && !name.contains("with")), "{names:?}");
+            names.sort();
+            names.dedup();
+            assert_eq!(names.len(), values.len(), "{names:?}");
+        }
+    }
+
+    #[test]
+    fn who_leaves_small_ones_out_culls_and_says_so() {
+        let off = Draw { cull: Cull::Off, ..ASKED.exact() };
+        let Some(knob) = KNOBS.iter().find(|k| k.key == "smallest") else { panic!("no such knob") };
+        let values = (knob.values)(&off);
+        assert_eq!([values[0].cull, values[1].cull], [Cull::Off, Cull::On]);
+        assert_eq!(knob.told(&values[1], &off), "0.25 with draw.cull = \"on\"");
+    }
+
+    #[test]
+    fn without_an_error_nothing_is_allowed_that_may_change_a_picture() {
+        let tried = |is_first, rmse| Tried { value: String::new(), is_first, times_ms: vec![1.0], rmse };
+        let of = |changes| KNOBS.iter().find(|k| k.changes == changes).expect("one");
+        let [rounding, nothing, picture] = [Changes::Rounding, Changes::Nothing, Changes::Picture].map(of);
+        let equal = tried(false, Some(0.0));
+        assert!(nothing.allows(&equal, 0.0) && !picture.allows(&equal, 0.0) && picture.allows(&equal, 1e-9));
+        assert!(picture.allows(&tried(true, Some(0.0)), 0.0));
+        let off = tried(false, Some(0.1));
+        assert!(rounding.allows(&off, 0.0) && !nothing.allows(&off, 0.01) && !picture.allows(&off, 0.01));
+        assert!(!rounding.allows(&tried(false, None), 1.0));
+    }
+}

@@ -6,6 +6,10 @@ const NOISE: f64 = 0.03;
 /// And so in this share of the turns, in each of which both were timed: a device that is shared is now fast, now slow.
 const MOSTLY: f64 = 0.75;
 
+/// But what takes less than this share of the time, by the median and by the least, is faster whatever single turns say: the
+/// least is what a device takes that is left alone.
+const CLEARLY: f64 = 0.75;
+
 /// Values whose times are so far apart need not be timed again.
 const FAR_APART: f64 = 4.0;
 
@@ -24,6 +28,10 @@ pub struct Tried {
 }
 
 impl Tried {
+    fn least_ms(&self) -> Option<f64> {
+        self.times_ms.iter().copied().min_by(f64::total_cmp)
+    }
+
     /// Median of its times.
     pub fn ms(&self) -> Option<f64> {
         let mut times = self.times_ms.clone();
@@ -68,11 +76,13 @@ pub fn taken(tried: &[Tried], allows: impl Fn(&Tried) -> bool) -> usize {
 
 /// Whether `a` is faster than `b` by more than noise.
 fn is_faster(a: &Tried, b: &Tried) -> bool {
-    let is_less = |a: f64, b: f64| a < (1.0 - NOISE) * b;
+    let is_less = |a: f64, b: f64, by: f64| a < by * b;
+    let by_medians = |by: f64| a.ms().zip(b.ms()).is_some_and(|(a, b)| is_less(a, b, by));
+    let by_least = |by: f64| a.least_ms().zip(b.least_ms()).is_some_and(|(a, b)| is_less(a, b, by));
     let turns = || a.times_ms.iter().zip(&b.times_ms);
-    let n_faster = turns().filter(|(a, b)| is_less(**a, **b)).count();
-    let by_medians = a.ms().zip(b.ms()).is_some_and(|(a, b)| is_less(a, b));
-    by_medians && n_faster as f64 >= MOSTLY * turns().count() as f64
+    let n_faster = turns().filter(|(a, b)| is_less(**a, **b, 1.0 - NOISE)).count();
+    let mostly = n_faster as f64 >= MOSTLY * turns().count() as f64;
+    (by_medians(1.0 - NOISE) && mostly) || (by_medians(CLEARLY) && by_least(CLEARLY))
 }
 
 /// Those of `open`, all of which were timed last, that may still be taken.
@@ -124,10 +134,15 @@ mod tests {
     fn what_is_faster_by_noise_alone_is_not_taken() {
         let two = |ms| tried(&[("0", 100.0, 0.0), ("0.1", ms, 0.0)]);
         assert_eq!([97.5, 97.1, 96.9, 50.0].map(|ms| taken(&two(ms), near(1.0))), [0, 0, 1, 1]);
-        // Nor what was faster in two turns of three, however much.
-        let mut twice = two(50.0);
-        twice[1].times_ms = vec![101.0, 50.0, 50.0];
+        // Nor what was faster in two turns of three, but for clearly.
+        let mut twice = two(80.0);
         twice[0].times_ms = vec![100.0; 3];
+        for (ms, i) in [(80.0, 0), (70.0, 1)] {
+            twice[1].times_ms = vec![101.0, ms, ms];
+            assert_eq!(taken(&twice, near(1.0)), i, "{ms}");
+        }
+        // Where the other is as fast in one turn it is a neighbour that slowed it down.
+        (twice[0].times_ms[2], twice[1].times_ms) = (70.0, vec![101.0, 60.0, 60.0]);
         assert_eq!(taken(&twice, near(1.0)), 0);
         // Nor the one that errs more where one that errs less is as fast.
         let three = tried(&[("0", 100.0, 0.0), ("0.1", 51.0, 1e-5), ("0.2", 50.0, 1e-4)]);

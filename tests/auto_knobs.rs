@@ -97,8 +97,9 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
     // What the last one says of all together is what is found, and every value was tried.
     let n_tried: Vec<(&str, usize)> = auto.choices.iter().map(|c| (c.key, c.tried.len())).collect();
     let of_sprites = if auto.draw.path == DrawPath::Sprites { &[("chunks", 4)][..] } else { &[] };
-    let of_all = [("cull", 2), ("threshold", 4), ("smallest", 4), ("resolution", 3)];
-    assert_eq!(n_tried, [&[("path", 2)], of_sprites, &of_all].concat());
+    let of_size = if asked.draw.resolution == Resolution::Auto { &[("resolution", 3)][..] } else { &[] };
+    let cuts = [("threshold", 4), ("smallest", 4)];
+    assert_eq!(n_tried, [&[("path", 2)], of_sprites, &[("cull", 2)], of_size, &cuts].concat());
     let last = auto.choices.last().map(|c| &c.tried[c.taken]).and_then(|t| t.rmse).expect("an error");
     assert!((last - found).abs() <= 1e-6 * (1.0 + found), "told {last:e}, found {found:e}");
     assert!(auto.choices.iter().flat_map(|c| &c.tried).all(|t| t.ms().is_some_and(|ms| ms > 0.0)));
@@ -127,7 +128,8 @@ fn with_sprites_chunks_are_chosen_too() {
 fn where_thresholds_help_they_are_taken_within_the_error() {
     // τ₀ 0.002 out to 8 σ of three pixels: cut at 0.001 they end at 1.2 σ, with a 45th of the pixels.
     let thin = blobs(2500, [0.4, 0.5], [0.002, 0.0021]);
-    let far = ["draw.cutoff=8"];
+    // A smaller size would be taken before.
+    let far = ["draw.cutoff=8", "draw.resolution=1.0"];
     let taken = check(&thin, 0.1, &far);
     assert!(taken.draw.threshold.bound() > 0.0, "{:?}", taken.draw);
     // So much is not allowed, but for what later knobs add.

@@ -61,6 +61,14 @@ pub const KNOBS: [Knob; 6] = [
         values: |draw| [Cull::On, Cull::Off].map(|cull| Draw { cull, ..*draw }).to_vec(),
         name: |draw| named(&Cull::NAMES, draw.cull),
     },
+    // Before what saves less by as much of the error.
+    Knob {
+        key: "resolution",
+        changes: Changes::Picture,
+        is_auto: |draw| draw.resolution == Resolution::Auto,
+        values: |draw| Resolution::ALL.map(|(_, resolution)| Draw { resolution, ..*draw }).to_vec(),
+        name: |draw| draw.resolution.name().to_owned(),
+    },
     Knob {
         key: "threshold",
         changes: Changes::Picture,
@@ -78,13 +86,6 @@ pub const KNOBS: [Knob; 6] = [
             SMALLEST.map(|w| Draw { smallest: Least::Of(w), cull: cull(w), ..*draw }).to_vec()
         },
         name: |draw| draw.smallest.bound().to_string(),
-    },
-    Knob {
-        key: "resolution",
-        changes: Changes::Picture,
-        is_auto: |draw| draw.resolution == Resolution::Auto,
-        values: |draw| Resolution::ALL.map(|(_, resolution)| Draw { resolution, ..*draw }).to_vec(),
-        name: |draw| draw.resolution.name().to_owned(),
     },
 ];
 

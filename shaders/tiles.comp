@@ -131,8 +131,9 @@ float opacity(float t) { return one_minus_exp(t); }
 // The row of pixels that an invocation owns, while it is composed.
 float x_of[RUN];
 float inv_norm[RUN];
-// -cut: a push constant would be fetched anew for every splat.
+// -cut, and what lets less through is full: push constants would be fetched anew for every splat.
 float least;
+float full;
 #if THRESHOLD
 float inv_threshold;
 #endif
@@ -175,7 +176,8 @@ void compose(Loaded splat, float y) {
         e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_norm[j];
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
-        bool is_seen = e[j] >= lowest;
+        // What is left out is a pixel's own affair: it must not depend on who else is drawn.
+        bool is_seen = e[j] >= lowest && !(passed[j] < full);
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
 #endif
@@ -302,6 +304,7 @@ void draw_tile(uvec4 range, uint i_tile) {
     // Pixels beyond the picture's edge are composed as its last ones are, and not kept.
     uint row = min(at.y, push.height - 1u) * push.width;
     least = -push.cut;
+    full = push.saturated;
 #if THRESHOLD
     inv_threshold = push.inv_threshold;
 #endif

@@ -137,7 +137,7 @@ fn bench_prints_its_table_and_writes_its_results_once() {
         "p50",
         "p99",
         "parallel / serial",
-        "sprites",
+        "tiles",
         "to the byte",
         "A B C C B A",
         "skipping saves",
@@ -153,13 +153,13 @@ fn bench_prints_its_table_and_writes_its_results_once() {
     assert!((0..3).all(|i| case["modes"][i]["image_hash"] == case["modes"][0]["image_hash"]));
     assert_eq!(case["skipping"]["same_bytes"], true);
     // What skipping saved a frame is what the pass takes where nothing is skipped.
-    let sprites = |i: usize| {
+    let tiles = |i: usize| {
         let passes = case["modes"][i]["passes"].as_array().expect("passes");
-        passes.iter().find(|p| p["name"] == "sprites").expect("sprites")
+        passes.iter().find(|p| p["name"] == "tiles").expect("tiles")
     };
-    assert_eq!((&sprites(0)["n_skipped"], &sprites(2)["n_skipped"]), (&12.into(), &0.into()));
-    assert_eq!(sprites(0)["saved_ms"], sprites(2)["p50_ms"]);
-    assert_eq!(sprites(0)["reasons"], serde_json::json!([{ "reason": "the picture is the same", "n": 12 }]));
+    assert_eq!((&tiles(0)["n_skipped"], &tiles(2)["n_skipped"]), (&12.into(), &0.into()));
+    assert_eq!(tiles(0)["saved_ms"], tiles(2)["p50_ms"]);
+    assert_eq!(tiles(0)["reasons"], serde_json::json!([{ "reason": "the picture is the same", "n": 12 }]));
     for word in ["1 % low: p99", "mean of slowest 1 %", "1 % of the time", "perfect overlap = max(game", "host clock"] {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }

@@ -52,8 +52,11 @@ fn frame(renderer: &mut Renderer, game: &mut Game, i: u32) -> (Packet, Vec<u8>, 
 #[test]
 fn leaving_out_what_is_out_of_view_changes_no_byte() {
     let gpu = Gpu::new();
-    for count in ["draw.count='all'", "draw.count='distance'"] {
-        let mut scene = scene(&[count, "time.step_s=0.5", "draw.count_a=10", "draw.sort_bits=16"]);
+    let ways = ["draw.path='tiles'", "draw.path='sprites'"];
+    for (count, path) in
+        [("draw.count='all'", ways[0]), ("draw.count='distance'", ways[0]), ("draw.count='all'", ways[1])]
+    {
+        let mut scene = scene(&[count, path, "time.step_s=0.5", "draw.count_a=10", "draw.sort_bits=16"]);
         // Along the row, into a cloud and through it, turning away and back.
         let key = |time_s: f64, x: f64, z: f64, to: [f64; 3]| CameraKey {
             time_s,
@@ -76,7 +79,7 @@ fn leaving_out_what_is_out_of_view_changes_no_byte() {
         for i in 0..20 {
             let (packet, bytes, _) = frame(&mut culled, &mut game, i);
             let (every, expected, _) = frame(&mut whole, &mut all, i);
-            assert!(bytes == expected, "{count}, frame {i}: {} of {} drawn", packet.n_drawn, every.n_drawn);
+            assert!(bytes == expected, "{count}, {path}, frame {i}: {} of {} drawn", packet.n_drawn, every.n_drawn);
             counts.push((packet.n_drawn, every.n_drawn));
         }
         // There were frames of all, of some and of none.
@@ -102,7 +105,7 @@ fn looking_away_draws_nothing_and_lights_nothing_anew() {
     assert!(packet.n_drawn > 0 && bytes.iter().any(|b| *b != 0));
     let (packet, bytes, ran) = frame(&mut renderer, &mut game, 1);
     assert!(packet.n_drawn == 0 && bytes.iter().all(|b| *b == 0));
-    assert_eq!(ran, ["cull", "sort", "sprites"]);
+    assert_eq!(ran, ["cull", "sort", "tiles"]);
 }
 
 #[test]

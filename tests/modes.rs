@@ -93,7 +93,7 @@ fn three_hundred_frames_are_the_same_in_both_loops() {
         scene
     };
     let serial = run_for(300, scene(), Threading::Serial, true);
-    let stood = serial.iter().filter(|f| !f.1.plan.runs(Pass::Sprites)).count();
+    let stood = serial.iter().filter(|f| !f.1.plan.runs(Pass::Tiles)).count();
     assert!((90..110).contains(&stood), "{stood}");
     let serial = images(serial);
     assert!(serial == images(run_for(300, scene(), Threading::Parallel, true)), "the loops differ");
@@ -111,7 +111,7 @@ fn tiles_give_the_same_bytes_in_every_mode() {
     assert!(first == images(run(tiled(), Threading::Serial, false)), "no skip");
     assert!(first.windows(2).all(|w| w[0] != w[1]));
     // Another way to draw, and so other roundings.
-    assert!(first != images(run(scene(&[]), Threading::Serial, true)));
+    assert!(first != images(run(scene(&["draw.path='sprites'"]), Threading::Serial, true)));
 }
 
 #[test]
@@ -175,14 +175,14 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
         Pass::ALL.into_iter().filter(|p| plan.runs(*p)).map(Pass::name).collect::<Vec<_>>()
     };
     // The camera turns, so that the order may change; the floor's lobe shines elsewhere, what is dull stays as it is.
-    assert_eq!(runs(&still), ["first", "second", "cull", "sort", "surfaces", "sprites"]);
+    assert_eq!(runs(&still), ["first", "second", "cull", "sort", "surfaces", "tiles"]);
     let dull = [&still[..], &["material.1.ks=[0,0,0]"]].concat();
-    assert_eq!(runs(&dull), ["cull", "sort", "surfaces", "sprites"]);
+    assert_eq!(runs(&dull), ["cull", "sort", "surfaces", "tiles"]);
     let moving = runs(&[]);
     let all: Vec<&str> = Pass::ALL[1..]
         .iter()
         .map(|p| p.name())
-        .filter(|p| !["contract", "texture", "impostors", "tiles", "upsample"].contains(p))
+        .filter(|p| !["contract", "texture", "impostors", "sprites", "upsample"].contains(p))
         .collect();
     assert_eq!(moving, all);
 }

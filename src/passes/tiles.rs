@@ -162,7 +162,15 @@ fn capacity(n_splats: u32, division: &Division, limits: &Limits, most: Option<u6
     let two_blocks = 2 * u64::from(BLOCK) * u64::from(division.n_bins);
     let all = u64::from(n_splats) * u64::from(division.n_bins);
     let room = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes / 16) / 8;
-    (all / 4).max(1 << 20).min(all).min(room).min(most.unwrap_or(MOST_PAIRS)).max(two_blocks)
+    let most = most.unwrap_or(MOST_PAIRS);
+    // All of them, where there is no room for what one round hands to the next.
+    let least = if has_room_between_rounds(division, limits) { (all / 4).max(1 << 20) } else { all };
+    least.min(all).min(room).min(most).max(two_blocks)
+}
+
+/// Four floats a pixel.
+fn has_room_between_rounds(division: &Division, limits: &Limits) -> bool {
+    16 * division.n_pixels() <= limits.max_storage_buffer_bytes
 }
 
 /// Tiles that a workgroup draws where they have few pairs. A processor has few workgroups at once, and beginning one costs it as
@@ -192,6 +200,15 @@ impl Tiles {
         let worst = u64::from(n_max) * u64::from(division.n_bins);
         let by_pairs = worst.div_ceil(capacity - u64::from(BLOCK) * u64::from(division.n_bins)) as u32;
         let n_rounds = if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
+        if n_rounds > 1 && !has_room_between_rounds(&division, device.limits()) {
+            return Err(Error::limit(format!(
+                "draw.path = \"tiles\": a picture of {}×{} is drawn in rounds where the scene has {n_max} particles, and 16 bytes a \
+                 pixel between them are more than this device's {} (maxStorageBufferRange); expected \"sprites\"",
+                division.width,
+                division.height,
+                device.limits().max_storage_buffer_bytes
+            )));
+        }
         let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
             .map(|(k, v)| (k, u32::from(v)));
         let threshold = u32::from(variant.threshold);

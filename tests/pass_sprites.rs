@@ -3,12 +3,16 @@
 #[path = "harness/bounded.rs"]
 mod bounded;
 mod harness;
+#[path = "harness/mixed.rs"]
+mod mixed;
 #[path = "harness/picture.rs"]
 mod picture;
 #[path = "harness/scenery.rs"]
 mod scenery;
 #[path = "harness/sheets.rs"]
 mod sheets;
+#[path = "harness/tiled.rs"]
+mod tiled;
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,6 +20,7 @@ use std::sync::Arc;
 use bounded::{Random, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within};
+use mixed::{EYE, assert_small, cases, front};
 use nimbus::gpu::Compiler;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::io::scene_file;
@@ -26,12 +31,6 @@ use nimbus::passes;
 use nimbus::reference::texture::Pool;
 use nimbus::reference::{generate, place};
 use picture::{FORMATS, Picture};
-
-const EYE: DVec3 = DVec3::new(0.3, -0.2, 5.0);
-
-fn front() -> Picture {
-    Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 0.1)
-}
 
 /// Draws `picture` in both formats, lit and unlit, and compares every number of every pixel. Greatest value seen.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
@@ -62,6 +61,20 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
         }
     }
     greatest
+}
+
+/// What users are promised of floats; eight bits are rounded at every layer.
+#[test]
+fn blobs_of_all_kinds_are_near_the_truth() {
+    let mut gpu = Gpu::new();
+    for (what, picture, least) in cases() {
+        let greatest = compare(&mut gpu, &what, &picture);
+        assert!(if least > 0.0 { greatest > least } else { greatest == 0.0 }, "{what}: {greatest}");
+        for (target, format) in &FORMATS[1..] {
+            let values = picture.draw(&mut gpu, None, *target);
+            assert_small(&what, *format, [&values, &picture.truth(*format).0], picture.most_layers());
+        }
+    }
 }
 
 #[test]

@@ -56,7 +56,7 @@ fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
         // Of the frame that has just ended; the loop does not draw into its picture before this returns.
         let bytes = renderer.image_bytes()?;
         assert!(bytes != last, "frame {n_seen} is the one before it");
-        assert!([Pass::Place, Pass::Second, Pass::Sprites].iter().all(|pass| times.plan.runs(*pass)));
+        assert!([Pass::Place, Pass::Second, Pass::Tiles].iter().all(|pass| times.plan.runs(*pass)));
         soaked.chain = Sha256::new().chain_update(soaked.chain).chain_update(&bytes).finalize().into();
         last = bytes;
         n_seen += 1;

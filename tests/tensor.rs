@@ -66,8 +66,8 @@ fn an_edit_is_contracted_alone_and_its_frame_is_the_frame_from_scratch() {
     for overrides in [&[][..], &["lighting.mode=\"first\""], &["lighting.bases=1"]] {
         let scene = scene(overrides);
         let edited = run(&gpu, None, &scene, &[0, 2, 4], true);
-        assert_eq!(running(&edited.plans[1]), ["contract", "surfaces", "sprites"], "{overrides:?}");
-        assert_eq!(running(&edited.plans[2]), ["contract", "surfaces", "sprites"], "{overrides:?}");
+        assert_eq!(running(&edited.plans[1]), ["contract", "surfaces", "tiles"], "{overrides:?}");
+        assert_eq!(running(&edited.plans[2]), ["contract", "surfaces", "tiles"], "{overrides:?}");
         let anew = run(&gpu, None, &scene, &[0, 2, 4], false);
         let alone = run(&gpu, None, &scene, &[4], true);
         assert!(edited.lit == anew.lit && edited.images == anew.images, "{overrides:?}: no skip");
@@ -259,10 +259,10 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
     let most = gpu.device.limits().max_storage_buffer_bytes;
     let reason = frames.plans[1].decision(Pass::Contract).reason.to_string();
     if bytes > most {
-        assert_eq!(running(&frames.plans[1]), ["first", "second", "surfaces", "sprites"]);
+        assert_eq!(running(&frames.plans[1]), ["first", "second", "surfaces", "tiles"]);
         assert!(reason.contains(&bytes.to_string()) && reason.contains(&most.to_string()), "{reason}");
     } else {
-        assert_eq!(running(&frames.plans[1]), ["contract", "surfaces", "sprites"]);
+        assert_eq!(running(&frames.plans[1]), ["contract", "surfaces", "tiles"]);
     }
     assert!(frames.lit[0] != frames.lit[1]);
 }

@@ -2,30 +2,24 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
+#[path = "picture_drawn.rs"]
+mod drawn;
+
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use half::f16;
-use nimbus::frame::chunks::{self, Chunks};
-use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Start, Target};
 use nimbus::layout::facet::LitRecord;
-use nimbus::layout::frame::CameraRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
-use nimbus::model::film::{Film, FilmFormat, ToneMap};
-use nimbus::passes::sprites::Sprites;
-use nimbus::passes::surfaces::Surfaces;
-use nimbus::passes::tiles::{Division, Variant};
+use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
 use nimbus::reference::sprites::{Behind, Rounding, View, render_textured};
 use nimbus::reference::texture::{Pool, Sheet, Textured};
 
 use crate::bounded::{Bounded, U, dot, exact3};
-use crate::harness::Gpu;
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
 
@@ -171,133 +165,6 @@ impl Picture {
         let keys = depths(self.view.pose.forward, &positions).into_iter().map(|z| key32(z as f32));
         let order = order(&keys.collect::<Vec<_>>());
         order.into_iter().filter(|i| self.weight(*i as usize) > 0.0).collect()
-    }
-
-    /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
-    pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
-        self.draw_by(gpu, compiler, format, Way::Sprites)
-    }
-
-    /// The same in the way that is given.
-    pub fn draw_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat, way: Way) -> Vec<f64> {
-        let compiler = compiler.unwrap_or(&gpu.compiler);
-        let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
-        let [grouped, weighted] = [self.i_facet.is_some(), self.drawn.is_some()];
-        let [textured, threshold] = [self.textured.is_some(), self.view.threshold > 0.0];
-        let variant = [behind, grouped, weighted, textured, threshold];
-        let pass = Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites");
-        let of_chunks = if let Way::Chunks(n_chunks, _) = way { Some(n_chunks) } else { None };
-        let mut chunks = of_chunks.map(|n_chunks| {
-            // Room for more than there are, as where some are culled.
-            let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
-            let variant = [lit, grouped, weighted, textured, threshold];
-            Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant).expect("chunks")
-        });
-        let under = behind.then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
-        let tiling = match &way {
-            Way::Tiles(tiled) => Some((self.tiling(gpu, compiler, format, tiled), tiled)),
-            _ => None,
-        };
-        let scenery = self.scenery.clone().unwrap_or_default();
-        let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
-        // Facets of surfaces come before those of particles.
-        let facets = [&scenery.lit, self.lit.as_deref().unwrap_or(&[])].concat();
-        let lit = gpu.upload(&facets);
-        let [by_order, placed, particles] =
-            [gpu.upload(&entries), gpu.upload(&self.placed), gpu.upload(&self.particles)];
-        // What names a facet counts the surfaces' too.
-        let n_before = scenery.lit.len() as u32;
-        let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
-        let i_facet = gpu.upload(&named);
-        let regions = gpu.upload(&scenery.regions);
-        let (of_drawn, of_groups) = self.drawn.clone().unwrap_or_default();
-        let (of_textured, textures, words) = match &self.textured {
-            Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), pool.words()),
-            None => Default::default(),
-        };
-        assert!(of_drawn.is_empty() || of_textured.is_empty() || of_drawn == of_textured, "a particle has one group");
-        let i_group = gpu.upload(if of_drawn.is_empty() { &of_textured } else { &of_drawn });
-        let (drawn, textures, pool) = (gpu.upload(&of_groups), gpu.upload(&textures), gpu.upload(&words));
-        let (width, height) = (self.view.width, self.view.height);
-        let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
-        let mut depth = behind.then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
-        let film = Film {
-            width,
-            height,
-            format: FilmFormat::Rgba16f,
-            background: DVec3::ZERO,
-            exposure: 1.0,
-            tone_map: ToneMap::Clip,
-        };
-        let camera = CameraRecord::new(&self.camera, &self.view.pose, &film, DVec3::ZERO);
-        let n_numbers = 4 * target.n_pixels() as usize;
-        let bytes = target.n_pixels() * format.bytes_per_pixel();
-        let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback).expect("readback");
-        gpu.run(|rec| {
-            if let Some(under) = &under {
-                let target = Target { color: &mut target, depth: depth.as_mut() };
-                under.record(rec, [&regions, &lit], target, &camera, scenery.regions.len() as u32)?;
-            }
-            if under.is_none() || !entries.is_empty() {
-                let target = Target { color: &mut target, depth: depth.as_mut() };
-                let n = (Amount::Known(entries.len() as u32), scenery.lit.len() as u32);
-                let from = [&by_order, &placed, &particles, &lit, &i_facet, &i_group, &drawn, &textures, &pool];
-                if let Some((tiling, tiled)) = &tiling {
-                    let view = nimbus::passes::tiles::View {
-                        camera: &camera,
-                        cutoff: self.view.cutoff,
-                        threshold: self.view.threshold,
-                        saturated: tiled.saturated,
-                    };
-                    tiling.record(rec, 0, behind.then_some(target), from, &view, n)?;
-                    rec.copy(&tiling.pictures[0], &readback);
-                    return Ok(());
-                }
-                let cuts = [self.view.cutoff, self.view.threshold];
-                match (way, &mut chunks) {
-                    (Way::Chunks(_, saturated), Some(chunks)) => {
-                        let start = if behind { Start::Load } else { Start::Clear };
-                        let view = chunks::View { camera: &camera, cuts, saturated };
-                        chunks.record(rec, from, (target, start), &view, n)?;
-                    }
-                    _ => pass.record(rec, from, target, &camera, cuts, n)?,
-                }
-            }
-            rec.copy_image(&mut target, &readback);
-            Ok(())
-        });
-        match format {
-            TargetFormat::Rgba8 => {
-                readback.read::<u8>(n_numbers).expect("read").into_iter().map(|v| f64::from(v) / 255.0).collect()
-            }
-            TargetFormat::Rgba16f => {
-                readback.read::<f16>(n_numbers).expect("read").iter().map(|v| v.to_f64()).collect()
-            }
-            TargetFormat::Rgba32f => {
-                readback.read::<f32>(n_numbers).expect("read").into_iter().map(f64::from).collect()
-            }
-        }
-    }
-
-    fn tiling(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, tiled: &Tiled) -> Tiling {
-        let division = Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
-        let blobs = self.blobs();
-        let tau_most = blobs.iter().map(|b| SQRT_TAU * b.kappa * b.sigma).fold(0.0, f64::max);
-        let variant = Variant {
-            lit: self.lit.is_some(),
-            grouped: self.i_facet.is_some(),
-            textured: self.textured.is_some(),
-            threshold: self.view.threshold > 0.0,
-            weighted: self.drawn.is_some(),
-            format,
-            behind: self.scenery.is_some(),
-            // A rounding above what the blobs are made of in f32.
-            tau_most: tau_most * (1.0 + 8.0 * U),
-            portable: tiled.portable,
-            most_pairs: tiled.most_pairs,
-            most_tiles: tiled.most_tiles,
-        };
-        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant).expect("tiles")
     }
 
     /// The reference's picture and its bound for `format`.

@@ -1,0 +1,199 @@
+//! A picture as the device draws it, in each of the ways that there are.
+
+use glam::DVec3;
+use half::f16;
+use nimbus::error::Result;
+use nimbus::frame::chunks::{self, Chunks};
+use nimbus::frame::tiling::Tiling;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Recorder, Start, Target};
+use nimbus::layout::frame::CameraRecord;
+use nimbus::model::cloud::SQRT_TAU;
+use nimbus::model::film::{Film, FilmFormat, ToneMap};
+use nimbus::passes::sprites::Sprites;
+use nimbus::passes::surfaces::Surfaces;
+use nimbus::passes::tiles::{self, Division, Variant};
+
+use super::{Picture, Tiled, Way};
+use crate::bounded::U;
+use crate::harness::Gpu;
+
+/// What the passes are given.
+struct Uploaded {
+    n_entries: u32,
+    n_surface_facets: u32,
+    /// As `sprites` takes them; the fourth is the facets' light.
+    of_sprites: [Buffer; 9],
+    regions: Buffer,
+    n_regions: u32,
+}
+
+/// What draws.
+enum Made {
+    Sprites(Sprites),
+    Tiles(Tiling, f64),
+    Chunks(Chunks, f64),
+}
+
+impl Picture {
+    /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
+    pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
+        self.draw_by(gpu, compiler, format, Way::Sprites)
+    }
+
+    /// The same in the way that is given.
+    pub fn draw_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat, way: Way) -> Vec<f64> {
+        let compiler = compiler.unwrap_or(&gpu.compiler);
+        let mut made = self.make(gpu, compiler, format, way);
+        let under =
+            self.scenery.is_some().then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
+        let uploaded = self.upload(gpu);
+        let (width, height) = (self.view.width, self.view.height);
+        let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
+        let mut depth = under.is_some().then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
+        let camera = self.camera_record();
+        let n_numbers = 4 * target.n_pixels() as usize;
+        let bytes = target.n_pixels() * format.bytes_per_pixel();
+        let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback).expect("readback");
+        gpu.run(|rec| {
+            if let Some(under) = &under {
+                let target = Target { color: &mut target, depth: depth.as_mut() };
+                under.record(rec, [&uploaded.regions, &uploaded.of_sprites[3]], target, &camera, uploaded.n_regions)?;
+            }
+            if under.is_none() || uploaded.n_entries > 0 {
+                let target = Target { color: &mut target, depth: depth.as_mut() };
+                self.record(rec, &mut made, &uploaded, target, &camera)?;
+            }
+            match &made {
+                Made::Tiles(tiling, _) if under.is_none() || uploaded.n_entries > 0 => {
+                    rec.copy(&tiling.pictures[0], &readback)
+                }
+                _ => rec.copy_image(&mut target, &readback),
+            }
+            Ok(())
+        });
+        match format {
+            TargetFormat::Rgba8 => {
+                readback.read::<u8>(n_numbers).expect("read").into_iter().map(|v| f64::from(v) / 255.0).collect()
+            }
+            TargetFormat::Rgba16f => {
+                readback.read::<f16>(n_numbers).expect("read").iter().map(|v| v.to_f64()).collect()
+            }
+            TargetFormat::Rgba32f => {
+                readback.read::<f32>(n_numbers).expect("read").into_iter().map(f64::from).collect()
+            }
+        }
+    }
+
+    fn camera_record(&self) -> CameraRecord {
+        let film = Film {
+            width: self.view.width,
+            height: self.view.height,
+            format: FilmFormat::Rgba16f,
+            background: DVec3::ZERO,
+            exposure: 1.0,
+            tone_map: ToneMap::Clip,
+        };
+        CameraRecord::new(&self.camera, &self.view.pose, &film, DVec3::ZERO)
+    }
+
+    fn make(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, way: Way) -> Made {
+        let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
+        let [grouped, weighted] = [self.i_facet.is_some(), self.drawn.is_some()];
+        let [textured, threshold] = [self.textured.is_some(), self.view.threshold > 0.0];
+        match way {
+            Way::Sprites => {
+                let variant = [behind, grouped, weighted, textured, threshold];
+                Made::Sprites(Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites"))
+            }
+            Way::Tiles(tiled) => Made::Tiles(self.tiling(gpu, compiler, format, &tiled), tiled.saturated),
+            Way::Chunks(n_chunks, saturated) => {
+                // Room for more than there are, as where some are culled.
+                let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
+                let variant = [lit, grouped, weighted, textured, threshold];
+                let chunks = Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant);
+                Made::Chunks(chunks.expect("chunks"), saturated)
+            }
+        }
+    }
+
+    fn upload(&self, gpu: &mut Gpu) -> Uploaded {
+        let scenery = self.scenery.clone().unwrap_or_default();
+        let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
+        // Facets of surfaces come before those of particles.
+        let facets = [&scenery.lit, self.lit.as_deref().unwrap_or(&[])].concat();
+        // What names a facet counts the surfaces' too.
+        let n_before = scenery.lit.len() as u32;
+        let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
+        let (of_drawn, of_groups) = self.drawn.clone().unwrap_or_default();
+        let (of_textured, textures, words) = match &self.textured {
+            Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), pool.words()),
+            None => Default::default(),
+        };
+        assert!(of_drawn.is_empty() || of_textured.is_empty() || of_drawn == of_textured, "a particle has one group");
+        let i_group = if of_drawn.is_empty() { &of_textured } else { &of_drawn };
+        Uploaded {
+            n_entries: entries.len() as u32,
+            n_surface_facets: n_before,
+            of_sprites: [
+                gpu.upload(&entries),
+                gpu.upload(&self.placed),
+                gpu.upload(&self.particles),
+                gpu.upload(&facets),
+                gpu.upload(&named),
+                gpu.upload(i_group),
+                gpu.upload(&of_groups),
+                gpu.upload(&textures),
+                gpu.upload(&words),
+            ],
+            regions: gpu.upload(&scenery.regions),
+            n_regions: scenery.regions.len() as u32,
+        }
+    }
+
+    fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        made: &mut Made,
+        uploaded: &Uploaded,
+        target: Target<'_>,
+        camera: &CameraRecord,
+    ) -> Result<()> {
+        let from = uploaded.of_sprites.each_ref();
+        let n = (Amount::Known(uploaded.n_entries), uploaded.n_surface_facets);
+        let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);
+        match made {
+            Made::Sprites(sprites) => sprites.record(rec, from, target, camera, [cutoff, threshold], n),
+            Made::Tiles(tiling, saturated) => {
+                let view = tiles::View { camera, cutoff, threshold, saturated: *saturated };
+                tiling.record(rec, 0, self.scenery.is_some().then_some(target), from, &view, n)
+            }
+            Made::Chunks(chunks, saturated) => {
+                let start = if self.scenery.is_some() { Start::Load } else { Start::Clear };
+                let view = chunks::View { camera, cuts: [cutoff, threshold], saturated: *saturated };
+                chunks.record(rec, from, (target, start), &view, n)
+            }
+        }
+    }
+
+    fn tiling(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, tiled: &Tiled) -> Tiling {
+        let division = Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
+        let blobs = self.blobs();
+        let tau_most = blobs.iter().map(|b| SQRT_TAU * b.kappa * b.sigma).fold(0.0, f64::max);
+        let variant = Variant {
+            lit: self.lit.is_some(),
+            grouped: self.i_facet.is_some(),
+            textured: self.textured.is_some(),
+            threshold: self.view.threshold > 0.0,
+            weighted: self.drawn.is_some(),
+            format,
+            behind: self.scenery.is_some(),
+            // A rounding above what the blobs are made of in f32.
+            tau_most: tau_most * (1.0 + 8.0 * U),
+            portable: tiled.portable,
+            most_pairs: tiled.most_pairs,
+            most_tiles: tiled.most_tiles,
+        };
+        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant).expect("tiles")
+    }
+}

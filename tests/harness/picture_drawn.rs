@@ -31,7 +31,7 @@ struct Uploaded {
 /// What draws.
 enum Made {
     Sprites(Sprites),
-    Tiles(Tiling, f64),
+    Tiles(Box<Tiling>, f64),
     Chunks(Chunks, f64),
 }
 
@@ -106,7 +106,7 @@ impl Picture {
                 let variant = [behind, grouped, weighted, textured, threshold];
                 Made::Sprites(Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites"))
             }
-            Way::Tiles(tiled) => Made::Tiles(self.tiling(gpu, compiler, format, &tiled), tiled.saturated),
+            Way::Tiles(tiled) => Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated),
             Way::Chunks(n_chunks, saturated) => {
                 // Room for more than there are, as where some are culled.
                 let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);

@@ -32,7 +32,7 @@ struct Uploaded {
 enum Made {
     Sprites(Sprites),
     Tiles(Box<Tiling>, f64),
-    Chunks(Chunks, f64),
+    Chunks(Box<Chunks>, f64),
 }
 
 impl Picture {
@@ -112,7 +112,7 @@ impl Picture {
                 let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
                 let variant = [lit, grouped, weighted, textured, threshold];
                 let chunks = Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant);
-                Made::Chunks(chunks.expect("chunks"), saturated)
+                Made::Chunks(Box::new(chunks.expect("chunks")), saturated)
             }
         }
     }

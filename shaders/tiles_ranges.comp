@@ -10,7 +10,7 @@
 layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push { uint n_bins; uint i_round; uint max_groups; uint most_tiles; } push;
-// Pairs that a workgroup goes through: once for each of its tiles, 0.8 turns of its loops a pair, of 65 535.
+// Pairs that a workgroup goes through: once for each of its tiles, 0.8 turns of its loops a pair, and llvmpipe ends loops after 65 535.
 const uint MOST_PAIRS = 16384;
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };

@@ -138,7 +138,7 @@ fn a_flight_does_not_pop() {
             assert!(f.most_new < 0.04, "{first} {error}: {}", f.most_new);
         }
     }
-    let [off, on] = both(&gpu, &["draw.path='tiles'"], 200);
+    let [off, on] = both(&gpu, &["draw.path='sprites'"], 200);
     let f = compare(&on, &off);
     assert!(f.n_reused > 0 && f.pop <= POP_A_PIXEL * 0.5 + POP_AT_LEAST && f.most_new < 0.04, "{}", f.pop);
 }

@@ -115,6 +115,17 @@ fn tiles_give_the_same_bytes_in_every_mode() {
 }
 
 #[test]
+fn chunks_give_the_same_bytes_in_every_mode() {
+    let chunks = || scene(&["draw.path='sprites'", "draw.chunks=4"]);
+    let frames = run(chunks(), Threading::Serial, true);
+    assert!(frames.iter().all(|f| f.1.plan.runs(Pass::Sprites)));
+    let first = images(frames);
+    assert!(first == images(run(chunks(), Threading::Parallel, true)), "parallel");
+    assert!(first == images(run(chunks(), Threading::Serial, false)), "no skip");
+    assert!(first != images(run(scene(&["draw.path='sprites'"]), Threading::Serial, true)));
+}
+
+#[test]
 fn smaller_pictures_give_the_same_bytes_in_every_mode() {
     for path in ["sprites", "tiles"] {
         let path = format!("draw.path='{path}'");

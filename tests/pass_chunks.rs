@@ -155,7 +155,7 @@ fn ten_thousand_thin_layers_in_half_floats() {
 /// The numbers of some of a scene's frames, and what is said of the last one's impostors.
 fn frames(gpu: &Gpu, file: &str, range: Range<u32>, overrides: &[&str]) -> (Vec<f64>, bool) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
-    let all = ["film.format='rgba32f'", "lighting.mode='first'", "lighting.grid=24"];
+    let all = ["draw.path='sprites'", "film.format='rgba32f'", "lighting.mode='first'", "lighting.grid=24"];
     let overrides: Vec<String> = all.iter().chain(overrides).map(|o| (*o).to_owned()).collect();
     let scene = Arc::new(scene_file::load(&file, &overrides, None).expect("the scene").scene);
     let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
@@ -163,6 +163,7 @@ fn frames(gpu: &Gpu, file: &str, range: Range<u32>, overrides: &[&str]) -> (Vec<
     let (mut values, mut shown) = (vec![], false);
     for i in range {
         let done = renderer.step(game.step(i).expect("a packet")).expect("a frame");
+        assert!(done.plan.runs(Pass::Sprites) || overrides.contains(&"draw.path='tiles'".to_owned()));
         shown = done.plan.runs(Pass::Impostors);
         values.extend(renderer.image().expect("pixels").into_iter().map(f64::from));
     }

@@ -48,18 +48,22 @@ impl Chunks {
         variant: [bool; 5],
     ) -> Result<Chunks> {
         let named = |error| match error {
-            Error::Limit { what } => Error::limit(format!("draw.chunks: {what}; expected 0")),
+            Error::Limit { what } => {
+                Error::limit(format!("draw.chunks is composed in floats: {what}; or draw.chunks = 0"))
+            }
             error => error,
         };
         let stride = n_max.div_ceil(n_chunks);
         let (n_texels, n_places) = (u64::from(width) * u64::from(height), u64::from(stride) * u64::from(n_chunks));
         let image = |name| Image::color_target(device, name, width, height, FORMAT);
+        // First: it tells whether the device can blend into it.
+        let composed = image("chunks.composed").map_err(named)?;
         Ok(Chunks {
             pass: Pass::new(device, compiler, format)?,
             sprites: Sprites::under(device, compiler, FORMAT, variant)?,
             n_chunks,
             stride,
-            composed: image("chunks.composed").map_err(named)?,
+            composed,
             depth: Image::depth(device, "chunks.depth", width, height).map_err(named)?,
             texels: Buffer::new::<[f32; 4]>(device, "chunks.texels", n_texels, Place::Device).map_err(named)?,
             nearest: Buffer::new::<[u32; 2]>(device, "chunks.nearest", n_places, Place::Device).map_err(named)?,

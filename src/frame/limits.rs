@@ -75,8 +75,12 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
     let n_behind = if n_small > 0 && !scene.surfaces.is_empty() { n_pixels } else { 0 };
     // What does not fit is not tried by "auto".
-    let in_chunks = matches!(scene.draw.chunks, Chunks::Of(1..)) && scene.draw.path != DrawPath::Tiles;
-    let n_composed = if in_chunks { n_pixels } else { 0 };
+    let in_chunks = matches!(scene.draw.chunks, Chunks::Of(1..)) && scene.draw.path == DrawPath::Sprites;
+    let n_composed = match in_chunks {
+        true if n_small > 0 => n_small,
+        true => n_pixels,
+        false => 0,
+    };
     let wishes = [
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
@@ -113,7 +117,8 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("who is in the shell", if shells { n } else { 0 }, 4),
         ("what is far, and what is near", if shells { 2 * n } else { 0 }, 8),
         (COMPOSED, n_composed, 16),
-        ("the picture of chunks and its depth", n_composed, 16 + DEPTH_BYTES_PER_PIXEL),
+        ("the picture of chunks", n_composed, 16),
+        ("its depth", n_composed, DEPTH_BYTES_PER_PIXEL),
         ("the entries of chunks", if in_chunks { n + u64::from(MAX_CHUNKS) } else { 0 }, 8),
         (BLOBS, n_small, pixel),
         // With "auto" the half one beside the quarter, the larger one counted twice.

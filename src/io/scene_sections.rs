@@ -180,6 +180,10 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let impostor_error = s.f64("impostor_error", 0.5, Bounds::Within(0.01, 100.0))?;
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let chunks = read_chunks(&mut s)?;
+    if path == DrawPath::Tiles && !matches!(chunks, Chunks::Of(0) | Chunks::Auto) {
+        let what = "expected 0 where draw.path is \"tiles\", the default: only \"sprites\" are drawn in chunks";
+        return Err(s.fault("chunks", what.to_owned()));
+    }
     let threshold = read_least(&mut s, "threshold", Bounds::From(0.0, 1.0))?;
     let cull = s.choice("cull", "on", &Cull::NAMES, &[])?;
     let smallest = read_least(&mut s, "smallest", Bounds::Within(0.0, 1000.0))?;
@@ -285,6 +289,13 @@ fn read_resolution(s: &mut Section) -> Result<Resolution> {
 fn read_chunks(s: &mut Section) -> Result<Chunks> {
     if is_auto(s, "chunks") {
         return Ok(Chunks::Auto);
+    }
+    if let Some(node) = s.value("chunks")
+        && !matches!(node.value, Value::Integer(n) if (0..=i128::from(MAX_CHUNKS)).contains(&n))
+    {
+        let found = node.value.describe();
+        let what = format!("expected an integer from 0 to {MAX_CHUNKS} or \"auto\", found {found}");
+        return Err(s.fault("chunks", what));
     }
     Ok(Chunks::Of(s.u32("chunks", 0, 0, MAX_CHUNKS)?))
 }

@@ -1,4 +1,4 @@
-//! chunks: what `sprites` draws near to far, a chunk at a time; pixels that are full leave the rest out.
+//! chunks: what `sprites` draws near to far, a chunk at a time; pixels that are full leave the rest out. Its time stands under `sprites`.
 //!
 //! In: sorted entries, far to near, and their number; the picture that chunks are composed in (four floats a pixel). Out: the
 //! entries near to far, by chunk, and each chunk's draw; depth 1 where the picture lets less through than may be left out;

@@ -202,8 +202,8 @@ impl Tiles {
         let n_rounds = if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
         if n_rounds > 1 && !has_room_between_rounds(&division, device.limits()) {
             return Err(Error::limit(format!(
-                "draw.path = \"tiles\": a picture of {}×{} is drawn in rounds where the scene has {n_max} particles, and 16 bytes a \
-                 pixel between them are more than this device's {} (maxStorageBufferRange); expected \"sprites\"",
+                "draw.path = \"tiles\", the default: a picture of {}×{} is drawn in rounds where the scene has {n_max} particles, and 16 bytes a \
+                 pixel between them are more than this device's {} (maxStorageBufferRange); expected draw.path = \"sprites\"",
                 division.width,
                 division.height,
                 device.limits().max_storage_buffer_bytes

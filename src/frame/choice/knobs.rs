@@ -10,7 +10,7 @@ use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors};
 pub enum Changes {
     /// Every value draws the same law and rounds otherwise: the picture of the one that is taken is the exact one.
     Rounding,
-    /// Nothing, but for what rounds of `tiles` may round.
+    /// Nothing, but for what rounds of `tiles` and several chunks may round.
     Nothing,
     /// The picture, by as much as `draw.error` allows.
     Picture,

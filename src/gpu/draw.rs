@@ -22,73 +22,23 @@ pub struct DrawPipeline {
 }
 
 /// How a fragment meets what the target holds. Depth is reversed: the greater one is nearer.
-#[derive(Clone, Copy, PartialEq)]
-enum Meet {
-    /// Blended over it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Meet {
+    /// Blended premultiplied over it.
     Over,
     /// Blended over it where it is as near as what wrote depth, which it does not.
     OverNearer,
     /// Blended under it where it is as near as what wrote depth, which it does not.
     UnderNearer,
-    /// In its place, with its depth, where it is as near.
+    /// In its place, with its depth, where it is as near; of equally near ones the last stays.
     Replace,
     /// Not seen, and hides what is behind its depth.
     Hide,
 }
 
 impl DrawPipeline {
-    /// `name.vert` and `name.frag`, drawn as triangle strips, blended premultiplied over a target of `format`; `tested`:
-    /// only where they are as near as the target's depth.
-    pub fn over(
-        device: &Device,
-        compiler: &Compiler,
-        name: &str,
-        push: &[Field],
-        constants: &[(u32, u32)],
-        format: TargetFormat,
-        tested: bool,
-    ) -> Result<DrawPipeline> {
-        let meet = if tested { Meet::OverNearer } else { Meet::Over };
-        Self::new(device, compiler, name, push, constants, (format, meet))
-    }
-
-    /// The same, opaque: the nearest stays, and of equally near ones the last.
-    pub fn opaque(
-        device: &Device,
-        compiler: &Compiler,
-        name: &str,
-        push: &[Field],
-        constants: &[(u32, u32)],
-        format: TargetFormat,
-    ) -> Result<DrawPipeline> {
-        Self::new(device, compiler, name, push, constants, (format, Meet::Replace))
-    }
-
-    /// The same, blended under what the target holds, where they are as near as its depth.
-    pub fn under(
-        device: &Device,
-        compiler: &Compiler,
-        name: &str,
-        push: &[Field],
-        constants: &[(u32, u32)],
-        format: TargetFormat,
-    ) -> Result<DrawPipeline> {
-        Self::new(device, compiler, name, push, constants, (format, Meet::UnderNearer))
-    }
-
-    /// The same, not seen: what it covers is as near as it is from then on.
-    pub fn hiding(
-        device: &Device,
-        compiler: &Compiler,
-        name: &str,
-        push: &[Field],
-        constants: &[(u32, u32)],
-        format: TargetFormat,
-    ) -> Result<DrawPipeline> {
-        Self::new(device, compiler, name, push, constants, (format, Meet::Hide))
-    }
-
-    fn new(
+    /// `name.vert` and `name.frag`, drawn as triangle strips into a target of `format`, which they meet as `meet` says.
+    pub fn new(
         device: &Device,
         compiler: &Compiler,
         name: &str,

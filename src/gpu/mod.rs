@@ -17,7 +17,7 @@ pub mod timer;
 
 pub use calibration::{ClockFit, ClockPair};
 pub use device::{Device, DeviceInfo};
-pub use draw::DrawPipeline;
+pub use draw::{DrawPipeline, Meet};
 pub use instance::Instance;
 pub use kernel::{Field, Kernel};
 pub use memory::{Buffer, Image, Place};

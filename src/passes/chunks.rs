@@ -7,7 +7,7 @@
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Recorder, Start, Target};
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target};
 use crate::layout::record;
 
 record! {
@@ -32,8 +32,8 @@ impl Chunks {
     pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat) -> Result<Chunks> {
         Ok(Chunks {
             order: Kernel::new(device, compiler, "chunks.order", OrderPush::FIELDS, &[])?,
-            pick: DrawPipeline::hiding(device, compiler, "chunks", Push::FIELDS, &[(0, 1)], FORMAT)?,
-            show: DrawPipeline::over(device, compiler, "chunks", Push::FIELDS, &[(0, 0)], format, false)?,
+            pick: DrawPipeline::new(device, compiler, "chunks", Push::FIELDS, &[(0, 1)], (FORMAT, Meet::Hide))?,
+            show: DrawPipeline::new(device, compiler, "chunks", Push::FIELDS, &[(0, 0)], (format, Meet::Over))?,
         })
     }
 

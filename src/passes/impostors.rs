@@ -9,7 +9,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Recorder, Start, Target};
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target};
 use crate::layout::record;
 
 record! {
@@ -53,9 +53,10 @@ pub struct Shown {
 impl Impostors {
     /// `behind`: surfaces have been drawn, with depth.
     pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, behind: bool) -> Result<Impostors> {
+        let meet = if behind { Meet::OverNearer } else { Meet::Over };
         Ok(Impostors {
             part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS, &[])?,
-            show: DrawPipeline::over(device, compiler, "impostors", Push::FIELDS, &[], format, behind)?,
+            show: DrawPipeline::new(device, compiler, "impostors", Push::FIELDS, &[], (format, meet))?,
         })
     }
 

@@ -7,7 +7,7 @@
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Amount, Buffer, Compiler, Device, DrawPipeline, Instances, Recorder, Start, Target};
+use crate::gpu::{Amount, Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target};
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
@@ -40,7 +40,8 @@ impl Sprites {
         [behind, grouped, weighted, textured, threshold]: [bool; 5],
     ) -> Result<Sprites> {
         let constants = constants([lit, behind, grouped, weighted, textured, threshold]);
-        let pipeline = DrawPipeline::over(device, compiler, "sprites", Push::FIELDS, &constants, format, behind)?;
+        let meet = if behind { Meet::OverNearer } else { Meet::Over };
+        let pipeline = DrawPipeline::new(device, compiler, "sprites", Push::FIELDS, &constants, (format, meet))?;
         Ok(Sprites { pipeline })
     }
 
@@ -52,7 +53,8 @@ impl Sprites {
         [lit, grouped, weighted, textured, threshold]: [bool; 5],
     ) -> Result<Sprites> {
         let constants = constants([lit, true, grouped, weighted, textured, threshold]);
-        let pipeline = DrawPipeline::under(device, compiler, "sprites", Push::FIELDS, &constants, format)?;
+        let pipeline =
+            DrawPipeline::new(device, compiler, "sprites", Push::FIELDS, &constants, (format, Meet::UnderNearer))?;
         Ok(Sprites { pipeline })
     }
 

@@ -6,7 +6,7 @@
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Recorder, Start, Target};
+use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
@@ -22,7 +22,8 @@ impl Surfaces {
     /// `depth_only`: of no colour and no alpha.
     pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, depth_only: bool) -> Result<Surfaces> {
         let constants = [(0, u32::from(depth_only))];
-        let pipeline = DrawPipeline::opaque(device, compiler, "surfaces", Push::FIELDS, &constants, format)?;
+        let pipeline =
+            DrawPipeline::new(device, compiler, "surfaces", Push::FIELDS, &constants, (format, Meet::Replace))?;
         Ok(Surfaces { pipeline })
     }
 

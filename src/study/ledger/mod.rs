@@ -1,0 +1,3 @@
+//! What every approximation is off by, each against the one below it (model.md §10).
+
+pub mod records;

@@ -1,0 +1,3 @@
+//! Run time against error over the knobs of a scene.
+
+pub mod records;

@@ -300,7 +300,7 @@ fn wrong_transmittance_is_noticed() {
     // What is wrong in the transmittance (0), and what in the clouds' part alone (1).
     for (k, file, from, to) in [
         (0, "transmit.comp", "(t0 + 0.5 * ds)", "t0"),
-        (0, "transmit.comp", "min(push.step_length, length_total - t0)", "push.step_length"),
+        (0, "transmit.comp", "min(WEIGHT(push.step_length), length_total - t0)", "push.step_length"),
         (0, "transmit.comp", "push.backward * tau", "tau"),
         (0, "transmit.comp", "k / push.n_lights", "k % push.n_facets"),
         (0, "transmit.comp", "leave = distance", "leave = 3.4e38"),
@@ -314,7 +314,7 @@ fn wrong_transmittance_is_noticed() {
         (0, "include/occlude.glsl", "(a / (a - b))", "(a / (a + b))"),
         (0, "include/occlude.glsl", "p - d * (a / b)", "p + d * (a / b)"),
         (0, "include/occlude.glsl", "? e : 0.0", "? e : 1e-30"),
-        (0, "include/density.glsl", "inv_cell - 0.5", "inv_cell"),
+        (0, "include/density.glsl", "push.grid.low) - 0.5", "push.grid.low)"),
         (0, "include/density.glsl", "cell_at(c + 1)", "cell_at(c)"),
         (0, "include/density.glsl", "n.x * n.y;", "n.x * n.z;"),
     ] {

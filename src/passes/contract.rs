@@ -7,6 +7,7 @@
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
+use crate::layout::sums::SumMacros;
 
 /// Rows of T2 that lie side by side; the number of rows is a multiple of it.
 pub const TILE: u32 = 64;
@@ -20,9 +21,9 @@ pub struct Contract {
 }
 
 impl Contract {
-    /// `n_bases`: N_b.
-    pub fn new(device: &Device, compiler: &Compiler, n_bases: u32) -> Result<Contract> {
-        let macros = [("N_BASES", n_bases)];
+    /// `n_bases`: N_b. `sums`: how they are formed.
+    pub fn new(device: &Device, compiler: &Compiler, n_bases: u32, sums: &SumMacros) -> Result<Contract> {
+        let macros = [&[("N_BASES", n_bases)], sums.list()].concat();
         Ok(Contract { kernel: Kernel::with_macros(device, compiler, "contract", Push::FIELDS, &[], &macros)? })
     }
 

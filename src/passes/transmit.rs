@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
+use crate::layout::sums::SumMacros;
 
 record! {
     pub struct Push {
@@ -32,10 +33,11 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    /// `apart`: what the clouds let through is written by itself, too.
-    pub fn new(device: &Device, compiler: &Compiler, apart: bool) -> Result<Transmit> {
+    /// `apart`: what the clouds let through is written by itself, too. `sums`: how τ is summed.
+    pub fn new(device: &Device, compiler: &Compiler, apart: bool, sums: &SumMacros) -> Result<Transmit> {
         let constants = [(0, u32::from(apart))];
-        Ok(Transmit { kernel: Kernel::new(device, compiler, "transmit", Push::FIELDS, &constants)? })
+        let fields = Push::FIELDS;
+        Ok(Transmit { kernel: Kernel::with_macros(device, compiler, "transmit", fields, &constants, sums.list())? })
     }
 
     /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord, the surfaces' first; `density`: f32;

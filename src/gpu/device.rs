@@ -343,9 +343,8 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .compute_full_subgroups(true);
     let extensions: Vec<_> = info.calibrated_timestamps.iter().map(|name| name.as_ptr()).collect();
     let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
-    let features = vk::PhysicalDeviceFeatures::default()
-        .shader_int64(info.limits.words_64)
-        .shader_float64(info.limits.floats_64);
+    let features =
+        vk::PhysicalDeviceFeatures::default().shader_int64(info.limits.words_64).shader_float64(info.limits.floats_64);
     let create = create.enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
     unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
 }

@@ -11,6 +11,8 @@ mod inspect;
 mod output;
 mod render;
 mod render_reference;
+mod tradeoff;
+mod tradeoff_table;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -47,6 +49,7 @@ pub fn main() -> ExitCode {
             bench::run(a, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
+        Command::Error(a) => tradeoff::run(a, &STOP, &GRACEFUL),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
     };

@@ -16,11 +16,13 @@ mod sums;
 use gathers::{Truths, reference, truths, values};
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say, check_within};
-use nimbus::model::scene::Scene;
+use nimbus::io::scene_file;
+use nimbus::model::scene::{Gather, Scene};
 use nimbus::model::sums::{Precision, Sums};
 use nimbus::reference::rounding::sum_error;
 use rooms::{Frame, HEAD, Plate, frame, plates_text};
 use scene_text::load_with;
+use std::path::Path;
 use sums::{KAHAN, PAIRWISE, PLAIN, every_way};
 
 const SUN: &str = "[[light]]\nkind = 'directional'\ndirection = [0.0, -1.0, 0.0]\nirradiance = [3.0, 3.0, 3.0]\n";
@@ -87,6 +89,34 @@ fn every_way_to_sum_is_within_its_own_bound_and_plain_is_not_within_others() {
                 check_within("plain", &values, &truths, &bounds).is_err(),
                 "{gather}: plain keeps {sums:?}'s bound"
             );
+        }
+    }
+}
+
+/// Root mean square of a − b over that of b.
+fn off(a: &[f64], b: &[f64]) -> f64 {
+    let of = |difference: f64| move |(x, y): (&f64, &f64)| (x - difference * y).powi(2);
+    let differences: f64 = a.iter().zip(b).map(of(1.0)).sum();
+    (differences / b.iter().map(|y| y * y).sum::<f64>()).sqrt()
+}
+
+#[test]
+#[ignore = "a minute; the table of docs/measured.md"]
+fn what_every_way_is_off_by() {
+    let gpu = Gpu::new();
+    for (name, gather) in [("rectangles", Gather::Exact), ("ground", Gather::Exact), ("materials", Gather::Exact)] {
+        let set = ["film.width=8".to_owned(), "film.height=8".to_owned()];
+        let mut scene = scene_file::load(Path::new(&format!("scenes/{name}.toml")), &set, None).unwrap().scene;
+        scene.lighting.gather = gather;
+        let lit = |sums: Sums| values(&frame(&gpu, with(&scene, sums)));
+        let (truths, _) = truths(&reference(&frame(&gpu, scene.clone())));
+        let exact_sums = lit(Sums { precision: Precision::F64, ..KAHAN });
+        for sums in every_way() {
+            let found = lit(sums);
+            for (against, of) in [("f64", &truths), ("sums in f64", &exact_sums)] {
+                let [indirect, second] = [0, 1].map(|k| off(&found[k], &of[k]));
+                println!("{name}, {sums:?}, against {against}: I_i {indirect:.2e}, L2 {second:.2e}");
+            }
         }
     }
 }

@@ -98,3 +98,17 @@ fn a_plain_march_of_thousands_of_steps_is_not_within_the_bounds_of_the_others() 
         }
     }
 }
+
+#[test]
+#[ignore = "the table of docs/measured.md"]
+fn what_every_way_is_off_by() {
+    let mut gpu = Gpu::new();
+    for (what, case, step) in [("cloud", case(), 1.0), ("cloud", case(), 0.1), ("block", block(), TINY_STEPS[0])] {
+        let [_, truths] = case.truth(step, 0.0);
+        for sums in every_way() {
+            let [_, values] = case.run_as(&mut gpu, None, [step, 0.0], sums);
+            let squares: f64 = values.iter().zip(&truths).map(|(v, t)| (v - t) * (v - t)).sum();
+            println!("{what}, step {step}, {sums:?}: RMSE {:.2e}", (squares / truths.len() as f64).sqrt());
+        }
+    }
+}

@@ -168,7 +168,7 @@ fn compensation_may_not_be_optimised_away() {
             let n = n_kept_as_written(file, way);
             match way.summation {
                 // Seven additions wherever something is added.
-                Summation::Kahan => assert!(n > 0 && n % 7 == 0, "{file}, {way:?}: {n}"),
+                Summation::Kahan => assert!(n > 0 && n.is_multiple_of(7), "{file}, {way:?}: {n}"),
                 _ => assert_eq!(n, 0, "{file}, {way:?}"),
             }
         }

@@ -1,7 +1,8 @@
 //! second: the second reflection on every facet, gathered from all others.
 //!
 //! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid. Out: I_i and L2 in
-//! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11.
+//! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11; of the
+//! sum's error "sums" there.
 
 use bytemuck::Pod;
 

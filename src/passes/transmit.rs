@@ -3,8 +3,8 @@
 //! In: facets, lights, regions (rectangles), density grid. Out: transmittance [facet][light], and where it is asked for
 //! what clouds alone let through. Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
 //! docs/model.md §8, §11. Error: against the same march in f64, (1−g)τ times the samples' relative rounding plus
-//! 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few ulp may be hidden
-//! or not.
+//! the sum's ("sums") and 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few
+//! ulp may be hidden or not.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};

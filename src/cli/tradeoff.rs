@@ -102,7 +102,7 @@ pub fn run(args: &ErrorArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result
     study.interrupted = !matches!(done, Ok(true));
     sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
-        files::write(out, &study, &found.turns)?;
+        files::write(out, &study, &found)?;
     }
     done?;
     print(args, &study)?;
@@ -266,7 +266,7 @@ impl Keeping<'_> {
                     self.study.configurations = found.configurations.clone();
                     self.study.rounds = found.n_rounds;
                     self.study.interrupted = true;
-                    files::write(out, self.study, &found.turns)?;
+                    files::write(out, self.study, found)?;
                 }
             }
         }

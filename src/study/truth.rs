@@ -201,7 +201,7 @@ impl Truth {
 }
 
 /// How exactly the second reflection is integrated: a hundredth of the percent that it is compared to.
-pub(super) const SECOND_ACCURACY: f64 = 1e-4;
+const SECOND_ACCURACY: f64 = 1e-4;
 
 /// Facets of a surface, whose region is its number.
 fn facets_of(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_ {

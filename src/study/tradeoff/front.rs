@@ -57,27 +57,28 @@ fn is_better(a: &Both, b: &Both) -> bool {
     t && e && (a.time.value < b.time.value || a.error.value < b.error.value)
 }
 
-/// `a` is better in one by more than the intervals, and not worse in the other by more than them.
-fn is_surely_better(a: &Both, b: &Both) -> bool {
-    let (t, e) = (is_surely_less(&a.time, &b.time), is_surely_less(&a.error, &b.error));
-    (t && !is_surely_less(&b.error, &a.error)) || (e && !is_surely_less(&b.time, &a.time))
-}
-
-/// Says of every configuration where it lies: on the front where no other is better; off it where another is, and surely so;
-/// near it where only one of the two can be said. Times are `by_base`, which drifts take no part in.
-pub fn place(configurations: &mut [Configuration], metric: Metric) {
+/// Says of every configuration where it lies: on the front where no other is better; off it where another is, and surely so
+/// (better in one by more than chance, and not worse in the other by more than chance); near it where only one of the two can
+/// be said. Times are `by_base`, which drifts take no part in; `is_nearer(i, j)`: i's error is surely less than j's.
+pub fn place(configurations: &mut [Configuration], metric: Metric, is_nearer: impl Fn(usize, usize) -> bool) {
     let both: Vec<Option<Both>> = configurations
         .iter()
         .map(|c| c.by_base.zip(metric.of(c)).map(|(time, error)| Both { time, error }))
         .map(|both| both.filter(|b| b.time.value.is_finite() && b.error.value.is_finite()))
         .collect();
-    for (configuration, own) in configurations.iter_mut().zip(&both) {
-        let Some(own) = own else {
+    let is_surely_better = |i: usize, j: usize, a: &Both, b: &Both| {
+        let (faster, slower) = (is_surely_less(&a.time, &b.time), is_surely_less(&b.time, &a.time));
+        (faster && !is_nearer(j, i)) || (!slower && is_nearer(i, j))
+    };
+    for (j, configuration) in configurations.iter_mut().enumerate() {
+        let Some(own) = &both[j] else {
             configuration.front = Front::Unknown;
             continue;
         };
-        let others = || both.iter().flatten();
-        configuration.front = match (others().any(|o| is_better(o, own)), others().any(|o| is_surely_better(o, own))) {
+        let others = || both.iter().enumerate().filter_map(|(i, o)| o.as_ref().map(|o| (i, o)));
+        let is_off = others().any(|(_, o)| is_better(o, own));
+        let is_surely_off = others().any(|(i, o)| i != j && is_surely_better(i, j, o, own));
+        configuration.front = match (is_off, is_surely_off) {
             (false, false) => Front::On,
             (true, true) => Front::Off,
             _ => Front::Near,

@@ -378,3 +378,23 @@ fn ctrl_c_keeps_a_study_that_can_be_gone_on_with() {
     assert!(study(&after)[1..].iter().all(|c| n_turns(c) == n + 2), "{after}");
     assert!(study(&after).iter().zip(study(&before)).all(|(a, b)| a["error"] == b["error"]));
 }
+
+/// However early: the folder holds a study before its first configuration is drawn.
+#[test]
+fn a_killed_study_can_be_gone_on_with() {
+    let tiny = Tiny::new();
+    let knob = [&SHORT[..], &OUT, &["--grid", "--knob", "draw.cutoff=2"]].concat();
+    let mut child = tiny.start(&knob);
+    let begin = Instant::now();
+    while !tiny.path("out/study.json").exists() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "it never begins");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("it is there, or was");
+    child.wait().expect("it ends");
+    assert_valid(&tiny.json("out/study.json"), "study.schema.json");
+    tiny.good(&[&knob[..], &["--resume"]].concat());
+    let json = tiny.json("out/study.json");
+    assert!(json["interrupted"] == false && names(&json) == ["as it stands", "draw.cutoff=2"], "{json}");
+    assert!(study(&json).iter().all(|c| c["error"].is_object() && c["by_base"].is_object()), "{json}");
+}

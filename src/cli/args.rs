@@ -133,6 +133,8 @@ pub enum ReferenceArg {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Time against particles and picture size:\n  \
     nimbus bench scenes/cubes-554.toml --sweep draw.particles=500,5000,50000 --sweep size=800x600,1024x768\n\n\
+    Draw the frame times here, and as SVG files beside the results:\n  \
+    nimbus bench scenes/threads.toml --plot --out run\n\n\
     A scene's [[phase]] sections are timed one by one; --set and --sweep count for each of them.\n\n\
     Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept.")]
 pub struct BenchArgs {
@@ -158,9 +160,12 @@ pub struct BenchArgs {
     /// Blocks of each loop, in the order A B B A …; with an even number a steady drift cancels
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     pub repeat: u32,
-    /// Folder for run.json and frames.csv (with several scenes: a folder each in it)
+    /// Folder for run.json, frames.csv and the last frame of every case as a PNG (with several scenes: a folder each in it)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Draw the frame times below the table; with --out also as frames.svg, and the passes' times as passes.svg
+    #[arg(long)]
+    pub plot: bool,
     /// Write every frame's image hash to frames.csv; reading the frames back disturbs the times
     #[arg(long, requires = "out")]
     pub hash_frames: bool,

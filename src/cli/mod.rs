@@ -3,6 +3,7 @@
 pub mod args;
 mod attach;
 mod bench;
+mod bench_plot;
 mod bench_table;
 mod compare;
 mod compare_pictures;
@@ -44,7 +45,7 @@ pub fn main() -> ExitCode {
         Command::Render(a) => render::run(a),
         Command::Bench(a) => {
             GRACEFUL.store(true, Ordering::Relaxed);
-            bench::run(a, &STOP, zones.as_ref())
+            bench::run(a, args.color, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
         Command::Inspect(a) => inspect::run(a),

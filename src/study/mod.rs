@@ -2,6 +2,7 @@
 
 pub mod basis;
 pub mod bench;
+pub mod beside;
 pub mod cases;
 pub mod compare;
 pub mod difference;
@@ -11,6 +12,7 @@ pub mod machine;
 pub mod outcome;
 pub mod overlap;
 pub mod picture;
+pub mod plot;
 pub mod provenance;
 pub mod recorded;
 pub mod records;

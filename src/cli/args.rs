@@ -10,7 +10,8 @@ use crate::io::scene_file::MAX_SIDE;
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
-    nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
+    nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus report before after -o report.html\n  \
+    nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  101 a fault of nimbus itself; 130 interrupted.")]
 pub struct Args {
     #[command(subcommand)]
@@ -50,6 +51,14 @@ pub enum Command {
     /// are shown: an EXR over black, through the default tone map. A is what is measured by. Pixels that are not finite in
     /// either picture are counted and left out; SSIM and FLIP take them for black in both.
     Compare(CompareArgs),
+    /// Make one HTML page of results: where they were measured, plots, tables, pictures
+    ///
+    /// Of every folder that bench, error or ledger wrote: machine and provenance, every figure as a table, frame times and
+    /// passes, time against error, the ledger, and the pictures in it. Where two benches or two studies are given, the later
+    /// ones are compared with the first: ratios with their intervals, the pictures behind a slider, and where they differ.
+    ///
+    /// The page is one file and loads nothing: it can be mailed, kept beside the results, or printed.
+    Report(ReportArgs),
     /// Print a stage's buffer, or what f64 says it should be
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
@@ -227,6 +236,30 @@ pub struct CompareArgs {
     /// JSON in place of the table
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "One run:\n  \
+    nimbus bench scenes/threads.toml --out run\n  \
+    nimbus report run -o run.html\n\n\
+    Before and after, compared:\n  \
+    nimbus bench scenes/threads.toml --out before\n  \
+    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
+    nimbus report before after -o change.html\n\n\
+    Exit codes: 0 written; 2 a folder without results, results of another schema, or a page that exists already.")]
+pub struct ReportArgs {
+    /// Folders of results, or run.json, study.json or ledger.json in one
+    #[arg(required = true, value_name = "RUN")]
+    pub runs: Vec<PathBuf>,
+    /// The page: .html
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -170,7 +170,12 @@ fn bench_one(
 ) -> Result<(Run, Option<Error>)> {
     let date = machine::utc_now();
     let Prepared { cases, scene_hash, resolved } = prepare(args, path, &args.options)?;
-    let plan = BenchPlan { n_warm_up: args.warmup, n_rounds: args.repeat, hash_frames: args.hash_frames, pictures: out.is_some() };
+    let plan = BenchPlan {
+        n_warm_up: args.warmup,
+        n_rounds: args.repeat,
+        hash_frames: args.hash_frames,
+        pictures: out.is_some(),
+    };
     let mut stage = open(args, &cases)?;
     if args.options.verbose {
         say_sizes(&stage.scene, Some(&stage));

@@ -12,6 +12,7 @@ mod inspect;
 mod output;
 mod render;
 mod render_reference;
+mod report;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -48,6 +49,7 @@ pub fn main() -> ExitCode {
             bench::run(a, args.color, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
+        Command::Report(a) => report::run(a),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
     };

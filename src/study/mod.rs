@@ -16,6 +16,7 @@ pub mod plot;
 pub mod provenance;
 pub mod recorded;
 pub mod records;
+pub mod report;
 pub mod stage;
 pub mod trace;
 pub mod tradeoff;

@@ -281,7 +281,8 @@ pub fn write_results_with(
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     // Those that are only now made, too: RUN_FILE stays the last.
     let made = beside.names();
-    let all: Vec<&str> = made.iter().map(String::as_str).filter(|name| !names.contains(name)).chain(names.clone()).collect();
+    let all: Vec<&str> =
+        made.iter().map(String::as_str).filter(|name| !names.contains(name)).chain(names.clone()).collect();
     replace_files(out_dir, &all, |folder| {
         beside.write(folder)?;
         write_frames(&folder.join(FRAMES_FILE), pass_names, rows)?;

@@ -115,7 +115,13 @@ impl FrameChart {
         (frames().min().unwrap_or(0), frames().max().unwrap_or(0))
     }
 
-    fn draw_loop<DB: DrawingBackend>(&self, plane: &Plane<'_, DB>, i: usize, found: &[Bin], top: f64) -> DrawResult<(), DB> {
+    fn draw_loop<DB: DrawingBackend>(
+        &self,
+        plane: &Plane<'_, DB>,
+        i: usize,
+        found: &[Bin],
+        top: f64,
+    ) -> DrawResult<(), DB> {
         let at = |bin: &Bin, ms: f64| (bin.middle(), ms.min(top));
         if plane.look.characters {
             for bin in found {
@@ -142,7 +148,12 @@ impl FrameChart {
         Ok(())
     }
 
-    fn draw_phases<DB: DrawingBackend>(&self, plane: &Plane<'_, DB>, range: (u32, u32), top: f64) -> DrawResult<(), DB> {
+    fn draw_phases<DB: DrawingBackend>(
+        &self,
+        plane: &Plane<'_, DB>,
+        range: (u32, u32),
+        top: f64,
+    ) -> DrawResult<(), DB> {
         let [_, upper, right, _] = plane.bounds();
         let mut phases = self.phases.clone();
         phases.sort();
@@ -173,12 +184,15 @@ impl Plot for FrameChart {
     }
 
     fn notes(&self) -> Vec<String> {
-        let mut notes = vec!["middle: median of a frame's blocks, or of neighbouring frames; about it: least to greatest".to_owned()];
+        let mut notes = vec![
+            "middle: median of a frame's blocks, or of neighbouring frames; about it: least to greatest".to_owned(),
+        ];
         let (top, n_above) = self.top();
         if n_above > 0 {
             let most = self.times().into_iter().fold(0.0, f64::max);
             let (top, most) = (number(top), number(most));
-            notes.push(format!("{n_above} of {} frames took longer than {top} ms, up to {most} ms", self.times().len()));
+            notes
+                .push(format!("{n_above} of {} frames took longer than {top} ms, up to {most} ms", self.times().len()));
         }
         notes
     }

@@ -58,7 +58,11 @@ impl Plot for LedgerChart {
         let key = |color, glyph, name: &str| Key { color, glyph, name: name.to_owned(), mark: None };
         let mut keys = vec![key(series(0), '█', "one approximation")];
         if self.rows.iter().any(|r| r.note.is_none() && !r.is_resolved) {
-            keys.push(key(if look.characters { series(0) } else { MUTED }, '░', "not resolved: its references are no better"));
+            keys.push(key(
+                if look.characters { series(0) } else { MUTED },
+                '░',
+                "not resolved: its references are no better",
+            ));
         }
         keys.push(key(series(1), '│', "all together"));
         keys
@@ -83,7 +87,8 @@ impl Plot for LedgerChart {
         let least = self.errors().fold(f64::INFINITY, f64::min);
         let most = self.errors().fold(0.0, f64::max);
         // Behind the longest bar there is room for its number.
-        let room = ((most / least).log10().max(1.0) * f64::from(look.across(110, 12)) / f64::from(width.max(1))).max(0.1);
+        let room =
+            ((most / least).log10().max(1.0) * f64::from(look.across(110, 12)) / f64::from(width.max(1))).max(0.1);
         let values = [least * 10f64.powf(-BELOW - 0.25), most * 10f64.powf(room)].into_iter();
         let x = Axis::log("RMSE", values, false, (width / look.across(80, 10)) as usize);
         let plane = Plane::new(place, &x, &Axis::rows(&names), Behind::Vertical)?;

@@ -139,9 +139,16 @@ pub trait Plot {
         let widest = columns as i32 * look::CELL.0;
         let lines = key_lines(Look::TERMINAL, &keys, widest);
         for (i, (key, (line, _))) in keys.iter().zip(&lines).enumerate() {
-            let before = if i == 0 { "" } else if lines[i - 1].0 == *line { "  " } else { "\n" };
+            let before = if i == 0 {
+                ""
+            } else if lines[i - 1].0 == *line {
+                "  "
+            } else {
+                "\n"
+            };
             let sgr = sgr_of((key.color.0, key.color.1, key.color.2));
-            let glyph = if colored && sgr != 39 { format!("\x1b[{sgr}m{}\x1b[39m", key.glyph) } else { key.glyph.into() };
+            let glyph =
+                if colored && sgr != 39 { format!("\x1b[{sgr}m{}\x1b[39m", key.glyph) } else { key.glyph.into() };
             let _ = write!(out, "{before}{glyph} {}", key.name);
         }
         out += if keys.is_empty() { "" } else { "\n" };
@@ -223,8 +230,12 @@ mod tests {
 
     #[test]
     fn keys_go_on_as_many_lines_as_they_need() {
-        let keys = ["a", "bb", "a name that takes a line of its own"]
-            .map(|name| Key { color: INK, glyph: '●', name: name.to_owned(), mark: None });
+        let keys = ["a", "bb", "a name that takes a line of its own"].map(|name| Key {
+            color: INK,
+            glyph: '●',
+            name: name.to_owned(),
+            mark: None,
+        });
         let places = key_lines(Look::TERMINAL, &keys, 40 * look::CELL.0);
         assert_eq!(places.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [0, 0, 1]);
         assert_eq!(places[1].1, (2 + 1 + 2) * look::CELL.0);

@@ -11,7 +11,14 @@ pub fn significant(value: f64, n: usize) -> String {
         return "0".to_owned();
     }
     if !value.is_finite() {
-        return if value.is_nan() { "—" } else if value > 0.0 { "∞" } else { "−∞" }.to_owned();
+        return if value.is_nan() {
+            "—"
+        } else if value > 0.0 {
+            "∞"
+        } else {
+            "−∞"
+        }
+        .to_owned();
     }
     // Through the text of the rounded number, so that 9.999 counts as 10.
     let scientific = format!("{:.*e}", n.saturating_sub(1), value);

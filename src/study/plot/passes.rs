@@ -116,7 +116,14 @@ impl Plot for PassChart {
         let others = self.has_others().then(|| "others".to_owned());
         let names = self.passes.iter().cloned().chain(others).enumerate();
         let letters = self.letters();
-        names.map(|(i, name)| Key { color: self.color(i), glyph: letters.get(i).copied().unwrap_or('.'), name, mark: None }).collect()
+        names
+            .map(|(i, name)| Key {
+                color: self.color(i),
+                glyph: letters.get(i).copied().unwrap_or('.'),
+                name,
+                mark: None,
+            })
+            .collect()
     }
 
     fn notes(&self) -> Vec<String> {

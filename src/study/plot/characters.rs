@@ -46,6 +46,7 @@ impl Characters {
 
     fn glyph(&mut self, (column, row): (i32, i32), glyph: char, color: BackendColor) {
         if let Some(cell) = self.cell(column, row) {
+            let glyph = if glyph.is_control() { '\u{FFFD}' } else { glyph };
             (cell.glyph, cell.rgb) = (Some(glyph), color.rgb);
         }
     }

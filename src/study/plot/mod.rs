@@ -94,7 +94,7 @@ pub trait Plot {
         let lines = key_lines(look, &keys, width as i32 - 2 * MARGIN);
         let n_lines = lines.iter().map(|(line, _)| line + 1).max().unwrap_or(0) as i32;
         let top = 34 + n_lines * look.line_height();
-        let bottom = notes.len() as i32 * look.line_height() + MARGIN;
+        let bottom = notes.len() as i32 * look.line_height() + MARGIN + NOTES_GAP;
         let mut text = String::new();
         let marks = {
             let root = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
@@ -112,7 +112,7 @@ pub trait Plot {
                     root.draw_text(&key.name, &look.text(INK), (MARGIN + x + SWATCH + 5, y))?;
                 }
                 for (i, note) in (0..).zip(&notes) {
-                    let y = height as i32 - bottom + 4 + i * look.line_height();
+                    let y = height as i32 - bottom + NOTES_GAP + i * look.line_height();
                     root.draw_text(note, &look.text(MUTED), (MARGIN, y))?;
                 }
                 let marks = self.draw(&place)?;
@@ -121,6 +121,8 @@ pub trait Plot {
             };
             all().map_err(|cause| Error::Fault { what: format!("a chart could not be drawn: {cause}") })?
         };
+        // No XML has a place for them.
+        text.retain(|c| !c.is_control() || c == '\n');
         Ok(with_marks(text, &self.title(), &marks))
     }
 
@@ -134,7 +136,9 @@ pub trait Plot {
             let failed = |cause: DrawingAreaErrorKind<Infallible>| Error::Fault { what: format!("a chart: {cause}") };
             drawn.map_err(failed)?;
         }
-        let mut out = format!("{}\n", self.title());
+        // What a file brought along is no command to the terminal.
+        let plain = |text: &str| text.replace(char::is_control, "");
+        let mut out = format!("{}\n", plain(&self.title()));
         let keys = self.keys(Look::TERMINAL);
         let widest = columns as i32 * look::CELL.0;
         let lines = key_lines(Look::TERMINAL, &keys, widest);
@@ -149,12 +153,12 @@ pub trait Plot {
             let sgr = sgr_of((key.color.0, key.color.1, key.color.2));
             let glyph =
                 if colored && sgr != 39 { format!("\x1b[{sgr}m{}\x1b[39m", key.glyph) } else { key.glyph.into() };
-            let _ = write!(out, "{before}{glyph} {}", key.name);
+            let _ = write!(out, "{before}{glyph} {}", plain(&key.name));
         }
         out += if keys.is_empty() { "" } else { "\n" };
         out += &characters.text(colored);
         for note in self.notes() {
-            out += &format!("{note}\n");
+            out += &format!("{}\n", plain(&note));
         }
         Ok(out)
     }
@@ -162,6 +166,8 @@ pub trait Plot {
 
 /// From the edges of a picture, px.
 const MARGIN: i32 = 12;
+/// Over the notes, px.
+const NOTES_GAP: i32 = 8;
 /// Side of a key's square, px.
 const SWATCH: i32 = 11;
 

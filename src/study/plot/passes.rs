@@ -19,7 +19,7 @@ const N_LETTERS: usize = 40;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct PassChart {
-    /// Those with a colour, the dearest first.
+    /// Those with a colour, the dearest, in the order of the frame.
     passes: Vec<String>,
     bars: Vec<Bar>,
 }
@@ -51,7 +51,15 @@ pub fn chart(run: &Run) -> Option<PassChart> {
     }
     sums.retain(|(_, sum)| *sum > 0.0);
     sums.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let passes: Vec<String> = sums.into_iter().take(N_NAMED).map(|(name, _)| name).collect();
+    sums.truncate(N_NAMED);
+    // In the order of the frame, so that two runs of one scene have the same colours.
+    let is_named = |pass: &&Pass| sums.iter().any(|(name, _)| *name == pass.name);
+    let mut passes: Vec<String> = Vec::new();
+    for pass in loops.iter().flat_map(|(_, mode)| &mode.passes).filter(is_named) {
+        if !passes.contains(&pass.name) {
+            passes.push(pass.name.clone());
+        }
+    }
     if passes.is_empty() {
         return None;
     }

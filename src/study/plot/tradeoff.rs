@@ -192,11 +192,12 @@ impl Plot for TradeoffChart {
         let drawn: Vec<(&Point, (f64, f64))> = self.points.iter().filter_map(|p| Some((p, at(p)?))).collect();
         // What matters most is drawn last, over the rest.
         let mut order: Vec<usize> = (0..drawn.len()).collect();
-        order.sort_by_key(|i| match drawn[*i].0.front {
+        let rank = |p: &Point| match p.front {
             Front::Off | Front::Unknown => 0,
             Front::Near => 1,
             Front::On => 2,
-        });
+        };
+        order.sort_by_key(|i| (rank(drawn[*i].0), std::cmp::Reverse(drawn[*i].0.number)));
         let drawn: Vec<(&Point, (f64, f64))> = order.into_iter().map(|i| drawn[i]).collect();
         // To the right, then down: as slow as the next, no error is less than this one's.
         let on: Vec<(f64, f64)> = self.front().into_iter().filter_map(at).collect();

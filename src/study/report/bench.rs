@@ -54,7 +54,7 @@ pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
         h3 { "Frames" }
         (loops(run))
         @for chart in &charts { (chart) }
-        (gains(run))
+        (cases(run))
         h3 { "Passes" }
         @match &passes { Some(passes) => { (passes) } None => { p { "No pass was timed: the device has no timestamps." } } }
         (pass_table(run))
@@ -66,8 +66,6 @@ fn loops(run: &Run) -> Markup {
         let of = |m: Option<crate::study::records::Measured>| m.map(|m| m.of);
         vec![
             text(&format!("{} {}", case.name(), loop_name(mode))),
-            count(case.particles as usize),
-            text(&format!("{}×{}", case.width, case.height)),
             count(mode.frames),
             median(mode.frame_ms),
             ms(of(mode.frame_ms).map(|s| s.p95)),
@@ -83,8 +81,6 @@ fn loops(run: &Run) -> Markup {
     let rows: Vec<Vec<Cell>> = run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| row((c, m)))).collect();
     let header = [
         "case and loop",
-        "particles",
-        "pixels",
         "frames",
         "frame p50, ms",
         "p95",
@@ -100,41 +96,37 @@ fn loops(run: &Run) -> Markup {
     table(caption, &header, &rows)
 }
 
-/// What overlap and skipping gained.
-fn gains(run: &Run) -> Markup {
-    let row = |case: &Case| -> Option<Vec<Cell>> {
+/// The cases, and what overlap and skipping gained in each.
+fn cases(run: &Run) -> Markup {
+    let row = |case: &Case| -> Vec<Cell> {
         let ratio = case.ratio.map(|r| with_interval(r.parallel_by_serial, r.low, r.high));
-        let bound = case.overlap.as_ref().map(|o| o.bound_ms);
         let skipping = case.skipping;
-        (ratio.is_some() || skipping.is_some()).then(|| {
-            vec![
-                text(&named(case)),
-                text(ratio.as_deref().unwrap_or("—")),
-                ms(bound),
-                ms(skipping.map(|s| s.gpu_ms)),
-                ms(skipping.map(|s| s.gpu_no_skip_ms)),
-                text(match skipping.and_then(|s| s.same_bytes) {
-                    Some(true) => "yes",
-                    Some(false) => "no",
-                    None => "—",
-                }),
-            ]
-        })
+        vec![
+            text(&named(case)),
+            count(case.particles as usize),
+            text(&format!("{}×{}", case.width, case.height)),
+            text(ratio.as_deref().unwrap_or("—")),
+            ms(case.overlap.as_ref().map(|o| o.bound_ms)),
+            ms(skipping.map(|s| s.gpu_ms)),
+            ms(skipping.map(|s| s.gpu_no_skip_ms)),
+            text(match skipping.and_then(|s| s.same_bytes) {
+                Some(true) => "yes",
+                Some(false) => "no",
+                None => "—",
+            }),
+        ]
     };
-    let rows: Vec<Vec<Cell>> = run.cases.iter().filter_map(row).collect();
     let header = [
         "case",
+        "particles",
+        "pixels",
         "parallel / serial",
         "best of overlap, ms",
         "GPU mean, ms",
         "without skipping, ms",
         "same picture, to the byte",
     ];
-    if rows.is_empty() {
-        html! {}
-    } else {
-        table("What overlap and skipping gained", &header, &rows)
-    }
+    table("The cases, and what overlap and skipping gained", &header, &run.cases.iter().map(row).collect::<Vec<_>>())
 }
 
 fn pass_table(run: &Run) -> Markup {

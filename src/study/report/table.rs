@@ -56,11 +56,14 @@ fn shown(value: Option<f64>, text: String) -> Cell {
 
 /// A name, a unit or nothing in brackets behind it.
 pub fn table(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
+    let is_number = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|cell| cell.is_number));
     html! {
         div class="wide" tabindex="0" role="region" aria-label=(caption) {
             table class="sortable" {
                 caption { (caption) }
-                thead { tr { @for name in header { th scope="col" { (name) } } } }
+                thead { tr { @for (i, name) in header.iter().enumerate() {
+                    th scope="col" class=[is_number(i).then_some("number")] { (name) }
+                } } }
                 tbody {
                     @for row in rows {
                         tr {

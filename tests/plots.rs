@@ -370,7 +370,7 @@ fn a_ledger_s_bars_are_its_errors() {
         .collect();
     let px = |v: f64| Axes::px([ticks[0], ticks[ticks.len() - 1]], v.log10());
     let ends: Vec<f64> = named(&doc, "rect")
-        .filter(|n| n.attribute("fill") == Some("#005FA3") && number(*n, "height") > 12.0)
+        .filter(|n| ["#005FA3", "#5B6570"].map(Some).contains(&n.attribute("fill")) && number(*n, "height") > 12.0)
         .map(|n| number(n, "x") + number(n, "width"))
         .collect();
     let drawn: Vec<f64> = found.rows.iter().filter(|r| r.note.is_none()).map(|r| r.error.value).collect();
@@ -378,7 +378,7 @@ fn a_ledger_s_bars_are_its_errors() {
     for (end, error) in ends.iter().zip(drawn) {
         assert!((end - px(error)).abs() <= PX, "{end} for {error}");
     }
-    assert!(svg.contains("does not apply") && svg.contains("opacity=\"0.4\""));
+    assert!(svg.contains("does not apply"));
     let total =
         named(&doc, "polyline").map(points).find(|l| l.len() == 2 && (l[0].0 - px(found.total.value)).abs() <= PX);
     assert!(total.is_some_and(|l| l[0].0 == l[1].0), "a line at the total");

@@ -53,12 +53,25 @@ fn write_study(folder: &std::path::Path, study: &Study) {
 
 /// Two real benches of a few frames: the second one's picture is another.
 fn benches(dir: &TempDir) -> [String; 2] {
-    let scene = format!("{}/scenes/hello.toml", env!("CARGO_MANIFEST_DIR"));
+    let scene = format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR"));
     let bench = |name: &str, set: &str| {
         let out = path(dir, name);
         let args = [
-            "bench", &scene, "--size", "64x48", "--frames", "16", "--warmup", "1", "--plot", "--out", &out, "--set",
+            "bench",
+            &scene,
+            "--size",
+            "64x48",
+            "--frames",
+            "16",
+            "--warmup",
+            "1",
+            "--plot",
+            "--out",
+            &out,
+            "--set",
             set,
+            "--set",
+            "draw.particles=200",
         ];
         let output = run(&args);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -18,15 +18,16 @@ pub fn placed(
     for ((x, y), text) in texts {
         let (width, half) = (look.width_of(text), look.down(8, 1) / 2);
         let (near, up) = (look.across(8, 1), look.down(13, 1));
+        // Of long texts those above and below are nearer to their point than those beside it.
         let sides = [
             (x + near, y - up),
             (x + near, *y),
             (x + near, y + up),
+            (x - width / 2, y - up),
+            (x - width / 2, y + up),
             (x - near - width, y - up),
             (x - near - width, y + up),
             (x - near - width, *y),
-            (x - width / 2, y - up),
-            (x - width / 2, y + up),
             (x - width / 2, y - 2 * up),
             (x + 2 * near, y - 2 * up),
             (x - 2 * near - width, y + 2 * up),

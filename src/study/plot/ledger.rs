@@ -15,8 +15,6 @@ use crate::study::provenance::Figure;
 
 /// Bars begin a decade and a bit below the least error, so that it has a length.
 const BELOW: f64 = 0.08;
-/// Of an error that its references may have made up.
-const FAINT: f64 = 0.4;
 const N_LETTERS: usize = 30;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -54,15 +52,11 @@ impl Plot for LedgerChart {
         "What every approximation is off by".to_owned()
     }
 
-    fn keys(&self, look: Look) -> Vec<Key> {
+    fn keys(&self, _: Look) -> Vec<Key> {
         let key = |color, glyph, name: &str| Key { color, glyph, name: name.to_owned(), mark: None };
         let mut keys = vec![key(series(0), '█', "one approximation")];
         if self.rows.iter().any(|r| r.note.is_none() && !r.is_resolved) {
-            keys.push(key(
-                if look.characters { series(0) } else { MUTED },
-                '░',
-                "not resolved: its references are no better",
-            ));
+            keys.push(key(MUTED, '░', "not resolved: its references are no better"));
         }
         keys.push(key(series(1), '│', "all together"));
         keys
@@ -105,8 +99,8 @@ impl Plot for LedgerChart {
                 plane.write(&shortened(&why, n_letters), (left + look.across(6, 1), middle), MUTED, HPos::Left)?;
                 continue;
             };
-            let (opacity, glyph) = if row.is_resolved { (1.0, '█') } else { (FAINT, '░') };
-            bar(&plane, (i, n), (x.range.start, end), (series(0), opacity), glyph)?;
+            let (color, glyph) = if row.is_resolved { (series(0), '█') } else { (MUTED, '░') };
+            bar(&plane, (i, n), (x.range.start, end), (color, 1.0), glyph)?;
             let mut last = end;
             if let (Some(low), Some(high)) = (row.error.low, row.error.high) {
                 last = x.end_at(high);

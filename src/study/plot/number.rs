@@ -45,11 +45,17 @@ fn superscript(n: i32) -> String {
     n.to_string().chars().map(digit).collect()
 }
 
-/// "12.3 (11.9 to 12.8)", or the value alone.
+/// "12.3 (11.9 to 12.8)", "1.5 (1.2 to 1.8)×10⁻⁶", or the value alone.
 pub fn with_interval(value: f64, low: Option<f64>, high: Option<f64>) -> String {
-    match (low, high) {
-        (Some(low), Some(high)) => format!("{} ({} to {})", number(value), number(low), number(high)),
-        _ => number(value),
+    let (Some(low), Some(high)) = (low, high) else { return number(value) };
+    match number(value).split_once('×') {
+        // One power of ten for all three.
+        Some((_, power)) => {
+            let scale = 10f64.powf(value.abs().log10().floor());
+            let [value, low, high] = [value, low, high].map(|v| number(v / scale));
+            format!("{value} ({low} to {high})×{power}")
+        }
+        None => format!("{} ({} to {})", number(value), number(low), number(high)),
     }
 }
 
@@ -78,5 +84,6 @@ mod tests {
         }
         assert_eq!(with_interval(1.0, Some(0.5), Some(2.0)), "1 (0.5 to 2)");
         assert_eq!(with_interval(1.0, None, Some(2.0)), "1");
+        assert_eq!(with_interval(1.5e-6, Some(9e-7), Some(2.1e-5)), "1.5 (0.9 to 21)×10⁻⁶");
     }
 }

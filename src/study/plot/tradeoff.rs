@@ -163,7 +163,7 @@ impl Plot for TradeoffChart {
         let front = self.front();
         let line = |p: &&Point| {
             let Point { name, time, error, number: n, .. } = p;
-            let line = format!("{}  {} ms, {}: {name}", n.unwrap_or(0), number(time.value), number(error.value));
+            let line = format!("{}) {} ms, {}: {name}", n.unwrap_or(0), number(time.value), number(error.value));
             shortened(&line, N_LETTERS)
         };
         let mut notes: Vec<String> = front.iter().take(N_NAMED).map(line).collect();

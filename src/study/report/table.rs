@@ -14,7 +14,10 @@ pub struct Cell {
 }
 
 pub fn text(text: &str) -> Cell {
-    Cell { content: html! { (text) }, value: None, is_number: false }
+    // A few words are one thing to the eye.
+    const N_SHORT: usize = 18;
+    let is_short = text.chars().count() <= N_SHORT;
+    Cell { content: html! { span class=[is_short.then_some("short")] { (text) } }, value: None, is_number: false }
 }
 
 pub fn markup(content: Markup) -> Cell {

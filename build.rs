@@ -1,5 +1,6 @@
 //! Hands the git revision to the program as `NIMBUS_GIT_REVISION`, so that every result names the code it came from:
-//! twelve digits, with `-dirty` when what is built differs from the commit, or `unknown` outside a git checkout.
+//! twelve digits, with `-dirty` when what is built differs from the commit, or `unknown` outside a git checkout. And a digest
+//! of all that f64 references are computed by as `NIMBUS_REFERENCE_CODE`, so that none that older code made is taken for new.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,15 +10,50 @@ use std::process::Command;
 /// changes nothing that is built.
 const BUILT_FROM: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
 
+/// What f64 references are computed by.
+const REFERENCES_FROM: [&str; 8] = [
+    "src/model",
+    "src/reference",
+    "src/frame/game.rs",
+    "src/study/against.rs",
+    "src/study/model_light.rs",
+    "src/study/picture.rs",
+    "src/study/pixels.rs",
+    "src/study/truth.rs",
+];
+
 fn main() {
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| ".".into()));
     println!("cargo:rustc-env=NIMBUS_GIT_REVISION={}", revision(&root).unwrap_or_else(|| "unknown".into()));
+    println!("cargo:rustc-env=NIMBUS_REFERENCE_CODE={:016x}", digest(&root));
     for path in BUILT_FROM.iter().map(|name| root.join(name)).chain(head_files(&root)) {
         // A watched file that does not exist would make cargo run this script every time.
         if path.exists() {
             println!("cargo:rerun-if-changed={}", path.display());
         }
     }
+}
+
+/// FNV-1a over the files' names and texts in the order of their names.
+fn digest(root: &Path) -> u64 {
+    let mut files: Vec<PathBuf> = REFERENCES_FROM.iter().flat_map(|name| files_under(&root.join(name))).collect();
+    files.sort();
+    let mut hash = 0xcbf2_9ce4_8422_2325u64;
+    for file in files {
+        let name = file.strip_prefix(root).unwrap_or(&file).to_string_lossy().into_owned();
+        for byte in name.into_bytes().into_iter().chain(std::fs::read(&file).unwrap_or_default()) {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+    }
+    hash
+}
+
+fn files_under(path: &Path) -> Vec<PathBuf> {
+    if path.is_file() {
+        return vec![path.to_owned()];
+    }
+    let entries = std::fs::read_dir(path).into_iter().flatten().flatten();
+    entries.flat_map(|entry| files_under(&entry.path())).collect()
 }
 
 fn revision(root: &Path) -> Option<String> {

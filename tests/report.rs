@@ -78,7 +78,7 @@ fn benches(dir: &TempDir) -> [String; 2] {
         let shown = String::from_utf8(output.stdout).expect("UTF-8");
         assert!(shown.contains("Frame time\n● serial  ○ parallel") && shown.contains("frame of the scene"), "{shown}");
         assert!(!shown.contains('\u{1b}'), "no colours where no terminal is");
-        for file in ["run.json", "frames.csv", "frames.svg", "passes.svg", "picture-0.png"] {
+        for file in ["run.json", "frames.csv", "frames.svg", "passes.svg", "case-0.png"] {
             assert!(PathBuf::from(&out).join(file).exists(), "{file}");
         }
         out
@@ -316,7 +316,7 @@ fn bad_input_is_one_message_and_no_page() {
         (empty.as_str(), "holds no results: none of run.json, study.json, ledger.json; expected a folder that bench"),
         ("nowhere", "nowhere: no such file or folder"),
         (&picture, "expected a results folder, or in one run.json, study.json, ledger.json"),
-        (&later, "results of schema 99; this nimbus reads 1"),
+        (&later, "a study of schema 99; this nimbus reads 1"),
         (&lacking, "missing field `reference`"),
         (&none, "not a study.json of nimbus: it names no schema version"),
         (&cut, "not JSON, or not all of it"),

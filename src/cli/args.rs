@@ -1,10 +1,14 @@
 //! The command line, as typed.
 
+mod results;
+
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
+use crate::study::against::Against;
+pub use results::{CompareArgs, ReportArgs, SamenessArg};
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
 #[derive(Debug, Parser)]
@@ -59,6 +63,20 @@ pub enum Command {
     ///
     /// The page is one file and loads nothing: it can be mailed, kept beside the results, or printed.
     Report(ReportArgs),
+    /// Say how much error a millisecond buys: run time against error over a scene's knobs
+    ///
+    /// Every configuration of the knobs is drawn once and compared with a reference in f64, and all are timed in turn with the
+    /// scene as it stands. What is printed is sorted by time; "*" marks the front: no other configuration is faster without
+    /// being less exact. "~" marks what is on it or off it only by less than the 95 % intervals.
+    ///
+    /// References (--against), each without something that the one before it shares with the device's picture: "thin", the
+    /// sprites in f64, all and uncut, in the scene's own light; "volume", the integral over the overlapping blobs in that light;
+    /// "model", that of light without density grid, groups, basis and pairs: closed forms, a facet a particle, areas integrated;
+    /// "reflections=K", that with K reflections, those beyond the second by random paths. For knobs of light take the latter two.
+    ///
+    /// Frames are timed as if everything moved in each, but for what a run makes once (particles of boxes, textures);
+    /// --as-played times what the scene's own frames leave to be done.
+    Error(ErrorArgs),
     /// Print a stage's buffer, or what f64 says it should be
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
@@ -199,77 +217,92 @@ pub enum ThreadingArg {
 }
 
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Two settings of a scene:\n  \
-    nimbus bench scenes/threads.toml --out before\n  \
-    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
-    nimbus compare before after --allow scene\n\n\
-    Two builds:\n  nimbus compare old new --allow build\n\n\
-    Two pictures:\n  \
-    nimbus render scenes/hello.toml --reference thin -o thin.exr\n  \
-    nimbus render scenes/hello.toml -o drawn.exr\n  \
-    nimbus compare thin.exr drawn.exr --fail-above rmse=1e-3 --fail-below ssim=0.99\n\n\
-    Exit codes: 0 compared, whatever the verdict; 1 a metric is beyond --fail-above or --fail-below;\n  \
-    2 not comparable, or neither results of nimbus bench nor pictures.")]
-pub struct CompareArgs {
-    /// Results folder (`nimbus bench --out DIR`) or picture to measure by
-    pub a: PathBuf,
-    /// Results folder that may be faster or slower, or picture that may be off
-    pub b: PathBuf,
-    /// What may differ between A and B; anything else that does is refused
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…", help_heading = "Results")]
-    pub allow: Vec<SamenessArg>,
-    /// Write every pixel's FLIP error as a picture, dark for none
-    #[arg(short, long, value_name = "FILE.png", help_heading = "Pictures")]
-    pub output: Option<PathBuf>,
-    /// Replace an existing file
-    #[arg(long, requires = "output", help_heading = "Pictures")]
-    pub force: bool,
-    /// Pixels that a degree of the eye's field of view sees, for FLIP [default: 67]
-    #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Pictures")]
-    pub pixels_per_degree: Option<f64>,
-    /// Exit with 1 where a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or not_finite (repeatable)
-    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
-    pub fail_above: Vec<(String, f64)>,
-    /// Exit with 1 where a metric is less: psnr or ssim (repeatable)
-    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
-    pub fail_below: Vec<(String, f64)>,
-    /// JSON in place of the table
+#[command(after_help = "Examples:\n  \
+    nimbus error scenes/study-cloud.toml\n  \
+    nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 --knob lighting.theta=0.2,0.4,0.8 --grid\n  \
+    nimbus error scenes/study-cloud.toml --out cloud --budget-ms 5 --budget-error 0.01\n  \
+    nimbus error scenes/study-cloud.toml --out cloud --resume --knob draw.cutoff=2.2,2.7\n\n\
+    Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept in --out.")]
+pub struct ErrorArgs {
+    /// Scene file
+    pub scene: PathBuf,
+    /// Values of a key, e.g. draw.cutoff=2,3 or 'surface.*.subdivide=[4,4],[8,8]' (repeatable) [default: every knob that can change the scene]
+    #[arg(long, value_name = "KEY=VALUE,…", help_heading = "Knobs")]
+    pub knob: Vec<String>,
+    /// All combinations of the knobs; else each value alone, then what saves time for little error put together
+    #[arg(long, requires = "knob", help_heading = "Knobs")]
+    pub grid: bool,
+    /// What pictures are compared with: thin, volume, model or reflections=K
+    #[arg(long, value_name = "WHAT", default_value = "model", help_heading = "Error")]
+    pub against: Against,
+    /// Draw every cloud without its texture, which no volume and no light knows
+    #[arg(long, help_heading = "Error")]
+    pub plain: bool,
+    /// The error that decides who is on the front
+    #[arg(long, value_enum, default_value = "rmse", help_heading = "Error")]
+    pub metric: MetricArg,
+    /// The reference is computed at so many pixels at most, spread over the picture; "all" for every one
+    #[arg(long, value_name = "N", default_value = "16384", value_parser = parse_pixels, help_heading = "Error")]
+    pub pixels: usize,
+    /// The frame that is drawn and compared, and the first that is timed
+    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Error")]
+    pub frame: u32,
+    /// The time that decides [default: gpu where the device has timestamps]
+    #[arg(long, value_enum, help_heading = "Time")]
+    pub time: Option<TimeArg>,
+    /// Turns of each configuration
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Time")]
+    pub rounds: u32,
+    /// Timed frames of a turn
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Time")]
+    pub frames: u32,
+    /// Time what the scene's own frames leave to be done
+    #[arg(long, help_heading = "Time")]
+    pub as_played: bool,
+    /// Say what is the most exact within so many ms a frame (repeatable)
+    #[arg(long, value_name = "MS", value_parser = parse_positive, help_heading = "Budgets")]
+    pub budget_ms: Vec<f64>,
+    /// Say what is the fastest within such an error (repeatable)
+    #[arg(long, value_name = "ERROR", value_parser = parse_positive, help_heading = "Budgets")]
+    pub budget_error: Vec<f64>,
+    /// Folder for study.json, configurations.csv, times.csv, front.svg and pictures
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Go on with the study in --out: what it has is kept and not run again
+    #[arg(long, requires = "out", conflicts_with = "force")]
+    pub resume: bool,
+    /// Replace existing results
     #[arg(long)]
+    pub force: bool,
+    /// Draw time against error in the terminal, too
+    #[arg(long)]
+    pub plot: bool,
+    /// Print study.json in place of the table
+    #[arg(long, conflicts_with = "csv")]
     pub json: bool,
-}
-
-#[derive(Debug, ClapArgs)]
-#[command(after_help = "One run:\n  \
-    nimbus bench scenes/threads.toml --out run\n  \
-    nimbus report run -o run.html\n\n\
-    Before and after, compared:\n  \
-    nimbus bench scenes/threads.toml --out before\n  \
-    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
-    nimbus report before after -o change.html\n\n\
-    Exit codes: 0 written; 2 a folder without results, results of another schema, or a page that exists already.")]
-pub struct ReportArgs {
-    /// Folders of results, or run.json, study.json or ledger.json in one
-    #[arg(required = true, value_name = "RUN")]
-    pub runs: Vec<PathBuf>,
-    /// The page: .html
-    #[arg(short, long, value_name = "FILE")]
-    pub output: PathBuf,
-    /// Replace an existing file
+    /// Print configurations.csv in place of the table
     #[arg(long)]
-    pub force: bool,
-    /// No progress
-    #[arg(short, long)]
-    pub quiet: bool,
+    pub csv: bool,
+    #[command(flatten)]
+    pub options: SceneArgs,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SamenessArg {
-    /// Device, driver, processor, and variables that change what drivers do
-    Device,
-    /// Version and revision of nimbus
-    Build,
-    /// The scene's settings and files
-    Scene,
+pub enum MetricArg {
+    /// Root mean square over premultiplied linear red, green, blue and alpha
+    Rmse,
+    /// The greatest difference
+    Max,
+    /// Mean square relative to the reference's
+    Relmse,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TimeArg {
+    /// Device time of all passes
+    Gpu,
+    /// From the begin of the game step to the finished picture
+    Frame,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -343,6 +376,14 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     let parse = |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
     Ok((parse(w)?, parse(h)?))
+}
+
+fn parse_pixels(text: &str) -> Result<usize, String> {
+    if text == "all" {
+        return Ok(usize::MAX);
+    }
+    let n = text.parse().ok().filter(|n| *n > 0);
+    n.ok_or_else(|| format!("expected a number of pixels above 0, or all, found \"{text}\""))
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {

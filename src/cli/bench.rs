@@ -181,7 +181,7 @@ fn bench_one(
         say_sizes(&stage.scene, Some(&stage));
     }
     let info = stage.info().clone();
-    let clocks = machine::clocks_record(&mut stage)?;
+    let clocks = machine::clocks_record(&info, &mut stage.renderer)?;
     // Before and after, so that what the two clocks drift apart shows.
     let mut readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
     if let Some(dir) = out {

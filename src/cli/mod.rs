@@ -13,6 +13,8 @@ mod output;
 mod render;
 mod render_reference;
 mod report;
+mod tradeoff;
+mod tradeoff_table;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -49,6 +51,7 @@ pub fn main() -> ExitCode {
             bench::run(a, args.color, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
+        Command::Error(a) => tradeoff::run(a, &STOP, &GRACEFUL),
         Command::Report(a) => report::run(a),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),

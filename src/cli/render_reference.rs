@@ -56,7 +56,7 @@ pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f6
 }
 
 /// What a person sees of the work.
-enum Shown {
+pub(super) enum Shown {
     Nothing,
     /// Generating, lighting once, composing: work without a count.
     Spinner {
@@ -70,12 +70,12 @@ enum Shown {
 }
 
 impl Shown {
-    fn spinner(quiet: bool) -> Shown {
+    pub(super) fn spinner(quiet: bool) -> Shown {
         Shown::Spinner { _spinner: output::spinner("drawing in f64", quiet) }
     }
 
     /// One more of `n` parts of `work` is done.
-    fn advance(&mut self, work: Work, n: usize, quiet: bool) {
+    pub(super) fn advance(&mut self, work: Work, n: usize, quiet: bool) {
         if !matches!(self, Shown::Bar { work: shown, .. } if *shown == work) {
             let what = match work {
                 Work::Lighting => "lighting",

@@ -194,6 +194,8 @@ pub struct Traits {
     pub shrunk: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
+    /// Without `skip`: but not what no frame of a run can change, the particles of boxes and the pool of textures.
+    pub keeps_made: bool,
 }
 
 impl Traits {
@@ -215,6 +217,7 @@ pub(super) fn pass(
 
 /// The plan for `next` after `last` (`None`: the first frame, nothing is there yet).
 pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
+    let is_made = last.is_some() && (traits.skip || traits.keeps_made);
     let last = last.filter(|_| traits.skip);
     let same = |f: &dyn Fn(&Packet, &Packet) -> bool| last.is_some_and(|l| f(l, next));
     let still =
@@ -254,7 +257,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         false => skip(other),
     };
     let mut decisions = [
-        if traits.has_boxes { unless(last.is_some(), "the boxes are the same") } else { skip("no boxes to fill") },
+        if traits.has_boxes { unless(is_made, "the boxes are the same") } else { skip("no boxes to fill") },
         unless(still, "nothing moved"),
         lighting(same_grid, "nothing moved"),
         if traits.grouped { unless(same_places, "nothing moved") } else { skip("a facet a particle") },
@@ -280,7 +283,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             true => unless(same_kept, "the same can be seen"),
             false => unless(same_order, "the order cannot have changed"),
         },
-        if traits.textured { unless(last.is_some(), "the pool is the same") } else { skip("no textures") },
+        if traits.textured { unless(is_made, "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
         match traits.impostors {
             false => skip("draw.impostors is \"off\""),

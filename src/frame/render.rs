@@ -154,6 +154,7 @@ impl Renderer {
                 culls: false,
                 path: DrawPath::Sprites,
                 skip,
+                keeps_made: false,
             }
             .drawn_by(scene),
             last: None,
@@ -239,6 +240,11 @@ impl Renderer {
     /// Whether the next frames leave out what they do not need.
     pub fn set_skip(&mut self, skip: bool) {
         self.traits.skip = skip;
+    }
+
+    /// From the next frame on as if everything moved in each: what a run makes once is kept, all else is done anew.
+    pub fn move_all(&mut self) {
+        (self.traits.skip, self.traits.keeps_made) = (false, true);
     }
 
     fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {

@@ -63,6 +63,16 @@ pub struct Compiler {
     cache: Option<PathBuf>,
 }
 
+/// Where what can be made again is kept: `$NIMBUS_CACHE_DIR`, else `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`, each with
+/// `name` below it.
+pub fn cache_folder(name: &str) -> Option<PathBuf> {
+    let var = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
+    let base = var("NIMBUS_CACHE_DIR")
+        .or_else(|| var("XDG_CACHE_HOME").map(|d| d.join("nimbus")))
+        .or_else(|| var("HOME").map(|d| d.join(".cache/nimbus")))?;
+    Some(base.join(name))
+}
+
 impl Compiler {
     /// `cache` is a folder for SPIR-V, made when first needed; without one every shader is compiled anew.
     pub fn new(sources: Sources, cache: Option<PathBuf>) -> Result<Compiler> {
@@ -71,13 +81,9 @@ impl Compiler {
         Ok(Compiler { raw, sources, cache })
     }
 
-    /// `$NIMBUS_CACHE_DIR`, else `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`, each with `spirv` below it.
+    /// `spirv` in the [`cache_folder`].
     pub fn default_cache() -> Option<PathBuf> {
-        let var = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
-        let base = var("NIMBUS_CACHE_DIR")
-            .or_else(|| var("XDG_CACHE_HOME").map(|d| d.join("nimbus")))
-            .or_else(|| var("HOME").map(|d| d.join(".cache/nimbus")))?;
-        Some(base.join("spirv"))
+        cache_folder("spirv")
     }
 
     pub fn sources(&self) -> &Sources {

@@ -1,5 +1,5 @@
 //! `--set key.path=VALUE`: one value laid over a scene's tree. A path's segments are keys, or numbers where
-//! the tree has an array; a value is TOML, or a bare word, which shells make awkward to quote.
+//! the tree has an array, or `*` for all of its items; a value is TOML, or a bare word, which shells make awkward to quote.
 
 use toml::de::DeValue;
 
@@ -56,12 +56,15 @@ pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> 
     let here = || segments[..i].join(".");
     match &mut node.value {
         Value::Table(table) => put_in_table(table, segments, i, value),
+        Value::Array(list) if *segment == "*" && !list.is_empty() => {
+            list.iter_mut().try_for_each(|item| put(item, segments, i + 1, value.clone()))
+        }
         Value::Array(list) => {
             let n = list.len();
             let item = segment.parse().ok().and_then(|k: usize| list.get_mut(k));
             let item = item.ok_or_else(|| match n {
                 0 => format!("`{}` is empty", here()),
-                _ => format!("`{}`: expected a number from 0 to {}, found `{segment}`", here(), n - 1),
+                _ => format!("`{}`: expected a number from 0 to {}, or *, found `{segment}`", here(), n - 1),
             })?;
             put(item, segments, i + 1, value)
         }
@@ -71,7 +74,9 @@ pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> 
 
 fn put_in_table(table: &mut Table, segments: &[&str], i: usize, value: Node) -> std::result::Result<(), String> {
     let origin = value.origin;
-    if !table.contains_key(segments[i]) && segments.get(i + 1).is_some_and(|next| next.parse::<usize>().is_ok()) {
+    if !table.contains_key(segments[i])
+        && segments.get(i + 1).is_some_and(|next| *next == "*" || next.parse::<usize>().is_ok())
+    {
         return Err(format!("the scene has no `{}`", segments[..=i].join(".")));
     }
     let empty = || Entry { key_origin: origin, node: Node { origin, value: Value::Table(Table::new()) } };

@@ -3,6 +3,7 @@
 //! knows which.
 
 pub mod flip;
+pub mod map;
 pub mod ssim;
 
 /// ε of relMSE: below its root, a tenth, errors count by their size and not by the value's. As in Rousselle et al. 2011.

@@ -7,7 +7,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::Blob;
-use super::grid::sample;
+use super::area::mean::each;
+use super::grid::{density, sample};
 use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
@@ -47,16 +48,25 @@ pub fn directions() -> [(DVec3, f64); 14] {
 
 /// G = Σ w ρ(p + 2√5 σ d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ d).
 pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64) -> (DVec3, f64) {
+    gradient_of(|x| sample(spec, cells, x), p, sigma)
+}
+
+/// The same of any density ρ.
+fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64) -> (DVec3, f64) {
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
-        let density = w * sample(spec, cells, p + GRADIENT_RADIUS_SIGMA * sigma * d);
+        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * d);
         (g + density * d, s + density)
     })
 }
 
 /// Unit normal and conditioning q of a blob at `p` in a cloud about `center`.
 pub fn normal(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, center: DVec3) -> (DVec3, f64) {
+    toward_less(gradient(spec, cells, p, sigma), p, center)
+}
+
+/// The unit normal down the gradient G beside S, and q.
+fn toward_less((g, s): (DVec3, f64), p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
-    let (g, s) = gradient(spec, cells, p, sigma);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
     let t = smoothstep(CONDITIONING, q);
     // t > 0 only where q > 0, hence |G| > 0.
@@ -86,14 +96,33 @@ pub fn facets(
     regions: &[u32],
     cloud_centers: &[DVec3],
 ) -> Vec<Facet> {
-    let facet = |((blob, &region), mean): ((&Blob, &u32), &f64)| {
-        let scale = blob.sigma.max(*mean);
-        let center = cloud_centers[region as usize];
-        let (normal, conditioning) = normal(spec, cells, blob.position, scale, center);
-        let position = blob.position + SHELL_SIGMA * scale * normal;
-        Facet { position, normal, area: area(blob.sigma, blob.kappa), region, conditioning }
+    let of = |p: DVec3, sigma: f64| gradient(spec, cells, p, sigma);
+    let facet = |(i, blob): (usize, &Blob)| {
+        let center = cloud_centers[regions[i] as usize];
+        facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
     };
-    blobs.iter().zip(regions).zip(sigma_means).map(facet).collect()
+    blobs.iter().enumerate().map(facet).collect()
+}
+
+/// One facet a blob, its normal from the blobs' own density Σ κ e^{−|x − p|²/2σ²} in place of a grid's.
+pub fn closed(blobs: &[Blob], sigma_means: &[f64], regions: &[u32], cloud_centers: &[DVec3]) -> Vec<Facet> {
+    let of = |p: DVec3, sigma: f64| gradient_of(|x| density(blobs, x), p, sigma);
+    each(blobs.len(), |i| {
+        let (blob, center) = (&blobs[i], cloud_centers[regions[i] as usize]);
+        facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
+    })
+}
+
+fn facet_of(
+    blob: &Blob,
+    scale: f64,
+    region: u32,
+    center: DVec3,
+    gradient: impl Fn(DVec3, f64) -> (DVec3, f64),
+) -> Facet {
+    let (normal, conditioning) = toward_less(gradient(blob.position, scale), blob.position, center);
+    let position = blob.position + SHELL_SIGMA * scale * normal;
+    Facet { position, normal, area: area(blob.sigma, blob.kappa), region, conditioning }
 }
 
 /// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for [`facets`].
@@ -214,6 +243,26 @@ mod tests {
             // cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below one degree.
             assert!(q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(), "{p} {n} {q}");
         }
+    }
+
+    #[test]
+    fn in_closed_form_a_ball_has_the_gradient_of_its_gaussian() {
+        // Of one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and exactly so by symmetry on an
+        // axis. Far from all blobs only the cloud's centre is left.
+        let blobs = [
+            Blob { position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
+            Blob { sigma: 0.4, position: DVec3::X, kappa: 0.0 },
+        ];
+        let facets = closed(&blobs, &[0.4, 0.4], &[0, 0], &[DVec3::new(0.0, 9.0, 0.0)]);
+        assert!((facets[1].normal - DVec3::X).length() < 1e-12 && facets[1].conditioning > CONDITIONING.1);
+        assert!((facets[1].position - DVec3::X * 1.6).length() < 1e-12);
+        // At its own centre nothing points anywhere: away from the cloud's.
+        assert!((facets[0].normal + DVec3::Y).length() < 1e-12);
+        // A fine grid says the same.
+        let off = [blobs[0], Blob { position: DVec3::new(0.9, -0.5, 0.3), ..blobs[1] }];
+        let by_grid = super::facets(&SPEC, &ball(), &off, &[0.4; 2], &[0; 2], &[DVec3::ZERO])[1];
+        let found = closed(&off, &[0.4; 2], &[0; 2], &[DVec3::ZERO])[1];
+        assert!(found.normal.dot(by_grid.normal) > 1f64.to_radians().cos());
     }
 
     #[test]

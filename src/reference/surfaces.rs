@@ -64,19 +64,18 @@ pub fn render(view: &View, surfaces: &[Surface], facets: &[DVec3]) -> Vec<Behind
     rows.map(|(i, j)| pixel(view, surfaces, facets, view.ray(i, j))).collect()
 }
 
-/// The nearest hit, and of equally near ones the last.
+/// Which surface is seen along `ray`, and where: the nearest hit, and of equally near ones the last.
+pub fn seen(view: &View, surfaces: &[Surface], ray: DVec3) -> Option<(usize, Hit)> {
+    let hits = surfaces.iter().enumerate().filter_map(|(i, s)| hit(s, view, ray).map(|hit| (i, hit)));
+    hits.reduce(|nearest, next| if next.1.depth <= nearest.1.depth { next } else { nearest })
+}
+
 fn pixel(view: &View, surfaces: &[Surface], facets: &[DVec3], ray: DVec3) -> Behind {
-    let mut nearest = Behind::NOTHING;
-    let mut i_first = 0;
-    for surface in surfaces {
-        let of = &facets[i_first..][..surface.n_facets() as usize];
-        i_first += of.len();
-        if let Some(hit) = hit(surface, view, ray).filter(|hit| hit.depth <= nearest.depth) {
-            let color = radiance(surface, of, &hit).extend(1.0).to_array();
-            nearest = Behind { color, depth: hit.depth, ..Behind::NOTHING };
-        }
-    }
-    nearest
+    let Some((i, hit)) = seen(view, surfaces, ray) else { return Behind::NOTHING };
+    let i_first: usize = surfaces[..i].iter().map(|s| s.n_facets() as usize).sum();
+    let of = &facets[i_first..][..surfaces[i].n_facets() as usize];
+    let color = radiance(&surfaces[i], of, &hit).extend(1.0).to_array();
+    Behind { color, depth: hit.depth, ..Behind::NOTHING }
 }
 
 #[cfg(test)]

@@ -75,16 +75,21 @@ impl<'a> Volume<'a> {
 
     /// Row `j` before `behind`, a pixel each.
     pub fn row(&self, j: u32, behind: &[Behind]) -> Vec<Pixel> {
+        self.of_row(j, (0..self.view.width).zip(behind.iter().copied()))
+    }
+
+    /// Some pixels of row `j`: their columns, and what is behind each.
+    pub fn of_row(&self, j: u32, columns: impl Iterator<Item = (u32, Behind)>) -> Vec<Pixel> {
         let inside = |(from, to): (u32, u32), i: u32| (from..to).contains(&i);
         let of_row: Vec<usize> = (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
         let mut march = March::default();
-        let pixel = |(i, behind): (u32, &Behind)| {
+        let pixel = |(i, behind): (u32, Behind)| {
             let ray = self.view.ray(i, j);
             let near = of_row.iter().filter(|&&k| inside(self.places[k][0], i));
             let passed = near.filter_map(|&k| self.pass(k, ray, behind.depth)).collect();
-            self.pixel(&mut march, passed, behind)
+            self.pixel(&mut march, passed, &behind)
         };
-        (0..self.view.width).zip(behind).map(pixel).collect()
+        columns.map(pixel).collect()
     }
 
     /// Blob `k` along `ray` from the near plane to `end`, where it is there at all.

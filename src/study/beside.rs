@@ -21,7 +21,7 @@ pub struct Beside {
 
 /// The last frame of a case.
 pub fn picture_file(i_case: usize) -> String {
-    format!("picture-{i_case}.png")
+    format!("case-{i_case}.png")
 }
 
 /// The frame times of the i-th of `n` points of a sweep (study/plot/frames.rs).
@@ -57,7 +57,7 @@ fn is_ours(name: &str) -> bool {
         let number = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
         number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
     };
-    name == PASSES_CHART || name == "frames.svg" || numbered("frames-", ".svg") || numbered("picture-", ".png")
+    name == PASSES_CHART || name == "frames.svg" || numbered("frames-", ".svg") || numbered("case-", ".png")
 }
 
 #[cfg(test)]
@@ -69,7 +69,9 @@ mod tests {
         for name in [PASSES_CHART, &frames_chart(0, 1), &frames_chart(12, 20), &picture_file(0), &picture_file(137)] {
             assert!(is_ours(name), "{name}");
         }
-        for name in ["picture-.png", "picture-a.png", "picture-1.png.bak", "my-frames.svg", "frames-1x.svg", "a.png"] {
+        for name in
+            ["case-.png", "case-a.png", "case-1.png.bak", "picture-1.png", "my-frames.svg", "frames-1x.svg", "a.png"]
+        {
             assert!(!is_ours(name), "{name}");
         }
     }

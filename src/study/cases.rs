@@ -67,9 +67,14 @@ pub const SIZE_KEY: &str = "size";
 impl Axis {
     /// "key=v1,v2,…". Commas within brackets or quotes part nothing.
     pub fn parse(text: &str) -> Result<Axis> {
+        Axis::parse_as("--sweep", text)
+    }
+
+    /// The same, as the argument `name` has it.
+    pub fn parse_as(name: &str, text: &str) -> Result<Axis> {
         let wrong = |what: &str| {
             let expected = "expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4 or size=800x600,1024x768";
-            Error::usage(format!("--sweep {text}: {what}; {expected}"))
+            Error::usage(format!("{name} {text}: {what}; {expected}"))
         };
         let (key, list) = text.split_once('=').ok_or_else(|| wrong("no `=`"))?;
         let values = split(list);

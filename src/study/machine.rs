@@ -6,8 +6,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
-use super::stage::Stage;
 use crate::error::Result;
+use crate::frame::render::Renderer;
 use crate::gpu::DeviceInfo;
 use crate::measure::clock::ClockQuality;
 
@@ -54,11 +54,11 @@ pub fn device_record(info: &DeviceInfo) -> Device {
 }
 
 /// The host's clock and the device's, measured.
-pub fn clocks_record(stage: &mut Stage) -> Result<Clocks> {
+pub fn clocks_record(info: &DeviceInfo, renderer: &mut Renderer) -> Result<Clocks> {
     let host = ClockQuality::measure();
-    let limits = &stage.info().limits;
+    let limits = &info.limits;
     let timestamp_period_ns = (limits.timestamp_valid_bits > 0).then_some(limits.timestamp_period_ns);
-    let timestamp_overhead_ns = stage.renderer.empty_scope_ns()?;
+    let timestamp_overhead_ns = renderer.empty_scope_ns()?;
     let (resolution_ns, overhead_ns) = (host.resolution_ns as f64, host.overhead_ns);
     Ok(Clocks { resolution_ns, overhead_ns, timestamp_period_ns, timestamp_overhead_ns })
 }

@@ -55,14 +55,19 @@ pub struct Picture {
 pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener) -> Result<Picture> {
     check(scene, time_s, drawing)?;
     let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
+    Ok(draw(scene, &truth, drawing, listener))
+}
+
+/// `scene`, lit as `truth` has it.
+pub(super) fn draw(scene: &Scene, truth: &Truth, drawing: Drawing, listener: Listener) -> Picture {
     let radiance = truth.particle_radiance(scene);
-    let view = view(scene, &truth);
-    let behind = behind(scene, &truth, &view);
+    let view = view(scene, truth);
+    let behind = behind(scene, truth, &view);
     let brightest = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
-    Ok(match drawing {
+    match drawing {
         Drawing::Thin => {
-            let (blobs, order) = drawn(scene, &truth);
-            let (pool, sheets) = sheets(scene, &truth, &view).unzip();
+            let (blobs, order) = drawn(scene, truth);
+            let (pool, sheets) = sheets(scene, truth, &view).unzip();
             let factor = |j: usize, delta: DVec2| match (&pool, &sheets) {
                 (Some(pool), Some(sheets)) => sheets[j].factor(pool, delta),
                 _ => 1.0,
@@ -86,11 +91,11 @@ pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener)
             let rgba = pixels.into_iter().map(|p| p.color).collect();
             Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len(), cut: Cut::default() }
         }
-    })
+    }
 }
 
 /// Refuses what the references do not know.
-fn check(scene: &Scene, time_s: f64, drawing: Drawing) -> Result<()> {
+pub(super) fn check(scene: &Scene, time_s: f64, drawing: Drawing) -> Result<()> {
     let textured = scene.clouds.iter().position(|c| !c.texture.is_none());
     if let Some(i) = textured.filter(|_| drawing == Drawing::Volume) {
         return Err(Error::usage(format!(
@@ -113,7 +118,7 @@ fn check(scene: &Scene, time_s: f64, drawing: Drawing) -> Result<()> {
     Ok(())
 }
 
-fn view(scene: &Scene, truth: &Truth) -> View {
+pub(super) fn view(scene: &Scene, truth: &Truth) -> View {
     let setting = &truth.setting;
     let mut pose = setting.pose;
     pose.position -= setting.light_origin;
@@ -130,7 +135,7 @@ fn view(scene: &Scene, truth: &Truth) -> View {
 }
 
 /// The surfaces, a pixel each; where nothing is lit they show their materials' K_d, as particles show their colours.
-fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
+pub(super) fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
     let origin = truth.setting.light_origin;
     let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
     let placed: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();

@@ -1,10 +1,16 @@
 //! What every record of a study says of how it came to be.
 
 use std::collections::BTreeMap;
+use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::machine::{Clocks, Cpu, Device};
+use super::kept::Kept;
+use super::machine::{self, Clocks, Cpu, Device};
+use super::pixels::Pixels;
+use crate::gpu::DeviceInfo;
+use crate::io::scene_file::LoadedScene;
+use crate::study::against::Against;
 
 /// With what, where and of what a study was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -27,6 +33,26 @@ pub struct Provenance {
     pub clocks: Clocks,
 }
 
+impl Provenance {
+    /// Of a study of `scene` that is being made now.
+    pub fn now(schema: u32, scene_file: &Path, scene: &LoadedScene, info: &DeviceInfo, clocks: Clocks) -> Provenance {
+        Provenance {
+            schema,
+            nimbus: env!("CARGO_PKG_VERSION").into(),
+            revision: machine::revision().into(),
+            date: machine::utc_now(),
+            command: std::env::args().collect(),
+            scene_file: scene_file.display().to_string(),
+            scene_hash: scene.hash.clone(),
+            scene: scene.resolved.clone(),
+            device: machine::device_record(info),
+            cpu: machine::cpu(),
+            environment: machine::environment(),
+            clocks,
+        }
+    }
+}
+
 /// A figure with its 95 % interval; none where there were too few values for one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
@@ -42,8 +68,8 @@ pub struct ReferenceRecord {
     pub against: String,
     /// SHA-256 of all that it is computed from.
     pub hash: String,
-    /// Root mean square of its own error over the pixels: an estimate, see `accuracy`.
-    pub own_error: f64,
+    /// Root mean square of its own error over the pixels: an estimate, see `accuracy`; none where there is no bound.
+    pub own_error: Option<f64>,
     /// What that estimate is, in words.
     pub accuracy: String,
     /// Root mean square of its premultiplied red, green, blue and alpha: what errors are relative to.
@@ -58,4 +84,26 @@ pub struct ReferenceRecord {
     pub n_pixels: usize,
     pub frame: u32,
     pub time_s: f64,
+}
+
+impl ReferenceRecord {
+    /// Of `kept`, which is `against`'s picture of a frame at `pixels`.
+    pub fn of(kept: &Kept, against: Against, pixels: &Pixels, frame: u32, time_s: f64) -> ReferenceRecord {
+        let Kept { reference, hash, from_cache } = kept;
+        let squares: f64 = reference.rgba.iter().flatten().map(|v| v * v).sum();
+        ReferenceRecord {
+            against: against.to_string(),
+            hash: hash.clone(),
+            own_error: Some(reference.own_error).filter(|e| e.is_finite()),
+            accuracy: reference.accuracy.clone(),
+            magnitude: (squares / (4 * reference.rgba.len()).max(1) as f64).sqrt(),
+            from_cache: *from_cache,
+            seconds: reference.seconds,
+            width: pixels.width,
+            height: pixels.height,
+            n_pixels: pixels.at.len(),
+            frame,
+            time_s,
+        }
+    }
 }

@@ -23,6 +23,50 @@ pub struct DeviceChoice {
     pub validation: bool,
 }
 
+/// A device on which any number of scenes can be made ready side by side.
+pub struct Bed {
+    compiler: Compiler,
+    pub device: Device,
+    instance: Arc<Instance>,
+}
+
+/// What a device holds of one scene.
+pub struct Player {
+    pub renderer: Renderer,
+    pub game: Game,
+    /// Its `draw` is what is drawn by: nothing in it is "auto".
+    pub scene: Arc<Scene>,
+    /// What every "auto" of the scene's `draw` came to.
+    pub choices: Vec<Choice>,
+    /// The same of its `draw.impostors`.
+    pub impostor_choice: Option<ImpostorChoice>,
+}
+
+impl Bed {
+    pub fn open(choice: &DeviceChoice) -> Result<Bed> {
+        let instance = Instance::new(choice.validation)?;
+        let device = Device::open(&instance, choice.device.as_deref())?;
+        let mut sources = passes::sources();
+        if let Some(dir) = &choice.shaders {
+            sources = sources.with_dir(dir)?;
+        }
+        let compiler = Compiler::new(sources, Compiler::default_cache())?;
+        Ok(Bed { compiler, device, instance })
+    }
+
+    /// All that `scene` needs. `skip`: leave out what a frame does not need.
+    pub fn player(&self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Player> {
+        player(&self.device, &self.compiler, scene.into(), skip)
+    }
+
+    /// Ends it, once all players are gone; an error where validation or the leak report had anything to say.
+    pub fn close(self) -> Result<()> {
+        let Bed { device, instance, .. } = self;
+        drop(device);
+        said(&instance)
+    }
+}
+
 // Fields drop in order: what lies on the device before the device.
 pub struct Stage {
     pub renderer: Renderer,
@@ -41,35 +85,19 @@ pub struct Stage {
 impl Stage {
     /// Opens a device and makes everything the scene needs on it. `skip`: leave out what a frame does not need.
     pub fn new(scene: impl Into<Arc<Scene>>, choice: &DeviceChoice, skip: bool) -> Result<Stage> {
-        let instance = Instance::new(choice.validation)?;
-        let device = Device::open(&instance, choice.device.as_deref())?;
-        let mut sources = passes::sources();
-        if let Some(dir) = &choice.shaders {
-            sources = sources.with_dir(dir)?;
-        }
-        let compiler = Compiler::new(sources, Compiler::default_cache())?;
-        Stage::build(scene.into(), skip, compiler, device, instance)
+        Stage::build(scene.into(), skip, Bed::open(choice)?)
     }
 
     /// Another scene on the same device; what was there for this one is given back first.
     pub fn again(self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Stage> {
         let Stage { renderer, game, compiler, device, instance, .. } = self;
         drop((renderer, game));
-        Stage::build(scene.into(), skip, compiler, device, instance)
+        Stage::build(scene.into(), skip, Bed { compiler, device, instance })
     }
 
-    fn build(
-        scene: Arc<Scene>,
-        skip: bool,
-        compiler: Compiler,
-        device: Device,
-        instance: Arc<Instance>,
-    ) -> Result<Stage> {
-        let (made, impostor_choice) = match scene.draw.impostors {
-            Impostors::Auto => faster(&device, &compiler, &scene, skip)?,
-            _ => (make(&device, &compiler, scene, skip)?, None),
-        };
-        let Made { renderer, game, scene, choices } = made;
+    fn build(scene: Arc<Scene>, skip: bool, bed: Bed) -> Result<Stage> {
+        let Player { renderer, game, scene, choices, impostor_choice } = bed.player(scene, skip)?;
+        let Bed { compiler, device, instance } = bed;
         Ok(Stage { renderer, game, scene, choices, impostor_choice, compiler, device, instance })
     }
 
@@ -108,24 +136,28 @@ impl Stage {
         let Stage { renderer, game, device, instance, .. } = self;
         drop((renderer, game));
         drop(device);
-        let said = instance.messages().take();
-        if said.is_empty() {
-            return Ok(());
-        }
-        Err(Error::Check { what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")) })
+        said(&instance)
     }
 }
 
-/// What a stage holds of one scene.
-struct Made {
-    renderer: Renderer,
-    game: Game,
-    scene: Arc<Scene>,
-    choices: Vec<Choice>,
+/// An error where validation or the leak report had anything to say.
+fn said(instance: &Instance) -> Result<()> {
+    let said = instance.messages().take();
+    if said.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Check { what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")) })
+}
+
+fn player(device: &Device, compiler: &Compiler, scene: Arc<Scene>, skip: bool) -> Result<Player> {
+    match scene.draw.impostors {
+        Impostors::Auto => faster(device, compiler, &scene, skip),
+        _ => make(device, compiler, scene, skip),
+    }
 }
 
 /// Everything that `scene`, whose impostors are decided, needs on a device.
-fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool) -> Result<Made> {
+fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool) -> Result<Player> {
     let mut renderer = Renderer::new(device, compiler, &scene, skip)?;
     let rest = match scene.threads.simulate {
         Simulate::Gpu => None,
@@ -137,16 +169,11 @@ fn make(device: &Device, compiler: &Compiler, mut scene: Arc<Scene>, skip: bool)
         Arc::make_mut(&mut scene).draw = draw;
         game = game.drawn_by(scene.clone());
     }
-    Ok(Made { renderer, game, scene, choices })
+    Ok(Player { renderer, game, scene, choices, impostor_choice: None })
 }
 
 /// `scene` with impostors or without, whichever draws its first frames faster.
-fn faster(
-    device: &Device,
-    compiler: &Compiler,
-    scene: &Arc<Scene>,
-    skip: bool,
-) -> Result<(Made, Option<ImpostorChoice>)> {
+fn faster(device: &Device, compiler: &Compiler, scene: &Arc<Scene>, skip: bool) -> Result<Player> {
     let with = |scene: &Arc<Scene>, impostors| {
         let mut scene = Scene::clone(scene);
         scene.draw.impostors = impostors;
@@ -155,11 +182,11 @@ fn faster(
     let mut off = make(device, compiler, with(scene, Impostors::Off), skip)?;
     if !skip {
         // Where nothing is skipped there are none.
-        return Ok((off, None));
+        return Ok(off);
     }
     let off_ms = off.renderer.time_frames(&mut off.game)?;
     // One at a time: both may not fit. What draws stays the same.
-    let Made { scene, choices, .. } = off;
+    let Player { scene, choices, .. } = off;
     let made = make(device, compiler, with(&scene, Impostors::On), skip).and_then(|mut on| {
         let ms = on.renderer.time_frames(&mut on.game)?;
         Ok((on, ms))
@@ -175,5 +202,5 @@ fn faster(
         Some(on) => on,
         None => make(device, compiler, scene, skip)?,
     };
-    Ok((Made { choices, ..made }, Some(chosen)))
+    Ok(Player { choices, impostor_choice: Some(chosen), ..made })
 }

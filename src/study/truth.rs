@@ -35,6 +35,8 @@ pub struct Truth {
     /// I_i, and L2 toward the eye; empty but for lighting.mode "two-reflection".
     pub indirect: Vec<DVec3>,
     pub second: Vec<DVec3>,
+    /// What L2 may be off, greatest channel: an estimate.
+    pub second_error: Vec<f64>,
 }
 
 impl Truth {
@@ -44,6 +46,15 @@ impl Truth {
 
     /// `on_facet` hears how many facets receive a second reflection each time that one of them has; it may take long.
     pub fn of_with_listener(scene: &Scene, time_s: f64, on_facet: &(dyn Fn(usize) + Sync)) -> Result<Truth> {
+        let mut truth = Truth::unlit(scene, time_s)?;
+        if scene.lighting.mode != LightingMode::None {
+            truth.light(scene, on_facet);
+        }
+        Ok(truth)
+    }
+
+    /// Particles where they are, and nothing of light.
+    pub fn unlit(scene: &Scene, time_s: f64) -> Result<Truth> {
         let groups = scene.groups();
         let setting = Setting::at(scene, &groups, time_s)?;
         let generated: Vec<Generated> = scene.clouds.iter().flat_map(reference::generate::cloud).collect();
@@ -54,7 +65,7 @@ impl Truth {
         reference::place::add_gusts(&mut placed, &positions, &groups, &scene.clouds, time_s);
         let blobs = reference::place::blobs(&generated, &placed);
         let colors = colors(scene);
-        let mut truth = Truth {
+        Ok(Truth {
             setting,
             groups,
             generated,
@@ -66,11 +77,8 @@ impl Truth {
             radiance: vec![],
             indirect: vec![],
             second: vec![],
-        };
-        if scene.lighting.mode != LightingMode::None {
-            truth.light(scene, on_facet);
-        }
-        Ok(truth)
+            second_error: vec![],
+        })
     }
 
     fn light(&mut self, scene: &Scene, on_facet: &(dyn Fn(usize) + Sync)) {
@@ -153,6 +161,7 @@ impl Truth {
             });
             self.indirect = found.iter().map(|e| e.irradiance).collect();
             self.second = found.iter().map(|e| e.radiance).collect();
+            self.second_error = found.iter().map(|e| e.error).collect();
         }
     }
 

@@ -76,7 +76,7 @@ pub fn study(configurations: Vec<Configuration>) -> Study {
         reference: ReferenceRecord {
             against: "thin".to_owned(),
             hash: "ef".repeat(32),
-            own_error: 1e-6,
+            own_error: Some(1e-6),
             accuracy: "arithmetic in f64".to_owned(),
             magnitude: 0.4,
             from_cache: false,

@@ -20,6 +20,7 @@ const TRAITS: Traits = Traits {
     path: DrawPath::Sprites,
     shrunk: false,
     skip: true,
+    keeps_made: false,
 };
 const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
 /// With every pass.
@@ -66,6 +67,11 @@ fn the_first_frame_runs_everything_and_a_still_one_nothing() {
     }
     // Where nothing is skipped no picture is used again.
     assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), all - 1);
+    // What a run makes once is kept; all else is done as without skipping.
+    let moving = Traits { skip: false, keeps_made: true, ..ALL_TRAITS };
+    let (whole, kept) = (running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p), running(&moving, Some(&p), &p));
+    assert!(whole.iter().filter(|pass| !kept.contains(pass)).eq(["generate", "texture"].iter()), "{kept:?}");
+    assert_eq!(running(&moving, None, &p), running(&Traits { skip: false, ..ALL_TRAITS }, None, &p));
     // Without tensors it is all but `contract`.
     let without = Traits { tensors: Tensors::Needless, ..ALL_TRAITS };
     assert_eq!(running(&without, None, &p).len(), all - 1);

@@ -1,8 +1,7 @@
 //! Means over a surface or one of its facets, and work spread over the processor's threads.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::adaptive::{self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles};
 use super::clip::{self, Line, Polygon, WHOLE};
@@ -128,24 +127,6 @@ impl Integrand for Mean<'_, '_> {
 }
 
 /// `f` of 0…n−1, on as many threads as the machine has.
-pub fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let n_threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(n.max(1));
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut done = Vec::new();
-        loop {
-            let i = next.fetch_add(1, Ordering::Relaxed);
-            if i >= n {
-                return done;
-            }
-            done.push((i, f(i)));
-        }
-    };
-    let mut all: Vec<(usize, T)> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..n_threads).map(|_| scope.spawn(work)).collect();
-        let joined = threads.into_iter().map(|t| t.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        joined.flatten().collect()
-    });
-    all.sort_by_key(|&(i, _)| i);
-    all.into_iter().map(|(_, value)| value).collect()
+pub fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    (0..n).into_par_iter().map(f).collect()
 }

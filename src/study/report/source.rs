@@ -3,14 +3,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::error::{Error, Result};
-use crate::study::ledger::records::{self as ledger, LEDGER_FILE, Ledger};
+use crate::study::ledger::records::{LEDGER_FILE, Ledger, SCHEMA_VERSION};
 use crate::study::recorded::{Recorded, read_results};
 use crate::study::records::RUN_FILE;
-use crate::study::tradeoff::records::{self as tradeoff, STUDY_FILE, Study};
+use crate::study::tradeoff::files::read_study;
+use crate::study::tradeoff::records::{STUDY_FILE, Study};
 
 /// One result.
 #[derive(Debug, Clone)]
@@ -55,26 +55,25 @@ fn source(folder: &Path, file: &str, name: String) -> Result<Source> {
     let path = folder.join(file);
     let found = match file {
         RUN_FILE => Found::Bench(Box::new(read_results(folder)?)),
-        STUDY_FILE => Found::Study(Box::new(record(&path, tradeoff::SCHEMA_VERSION)?)),
-        _ => Found::Ledger(Box::new(record(&path, ledger::SCHEMA_VERSION)?)),
+        STUDY_FILE => Found::Study(Box::new(read_study(folder)?)),
+        _ => Found::Ledger(Box::new(read_ledger(&path)?)),
     };
     Ok(Source { name, folder: folder.to_owned(), found })
 }
 
-fn record<T: DeserializeOwned>(path: &Path, wanted: u32) -> Result<T> {
+fn read_ledger(path: &Path) -> Result<Ledger> {
     let text = fs::read_to_string(path).map_err(|cause| Error::io(path, cause))?;
     let broken = |cause| Error::io(path, format!("not JSON, or not all of it: {cause}"));
     let value: Value = serde_json::from_str(&text).map_err(broken)?;
-    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     // The version is looked at first: of another version any other complaint would mislead.
     match value.get("schema").and_then(Value::as_u64) {
-        Some(version) if version == u64::from(wanted) => {}
+        Some(version) if version == u64::from(SCHEMA_VERSION) => {}
         Some(version) => {
-            return Err(Error::io(path, format!("results of schema {version}; this nimbus reads {wanted}")));
+            return Err(Error::io(path, format!("a ledger of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
         }
-        None => return Err(Error::io(path, format!("not a {file} of nimbus: it names no schema version"))),
+        None => return Err(Error::io(path, "not a ledger.json of nimbus: it names no schema version")),
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a {file} of nimbus: {cause}")))
+    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a ledger.json of nimbus: {cause}")))
 }
 
 /// Later benches and studies, each beside the first of its kind.

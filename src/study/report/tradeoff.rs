@@ -40,7 +40,7 @@ fn reference(study: &Study) -> Markup {
         dl class="made" {
             dt { "Reference" } dd { (r.against) ", frame " (r.frame) " at " (number(r.time_s)) " s, " (r.width) "×" (r.height) " pixels" }
             dt { "Known at" } dd { @if r.n_pixels as u64 == all { "every pixel" } @else { (r.n_pixels) " of " (all) " pixels" } }
-            dt { "Its own error" } dd { (number(r.own_error)) " RMSE: " (r.accuracy) }
+            dt { "Its own error" } dd { @if let Some(rmse) = r.own_error { (number(rmse)) " RMSE: " } @else { "no bound: " } (r.accuracy) }
             dt { "Magnitude" } dd { (number(r.magnitude)) ", root mean square" }
             dt { "Computed in" } dd { (number(r.seconds)) " s" @if r.from_cache { ", earlier, and kept" } }
             dt { "Reference hash" } dd { code { (r.hash) } }

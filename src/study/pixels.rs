@@ -1,0 +1,96 @@
+//! At which pixels a reference is known: all of them, or one in each cell of a square raster.
+
+use crate::model::philox::{philox4x32_10, uniform};
+
+/// Second word of the key, so that pixels share no numbers with particles and paths.
+const KEY: u32 = 0x7069_7873;
+
+/// Pixels of a picture, cell by cell, rows of cells from the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pixels {
+    pub width: u32,
+    pub height: u32,
+    /// Pixels along a side of a cell.
+    pub cell: u32,
+    /// [column, row], one a cell.
+    pub at: Vec<[u32; 2]>,
+}
+
+impl Pixels {
+    /// One pixel at random in each cell, at most `n` in all but for the cells that the picture's edges cut. A mean over
+    /// them is one over the picture but for those cells, whose pixels count as much as a whole one's.
+    pub fn sample(width: u32, height: u32, n: usize) -> Pixels {
+        let all = f64::from(width) * f64::from(height);
+        let cell = ((all / n.max(1) as f64).sqrt().ceil() as u32).max(1);
+        let (columns, rows) = (width.div_ceil(cell), height.div_ceil(cell));
+        let place = |i: u32, j: u32| {
+            let words = philox4x32_10([0, KEY], [i, j, cell, 0]);
+            let within = |k: u32, size: u32, word: u32| {
+                let (first, end) = (k * cell, size.min((k + 1) * cell));
+                first + ((uniform(word) * f64::from(end - first)) as u32).min(end - first - 1)
+            };
+            [within(i, width, words[0]), within(j, height, words[1])]
+        };
+        let at = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| place(i, j)).collect();
+        Pixels { width, height, cell, at }
+    }
+
+    pub fn all(width: u32, height: u32) -> Pixels {
+        Pixels::sample(width, height, usize::MAX)
+    }
+
+    pub fn n_columns(&self) -> u32 {
+        self.width.div_ceil(self.cell)
+    }
+
+    pub fn n_rows(&self) -> u32 {
+        self.height.div_ceil(self.cell)
+    }
+
+    /// Place of a pixel in a picture's rows.
+    pub fn index(&self, [i, j]: [u32; 2]) -> usize {
+        j as usize * self.width as usize + i as usize
+    }
+
+    /// Their values of a whole picture, row 0 at the top.
+    pub fn pick<T: Copy>(&self, whole: &[T]) -> Vec<T> {
+        self.at.iter().map(|&at| whole[self.index(at)]).collect()
+    }
+
+    /// A whole picture that shows in every cell its pixel's value.
+    pub fn spread<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        let columns = self.n_columns();
+        let of = |i: u32, j: u32| values[((j / self.cell) * columns + i / self.cell) as usize];
+        (0..self.height).flat_map(|j| (0..self.width).map(move |i| of(i, j))).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_in_each_cell_of_few_enough() {
+        let pixels = Pixels::sample(80, 61, 500);
+        // 4880/500 = 9.76: cells of 4, 20 by 16 of them.
+        assert_eq!((pixels.cell, pixels.n_columns(), pixels.n_rows(), pixels.at.len()), (4, 20, 16, 320));
+        for (k, [i, j]) in pixels.at.iter().enumerate() {
+            assert_eq!((i / 4, j / 4), (k as u32 % 20, k as u32 / 20));
+            assert!(*i < 80 && *j < 61);
+        }
+        // All places within a cell come up.
+        let mut places: Vec<u32> = pixels.at.iter().map(|[i, j]| i % 4 + 4 * (j % 4)).collect();
+        places.sort_unstable();
+        places.dedup();
+        assert_eq!(places.len(), 16);
+    }
+
+    #[test]
+    fn all_of_them_in_order() {
+        let pixels = Pixels::all(5, 3);
+        let whole: Vec<u32> = (0..15).collect();
+        assert_eq!((pixels.pick(&whole), pixels.spread(&whole)), (whole.clone(), whole));
+        let pixels = Pixels::sample(4, 4, 4);
+        assert_eq!(pixels.spread(&[1, 2, 3, 4])[..6], [1, 1, 2, 2, 1, 1]);
+    }
+}

@@ -1,0 +1,226 @@
+//! A study from its knobs to its front: configurations are drawn, compared, timed in turn, put together, and placed.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::design::{Design, name_of, settings, together};
+use super::errors::{Parts, is_surely_nearer, picture_error};
+use super::front::{Metric, place};
+use super::records::{Configuration, Front};
+use super::turns::{Time, Turn, n_turns, order, timed};
+use crate::error::{Error, Result};
+use crate::model::scene::Scene;
+use crate::study::against::Reference;
+use crate::study::cases::Axis;
+use crate::study::pixels::Pixels;
+use crate::study::records::Setting;
+
+/// What draws and times configurations, which are numbered in the order they are added.
+pub trait Subject {
+    fn add(&mut self, scene: &Arc<Scene>);
+    /// Its picture: premultiplied linear RGBA, rows from the top.
+    fn picture(&mut self, i: usize) -> Result<Vec<f32>>;
+    /// A few frames of it, timed.
+    fn turn(&mut self, i: usize, i_round: usize) -> Result<Turn>;
+}
+
+/// A configuration's scene, and the hash of that and its files.
+pub struct Loaded {
+    pub scene: Arc<Scene>,
+    pub hash: String,
+}
+
+const NOT_FINITE: &str = "its picture holds values that are no finite numbers";
+
+/// Which configurations, and how they are measured.
+#[derive(Debug, Clone)]
+pub struct StudyPlan {
+    pub axes: Vec<Axis>,
+    pub design: Design,
+    pub metric: Metric,
+    pub time: Time,
+    pub n_rounds: usize,
+}
+
+/// What of a study is there so far.
+#[derive(Debug, Clone, Default)]
+pub struct Found {
+    pub configurations: Vec<Configuration>,
+    /// Of each the squared errors, part by part of the picture; none where it has no error.
+    pub parts: Vec<Parts>,
+    pub turns: Vec<Turn>,
+    /// Rounds that the turns are of.
+    pub n_rounds: usize,
+}
+
+/// What happens on the way.
+pub enum Event<'a> {
+    /// So many more pictures and turns are to come.
+    More(usize),
+    /// Configuration `i` was drawn.
+    Picture { i: usize, rgba: &'a [f32], found: &'a mut Found },
+    /// One was timed.
+    Turn,
+    /// A round has ended: what is there may be kept.
+    Round(&'a Found),
+}
+
+/// All that a study is run with.
+pub struct Setup<'a> {
+    pub plan: &'a StudyPlan,
+    /// The scene with such settings.
+    pub load: &'a dyn Fn(&[Setting]) -> Result<Loaded>,
+    pub reference: &'a Reference,
+    pub pixels: &'a Pixels,
+    /// Ends the study early, and cleanly.
+    pub stop: &'a AtomicBool,
+}
+
+impl Setup<'_> {
+    /// Runs what `found` does not have yet, and says where every configuration lies; whether it ran to its end.
+    pub fn run(
+        &self,
+        subject: &mut dyn Subject,
+        found: &mut Found,
+        on: &mut dyn FnMut(Event<'_>) -> Result<()>,
+    ) -> Result<bool> {
+        // Those of an earlier run come first, in their order; what is asked for and not among them follows.
+        for settings in found.configurations.iter().map(|c| c.settings.clone()).collect::<Vec<_>>() {
+            subject.add(&(self.load)(&settings)?.scene);
+        }
+        let wanted = settings(&self.plan.axes, self.plan.design);
+        self.add(subject, found, std::iter::once(Vec::new()).chain(wanted))?;
+        let mut is_whole = self.measure(subject, found, on)?;
+        if is_whole && self.plan.design == Design::Alone {
+            let more = together(&found.configurations);
+            if self.add(subject, found, more.into_iter())? > 0 {
+                is_whole = self.measure(subject, found, on)?;
+            }
+        }
+        Ok(is_whole)
+    }
+
+    /// Adds what is not there yet; how many.
+    fn add(
+        &self,
+        subject: &mut dyn Subject,
+        found: &mut Found,
+        all: impl Iterator<Item = Vec<Setting>>,
+    ) -> Result<usize> {
+        let n_before = found.configurations.len();
+        for settings in all {
+            let Loaded { scene, hash } = (self.load)(&settings)?;
+            if found.configurations.iter().any(|c| c.hash == hash) {
+                continue;
+            }
+            subject.add(&scene);
+            found.configurations.push(Configuration {
+                name: name_of(&settings),
+                settings,
+                hash,
+                gpu_ms: None,
+                frame_ms: None,
+                by_base: None,
+                n_turns: 0,
+                error: None,
+                front: Front::Unknown,
+                failure: None,
+                picture: None,
+                error_map: None,
+            });
+            found.parts.push(Parts::default());
+        }
+        Ok(found.configurations.len() - n_before)
+    }
+
+    /// Draws and times what was not; false where it was stopped.
+    fn measure(
+        &self,
+        subject: &mut dyn Subject,
+        found: &mut Found,
+        on: &mut dyn FnMut(Event<'_>) -> Result<()>,
+    ) -> Result<bool> {
+        let is_open = |c: &Configuration| c.error.is_none() && c.failure.is_none();
+        let open: Vec<usize> = (0..found.configurations.len()).filter(|&i| is_open(&found.configurations[i])).collect();
+        let late = |i: usize, found: &Found| n_turns(&found.turns, i) < self.plan.n_rounds;
+        let mut late: Vec<usize> = (1..found.configurations.len()).filter(|&i| late(i, found)).collect();
+        on(Event::More(open.len() + late.len() * self.plan.n_rounds))?;
+        for i in open {
+            if self.stop.load(Ordering::Relaxed) {
+                break;
+            }
+            self.draw(subject, found, on, i)?;
+        }
+        late.retain(|&i| found.configurations[i].failure.is_none());
+        // The scene as it stands alone is timed, too.
+        while !self.stop.load(Ordering::Relaxed)
+            && (late.iter().any(|&i| n_turns(&found.turns, i) < self.plan.n_rounds)
+                || n_turns(&found.turns, 0) < self.plan.n_rounds)
+        {
+            late.retain(|&i| n_turns(&found.turns, i) < self.plan.n_rounds);
+            for i in order(&late, found.n_rounds) {
+                if self.stop.load(Ordering::Relaxed) {
+                    break;
+                }
+                found.turns.push(subject.turn(i, found.n_rounds)?);
+                on(Event::Turn)?;
+            }
+            found.n_rounds += 1;
+            self.sum_up(found);
+            on(Event::Round(found))?;
+        }
+        self.sum_up(found);
+        Ok(!self.stop.load(Ordering::Relaxed))
+    }
+
+    /// Draws configuration `i` and compares it; what does not fit the device is told and left out.
+    fn draw(
+        &self,
+        subject: &mut dyn Subject,
+        found: &mut Found,
+        on: &mut dyn FnMut(Event<'_>) -> Result<()>,
+        i: usize,
+    ) -> Result<()> {
+        match subject.picture(i) {
+            Ok(rgba) => {
+                let whole: Vec<[f64; 4]> =
+                    rgba.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|k| f64::from(p[k]))).collect();
+                let drawn = self.pixels.pick(&whole);
+                let error = picture_error(self.pixels, &drawn, &self.reference.rgba, self.reference.own_error);
+                match error {
+                    Some((error, parts)) => {
+                        found.configurations[i].error = Some(error);
+                        found.parts[i] = parts;
+                    }
+                    None if i > 0 => found.configurations[i].failure = Some(NOT_FINITE.to_owned()),
+                    None => return Err(Error::usage(format!("the scene as it stands: {NOT_FINITE}"))),
+                }
+                on(Event::Picture { i, rgba: &rgba, found })
+            }
+            // The scene as it stands is what all are measured by.
+            Err(Error::Limit { what }) if i > 0 => {
+                found.configurations[i].failure = Some(what);
+                on(Event::Turn)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn sum_up(&self, found: &mut Found) {
+        let Found { configurations, parts, turns, .. } = found;
+        for (i, c) in configurations.iter_mut().enumerate() {
+            let [gpu, frame] = [Time::Gpu, Time::Frame].map(|time| timed(turns, i, time));
+            c.gpu_ms = gpu.map(|t| t.ms);
+            c.frame_ms = frame.map(|t| t.ms);
+            c.by_base = if self.plan.time == Time::Gpu { gpu } else { frame }.map(|t| t.by_base);
+            c.n_turns = n_turns(turns, i);
+        }
+        let (metric, own_error) = (self.plan.metric, self.reference.own_error);
+        let errors: Vec<Option<f64>> = configurations.iter().map(|c| metric.of(c).map(|e| e.value)).collect();
+        place(configurations, metric, |i, j| match metric {
+            Metric::Rmse => is_surely_nearer(&parts[i], &parts[j], own_error),
+            // Of these there are no intervals.
+            Metric::Max | Metric::RelMse => errors[i] < errors[j],
+        });
+    }
+}

@@ -117,7 +117,8 @@ fn every_point_lies_at_its_time_and_error() {
     for c in &study.configurations {
         let (time, error) = (c.gpu_ms.expect("a time").value, c.error.expect("an error").rmse.value);
         let (x, y) = axes.log(time, error);
-        let ((px, py), _) = marks.iter().find(|(_, says)| says.starts_with(&c.name)).expect("its mark");
+        let ((px, py), _) =
+            marks.iter().find(|(_, says)| says.starts_with(&format!("{}\n", c.name))).expect("its mark");
         assert!((px - x).abs() <= PX && (py - y).abs() <= PX, "{}: {px} {py} for {x} {y}", c.name);
     }
     // The other time and the other error, and the test would see it.

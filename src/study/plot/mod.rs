@@ -194,7 +194,8 @@ fn with_marks(mut text: String, title: &str, marks: &[Mark]) -> String {
     }
     let mut over = String::new();
     for Mark { place: [x, y, width, height], says } in marks {
-        let says = escaped(says);
+        // A line's end in an attribute of XML would be read as a blank.
+        let says = escaped(says).replace('\n', "&#10;");
         let _ = writeln!(
             over,
             "<g class=\"mark\" tabindex=\"0\" role=\"img\" aria-label=\"{says}\"><title>{says}</title>\

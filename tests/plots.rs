@@ -144,6 +144,16 @@ fn intervals_end_where_they_end() {
     assert!(has(axes.log(8.0, 0.01), axes.log(12.5, 0.01)), "{lines:?}");
     assert!(has(axes.log(10.0, 0.007), axes.log(10.0, 0.02)), "{lines:?}");
     assert!(!has(axes.log(9.0, 0.01), axes.log(12.5, 0.01)));
+    // One that goes on beyond the axis runs to its end, and has no foot there: three lines across in place of four.
+    let feet = |svg: &str| {
+        let doc = parsed(svg);
+        let lines = named(&doc, "polyline").filter(|n| n.attribute("stroke") == Some("#005FA3"));
+        lines.map(points).filter(|l| l.len() == 2 && (l[0].0 - l[1].0).hypot(l[0].1 - l[1].1) == 6.0).count()
+    };
+    let mut endless = configuration(&[], 10.0, 0.01, Front::On);
+    let n = feet(&crate::svg(&tradeoff::chart(&study(vec![endless.clone()]))));
+    endless.gpu_ms = Some(Figure { value: 10.0, low: Some(8.0), high: Some(f64::INFINITY) });
+    assert_eq!((n, feet(&crate::svg(&tradeoff::chart(&study(vec![endless]))))), (4, 3));
 }
 
 fn points(line: Node) -> Vec<(f64, f64)> {

@@ -105,7 +105,7 @@ impl Plot for LedgerChart {
             if let (Some(low), Some(high)) = (row.error.low, row.error.high) {
                 last = x.end_at(high);
                 if !look.characters {
-                    plane.whisker((x.end_at(low), y), (last, y), INK)?;
+                    plane.whisker([(x.end_at(low), y), (last, y)], [low, high].map(|v| x.shows(v)), INK)?;
                 }
             }
             let at = plane.pixel(if look.characters { end } else { last.max(end) }, y).0 + look.across(7, 1);

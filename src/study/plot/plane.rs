@@ -25,6 +25,9 @@ pub enum Behind {
     Horizontal,
 }
 
+/// Half of what is drawn across an interval's end.
+const FOOT_PX: i32 = 3;
+
 /// How a point is marked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fill {
@@ -95,17 +98,23 @@ impl<'a, DB: DrawingBackend> Plane<'a, DB> {
         self.root.draw(&PathElement::new(pixels, style))
     }
 
-    /// A line from one value to another, with a foot at either end, along x or along y.
-    pub fn whisker(&self, from: (f64, f64), to: (f64, f64), color: RGBColor) -> DrawResult<(), DB> {
+    /// A line from one place to another along x or along y, with a foot at either end that `has_foot`: where an interval goes
+    /// on beyond the axis it has none.
+    pub fn whisker(
+        &self,
+        [from, to]: [(f64, f64); 2],
+        has_foot: [bool; 2],
+        style: impl Into<ShapeStyle>,
+    ) -> DrawResult<(), DB> {
         let (a, b) = (self.pixel(from.0, from.1), self.pixel(to.0, to.1));
+        let style = style.into();
         if a == b {
             return Ok(());
         }
-        self.line_px(vec![a, b], color)?;
-        let foot = if self.look.characters { 0 } else { 3 };
-        let (dx, dy) = if a.1 == b.1 { (0, foot) } else { (foot, 0) };
-        for (x, y) in [a, b].into_iter().filter(|_| foot > 0) {
-            self.line_px(vec![(x - dx, y - dy), (x + dx, y + dy)], color)?;
+        self.line_px(vec![a, b], style)?;
+        let (dx, dy) = if a.1 == b.1 { (0, FOOT_PX) } else { (FOOT_PX, 0) };
+        for ((x, y), _) in [a, b].into_iter().zip(has_foot).filter(|(_, has)| *has && !self.look.characters) {
+            self.line_px(vec![(x - dx, y - dy), (x + dx, y + dy)], style)?;
         }
         Ok(())
     }

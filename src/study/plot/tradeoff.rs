@@ -16,6 +16,8 @@ use crate::study::tradeoff::records::{Configuration, Front, PictureError, Study}
 const N_NAMED: usize = 14;
 /// Letters of such a line.
 const N_LETTERS: usize = 112;
+/// Of the intervals of what is behind the front.
+const FAINT: f64 = 0.55;
 /// Ends of intervals do not stretch an axis beyond this factor of the outermost values: they run to its end.
 const INTERVAL_REACH: f64 = 3.0;
 
@@ -205,11 +207,19 @@ impl Plot for TradeoffChart {
         plane.line(&on.windows(2).flat_map(step).collect::<Vec<_>>(), series(0).stroke_width(2))?;
         for (point, (px, py)) in &drawn {
             let (_, color, _) = point.look();
+            let is_behind = matches!(point.front, Front::Off | Front::Unknown);
+            if is_behind && look.characters {
+                // Lines of dots would cover what matters.
+                continue;
+            }
+            let style = color.mix(if is_behind { FAINT } else { 1.0 });
             if let (Some(low), Some(high)) = (point.time.low, point.time.high) {
-                plane.whisker((x.end_at(low), *py), (x.end_at(high), *py), color)?;
+                let ends = [(x.end_at(low), *py), (x.end_at(high), *py)];
+                plane.whisker(ends, [low, high].map(|v| x.shows(v)), style)?;
             }
             if let (Some(low), Some(high)) = (point.error.low, point.error.high) {
-                plane.whisker((*px, y.end_at(low)), (*px, y.end_at(high)), color)?;
+                let ends = [(*px, y.end_at(low)), (*px, y.end_at(high))];
+                plane.whisker(ends, [low, high].map(|v| y.shows(v)), style)?;
             }
         }
         let mut marks = Vec::new();

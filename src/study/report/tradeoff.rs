@@ -113,6 +113,14 @@ fn best(study: &Study) -> Markup {
     }
 }
 
+fn reference_caption(study: &Study) -> &'static str {
+    let r = &study.reference;
+    match r.n_pixels as u64 == u64::from(r.width) * u64::from(r.height) {
+        true => "the reference",
+        false => "the reference: every cell has the colour of its one pixel that was computed",
+    }
+}
+
 fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
     let read = |name: &Option<String>| match name {
         Some(name) => Png::read(folder, name),
@@ -145,7 +153,7 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
     }
     Ok(html! {
         @if reference.is_some() || !shown.is_empty() { h3 { "Pictures" } }
-        @if let Some(reference) = &reference { div class="reference" { (reference.figure("The reference", "the reference")) } }
+        @if let Some(reference) = &reference { div class="reference" { (reference.figure("The reference", reference_caption(study))) } }
         @for pair in &shown { (pair) }
     })
 }

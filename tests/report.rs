@@ -361,3 +361,36 @@ fn a_run_without_anything_to_draw_has_a_page() {
     assert!(text.contains("No pass was timed") && text.contains("nothing was both timed and compared"));
     assert!(text.contains("Interrupted:"));
 }
+
+#[test]
+fn a_bench_keeps_the_last_frame_of_its_cases_and_no_other_run_s() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (scene, out) = (format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR")), path(&dir, "run"));
+    let scene = [scene.as_str(), "--size", "64x48", "--set", "draw.particles=200"];
+    let bench = |more: &[&str]| {
+        let args =
+            [&["bench"], &scene[..], &["--frames", "4", "--warmup", "1", "--no-saved", "--out", &out], more].concat();
+        let output = run(&args);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let mut names: Vec<String> = fs::read_dir(&out)
+            .expect("the folder")
+            .map(|entry| entry.expect("an entry").file_name().into_string().expect("UTF-8"))
+            .collect();
+        names.sort();
+        names
+    };
+    let swept = bench(&["--sweep", "film.exposure=1,0.5", "--plot", "--threading", "serial"]);
+    let all = ["case-0.png", "case-1.png", "frames-0.svg", "frames-1.svg", "frames.csv", "passes.svg", "run.json"];
+    assert_eq!(swept, all);
+    // The frame itself, as `render` writes it.
+    let drawn = path(&dir, "drawn.png");
+    for (i, exposure) in ["film.exposure=1", "film.exposure=0.5"].into_iter().enumerate() {
+        let more = ["--set", exposure, "--frame", "3", "-o", &drawn, "--force"];
+        assert!(run(&[&["render"], &scene[..], &more].concat()).status.success());
+        let [kept, drawn] =
+            [format!("{out}/case-{i}.png"), drawn.clone()].map(|file| fs::read(file).expect("a picture"));
+        assert!(kept == drawn, "{exposure}");
+    }
+    fs::write(format!("{out}/picture-7.png"), "mine").expect("a file");
+    assert_eq!(bench(&["--force"]), ["case-0.png", "frames.csv", "picture-7.png", "run.json"]);
+}

@@ -108,7 +108,7 @@ impl Plot for LedgerChart {
                     plane.whisker([(x.end_at(low), y), (last, y)], [low, high].map(|v| x.shows(v)), INK)?;
                 }
             }
-            let at = plane.pixel(if look.characters { end } else { last.max(end) }, y).0 + look.across(7, 1);
+            let at = plane.pixel(if look.characters { end } else { last.max(end) }, y).0 + look.across(7, 2);
             plane.write(&number(row.error.value), (at, middle), INK, HPos::Left)?;
         }
         if let Some(at) = x.at(self.total.value) {

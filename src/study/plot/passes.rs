@@ -68,7 +68,8 @@ pub fn chart(run: &Run) -> Option<PassChart> {
     Some(PassChart { passes, bars })
 }
 
-fn row_name(case: &str, mode: &Mode) -> String {
+/// A case's loop in words.
+pub fn row_name(case: &str, mode: &Mode) -> String {
     let of = if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) };
     if case.is_empty() { of } else { format!("{case}: {of}") }
 }
@@ -166,7 +167,7 @@ impl Plot for PassChart {
             }
             let (upper, lower) = span(&plane, i, n);
             let (left, right) = (plane.pixel(0.0, 0.0).0, plane.pixel(from, 0.0).0);
-            plane.write(&number(from), (right + look.across(6, 1), (upper + lower) / 2), INK, HPos::Left)?;
+            plane.write(&number(from), (right + look.across(6, 2), (upper + lower) / 2), INK, HPos::Left)?;
             marks.push(Mark { place: [left, upper, (right - left).max(4), lower - upper], says: of.says.clone() });
         }
         Ok(marks)

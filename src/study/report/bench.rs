@@ -25,10 +25,6 @@ fn named(case: &Case) -> String {
     if name.is_empty() { "the scene".to_owned() } else { name }
 }
 
-fn loop_name(mode: &Mode) -> String {
-    if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) }
-}
-
 pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
     let run = &recorded.run;
     let mut charts = Vec::new();
@@ -65,7 +61,7 @@ fn loops(run: &Run) -> Markup {
     let row = |(case, mode): (&Case, &Mode)| -> Vec<Cell> {
         let of = |m: Option<crate::study::records::Measured>| m.map(|m| m.of);
         vec![
-            text(&format!("{} {}", case.name(), loop_name(mode))),
+            text(&passes::row_name(&case.name(), mode)),
             count(mode.frames),
             median(mode.frame_ms),
             ms(of(mode.frame_ms).map(|s| s.p95)),
@@ -134,7 +130,7 @@ fn pass_table(run: &Run) -> Markup {
         let reasons = pass.reasons.iter().map(|r| format!("{} ({})", r.reason, number(r.n as f64)));
         vec![
             text(&pass.name),
-            text(&format!("{} {}", case.name(), loop_name(mode))),
+            text(&passes::row_name(&case.name(), mode)),
             ms(pass.p50_ms),
             ms(passes::ms_of_frame(pass)),
             percent(pass.share),

@@ -4,6 +4,7 @@
 #include "records.glsl"
 #include "each.glsl"
 #include "tensor.glsl"
+#include "sum.glsl"
 
 // Radiance and irradiance of every facet from the tensors T1 and T2, the lights' energies and the materials' coefficients,
 // C (13)-(16) (docs/model.md §7, §11 "contract").
@@ -15,7 +16,11 @@
 
 layout(local_size_x = 64) in;
 
-const float PI = 3.14159265358979;
+#if DOUBLE
+const REAL PI = 3.14159265358979LF;
+#else
+const REAL PI = 3.14159265358979;
+#endif
 
 layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_rows; uint n_columns; } push;
 layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
@@ -34,11 +39,12 @@ layout(std430, binding = 7) writeonly buffer LitFacets { Lit lit[]; };
 
 vec3 coefficient_of(uint column) { return uintBitsToFloat(texelFetch(coefficients, int(column)).rgb); }
 
-struct Sum { vec3 direct; vec3 indirect; vec3 first; vec3 second; };
-
 // A facet as a receiver: c_b of its bases, and the row of each.
-vec3 own[N_BASES];
+REAL3 own[N_BASES];
 uint rows[N_BASES];
+
+#if SUMMATION == PLAIN && !DOUBLE
+struct Sum { vec3 direct; vec3 indirect; vec3 first; vec3 second; };
 
 // What one light of energy 1 brings. A column's coefficient is loaded once for all bases.
 Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
@@ -71,18 +77,53 @@ Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
     return sum;
 }
 
+#else
+// What all lights bring, each a single sum over lights, bases and columns.
+struct Sum { SUM3 direct; SUM3 indirect; SUM3 first; SUM3 second; };
+
+void add_light(inout Sum sum, REAL3 energy, uint l, uvec2 own_spans, uint n_shiny) {
+    uint at[N_BASES];
+    REAL3 direct = energy * texelFetch(t1, int(l * push.n_rows + rows[0])).x;
+    ADD(sum.direct, direct);
+    ADD(sum.first, direct * own[0]);
+    for (uint k = 0u; k < n_shiny; ++k) {
+        [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+            ADD(sum.first, energy * own[b] * texelFetch(t1, int(l * push.n_rows + rows[b])).x);
+        }
+    }
+    [[unroll]] for (uint b = 0u; b < N_BASES; ++b) {
+        at[b] = second_at(l, rows[b], push.n_rows, push.n_columns);
+    }
+    for (uint i = 0u; i < own_spans.y; ++i) {
+        uvec2 span = spans[own_spans.x + i];
+        for (uint c = span.x; c < span.x + span.y; ++c) {
+            REAL3 column = energy * coefficient_of(c);
+            REAL3 indirect = column * texelFetch(t2, int(at[0] + c * TILE)).x;
+            ADD(sum.indirect, indirect);
+            ADD(sum.second, indirect * own[0]);
+            for (uint k = 0u; k < n_shiny; ++k) {
+                [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+                    ADD(sum.second, column * own[b] * texelFetch(t2, int(at[b] + c * TILE)).x);
+                }
+            }
+        }
+    }
+}
+#endif
+
 void main() {
     FOR_EACH(j, push.n_facets) {
         Facet facet = facets[j];
         Region region = region_at(facet.i_region);
         bool glossy = region.i_lobe != NO_LOBE;
         uint i_vector = region.i_column + (region.kind == REGION_COLORED ? 3u : 1u);
-        own[0] = region.kd * facet.color;
+        own[0] = REAL3(region.kd) * facet.color;
         rows[0] = region.i_row + j - region.i_first_facet;
         [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
-            own[b] = glossy ? coefficient_of(i_vector + b - 1u) : vec3(0.0);
+            own[b] = REAL3(glossy ? coefficient_of(i_vector + b - 1u) : vec3(0.0));
             rows[b] = glossy ? rows[b - 1u] + region.n_facets : rows[0];
         }
+#if SUMMATION == PLAIN && !DOUBLE
         Sum sum = Sum(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
         for (uint l = 0u; l < push.n_lights; ++l) {
             vec3 energy = lights[l].energy;
@@ -92,10 +133,17 @@ void main() {
             sum.first += energy * light.first;
             sum.second += energy * light.second;
         }
+#else
+        Sum sum = Sum(EMPTY3, EMPTY3, EMPTY3, EMPTY3);
+        for (uint l = 0u; l < push.n_lights; ++l) {
+            vec3 energy = lights[l].energy;
+            add_light(sum, energy, l, energy == vec3(0.0) ? uvec2(0u) : spans[facet.i_region], glossy ? 1u : 0u);
+        }
+#endif
         // n_unresolved stays as second counted it.
-        lit[j].direct = PI * sum.direct;
-        lit[j].indirect = PI * sum.indirect;
-        lit[j].first = sum.first;
-        lit[j].second = sum.second;
+        lit[j].direct = vec3(PI * TOTAL(sum.direct));
+        lit[j].indirect = vec3(PI * TOTAL(sum.indirect));
+        lit[j].first = vec3(TOTAL(sum.first));
+        lit[j].second = vec3(TOTAL(sum.second));
     }
 }

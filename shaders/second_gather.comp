@@ -72,6 +72,7 @@ layout(binding = 14) uniform usamplerBuffer stencils;
 // Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
 layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
+#include "sum.glsl"
 #include "lobe.glsl"
 #if MARCH
 #include "density.glsl"
@@ -83,18 +84,18 @@ layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 #include "cells.glsl"
 
 // What the receiver has got.
-vec3 indirect = vec3(0.0);
-vec3 glossy = vec3(0.0);
+SUM3 indirect = EMPTY3;
+SUM3 glossy = EMPTY3;
 // Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest channel.
 float n_unresolved = 0.0;
 float unresolved = 0.0;
 
 // Adds what comes along the view's way.
 void add(View view, vec3 e, Taker taker) {
-    indirect += e;
+    ADD(indirect, e);
 #if GLOSSY
     if (e != vec3(0.0)) {
-        glossy += e * lobe_at(taker.region.i_lobe, view.taker_gap);
+        ADD(glossy, e * lobe_at(taker.region.i_lobe, view.taker_gap));
     }
 #endif
 }
@@ -146,17 +147,17 @@ void take_cell(
     [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
         vec4 g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);
         vec3 diffuse = LIGHT(l).energy * emitter.kd * PI_INVERSE;
-        indirect += diffuse * dot(g, vec4(1.0));
+        ADD(indirect, diffuse * dot(g, vec4(1.0)));
 #if GLOSSY
-        glossy += diffuse * dot(g, taken);
+        ADD(glossy, diffuse * dot(g, taken));
 #endif
 #if SHINY
         if (emitter.i_lobe != NO_LOBE && shine_of(i, source, view, l).x > 0.0 && part > 0.0) {
             g *= shining_from(cell, source, emitter, taker, l);
             vec3 shining = LIGHT(l).energy * emitter.ks;
-            indirect += shining * dot(g, vec4(1.0));
+            ADD(indirect, shining * dot(g, vec4(1.0)));
 #if GLOSSY
-            glossy += shining * dot(g, taken);
+            ADD(glossy, shining * dot(g, taken));
 #endif
         }
 #endif
@@ -241,11 +242,12 @@ void main() {
         // The lobe is the front side's.
         float front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
         bool begins = push.i_round == 0u;
+        vec3 arrived = vec3(TOTAL(indirect)), shone = vec3(TOTAL(glossy));
         Lit before = lit[j];
         // What none of the dispatches has come to is told, and has no bound.
         float n_lost = n_cut + (push.i_round + 1u == push.n_rounds ? float(last - min(next, last)) : 0.0);
-        lit[j].indirect = (begins ? vec3(0.0) : before.indirect) + indirect;
-        lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * indirect + front * own.ks * glossy;
+        lit[j].indirect = (begins ? vec3(0.0) : before.indirect) + arrived;
+        lit[j].second = (begins ? vec3(0.0) : before.second) + albedo * arrived + front * own.ks * shone;
         lit[j].n_unresolved = (begins ? 0.0 : before.n_unresolved) + n_unresolved;
         lit[j].unresolved = n_lost > 0.0 ? uintBitsToFloat(0x7f800000u) : (begins ? 0.0 : before.unresolved) + unresolved;
         lit[j].n_lost = (begins ? 0.0 : before.n_lost) + n_lost;

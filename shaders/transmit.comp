@@ -1,5 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
@@ -22,43 +23,61 @@ layout(binding = 3) uniform samplerBuffer density;
 layout(std430, binding = 4) writeonly buffer Transmittance { float transmittance[]; };
 layout(std430, binding = 5) writeonly buffer Through { float through[]; };
 
+#include "sum.glsl"
+// What is summed in double is sampled in double.
+#define DEEP DOUBLE
 #include "density.glsl"
 #include "reach.glsl"
 
+// Whither light comes from, and from how far.
+struct Way { PLACE toward; WEIGHT distance; };
+
+Way way_to(Light light, vec3 p) {
+#if DEEP
+    if (light.kind == LIGHT_POINT) {
+        PLACE offset = PLACE(light.position) - PLACE(p);
+        WEIGHT d = length(offset);
+        return Way(d > 0.0 ? offset / d : PLACE(0.0, 1.0, 0.0), d);
+    }
+#endif
+    Arrival a = arrival_at(light, p);
+    return Way(PLACE(a.toward), a.distance);
+}
+
 // From where to where the way from p along d, so far, leads through the grid's box; the end before the begin where it
 // misses the box.
-vec2 crossing(vec3 p, vec3 d, float distance) {
-    vec3 low = push.grid.low;
-    vec3 high = low + push.grid.cell * vec3(push.grid.n_cells);
-    float enter = 0.0, leave = distance;
+WEIGHTS2 crossing(PLACE p, PLACE d, WEIGHT distance) {
+    PLACE low = push.grid.low;
+    PLACE high = low + push.grid.cell * PLACE(push.grid.n_cells);
+    WEIGHT enter = 0.0, leave = distance;
     for (int axis = 0; axis < 3; ++axis) {
         if (d[axis] != 0.0) {
-            float a = (low[axis] - p[axis]) / d[axis], b = (high[axis] - p[axis]) / d[axis];
+            WEIGHT a = (low[axis] - p[axis]) / d[axis], b = (high[axis] - p[axis]) / d[axis];
             enter = max(enter, min(a, b));
             leave = min(leave, max(a, b));
         } else if (p[axis] < low[axis] || p[axis] > high[axis]) {
             leave = -1.0;
         }
     }
-    return vec2(enter, leave);
+    return WEIGHTS2(enter, leave);
 }
 
 // e^-(1-g)tau from p to the light.
-float through_the_cloud(vec3 p, Arrival way) {
-    vec3 d = way.toward;
-    vec2 part = crossing(p, d, way.distance);
-    float length_total = part.y - part.x;
+float through_the_cloud(PLACE p, Way way) {
+    PLACE d = way.toward;
+    WEIGHTS2 part = crossing(p, d, way.distance);
+    WEIGHT length_total = part.y - part.x;
     // Where no light is lost there is nothing to march for, nor where the way misses the box.
     bool is_marched = push.backward > 0.0 && length_total > 0.0;
     uint n = is_marched ? clamp(uint(ceil(length_total / push.step_length)), 1u, push.max_steps) : 0u;
-    float tau = 0.0;
+    SUM1 tau = EMPTY1;
     for (uint j = 0; j < n; ++j) {
-        float t0 = float(j) * push.step_length;
-        float ds = min(push.step_length, length_total - t0);
-        tau += density_at(p + (part.x + (t0 + 0.5 * ds)) * d) * ds;
+        WEIGHT t0 = WEIGHT(j) * push.step_length;
+        WEIGHT ds = min(WEIGHT(push.step_length), length_total - t0);
+        ADD(tau, density_at(p + (part.x + (t0 + 0.5 * ds)) * d) * ds);
     }
-    // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing.
-    float depth = push.backward * tau;
+    // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing. There is none of doubles.
+    float depth = float(push.backward * TOTAL(tau));
     return depth > 0.0 ? exp(-depth) : 1.0;
 }
 
@@ -70,7 +89,7 @@ void main() {
         bool is_on = any(notEqual(light.energy, vec3(0.0)));
         bool is_center_clear = is_on && is_clear(facet.position, light, facet.i_region, push.n_surfaces);
         // Part of a surface's facet may be lit though its centre is hidden.
-        float dimmed = is_center_clear || (APART != 0 && is_on) ? through_the_cloud(facet.position, arrival_at(light, facet.position)) : 0.0;
+        float dimmed = is_center_clear || (APART != 0 && is_on) ? through_the_cloud(facet.position, way_to(light, facet.position)) : 0.0;
         transmittance[k] = is_center_clear ? dimmed : 0.0;
         if (APART != 0) {
             through[k] = dimmed;

@@ -202,7 +202,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "lighting": {
                 "mode": "two-reflection", "grid": 64, "step": 1.0, "forward": 0.85, "bases": 8, "sampling": "log",
                 "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": 0,
-                "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16,
+                "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16, "summation": "plain", "precision": "f32",
             },
             "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": 3.0, "threshold": 0.0, "chunks": 0, "cull": "on", "smallest": 0.0, "sort_bits": 32, "resolution": 1.0, "error": 1.0 / 1020.0, "count": "all", "count_a": 280.0, "count_d0": 1.0,
                       "count_normalised": false, "count_conserve": true, "particles": 0, "texture_seed": 1 },

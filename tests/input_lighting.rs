@@ -9,6 +9,7 @@ use nimbus::model::basis::Sampling;
 use nimbus::model::light::{LEAST_PENUMBRA, Light};
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::{Gather, LightingMode, Pairs};
+use nimbus::model::sums::{Precision, Summation, Sums};
 use scene_text::{CLOUD, assert_table, good, load_with, message, to_toml};
 use serde_json::json;
 
@@ -122,6 +123,13 @@ fn the_second_reflection_has_its_keys() {
     for (name, gather) in Gather::NAMES {
         assert_eq!(lighting(&format!("[lighting]\ngather = '{name}'")).gather, gather);
     }
+    assert_eq!(l.sums, Sums { summation: Summation::Plain, precision: Precision::F32 });
+    for (name, summation) in Summation::NAMES {
+        assert_eq!(lighting(&format!("[lighting]\nsummation = '{name}'")).sums.summation, summation);
+    }
+    for (name, precision) in Precision::NAMES {
+        assert_eq!(lighting(&format!("[lighting]\nprecision = '{name}'")).sums.precision, precision);
+    }
     let loaded = good(&format!("[lighting]\nfacets_per_cloud = 2\nsampling = 'uniform'\n{CLOUD}"));
     assert_eq!((loaded.scene.lighting.facets_per_cloud, loaded.scene.n_facets()), (Some(2), 2));
     assert_eq!((loaded.scene.n_particles(), loaded.scene.lighting.sampling), (3, Sampling::Uniform));
@@ -162,6 +170,8 @@ fn whatever_is_lit_otherwise_has_another_hash() {
         format!("{FLOOR}subdivide = [8, 9]"),
         format!("{FLOOR}[lighting]\ntheta = 0.6"),
         format!("{FLOOR}[lighting]\npair_steps = 8"),
+        format!("{FLOOR}[lighting]\nsummation = 'kahan'"),
+        format!("{FLOOR}[lighting]\nprecision = 'f64'"),
         format!("{FLOOR}[[material]]\nname = 'cloud'\npath = [{{ time_s = 0 }}, {{ time_s = 1, ns = 9 }}]"),
         format!("{FLOOR}[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nintensity = [1, 1, 1]"),
         format!("{FLOOR}[[light]]\nkind = 'point'\nposition = [0, 0, 0]\nintensity = [1, 1, 1]\nradius = 1"),

@@ -6,6 +6,7 @@ use harness::Gpu;
 use nimbus::frame::limits::{advice, check, n_deposits};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Scene;
+use nimbus::model::sums::Precision;
 use nimbus::model::texture::Choice;
 
 fn scene(n_particles: u32, grid: u32, mode: &str) -> Scene {
@@ -41,6 +42,22 @@ fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
     unlit.clouds[0].texture.choice = Choice::ByBox;
     let refused = check(&unlit, &limits).unwrap_err().to_string();
     assert!(refused.contains("the pool of textures: 698880 texels of 16 bytes"), "{refused}");
+}
+
+#[test]
+fn doubles_are_refused_where_the_device_has_none() {
+    let mut limits = *Gpu::new().device.limits();
+    let mut scene = scene(500, 64, "first");
+    scene.lighting.sums.precision = Precision::F64;
+    limits.floats_64 = true;
+    assert!(check(&scene, &limits).is_ok());
+    limits.floats_64 = false;
+    let refused = check(&scene, &limits).unwrap_err();
+    assert_eq!(refused.exit_code(), 2);
+    let said = refused.to_string();
+    assert!(said.contains("lighting.precision = \"f64\"") && said.contains("shaderFloat64"), "{said}");
+    scene.lighting.sums.precision = Precision::F32;
+    assert!(check(&scene, &limits).is_ok());
 }
 
 #[test]

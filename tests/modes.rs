@@ -115,6 +115,20 @@ fn tiles_give_the_same_bytes_in_every_mode() {
 }
 
 #[test]
+fn every_way_to_sum_gives_the_same_bytes_in_every_mode() {
+    let summed = |[summation, precision]: [&str; 2]| {
+        let set = [format!("lighting.summation='{summation}'"), format!("lighting.precision='{precision}'")];
+        scene(&[&set[0], &set[1]])
+    };
+    let default = images(run(scene(&[]), Threading::Serial, true));
+    assert!(default == images(run(summed(["plain", "f32"]), Threading::Serial, true)), "what is said by default");
+    for way in [["kahan", "f64"], ["pairwise", "f32"]] {
+        let first = images(run(summed(way), Threading::Serial, false));
+        assert!(first == images(run(summed(way), Threading::Parallel, true)), "{way:?}");
+    }
+}
+
+#[test]
 fn chunks_give_the_same_bytes_in_every_mode() {
     let chunks = || scene(&["draw.path='sprites'", "draw.chunks=4"]);
     let frames = run(chunks(), Threading::Serial, true);

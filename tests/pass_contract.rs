@@ -3,6 +3,8 @@
 #[path = "harness/bounded.rs"]
 mod bounded;
 mod harness;
+#[path = "harness/sums.rs"]
+mod sums;
 
 use bounded::{Random, U, greatest_ratio};
 use glam::DVec3;
@@ -11,8 +13,11 @@ use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use nimbus::layout::facet::{RegionRecord, lobe_width};
 use nimbus::layout::frame::LightRecord;
+use nimbus::model::sums::{Precision, Sums};
 use nimbus::passes::contract::{Contract, Push, TILE};
 use nimbus::reference::contract::{Receiver, Reflected, Tensors, contract};
+use nimbus::reference::rounding::sum_error;
+use sums::{KAHAN, PAIRWISE, PLAIN, every_way};
 
 const N_BASES: u32 = 5;
 /// Columns that each region can receive light from, of 16: (first, number).
@@ -93,7 +98,12 @@ fn case(n_lights: usize, two_reflections: bool) -> Case {
 
 impl Case {
     fn run(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Vec<f64> {
-        let pass = Contract::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), N_BASES).expect("contract");
+        self.run_as(gpu, compiler, PLAIN)
+    }
+
+    fn run_as(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, sums: Sums) -> Vec<f64> {
+        let compiler = compiler.unwrap_or(&gpu.compiler);
+        let pass = Contract::new(&gpu.device, compiler, N_BASES, &sums.into()).expect("contract");
         // What second counted must stay.
         let lit: Vec<_> = (0..self.facets.len())
             .map(|j| LitRecord { n_unresolved: j as f32, unresolved: 0.5, ..LitRecord::default() })
@@ -167,6 +177,40 @@ impl Case {
         let n = (self.n_columns as usize + self.lights.len()) as f64 + f64::from(N_BASES) + 6.0;
         self.truth(true).into_iter().map(|m| n * U / (1.0 - n * U) * m + 2f64.powi(-100)).collect()
     }
+
+    /// Of sums that are no plain f32 ones: one over all lights, bases and columns, of products of four (K_d c, E, C, T), which
+    /// in f32 are rounded four times, as are π and the product by it; in f64 2⁻²⁹ of that.
+    fn bounds_as(&self, sums: Sums) -> Vec<f64> {
+        if sums == PLAIN {
+            return self.bounds();
+        }
+        let n_terms = self.n_columns as usize * self.lights.len() * N_BASES as usize;
+        let of_terms = if sums.precision == Precision::F32 { 6.01 * U } else { 1e-6 * U };
+        let share = of_terms + (1.0 + of_terms) * sum_error(sums, n_terms as u64);
+        self.truth(true).into_iter().map(|m| share * m + 2f64.powi(-100)).collect()
+    }
+}
+
+/// Diffuse facets that receive from thousands of columns, the first of which brings all but what by itself is rounded away.
+fn long() -> Case {
+    const N_COLUMNS: usize = 4096;
+    let mut r = Random(3);
+    let region = RegionRecord { kd: [0.5; 3], i_lobe: NO_LOBE, n_facets: 64, ..RegionRecord::default() };
+    let facet = FacetRecord { color: [1.0; 3], ..FacetRecord::default() };
+    let light = LightRecord { energy: [1.0, 2.0, 0.5], ..LightRecord::default() };
+    let of_column = |c: usize| if c == 0 { 1.0 } else { f64::from(r.within(0.3, 0.45)) * U };
+    let columns: Vec<f32> = (0..N_COLUMNS).map(of_column).map(|v| v as f32).collect();
+    Case {
+        facets: vec![facet; 64],
+        regions: vec![region],
+        lights: vec![light],
+        coefficients: vec![[1.0; 4]; N_COLUMNS],
+        t1: vec![0.5; 64],
+        t2: columns.iter().flat_map(|v| [*v; 64]).collect(),
+        spans: vec![[1, 1], [0, N_COLUMNS as u32]],
+        n_rows: 64,
+        n_columns: N_COLUMNS as u32,
+    }
 }
 
 #[test]
@@ -186,6 +230,46 @@ fn every_facet_is_the_sum_that_the_reference_says() {
 }
 
 #[test]
+fn every_way_to_sum_is_within_its_own_bound() {
+    let mut gpu = Gpu::new();
+    for case in [case(4, true), long()] {
+        let truths = case.truth(false);
+        for sums in every_way() {
+            let (values, bounds) = (case.run_as(&mut gpu, None, sums), case.bounds_as(sums));
+            assert_within_and_say(&format!("{sums:?}"), &values, &truths, &bounds);
+        }
+    }
+    // The bounds of the others are not those of plain sums, and these would not keep them.
+    let (case, ways) = (long(), [KAHAN, PAIRWISE, Sums { precision: Precision::F64, ..PLAIN }]);
+    let (plain, truths) = (case.run(&mut gpu, None), case.truth(false));
+    for sums in ways {
+        let ratio = greatest_ratio(&plain, &truths, &case.bounds_as(sums));
+        assert!(ratio > 10.0, "{sums:?}: {ratio}");
+    }
+}
+
+#[test]
+fn wrong_terms_of_long_sums_are_noticed() {
+    let mut gpu = Gpu::new();
+    let case = case(3, true);
+    let truths = case.truth(false);
+    for (from, to) in [
+        ("energy * own[b] * texelFetch(t1", "own[b] * texelFetch(t1"),
+        ("ADD(sum.second, indirect * own[0])", "ADD(sum.second, indirect)"),
+        ("ADD(sum.second, column * own[b]", "ADD(sum.second, column * own[0]"),
+        ("REAL3 column = energy * coefficient_of(c)", "REAL3 column = REAL3(energy)"),
+        ("3.14159265358979", "3.1415"),
+    ] {
+        let compiler = Gpu::wrong_compiler("contract.comp", from, to);
+        for sums in [KAHAN, Sums { precision: Precision::F64, ..PLAIN }] {
+            let values = case.run_as(&mut gpu, Some(&compiler), sums);
+            let ratio = greatest_ratio(&values, &truths, &case.bounds_as(sums));
+            assert!(ratio > 1.0, "{sums:?}: {from} as {to}");
+        }
+    }
+}
+
+#[test]
 fn without_lights_it_is_dark() {
     assert!(case(0, true).run(&mut Gpu::new(), None).iter().all(|v| *v == 0.0));
 }
@@ -200,7 +284,7 @@ fn a_wrong_sum_is_noticed() {
         ("second_at(l, rows", "second_at(0u, rows"),
         ("int(l * push.n_rows + rows[b])", "int(rows[b])"),
         ("region.kind == REGION_COLORED ? 3u : 1u", "1u"),
-        ("region.kd * facet.color", "region.kd"),
+        ("REAL3(region.kd) * facet.color", "REAL3(region.kd)"),
         ("glossy ? 1u : 0u", "0u"),
         ("rows[b - 1u] + region.n_facets", "rows[b - 1u] + 1u"),
         ("j - region.i_first_facet", "j"),

@@ -1,22 +1,40 @@
 // Trilinear density between cell centres, 0 outside their hull (docs/model.md, "sample"). Needs `Grid grid` in the push
 // constants and `samplerBuffer density`.
 
+// 1: places and weights are doubles.
+#ifndef DEEP
+#define DEEP 0
+#endif
+#if DEEP
+#define PLACE dvec3
+#define WEIGHT double
+#define WEIGHTS2 dvec2
+#define WEIGHTS4 dvec4
+#define IN_CELLS(x) ((x) / double(push.grid.cell))
+#else
+#define PLACE vec3
+#define WEIGHT float
+#define WEIGHTS2 vec2
+#define WEIGHTS4 vec4
+#define IN_CELLS(x) (x) * push.grid.inv_cell
+#endif
+
 float cell_at(int c) { return texelFetch(density, c).x; }
 
-float density_at(vec3 p) {
-    vec3 g = (p - push.grid.low) * push.grid.inv_cell - 0.5;
-    vec3 base = floor(g);
+WEIGHT density_at(PLACE p) {
+    PLACE g = IN_CELLS(p - push.grid.low) - 0.5;
+    PLACE base = floor(g);
     ivec3 i = ivec3(base);
     ivec3 n = ivec3(push.grid.n_cells);
     if (any(lessThan(i, ivec3(0))) || any(greaterThanEqual(i, n - 1))) {
         return 0.0;
     }
-    vec3 f = g - base;
+    PLACE f = g - base;
     int row = n.x, layer = n.x * n.y;
     int c = i.x + row * i.y + layer * i.z;
-    vec4 low = vec4(cell_at(c), cell_at(c + row), cell_at(c + layer), cell_at(c + layer + row));
-    vec4 high = vec4(cell_at(c + 1), cell_at(c + row + 1), cell_at(c + layer + 1), cell_at(c + layer + row + 1));
-    vec4 x = mix(low, high, f.x);
-    vec2 y = mix(x.xz, x.yw, f.y);
+    WEIGHTS4 low = WEIGHTS4(cell_at(c), cell_at(c + row), cell_at(c + layer), cell_at(c + layer + row));
+    WEIGHTS4 high = WEIGHTS4(cell_at(c + 1), cell_at(c + row + 1), cell_at(c + layer + 1), cell_at(c + layer + row + 1));
+    WEIGHTS4 x = mix(low, high, f.x);
+    WEIGHTS2 y = mix(x.xz, x.yw, f.y);
     return mix(y.x, y.y, f.z);
 }

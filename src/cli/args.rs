@@ -1,14 +1,15 @@
 //! The command line, as typed.
 
 mod results;
+mod study;
 
 use std::path::PathBuf;
 
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
-use crate::study::against::Against;
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
+pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
 #[derive(Debug, Parser)]
@@ -55,14 +56,6 @@ pub enum Command {
     /// are shown: an EXR over black, through the default tone map. A is what is measured by. Pixels that are not finite in
     /// either picture are counted and left out; SSIM and FLIP take them for black in both.
     Compare(CompareArgs),
-    /// Make one HTML page of results: where they were measured, plots, tables, pictures
-    ///
-    /// Of every folder that bench, error or ledger wrote: machine and provenance, every figure as a table, frame times and
-    /// passes, time against error, the ledger, and the pictures in it. Where two benches or two studies are given, the later
-    /// ones are compared with the first: ratios with their intervals, the pictures behind a slider, and where they differ.
-    ///
-    /// The page is one file and loads nothing: it can be mailed, kept beside the results, or printed.
-    Report(ReportArgs),
     /// Say how much error a millisecond buys: run time against error over a scene's knobs
     ///
     /// Every configuration of the knobs is drawn once and compared with a reference in f64, and all are timed in turn with the
@@ -77,6 +70,21 @@ pub enum Command {
     /// Frames are timed as if everything moved in each, but for what a run makes once (particles of boxes, textures);
     /// --as-played times what the scene's own frames leave to be done.
     Error(ErrorArgs),
+    /// Say what every approximation is off by, each against the one below it
+    ///
+    /// A chain of pictures from the one that is drawn down to the whole model with further reflections; each has one approximation
+    /// less than the one before it, and a row says how far the two are apart. The first ones are drawn by the device, and their
+    /// times are taken in turn; the others are computed in f64. Differences that follow each other can only cancel: the rows'
+    /// sum is at least the total, which is checked (exit code 1 where it is not so).
+    Ledger(LedgerArgs),
+    /// Make one HTML page of results: where they were measured, plots, tables, pictures
+    ///
+    /// Of every folder that bench, error or ledger wrote: machine and provenance, every figure as a table, frame times and
+    /// passes, time against error, the ledger, and the pictures in it. Where two benches or two studies are given, the later
+    /// ones are compared with the first: ratios with their intervals, the pictures behind a slider, and where they differ.
+    ///
+    /// The page is one file and loads nothing: it can be mailed, kept beside the results, or printed.
+    Report(ReportArgs),
     /// Print a stage's buffer, or what f64 says it should be
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
@@ -217,95 +225,6 @@ pub enum ThreadingArg {
 }
 
 #[derive(Debug, ClapArgs)]
-#[command(after_help = "Examples:\n  \
-    nimbus error scenes/study-cloud.toml\n  \
-    nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 --knob lighting.theta=0.2,0.4,0.8 --grid\n  \
-    nimbus error scenes/study-cloud.toml --out cloud --budget-ms 5 --budget-error 0.01\n  \
-    nimbus error scenes/study-cloud.toml --out cloud --resume --knob draw.cutoff=2.2,2.7\n\n\
-    Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept in --out.")]
-pub struct ErrorArgs {
-    /// Scene file
-    pub scene: PathBuf,
-    /// Values of a key, e.g. draw.cutoff=2,3 or 'surface.*.subdivide=[4,4],[8,8]' (repeatable) [default: every knob that can change the scene]
-    #[arg(long, value_name = "KEY=VALUE,…", help_heading = "Knobs")]
-    pub knob: Vec<String>,
-    /// All combinations of the knobs; else each value alone, then what saves time for little error put together
-    #[arg(long, requires = "knob", help_heading = "Knobs")]
-    pub grid: bool,
-    /// What pictures are compared with: thin, volume, model or reflections=K
-    #[arg(long, value_name = "WHAT", default_value = "model", help_heading = "Error")]
-    pub against: Against,
-    /// Draw every cloud without its texture, which no volume and no light knows
-    #[arg(long, help_heading = "Error")]
-    pub plain: bool,
-    /// The error that decides who is on the front
-    #[arg(long, value_enum, default_value = "rmse", help_heading = "Error")]
-    pub metric: MetricArg,
-    /// The reference is computed at so many pixels at most, spread over the picture; "all" for every one
-    #[arg(long, value_name = "N", default_value = "16384", value_parser = parse_pixels, help_heading = "Error")]
-    pub pixels: usize,
-    /// The frame that is drawn and compared, and the first that is timed
-    #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Error")]
-    pub frame: u32,
-    /// The time that decides [default: gpu where the device has timestamps]
-    #[arg(long, value_enum, help_heading = "Time")]
-    pub time: Option<TimeArg>,
-    /// Turns of each configuration
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Time")]
-    pub rounds: u32,
-    /// Timed frames of a turn
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Time")]
-    pub frames: u32,
-    /// Time what the scene's own frames leave to be done
-    #[arg(long, help_heading = "Time")]
-    pub as_played: bool,
-    /// Say what is the most exact within so many ms a frame (repeatable)
-    #[arg(long, value_name = "MS", value_parser = parse_positive, help_heading = "Budgets")]
-    pub budget_ms: Vec<f64>,
-    /// Say what is the fastest within such an error (repeatable)
-    #[arg(long, value_name = "ERROR", value_parser = parse_positive, help_heading = "Budgets")]
-    pub budget_error: Vec<f64>,
-    /// Folder for study.json, configurations.csv, times.csv, front.svg and pictures
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
-    /// Go on with the study in --out: what it has is kept and not run again
-    #[arg(long, requires = "out", conflicts_with = "force")]
-    pub resume: bool,
-    /// Replace existing results
-    #[arg(long)]
-    pub force: bool,
-    /// Draw time against error in the terminal, too
-    #[arg(long)]
-    pub plot: bool,
-    /// Print study.json in place of the table
-    #[arg(long, conflicts_with = "csv")]
-    pub json: bool,
-    /// Print configurations.csv in place of the table
-    #[arg(long)]
-    pub csv: bool,
-    #[command(flatten)]
-    pub options: SceneArgs,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MetricArg {
-    /// Root mean square over premultiplied linear red, green, blue and alpha
-    Rmse,
-    /// The greatest difference
-    Max,
-    /// Mean square relative to the reference's
-    Relmse,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TimeArg {
-    /// Device time of all passes
-    Gpu,
-    /// From the begin of the game step to the finished picture
-    Frame,
-}
-
-#[derive(Debug, ClapArgs)]
 #[command(group = clap::ArgGroup::new("what").args(["boxes", "particles", "facets", "plan", "basis"]))]
 pub struct InspectArgs {
     /// Scene file
@@ -376,14 +295,6 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     let parse = |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
     Ok((parse(w)?, parse(h)?))
-}
-
-fn parse_pixels(text: &str) -> Result<usize, String> {
-    if text == "all" {
-        return Ok(usize::MAX);
-    }
-    let n = text.parse().ok().filter(|n| *n > 0);
-    n.ok_or_else(|| format!("expected a number of pixels above 0, or all, found \"{text}\""))
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {

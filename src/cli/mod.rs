@@ -9,6 +9,7 @@ mod compare;
 mod compare_pictures;
 mod devices;
 mod inspect;
+mod ledger;
 mod output;
 mod render;
 mod render_reference;
@@ -52,6 +53,7 @@ pub fn main() -> ExitCode {
         }
         Command::Compare(a) => compare::run(a),
         Command::Error(a) => tradeoff::run(a, &STOP, &GRACEFUL),
+        Command::Ledger(a) => ledger::run(a, &STOP, &GRACEFUL),
         Command::Report(a) => report::run(a),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),

@@ -17,6 +17,7 @@ use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
 use crate::model::resolution::{Resolution, SmallPicture};
 use crate::model::scene::{Chunks, DrawPath, Impostors, LightingMode, MAX_CHUNKS, Scene};
+use crate::model::sums::Precision;
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
@@ -57,6 +58,11 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let n = scene.n_particles();
     if u32::try_from(n).is_err() {
         return Err(Error::limit(format!("the scene's {n} particles; nimbus numbers them with 32 bits")));
+    }
+    if scene.lighting.sums.precision == Precision::F64 && !limits.floats_64 {
+        return Err(Error::limit(
+            "lighting.precision = \"f64\": this device's shaders have no doubles (shaderFloat64); expected \"f32\"",
+        ));
     }
     // A tree has at most a cluster for every three of its facets, and each region a root.
     let n_sources = if has_second(scene) { scene.n_facets() * 4 / 3 + scene.n_regions() as u64 } else { 0 };

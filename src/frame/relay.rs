@@ -46,7 +46,8 @@ impl Relay {
         tree: bool,
     ) -> Result<Relay> {
         let shiny = (0..scene.n_regions()).any(|i| is_glossy(scene, i));
-        let second = Second::new(device, compiler, [scene.n_particles() > 0, tree, shiny], turns(scene))?;
+        let traits = [scene.n_particles() > 0, tree, shiny];
+        let second = Second::new(device, compiler, traits, turns(scene), &scene.lighting.sums.into())?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
         Ok(Relay {

@@ -126,7 +126,7 @@ impl Renderer {
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler)?,
             grouping,
-            transmit: Transmit::new(device, compiler, has_second(scene))?,
+            transmit: Transmit::new(device, compiler, has_second(scene), &scene.lighting.sums.into())?,
             first: First::new(device, compiler)?,
             second,
             tensor,

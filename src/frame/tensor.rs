@@ -192,7 +192,7 @@ impl TensorStage {
             spans,
             first: FirstTensor::new(device, compiler)?,
             second,
-            contract: Contract::new(device, compiler, shape.n_bases)?,
+            contract: Contract::new(device, compiler, shape.n_bases, &scene.lighting.sums.into())?,
             t1: Buffer::new::<f32>(device, "first.t1", shape.n_first(), Place::Device)?,
             t2: Buffer::new::<f32>(device, "second.t2", n_second, Place::Device)?,
             coefficients: Feed::new::<[f32; 4]>(device, "contract.coefficients", u64::from(shape.n_columns))?,

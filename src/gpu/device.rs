@@ -55,6 +55,8 @@ pub struct Limits {
     pub subgroup_size_chosen: bool,
     /// Shaders may have words of 64 bits.
     pub words_64: bool,
+    /// And floats of 64 bits.
+    pub floats_64: bool,
     /// 0 where the queue has no timestamps.
     pub timestamp_valid_bits: u32,
     pub timestamp_period_ns: f64,
@@ -290,6 +292,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             subgroup_size_fixed: sizes.min_subgroup_size == sizes.max_subgroup_size,
             subgroup_size_chosen: sizes.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
             words_64: features.shader_int64 == vk::TRUE,
+            floats_64: features.shader_float64 == vk::TRUE,
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
             timestamp_period_ns: f64::from(limits.timestamp_period),
         },
@@ -340,7 +343,8 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .compute_full_subgroups(true);
     let extensions: Vec<_> = info.calibrated_timestamps.iter().map(|name| name.as_ptr()).collect();
     let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
-    let features = vk::PhysicalDeviceFeatures::default().shader_int64(info.limits.words_64);
+    let features =
+        vk::PhysicalDeviceFeatures::default().shader_int64(info.limits.words_64).shader_float64(info.limits.floats_64);
     let create = create.enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
     unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
 }
@@ -381,6 +385,7 @@ mod tests {
             subgroup_size_fixed: false,
             subgroup_size_chosen: false,
             words_64: false,
+            floats_64: false,
             timestamp_valid_bits: 0,
             timestamp_period_ns: 0.0,
         };

@@ -16,6 +16,7 @@ use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
 use crate::model::scene::{MAX_CHUNKS, MAX_PAIR_LEVELS, Simulate, Threading, Threads, Time};
+use crate::model::sums::{Precision, Summation, Sums};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
 pub const MAX_SIDE: u32 = 16384;
@@ -126,6 +127,10 @@ pub fn read_lighting(root: &mut Section, exponents: &[f64]) -> Result<Lighting> 
             levels: s.u32("pair_levels", 6, 0, MAX_PAIR_LEVELS)?,
             steps: s.u32("pair_steps", 16, 1, MAX_MARCH_STEPS)?,
         },
+        sums: Sums {
+            summation: s.choice("summation", "plain", &Summation::NAMES, &[])?,
+            precision: s.choice("precision", "f32", &Precision::NAMES, &[])?,
+        },
     };
     let least = least_step(lighting.grid);
     if lighting.step < least {
@@ -153,6 +158,8 @@ const LIGHTING_KEYS: &[&str] = &[
     "pair_size",
     "pair_levels",
     "pair_steps",
+    "summation",
+    "precision",
 ];
 
 /// The range of n_s: as given, and then every lobe must lie in it; else [1, 256], or as wide as the materials need.

@@ -6,6 +6,7 @@ pub mod facet;
 pub mod frame;
 pub mod particle;
 pub mod second;
+pub mod sums;
 pub mod tiles;
 
 /// Declares a `repr(C)` record and lists its fields as (name, offset, bytes), for comparison with what the

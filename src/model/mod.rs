@@ -19,6 +19,7 @@ pub mod pairings;
 pub mod philox;
 pub mod resolution;
 pub mod scene;
+pub mod sums;
 pub mod surface;
 pub mod texture;
 pub mod tree;

@@ -13,6 +13,7 @@ use super::least::Least;
 use super::light::Light;
 use super::material::Material;
 use super::resolution::{Resolution, SmallPicture};
+use super::sums::Sums;
 use super::surface::Surface;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -101,6 +102,7 @@ pub struct Lighting {
     /// Facets of a cloud; `None`: one a particle.
     pub facets_per_cloud: Option<u32>,
     pub pairs: Pairs,
+    pub sums: Sums,
 }
 
 /// An emitter that is quartered this often is 2¹⁶ times smaller.

@@ -2,11 +2,12 @@
 //!
 //! In: T1, T2, the lights' energies, the regions' materials as coefficients of the basis. Out: I_d, I_i, L1, L2 in `lit`.
 //! Law: L1 = Σ_l E_l Σ_b' c_b' T1, L2 = Σ_l E_l Σ_b' c_b' Σ_columns C T2. Source: C (13)–(16), docs/model.md §7, §11.
-//! Error: (columns + lights + bases) roundings of the sums of magnitudes.
+//! Error: (columns + lights + bases) roundings of the sums of magnitudes; formed otherwise, six and those of "sums".
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
+use crate::layout::sums::SumMacros;
 
 /// Rows of T2 that lie side by side; the number of rows is a multiple of it.
 pub const TILE: u32 = 64;
@@ -20,9 +21,9 @@ pub struct Contract {
 }
 
 impl Contract {
-    /// `n_bases`: N_b.
-    pub fn new(device: &Device, compiler: &Compiler, n_bases: u32) -> Result<Contract> {
-        let macros = [("N_BASES", n_bases)];
+    /// `n_bases`: N_b. `sums`: how they are formed.
+    pub fn new(device: &Device, compiler: &Compiler, n_bases: u32, sums: &SumMacros) -> Result<Contract> {
+        let macros = [&[("N_BASES", n_bases)], sums.list()].concat();
         Ok(Contract { kernel: Kernel::with_macros(device, compiler, "contract", Push::FIELDS, &[], &macros)? })
     }
 

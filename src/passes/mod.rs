@@ -67,6 +67,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/shell.glsl",
     "include/stencil.glsl",
     "include/sort.glsl",
+    "include/sum.glsl",
     "include/tensor.glsl",
     "include/texture.glsl",
     "include/tiles.glsl",

@@ -1,7 +1,8 @@
 //! second: the second reflection on every facet, gathered from all others.
 //!
 //! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid. Out: I_i and L2 in
-//! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11.
+//! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11; of the
+//! sum's error "sums" there.
 
 use bytemuck::Pod;
 
@@ -9,6 +10,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
+use crate::layout::sums::SumMacros;
 
 record! {
     pub struct SourcesPush { n_facets: u32, n_lights: u32, n_surfaces: u32 }
@@ -80,12 +82,13 @@ pub enum Receivers {
 impl Second {
     /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree;
     /// `shiny`: some region has a lobe.
-    /// `turns`: of a dispatch.
+    /// `turns`: of a dispatch. `sums`: how a receiver's sums over its senders are formed.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         [has_clouds, tree, shiny]: [bool; 3],
         turns: Turns,
+        sums: &SumMacros,
     ) -> Result<Second> {
         let width = block_len(device);
         let gather = |glossy: u32| {
@@ -96,7 +99,7 @@ impl Second {
                 ("TREE", u32::from(tree)),
                 ("SHINY", u32::from(shiny)),
             ];
-            let macros = [&macros[..], &turns.macros(device)].concat();
+            let macros = [&macros[..], &turns.macros(device), sums.list()].concat();
             Kernel::with_macros(device, compiler, "second.gather", GatherPush::FIELDS, &[], &macros)
         };
         Ok(Second {

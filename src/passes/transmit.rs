@@ -3,13 +3,14 @@
 //! In: facets, lights, regions (rectangles), density grid. Out: transmittance [facet][light], and where it is asked for
 //! what clouds alone let through. Law: [nothing hides the way] e^{−(1−g)τ}, τ by the midpoint rule along the grid. Source:
 //! docs/model.md §8, §11. Error: against the same march in f64, (1−g)τ times the samples' relative rounding plus
-//! 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few ulp may be hidden
-//! or not.
+//! the sum's ("sums") and 3 + 2|x| ulp of exp; against the closed form, the grid's. What passes an edge by less than a few
+//! ulp may be hidden or not.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
+use crate::layout::sums::SumMacros;
 
 record! {
     pub struct Push {
@@ -32,10 +33,11 @@ pub struct Transmit {
 }
 
 impl Transmit {
-    /// `apart`: what the clouds let through is written by itself, too.
-    pub fn new(device: &Device, compiler: &Compiler, apart: bool) -> Result<Transmit> {
+    /// `apart`: what the clouds let through is written by itself, too. `sums`: how τ is summed.
+    pub fn new(device: &Device, compiler: &Compiler, apart: bool, sums: &SumMacros) -> Result<Transmit> {
         let constants = [(0, u32::from(apart))];
-        Ok(Transmit { kernel: Kernel::new(device, compiler, "transmit", Push::FIELDS, &constants)? })
+        let fields = Push::FIELDS;
+        Ok(Transmit { kernel: Kernel::with_macros(device, compiler, "transmit", fields, &constants, sums.list())? })
     }
 
     /// `facets`: FacetRecord; `lights`: LightRecord; `regions`: RegionRecord, the surfaces' first; `density`: f32;

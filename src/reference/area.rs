@@ -225,15 +225,22 @@ impl<'a> Scenery<'a> {
     /// Irradiance that disc `i` brings if its radiance is `radiance`, and from where.
     fn of_disc(&self, i: usize, at: &Receiver, radiance: DVec3) -> (DVec3, DVec3) {
         let disc = &self.discs[i];
+        let direction = (disc.position - at.position).normalize_or_zero();
+        let (pair, source) = (self.pair(i, at), Source::At(disc.position));
+        if pair == 0.0 || !visibility::is_open(&self.rects, at.position, source) {
+            return (DVec3::ZERO, direction);
+        }
+        (radiance * (pair * self.transmittance(at.position, source)), direction)
+    }
+
+    /// cos θ_i cos θ_j A/(d² + A/π) of disc `i`; 0 where one is behind the other.
+    fn pair(&self, i: usize, at: &Receiver) -> f64 {
+        let disc = &self.discs[i];
         let offset = disc.position - at.position;
         let direction = offset.normalize_or_zero();
         let (cos_j, cos_i) = (at.normal.dot(direction), -disc.normal.dot(direction));
-        let source = Source::At(disc.position);
-        if cos_j <= 0.0 || cos_i <= 0.0 || !visibility::is_open(&self.rects, at.position, source) {
-            return (DVec3::ZERO, direction);
-        }
-        let pair = cos_i * cos_j * disc.area / (offset.length_squared() + disc.area * FRAC_1_PI);
-        (radiance * (pair * self.transmittance(at.position, source)), direction)
+        let cosines = if cos_j <= 0.0 || cos_i <= 0.0 { 0.0 } else { cos_i * cos_j };
+        cosines * disc.area / (offset.length_squared() + disc.area * FRAC_1_PI)
     }
 }
 

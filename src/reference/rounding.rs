@@ -12,9 +12,13 @@ use glam::DVec3;
 
 use super::generate::{is_inside, offset, uniforms};
 use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor};
+use crate::model::sums::{Precision, Summation, Sums};
 
 /// Unit round-off of f32.
 pub const U_F32: f64 = 1.0 / 16_777_216.0;
+
+/// And of f64.
+pub const U_F64: f64 = U_F32 / 536_870_912.0;
 
 /// Greatest absolute error of the f32 sine at its reduced argument: 4 units of round-off at 1.
 pub const SINE_ERROR: f64 = 4.0 * U_F32;
@@ -163,4 +167,67 @@ pub fn particle_bound(b: &CloudBox, i_box: u32, seed: u32, form: Form, i_particl
         }
     }
     unreachable!("MAX_ATTEMPTS is not 0")
+}
+
+/// Terms of a block of a pairwise sum, and partial sums of its counter, of which the last takes all beyond.
+const BLOCK: u64 = 8;
+const LAST_PART: u32 = 11;
+
+/// Bound on what a sum of `n` f32 numbers, formed as `sums` says and rounded to f32, may be off by, as a share of the sum of
+/// their magnitudes (model.md §11 "sums").
+pub fn sum_error(sums: Sums, n: u64) -> f64 {
+    let of = |u: f64| match sums.summation {
+        Summation::Plain => roundings(n.saturating_sub(1), u),
+        Summation::Kahan => {
+            // y_k = (x_k + c_{k-1})(1 + η_k), and s_k + c_k = s_{k-1} + y_k exactly. With |c_k| ≤ uM, M the greatest
+            // |s_k + c_k|: M ≤ (1 + u) S + n u² M, and s_n is off by |c_n| + Σ|η_k|(|x_k| + |c_{k-1}|) ≤ uM + uS + n u² M.
+            let lost = n as f64 * u * u;
+            u + (u + lost) * (1.0 + u) / (1.0 - lost)
+        }
+        Summation::Pairwise => roundings(pairwise_depth(n), u),
+    };
+    match sums.precision {
+        Precision::F32 => of(U_F32),
+        // And what is summed is rounded once.
+        Precision::F64 => U_F32 + (1.0 + U_F32) * of(U_F64),
+    }
+}
+
+/// What `n` roundings change, one after the other, as a share.
+fn roundings(n: u64, u: f64) -> f64 {
+    let nu = n as f64 * u;
+    if nu < 1.0 { nu / (1.0 - nu) } else { f64::INFINITY }
+}
+
+/// Additions that round and that a term of a pairwise sum passes, at most.
+fn pairwise_depth(n: u64) -> u64 {
+    // A block's first term is added to nothing. Then as many as the number of blocks has bits: k to get into part k, and the
+    // others when all parts are added up, the least first.
+    let n_blocks = n / BLOCK;
+    let n_last = n_blocks >> LAST_PART;
+    let n_bits = u64::from(u64::BITS - n_blocks.leading_zeros());
+    let depth = BLOCK - 1 + if n_last == 0 { n_bits } else { u64::from(LAST_PART) + n_last };
+    // No tree of n terms is deeper.
+    depth.min(n.saturating_sub(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_err_as_the_law_says() {
+        let of = |summation, precision, n| sum_error(Sums { summation, precision }, n) / U_F32;
+        for summation in [Summation::Plain, Summation::Pairwise] {
+            assert_eq!([0, 1].map(|n| of(summation, Precision::F32, n)), [0.0; 2]);
+        }
+        assert!((of(Summation::Plain, Precision::F32, 4096) / 4095.0 - 1.0).abs() < 1e-3);
+        assert!((of(Summation::Kahan, Precision::F32, 4096) - 2.0).abs() < 1e-3);
+        // 512 blocks: a number of 10 bits.
+        assert!((of(Summation::Pairwise, Precision::F32, 4096) - 17.0).abs() < 1e-3);
+        assert_eq!([3, 8, 16, 4096, 8 * 2047, 8 * 2048, 8 * 6000].map(pairwise_depth), [2, 7, 9, 17, 18, 19, 20]);
+        for summation in [Summation::Plain, Summation::Kahan, Summation::Pairwise] {
+            assert!((of(summation, Precision::F64, 4096) - 1.0).abs() < 1e-4);
+        }
+    }
 }

@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
+use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
 use crate::reference::sprites::{Behind, View};
 use crate::reference::surfaces;
@@ -122,12 +123,13 @@ impl Against {
         let drawn = match self {
             Against::Thin | Against::Volume => {
                 let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
-                of_scene_light(scene, &truth, self, pixels, listener)
+                let drawing = if self == Against::Thin { Drawing::Thin } else { Drawing::Volume };
+                of_scene_light(scene, &truth, drawing, pixels, listener)
             }
-            Against::Model => of_model(scene, time_s, None, pixels, listener)?,
-            Against::Reflections(k) => of_model(scene, time_s, Some(k), pixels, listener)?,
+            Against::Model => of_model(scene, time_s, None, false, pixels, listener)?,
+            Against::Reflections(k) => of_model(scene, time_s, Some(k), false, pixels, listener)?,
         };
-        let own_error = root_mean_square(drawn.errors.iter().copied());
+        let own_error = drawn.own_error();
         Ok(Reference {
             rgba: drawn.rgba,
             own_error,
@@ -153,18 +155,32 @@ impl Against {
 }
 
 /// A picture at the pixels of a sample.
-struct Drawn {
-    rgba: Vec<[f64; 4]>,
-    /// By pixel.
+pub(super) struct Drawn {
+    pub rgba: Vec<[f64; 4]>,
+    /// Estimates of what each may be off.
     errors: Vec<f64>,
+}
+
+impl Drawn {
+    /// Their root mean square.
+    pub fn own_error(&self) -> f64 {
+        root_mean_square(self.errors.iter().copied())
+    }
 }
 
 /// Rounding of what is composed in f64, of the greatest value: some thousand layers.
 const ROUNDING: f64 = 1e-12;
 
-fn of_scene_light(scene: &Scene, truth: &Truth, against: Against, pixels: &Pixels, listener: Listener) -> Drawn {
+/// `scene` in the light of `truth`.
+pub(super) fn of_scene_light(
+    scene: &Scene,
+    truth: &Truth,
+    drawing: Drawing,
+    pixels: &Pixels,
+    listener: Listener,
+) -> Drawn {
     let of_light = root_mean_square(truth.second_error.iter().copied());
-    if against == Against::Thin {
+    if drawing == Drawing::Thin {
         let picture = picture::draw(scene, truth, Drawing::Thin, listener);
         let errors = vec![of_light + ROUNDING * picture.brightest; pixels.at.len()];
         return Drawn { rgba: pixels.pick(&picture.rgba), errors };
@@ -177,26 +193,53 @@ fn of_scene_light(scene: &Scene, truth: &Truth, against: Against, pixels: &Pixel
     Drawn { rgba: found.into_iter().map(|p| p.color).collect(), errors }
 }
 
-fn of_model(scene: &Scene, time_s: f64, n: Option<u32>, pixels: &Pixels, listener: Listener) -> Result<Drawn> {
+/// `scene` in the model's light, of `n` reflections where they are not the scene's. `by_facet`: surfaces are lit where the scene
+/// has facets, and between them as it is drawn; else at every pixel.
+pub(super) fn of_model(
+    scene: &Scene,
+    time_s: f64,
+    n: Option<u32>,
+    by_facet: bool,
+    pixels: &Pixels,
+    listener: Listener,
+) -> Result<Drawn> {
     if scene.lighting.mode == LightingMode::None {
         let truth = Truth::unlit(scene, time_s)?;
-        return Ok(of_scene_light(scene, &truth, Against::Volume, pixels, listener));
+        return Ok(of_scene_light(scene, &truth, Drawing::Volume, pixels, listener));
     }
     let truth = Truth::unlit(scene, time_s)?;
     let view = picture::view(scene, &truth);
     let met = Met::of(scene, &truth);
     let light = ModelLight::new(scene, &met, &truth, n);
-    let n_parts = met.n_discs() + pixels.at.len();
+    let facets: Vec<(usize, DVec3)> = match by_facet {
+        true => met
+            .surfaces
+            .iter()
+            .enumerate()
+            .flat_map(|(i, s)| (0..s.n_facets() as u32).map(move |k| (i, s.facet_center(k))))
+            .collect(),
+        false => Vec::new(),
+    };
+    let n_lit_pixels = if by_facet { 0 } else { pixels.at.len() };
+    let n_parts = met.n_discs() + facets.len() + n_lit_pixels;
     let discs = each(met.n_discs(), |i| {
         let lit = light.of_disc(i);
         listener(Work::Lighting, n_parts);
         lit
     });
-    let behind = each(pixels.at.len(), |k| {
-        let seen = seen(&view, &met.surfaces, &light, pixels.at[k], met.n_discs() + k);
+    let lit_facets = each(facets.len(), |k| {
+        let lit = light.of_surface(facets[k].0, facets[k].1, met.n_discs() + k);
         listener(Work::Lighting, n_parts);
-        seen
+        lit
     });
+    let behind = match by_facet {
+        true => between(&view, &met.surfaces, &lit_facets, pixels),
+        false => each(pixels.at.len(), |k| {
+            let seen = seen(&view, &met.surfaces, &light, pixels.at[k], met.n_discs() + k);
+            listener(Work::Lighting, n_parts);
+            seen
+        }),
+    };
     let radiance: Vec<DVec3> = discs.iter().map(|lit| lit.radiance).collect();
     let of_discs = root_mean_square(discs.iter().map(|lit| lit.error));
     let places: Vec<Behind> = behind.iter().map(|(b, _)| *b).collect();
@@ -210,14 +253,15 @@ fn of_model(scene: &Scene, time_s: f64, n: Option<u32>, pixels: &Pixels, listene
     Ok(Drawn { rgba: found.into_iter().map(|p| p.color).collect(), errors })
 }
 
+/// The surfaces in the pixels as they are drawn from the light of their facets.
+fn between(view: &View, placed: &[Surface], facets: &[Lit], pixels: &Pixels) -> Vec<(Behind, f64)> {
+    let radiance: Vec<DVec3> = facets.iter().map(|lit| lit.radiance).collect();
+    let error = root_mean_square(facets.iter().map(|lit| lit.error));
+    pixels.pick(&surfaces::render(view, placed, &radiance)).into_iter().map(|behind| (behind, error)).collect()
+}
+
 /// The surface in a pixel, and what its radiance may be off; black from behind.
-fn seen(
-    view: &View,
-    placed: &[crate::model::surface::Surface],
-    light: &ModelLight<'_>,
-    [i, j]: [u32; 2],
-    number: usize,
-) -> (Behind, f64) {
+fn seen(view: &View, placed: &[Surface], light: &ModelLight<'_>, [i, j]: [u32; 2], number: usize) -> (Behind, f64) {
     let ray = view.ray(i, j);
     let Some((i_surface, hit)) = surfaces::seen(view, placed, ray) else { return (Behind::NOTHING, 0.0) };
     let lit = match hit.is_front {

@@ -14,8 +14,10 @@ use super::pixels::Pixels;
 use crate::error::Result;
 use crate::gpu::shader::cache_folder;
 use crate::io::atomic::write_atomic;
+use crate::model::basis::Sampling;
 use crate::model::film::{Film, FilmFormat, ToneMap};
-use crate::model::scene::{Gather, Lighting, Scene, Simulate, Threading, Threads};
+use crate::model::scene::{Gather, Lighting, Pairs, Scene, Simulate, Threading, Threads};
+use crate::model::sums::Sums;
 
 /// A reference, and where it came from.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,11 +92,12 @@ fn counted(scene: &Scene, against: Against) -> Scene {
         forward,
         facets_per_cloud,
         bases: 1,
-        sampling: crate::model::basis::Sampling::Log,
+        sampling: Sampling::Log,
         exponents: [1.0, 1.0],
         gather: Gather::Exact,
         theta: 0.0,
-        ..scene.lighting
+        pairs: Pairs { size: 1.0, levels: 0, steps: 1 },
+        sums: Sums::default(),
     };
     let film = Film {
         format: FilmFormat::Rgba32f,

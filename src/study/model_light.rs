@@ -32,8 +32,12 @@ pub struct Lit {
 /// How exactly the second reflection is integrated: of a light that is a tenth of all a tenth of a thousandth is left, far below
 /// what pictures are off by.
 const SECOND_ACCURACY: f64 = 1e-3;
-/// Random paths of a receiver, for what comes after the second reflection.
-const N_PATHS: u32 = 2048;
+/// Random paths of a receiver, for what comes after the second reflection: so many at once,
+const N_PATHS: u32 = 128;
+/// until their standard error is this share of what the first two reflections bring,
+const PATHS_ACCURACY: f64 = 2e-3;
+/// or so often.
+const N_BATCHES: u32 = 16;
 
 impl Met {
     /// Of `scene`, whose particles are where `truth` has them.
@@ -99,15 +103,29 @@ impl<'a> ModelLight<'a> {
             lit.error += second.error;
         }
         if self.n_reflections >= 3 {
-            let chance = Chance { n_paths: N_PATHS, seed: i as u32 };
-            let all = self.scenery.reflections(at, toward, self.n_reflections as usize, chance);
-            for further in &all[2..self.n_reflections as usize] {
-                lit.radiance += further.radiance;
-                // Of the same paths: their errors may add up.
-                lit.error += further.error.max_element();
-            }
+            let further = self.further(at, toward, i, PATHS_ACCURACY * lit.radiance.abs().max_element());
+            lit.radiance += further.radiance;
+            lit.error += further.error;
         }
         lit
+    }
+
+    /// What comes after the second reflection, by random paths, to about `accuracy`.
+    fn further(&self, at: &Receiver, toward: DVec3, i: usize, accuracy: f64) -> Lit {
+        let k = self.n_reflections as usize;
+        let (mut sum, mut squares, mut n) = (DVec3::ZERO, 0.0, 0.0);
+        for i_batch in 0..N_BATCHES {
+            let seed = (i as u32).wrapping_mul(N_BATCHES).wrapping_add(i_batch);
+            let all = self.scenery.reflections(at, toward, k, Chance { n_paths: N_PATHS, seed });
+            sum += all[2..k].iter().map(|r| r.radiance).sum::<DVec3>();
+            // Of the same paths: errors of one reflection and the next may add up.
+            let error: f64 = all[2..k].iter().map(|r| r.error.max_element()).sum();
+            (squares, n) = (squares + error * error, n + 1.0);
+            if squares.sqrt() / n <= accuracy {
+                break;
+            }
+        }
+        Lit { radiance: sum / n, error: squares.sqrt() / n }
     }
 }
 

@@ -20,6 +20,7 @@ use crate::reference::transmit::{self, Obstacles};
 use crate::reference::{self, Blob};
 
 /// All stages of one frame up to the light on the facets. Positions relative to the lighting origin.
+#[derive(Clone)]
 pub struct Truth {
     pub setting: Setting,
     pub groups: Vec<Group>,

@@ -3,10 +3,22 @@
 use glam::{DVec3, IVec3};
 use nimbus::model::grid::GridSpec;
 use nimbus::model::light::Light;
-use nimbus::reference::transmit;
+use nimbus::model::sums::{Precision, Sums};
+use nimbus::reference::{rounding, transmit};
 
 use crate::bounded::{self, Bounded};
 use crate::lights::{arrival, double};
+
+/// The sum of terms, and what they and the sum may err: of f64 sums, when it is rounded to f32.
+fn sum_of(terms: &[Bounded], sums: Sums) -> Bounded {
+    if sums == Sums::default() {
+        // As it grows.
+        return terms.iter().fold(Bounded::exact(0.0), |tau, term| tau.plus(*term));
+    }
+    let (value, error) = terms.iter().fold((0.0, 0.0), |(v, e), t| (v + t.value, e + t.error));
+    let share = rounding::sum_error(sums, terms.len() as u64);
+    Bounded { value, error: error + share * (value + error) + 1e-37 * terms.len() as f64 }
+}
 
 /// Numbers of the grid are f32 numbers.
 pub struct March<'a> {
@@ -37,8 +49,15 @@ impl March<'_> {
         [extreme(&enter, f64::max), extreme(&leave, f64::min)]
     }
 
-    /// τ of a march, term by term.
-    pub fn depth(&self, p: [f32; 3], light: &Light, step: f64) -> Bounded {
+    /// τ of a march, term by term, and its sum as it is formed.
+    pub fn depth(&self, p: [f32; 3], light: &Light, step: f64, sums: Sums) -> Bounded {
+        match sums.precision {
+            Precision::F32 => self.depth_in_floats(p, light, step, sums),
+            Precision::F64 => self.depth_in_doubles(p, light, step, sums),
+        }
+    }
+
+    fn depth_in_floats(&self, p: [f32; 3], light: &Light, step: f64, sums: Sums) -> Bounded {
         let way = light.arrival(double(p));
         // A way that passes the box by less than the rounding would pass through its outermost cells, which are empty.
         if transmit::crossing(self.spec, double(p), way.toward, way.distance).is_none() {
@@ -50,20 +69,22 @@ impl March<'_> {
         let length = leave.minus(enter);
         let s = Bounded::once(step * self.spec.cell);
         let n = transmit::n_steps(self.spec, length.value, step);
-        let mut tau = Bounded::exact(0.0);
+        let mut terms = vec![];
         let mut last_error = 0.0;
         for k in 0..n {
             let start = s.times(Bounded::exact(f64::from(k)));
             let rest = length.minus(start);
             let ds = if s.value <= rest.value { s } else { rest };
-            // The lesser of two errs no more than they.
-            let ds = Bounded { error: s.error.max(rest.error), ..ds };
+            // The lesser of two errs no more than they, and where it surely is the step no more than that.
+            let surely_s = s.value + s.error < rest.value - rest.error;
+            let ds = Bounded { error: if surely_s { s.error } else { s.error.max(rest.error) }, ..ds };
             let at = enter.plus(start.plus(ds.scaled(0.5)));
             let x = [0, 1, 2].map(|i| Bounded::exact(f64::from(p[i])).plus(at.times(way.toward[i])));
-            let rho = self.density_at(x);
-            tau = tau.plus(rho.times(ds));
+            let rho = self.density_at(x, bounded::U);
+            terms.push(rho.times(ds));
             last_error = rho.value * (rest.error + s.error) + rho.error * s.value;
         }
+        let tau = sum_of(&terms, sums);
         // A length beside a multiple of the step: one step more or less, no longer than the error of the rest. A last
         // step that the f64 side has and the other lacks is in `last_error` when it is that short; one that only
         // the other has is as short, in no more density than there is anywhere.
@@ -75,19 +96,58 @@ impl March<'_> {
         Bounded { error: tau.error + if beside { last_error + more } else { 0.0 }, ..tau }
     }
 
+    /// The same in doubles: places err by the step, which is an f32 number, and by some hundred roundings of doubles.
+    fn depth_in_doubles(&self, p: [f32; 3], light: &Light, step: f64, sums: Sums) -> Bounded {
+        const SLACK: f64 = 1e-13;
+        let way = light.arrival(double(p));
+        let Some((enter, leave)) = transmit::crossing(self.spec, double(p), way.toward, way.distance) else {
+            return Bounded::exact(0.0);
+        };
+        let (length, s) = (leave - enter, step * self.spec.cell);
+        let rounded = (f64::from(s as f32) - s).abs();
+        let n = transmit::n_steps(self.spec, length, step);
+        let scale = self.spec.low.abs().max_element() + enter.abs() + length;
+        let mut terms = vec![];
+        let mut last_error = 0.0;
+        for k in 0..n {
+            let start = f64::from(k) * s;
+            // The step's own error, or with the last and shorter one that of all the steps before.
+            let moved = f64::from(k + 1) * rounded + SLACK * scale;
+            let ds = Bounded { value: s.min(length - start), error: moved.min(s) };
+            let at = double(p) + (enter + (start + 0.5 * ds.value)) * way.toward;
+            let x = [0, 1, 2].map(|i| Bounded { value: at[i], error: moved * way.toward[i].abs() + SLACK * scale });
+            let rho = self.density_at(x, 0.0);
+            let ds = if length - start > s + moved { Bounded { error: rounded + SLACK * s, ..ds } } else { ds };
+            let error = rho.value * ds.error + rho.error * (ds.value + ds.error);
+            terms.push(Bounded { value: rho.value * ds.value, error: error + SLACK * rho.value * ds.value });
+            last_error = rho.value * ds.error + rho.error * s;
+        }
+        // A step more or less, as in floats.
+        let steps = length / s;
+        let short = (steps + 1.0) * rounded + SLACK * scale;
+        let densest = self.cells.iter().cloned().fold(0.0, f64::max);
+        let beside = (steps - steps.round()).abs() * s <= short;
+        let tau = sum_of(&terms, sums);
+        Bounded { error: tau.error + if beside { last_error + densest * short } else { 0.0 }, ..tau }
+    }
+
     /// Trilinear density: what the position's error makes of it, by the steepest slope among the cells around; and the
-    /// rounding of three levels of (1 − f) a + f b, three operations each, of numbers that are not negative.
-    fn density_at(&self, x: [Bounded; 3]) -> Bounded {
+    /// rounding of three levels of (1 − f) a + f b, three operations each, of numbers that are not negative. `u`: unit
+    /// round-off, 0 where no f32 is rounded.
+    fn density_at(&self, x: [Bounded; 3], u: f64) -> Bounded {
         let value = nimbus::reference::grid::sample(self.spec, self.cells, DVec3::from(x.map(|x| x.value)));
         let exact = Bounded::exact;
-        let g = [0, 1, 2].map(|i| {
-            let offset = x[i].minus(exact(self.spec.low[i]));
-            offset.times(Bounded::once(1.0 / self.spec.cell)).minus(exact(0.5))
+        let g = [0, 1, 2].map(|i| match u > 0.0 {
+            true => x[i].minus(exact(self.spec.low[i])).times(Bounded::once(1.0 / self.spec.cell)).minus(exact(0.5)),
+            false => Bounded {
+                value: (x[i].value - self.spec.low[i]) / self.spec.cell - 0.5,
+                error: x[i].error / self.spec.cell,
+            },
         });
         let base = IVec3::from(g.map(|g| g.value.floor() as i32));
         let (slopes, any) = self.slopes(base);
         let moved: f64 = (0..3).map(|i| slopes[i] * g[i].error).sum();
-        let rounding = if any { 9.0 * bounded::U * (value + moved) * (1.0 + 1e-5) + 1e-37 } else { 0.0 };
+        let rounding = if any { 9.0 * u * (value + moved) * (1.0 + 1e-5) + 1e-37 } else { 0.0 };
         Bounded { value, error: moved + rounding }
     }
 

@@ -87,16 +87,13 @@ impl Scenery<'_> {
 
     /// The next vertex, the direction there, and f cos θ V over the probability.
     fn step(&self, at: &Receiver, toward: DVec3, u: [f64; 4], more: [f64; 4]) -> Option<(Receiver, DVec3, DVec3)> {
-        let discs = !self.discs.is_empty();
-        let choices = if discs { 2.0 } else { 1.0 };
-        if discs && more[0] < 0.5 {
-            let i = ((more[1] * self.discs.len() as f64) as usize).min(self.discs.len() - 1);
-            if at.i_disc == Some(i) {
-                return None;
-            }
-            let (e, direction) = self.of_disc(i, at, DVec3::splat(self.discs.len() as f64 * choices));
-            let w = e * reflectance(&at.brdf, at.normal, direction, toward);
-            return (w != DVec3::ZERO).then(|| (self.on_disc(i), direction, w));
+        let to_discs = match (self.discs.is_empty(), self.rects.is_empty()) {
+            (true, _) => 0.0,
+            (false, true) => 1.0,
+            (false, false) => 0.5,
+        };
+        if more[0] < to_discs {
+            return self.step_to_disc(at, toward, more[1], to_discs);
         }
         let direction = direction(&at.brdf, at.normal, toward, u);
         let cosine = at.normal.dot(direction);
@@ -108,10 +105,28 @@ impl Scenery<'_> {
             return None;
         }
         let position = at.position + t * direction;
-        let v = self.transmittance(at.position, Source::At(position)) * choices;
+        let v = self.transmittance(at.position, Source::At(position)) / (1.0 - to_discs);
         let density = density(&at.brdf, at.normal, toward, direction);
         let w = reflectance(&at.brdf, at.normal, direction, toward) * (v * cosine / density);
         Some((self.on_surface(i, position), direction, w))
+    }
+
+    /// The same to one of the discs, drawn by how much light each would bring if all shone alike and nothing lay between; the
+    /// choice fell on discs with probability `chosen`.
+    fn step_to_disc(&self, at: &Receiver, toward: DVec3, u: f64, chosen: f64) -> Option<(Receiver, DVec3, DVec3)> {
+        let pairs: Vec<f64> =
+            (0..self.discs.len()).map(|i| if at.i_disc == Some(i) { 0.0 } else { self.pair(i, at) }).collect();
+        let sum: f64 = pairs.iter().sum();
+        let mut left = u * sum;
+        let drawn = pairs.iter().position(|pair| {
+            left -= pair;
+            left < 0.0
+        });
+        // None lies before it, or rounding led past the last.
+        let i = drawn.or_else(|| pairs.iter().rposition(|pair| *pair > 0.0))?;
+        let (e, direction) = self.of_disc(i, at, DVec3::splat(sum / (pairs[i] * chosen)));
+        let w = e * reflectance(&at.brdf, at.normal, direction, toward);
+        (w != DVec3::ZERO).then(|| (self.on_disc(i), direction, w))
     }
 }
 

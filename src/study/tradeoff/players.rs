@@ -7,6 +7,7 @@ use super::run::Subject;
 use super::turns::Turn;
 use crate::error::{Error, Result};
 use crate::frame::limits;
+use crate::layout::facet::LitRecord;
 use crate::model::scene::Scene;
 use crate::study::stage::{Bed, Player};
 
@@ -73,6 +74,14 @@ impl<'a> Players<'a> {
         self.kept.push(kept);
         let last = self.kept.last_mut().ok_or_else(|| Error::usage("nothing is kept"))?;
         Ok((&mut last.player, is_new))
+    }
+}
+
+impl Players<'_> {
+    /// The light on the facets of configuration `i`, whose picture was drawn last.
+    pub fn lit(&mut self, i: usize) -> Result<Vec<LitRecord>> {
+        let bed = self.bed;
+        Ok(self.player(i)?.0.renderer.facets(&bed.device)?.1)
     }
 }
 

@@ -22,6 +22,21 @@ pub fn error(error: &Error, color: ColorChoice) {
     eprintln!("{label} {error}");
 }
 
+/// Whether what goes to stdout may be coloured.
+pub fn colored(color: ColorChoice) -> bool {
+    match color {
+        ColorChoice::Always => true,
+        ColorChoice::Never => false,
+        ColorChoice::Auto => std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+    }
+}
+
+/// Characters across a chart: the terminal's, where stdout is one, within what can be read.
+pub fn columns() -> usize {
+    const USUAL: usize = 100;
+    terminal_size::terminal_size().map_or(USUAL, |(width, _)| usize::from(width.0)).clamp(40, 160)
+}
+
 /// Text to stdout. A reader that has gone away (`| head`) is no error.
 pub fn text(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();

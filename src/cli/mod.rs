@@ -52,7 +52,7 @@ pub fn main() -> ExitCode {
             bench::run(a, args.color, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
-        Command::Error(a) => tradeoff::run(a, &STOP, &GRACEFUL),
+        Command::Error(a) => tradeoff::run(a, args.color, &STOP, &GRACEFUL),
         Command::Ledger(a) => ledger::run(a, &STOP, &GRACEFUL),
         Command::Report(a) => report::run(a),
         Command::Inspect(a) => inspect::run(a),

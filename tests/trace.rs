@@ -29,7 +29,7 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
-    let plan = BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false };
+    let plan = BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false, pictures: false };
     let ran = bench::run(stage, &cases, &plan, &AtomicBool::new(false), &mut || {});
     assert_eq!(ran.failure, None);
     let (stage, outcome) = (ran.stage.expect("a stage"), ran.outcome);

@@ -1,5 +1,6 @@
 //! The command line, as typed.
 
+mod results;
 mod study;
 
 use std::path::PathBuf;
@@ -7,13 +8,15 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
+pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
-    nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
+    nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus report before after -o report.html\n  \
+    nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  101 a fault of nimbus itself; 130 interrupted.")]
 pub struct Args {
     #[command(subcommand)]
@@ -74,6 +77,14 @@ pub enum Command {
     /// times are taken in turn; the others are computed in f64. Differences that follow each other can only cancel: the rows'
     /// sum is at least the total, which is checked (exit code 1 where it is not so).
     Ledger(LedgerArgs),
+    /// Make one HTML page of results: where they were measured, plots, tables, pictures
+    ///
+    /// Of every folder that bench, error or ledger wrote: machine and provenance, every figure as a table, frame times and
+    /// passes, time against error, the ledger, and the pictures in it. Where two benches or two studies are given, the later
+    /// ones are compared with the first: ratios with their intervals, the pictures behind a slider, and where they differ.
+    ///
+    /// The page is one file and loads nothing: it can be mailed, kept beside the results, or printed.
+    Report(ReportArgs),
     /// Print a stage's buffer, or what f64 says it should be
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
@@ -157,6 +168,8 @@ pub enum ReferenceArg {
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Time against particles and picture size:\n  \
     nimbus bench scenes/cubes-554.toml --sweep draw.particles=500,5000,50000 --sweep size=800x600,1024x768\n\n\
+    Draw the frame times here, and as SVG files beside the results:\n  \
+    nimbus bench scenes/threads.toml --plot --out run\n\n\
     A scene's [[phase]] sections are timed one by one; --set and --sweep count for each of them.\n\n\
     Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept.")]
 pub struct BenchArgs {
@@ -182,9 +195,12 @@ pub struct BenchArgs {
     /// Blocks of each loop, in the order A B B A …; with an even number a steady drift cancels
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     pub repeat: u32,
-    /// Folder for run.json and frames.csv (with several scenes: a folder each in it)
+    /// Folder for run.json, frames.csv and the last frame of every case as a PNG (with several scenes: a folder each in it)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Draw the frame times below the table; with --out also as frames.svg, and the passes' times as passes.svg
+    #[arg(long)]
+    pub plot: bool,
     /// Write every frame's image hash to frames.csv; reading the frames back disturbs the times
     #[arg(long, requires = "out")]
     pub hash_frames: bool,
@@ -206,56 +222,6 @@ pub enum ThreadingArg {
     Serial,
     Parallel,
     Both,
-}
-
-#[derive(Debug, ClapArgs)]
-#[command(after_help = "Two settings of a scene:\n  \
-    nimbus bench scenes/threads.toml --out before\n  \
-    nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
-    nimbus compare before after --allow scene\n\n\
-    Two builds:\n  nimbus compare old new --allow build\n\n\
-    Two pictures:\n  \
-    nimbus render scenes/hello.toml --reference thin -o thin.exr\n  \
-    nimbus render scenes/hello.toml -o drawn.exr\n  \
-    nimbus compare thin.exr drawn.exr --fail-above rmse=1e-3 --fail-below ssim=0.99\n\n\
-    Exit codes: 0 compared, whatever the verdict; 1 a metric is beyond --fail-above or --fail-below;\n  \
-    2 not comparable, or neither results of nimbus bench nor pictures.")]
-pub struct CompareArgs {
-    /// Results folder (`nimbus bench --out DIR`) or picture to measure by
-    pub a: PathBuf,
-    /// Results folder that may be faster or slower, or picture that may be off
-    pub b: PathBuf,
-    /// What may differ between A and B; anything else that does is refused
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…", help_heading = "Results")]
-    pub allow: Vec<SamenessArg>,
-    /// Write every pixel's FLIP error as a picture, dark for none
-    #[arg(short, long, value_name = "FILE.png", help_heading = "Pictures")]
-    pub output: Option<PathBuf>,
-    /// Replace an existing file
-    #[arg(long, requires = "output", help_heading = "Pictures")]
-    pub force: bool,
-    /// Pixels that a degree of the eye's field of view sees, for FLIP [default: 67]
-    #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Pictures")]
-    pub pixels_per_degree: Option<f64>,
-    /// Exit with 1 where a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or not_finite (repeatable)
-    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
-    pub fail_above: Vec<(String, f64)>,
-    /// Exit with 1 where a metric is less: psnr or ssim (repeatable)
-    #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
-    pub fail_below: Vec<(String, f64)>,
-    /// JSON in place of the table
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SamenessArg {
-    /// Device, driver, processor, and variables that change what drivers do
-    Device,
-    /// Version and revision of nimbus
-    Build,
-    /// The scene's settings and files
-    Scene,
 }
 
 #[derive(Debug, ClapArgs)]

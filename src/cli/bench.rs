@@ -4,8 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
+use clap::ColorChoice;
+
 use super::args::{BenchArgs, ThreadingArg};
-use super::{bench_table, device_choice, load, output, say_sizes, warnings_of};
+use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
 use crate::frame::limits;
 use crate::gpu::ClockFit;
@@ -13,18 +15,19 @@ use crate::io::atomic;
 use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Ran};
+use crate::study::beside::Beside;
 use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points, sweep_text};
 use crate::study::machine;
 use crate::study::outcome::pass_names;
 use crate::study::records::{self, Run};
 use crate::study::stage::Stage;
-use crate::study::trace::{self, Beside};
+use crate::study::trace;
 
 /// Of the device's clock beside the host's, before the frames and after them.
 const N_CLOCK_READINGS: usize = 8;
 
-/// `zones`: where what the threads do is collected.
-pub fn run(args: &BenchArgs, stop: &AtomicBool, zones: Option<&Zones>) -> Result<()> {
+/// `zones`: where what the threads do is collected; `color`: of charts.
+pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Option<&Zones>) -> Result<()> {
     let outs = out_dirs(args)?;
     if let Some(file) = &args.trace {
         super::refuse_existing(file, args.force)?;
@@ -42,7 +45,7 @@ pub fn run(args: &BenchArgs, stop: &AtomicBool, zones: Option<&Zones>) -> Result
     let mut runs = Vec::new();
     let mut ended = None;
     for (scene, out) in args.scenes.iter().zip(&outs) {
-        let (run, end) = match bench_one(args, scene, out.as_deref(), stop, zones) {
+        let (run, end) = match bench_one((args, color), scene, out.as_deref(), stop, zones) {
             Ok((run, end)) => (Some(run), end),
             Err(error) => (None, Some(error)),
         };
@@ -159,7 +162,7 @@ fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
 
 /// The run, and why it ended before its end, if it did.
 fn bench_one(
-    args: &BenchArgs,
+    (args, color): (&BenchArgs, ColorChoice),
     path: &Path,
     out: Option<&Path>,
     stop: &AtomicBool,
@@ -167,7 +170,12 @@ fn bench_one(
 ) -> Result<(Run, Option<Error>)> {
     let date = machine::utc_now();
     let Prepared { cases, scene_hash, resolved } = prepare(args, path, &args.options)?;
-    let plan = BenchPlan { n_warm_up: args.warmup, n_rounds: args.repeat, hash_frames: args.hash_frames };
+    let plan = BenchPlan {
+        n_warm_up: args.warmup,
+        n_rounds: args.repeat,
+        hash_frames: args.hash_frames,
+        pictures: out.is_some(),
+    };
     let mut stage = open(args, &cases)?;
     if args.options.verbose {
         say_sizes(&stage.scene, Some(&stage));
@@ -205,20 +213,26 @@ fn bench_one(
         chosen: outcome.chosen.clone(),
         interrupted: outcome.interrupted || failure.is_some(),
     };
+    let rows = if out.is_some() || args.plot { outcome.rows(&cases) } else { vec![] };
     if let Some(dir) = out {
-        records::write_results(dir, &run, &pass_names(), &outcome.rows(&cases))?;
+        let charts = if args.plot { bench_plot::files(&run, &rows)? } else { vec![] };
+        let beside = Beside { pictures: outcome.pictures.clone(), charts };
+        records::write_results_with(dir, &run, &pass_names(), &rows, &beside)?;
     }
     if !args.json {
         let same: Vec<Option<bool>> =
             cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case)).collect();
         output::text(&bench_table::report(path, &run, &same, args.options.verbose))?;
+        if args.plot {
+            output::text(&bench_plot::text(&run, &rows, color)?)?;
+        }
     }
     if let Some(file) = &args.trace {
         if let Some(stage) = &stage {
             readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
         }
         let zones = zones.map(Zones::take);
-        trace::write(file, &outcome.samples, &Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
+        trace::write(file, &outcome.samples, &trace::Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
     }
     for chosen in outcome.chosen.iter().filter(|_| !args.options.quiet) {
         eprintln!("note: {chosen}");

@@ -17,6 +17,7 @@ use crate::study::ledger::run::Setup;
 use crate::study::machine;
 use crate::study::picture::Work;
 use crate::study::pixels::Pixels;
+use crate::study::plot;
 use crate::study::provenance::{Figure, Provenance};
 use crate::study::records::prepare_out_dir;
 use crate::study::stage::Bed;
@@ -57,6 +58,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     let ledger = measure(args, &bed, &scene, time_s, made, stop)?;
     if let Some(out) = &args.out {
         write(&out.join(LEDGER_FILE), &ledger)?;
+        output::write_chart(&out.join("ledger.svg"), &plot::ledger::chart(&ledger))?;
     }
     if args.json {
         output::object(&ledger)?;

@@ -3,6 +3,7 @@
 pub mod args;
 mod attach;
 mod bench;
+mod bench_plot;
 mod bench_table;
 mod compare;
 mod compare_pictures;
@@ -12,6 +13,7 @@ mod ledger;
 mod output;
 mod render;
 mod render_reference;
+mod report;
 mod tradeoff;
 mod tradeoff_table;
 
@@ -47,11 +49,12 @@ pub fn main() -> ExitCode {
         Command::Render(a) => render::run(a),
         Command::Bench(a) => {
             GRACEFUL.store(true, Ordering::Relaxed);
-            bench::run(a, &STOP, zones.as_ref())
+            bench::run(a, args.color, &STOP, zones.as_ref())
         }
         Command::Compare(a) => compare::run(a),
-        Command::Error(a) => tradeoff::run(a, &STOP, &GRACEFUL),
+        Command::Error(a) => tradeoff::run(a, args.color, &STOP, &GRACEFUL),
         Command::Ledger(a) => ledger::run(a, &STOP, &GRACEFUL),
+        Command::Report(a) => report::run(a),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
     };

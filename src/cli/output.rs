@@ -1,6 +1,7 @@
 //! Writing for people and for programs.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -10,6 +11,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
+use crate::io::atomic::write_atomic;
+use crate::study::plot::Plot;
 
 /// `error: …` on stderr.
 pub fn error(error: &Error, color: ColorChoice) {
@@ -22,6 +25,21 @@ pub fn error(error: &Error, color: ColorChoice) {
     eprintln!("{label} {error}");
 }
 
+/// Whether what goes to stdout may be coloured.
+pub fn colored(color: ColorChoice) -> bool {
+    match color {
+        ColorChoice::Always => true,
+        ColorChoice::Never => false,
+        ColorChoice::Auto => std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+    }
+}
+
+/// Characters across a chart: the terminal's, where stdout is one, within what can be read.
+pub fn columns() -> usize {
+    const USUAL: usize = 100;
+    terminal_size::terminal_size().map_or(USUAL, |(width, _)| usize::from(width.0)).clamp(40, 160)
+}
+
 /// Text to stdout. A reader that has gone away (`| head`) is no error.
 pub fn text(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
@@ -29,6 +47,12 @@ pub fn text(text: &str) -> Result<()> {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(fail(e)),
         _ => Ok(()),
     }
+}
+
+/// A chart as an SVG file.
+pub fn write_chart(path: &Path, chart: &impl Plot) -> Result<()> {
+    let svg = chart.svg(chart.size())?;
+    write_atomic(path, |file| file.write_all(svg.as_bytes()))
 }
 
 /// Rows as CSV with a header, or as a JSON array.

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use clap::ColorChoice;
 use indicatif::ProgressBar;
 
 use super::args::{ErrorArgs, MetricArg, TimeArg};
@@ -13,7 +14,6 @@ use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
 use crate::frame::limits;
 use crate::io::image;
-use crate::io::scene_file::LoadedScene;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
@@ -22,6 +22,7 @@ use crate::study::kept::{self, Kept};
 use crate::study::machine;
 use crate::study::picture::Work;
 use crate::study::pixels::Pixels;
+use crate::study::plot::{self, Plot};
 use crate::study::provenance::{Provenance, ReferenceRecord};
 use crate::study::records::{Setting, prepare_out_dir};
 use crate::study::stage::Bed;
@@ -35,17 +36,16 @@ use crate::study::tradeoff::run::{Event, Found, Loaded, Setup, StudyPlan};
 use crate::study::tradeoff::turns::Time;
 
 /// `graceful`: set once there is something to keep on Ctrl-C.
-pub fn run(args: &ErrorArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
     if let (Some(out), false) = (&args.out, args.resume) {
         super::refuse_existing(out, args.force)?;
     }
     let options = plain(args)?;
     let base = load(&args.scene, &options)?;
-    let (scene_hash, resolved) = (base.hash.clone(), base.resolved.clone());
     let time_s = base.scene.time.at(args.frame);
-    let loaded = LoadedScene { scene: base.clone().at_frame(args.frame), ..base };
-    super::check_time(&loaded.scene, time_s)?;
-    let (scene, film) = (&loaded.scene, loaded.scene.film);
+    let scene = &base.clone().at_frame(args.frame);
+    super::check_time(scene, time_s)?;
+    let film = scene.film;
     let axes = axes(args, scene)?;
     check_values(args, &options, &axes, &film)?;
     let bed = Bed::open(&device_choice(&args.options))?;
@@ -58,30 +58,11 @@ pub fn run(args: &ErrorArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result
     let metric = metric(args.metric);
     let pixels = Pixels::sample(film.width, film.height, args.pixels);
     let kept = reference(args, scene, time_s, &pixels)?;
-    let plan = StudyPlan {
-        axes,
-        design: if args.grid { Design::Grid } else { Design::Alone },
-        metric,
-        time,
-        n_rounds: args.rounds as usize,
-    };
-    let mut study = Study {
-        made: Provenance::now(
-            SCHEMA_VERSION,
-            &args.scene,
-            &LoadedScene { hash: scene_hash, resolved, ..loaded.clone() },
-            bed.device.info(),
-            clocks,
-        ),
-        reference: ReferenceRecord::of(&kept, args.against, &pixels, args.frame, time_s),
-        metric: metric.name().into(),
-        time: time.name().into(),
-        rounds: 0,
-        frames: args.frames,
-        configurations: Vec::new(),
-        best: Vec::new(),
-        interrupted: false,
-    };
+    let design = if args.grid { Design::Grid } else { Design::Alone };
+    let plan = StudyPlan { axes, design, metric, time, n_rounds: args.rounds as usize };
+    let made = Provenance::now(SCHEMA_VERSION, &args.scene, &base, bed.device.info(), clocks);
+    let reference = ReferenceRecord::of(&kept, args.against, &pixels, args.frame, time_s);
+    let mut study = begun(args, made, reference, &plan);
     let mut found = earlier(args, &study)?;
     sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
@@ -106,14 +87,30 @@ pub fn run(args: &ErrorArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result
     sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
         files::write(out, &study, &found)?;
+        output::write_chart(&out.join("front.svg"), &plot::tradeoff::chart(&study))?;
     }
     done?;
-    print(args, &study)?;
+    print(args, color, &study)?;
     bed.close()?;
     if study.interrupted { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-fn print(args: &ErrorArgs, study: &Study) -> Result<()> {
+/// A study that has found nothing yet.
+fn begun(args: &ErrorArgs, made: Provenance, reference: ReferenceRecord, plan: &StudyPlan) -> Study {
+    Study {
+        made,
+        reference,
+        metric: plan.metric.name().into(),
+        time: plan.time.name().into(),
+        rounds: 0,
+        frames: args.frames,
+        configurations: Vec::new(),
+        best: Vec::new(),
+        interrupted: false,
+    }
+}
+
+fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     if args.json {
         return output::object(study);
     }
@@ -121,7 +118,12 @@ fn print(args: &ErrorArgs, study: &Study) -> Result<()> {
         let rows: Vec<_> = study.configurations.iter().map(files::csv_row).collect();
         return output::rows(&rows, false);
     }
-    output::text(&tradeoff_table::report(study))
+    output::text(&tradeoff_table::report(study))?;
+    if !args.plot {
+        return Ok(());
+    }
+    let chart = plot::tradeoff::chart(study);
+    output::text(&format!("\n{}", chart.text(output::columns(), chart.rows(), output::colored(color))?))
 }
 
 /// The options, with every cloud plain where that is asked for.

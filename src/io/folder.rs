@@ -12,8 +12,9 @@ use std::path::Path;
 use super::atomic::{Temporary, in_progress};
 use crate::error::{Error, Result};
 
-/// Makes `folder` hold the `files` that `write` puts into the folder it is given, which may be asked for twice. Readers
-/// look for the last of `files` first. When `write` fails the old files stay.
+/// Makes `folder` hold the `files` that `write` puts into the folder it is given, which may be asked for twice; those of
+/// `files` that it does not make are gone then. Readers look for the last of `files`, which it must make, first. When `write`
+/// fails the old files stay.
 pub fn replace_files(folder: &Path, files: &[&str], write: impl Fn(&Path) -> Result<()>) -> Result<()> {
     if exchanged(folder, files, &write)? { Ok(()) } else { one_by_one(folder, files, &write) }
 }
@@ -38,7 +39,7 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
         fs::rename(&last, &aside).map_err(failed)?;
     }
     for (i, name) in files.iter().enumerate() {
-        if let Err(cause) = fs::rename(staged.path.join(name), folder.join(name)) {
+        if let Err(cause) = moved_or_removed(&staged.path.join(name), &folder.join(name)) {
             // With no file replaced the old ones are whole again; else the old last one is kept where it is.
             if i == 0 && had_one {
                 fs::rename(&aside, &last).map_err(failed)?;
@@ -50,6 +51,17 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
         }
     }
     Ok(())
+}
+
+/// `new` in the place of `old`, or nothing there where there is no new one.
+fn moved_or_removed(new: &Path, old: &Path) -> std::io::Result<()> {
+    match new.symlink_metadata() {
+        Ok(_) => fs::rename(new, old),
+        Err(_) => match fs::remove_file(old) {
+            Err(cause) if cause.kind() != std::io::ErrorKind::NotFound => Err(cause),
+            _ => Ok(()),
+        },
+    }
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -247,6 +259,28 @@ mod tests {
             way(&folder, &|f| write_both("half")(f).and(Err(Error::usage("no more")))).unwrap_err();
             assert_eq!(tree(&folder), expected("new"));
             assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nor of what failed");
+        }
+    }
+
+    #[test]
+    fn what_is_not_made_again_is_gone() {
+        for at_once in [true, false] {
+            let dir = tempfile::tempdir().unwrap();
+            let folder = dir.path().join("run");
+            fs::create_dir(&folder).unwrap();
+            write_both("old")(&folder).unwrap();
+            for name in ["stale", "mine"] {
+                fs::write(folder.join(name), "old").unwrap();
+            }
+            // One that neither run has is no error.
+            let files = ["rows", "stale", "never", "head"];
+            match at_once {
+                true => replace_files(&folder, &files, write_both("new")).unwrap(),
+                false => one_by_one(&folder, &files, &write_both("new")).unwrap(),
+            }
+            let left = tree(&folder);
+            let expected = [("head", "new"), ("mine", "old"), ("rows", "new")];
+            assert_eq!(left, expected.map(|(name, text)| (name.to_owned(), text.to_owned())));
         }
     }
 

@@ -75,6 +75,14 @@ pub fn write_bytes(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<(
     write_atomic(path, |writer| PngEncoder::new(writer).write_image(rgb, width, height, ExtendedColorType::Rgb8))
 }
 
+/// 8-bit sRGB as the bytes of a PNG file. Panics where `rgb` is not width × height pixels.
+pub fn png_bytes(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    let encoded = PngEncoder::new(&mut bytes).write_image(rgb, width, height, ExtendedColorType::Rgb8);
+    encoded.map_err(|cause| Error::Fault { what: format!("a picture could not be encoded: {cause}") })?;
+    Ok(bytes)
+}
+
 /// Writes what the extension asks for.
 pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
     match ImageKind::of(path)? {

@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::frame::FrameTimes;
 use crate::frame::render::Renderer;
 use crate::gpu::shader::hex;
+use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, Scene};
 
 /// How long and how often.
@@ -23,6 +24,17 @@ pub struct BenchPlan {
     pub n_rounds: u32,
     /// Read back and hash every frame, which adds to the next one's time.
     pub hash_frames: bool,
+    /// Keep the last frame of every case, read back once all its blocks are timed.
+    pub pictures: bool,
+}
+
+/// A frame as it is shown: 8-bit sRGB, three bytes a pixel.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Shown {
+    pub i_case: usize,
+    pub width: u32,
+    pub height: u32,
+    pub rgb: Vec<u8>,
 }
 
 /// One frame of one block.
@@ -56,6 +68,8 @@ pub struct Outcome {
     pub notes: Vec<String>,
     /// What every "auto" of what draws came to, and why.
     pub chosen: Vec<String>,
+    /// The last frames, where they were asked for, of the cases that ran to their end.
+    pub pictures: Vec<Shown>,
     pub interrupted: bool,
 }
 
@@ -109,6 +123,10 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
             if is_last {
                 ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
+                // Of a block that was cut short the last frame is another one.
+                if plan.pictures && !stop.load(Ordering::Relaxed) {
+                    ran.outcome.pictures.push(shown(i_case, case, &mut stage.renderer)?);
+                }
             }
             Ok(())
         };
@@ -176,6 +194,13 @@ fn frames_of(case: &Case, n_warm_up: u32) -> impl Iterator<Item = u32> + Send + 
     (first..end).map(|i| u32::try_from(i.unsigned_abs()).unwrap_or(u32::MAX))
 }
 
+/// The last frame over the background, tone-mapped.
+fn shown(i_case: usize, case: &Case, renderer: &mut Renderer) -> Result<Shown> {
+    let film = case.scene.film;
+    let rgb = display_bytes(&film, film.width, film.height, &renderer.image()?);
+    Ok(Shown { i_case, width: film.width, height: film.height, rgb })
+}
+
 /// SHA-256 of the last frame, as it lies in the target.
 fn image_hash(renderer: &mut Renderer) -> Result<String> {
     Ok(hex(&Sha256::digest(renderer.image_bytes()?)))
@@ -216,7 +241,7 @@ mod tests {
         let there = ["0serial", "0parallel", "0serial no-skip", "1serial", "1parallel"];
         let back = there.iter().rev();
         assert_eq!(names(&two, 2).trim_end(), there.iter().chain(back).copied().collect::<Vec<_>>().join(" "));
-        let plan = BenchPlan { n_warm_up: 2, n_rounds: 2, hash_frames: false };
+        let plan = BenchPlan { n_warm_up: 2, n_rounds: 2, hash_frames: false, pictures: false };
         assert_eq!(n_frames_total(&two, &plan), 2 * (3 * 8 + 2 * 7));
     }
 }

@@ -10,6 +10,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::beside::{self, Beside};
 use super::cases::sweep_text;
 use super::machine::{Clocks, Cpu, Device};
 use super::overlap::Overlap;
@@ -264,7 +265,26 @@ pub fn prepare_out_dir(path: &Path, force: bool) -> Result<()> {
 
 /// Both files, at once: never a `run.json` beside another run's frames.
 pub fn write_results(out_dir: &Path, run: &Run, pass_names: &[String], rows: &[FrameRow]) -> Result<()> {
-    replace_files(out_dir, &[FRAMES_FILE, RUN_FILE], |folder| {
+    write_results_with(out_dir, run, pass_names, rows, &Beside::default())
+}
+
+/// The same, and at once with them what lies beside them; of an earlier run's pictures and charts none is left.
+pub fn write_results_with(
+    out_dir: &Path,
+    run: &Run,
+    pass_names: &[String],
+    rows: &[FrameRow],
+    beside: &Beside,
+) -> Result<()> {
+    let mut names = beside::names_in(out_dir);
+    names.extend([FRAMES_FILE, RUN_FILE].map(str::to_owned));
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    // Those that are only now made, too: RUN_FILE stays the last.
+    let made = beside.names();
+    let all: Vec<&str> =
+        made.iter().map(String::as_str).filter(|name| !names.contains(name)).chain(names.clone()).collect();
+    replace_files(out_dir, &all, |folder| {
+        beside.write(folder)?;
         write_frames(&folder.join(FRAMES_FILE), pass_names, rows)?;
         write_run(&folder.join(RUN_FILE), run)
     })

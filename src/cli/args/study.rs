@@ -104,7 +104,7 @@ pub struct LedgerArgs {
     /// Timed frames of a turn
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub frames: u32,
-    /// Folder for ledger.json
+    /// Folder for ledger.json and ledger.svg
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Replace existing results

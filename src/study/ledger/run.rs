@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
-use crate::study::against::{Against, Drawn};
+use crate::study::against::{Against, Drawn, of_model, of_scene_light};
 use crate::study::model_light::reflections_of;
 use crate::study::picture::{Drawing, Listener, Work};
 use crate::study::pixels::Pixels;
@@ -120,7 +120,6 @@ impl Setup<'_> {
         let scene = &Against::of_scene(scene);
         let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
         let is_lit = scene.lighting.mode != LightingMode::None;
-        let words = |from: &str, to: &str| [from.to_owned(), to.to_owned()];
         let mut by_device = truth.clone();
         if is_lit {
             let lit = players.lit(i)?;
@@ -129,9 +128,7 @@ impl Setup<'_> {
             // As it is, it is exact: what it should be is told by the rows below.
             by_device.second_error = Vec::new();
         }
-        let draw = |truth: &Truth, drawing: Drawing| {
-            Shown::of(crate::study::against::of_scene_light(scene, truth, drawing, pixels, listener))
-        };
+        let draw = |truth: &Truth, drawing: Drawing| Shown::of(of_scene_light(scene, truth, drawing, pixels, listener));
         chain.add("drawing", words("f32", "f64"), false, draw(&by_device, Drawing::Thin));
         if self.is_stopped() {
             return Ok(());
@@ -142,18 +139,32 @@ impl Setup<'_> {
         if !is_lit || self.is_stopped() {
             return Ok(());
         }
+        self.light(scene, &truth, &by_device, chain, listener)
+    }
+
+    /// The pictures that differ in light alone, from the device's, which `by_device` has, to that of more reflections.
+    fn light(
+        &self,
+        scene: &Scene,
+        truth: &Truth,
+        by_device: &Truth,
+        chain: &mut Chain,
+        listener: Listener,
+    ) -> Result<()> {
+        let (time_s, pixels) = (self.frames.time_s, self.pixels);
+        let draw = |truth: &Truth| Shown::of(of_scene_light(scene, truth, Drawing::Volume, pixels, listener));
         let first = Truth { second: by_device.second.clone(), second_error: Vec::new(), ..truth.clone() };
         // The reference of surfaces' light knows no density grid.
         let on_both = scene.n_particles() > 0 && !scene.surfaces.is_empty();
         let of_first = if on_both { words("f32, grid", "f64, closed form on surfaces") } else { words("f32", "f64") };
-        chain.add("first reflection", of_first, false, draw(&first, Drawing::Volume));
+        chain.add("first reflection", of_first, false, draw(&first));
         if reflections_of(scene) > 1 {
-            chain.add("second reflection", words("pairs in f32", "areas in f64"), false, draw(&truth, Drawing::Volume));
+            chain.add("second reflection", words("pairs in f32", "areas in f64"), false, draw(truth));
         }
         let k = reflections_of(scene);
         let mut model = |name: &str, [from, to]: [String; 2], by_facet: bool, n: u32| -> Result<()> {
             if !self.is_stopped() {
-                let drawn = crate::study::against::of_model(scene, time_s, Some(n), by_facet, pixels, listener)?;
+                let drawn = of_model(scene, time_s, Some(n), by_facet, pixels, listener)?;
                 chain.add(name, [from, to], false, Shown::of(drawn));
             }
             Ok(())
@@ -250,6 +261,10 @@ impl Shown {
         let own_error = drawn.own_error();
         Shown { rgba: drawn.rgba, own_error }
     }
+}
+
+fn words(from: &str, to: &str) -> [String; 2] {
+    [from.to_owned(), to.to_owned()]
 }
 
 /// Time of player `i` by that of player `i + 1`, which does without one more; in every round they are neighbours.

@@ -26,7 +26,7 @@ use crate::study::plot::{self, Plot};
 use crate::study::provenance::{Provenance, ReferenceRecord};
 use crate::study::records::{Setting, prepare_out_dir};
 use crate::study::stage::Bed;
-use crate::study::tradeoff::design::Design;
+use crate::study::tradeoff::design::{Design, name_of, settings};
 use crate::study::tradeoff::files;
 use crate::study::tradeoff::front::{Metric, best_within_error, best_within_ms};
 use crate::study::tradeoff::knobs::default_axes;
@@ -47,24 +47,29 @@ pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &A
     super::check_time(scene, time_s)?;
     let film = scene.film;
     let axes = axes(args, scene)?;
+    check_values(args, &options, &axes, &film)?;
     let bed = Bed::open(&device_choice(&args.options))?;
     limits::check(scene, bed.device.limits())?;
     let clocks = machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
     if args.options.verbose {
         say_sizes(scene, None);
     }
+    let time = time(args, bed.device.limits().timestamp_valid_bits > 0)?;
+    let metric = metric(args.metric);
     let pixels = Pixels::sample(film.width, film.height, args.pixels);
     let kept = reference(args, scene, time_s, &pixels)?;
-    let (metric, time) = (metric(args.metric), time(args, bed.device.limits().timestamp_valid_bits > 0)?);
     let design = if args.grid { Design::Grid } else { Design::Alone };
     let plan = StudyPlan { axes, design, metric, time, n_rounds: args.rounds as usize };
     let made = Provenance::now(SCHEMA_VERSION, &args.scene, &base, bed.device.info(), clocks);
     let reference = ReferenceRecord::of(&kept, args.against, &pixels, args.frame, time_s);
     let mut study = begun(args, made, reference, &plan);
     let mut found = earlier(args, &study)?;
+    sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
         write_spread(&out.join("reference.png"), &film, &pixels, &kept.reference.rgba)?;
+        // However early it is ended, the folder holds a study that can be gone on with, and no earlier one's.
+        files::write(out, &Study { interrupted: true, ..study.clone() }, &found)?;
     }
     graceful.store(true, Ordering::Relaxed);
     let frames = Frames { i_frame: args.frame, time_s, n_frames: args.frames, as_played: args.as_played };
@@ -131,6 +136,8 @@ fn plain(args: &ErrorArgs) -> Result<super::SceneArgs> {
     Ok(options)
 }
 
+const ONE_SIZE: &str = "pictures of several sizes cannot be compared with one reference";
+
 /// The knobs' values: those named, or all that can change the scene.
 fn axes(args: &ErrorArgs, scene: &Scene) -> Result<Vec<Axis>> {
     if args.knob.is_empty() {
@@ -143,16 +150,30 @@ fn axes(args: &ErrorArgs, scene: &Scene) -> Result<Vec<Axis>> {
         if axes[..i].iter().any(|before| before.key == *key) {
             return refuse("the key twice; name all its values in one");
         }
-        if key == SIZE_KEY || key.starts_with("film.width") || key.starts_with("film.height") {
-            return refuse("pictures of several sizes cannot be compared with one reference");
+        if key == SIZE_KEY {
+            return refuse(ONE_SIZE);
         }
-        if key.starts_with("time.") || key.starts_with("threads.") || key.starts_with("camera.") {
+        let table = key.split('.').next().unwrap_or_default().trim();
+        if ["title", "time", "threads", "camera", "phase"].contains(&table) {
             return refuse(
                 "changes no picture, or which picture it is; expected a key of film, lighting, draw, cloud or surface",
             );
         }
     }
     Ok(axes)
+}
+
+/// Refuses a value that the scene cannot have, before anything takes time and before anything is written.
+fn check_values(args: &ErrorArgs, options: &super::SceneArgs, axes: &[Axis], film: &Film) -> Result<()> {
+    // Those that nobody named are checked when they are run.
+    let named = if args.knob.is_empty() { &[] } else { axes };
+    settings(named, Design::Alone).iter().try_for_each(|alone| {
+        let Film { width, height, .. } = load_with(args, options, alone)?.scene.film;
+        match (width, height) == (film.width, film.height) {
+            true => Ok(()),
+            false => Err(Error::usage(format!("--knob {}: {ONE_SIZE}", name_of(alone)))),
+        }
+    })
 }
 
 /// The scene with a configuration's settings. What is wrong with one is the knob's fault.
@@ -221,6 +242,8 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
         ("the build", before.made.revision == study.made.revision),
         ("the time that decides", before.time == study.time),
         ("--frames", before.frames == study.frames),
+        ("--frame", before.reference.frame == study.reference.frame),
+        ("--as-played", is_as_played(&before) == args.as_played),
     ];
     let differ: BTreeSet<&str> = same.iter().filter(|(_, same)| !same).map(|(what, _)| *what).collect();
     if !differ.is_empty() {
@@ -228,6 +251,11 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
         return Err(Error::io(out, format!("is of another study; what differs: {what}")));
     }
     Ok(found)
+}
+
+/// Whether the frames of an earlier run left out what they could.
+fn is_as_played(before: &Study) -> bool {
+    before.made.command.iter().any(|word| word == "--as-played")
 }
 
 fn sum_up(args: &ErrorArgs, study: &mut Study, found: &Found, metric: Metric, time: Time) {

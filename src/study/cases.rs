@@ -73,8 +73,10 @@ impl Axis {
     /// The same, as the argument `name` has it.
     pub fn parse_as(name: &str, text: &str) -> Result<Axis> {
         let wrong = |what: &str| {
-            let expected = "expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4 or size=800x600,1024x768";
-            Error::usage(format!("{name} {text}: {what}; {expected}"))
+            // A study compares pictures of one size.
+            let or_size = if name == "--sweep" { " or size=800x600,1024x768" } else { "" };
+            let expected = "expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4";
+            Error::usage(format!("{name} {text}: {what}; {expected}{or_size}"))
         };
         let (key, list) = text.split_once('=').ok_or_else(|| wrong("no `=`"))?;
         let values = split(list);

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::records::{Ledger, Row};
 use super::steps::{Step, steps, ungrouped};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
@@ -87,7 +87,7 @@ impl Setup<'_> {
             }
         }
         let turns = self.turns(&mut players, scenes.len())?;
-        Ok(self.sum_up(made, &chain, &turns))
+        self.sum_up(made, &chain, &turns)
     }
 
     fn device_steps(&self) -> Vec<Step> {
@@ -199,20 +199,21 @@ impl Setup<'_> {
         Ok(rounds)
     }
 
-    fn sum_up(&self, made: Provenance, chain: &Chain, rounds: &[Vec<Turn>]) -> Ledger {
+    fn sum_up(&self, made: Provenance, chain: &Chain, rounds: &[Vec<Turn>]) -> Result<Ledger> {
         let nothing = Figure { value: 0.0, low: None, high: None };
         let compare = |a: &Shown, b: &Shown| {
             let own_error = a.own_error + b.own_error;
             let found = picture_error(self.pixels, &a.rgba, &b.rgba, own_error);
-            (found.map_or(Figure { value: f64::INFINITY, ..nothing }, |(error, _)| error.rmse), own_error)
+            let what = "a picture of the scene holds values that are no finite numbers";
+            found.map(|(error, _)| (error.rmse, own_error)).ok_or_else(|| Error::usage(what))
         };
         let (Some(first), Some(last)) = (chain.pictures.first(), chain.pictures.last()) else {
-            return self.empty(made, nothing);
+            return Ok(self.empty(made, nothing));
         };
         let squares: f64 = last.rgba.iter().flatten().map(|v| v * v).sum();
         let magnitude = (squares / (4 * last.rgba.len()).max(1) as f64).sqrt();
         let pairs = chain.pictures.windows(2).map(|pair| compare(&pair[0], &pair[1]));
-        let errors: Vec<(Figure, f64)> = pairs.collect();
+        let errors: Vec<(Figure, f64)> = pairs.collect::<Result<_>>()?;
         let sum: f64 = errors.iter().map(|(error, _)| error.value).sum();
         let row = |(i, (between, (error, own_error))): (usize, (&Between, &(Figure, f64)))| Row {
             name: between.name.clone(),
@@ -227,13 +228,13 @@ impl Setup<'_> {
             note: None,
         };
         let rows: Vec<Row> = chain.between.iter().zip(&errors).enumerate().map(row).collect();
-        let (total, _) = compare(first, last);
+        let (total, _) = compare(first, last)?;
         // A root mean square is a norm: of differences that follow each other the sum's is at most the sum of theirs, but for
         // the rounding of both.
         let holds = total.value <= sum * (1.0 + 1e-9) + 1e-15;
         let interrupted = self.is_stopped();
         let cancelled = sum - total.value;
-        Ledger { magnitude, rows, total, sum, cancelled, holds, interrupted, ..self.empty(made, nothing) }
+        Ok(Ledger { magnitude, rows, total, sum, cancelled, holds, interrupted, ..self.empty(made, nothing) })
     }
 
     fn empty(&self, made: Provenance, nothing: Figure) -> Ledger {

@@ -1,0 +1,400 @@
+//! `nimbus error` and `nimbus ledger` as a user types them: what stands in the results' folder, and what a study
+//! goes on from.
+
+#[path = "harness/program.rs"]
+mod program;
+#[path = "harness/tiny.rs"]
+mod tiny;
+
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tiny::{HEIGHT, N_PIXELS, OUT, SHORT, Table, Tiny, WIDTH, assert_valid, names, size, study};
+
+const TWO_KNOBS: [&str; 4] = ["--knob", "draw.cutoff=2,3", "--knob", "draw.sort_bits=16,32"];
+
+/// What follows from the divisions and logarithms of two ways to the same figure.
+const ROUNDING: f64 = 1e-12;
+
+fn is_near(a: f64, b: f64) -> bool {
+    (a - b).abs() <= ROUNDING * b.abs()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let n = values.len();
+    0.5 * (values[(n - 1) / 2] + values[n / 2])
+}
+
+/// A picture's pixels.
+fn pixels(tiny: &Tiny, name: &str) -> Vec<u8> {
+    image::open(tiny.path(name)).expect(name).into_rgba8().into_raw()
+}
+
+#[test]
+fn a_study_is_one_in_all_its_files() {
+    let tiny = Tiny::new();
+    let budgets = ["--budget-ms=1e-9", "--budget-ms=1e9", "--budget-error=1e-9", "--budget-error=9"];
+    let printed = tiny.good(&[&SHORT[..], &TWO_KNOBS, &OUT, &budgets, &["--json"]].concat());
+    let json = tiny.json("out/study.json");
+    assert_eq!(serde_json::from_str::<Value>(&printed).expect("JSON"), json);
+    assert_valid(&json, "study.schema.json");
+    assert_eq!((&json["interrupted"], &json["rounds"], &json["frames"]), (&json!(false), &json!(2), &json!(1)));
+    assert_eq!((&json["metric"], &json["time"]), (&json!("rmse"), &json!("frame")));
+    assert_eq!((&json["scene_file"], &json["reference"]["n_pixels"]), (&json!("scene.toml"), &json!(N_PIXELS)));
+    // The scene's own values are the scene. What is put together depends on what this machine finds faster.
+    assert_eq!(names(&json)[..3], ["as it stands", "draw.cutoff=2", "draw.sort_bits=16"]);
+    assert!(names(&json)[3..].iter().all(|name| name.contains("draw.cutoff=2") && name.contains("draw.sort_bits=16")));
+    let base = &study(&json)[0];
+    assert_eq!(base["by_base"], json!({ "value": 1.0, "low": 1.0, "high": 1.0 }));
+    assert_eq!(base["settings"], json!([]));
+    assert_eq!(base["hash"], json["scene_hash"]);
+    assert!(study(&json).iter().any(|c| c["front"] == "on"), "someone is on the front");
+    // The reference knows no sort; what is cut of a blob is an error.
+    let rmse = |i: usize| study(&json)[i]["error"]["rmse"]["value"].as_f64().expect("an error");
+    assert!(rmse(0) > 0.0 && rmse(1) > rmse(0) && rmse(2) == rmse(0), "{} {} {}", rmse(0), rmse(1), rmse(2));
+    check_times(&tiny, &json);
+    check_parts(&tiny, &json);
+    check_pictures(&tiny, &json);
+    check_best(&json);
+    check_rows(&tiny, &json);
+    // The other two ways to print it, of the same study: nothing is left to run.
+    let times = tiny.text("out/times.csv");
+    let again = [&SHORT[..], &TWO_KNOBS, &OUT, &budgets, &["--resume"]].concat();
+    assert_eq!(tiny.good(&[&again[..], &["--csv"]].concat()), tiny.text("out/configurations.csv"));
+    let printed = tiny.good(&again);
+    let lines =
+        ["within 0.000000001 ms: none of them", "within 1000000000 ms, the most exact: ", "9 of rmse, the fastest: "];
+    assert!(lines.iter().all(|line| printed.contains(line)), "{printed}");
+    assert_eq!(tiny.text("out/times.csv"), times);
+}
+
+/// The figures of times follow from times.csv: those of the scene as it stands are medians, those of others medians of
+/// ratios to the turns of the scene just before and just after.
+fn check_times(tiny: &Tiny, json: &Value) {
+    let table = Table::of(&tiny.text("out/times.csv"));
+    let turns: Vec<(usize, f64)> = table
+        .rows
+        .iter()
+        .map(|row| {
+            let at = |column: &str| table.number(row, column).expect(column);
+            (at("configuration") as usize, at("frame_ms"))
+        })
+        .collect();
+    let of = |i: usize| turns.iter().enumerate().filter(move |(_, turn)| turn.0 == i);
+    let base = median(of(0).map(|(_, turn)| turn.1).collect());
+    for (i, c) in study(json).iter().enumerate() {
+        assert_eq!(c["n_turns"].as_u64(), Some(of(i).count() as u64));
+        assert!(of(i).count() >= 2, "{i}");
+        let ms = c["frame_ms"]["value"].as_f64().expect("a time");
+        if i == 0 {
+            assert_eq!(ms, base);
+            continue;
+        }
+        let ratio = |(k, turn): (usize, &(usize, f64))| {
+            let scenes = |(i, _): &&(usize, f64)| *i == 0;
+            let before = turns[..k].iter().rev().find(scenes).expect("one before").1;
+            let after = turns[k..].iter().find(scenes).expect("one after").1;
+            turn.1 / (before * after).sqrt()
+        };
+        let by_base = median(of(i).map(ratio).collect());
+        let said = c["by_base"]["value"].as_f64().expect("a ratio");
+        assert!(is_near(said, by_base) && is_near(ms, by_base * base), "{i}: {said} {by_base} {ms}");
+    }
+}
+
+/// Squared errors part by part sum up to the RMSE.
+fn check_parts(tiny: &Tiny, json: &Value) {
+    let table = Table::of(&tiny.text("out/parts.csv"));
+    for (i, c) in study(json).iter().enumerate() {
+        let own = |row: &&csv::StringRecord| table.text(row, "configuration") == i.to_string();
+        let sum = |column: &str| table.rows.iter().filter(own).filter_map(|row| table.number(row, column)).sum::<f64>();
+        let (squares, n) = (sum("sum_of_squares"), sum("pixels"));
+        let rmse = c["error"]["rmse"]["value"].as_f64().expect("an error");
+        assert!(n == N_PIXELS as f64 && is_near(rmse, (squares / n).sqrt()), "{i}: {rmse} {squares} {n}");
+    }
+}
+
+fn check_pictures(tiny: &Tiny, json: &Value) {
+    assert_eq!(size(&tiny.path("out/reference.png")), (WIDTH, HEIGHT));
+    for c in study(json) {
+        for key in ["picture", "error_map"] {
+            let file = tiny.path("out").join(c[key].as_str().expect(key));
+            assert_eq!(size(&file), (WIDTH, HEIGHT), "{key}");
+        }
+    }
+    // They are what `render` draws.
+    for (i, more) in [(0, "draw.cutoff=3"), (1, "draw.cutoff=2")] {
+        tiny.good(&["render", "scene.toml", "-q", "--force", "-o", "drawn.png", "--set", more]);
+        let file = format!("out/picture-{i}.png");
+        assert!(pixels(tiny, &file) == pixels(tiny, "drawn.png"), "{file} is not what is drawn with {more}");
+    }
+    assert!(pixels(tiny, "out/picture-0.png") != pixels(tiny, "out/picture-1.png"), "two pictures that differ");
+}
+
+/// Each budget's choice is the best of all configurations within it.
+fn check_best(json: &Value) {
+    let figure = |c: &Value, keys: [&str; 2]| c[keys[0]][keys[1]].as_f64();
+    let ms = |c: &Value| figure(c, ["frame_ms", "value"]).expect("a time");
+    let rmse = |c: &Value| c["error"]["rmse"]["value"].as_f64().expect("an error");
+    let best: Vec<(&Value, &Value)> =
+        json["best"].as_array().expect("budgets").iter().map(|b| (&b["budget"], &b["configuration"])).collect();
+    assert_eq!(best.len(), 4);
+    let all = study(json);
+    // Of equally exact ones the faster.
+    let least = all.iter().map(rmse).fold(f64::INFINITY, f64::min);
+    let exact = all.iter().filter(|c| rmse(c) == least).map(ms).fold(f64::INFINITY, f64::min);
+    let fastest = all.iter().map(ms).fold(f64::INFINITY, f64::min);
+    let at = |time: f64| json!(all.iter().position(|c| ms(c) == time));
+    assert_eq!(best[0], (&json!("ms"), &Value::Null));
+    assert_eq!(best[1], (&json!("ms"), &at(exact)));
+    assert_eq!(best[2], (&json!("error"), &Value::Null));
+    assert_eq!(best[3], (&json!("error"), &at(fastest)));
+}
+
+/// configurations.csv says what study.json says.
+fn check_rows(tiny: &Tiny, json: &Value) {
+    let table = Table::of(&tiny.text("out/configurations.csv"));
+    assert_eq!(table.rows.len(), study(json).len());
+    for (row, c) in table.rows.iter().zip(study(json)) {
+        assert_eq!(table.text(row, "name"), c["name"]);
+        assert_eq!(table.text(row, "front"), c["front"]);
+        for (column, figure) in [
+            ("gpu_ms", &c["gpu_ms"]),
+            ("frame_ms", &c["frame_ms"]),
+            ("by_base", &c["by_base"]),
+            ("rmse", &c["error"]["rmse"]),
+        ] {
+            for (ending, key) in [("", "value"), ("_low", "low"), ("_high", "high")] {
+                let column = format!("{column}{ending}");
+                assert_eq!(table.number(row, &column), figure[key].as_f64(), "{column}");
+            }
+        }
+        assert_eq!(table.number(row, "max"), c["error"]["max"].as_f64());
+        assert_eq!(table.number(row, "relmse"), c["error"]["relmse"].as_f64());
+        assert_eq!(table.number(row, "turns").map(|n| json!(n as u64)).as_ref(), Some(&c["n_turns"]));
+    }
+}
+
+/// The error of a study is the one that `compare` finds between the picture and the reference, each drawn alone.
+#[test]
+fn an_error_is_what_compare_finds() {
+    let tiny = Tiny::new();
+    let unlit = ["--set", "lighting.mode=\"none\""];
+    tiny.good(&[&SHORT[..], &OUT, &unlit, &["--against=volume", "--knob", "draw.cutoff=2"]].concat());
+    tiny.good(&[&["render", "scene.toml", "-q", "-o", "volume.exr", "--reference=volume"], &unlit[..]].concat());
+    let json = tiny.json("out/study.json");
+    assert_valid(&json, "study.schema.json");
+    for (c, cutoff) in study(&json).iter().zip(["3", "2"]) {
+        let set = format!("draw.cutoff={cutoff}");
+        tiny.good(&[&["render", "scene.toml", "-q", "--force", "-o", "drawn.exr", "--set", &set], &unlit[..]].concat());
+        let found: Value =
+            serde_json::from_str(&tiny.good(&["compare", "volume.exr", "drawn.exr", "--json"])).expect("JSON");
+        for (ours, theirs) in [(&c["error"]["rmse"]["value"], "rmse"), (&c["error"]["max"], "max")] {
+            let (ours, theirs) = (ours.as_f64().expect("ours"), found["metrics"][theirs].as_f64().expect("theirs"));
+            // The reference as f32 in a file: half of 2⁻²³ of values of at most 1.
+            assert!(ours > 1e-3 && (ours - theirs).abs() <= 6e-8, "{set}: {ours} {theirs}");
+        }
+    }
+}
+
+#[test]
+fn a_grid_has_all_combinations() {
+    let tiny = Tiny::new();
+    let json: Value =
+        serde_json::from_str(&tiny.good(&[&SHORT[..], &TWO_KNOBS, &["--grid", "--json"]].concat())).expect("JSON");
+    let all = [
+        "as it stands",
+        "draw.cutoff=2, draw.sort_bits=16",
+        "draw.cutoff=2, draw.sort_bits=32",
+        "draw.cutoff=3, draw.sort_bits=16",
+    ];
+    assert_eq!(names(&json), all);
+    // No folder, no pictures in it.
+    assert!(study(&json).iter().all(|c| c["picture"].is_null() && c["error_map"].is_null()));
+    assert_valid(&json, "study.schema.json");
+}
+
+#[test]
+fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
+    let tiny = Tiny::new();
+    let first = [&SHORT[..], &OUT, &["--grid", "--knob", "draw.cutoff=2,3"]].concat();
+    tiny.good(&first);
+    let (before, times, picture) =
+        (tiny.json("out/study.json"), tiny.text("out/times.csv"), pixels(&tiny, "out/picture-1.png"));
+    assert_eq!(names(&before), ["as it stands", "draw.cutoff=2"]);
+    // What exists is replaced only where that is asked for.
+    assert_eq!(tiny.refused(&first), "out: exists; --force replaces it");
+    assert_eq!((tiny.json("out/study.json"), tiny.text("out/times.csv")), (before.clone(), times.clone()));
+    let go_on = |knob: &str| {
+        [&SHORT[..], &OUT, &["--resume", "--grid", "--knob", knob]]
+            .concat()
+            .iter()
+            .map(|s| s.to_string())
+            .collect::<Vec<_>>()
+    };
+    let run = |knob: &str| tiny.good(&go_on(knob).iter().map(String::as_str).collect::<Vec<_>>());
+    run("draw.cutoff=2,3,4");
+    let after = tiny.json("out/study.json");
+    assert_valid(&after, "study.schema.json");
+    assert_eq!(names(&after), ["as it stands", "draw.cutoff=2", "draw.cutoff=4"]);
+    assert!(tiny.text("out/times.csv").starts_with(&times), "turns are kept as they are");
+    for i in [0, 1] {
+        assert_eq!(study(&after)[i]["error"], study(&before)[i]["error"]);
+    }
+    assert_eq!(study(&after)[1]["n_turns"], study(&before)[1]["n_turns"]);
+    assert_eq!((&study(&after)[2]["n_turns"], &after["interrupted"]), (&json!(2), &json!(false)));
+    assert_eq!(pixels(&tiny, "out/picture-1.png"), picture);
+    check_times(&tiny, &after);
+    check_parts(&tiny, &after);
+    // A study of something else.
+    let times = tiny.text("out/times.csv");
+    for (more, what) in [
+        (&["--set", "draw.threshold=0.01"][..], "the scene"),
+        (&["--against=volume"], "the reference"),
+        (&["--pixels=20"], "the reference"),
+        (&["--frames=2"], "--frames"),
+        (&["--frame=3"], "--frame, the reference"),
+        (&["--as-played"], "--as-played"),
+        (&["--time=gpu"], "the time that decides"),
+        (&["--set", "cloud.0.position=[1,0,0]"], "the reference, the scene"),
+    ] {
+        // What is said last of one argument holds for it.
+        let name = more[0].split('=').next().expect("a name");
+        let own: Vec<String> = go_on("draw.cutoff=2")
+            .into_iter()
+            .filter(|a| name == "--set" || a.split('=').next() != Some(name))
+            .collect();
+        let message = tiny.refused(&[&own.iter().map(String::as_str).collect::<Vec<_>>()[..], more].concat());
+        assert_eq!(message, format!("out: is of another study; what differs: {what}"), "{more:?}");
+    }
+    assert_eq!((tiny.json("out/study.json"), tiny.text("out/times.csv")), (after, times));
+    // Replaced where that is asked for.
+    tiny.good(&[&first[..], &["--force"]].concat());
+    assert_eq!(names(&tiny.json("out/study.json")), ["as it stands", "draw.cutoff=2"]);
+    // Files that are not whole, or none.
+    fs::write(tiny.path("out/study.json"), "{").expect("study.json");
+    assert!(tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat()).starts_with("out/study.json: not JSON"));
+    fs::write(tiny.path("out/study.json"), "{\"schema\": 99}").expect("study.json");
+    assert_eq!(
+        tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat()),
+        "out/study.json: a study of schema 99; this nimbus reads 1"
+    );
+    let output = tiny.run(&[&SHORT[..], &["--resume"]].concat());
+    assert!(output.status.code() == Some(2) && String::from_utf8_lossy(&output.stderr).contains("--out <DIR>"));
+}
+
+#[test]
+fn a_ledger_sums_up() {
+    let more = "[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 3]\nv = [2.7, 0, 0]\nsubdivide = [2, 2]\n";
+    let tiny = Tiny::with(&format!("texture = \"0\"\n{more}"));
+    let args = [
+        "ledger",
+        "scene.toml",
+        "-q",
+        "--plain",
+        "--pixels=40",
+        "--rounds=2",
+        "--frames=1",
+        "--reflections=2",
+        "--out=out",
+    ];
+    let printed = tiny.good(&[&args[..], &["--json"]].concat());
+    let json = tiny.json("out/ledger.json");
+    assert_eq!(serde_json::from_str::<Value>(&printed).expect("JSON"), json);
+    assert_valid(&json, "ledger.schema.json");
+    let rows = json["rows"].as_array().expect("rows");
+    let names: Vec<&str> = rows.iter().map(|row| row["name"].as_str().expect("a name")).collect();
+    let all =
+        ["cutoff", "drawing", "thin sprites", "first reflection", "density grid", "facets of surfaces", "reflections"];
+    assert_eq!(names, all);
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let errors: Vec<f64> = rows.iter().map(|row| number(&row["error"]["value"])).collect();
+    let (sum, total) = (number(&json["sum"]), number(&json["total"]["value"]));
+    assert_eq!((sum, number(&json["cancelled"])), (errors.iter().sum(), sum - total));
+    assert!(total <= sum && total > 0.0 && json["holds"] == true && json["interrupted"] == false, "{total} {sum}");
+    for row in rows {
+        let error = number(&row["error"]["value"]);
+        assert!(is_near(number(&row["share"]), error / sum), "{row}");
+        assert!(is_near(number(&row["relative"]), error / number(&json["magnitude"])), "{row}");
+        assert_eq!(row["is_resolved"], json!(10.0 * number(&row["own_error"]) <= error), "{row}");
+        // Both of the device's are timed; the others it does not draw.
+        assert_eq!(row["time_ratio"].is_object(), row["name"] == "cutoff", "{row}");
+    }
+    assert_eq!((&rows[0]["from"], &rows[0]["to"]), (&json!("3 sigma"), &json!("8 sigma")));
+    assert_eq!(tiny.refused(&args), "out: exists; --force replaces it");
+    let printed = tiny.good(&[&args[..], &["--force"]].concat());
+    assert!(all.iter().all(|name| printed.contains(name)) && printed.contains("the rows sum to"), "{printed}");
+}
+
+#[test]
+fn ctrl_c_keeps_a_study_that_can_be_gone_on_with() {
+    let tiny = Tiny::new();
+    let knob = [
+        "error",
+        "scene.toml",
+        "-q",
+        "--pixels=all",
+        "--frames=1",
+        "--grid",
+        "--knob",
+        "draw.cutoff=2,4",
+        "--out",
+        "out",
+    ];
+    // More than it is given time for; it ends alone where the test does.
+    let child = tiny.start(&[&knob[..], &["--rounds=2000"]].concat());
+    let begin = Instant::now();
+    let n_rounds = || {
+        let text = fs::read_to_string(tiny.path("out/study.json")).ok()?;
+        serde_json::from_str::<Value>(&text).ok()?["rounds"].as_u64()
+    };
+    while n_rounds().is_none_or(|n| n < 2) {
+        assert!(begin.elapsed() < Duration::from_secs(120), "it never has a round");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+    assert!(killed.expect("kill").success());
+    let output = child.wait_with_output().expect("it ends");
+    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert!(
+        stdout.contains("INTERRUPTED: what was finished") && stderr.contains("keeps what is done"),
+        "{stdout}{stderr}"
+    );
+    let (before, times) = (tiny.json("out/study.json"), tiny.text("out/times.csv"));
+    assert_valid(&before, "study.schema.json");
+    let n = before["rounds"].as_u64().expect("rounds");
+    assert!(before["interrupted"] == true && n >= 2 && names(&before).len() == 3, "{before}");
+    // Two rounds more, of all.
+    let (rounds, n_turns) = (format!("--rounds={}", n + 2), |c: &Value| c["n_turns"].as_u64().expect("turns"));
+    tiny.good(&[&knob[..], &["--resume", &rounds]].concat());
+    let after = tiny.json("out/study.json");
+    assert_valid(&after, "study.schema.json");
+    assert!(after["interrupted"] == false && names(&after) == names(&before));
+    assert!(tiny.text("out/times.csv").starts_with(&times));
+    assert!(study(&after)[1..].iter().all(|c| n_turns(c) == n + 2), "{after}");
+    assert!(study(&after).iter().zip(study(&before)).all(|(a, b)| a["error"] == b["error"]));
+}
+
+/// However early: the folder holds a study before its first configuration is drawn.
+#[test]
+fn a_killed_study_can_be_gone_on_with() {
+    let tiny = Tiny::new();
+    let knob = [&SHORT[..], &OUT, &["--grid", "--knob", "draw.cutoff=2"]].concat();
+    let mut child = tiny.start(&knob);
+    let begin = Instant::now();
+    while !tiny.path("out/study.json").exists() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "it never begins");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("it is there, or was");
+    child.wait().expect("it ends");
+    assert_valid(&tiny.json("out/study.json"), "study.schema.json");
+    tiny.good(&[&knob[..], &["--resume"]].concat());
+    let json = tiny.json("out/study.json");
+    assert!(json["interrupted"] == false && names(&json) == ["as it stands", "draw.cutoff=2"], "{json}");
+    assert!(study(&json).iter().all(|c| c["error"].is_object() && c["by_base"].is_object()), "{json}");
+}

@@ -4,20 +4,20 @@
 #[path = "harness/program.rs"]
 mod program;
 
-/// Keys with values below the default, each of which does less work than the next, and than the default.
-const CHEAPER: [&str; 7] = [
+/// Keys of drawing with values below the default, each of which does less work than the next, and than the default.
+const DRAWING: [&str; 5] = [
     "draw.cutoff=2,2.5",
     "draw.resolution=0.25,0.5",
     "draw.threshold=0.01,0.03",
-    "lighting.grid=16,32,48",
-    "lighting.step=4,2",
     "film.format=rgba8",
     "draw.sort_bits=16",
 ];
+/// The same of light in a cloud.
+const LIGHT: [&str; 2] = ["lighting.grid=16,24,32", "lighting.step=4,2"];
 
 /// A cheaper value that is nearer by less than this share of the default's error is as near: both errors are then those of something
 /// else, which the knob moves by chance.
-const CHANCE: f64 = 0.01;
+const CHANCE: f64 = 0.03;
 
 /// Every error of a scene by name; the scene as it stands first.
 fn errors(args: &[&str], knobs: &[&str]) -> Vec<(String, f64)> {
@@ -43,17 +43,25 @@ fn as_near(found: &[(String, f64)]) -> Vec<String> {
 
 #[test]
 fn no_cheaper_value_is_nearer_to_the_reference() {
+    // By sprites in f64: what sprites themselves err would hide what the knobs do.
     let scenes: [&[&str]; 4] = [
-        &["scenes/hello.toml", "--against", "thin"],
-        &["scenes/cubes-554.toml", "--against", "thin", "--size", "400x300"],
-        &["scenes/cubes-615.toml", "--against", "thin", "--size", "400x300"],
-        &["scenes/study-cloud.toml", "--against", "volume", "--size", "200x150"],
+        &["scenes/hello.toml"],
+        &["scenes/cubes-554.toml", "--size", "400x300"],
+        &["scenes/cubes-615.toml", "--size", "400x300"],
+        &["scenes/study-cloud.toml", "--size", "200x150"],
     ];
     for scene in scenes {
-        let found = errors(scene, &CHEAPER);
-        assert!(found.len() > 10, "{found:?}");
+        let found = errors(&[scene, &["--against", "thin"]].concat(), &DRAWING);
+        assert!(found.len() > 7, "{found:?}");
         assert_eq!(as_near(&found), Vec::<String>::new(), "{scene:?}: {found:?}");
     }
+}
+
+#[test]
+fn of_light_in_a_cloud_neither() {
+    let found = errors(&["scenes/study-cloud.toml", "--against", "model", "--size", "200x150"], &LIGHT);
+    assert_eq!(found.len(), 6);
+    assert_eq!(as_near(&found), Vec::<String>::new(), "{found:?}");
 }
 
 #[test]

@@ -63,7 +63,7 @@ impl Subject for Law {
         if q > 6.9 {
             return Err(Error::limit("q is too great for this device"));
         }
-        let value = |k: u32| Law::error(q) as f32 * if (k / 7 + k / SIDE) % 2 == 0 { 1.2 } else { -0.75 };
+        let value = |k: u32| Law::error(q) as f32 * if (k / 7 + k / SIDE).is_multiple_of(2) { 1.2 } else { -0.75 };
         Ok((0..SIDE * SIDE).flat_map(|k| [value(k); 4]).collect())
     }
 

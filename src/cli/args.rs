@@ -68,13 +68,13 @@ pub enum Command {
     /// "reflections=K", that with K reflections, those beyond the second by random paths. For knobs of light take the latter two.
     ///
     /// Frames are timed as if everything moved in each, but for what a run makes once (particles of boxes, textures);
-    /// --as-played times what the scene's own frames leave to be done.
+    /// --as-played times what the scene's own frames leave to be done. Of "auto" in the scene's drawing what changes nothing is taken.
     Error(ErrorArgs),
     /// Say what every approximation is off by, each against the one below it
     ///
     /// A chain of pictures from the one that is drawn down to the whole model with further reflections; each has one approximation
     /// less than the one before it, and a row says how far the two are apart. The first ones are drawn by the device, and their
-    /// times are taken in turn; the others are computed in f64. Differences that follow each other can only cancel: the rows'
+    /// times are taken in turn; the others are computed in f64. By the triangle inequality the rows'
     /// sum is at least the total, which is checked (exit code 1 where it is not so).
     Ledger(LedgerArgs),
     /// Make one HTML page of results: where they were measured, plots, tables, pictures

@@ -15,6 +15,7 @@ use crate::study::against::Against;
 use crate::study::ledger::records::{LEDGER_FILE, Ledger, Row, SCHEMA_VERSION};
 use crate::study::ledger::run::Setup;
 use crate::study::machine;
+use crate::study::model_light::reflections_of;
 use crate::study::picture::Work;
 use crate::study::pixels::Pixels;
 use crate::study::plot;
@@ -46,6 +47,13 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         }
         other => other,
     })?;
+    if args.reflections < reflections_of(&scene) {
+        return Err(Error::usage(format!(
+            "--reflections {}: the scene has {}; expected at least as many",
+            args.reflections,
+            reflections_of(&scene)
+        )));
+    }
     let bed = Bed::open(&device_choice(&args.options))?;
     limits::check(&scene, bed.device.limits())?;
     let clocks = machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
@@ -114,8 +122,8 @@ fn report(ledger: &Ledger) -> String {
     );
     out += &output::table(&rows(ledger));
     out += &format!(
-        "\nas it is drawn against the last truth: RMSE {:.2e}; the rows sum to {:.2e}, of which {:.2e} cancel among themselves\n",
-        ledger.total.value, ledger.sum, ledger.cancelled
+        "\nas it is drawn against the last truth: RMSE {:.2e}; the rows sum to {:.2e}, in quadrature to {:.2e}\n",
+        ledger.total.value, ledger.sum, ledger.quadrature
     );
     if ledger.rows.iter().any(|row| !row.is_resolved) {
         out += "! the two pictures' own errors are more than a tenth of it\n";

@@ -154,6 +154,22 @@ fn axes(args: &ErrorArgs, scene: &Scene) -> Result<Vec<Axis>> {
             return refuse(ONE_SIZE);
         }
         let table = key.split('.').next().unwrap_or_default().trim();
+        if key.starts_with("draw.impostor") {
+            return refuse("a frame alone, as it is compared, is drawn without; bench --sweep times them");
+        }
+        const ASKED_FOR: [&str; 8] = [
+            "film.background",
+            "film.exposure",
+            "film.tone_map",
+            "lighting.forward",
+            "draw.particles",
+            "draw.texture_seed",
+            "draw.error",
+            "draw",
+        ];
+        if ASKED_FOR.contains(&key.as_str()) || ["light", "material"].contains(&table) {
+            return refuse("changes what is asked for, or nothing that is compared, and not how it is computed");
+        }
         if ["title", "time", "threads", "camera", "phase"].contains(&table) {
             return refuse(
                 "changes no picture, or which picture it is; expected a key of film, lighting, draw, cloud or surface",
@@ -191,7 +207,8 @@ fn load_with(args: &ErrorArgs, options: &super::SceneArgs, settings: &[Setting])
         other => other,
     })?;
     let hash = loaded.hash.clone();
-    Ok(Loaded { scene: Arc::new(loaded.at_frame(args.frame)), hash })
+    // What "auto" would take may differ from one to the next, and they would differ in more than their names.
+    Ok(Loaded { scene: Arc::new(loaded.at_frame(args.frame).exact().into_owned()), hash })
 }
 
 fn reference(args: &ErrorArgs, scene: &Scene, time_s: f64, pixels: &Pixels) -> Result<Kept> {
@@ -244,6 +261,10 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
         ("--frames", before.frames == study.frames),
         ("--frame", before.reference.frame == study.reference.frame),
         ("--as-played", is_as_played(&before) == args.as_played),
+        (
+            "--shaders",
+            args.options.shaders.is_none() && !before.made.command.iter().any(|word| word.starts_with("--shaders")),
+        ),
     ];
     let differ: BTreeSet<&str> = same.iter().filter(|(_, same)| !same).map(|(what, _)| *what).collect();
     if !differ.is_empty() {

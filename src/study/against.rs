@@ -244,7 +244,7 @@ pub(super) fn of_model(
     let of_discs = root_mean_square(discs.iter().map(|lit| lit.error));
     let places: Vec<Behind> = behind.iter().map(|(b, _)| *b).collect();
     let found = volume(&Volume::new(&view, &truth.blobs, &radiance), pixels, &places, listener);
-    // Of a surface as much shows as the cloud lets through, of particles as much as it holds back.
+    // Of a surface all may show, of particles as much as they hold back.
     let error = |(p, (behind, e)): (&Pixel, &(Behind, f64))| {
         let through = if behind.color[3] > 0.0 { 1.0 } else { 0.0 };
         p.error + e * through + of_discs * p.color[3]

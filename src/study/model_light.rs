@@ -34,9 +34,10 @@ pub struct Lit {
 const SECOND_ACCURACY: f64 = 1e-3;
 /// Random paths of a receiver, for what comes after the second reflection: so many at once,
 const N_PATHS: u32 = 128;
-/// until their standard error is this share of what the first two reflections bring,
+/// as often as should make their standard error this share of what the first two reflections bring,
 const PATHS_ACCURACY: f64 = 2e-3;
-/// or so often.
+/// within these bounds.
+const LEAST_BATCHES: u32 = 2;
 const N_BATCHES: u32 = 16;
 
 impl Met {
@@ -110,22 +111,29 @@ impl<'a> ModelLight<'a> {
         lit
     }
 
-    /// What comes after the second reflection, by random paths, to about `accuracy`.
+    /// What comes after the second reflection, by random paths, to about `accuracy`. A first batch says how many are needed and
+    /// counts for nothing else: who stops where chance has looked best so far is off to that side.
     fn further(&self, at: &Receiver, toward: DVec3, i: usize, accuracy: f64) -> Lit {
         let k = self.n_reflections as usize;
-        let (mut sum, mut squares, mut n) = (DVec3::ZERO, 0.0, 0.0);
-        for i_batch in 0..N_BATCHES {
-            let seed = (i as u32).wrapping_mul(N_BATCHES).wrapping_add(i_batch);
+        let batch = |i_batch: u32| {
+            let seed = (i as u32).wrapping_mul(N_BATCHES + 1).wrapping_add(i_batch);
             let all = self.scenery.reflections(at, toward, k, Chance { n_paths: N_PATHS, seed });
-            sum += all[2..k].iter().map(|r| r.radiance).sum::<DVec3>();
+            let radiance = all[2..k].iter().map(|r| r.radiance).sum::<DVec3>();
             // Of the same paths: errors of one reflection and the next may add up.
-            let error: f64 = all[2..k].iter().map(|r| r.error.max_element()).sum();
-            (squares, n) = (squares + error * error, n + 1.0);
-            if squares.sqrt() / n <= accuracy {
-                break;
+            Lit { radiance, error: all[2..k].iter().map(|r| r.error.max_element()).sum() }
+        };
+        let pilot = batch(0);
+        let n = match pilot.error > 0.0 && accuracy > 0.0 {
+            true => {
+                (pilot.error / accuracy).powi(2).ceil().clamp(f64::from(LEAST_BATCHES), f64::from(N_BATCHES)) as u32
             }
-        }
-        Lit { radiance: sum / n, error: squares.sqrt() / n }
+            // It met no light, or the same everywhere.
+            false => N_BATCHES,
+        };
+        let (sum, squares) = (1..=n).map(batch).fold((DVec3::ZERO, 0.0), |(sum, squares), found| {
+            (sum + found.radiance, squares + found.error * found.error)
+        });
+        Lit { radiance: sum / f64::from(n), error: squares.sqrt() / f64::from(n) }
     }
 }
 

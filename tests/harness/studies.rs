@@ -143,6 +143,7 @@ pub fn row(name: &str, error: f64, is_resolved: bool, note: Option<&str>) -> Row
 
 pub fn ledger(rows: Vec<Row>) -> Ledger {
     let sum = rows.iter().filter(|r| r.note.is_none()).map(|r| r.error.value).sum::<f64>();
+    let quadrature = rows.iter().map(|row| row.error.value.powi(2)).sum::<f64>().sqrt();
     Ledger {
         made: provenance(),
         frame: 0,
@@ -154,7 +155,7 @@ pub fn ledger(rows: Vec<Row>) -> Ledger {
         rows,
         total: about(0.8 * sum, 0.1),
         sum,
-        cancelled: 0.2 * sum,
+        quadrature,
         holds: true,
         interrupted: false,
     }

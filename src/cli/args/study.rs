@@ -121,7 +121,7 @@ pub struct LedgerArgs {
 pub enum MetricArg {
     /// Root mean square over premultiplied linear red, green, blue and alpha
     Rmse,
-    /// The greatest difference
+    /// The greatest difference at the pixels that are compared
     Max,
     /// Mean square relative to the reference's
     Relmse,

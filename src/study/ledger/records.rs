@@ -26,9 +26,9 @@ pub struct Ledger {
     pub total: Figure,
     /// Of all rows' errors.
     pub sum: f64,
-    /// `sum` less `total`: what the rows cancel among themselves. Below 0 only if something is wrong.
-    pub cancelled: f64,
-    /// total ≤ sum, within the references' own errors.
+    /// Root of the sum of their squares: what the total is where they know nothing of each other.
+    pub quadrature: f64,
+    /// total ≤ sum, but for rounding: anything else is a fault of nimbus.
     pub holds: bool,
     pub interrupted: bool,
 }

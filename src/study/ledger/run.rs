@@ -233,8 +233,8 @@ impl Setup<'_> {
         // the rounding of both.
         let holds = total.value <= sum * (1.0 + 1e-9) + 1e-15;
         let interrupted = self.is_stopped();
-        let cancelled = sum - total.value;
-        Ok(Ledger { magnitude, rows, total, sum, cancelled, holds, interrupted, ..self.empty(made, nothing) })
+        let quadrature = errors.iter().map(|(error, _)| error.value.powi(2)).sum::<f64>().sqrt();
+        Ok(Ledger { magnitude, rows, total, sum, quadrature, holds, interrupted, ..self.empty(made, nothing) })
     }
 
     fn empty(&self, made: Provenance, nothing: Figure) -> Ledger {
@@ -249,7 +249,7 @@ impl Setup<'_> {
             rows: Vec::new(),
             total: nothing,
             sum: 0.0,
-            cancelled: 0.0,
+            quadrature: 0.0,
             holds: true,
             interrupted: self.is_stopped(),
         }

@@ -6,7 +6,7 @@ use crate::model::basis::MAX_BASES;
 use crate::model::film::FilmFormat;
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks, DrawPath, Gather, Impostors, LightingMode, Scene};
+use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
 
 /// An approximation, and the scene without it.
 pub struct Step {
@@ -63,15 +63,7 @@ type Describe = fn(&Scene) -> String;
 type Lift = fn(&mut Scene);
 
 /// From what is drawn last up to what light is made of.
-const ALL: [(&str, What, Describe, Lift); 11] = [
-    (
-        "impostors",
-        What::Particles,
-        |s| if s.draw.impostors == Impostors::Off { "off" } else { "on" }.into(),
-        |s| {
-            s.draw.impostors = Impostors::Off;
-        },
-    ),
+const ALL: [(&str, What, Describe, Lift); 10] = [
     ("resolution", What::Particles, |s| s.draw.resolution.name().into(), |s| s.draw.resolution = Resolution::Full),
     ("smallest", What::Particles, |s| format!("{} px", s.draw.smallest.bound()), |s| s.draw.smallest = Least::Of(0.0)),
     (

@@ -19,7 +19,7 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
         dl class="made" {
             dt { "Picture" } dd { "frame " (ledger.frame) " at " (number(ledger.time_s)) " s, " (ledger.width) "×" (ledger.height) " pixels, compared at " (ledger.n_pixels) }
             dt { "Magnitude" } dd { (number(ledger.magnitude)) ", root mean square of the last row's truth" }
-            dt { "All together" } dd { (total) " RMSE; the rows' sum is " (number(ledger.sum)) ", of which " (number(ledger.cancelled)) " cancels" }
+            dt { "All together" } dd { (total) " RMSE; the rows' sum is " (number(ledger.sum)) ", in quadrature " (number(ledger.quadrature)) }
             dt { "Total at most the sum" } dd { @if ledger.holds { "yes" } @else { strong { "no: something is wrong" } } }
         }
         h3 { "Rows" }

@@ -23,7 +23,7 @@ const KNOBS: [Knob; 17] = [
     Knob { key: "lighting.grid", values: &["16", "32", "64", "128"], applies: marches },
     Knob { key: "lighting.step", values: &["0.5", "1.0", "2.0", "4.0"], applies: marches },
     Knob { key: "lighting.facets_per_cloud", values: &["32", "128", "512", "0"], applies: marches },
-    Knob { key: "lighting.mode", values: &["first", "two-reflection"], applies: |scene| reflections(scene) > 0 },
+    Knob { key: "lighting.mode", values: &["first", "two-reflection"], applies: |scene| reflections(scene) == 2 },
     Knob { key: "lighting.gather", values: &["exact", "tree"], applies: gathers },
     Knob { key: "lighting.theta", values: &["0.2", "0.4", "0.8"], applies: gathers_from_tree },
     Knob { key: "lighting.pair_size", values: &["0.25", "0.5", "1.0"], applies: |s| gathers(s) && has_surfaces(s) },

@@ -73,11 +73,12 @@ pub struct PictureError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Front {
-    /// No other is as fast and as near to the reference.
+    /// No other is as fast and as near to the reference as the figures stand, and none is surely better in one of the two without
+    /// being surely worse in the other.
     On,
-    /// Another one is, but not by more than their intervals.
+    /// One of the two can be said, the other not.
     Near,
-    /// Another one is better in both by more than their intervals.
+    /// Neither can be said.
     Off,
     /// It has no time or no error.
     Unknown,

@@ -85,8 +85,13 @@ impl Setup<'_> {
         on: &mut dyn FnMut(Event<'_>) -> Result<()>,
     ) -> Result<bool> {
         // Those of an earlier run come first, in their order; what is asked for and not among them follows.
-        for settings in found.configurations.iter().map(|c| c.settings.clone()).collect::<Vec<_>>() {
-            subject.add(&(self.load)(&settings)?.scene);
+        for configuration in &found.configurations {
+            let Loaded { scene, hash } = (self.load)(&configuration.settings)?;
+            if hash != configuration.hash {
+                let name = &configuration.name;
+                return Err(Error::usage(format!("{name}: its scene or files have changed since the study began")));
+            }
+            subject.add(&scene);
         }
         let wanted = settings(&self.plan.axes, self.plan.design);
         self.add(subject, found, std::iter::once(Vec::new()).chain(wanted))?;

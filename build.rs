@@ -1,6 +1,7 @@
 //! Hands the git revision to the program as `NIMBUS_GIT_REVISION`, so that every result names the code it came from:
-//! twelve digits, with `-dirty` when what is built differs from the commit, or `unknown` outside a git checkout. And a digest
-//! of all that f64 references are computed by as `NIMBUS_REFERENCE_CODE`, so that none that older code made is taken for new.
+//! twelve digits, with `-dirty` when what is built differs from the commit, or `unknown` outside a git checkout. A digest of all
+//! that is built as `NIMBUS_CODE`, which tells such builds apart, and one of all that f64 references are computed by as
+//! `NIMBUS_REFERENCE_CODE`, so that none that older code made is taken for new.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,7 +12,8 @@ use std::process::Command;
 const BUILT_FROM: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
 
 /// What f64 references are computed by.
-const REFERENCES_FROM: [&str; 8] = [
+const REFERENCES_FROM: [&str; 9] = [
+    "Cargo.lock",
     "src/model",
     "src/reference",
     "src/frame/game.rs",
@@ -25,7 +27,8 @@ const REFERENCES_FROM: [&str; 8] = [
 fn main() {
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| ".".into()));
     println!("cargo:rustc-env=NIMBUS_GIT_REVISION={}", revision(&root).unwrap_or_else(|| "unknown".into()));
-    println!("cargo:rustc-env=NIMBUS_REFERENCE_CODE={:016x}", digest(&root));
+    println!("cargo:rustc-env=NIMBUS_CODE={:016x}", digest(&root, &BUILT_FROM));
+    println!("cargo:rustc-env=NIMBUS_REFERENCE_CODE={:016x}", digest(&root, &REFERENCES_FROM));
     for path in BUILT_FROM.iter().map(|name| root.join(name)).chain(head_files(&root)) {
         // A watched file that does not exist would make cargo run this script every time.
         if path.exists() {
@@ -35,8 +38,8 @@ fn main() {
 }
 
 /// FNV-1a over the files' names and texts in the order of their names.
-fn digest(root: &Path) -> u64 {
-    let mut files: Vec<PathBuf> = REFERENCES_FROM.iter().flat_map(|name| files_under(&root.join(name))).collect();
+fn digest(root: &Path, names: &[&str]) -> u64 {
+    let mut files: Vec<PathBuf> = names.iter().flat_map(|name| files_under(&root.join(name))).collect();
     files.sort();
     let mut hash = 0xcbf2_9ce4_8422_2325u64;
     for file in files {

@@ -274,6 +274,7 @@ fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
     // Replaced where that is asked for.
     tiny.good(&[&first[..], &["--force"]].concat());
     assert_eq!(names(&tiny.json("out/study.json")), ["as it stands", "draw.cutoff=2"]);
+    assert!(tiny.path("out/picture-1.png").exists() && !tiny.path("out/picture-2.png").exists());
     // Files that are not whole, or none.
     fs::write(tiny.path("out/study.json"), "{").expect("study.json");
     assert!(tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat()).starts_with("out/study.json: not JSON"));

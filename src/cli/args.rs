@@ -60,7 +60,7 @@ pub enum Command {
     ///
     /// Every configuration of the knobs is drawn once and compared with a reference in f64, and all are timed in turn with the
     /// scene as it stands. What is printed is sorted by time; "*" marks the front: no other configuration is faster without
-    /// being less exact. "~" marks what is on it or off it only by less than the 95 % intervals.
+    /// being less exact. "~" marks what others beat, but none by more than the 95 % intervals in either.
     ///
     /// References (--against), each without something that the one before it shares with the device's picture: "thin", the
     /// sprites in f64, all and uncut, in the scene's own light; "volume", the integral over the overlapping blobs in that light;

@@ -67,6 +67,9 @@ pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &A
     sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
+        if !args.resume {
+            files::remove_earlier(out)?;
+        }
         write_spread(&out.join("reference.png"), &film, &pixels, &kept.reference.rgba)?;
         // However early it is ended, the folder holds a study that can be gone on with, and no earlier one's.
         files::write(out, &Study { interrupted: true, ..study.clone() }, &found)?;
@@ -104,6 +107,8 @@ fn begun(args: &ErrorArgs, made: Provenance, reference: ReferenceRecord, plan: &
         time: plan.time.name().into(),
         rounds: 0,
         frames: args.frames,
+        as_played: args.as_played,
+        own_shaders: args.options.shaders.is_some(),
         configurations: Vec::new(),
         best: Vec::new(),
         interrupted: false,
@@ -256,15 +261,13 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
         ("the scene", before.made.scene_hash == study.made.scene_hash),
         ("the reference", before.reference.hash == study.reference.hash),
         ("the device", before.made.device == study.made.device && before.made.environment == study.made.environment),
-        ("the build", before.made.revision == study.made.revision),
+        ("the build", before.made.code == study.made.code),
         ("the time that decides", before.time == study.time),
         ("--frames", before.frames == study.frames),
         ("--frame", before.reference.frame == study.reference.frame),
-        ("--as-played", is_as_played(&before) == args.as_played),
-        (
-            "--shaders",
-            args.options.shaders.is_none() && !before.made.command.iter().any(|word| word.starts_with("--shaders")),
-        ),
+        ("--as-played", before.as_played == args.as_played),
+        // What is in such a folder may have changed.
+        ("--shaders", !before.own_shaders && !study.own_shaders),
     ];
     let differ: BTreeSet<&str> = same.iter().filter(|(_, same)| !same).map(|(what, _)| *what).collect();
     if !differ.is_empty() {
@@ -272,11 +275,6 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
         return Err(Error::io(out, format!("is of another study; what differs: {what}")));
     }
     Ok(found)
-}
-
-/// Whether the frames of an earlier run left out what they could.
-fn is_as_played(before: &Study) -> bool {
-    before.made.command.iter().any(|word| word == "--as-played")
 }
 
 fn sum_up(args: &ErrorArgs, study: &mut Study, found: &Found, metric: Metric, time: Time) {

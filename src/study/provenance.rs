@@ -19,6 +19,8 @@ pub struct Provenance {
     pub schema: u32,
     pub nimbus: String,
     pub revision: String,
+    /// Digest of the sources that were built: two builds that differ from one revision differ in it.
+    pub code: String,
     /// UTC, ISO 8601.
     pub date: String,
     pub command: Vec<String>,
@@ -40,6 +42,7 @@ impl Provenance {
             schema,
             nimbus: env!("CARGO_PKG_VERSION").into(),
             revision: machine::revision().into(),
+            code: env!("NIMBUS_CODE").into(),
             date: machine::utc_now(),
             command: std::env::args().collect(),
             scene_file: scene_file.display().to_string(),

@@ -53,6 +53,4 @@ pub struct Row {
     pub is_resolved: bool,
     /// GPU time of a frame with it by that without, where both are drawn by the device.
     pub time_ratio: Option<Figure>,
-    /// Why it is not there, where it does not apply to the scene.
-    pub note: Option<String>,
 }

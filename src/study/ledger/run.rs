@@ -225,7 +225,6 @@ impl Setup<'_> {
             own_error: *own_error,
             is_resolved: own_error * RESOLVED <= error.value,
             time_ratio: if between.on_device { ratio(rounds, i) } else { None },
-            note: None,
         };
         let rows: Vec<Row> = chain.between.iter().zip(&errors).enumerate().map(row).collect();
         let (total, _) = compare(first, last)?;

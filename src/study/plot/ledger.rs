@@ -28,13 +28,10 @@ pub fn chart(ledger: &Ledger) -> LedgerChart {
 }
 
 fn says(row: &Row) -> String {
-    let Row { name, from, to, error, note, own_error, is_resolved, .. } = row;
-    let mut lines = vec![name.clone(), format!("{from} for {to}")];
-    match note {
-        Some(note) => lines.push(note.clone()),
-        None => lines.push(format!("RMSE: {}", with_interval(error.value, error.low, error.high))),
-    }
-    if note.is_none() && !is_resolved {
+    let Row { name, from, to, error, own_error, is_resolved, .. } = row;
+    let rmse = with_interval(error.value, error.low, error.high);
+    let mut lines = vec![name.clone(), format!("{from} for {to}"), format!("RMSE: {rmse}")];
+    if !is_resolved {
         lines.push(format!("not resolved: the references' own error is {}", number(*own_error)));
     }
     lines.join("\n")
@@ -42,7 +39,7 @@ fn says(row: &Row) -> String {
 
 impl LedgerChart {
     fn errors(&self) -> impl Iterator<Item = f64> + '_ {
-        let of_rows = self.rows.iter().filter(|r| r.note.is_none()).flat_map(|r| [Some(r.error.value), r.error.high]);
+        let of_rows = self.rows.iter().flat_map(|r| [Some(r.error.value), r.error.high]);
         of_rows.chain([Some(self.total.value), self.total.high]).flatten().filter(|v| v.is_finite() && *v > 0.0)
     }
 }
@@ -61,7 +58,7 @@ impl Plot for LedgerChart {
     fn keys(&self, _: Look) -> Vec<Key> {
         let key = |color, glyph, name: &str| Key { color, glyph, name: name.to_owned(), mark: None };
         let mut keys = vec![key(series(0), '█', "one approximation")];
-        if self.rows.iter().any(|r| r.note.is_none() && !r.is_resolved) {
+        if self.rows.iter().any(|r| !r.is_resolved) {
             keys.push(key(MUTED, '░', "not resolved: its references are no better"));
         }
         keys.push(key(series(1), '│', "all together"));
@@ -98,9 +95,8 @@ impl Plot for LedgerChart {
             let middle = plane.pixel(0.0, y).1;
             let [left, _, right, _] = plane.bounds();
             marks.push(Mark { place: [left, upper, right - left, (lower - upper).max(1)], says: says(row) });
-            let end = x.at(row.error.value).filter(|_| row.note.is_none());
-            let Some(end) = end else {
-                let why = row.note.clone().unwrap_or_else(|| number(row.error.value));
+            let Some(end) = x.at(row.error.value) else {
+                let why = number(row.error.value);
                 let n_letters = ((right - left) / look.width_of("m")).max(2) as usize;
                 plane.write(&shortened(&why, n_letters), (left + look.across(6, 1), middle), MUTED, HPos::Left)?;
                 continue;

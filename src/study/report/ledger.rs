@@ -30,19 +30,17 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
 
 fn rows(ledger: &Ledger) -> Markup {
     let row = |r: &Row| -> Vec<Cell> {
-        let is_there = r.note.is_none();
-        let of = |v: f64| Some(v).filter(|_| is_there);
         let resolved = if r.is_resolved { "" } else { "not resolved: the references are no better" };
         vec![
             text(&r.name),
             text(&r.from),
             text(&r.to),
-            figure(Some(r.error).filter(|_| is_there)),
-            percent(of(r.relative)),
-            percent(of(r.share)),
-            value(of(r.own_error)),
-            figure(r.time_ratio.filter(|_| is_there)),
-            text(r.note.as_deref().unwrap_or(resolved)),
+            figure(Some(r.error)),
+            percent(Some(r.relative)),
+            percent(Some(r.share)),
+            value(Some(r.own_error)),
+            figure(r.time_ratio),
+            text(resolved),
         ]
     };
     let header = [

@@ -54,6 +54,22 @@ pub fn write(folder: &Path, study: &Study, found: &Found) -> Result<()> {
     })
 }
 
+/// Takes the pictures and charts of an earlier study out of a folder that a new one takes over.
+pub fn remove_earlier(folder: &Path) -> Result<()> {
+    let is_ours = |name: &str| {
+        let number = |begin| name.strip_prefix(begin).and_then(|rest| rest.strip_suffix(".png"));
+        let of_configuration = number("picture-").or(number("error-"));
+        of_configuration.is_some_and(|n| n.parse::<usize>().is_ok()) || ["front.svg", "reference.png"].contains(&name)
+    };
+    for entry in fs::read_dir(folder).map_err(|cause| Error::io(folder, cause))? {
+        let entry = entry.map_err(|cause| Error::io(folder, cause))?;
+        if entry.file_name().to_str().is_some_and(is_ours) {
+            fs::remove_file(entry.path()).map_err(|cause| Error::io(&entry.path(), cause))?;
+        }
+    }
+    Ok(())
+}
+
 fn part_rows(configuration: usize, Parts(parts): &Parts) -> impl Iterator<Item = PartRow> {
     let row = move |(part, (sum_of_squares, pixels)): (usize, &(f64, f64))| PartRow {
         configuration,

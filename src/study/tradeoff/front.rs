@@ -57,31 +57,29 @@ fn is_better(a: &Both, b: &Both) -> bool {
     t && e && (a.time.value < b.time.value || a.error.value < b.error.value)
 }
 
-/// Says of every configuration where it lies: on the front where no other is better; off it where another is, and surely so
-/// (better in one by more than chance, and not worse in the other by more than chance); near it where only one of the two can
-/// be said. Times are `by_base`, which drifts take no part in; `is_nearer(i, j)`: i's error is surely less than j's.
+/// Says of every configuration where it lies. On the front no other is better, as the figures stand: at most as long and at most
+/// as far off, and one of the two less. Another one is off it where some better one is better by more than chance in one of the
+/// two, and near it where all that is better may be so by chance. Times are `by_base`, which drifts take no part in;
+/// `is_nearer(i, j)`: i's error is surely less than j's.
 pub fn place(configurations: &mut [Configuration], metric: Metric, is_nearer: impl Fn(usize, usize) -> bool) {
     let both: Vec<Option<Both>> = configurations
         .iter()
         .map(|c| c.by_base.zip(metric.of(c)).map(|(time, error)| Both { time, error }))
         .map(|both| both.filter(|b| b.time.value.is_finite() && b.error.value.is_finite()))
         .collect();
-    let is_surely_better = |i: usize, j: usize, a: &Both, b: &Both| {
-        let (faster, slower) = (is_surely_less(&a.time, &b.time), is_surely_less(&b.time, &a.time));
-        (faster && !is_nearer(j, i)) || (!slower && is_nearer(i, j))
-    };
     for (j, configuration) in configurations.iter_mut().enumerate() {
         let Some(own) = &both[j] else {
             configuration.front = Front::Unknown;
             continue;
         };
-        let others = || both.iter().enumerate().filter_map(|(i, o)| o.as_ref().map(|o| (i, o)));
-        let is_off = others().any(|(_, o)| is_better(o, own));
-        let is_surely_off = others().any(|(i, o)| i != j && is_surely_better(i, j, o, own));
-        configuration.front = match (is_off, is_surely_off) {
-            (false, false) => Front::On,
-            (true, true) => Front::Off,
-            _ => Front::Near,
+        let others = || both.iter().enumerate().filter_map(|(i, other)| other.as_ref().map(|other| (i, other)));
+        let better = || others().filter(|(_, other)| is_better(other, own));
+        configuration.front = if better().any(|(i, other)| is_surely_less(&other.time, &own.time) || is_nearer(i, j)) {
+            Front::Off
+        } else if better().next().is_some() {
+            Front::Near
+        } else {
+            Front::On
         };
     }
 }
@@ -121,4 +119,55 @@ fn best(
         a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
     })
     .map(|(i, _)| i)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::design::name_of;
+    use super::super::records::PictureError;
+    use super::*;
+
+    fn found(time: (f64, f64), error: f64) -> Configuration {
+        let figure =
+            |(value, spread): (f64, f64)| Figure { value, low: Some(value - spread), high: Some(value + spread) };
+        Configuration {
+            name: name_of(&[]),
+            settings: Vec::new(),
+            hash: String::new(),
+            gpu_ms: None,
+            frame_ms: None,
+            by_base: Some(figure(time)),
+            n_turns: 8,
+            error: Some(PictureError { rmse: figure((error, 0.0)), max: error, relmse: error, is_resolved: true }),
+            front: Front::Unknown,
+            failure: None,
+            picture: None,
+            error_map: None,
+        }
+    }
+
+    fn placed(mut all: Vec<Configuration>, is_nearer: impl Fn(usize, usize) -> bool) -> Vec<Front> {
+        place(&mut all, Metric::Rmse, is_nearer);
+        all.iter().map(|c| c.front).collect()
+    }
+
+    #[test]
+    fn off_only_where_something_better_is_so_by_more_than_chance() {
+        use Front::{Near, Off, On};
+        // Where no error is sure, times decide: 0.8 is beaten by 0.5 surely, 0.52 by it not.
+        let all = || {
+            vec![found((1.0, 0.0), 0.1), found((0.5, 0.05), 0.2), found((0.8, 0.05), 0.3), found((0.52, 0.05), 0.25)]
+        };
+        assert_eq!(placed(all(), |_, _| false), [On, On, Off, Near]);
+        // Where errors are sure, they do.
+        assert_eq!(placed(all(), |i, j| (i, j) == (1, 3)), [On, On, Off, Off]);
+        // Who is surely faster but further off, by however little, beats nobody.
+        assert_eq!(placed(vec![found((1.0, 0.0), 0.1), found((0.5, 0.01), 0.1000001)], |_, _| false), [On, On]);
+        // Equals do not beat each other; what has no figures is nowhere.
+        let bare = Configuration { error: None, ..found((0.1, 0.0), 0.0) };
+        assert_eq!(
+            placed(vec![found((1.0, 0.0), 0.1), found((1.0, 0.1), 0.1), bare], |_, _| true),
+            [On, On, Front::Unknown]
+        );
+    }
 }

@@ -24,6 +24,10 @@ pub struct Study {
     pub rounds: usize,
     /// Timed frames of a configuration in a round.
     pub frames: u32,
+    /// Frames leave out what did not change, as when the scene is played; else everything moves.
+    pub as_played: bool,
+    /// The shaders are those of a folder and not the build's.
+    pub own_shaders: bool,
     /// The first is the scene as it stands, which the others' times are measured by.
     pub configurations: Vec<Configuration>,
     pub best: Vec<Best>,
@@ -73,12 +77,11 @@ pub struct PictureError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Front {
-    /// No other is as fast and as near to the reference as the figures stand, and none is surely better in one of the two without
-    /// being surely worse in the other.
+    /// None is better, as the figures stand: at most as long and as far off, and one of the two less.
     On,
-    /// One of the two can be said, the other not.
+    /// Some are, but may be so by chance.
     Near,
-    /// Neither can be said.
+    /// Some are, and by more than chance in one of the two.
     Off,
     /// It has no time or no error.
     Unknown,

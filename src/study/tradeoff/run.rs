@@ -97,7 +97,7 @@ impl Setup<'_> {
         self.add(subject, found, std::iter::once(Vec::new()).chain(wanted))?;
         let mut is_whole = self.measure(subject, found, on)?;
         if is_whole && self.plan.design == Design::Alone {
-            let more = together(&found.configurations);
+            let more = together(&found.configurations, self.plan.metric);
             if self.add(subject, found, more.into_iter())? > 0 {
                 is_whole = self.measure(subject, found, on)?;
             }

@@ -3,12 +3,11 @@
 
 mod harness;
 
-use harness::bounds::erf_bound;
 use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::{Compiler, Kernel, Sources};
 use nimbus::layout::record;
 use nimbus::passes::SHADERS;
-use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32};
+use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32, erf_bound};
 
 record! {
     struct Push { n: u32, which: u32 }

@@ -3,7 +3,7 @@
 mod harness;
 
 use glam::{DVec3, UVec3, Vec3};
-use harness::bounds::erf_bound;
+
 use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::frame::GridRecord;
@@ -14,7 +14,7 @@ use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
 use nimbus::reference::generate::{generate_box, uniforms};
 use nimbus::reference::grid::{axis_weights, deposit, mass};
-use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
+use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 
 const U: f64 = U_F32;
 

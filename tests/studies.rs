@@ -56,7 +56,6 @@ fn a_study_is_one_in_all_its_files() {
     let rmse = |i: usize| study(&json)[i]["error"]["rmse"]["value"].as_f64().expect("an error");
     assert!(rmse(0) > 0.0 && rmse(1) > rmse(0) && rmse(2) == rmse(0), "{} {} {}", rmse(0), rmse(1), rmse(2));
     check_times(&tiny, &json);
-    check_parts(&tiny, &json);
     check_pictures(&tiny, &json);
     check_best(&json);
     check_rows(&tiny, &json);
@@ -102,18 +101,6 @@ fn check_times(tiny: &Tiny, json: &Value) {
         let by_base = median(of(i).map(ratio).collect());
         let said = c["by_base"]["value"].as_f64().expect("a ratio");
         assert!(is_near(said, by_base) && is_near(ms, by_base * base), "{i}: {said} {by_base} {ms}");
-    }
-}
-
-/// Squared errors part by part sum up to the RMSE.
-fn check_parts(tiny: &Tiny, json: &Value) {
-    let table = Table::of(&tiny.text("out/parts.csv"));
-    for (i, c) in study(json).iter().enumerate() {
-        let own = |row: &&csv::StringRecord| table.text(row, "configuration") == i.to_string();
-        let sum = |column: &str| table.rows.iter().filter(own).filter_map(|row| table.number(row, column)).sum::<f64>();
-        let (squares, n) = (sum("sum_of_squares"), sum("pixels"));
-        let rmse = c["error"]["rmse"]["value"].as_f64().expect("an error");
-        assert!(n == N_PIXELS as f64 && is_near(rmse, (squares / n).sqrt()), "{i}: {rmse} {squares} {n}");
     }
 }
 
@@ -248,7 +235,6 @@ fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
     assert_eq!((&study(&after)[2]["n_turns"], &after["interrupted"]), (&json!(2), &json!(false)));
     assert_eq!(pixels(&tiny, "out/picture-1.png"), picture);
     check_times(&tiny, &after);
-    check_parts(&tiny, &after);
     // A study of something else.
     let times = tiny.text("out/times.csv");
     for (more, what) in [

@@ -1,6 +1,7 @@
 //! The command line, as typed.
 
 mod results;
+mod stress;
 mod study;
 
 use std::path::PathBuf;
@@ -9,6 +10,7 @@ use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
+pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
@@ -60,7 +62,7 @@ pub enum Command {
     ///
     /// Every configuration of the knobs is drawn once and compared with a reference in f64, and all are timed in turn with the
     /// scene as it stands. What is printed is sorted by time; "*" marks the front: no other configuration is faster without
-    /// being less exact. "~" marks what others beat, but none by more than the 95 % intervals in either.
+    /// being less exact. "~" marks what others beat, but none that is faster by more than the 95 % intervals.
     ///
     /// References (--against), each without something that the one before it shares with the device's picture: "thin", the
     /// sprites in f64, all and uncut, in the scene's own light; "volume", the integral over the overlapping blobs in that light;
@@ -77,6 +79,13 @@ pub enum Command {
     /// times are taken in turn; the others are computed in f64. By the triangle inequality the rows'
     /// sum is at least the total, which is checked (exit code 1 where it is not so).
     Ledger(LedgerArgs),
+    /// Say whether this device computes at the edges what nimbus claims
+    ///
+    /// Functions, particles, light, layers, far places and late times, each at the edge of what can be asked for, against f64 (or
+    /// what must be exact), within a bound that is derived from the precision that Vulkan promises (docs/stability.md) and not
+    /// tuned. A row a case: the number of the device that is the furthest off by its bound, what it should be, error and bound.
+    /// Exit code 1 where one is beyond.
+    Stress(StressArgs),
     /// Make one HTML page of results: where they were measured, plots, tables, pictures
     ///
     /// Of every folder that bench, error or ledger wrote: machine and provenance, every figure as a table, frame times and

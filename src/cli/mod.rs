@@ -14,6 +14,7 @@ mod output;
 mod render;
 mod render_reference;
 mod report;
+mod stress;
 mod tradeoff;
 mod tradeoff_table;
 
@@ -55,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Error(a) => tradeoff::run(a, args.color, &STOP, &GRACEFUL),
         Command::Ledger(a) => ledger::run(a, &STOP, &GRACEFUL),
         Command::Report(a) => report::run(a),
+        Command::Stress(a) => stress::run(a, &STOP, &GRACEFUL),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
     };

@@ -18,7 +18,7 @@ pub fn report(study: &Study) -> String {
         if study.interrupted { "; INTERRUPTED: what was finished" } else { "" }
     );
     out += &output::table(&rows(study));
-    out += "\n* on the front  ~ what beats it may do so by chance";
+    out += "\n* on the front  ~ what beats it may be no faster: by less than the intervals";
     if study.configurations.iter().any(|c| c.error.is_some_and(|e| !e.is_resolved)) {
         out += "  ! the reference's own error is more than a tenth of it";
     }

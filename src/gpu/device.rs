@@ -2,6 +2,7 @@
 
 use std::ffi::CStr;
 use std::mem::ManuallyDrop;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::{ext, vk};
@@ -95,6 +96,8 @@ pub(super) struct Shared {
     pub limits: Limits,
     pub allocator: ManuallyDrop<Mutex<Allocator>>,
     debug: Option<ext::debug_utils::Device>,
+    /// Buffers are filled with NaN when they are made.
+    pub poisons: AtomicBool,
     pub instance: Arc<Instance>,
 }
 
@@ -135,6 +138,7 @@ impl Device {
             limits: info.limits,
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             debug,
+            poisons: AtomicBool::new(false),
             instance: instance.clone(),
         });
         Ok(Device { shared, info })
@@ -178,6 +182,11 @@ impl Device {
 
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// From now on every buffer is made full of NaN, so that what is read before it is written shows.
+    pub fn poison(&self) {
+        self.shared.poisons.store(true, Ordering::Relaxed);
     }
 
     pub fn limits(&self) -> &Limits {

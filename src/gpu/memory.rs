@@ -2,6 +2,7 @@
 //! allocated.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ash::vk;
 use bytemuck::Pod;
@@ -9,6 +10,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
 use super::device::{Device, Limits, Shared};
+use super::recorder::{Commands, Recorder};
 use super::reflect::BindingKind;
 use crate::error::{Error, Result};
 
@@ -65,7 +67,28 @@ impl Buffer {
         unsafe { buffer.shared.raw.bind_buffer_memory(raw, memory, offset) }
             .map_err(|e| Error::vulkan(format!("vkBindBufferMemory {name}"), e))?;
         buffer.make_views(device.limits())?;
+        if buffer.shared.poisons.load(Ordering::Relaxed) {
+            buffer.poison(device, place)?;
+        }
         Ok(buffer)
+    }
+
+    /// Fills it with words that are NaN as floats and too great as numbers.
+    fn poison(&mut self, device: &Device, place: Place) -> Result<()> {
+        if place == Place::Device {
+            let mut commands = Commands::new(device, "poison")?;
+            let fill = |rec: &mut Recorder<'_>| {
+                rec.fill(self, u32::MAX);
+                Ok(())
+            };
+            return commands.run(fill).map(|_| ());
+        }
+        let size = self.bytes as usize;
+        let mapped = self.allocation.as_mut().and_then(Allocation::mapped_slice_mut);
+        if let Some(bytes) = mapped.and_then(|m| m.get_mut(..size)) {
+            bytes.fill(u8::MAX);
+        }
+        Ok(())
     }
 
     fn make_views(&mut self, limits: &Limits) -> Result<()> {

@@ -37,6 +37,12 @@ impl Sources {
         Ok(self)
     }
 
+    /// One text more, or in place of another of that name.
+    pub fn with_text(mut self, name: &str, text: &str) -> Sources {
+        self.0.insert(name.to_owned(), text.to_owned());
+        self
+    }
+
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }

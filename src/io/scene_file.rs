@@ -66,7 +66,15 @@ const ROOT_KEYS: &[&str] = &[
 /// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
 /// N + i, whatever the scene says.
 pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
-    let mut file = Document::read(path)?;
+    load_document(Document::read(path)?, path, overrides, seed)
+}
+
+/// The same of a text; `path` is what errors call it, and files that it names lie beside that.
+pub fn parse(text: String, path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
+    load_document(Document::parse(text, path)?, path, overrides, seed)
+}
+
+fn load_document(mut file: Document, path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
     file.default_to("light", scene_lights::DEFAULT_LIGHTS);
     file.default_to("material", scene_lights::DEFAULT_MATERIAL);
     let mut document = file.clone();

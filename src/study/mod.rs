@@ -22,6 +22,7 @@ pub mod recorded;
 pub mod records;
 pub mod report;
 pub mod stage;
+pub mod stress;
 pub mod trace;
 pub mod tradeoff;
 pub mod truth;

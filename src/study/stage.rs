@@ -9,7 +9,7 @@ use crate::frame::choice::impostors::ImpostorChoice;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::{OnFrame, parallel, serial};
-use crate::gpu::{Compiler, Device, DeviceInfo, Instance};
+use crate::gpu::{Compiler, Device, DeviceInfo, Instance, Sources};
 use crate::model::scene::{Impostors, Scene, Simulate, Threading};
 use crate::passes;
 
@@ -44,12 +44,17 @@ pub struct Player {
 
 impl Bed {
     pub fn open(choice: &DeviceChoice) -> Result<Bed> {
-        let instance = Instance::new(choice.validation)?;
-        let device = Device::open(&instance, choice.device.as_deref())?;
         let mut sources = passes::sources();
         if let Some(dir) = &choice.shaders {
             sources = sources.with_dir(dir)?;
         }
+        Bed::with_sources(choice, sources)
+    }
+
+    /// With these shaders, whatever `choice` says of them.
+    pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<Bed> {
+        let instance = Instance::new(choice.validation)?;
+        let device = Device::open(&instance, choice.device.as_deref())?;
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
         Ok(Bed { compiler, device, instance })
     }

@@ -3,8 +3,6 @@
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
-pub mod bounds;
-
 use std::sync::Arc;
 
 use bytemuck::Pod;

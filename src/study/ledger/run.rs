@@ -205,7 +205,7 @@ impl Setup<'_> {
             let own_error = a.own_error + b.own_error;
             let found = picture_error(self.pixels, &a.rgba, &b.rgba, own_error);
             let what = "a picture of the scene holds values that are no finite numbers";
-            found.map(|(error, _)| (error.rmse, own_error)).ok_or_else(|| Error::usage(what))
+            found.map(|error| (error.rmse, own_error)).ok_or_else(|| Error::usage(what))
         };
         let (Some(first), Some(last)) = (chain.pictures.first(), chain.pictures.last()) else {
             return Ok(self.empty(made, nothing));

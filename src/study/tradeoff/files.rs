@@ -1,4 +1,4 @@
-//! A study on disk: `study.json`, `configurations.csv`, `times.csv`, `parts.csv` and pictures. Written after every round, so that whatever
+//! A study on disk: `study.json`, `configurations.csv`, `times.csv` and pictures. Written after every round, so that whatever
 //! ends a run early leaves what was finished, and a later run goes on from there.
 
 use std::fs;
@@ -7,7 +7,6 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::errors::Parts;
 use super::records::{Configuration, Front, SCHEMA_VERSION, STUDY_FILE, Study, TIMES_FILE};
 use super::run::Found;
 use super::turns::Turn;
@@ -17,18 +16,6 @@ use crate::io::folder::replace_files;
 use crate::study::provenance::Figure;
 
 pub const CONFIGURATIONS_FILE: &str = "configurations.csv";
-
-/// Squared errors part by part of the picture.
-const PARTS_FILE: &str = "parts.csv";
-
-/// A row of parts.csv.
-#[derive(Debug, Serialize, Deserialize)]
-struct PartRow {
-    configuration: usize,
-    part: usize,
-    sum_of_squares: f64,
-    pixels: f64,
-}
 
 /// A frame of times.csv.
 #[derive(Debug, Serialize, Deserialize)]
@@ -43,9 +30,8 @@ struct TimeRow {
 
 /// Writes the study and its tables; all of them, or none.
 pub fn write(folder: &Path, study: &Study, found: &Found) -> Result<()> {
-    replace_files(folder, &[TIMES_FILE, PARTS_FILE, CONFIGURATIONS_FILE, STUDY_FILE], |folder| {
+    replace_files(folder, &[TIMES_FILE, CONFIGURATIONS_FILE, STUDY_FILE], |folder| {
         write_times(&folder.join(TIMES_FILE), study, &found.turns)?;
-        write_csv(&folder.join(PARTS_FILE), found.parts.iter().enumerate().flat_map(|(i, p)| part_rows(i, p)))?;
         write_csv(&folder.join(CONFIGURATIONS_FILE), study.configurations.iter().map(csv_row))?;
         let path = folder.join(STUDY_FILE);
         let mut text = serde_json::to_string_pretty(study).map_err(|cause| Error::io(&path, cause))?;
@@ -68,16 +54,6 @@ pub fn remove_earlier(folder: &Path) -> Result<()> {
         }
     }
     Ok(())
-}
-
-fn part_rows(configuration: usize, Parts(parts): &Parts) -> impl Iterator<Item = PartRow> {
-    let row = move |(part, (sum_of_squares, pixels)): (usize, &(f64, f64))| PartRow {
-        configuration,
-        part,
-        sum_of_squares: *sum_of_squares,
-        pixels: *pixels,
-    };
-    parts.iter().enumerate().map(row)
 }
 
 fn write_times(path: &Path, study: &Study, turns: &[Turn]) -> Result<()> {
@@ -199,18 +175,5 @@ pub fn read_found(folder: &Path) -> Result<(Study, Found)> {
     }
     let n_rounds = turns.iter().map(|turn| turn.i_round + 1).max().unwrap_or(0);
     let configurations = study.configurations.clone();
-    let parts = read_parts(&folder.join(PARTS_FILE), configurations.len())?;
-    Ok((study, Found { configurations, parts, turns, n_rounds }))
-}
-
-fn read_parts(path: &Path, n: usize) -> Result<Vec<Parts>> {
-    let mut parts = vec![Parts::default(); n];
-    let mut reader = csv::Reader::from_path(path).map_err(|cause| Error::io(path, cause))?;
-    for row in reader.deserialize::<PartRow>() {
-        let row = row.map_err(|cause| Error::io(path, cause))?;
-        let own = parts.get_mut(row.configuration).filter(|own| own.0.len() == row.part);
-        let own = own.ok_or_else(|| Error::io(path, "its rows are not those of this study"))?;
-        own.0.push((row.sum_of_squares, row.pixels));
-    }
-    Ok(parts)
+    Ok((study, Found { configurations, turns, n_rounds }))
 }

@@ -79,9 +79,9 @@ pub struct PictureError {
 pub enum Front {
     /// None is better, as the figures stand: at most as long and as far off, and one of the two less.
     On,
-    /// Some are, but may be so by chance.
+    /// Some are, but none is faster by more than the intervals.
     Near,
-    /// Some are, and by more than chance in one of the two.
+    /// One is, and faster by more than the intervals.
     Off,
     /// It has no time or no error.
     Unknown,

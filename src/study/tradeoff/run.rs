@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::design::{Design, name_of, settings, together};
-use super::errors::{Parts, is_surely_nearer, picture_error};
+use super::errors::picture_error;
 use super::front::{Metric, place};
 use super::records::{Configuration, Front};
 use super::turns::{Time, Turn, n_turns, order, timed};
@@ -46,8 +46,6 @@ pub struct StudyPlan {
 #[derive(Debug, Clone, Default)]
 pub struct Found {
     pub configurations: Vec<Configuration>,
-    /// Of each the squared errors, part by part of the picture; none where it has no error.
-    pub parts: Vec<Parts>,
     pub turns: Vec<Turn>,
     /// Rounds that the turns are of.
     pub n_rounds: usize,
@@ -133,7 +131,6 @@ impl Setup<'_> {
                 picture: None,
                 error_map: None,
             });
-            found.parts.push(Parts::default());
         }
         Ok(found.configurations.len() - n_before)
     }
@@ -193,10 +190,7 @@ impl Setup<'_> {
                 let drawn = self.pixels.pick(&whole);
                 let error = picture_error(self.pixels, &drawn, &self.reference.rgba, self.reference.own_error);
                 match error {
-                    Some((error, parts)) => {
-                        found.configurations[i].error = Some(error);
-                        found.parts[i] = parts;
-                    }
+                    Some(error) => found.configurations[i].error = Some(error),
                     None if i > 0 => found.configurations[i].failure = Some(NOT_FINITE.to_owned()),
                     None => return Err(Error::usage(format!("the scene as it stands: {NOT_FINITE}"))),
                 }
@@ -212,7 +206,7 @@ impl Setup<'_> {
     }
 
     fn sum_up(&self, found: &mut Found) {
-        let Found { configurations, parts, turns, .. } = found;
+        let Found { configurations, turns, .. } = found;
         for (i, c) in configurations.iter_mut().enumerate() {
             let [gpu, frame] = [Time::Gpu, Time::Frame].map(|time| timed(turns, i, time));
             c.gpu_ms = gpu.map(|t| t.ms);
@@ -220,12 +214,6 @@ impl Setup<'_> {
             c.by_base = if self.plan.time == Time::Gpu { gpu } else { frame }.map(|t| t.by_base);
             c.n_turns = n_turns(turns, i);
         }
-        let (metric, own_error) = (self.plan.metric, self.reference.own_error);
-        let errors: Vec<Option<f64>> = configurations.iter().map(|c| metric.of(c).map(|e| e.value)).collect();
-        place(configurations, metric, |i, j| match metric {
-            Metric::Rmse => is_surely_nearer(&parts[i], &parts[j], own_error),
-            // Of these there are no intervals.
-            Metric::Max | Metric::RelMse => errors[i] < errors[j],
-        });
+        place(configurations, self.plan.metric);
     }
 }

@@ -1,0 +1,181 @@
+//! `nimbus stress [CASE…]`.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use serde::Serialize;
+
+use super::args::StressArgs;
+use super::output;
+use crate::error::{Error, Result};
+use crate::study::machine::{self, Cpu, Device};
+use crate::study::stage::DeviceChoice;
+use crate::study::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
+
+/// What `--json` prints; its form is docs/stress.schema.json.
+#[derive(Debug, Serialize)]
+struct Report {
+    schema: u32,
+    nimbus: &'static str,
+    revision: &'static str,
+    date: String,
+    device: Device,
+    cpu: Cpu,
+    interrupted: bool,
+    cases: Vec<Outcome>,
+}
+
+const SCHEMA_VERSION: u32 = 1;
+
+pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+    let chosen = chosen(&args.cases)?;
+    if args.list {
+        let rows = chosen.iter().map(|c| [c.name, c.what, c.bound].map(str::to_owned).to_vec());
+        let head = ["case", "what is tried", "what is allowed"].map(str::to_owned).to_vec();
+        return output::text(&output::table(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
+    }
+    let choice =
+        DeviceChoice { device: args.device.clone(), shaders: args.shaders.clone(), validation: args.validation };
+    let mut desk = Desk::open(&choice)?;
+    graceful.store(true, Ordering::Relaxed);
+    let bar = output::progress(chosen.len() as u64, "cases", args.quiet);
+    let mut done: Vec<Outcome> = Vec::new();
+    for case in &chosen {
+        if stop.load(Ordering::Relaxed) {
+            break;
+        }
+        bar.set_message(case.name);
+        done.push(run_case(case, &mut desk));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let interrupted = done.len() < chosen.len();
+    let info = desk.device().info().clone();
+    let report = Report {
+        schema: SCHEMA_VERSION,
+        nimbus: env!("CARGO_PKG_VERSION"),
+        revision: machine::revision(),
+        date: machine::utc_now(),
+        device: machine::device_record(&info),
+        cpu: machine::cpu(),
+        interrupted,
+        cases: done,
+    };
+    match (args.json, args.csv) {
+        (true, _) => output::object(&report)?,
+        (_, true) => output::rows(&report.cases.iter().map(row).collect::<Vec<_>>(), false)?,
+        _ => output::text(&text(&report))?,
+    }
+    desk.close()?;
+    if interrupted { Err(Error::Interrupted) } else { judged(&report.cases) }
+}
+
+/// The cases whose names begin with what was typed; all where nothing was.
+fn chosen(names: &[String]) -> Result<Vec<Case>> {
+    let all = cases();
+    if let Some(unknown) = names.iter().find(|name| !all.iter().any(|c| c.name.starts_with(name.as_str()))) {
+        let mut families: Vec<&str> = all.iter().map(Case::family).collect();
+        families.dedup();
+        return Err(Error::usage(format!(
+            "no case begins with \"{unknown}\"; expected one of `nimbus stress --list`, or a family: {}",
+            families.join(", ")
+        )));
+    }
+    Ok(all
+        .into_iter()
+        .filter(|c| names.is_empty() || names.iter().any(|name| c.name.starts_with(name.as_str())))
+        .collect())
+}
+
+/// An outcome as a row, for programs.
+#[derive(Debug, Serialize)]
+struct CsvRow<'a> {
+    name: &'a str,
+    verdict: Verdict,
+    n: usize,
+    n_beyond: usize,
+    at: Option<&'a str>,
+    value: Option<f64>,
+    truth: Option<f64>,
+    error: Option<f64>,
+    bound: Option<f64>,
+    remark: Option<&'a str>,
+    seconds: f64,
+}
+
+fn row(o: &Outcome) -> CsvRow<'_> {
+    let worst = o.worst.as_ref();
+    CsvRow {
+        name: &o.name,
+        verdict: o.verdict,
+        n: o.n,
+        n_beyond: o.n_beyond,
+        at: worst.map(|w| w.at.as_str()),
+        value: worst.map(|w| w.value),
+        truth: worst.map(|w| w.truth),
+        error: worst.map(|w| w.error),
+        bound: worst.map(|w| w.bound),
+        remark: o.remark.as_deref(),
+        seconds: o.seconds,
+    }
+}
+
+/// What is printed for people.
+fn text(report: &Report) -> String {
+    let head =
+        ["case", "verdict", "compared", "device", "reference", "error", "bound", "error/bound"].map(str::to_owned);
+    let number = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.3e}") };
+    let of = |o: &Outcome| {
+        let worst = o.worst.as_ref().map(|w| {
+            let share = if w.error == 0.0 { "0".to_owned() } else { format!("{:.2}", w.share()) };
+            [number(w.value), number(w.truth), number(w.error), number(w.bound), share]
+        });
+        let worst = worst.unwrap_or([const { String::new() }; 5]);
+        [vec![o.name.clone(), word(o.verdict).to_owned(), o.n.to_string()], worst.to_vec()].concat()
+    };
+    let rows: Vec<Vec<String>> = std::iter::once(head.to_vec()).chain(report.cases.iter().map(of)).collect();
+    let count = |verdict: Verdict| report.cases.iter().filter(|o| o.verdict == verdict).count();
+    let mut out = format!("{} ({}), {}\n\n", report.device.name, report.device.driver, report.cpu.model);
+    out += &output::table(&rows);
+    for o in report.cases.iter().filter(|o| o.verdict != Verdict::Passed || o.remark.is_some()) {
+        let beyond = match (&o.worst, o.verdict) {
+            (Some(w), Verdict::Failed) => format!("{} of {} out of bound; at {}", o.n_beyond, o.n, w.at),
+            (None, Verdict::Failed) => "nothing was compared".to_owned(),
+            _ => String::new(),
+        };
+        let words: Vec<&str> =
+            [beyond.as_str(), o.remark.as_deref().unwrap_or("")].into_iter().filter(|w| !w.is_empty()).collect();
+        out += &format!("\n{}: {}", o.name, words.join("; "));
+    }
+    let seconds: f64 = report.cases.iter().map(|o| o.seconds).sum();
+    out += &format!(
+        "\n\n{} passed, {} failed, {} broken, {} not on this device; {seconds:.1} s{}\n",
+        count(Verdict::Passed),
+        count(Verdict::Failed),
+        count(Verdict::Broken),
+        count(Verdict::NotHere),
+        if report.interrupted { "; INTERRUPTED" } else { "" }
+    );
+    out
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Passed => "passed",
+        Verdict::Failed => "FAILED",
+        Verdict::Broken => "BROKEN",
+        Verdict::NotHere => "not here",
+    }
+}
+
+/// An error where a case failed.
+fn judged(cases: &[Outcome]) -> Result<()> {
+    let bad: Vec<&str> = cases
+        .iter()
+        .filter(|o| matches!(o.verdict, Verdict::Failed | Verdict::Broken))
+        .map(|o| o.name.as_str())
+        .collect();
+    if bad.is_empty() {
+        return Ok(());
+    }
+    Err(Error::Check { what: format!("{} of {} cases failed: {}", bad.len(), cases.len(), bad.join(", ")) })
+}

@@ -1,0 +1,280 @@
+//! Particles of boxes at the edge: without extent, huge, needles and plates, far away, with no radius or a huge one.
+
+use glam::DVec3;
+
+use super::case::{Case, Comparison, Found};
+use super::desk::Desk;
+use super::scenes::{OPTICAL_DEPTH, PLAIN, SEED, one_box, with_boxes};
+use crate::error::{Error, Result};
+use crate::layout::particle::ParticleRecord;
+use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS};
+use crate::model::cloud::SIGMA_PER_RADIUS;
+use crate::passes::generate::FOLDED;
+use crate::reference::generate::generate_particle;
+use crate::reference::place::placed_bound;
+use crate::reference::rounding::{U_F32, particle_bound};
+
+pub const CASES: &[Case] = &[
+    Case {
+        name: "generation/unit",
+        what: "an ordinary box, for comparison with the others",
+        bound: "running error analysis of each particle (reference::rounding)",
+        run: |desk| particles(desk, one_box(2000, [2.0, 1.5, 1.0], 1.0)),
+    },
+    Case {
+        name: "generation/flat",
+        what: "a box without extent: every particle at its centre",
+        bound: "running error analysis of each particle",
+        run: |desk| particles(desk, one_box(500, [0.0; 3], 1.0)),
+    },
+    Case {
+        name: "generation/tiny",
+        what: "a box of 1e-30",
+        bound: "running error analysis of each particle",
+        run: |desk| particles(desk, one_box(500, [1e-30; 3], 1.0)),
+    },
+    Case {
+        name: "generation/huge",
+        what: "a box of 1e30, where sines are of arguments that mean nothing: inside all the same",
+        bound: "|offset| <= half of the box; finite",
+        run: |desk| inside(desk, one_box(500, [1e30; 3], 1.0)),
+    },
+    Case {
+        name: "generation/wide",
+        what: "a box of 2000, where f32 and f64 decide differently: inside, and as many attempts on the average",
+        bound: "|offset| <= half of the box; 5 standard deviations",
+        run: wide,
+    },
+    Case {
+        name: "generation/needle",
+        what: "a box of 40 x 0.001 x 0.001, which accepts next to nothing",
+        bound: "running error analysis of each particle, folds included",
+        run: |desk| particles(desk, one_box(2000, [40.0, 1e-3, 1e-3], 1.0)),
+    },
+    Case {
+        name: "generation/plate",
+        what: "a box of 20 x 0.0001 x 20",
+        bound: "running error analysis of each particle, folds included",
+        run: |desk| particles(desk, one_box(2000, [20.0, 1e-4, 20.0], 1.0)),
+    },
+    Case {
+        name: "generation/folded",
+        what: "a box in which 64 attempts fail: folds are counted as the reference counts them, and lie inside",
+        bound: "0 in the count of what is surely folded; |offset| <= half of the box",
+        run: folded,
+    },
+    Case {
+        name: "generation/no-radius",
+        what: "particles of radius 0: none is drawn, and nothing is odd",
+        bound: "0",
+        run: no_radius,
+    },
+    Case {
+        name: "generation/huge-radius",
+        what: "particles of radii up to 1e6, beyond what the sine can reduce",
+        bound: "pi/2 either way of the radius before its sine, and rounding",
+        run: huge_radius,
+    },
+    Case {
+        name: "generation/far-left",
+        what: "a box centred at -1e7: places relative to the scene's own origin",
+        bound: "that of the same box at 0, and 2^-52 of 1e7",
+        run: |desk| far(desk, -1e7),
+    },
+    Case {
+        name: "generation/far-right",
+        what: "a box centred at 1e7",
+        bound: "that of the same box at 0, and 2^-52 of 1e7",
+        run: |desk| far(desk, 1e7),
+    },
+    Case { name: "generation/none", what: "no particle at all: a picture of nothing", bound: "0", run: none },
+    Case {
+        name: "generation/one",
+        what: "one particle",
+        bound: "running error analysis",
+        run: |desk| particles(desk, one_box(1, [1.0; 3], 1.0)),
+    },
+    Case {
+        name: "generation/too-many",
+        what: "2^31 particles: refused with the limit that they break, before anything is allocated",
+        bound: "an error of the kind \"limit\"",
+        run: too_many,
+    },
+];
+
+/// What the device makes of one box.
+fn made(desk: &mut Desk, b: CloudBox) -> Result<(Vec<ParticleRecord>, Vec<u32>)> {
+    let scene = with_boxes(desk, PLAIN, vec![b])?;
+    let mut player = desk.player(&scene, false)?;
+    player.renderer.generate_now(desk.device())
+}
+
+/// Every particle against the reference, each at its own bound; where rounding may decide otherwise only that it is inside.
+fn particles(desk: &mut Desk, b: CloudBox) -> Result<Found> {
+    let (records, status) = made(desk, b)?;
+    let mut c = Comparison::default();
+    let (mut n_open, mut n_folded) = (0, 0);
+    for (i, (record, status)) in (0u32..).zip(records.iter().zip(&status)) {
+        let truth = generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i);
+        let bound = particle_bound(&b, 0, SEED, Form::Centred, i, U_F32);
+        n_folded += usize::from(status & FOLDED != 0);
+        is_inside(&mut c, record, &b, i);
+        if !bound.decided {
+            n_open += 1;
+            continue;
+        }
+        c.expect(status & !FOLDED == truth.n_attempts, || format!("attempts of particle {i}"));
+        c.expect((status & FOLDED != 0) == truth.folded, || format!("fold of particle {i}"));
+        for axis in 0..3 {
+            // Below f32's least normal number products may be flushed.
+            let bound = bound.position[axis] + f64::from(f32::MIN_POSITIVE);
+            c.add(f64::from(record.position[axis]), truth.position[axis], bound, || {
+                format!("place of particle {i}, axis {axis}")
+            });
+        }
+        c.add(f64::from(record.sigma), truth.sigma, bound.radius * SIGMA_PER_RADIUS, || {
+            format!("sigma of particle {i}")
+        });
+    }
+    Ok(c.remark(format!("{n_folded} folded; of {n_open} rounding decides")).into())
+}
+
+fn is_inside(c: &mut Comparison, record: &ParticleRecord, b: &CloudBox, i: u32) {
+    for axis in 0..3 {
+        // The half is rounded to f32.
+        let most = f64::from((0.5 * b.extent[axis]) as f32);
+        let beyond = (f64::from(record.position[axis]).abs() - most).max(0.0);
+        c.add(beyond, 0.0, 0.0, || format!("particle {i} beyond its box, axis {axis}"));
+    }
+}
+
+fn inside(desk: &mut Desk, b: CloudBox) -> Result<Found> {
+    let (records, status) = made(desk, b)?;
+    let mut c = Comparison::default();
+    for (i, record) in (0..).zip(&records) {
+        is_inside(&mut c, record, &b, i);
+        c.expect(record.sigma.is_finite() && record.kappa.is_finite(), || format!("a finite particle {i}"));
+    }
+    let n_folded = status.iter().filter(|s| *s & FOLDED != 0).count();
+    Ok(c.remark(format!("{n_folded} of {} folded", status.len())).into())
+}
+
+fn wide(desk: &mut Desk) -> Result<Found> {
+    let b = one_box(4000, [2000.0; 3], 1.0);
+    let (records, status) = made(desk, b)?;
+    let mut c = Comparison::default();
+    (0..).zip(&records).for_each(|(i, record)| is_inside(&mut c, record, &b, i));
+    let truths =
+        (0..b.n_particles).map(|i| generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i).n_attempts);
+    let truths: Vec<f64> = truths.map(f64::from).collect();
+    let n = truths.len() as f64;
+    let mean = |values: &mut dyn Iterator<Item = f64>| values.sum::<f64>() / n;
+    let expected = mean(&mut truths.iter().copied());
+    let variance = mean(&mut truths.iter().map(|t| (t - expected).powi(2)));
+    let found = mean(&mut status.iter().map(|s| f64::from(s & !FOLDED)));
+    // Two means of n draws each.
+    c.add(found, expected, 5.0 * (2.0 * variance / n).sqrt(), || "mean of attempts".to_owned());
+    Ok(c.into())
+}
+
+fn folded(desk: &mut Desk) -> Result<Found> {
+    let b = one_box(3000, [60.0, 1e-6, 1e-6], 1.0);
+    let (records, status) = made(desk, b)?;
+    let mut c = Comparison::default();
+    let [mut found, mut expected] = [0u32; 2];
+    for (i, (record, status)) in (0u32..).zip(records.iter().zip(&status)) {
+        is_inside(&mut c, record, &b, i);
+        c.expect(status & !FOLDED <= MAX_ATTEMPTS, || format!("attempts of particle {i}"));
+        if particle_bound(&b, 0, SEED, Form::Centred, i, U_F32).decided {
+            found += u32::from(status & FOLDED != 0);
+            expected += u32::from(generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i).folded);
+        }
+    }
+    c.add(f64::from(found), f64::from(expected), 0.0, || "folded particles".to_owned());
+    c.expect(expected > 0, || "that some are folded".to_owned());
+    Ok(c.remark(format!("{found} folded")).into())
+}
+
+fn no_radius(desk: &mut Desk) -> Result<Found> {
+    let scene = with_boxes(desk, PLAIN, vec![one_box(500, [2.0; 3], 0.0)])?;
+    let played = desk.play(&scene, 0)?;
+    let mut c = Comparison::default();
+    for (i, p) in played.particles.iter().enumerate() {
+        c.add(f64::from(p.sigma), 0.0, 0.0, || format!("sigma of particle {i}"));
+    }
+    for (i, v) in played.rgba.iter().enumerate() {
+        c.add(f64::from(*v), 0.0, 0.0, || format!("number {i} of the picture"));
+    }
+    Ok(c.into())
+}
+
+fn huge_radius(desk: &mut Desk) -> Result<Found> {
+    let b = one_box(2000, [2.0; 3], 1e6);
+    let (records, status) = made(desk, b)?;
+    let mut c = Comparison::default();
+    let factor = crate::model::boxes::radius_factor(Form::Centred, b.radius_max);
+    for (i, (record, status)) in (0u32..).zip(records.iter().zip(&status)) {
+        let attempt = (status & !FOLDED).saturating_sub(1);
+        let [.., u] = crate::reference::generate::uniforms(SEED, 0, i, attempt);
+        let r = u * b.radius_max;
+        // |pi/2 sin| <= pi/2 (1 + 4 u), and the roundings of a number of 1e6.
+        let bound = std::f64::consts::FRAC_PI_2 * 1.001 + 6.0 * U_F32 * r;
+        let radius = f64::from(record.sigma) / (factor * SIGMA_PER_RADIUS);
+        c.add(radius, r, bound, || format!("radius of particle {i}"));
+    }
+    Ok(c.into())
+}
+
+fn far(desk: &mut Desk, at: f64) -> Result<Found> {
+    let b = one_box(1500, [2.0, 1.5, 1.0], 1.0);
+    let mut scene = with_boxes(desk, PLAIN, vec![CloudBox { center: DVec3::new(at, at, -at), ..b }])?;
+    for key in &mut scene.camera.keys {
+        key.position += DVec3::new(at, at, -at);
+        key.target += DVec3::new(at, at, -at);
+    }
+    let played = desk.play(&scene, 0)?;
+    let mut c = Comparison::default();
+    for (i, place) in (0u32..).zip(&played.placed) {
+        let truth = generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i).position;
+        let bound = particle_bound(&b, 0, SEED, Form::Centred, i, U_F32);
+        if !bound.decided {
+            continue;
+        }
+        // The box's centre is the origin of all that is lit, but for f64's rounding of 1e7.
+        let bound = placed_bound(bound.position, DVec3::ZERO, truth, U_F32) + DVec3::splat(2f64.powi(-52) * at.abs());
+        for axis in 0..3 {
+            c.add(f64::from(place.position[axis]), truth[axis], bound[axis], || {
+                format!("place of particle {i}, axis {axis}")
+            });
+        }
+    }
+    c.expect(played.n_odd() == 0, || "a finite picture".to_owned());
+    c.expect(played.rgba.iter().any(|v| *v > 0.1), || "that something is drawn".to_owned());
+    Ok(c.into())
+}
+
+fn none(desk: &mut Desk) -> Result<Found> {
+    let mut c = Comparison::default();
+    for boxes in [vec![], vec![one_box(0, [1.0; 3], 1.0)], vec![one_box(0, [1.0; 3], 1.0); 3]] {
+        let n = boxes.len();
+        let scene = with_boxes(desk, PLAIN, boxes)?;
+        let played = desk.play(&scene, 0)?;
+        let n_other = played.rgba.iter().filter(|v| **v != 0.0).count();
+        c.add(n_other as f64, 0.0, 0.0, || format!("numbers that are not 0 in a picture of {n} empty boxes"));
+    }
+    Ok(c.into())
+}
+
+fn too_many(desk: &mut Desk) -> Result<Found> {
+    let scene = with_boxes(desk, PLAIN, vec![one_box(1 << 31, [1.0; 3], 1.0)])?;
+    let before = desk.device().allocated_bytes();
+    let refused = match desk.player(&scene, false) {
+        Err(Error::Limit { what }) => Some(what),
+        Err(error) => return Err(error),
+        Ok(_) => None,
+    };
+    let mut c = Comparison::default();
+    c.expect(refused.is_some(), || "that it is refused".to_owned());
+    c.add(desk.device().allocated_bytes() as f64, before as f64, 0.0, || "bytes that are left allocated".to_owned());
+    Ok(c.remark(refused.unwrap_or_default()).into())
+}

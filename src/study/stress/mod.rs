@@ -1,0 +1,24 @@
+//! `nimbus stress`: whether a device computes at the edges what nimbus claims, case by case, each with a bound that is derived
+//! (docs/stability.md) from the precision that Vulkan promises.
+
+mod case;
+mod compositing;
+mod count;
+mod desk;
+mod determinism;
+mod functions;
+mod generation;
+mod run;
+mod scenes;
+mod space;
+
+pub use case::{Case, Comparison, Found, Outcome, Verdict, Worst};
+pub use desk::{Desk, Played};
+pub use run::run_case;
+
+/// Every case, family by family.
+pub fn cases() -> Vec<Case> {
+    let families: [&[Case]; 6] =
+        [functions::CASES, generation::CASES, count::CASES, compositing::CASES, space::CASES, determinism::CASES];
+    families.concat()
+}

@@ -122,6 +122,20 @@ const FAULTS: &[Fault] = &[
         "total += k != 6u && (n_blocks >> k & 1u) == 1u ? sum.parts[k] : T(0.0);",
         "transport/sum-pairwise",
     ),
+    (
+        "the last particle's place is not written",
+        "place.comp",
+        "FOR_EACH(i, push.n_particles) {",
+        "FOR_EACH(i, push.n_particles - 1u) {",
+        "determinism/poison",
+    ),
+    (
+        "an epsilon added to a depth",
+        "include/functions.glsl",
+        "t * (1.0 - t * (1.0 / 2.0)",
+        "(t + 1e-7) * (1.0 - t * (1.0 / 2.0)",
+        "functions/one-minus-exp",
+    ),
     ("pi forgotten in what a diffuse surface sends", "first.comp", "0.318309886183791", "1.0", "brdf/exponent-0"),
 ];
 

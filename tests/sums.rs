@@ -58,8 +58,20 @@ fn one_and_dust(n: usize) -> Vec<f32> {
     std::iter::once(1.0).chain((1..n).map(|_| 0.4 / 16_777_216.0)).collect()
 }
 
+/// The same by fours, in a loop whose length is known.
+fn by_fours() -> Compiler {
+    let (from, to) = ("++i) {", "i += 4u) { UNROLL for (uint k = 0u; k < 4u; ++k) {");
+    let text =
+        TEXT.replace(from, to).replace("terms[i]);\n    }", "terms[i]);\n    } }").replace("terms[i]", "terms[i + k]");
+    compiler_of(&text, None)
+}
+
 fn compiler(wrong: Option<(&str, &str)>) -> Compiler {
-    let text = TEXT.replace('\'', "\"");
+    compiler_of(TEXT, wrong)
+}
+
+fn compiler_of(text: &str, wrong: Option<(&str, &str)>) -> Compiler {
+    let text = text.replace('\'', "\"");
     let mut sources = Sources::embedded(&[&[("sums.comp", text.as_str())], SHADERS].concat());
     if let Some((from, to)) = wrong {
         assert!(sources.replace("include/sum.glsl", from, to), "{from}");
@@ -107,6 +119,17 @@ fn every_sum_is_within_its_bound() {
         let found = run(&mut gpu, &compiler(None), way, &rows);
         assert_within_and_say(&format!("{way:?}"), &found[0], &truths, &bounds);
         assert_eq!(found[0], found[1], "{way:?}: of numbers and of vectors");
+    }
+}
+
+/// What an optimiser copies of an unrolled body loses `precise`.
+#[test]
+fn sums_in_loops_of_a_known_length_are_within_their_bounds() {
+    let (mut gpu, rows) = (Gpu::new(), vec![one_and_dust(8192), vec![0.1; 4096]]);
+    let truths: Vec<f64> = rows.iter().map(|row| exact(row)).collect();
+    for way in every_way() {
+        let found = run(&mut gpu, &by_fours(), way, &rows);
+        assert_within_and_say(&format!("{way:?} by fours"), &found[0], &truths, &bounds(way, &rows));
     }
 }
 

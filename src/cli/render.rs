@@ -45,8 +45,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }
-    let counts = Counts::of(&mut stage)?;
-    if args.options.verbose {
+    let counts = (args.options.verbose || args.json).then(|| Counts::of(&mut stage)).transpose()?;
+    if let (Some(counts), true) = (&counts, args.options.verbose) {
         eprintln!("  {}", counts.text());
     }
     stage.close()?;

@@ -29,9 +29,8 @@ const SCHEMA_VERSION: u32 = 1;
 pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
     let chosen = chosen(&args.cases)?;
     if args.list {
-        let rows = chosen.iter().map(|c| [c.name, c.what, c.bound].map(str::to_owned).to_vec());
-        let head = ["case", "what is tried", "what is allowed"].map(str::to_owned).to_vec();
-        return output::text(&output::table(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
+        let text = |c: &Case| format!("{}\n    {}\n    allowed: {}\n", c.name, c.what, c.bound);
+        return output::text(&chosen.iter().map(text).collect::<String>());
     }
     let choice = DeviceChoice {
         device: args.device.clone(),
@@ -76,7 +75,9 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
 /// The cases whose names begin with what was typed; all where nothing was.
 fn chosen(names: &[String]) -> Result<Vec<Case>> {
     let all = cases();
-    if let Some(unknown) = names.iter().find(|name| !all.iter().any(|c| c.name.starts_with(name.as_str()))) {
+    if let Some(unknown) =
+        names.iter().find(|name| name.is_empty() || !all.iter().any(|c| c.name.starts_with(name.as_str())))
+    {
         let mut families: Vec<&str> = all.iter().map(Case::family).collect();
         families.dedup();
         return Err(Error::usage(format!(
@@ -84,10 +85,11 @@ fn chosen(names: &[String]) -> Result<Vec<Case>> {
             families.join(", ")
         )));
     }
-    Ok(all
-        .into_iter()
-        .filter(|c| names.is_empty() || names.iter().any(|name| c.name.starts_with(name.as_str())))
-        .collect())
+    // A whole name is that case alone, though others may begin with it.
+    let is_whole = |name: &String| all.iter().any(|c| c.name == name);
+    let is_meant =
+        |c: &Case| names.iter().any(|n| if is_whole(n) { c.name == n } else { c.name.starts_with(n.as_str()) });
+    Ok(all.iter().copied().filter(|c| names.is_empty() || is_meant(c)).collect())
 }
 
 /// An outcome as a row, for programs.

@@ -113,6 +113,11 @@ impl Basis {
         &self.vectors
     }
 
+    /// The product under that weight of two functions at the nodes.
+    pub fn product(&self, a: &[f64], b: &[f64]) -> f64 {
+        product(a, b, &self.weights)
+    }
+
     /// Of all lobes that the basis is made from, falling; the first `n_bases` − 1 are those of the vectors.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values

@@ -15,6 +15,7 @@ pub mod impostor;
 pub mod least;
 pub mod light;
 pub mod material;
+pub mod moisture;
 pub mod pairings;
 pub mod philox;
 pub mod resolution;

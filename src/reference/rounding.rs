@@ -94,7 +94,9 @@ impl Rounded {
     /// |sin(a + e) − sin a| ≤ |cos a||e| + e²/2, e the argument's own error and that of its reduction.
     fn sine(self, u: f64) -> Rounded {
         let e = self.error + REDUCTION_ERROR * u * (self.value.abs() + self.error);
-        let error = self.value.cos().abs() * e + 0.5 * e * e + SINE_ERROR;
+        // Of small arguments it is their own, to 3.5 ulp.
+        let own = SINE_ERROR.min(7.0 * u * (self.value.sin().abs() + e));
+        let error = self.value.cos().abs() * e + 0.5 * e * e + own;
         Rounded { value: self.value.sin(), error }
     }
 }

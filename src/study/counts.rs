@@ -69,7 +69,9 @@ impl Counts {
     }
 
     fn add_light(&mut self, lit: &[LitRecord]) {
-        let any = |l: &LitRecord, is_odd: fn(f32) -> bool| l.first.iter().chain(&l.second).any(|v| is_odd(*v));
+        let any = |l: &LitRecord, is_odd: fn(f32) -> bool| {
+            [l.direct, l.indirect, l.first, l.second].iter().flatten().any(|v| is_odd(*v))
+        };
         self.facets = lit.len() as u64;
         self.facets_not_finite = lit.iter().filter(|l| any(l, |v| !v.is_finite())).count() as u64;
         self.facets_negative = lit.iter().filter(|l| any(l, |v| v < 0.0)).count() as u64;

@@ -75,14 +75,14 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "compositing/saturated-half",
-        what: "radiances of 1e6 in a target of 16 bits, which holds 65504: counted as infinite, alpha right",
+        what: "radiances of 1e6 in a target of 16 bits, which holds 65504: infinite or that, alpha right",
         bound: "0 in alpha; infinity or 65504 in colour",
         run: saturated_half,
     },
     Case {
         name: "compositing/paths",
         what: "a heap of 800 blobs by sprites and by tiles: the same picture",
-        bound: "2^-22 a layer, and (1e-6 + 64 u) tau of each",
+        bound: "2^-22 a layer, and (2e-6 + 64 u) tau of all",
         run: paths,
     },
 ];
@@ -119,7 +119,7 @@ fn thin(desk: &mut Desk, path: &str) -> Result<Found> {
         let n = f64::from(N);
         let passed = n * (-a).ln_1p();
         let truth = -passed.exp_m1();
-        // Blending: of every layer what is written is rounded, by 2 u of it, and (1 - a) of that goes on; no more than 2 u/a.
+        // Blending: of every layer what is written is rounded, by 2 u of it, and (1 - a) of that goes on: no more than 2 u/a of it, and as much again by second orders.
         // Tiles: A + (1 - A) a, whose sum is rounded as what it is; 1 - A and the product by 2 u of what is added, all of them once.
         let bound = match is_tiled {
             false => (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth,
@@ -280,7 +280,7 @@ fn paths(desk: &mut Desk) -> Result<Found> {
     for i in 0..WIDTH * 49 {
         // What the opacities' errors can do is bounded by the depth of all of them, which alpha tells where it is not full.
         let tau = -(1.0 - channel(&a, i, 3)).max(1e-7).ln();
-        let bound = f64::from(N) * 2f64.powi(-22) + (1e-6 + 64.0 * U_F32) * tau;
+        let bound = f64::from(N) * 2f64.powi(-22) + (2e-6 + 64.0 * U_F32) * tau;
         for k in 0..4 {
             c.add(channel(&a, i, k), channel(&b, i, k), bound, || format!("pixel {i}, channel {k}"));
         }

@@ -188,7 +188,7 @@ fn drawn(desk: &mut Desk) -> Result<Found> {
     const TAU: f64 = 0.02;
     let mut c = Comparison::default();
     for path in ["sprites", "tiles"] {
-        // Of C's formula with d0 = 1 the eye at 10 sees e^{-10/a}: from all to a sixteenth of one.
+        // Of C's formula with d0 = 1 the eye at 10 sees e^{-10/a}: from all to one.
         for a in [1e9, 20.0, 5.0, 3.0, 2.45] {
             let text = format!("{PLAIN}[draw]\npath = '{path}'\ncount = 'distance'\ncount_a = {a:?}\ncount_d0 = 1.0\n");
             let scene = with_particles(desk, &text, vec![blob([0.0; 3], 0.5, TAU); N as usize])?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Commands, Compiler, Device, Field, Kernel, Place, Recorder, Sources};
 use crate::io::scene_file::parse;
 use crate::layout::facet::{FacetRecord, LitRecord};
@@ -35,6 +35,9 @@ void main() {
     }
 }
 ";
+
+/// Shaders that work by single records: their workgroups may be as large as one likes.
+const LEAST_CHANGED: u32 = 15;
 
 pub struct Desk {
     // Commands first: they are dropped first, and wait for what is still under way.
@@ -81,13 +84,20 @@ impl Desk {
         Ok(Desk { commands, sources, choice: choice.clone(), bed })
     }
 
-    /// Another one on the same device whose shaders, where they take workgroups of 64, take `n`.
+    /// Another one on the same device whose shaders, where they take workgroups of 64, take `n`. (Others' are made of subgroups, or of
+    /// what shared memory holds.)
     pub fn in_workgroups_of(&self, n: u32) -> Result<Desk> {
         let names: Vec<String> =
             self.sources.names().filter(|name| name.ends_with(".comp")).map(str::to_owned).collect();
         let mut sources = self.sources.clone();
+        let mut n_changed = 0;
         for name in names {
-            sources.replace(&name, "local_size_x = 64", &format!("local_size_x = {n}"));
+            n_changed += u32::from(sources.replace(&name, "local_size_x = 64", &format!("local_size_x = {n}")));
+        }
+        if n_changed < LEAST_CHANGED {
+            return Err(Error::usage(format!(
+                "{n_changed} shaders take workgroups of 64; expected at least {LEAST_CHANGED}"
+            )));
         }
         Desk::with_sources(&self.choice, sources)
     }

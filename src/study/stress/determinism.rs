@@ -15,13 +15,13 @@ pub const CASES: &[Case] = &[
     Case { name: "determinism/runs", what: "a frame of everything, made twice", bound: "0: the same bytes", run: runs },
     Case {
         name: "determinism/workgroups-32",
-        what: "compute shaders in workgroups of 32 and not 64",
+        what: "shaders that work by single records in workgroups of 32 and not 64",
         bound: "0: the same bytes",
         run: |desk| workgroups(desk, 32),
     },
     Case {
         name: "determinism/workgroups-128",
-        what: "compute shaders in workgroups of 128",
+        what: "shaders that work by single records in workgroups of 128",
         bound: "0: the same bytes",
         run: |desk| workgroups(desk, 128),
     },

@@ -10,6 +10,7 @@ mod determinism;
 mod functions;
 mod generation;
 mod metamorphic;
+mod moisture;
 mod run;
 mod scenes;
 mod sorting;
@@ -23,10 +24,11 @@ pub use run::run_case;
 
 /// Every case, family by family.
 pub fn cases() -> Vec<Case> {
-    let families: [&[Case]; 11] = [
+    let families: [&[Case]; 12] = [
         functions::CASES,
         generation::CASES,
         count::CASES,
+        moisture::CASES,
         brdf::CASES,
         transport::CASES,
         transmittance::CASES,

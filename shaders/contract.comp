@@ -87,7 +87,7 @@ void add_light(inout Sum sum, REAL3 energy, uint l, uvec2 own_spans, uint n_shin
     ADD(sum.direct, direct);
     ADD(sum.first, direct * own[0]);
     for (uint k = 0u; k < n_shiny; ++k) {
-        [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+        UNROLL for (uint b = 1u; b < N_BASES; ++b) {
             ADD(sum.first, energy * own[b] * texelFetch(t1, int(l * push.n_rows + rows[b])).x);
         }
     }
@@ -102,7 +102,7 @@ void add_light(inout Sum sum, REAL3 energy, uint l, uvec2 own_spans, uint n_shin
             ADD(sum.indirect, indirect);
             ADD(sum.second, indirect * own[0]);
             for (uint k = 0u; k < n_shiny; ++k) {
-                [[unroll]] for (uint b = 1u; b < N_BASES; ++b) {
+                UNROLL for (uint b = 1u; b < N_BASES; ++b) {
                     ADD(sum.second, column * own[b] * texelFetch(t2, int(at[b] + c * TILE)).x);
                 }
             }

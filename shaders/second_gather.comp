@@ -144,7 +144,7 @@ void take_cell(
 #if GLOSSY
     vec4 taken = taken_from(cell, taker);
 #endif
-    [[unroll]] for (uint l = 0u; l < N_LIGHTS; ++l) {
+    UNROLL for (uint l = 0u; l < N_LIGHTS; ++l) {
         vec4 g = part * arriving_by(i, source, walk, cell, seen, i_own, own, l);
         vec3 diffuse = LIGHT(l).energy * emitter.kd * PI_INVERSE;
         ADD(indirect, diffuse * dot(g, vec4(1.0)));

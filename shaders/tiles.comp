@@ -138,7 +138,8 @@ float full;
 float inv_threshold;
 #endif
 vec3 color[RUN];
-float passed[RUN];
+// What is composed hides so much: what passes, 1 - that, would lose thin layers in its rounding.
+float opaque[RUN];
 #if BEHIND
 float depth_of[RUN];
 #endif
@@ -170,13 +171,14 @@ void compose(Loaded splat, float y) {
     float lowest = least;
 #endif
     // Step by step for all pixels, so that what waits for a result stands apart from it.
-    float dx[RUN], e[RUN], tau[RUN];
+    float dx[RUN], e[RUN], tau[RUN], passed[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         dx[j] = x_of[j] - s.x;
         e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_norm[j];
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         // What is left out is a pixel's own affair: it must not depend on who else is drawn.
+        passed[j] = 1.0 - opaque[j];
         bool is_seen = e[j] >= lowest && !(passed[j] < full);
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
@@ -193,7 +195,7 @@ void compose(Loaded splat, float y) {
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         float here = passed[j] * tau[j];
-        passed[j] -= here;
+        opaque[j] += here;
         color[j] += here * light.xyz;
     }
 }
@@ -293,7 +295,7 @@ float depth_at(uint p) { return uintBitsToFloat(depths[p]); }
 #endif
 
 // Pixel j of the row over what stands behind it.
-vec4 seen(uint j, uint p) { return vec4(color[j], 1.0 - passed[j]) + passed[j] * load(p); }
+vec4 seen(uint j, uint p) { return vec4(color[j], opaque[j]) + (1.0 - opaque[j]) * load(p); }
 
 // Tile i_tile of the bin whose pairs are those of the range.
 void draw_tile(uvec4 range, uint i_tile) {
@@ -317,10 +319,10 @@ void draw_tile(uvec4 range, uint i_tile) {
 #if ROUNDS
         vec4 before = state[p];
         color[j] = before.xyz;
-        passed[j] = 1.0 - before.w;
+        opaque[j] = before.w;
 #else
         color[j] = vec3(0.0);
-        passed[j] = 1.0;
+        opaque[j] = 0.0;
 #endif
 #if BEHIND
         depth_of[j] = depth_at(p);
@@ -348,14 +350,14 @@ void draw_tile(uvec4 range, uint i_tile) {
         wait_for_all();
         float most = 0.0;
         [[unroll]] for (uint j = 0; j < RUN; ++j) {
-            most = max(most, passed[j]);
+            most = max(most, 1.0 - opaque[j]);
         }
         is_done = all_agree(most < push.saturated) || first >= range.y;
     } while (!is_done);
 #if ROUNDS
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         if (at.x + j < push.width && at.y < push.height) {
-            state[row + at.x + j] = vec4(color[j], 1.0 - passed[j]);
+            state[row + at.x + j] = vec4(color[j], opaque[j]);
         }
     }
 #endif

@@ -8,6 +8,7 @@ use std::path::Path;
 
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
+use nimbus::study::counts::Counts;
 use nimbus::study::machine::{Cpu, cpu, environment, revision, utc_now};
 use nimbus::study::overlap::{Overlap, SerialFrame};
 use nimbus::study::records::{
@@ -75,6 +76,7 @@ fn sample() -> Run {
         ratio: Some(Ratio { parallel_by_serial: 0.5, low: Some(0.25), high: Some(0.75) }),
         overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
         skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
+        counts: Some(Counts { values: 8, ..Counts::default() }),
         ..blank.cases[0].clone()
     };
     Run {
@@ -116,6 +118,7 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
             ratio: None,
             overlap: None,
             skipping: None,
+            counts: None,
             ..sample().cases[0].clone()
         }],
         block_order: Vec::new(),
@@ -185,9 +188,9 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
-    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping; twice a
+    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping, counts; twice a
     // mode, seven summaries, lows, two passes, a reason.
-    assert_eq!(n_compared, 4 + 2 + 6 + 2 * (1 + 7 + 1 + 2 + 1));
+    assert_eq!(n_compared, 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]

@@ -87,7 +87,9 @@ float positive_part(float mean, float variance) {
     float deviation = sqrt(max(variance, 1e-12));
     float z = clamp(mean / deviation, -6.0, 6.0);
     float below = 0.5 + 0.5 * erf_approx(0.70710678 * z);
-    return max(z > 5.9 ? mean : deviation * (z * below + 0.39894228 * exp(-0.5 * z * z)), 0.0);
+    // What does not spread is its mean; the least deviation would give what faces away 4e-7.
+    bool spreads = variance > 1e-12 && z <= 5.9;
+    return max(spreads ? deviation * (z * below + 0.39894228 * exp(-0.5 * z * z)) : mean, 0.0);
 }
 
 // A cluster's second moments times a vector.

@@ -20,6 +20,14 @@
 #define REAL3 vec3
 #endif
 
+// A loop that adds to sums. Not unrolled where they are compensated: spirv-opt's copies of an unrolled body lose `precise`, and
+// with it drivers take what is lost for 0.
+#if SUMMATION == KAHAN
+#define UNROLL [[dont_unroll]]
+#else
+#define UNROLL [[unroll]]
+#endif
+
 #if SUMMATION == PLAIN
 
 #define SUM1 REAL

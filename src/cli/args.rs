@@ -112,6 +112,9 @@ pub struct SceneArgs {
     /// Run with the validation layers; any message fails the command
     #[arg(long, help_heading = "Device")]
     pub validation: bool,
+    /// Fill every buffer with NaN when it is made, so that what is read before it is written shows; the pictures are the same
+    #[arg(long, help_heading = "Device")]
+    pub poison: bool,
     /// Seed of the first cloud; the others count on from it
     #[arg(long, value_name = "N", help_heading = "Scene")]
     pub seed: Option<u32>,

@@ -71,6 +71,7 @@ fn case_report(case: &Case, same: Option<bool>) -> String {
     out += &latency_line(case).unwrap_or_default();
     out += &drawn_line(case).unwrap_or_default();
     out += &case.skipping.as_ref().map_or(String::new(), skipping_line);
+    out += &case.counts.map_or(String::new(), |counts| format!("last frame: {}\n", counts.text()));
     out += match same {
         Some(true) => "the last frames of all blocks are the same, to the byte\n",
         Some(false) => DIFFER,

@@ -112,7 +112,12 @@ fn warnings_of(loaded: &LoadedScene) -> Vec<String> {
 }
 
 fn device_choice(args: &SceneArgs) -> DeviceChoice {
-    DeviceChoice { device: args.device.clone(), shaders: args.shaders.clone(), validation: args.validation }
+    DeviceChoice {
+        device: args.device.clone(),
+        shaders: args.shaders.clone(),
+        validation: args.validation,
+        poison: args.poison,
+    }
 }
 
 /// Refuses a time at which the scene is where f32 cannot follow; the frames of the scene itself are not such times.

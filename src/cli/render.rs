@@ -10,6 +10,7 @@ use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
 use crate::io::image::{self, ImageKind};
 use crate::model::film::FilmFormat;
+use crate::study::counts::Counts;
 use crate::study::machine::device_record;
 use crate::study::stage::Stage;
 
@@ -44,6 +45,10 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }
+    let counts = Counts::of(&mut stage)?;
+    if args.options.verbose {
+        eprintln!("  {}", counts.text());
+    }
     stage.close()?;
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     if n_bad > 0 && !quiet {
@@ -60,7 +65,7 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             "file": args.output.display().to_string(), "width": film.width, "height": film.height,
             "image_hash": hash, "device": device,
             // A time that was asked for is no frame's.
-            "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad,
+            "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad, "counts": counts,
             "passes": Pass::ALL.map(|pass| pass_json(&rendered, pass)),
         })
     ))

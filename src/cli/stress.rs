@@ -33,8 +33,12 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         let head = ["case", "what is tried", "what is allowed"].map(str::to_owned).to_vec();
         return output::text(&output::table(&std::iter::once(head).chain(rows).collect::<Vec<_>>()));
     }
-    let choice =
-        DeviceChoice { device: args.device.clone(), shaders: args.shaders.clone(), validation: args.validation };
+    let choice = DeviceChoice {
+        device: args.device.clone(),
+        shaders: args.shaders.clone(),
+        validation: args.validation,
+        poison: false,
+    };
     let mut desk = Desk::open(&choice)?;
     graceful.store(true, Ordering::Relaxed);
     let bar = output::progress(chosen.len() as u64, "cases", args.quiet);

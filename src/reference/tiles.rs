@@ -23,20 +23,22 @@ pub(super) type Layer = fn(&mut Composed, f64, f64, DVec3);
 impl Composed {
     /// A layer of true opacity `alpha`, on the device within `off` of `device_alpha`.
     fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
-        let here = self.passed * alpha;
-        // (T + dT)(a + da) - T a, rounded once.
-        let inherited = self.off_passed * (alpha + off) + self.passed * off;
+        let (passed, here) = (self.passed, self.passed * alpha);
+        // T = 1 - A is rounded; (T + dT)(a + da) - T a, rounded once.
+        let off_one_minus = U * (passed + self.off_passed);
+        let inherited = (self.off_passed + off_one_minus) * (alpha + off) + passed * off;
         let off_here = inherited + U * (here + inherited);
         self.off_color += radiance.abs() * off_here;
         self.color += here * radiance;
         // here L and the sum with it.
         self.off_color += U * (here + off_here) * radiance.abs() + U * (self.color.abs() + self.off_color);
         self.passed -= here;
-        self.off_passed = self.off_passed * (1.0 - alpha).abs()
-            + self.off_passed * off
-            + (self.passed + here) * off
+        // A + T a: what A is off by goes on times 1 - a; the sum is rounded as what it is.
+        self.off_passed = self.off_passed * ((1.0 - alpha).abs() + off)
+            + passed * off
+            + off_one_minus * (alpha + off)
             + U * (here + off_here)
-            + U * (self.passed + self.off_passed);
+            + U * (1.0 - self.passed + self.off_passed);
     }
 
     /// Over what stands behind: the pixel, and its bound. `most`: the brightest radiance there is.
@@ -45,11 +47,11 @@ impl Composed {
         let skipped = if self.passed - self.off_passed < saturated { saturated } else { 0.0 };
         let channel = |k: usize| {
             let (front, off, most) = match k {
-                3 => (1.0 - self.passed, self.off_passed + U, 1.0),
+                3 => (1.0 - self.passed, self.off_passed, 1.0),
                 _ => (self.color[k], self.off_color[k], 2.0 * most),
             };
             let value = front + self.passed * under.color[k];
-            let passed_most = self.passed + self.off_passed;
+            let passed_most = self.passed + self.off_passed + U;
             let inherited =
                 off + self.off_passed * under.color[k].abs() + passed_most * under.bound[k] + skipped * most;
             let inherited = inherited + 2.0 * U * (value.abs() + inherited);

@@ -1,11 +1,13 @@
 //! Frames of a scene, timed: each case in each of its loops, in interleaved blocks.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use sha2::{Digest, Sha256};
 
 use super::cases::{Case, Loop};
+use super::counts::Counts;
 use super::inspect::light_notes;
 use super::stage::Stage;
 use crate::error::{Error, Result};
@@ -70,6 +72,8 @@ pub struct Outcome {
     pub chosen: Vec<String>,
     /// The last frames, where they were asked for, of the cases that ran to their end.
     pub pictures: Vec<Shown>,
+    /// What of the last frame of each case that ran to its end is odd.
+    pub counts: BTreeMap<usize, Counts>,
     pub interrupted: bool,
 }
 
@@ -123,6 +127,7 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
             if is_last {
                 ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
+                ran.outcome.counts.insert(i_case, Counts::of(stage)?);
                 // Of a block that was cut short the last frame is another one.
                 if plan.pictures && !stop.load(Ordering::Relaxed) {
                     ran.outcome.pictures.push(shown(i_case, case, &mut stage.renderer)?);

@@ -6,6 +6,7 @@ pub mod bench;
 pub mod beside;
 pub mod cases;
 pub mod compare;
+pub mod counts;
 pub mod difference;
 pub mod inspect;
 pub mod kept;

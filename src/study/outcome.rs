@@ -85,6 +85,7 @@ impl Outcome {
             modes,
             ratio: pair.and_then(|(serial, parallel)| self.ratio(i, serial, parallel)),
             overlap: serial.and_then(|serial| self.overlap(i, serial, pair.map(|p| p.1))),
+            counts: self.counts.get(&i).copied(),
             skipping: unskipped
                 .and_then(|unskipped| self.skipping(i, case, [Loop { skip: true, ..unskipped }, unskipped])),
         }

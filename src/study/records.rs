@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::beside::{self, Beside};
 use super::cases::sweep_text;
+use super::counts::Counts;
 use super::machine::{Clocks, Cpu, Device};
 use super::overlap::Overlap;
 use crate::error::{Error, Result};
@@ -84,6 +85,9 @@ pub struct Case {
     pub overlap: Option<Overlap>,
     /// What leaving out saved; null where frames that leave nothing out were not timed.
     pub skipping: Option<Skipping>,
+    /// What of its last frame is odd; null where it did not run to its end.
+    #[serde(default)]
+    pub counts: Option<Counts>,
 }
 
 impl Case {

@@ -21,6 +21,8 @@ pub struct DeviceChoice {
     /// Shaders to use in place of those built in.
     pub shaders: Option<PathBuf>,
     pub validation: bool,
+    /// Buffers are full of NaN until something is written to them.
+    pub poison: bool,
 }
 
 /// A device on which any number of scenes can be made ready side by side.
@@ -55,8 +57,15 @@ impl Bed {
     pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<Bed> {
         let instance = Instance::new(choice.validation)?;
         let device = Device::open(&instance, choice.device.as_deref())?;
+        if choice.poison {
+            device.poison();
+        }
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
         Ok(Bed { compiler, device, instance })
+    }
+
+    pub fn compiler(&self) -> &Compiler {
+        &self.compiler
     }
 
     /// All that `scene` needs. `skip`: leave out what a frame does not need.

@@ -71,6 +71,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
             ratio: None,
             overlap: None,
             skipping: None,
+            counts: None,
         }],
         chosen: Vec::new(),
         interrupted: false,

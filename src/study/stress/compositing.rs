@@ -21,7 +21,7 @@ pub const CASES: &[Case] = &[
     Case {
         name: "compositing/thin-tiles",
         what: "100 000 layers of opacity 1e-5 by tiles: 1 - (1 - a)^n",
-        bound: "2 u a layer of what has passed, and of the sum",
+        bound: "u of the value a layer, and 4 u",
         run: |desk| thin(desk, TILES),
     },
     Case {
@@ -120,10 +120,10 @@ fn thin(desk: &mut Desk, path: &str) -> Result<Found> {
         let passed = n * (-a).ln_1p();
         let truth = -passed.exp_m1();
         // Blending: of every layer what is written is rounded, by 2 u of it, and (1 - a) of that goes on; no more than 2 u/a.
-        // Tiles: what has passed, T, is rounded twice a layer, and so is what is added to the sum, at most 1 - T.
+        // Tiles: A + (1 - A) a, whose sum is rounded as what it is; 1 - A and the product by 2 u of what is added, all of them once.
         let bound = match is_tiled {
             false => (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth,
-            true => 2.0 * U_F32 * n * (passed.exp().max(a) + truth),
+            true => (U_F32 * n + 4.0 * U_F32) * truth,
         };
         c.add(channel(&all, i, 3), truth, bound, || format!("alpha, opacity {a:e} each"));
         for (k, light) in [0.75, 0.5, 0.25].into_iter().enumerate() {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Compiler, Device, Kernel, Place, Recorder, Sources};
+use crate::gpu::{Buffer, Commands, Compiler, Device, Field, Kernel, Place, Recorder, Sources};
 use crate::io::scene_file::parse;
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
@@ -94,13 +94,16 @@ impl Desk {
 
     /// Another one whose buffers hold NaN when they are made.
     pub fn poisoned(&self) -> Result<Desk> {
-        let desk = Desk::with_sources(&self.choice, self.sources.clone())?;
-        desk.bed.device.poison();
-        Ok(desk)
+        let choice = DeviceChoice { poison: true, ..self.choice.clone() };
+        Desk::with_sources(&choice, self.sources.clone())
     }
 
     pub fn device(&self) -> &Device {
         &self.bed.device
+    }
+
+    pub fn compiler(&self) -> &Compiler {
+        self.bed.compiler()
     }
 
     /// Ends it; an error where validation or the leak report had anything to say.
@@ -110,11 +113,11 @@ impl Desk {
         bed.close()
     }
 
-    /// A kernel of a text of the suite's own, which may include what nimbus's shaders include.
-    pub fn kernel(&self, name: &str, text: &str, push: &[crate::gpu::Field]) -> Result<Kernel> {
-        let compiler =
-            Compiler::new(self.sources.clone().with_text(&format!("{name}.comp"), text), Compiler::default_cache())?;
-        Kernel::new(&self.bed.device, &compiler, name, push, &[])
+    /// A kernel of a text of the suite's own, which may include what nimbus's shaders include, and its macros.
+    pub fn kernel(&self, name: &str, text: &str, push: &[Field], macros: &[(&str, u32)]) -> Result<Kernel> {
+        let sources = self.sources.clone().with_text(&format!("{name}.comp"), text);
+        let compiler = Compiler::new(sources, Compiler::default_cache())?;
+        Kernel::with_macros(&self.bed.device, &compiler, name, push, &[], macros)
     }
 
     /// `body`, the inside of a GLSL function `vec4 probe(vec4 x)`, of every one of `inputs`.
@@ -136,7 +139,7 @@ impl Desk {
         let included = ["each.glsl"].iter().chain(includes).map(|name| format!("#include \"{name}\"\n"));
         let above: String = declared.chain(included).collect();
         let text = PROBE.replace("ABOVE", &above).replace("BODY", body);
-        let kernel = self.kernel("probe", &text, ProbePush::FIELDS)?;
+        let kernel = self.kernel("probe", &text, ProbePush::FIELDS, &[])?;
         let (x, y) = (self.upload(inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
         let tables = tables.iter().map(|(_, table)| self.upload(table)).collect::<Result<Vec<Buffer>>>()?;
         let buffers: Vec<&Buffer> = [&x, &y].into_iter().chain(&tables).collect();

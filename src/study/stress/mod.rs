@@ -1,6 +1,7 @@
 //! `nimbus stress`: whether a device computes at the edges what nimbus claims, case by case, each with a bound that is derived
 //! (docs/stability.md) from the precision that Vulkan promises.
 
+mod brdf;
 mod case;
 mod compositing;
 mod count;
@@ -8,9 +9,13 @@ mod desk;
 mod determinism;
 mod functions;
 mod generation;
+mod metamorphic;
 mod run;
 mod scenes;
+mod sorting;
 mod space;
+mod transmittance;
+mod transport;
 
 pub use case::{Case, Comparison, Found, Outcome, Verdict, Worst};
 pub use desk::{Desk, Played};
@@ -18,7 +23,18 @@ pub use run::run_case;
 
 /// Every case, family by family.
 pub fn cases() -> Vec<Case> {
-    let families: [&[Case]; 6] =
-        [functions::CASES, generation::CASES, count::CASES, compositing::CASES, space::CASES, determinism::CASES];
+    let families: [&[Case]; 11] = [
+        functions::CASES,
+        generation::CASES,
+        count::CASES,
+        brdf::CASES,
+        transport::CASES,
+        transmittance::CASES,
+        sorting::CASES,
+        compositing::CASES,
+        space::CASES,
+        determinism::CASES,
+        metamorphic::CASES,
+    ];
     families.concat()
 }

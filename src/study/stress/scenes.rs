@@ -9,6 +9,7 @@ use crate::model::cloud::{Cloud, CloudSource, Particle, SQRT_TAU};
 use crate::model::growth::Growth;
 use crate::model::gust::Gust;
 use crate::model::scene::Scene;
+use crate::model::surface::Surface;
 use crate::model::texture::Texture;
 
 /// An odd number of pixels, so that there is one in the middle; numbers are kept as they are.
@@ -78,4 +79,26 @@ pub fn heap(n: u32) -> Vec<Particle> {
         Particle { color, ..blob(at, 0.15 + 0.2 * share(0.569_840_290_9), 0.2 + share(0.41)) }
     };
     (0..n).map(of).collect()
+}
+
+/// A rectangle of half axes `u` and `v`, whose front is toward u × v, of `n` × `n` facets.
+pub fn plate(center: [f64; 3], u: [f64; 3], v: [f64; 3], n: u32) -> Surface {
+    let [center, u, v] = [center, u, v].map(DVec3::from_array);
+    Surface { center, u, v, i_material: 0, subdivide: [n, n] }
+}
+
+/// A sun from above, straight down.
+pub const NOON: &str = "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
+pub const DULL: &str = "kd = [0.5, 0.5, 0.5]\n";
+
+/// Rectangles of one material under `lights`, by two reflections; `lighting`: further keys of it.
+pub fn room(desk: &Desk, lighting: &str, lights: &str, material: &str, surfaces: Vec<Surface>) -> Result<Scene> {
+    let text = format!(
+        "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
+         [camera]\nposition = [0.3, 4, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = 'two-reflection'\n{lighting}\n{lights}\
+         [[material]]\nname = 'm'\n{material}"
+    );
+    let mut scene = desk.scene(&text)?;
+    scene.surfaces = surfaces;
+    Ok(scene)
 }

@@ -173,6 +173,8 @@ fn places(desk: &mut Desk, scene: &Scene, i_frame: u32, bound: impl Fn(DVec3) ->
             let value = f64::from(place.position[k]);
             c.add(value, blob.position[k], bound(blob.position), || format!("place of particle {i}, axis {k}"));
         }
+        // Rounded, and multiplied by a rounded scale.
+        c.add(f64::from(place.sigma), blob.sigma, 4.0 * U_F32 * blob.sigma, || format!("sigma of particle {i}"));
     }
     c.add(played.n_odd() as f64, 0.0, 0.0, || "numbers that are not finite".to_owned());
     Ok(c)

@@ -1,0 +1,131 @@
+//! What of a frame is odd, counted: what is no finite number, at the end of what a format holds, folded back, negative, left out.
+//! Zero is counted as zero.
+
+use serde::{Deserialize, Serialize};
+
+use super::stage::Stage;
+use crate::error::Result;
+use crate::layout::facet::LitRecord;
+use crate::model::film::FilmFormat;
+use crate::model::scene::LightingMode;
+use crate::passes::generate::FOLDED;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counts {
+    /// Numbers of the picture, four a pixel; those that are NaN or infinite; and colours at the end of what the format holds
+    /// (1 of "rgba8", 65504 of "rgba16f"), which may have been cut to it.
+    pub values: u64,
+    pub not_finite: u64,
+    pub saturated: u64,
+    /// Particles of boxes, and those that no attempt found a place for, so that they were folded back into their box.
+    pub particles: u64,
+    pub folded: u64,
+    /// Lit facets; those with light that is NaN or infinite, and with radiance below 0 (a basis that is cut off).
+    pub facets: u64,
+    pub facets_not_finite: u64,
+    pub facets_negative: u64,
+    /// Pairs of facets that stayed wider than `lighting.pair_size` asks for, and sources that the driver's loops ended before.
+    pub pairs_unresolved: u64,
+    pub sources_lost: u64,
+}
+
+/// Greatest finite number of a half float.
+const HALF_MAX: f32 = 65504.0;
+
+impl Counts {
+    /// Of the last frame of `stage`. No frame may be in flight.
+    pub fn of(stage: &mut Stage) -> Result<Counts> {
+        let rgba = stage.renderer.image()?;
+        let mut counts = Counts::of_picture(&rgba, stage.scene.film.format);
+        let status = stage.renderer.generate_now(&stage.device)?.1;
+        let has_boxes =
+            stage.scene.clouds.iter().any(|c| matches!(c.source, crate::model::cloud::CloudSource::Boxes { .. }));
+        if has_boxes {
+            // Of lists there are no attempts.
+            counts.particles = status.iter().filter(|s| **s & !FOLDED != 0).count() as u64;
+            counts.folded = status.iter().filter(|s| **s & FOLDED != 0).count() as u64;
+        }
+        if stage.scene.lighting.mode != LightingMode::None {
+            counts.add_light(&stage.renderer.facets(&stage.device)?.1);
+        }
+        Ok(counts)
+    }
+
+    fn of_picture(rgba: &[f32], format: FilmFormat) -> Counts {
+        let end = match format {
+            FilmFormat::Rgba8 => 1.0,
+            FilmFormat::Rgba16f => HALF_MAX,
+            FilmFormat::Rgba32f => f32::MAX,
+        };
+        let count = |is_odd: &dyn Fn(f32) -> bool| rgba.iter().filter(|v| is_odd(**v)).count() as u64;
+        // Alpha is 1 where it should be.
+        let colours = rgba.chunks_exact(4).flat_map(|p| &p[..3]);
+        Counts {
+            values: rgba.len() as u64,
+            not_finite: count(&|v| !v.is_finite()),
+            saturated: colours.filter(|v| v.is_finite() && v.abs() >= end).count() as u64,
+            ..Counts::default()
+        }
+    }
+
+    fn add_light(&mut self, lit: &[LitRecord]) {
+        let any = |l: &LitRecord, is_odd: fn(f32) -> bool| l.first.iter().chain(&l.second).any(|v| is_odd(*v));
+        self.facets = lit.len() as u64;
+        self.facets_not_finite = lit.iter().filter(|l| any(l, |v| !v.is_finite())).count() as u64;
+        self.facets_negative = lit.iter().filter(|l| any(l, |v| v < 0.0)).count() as u64;
+        self.pairs_unresolved = lit.iter().map(|l| f64::from(l.n_unresolved)).sum::<f64>() as u64;
+        self.sources_lost = lit.iter().map(|l| f64::from(l.n_lost)).sum::<f64>() as u64;
+    }
+
+    /// In a line.
+    pub fn text(&self) -> String {
+        let mut parts = vec![format!(
+            "of {} numbers of the picture {} not finite, {} at the format's end",
+            self.values, self.not_finite, self.saturated
+        )];
+        if self.particles > 0 {
+            parts.push(format!("of {} particles {} folded back", self.particles, self.folded));
+        }
+        if self.facets > 0 {
+            parts.push(format!(
+                "of {} lit facets {} not finite, {} negative; {} pairs unresolved, {} sources lost",
+                self.facets, self.facets_not_finite, self.facets_negative, self.pairs_unresolved, self.sources_lost
+            ));
+        }
+        parts.join("; ")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_odd_is_counted_and_nothing_else() {
+        let rgba = [0.5, 1.0, 0.2, 1.0, f32::NAN, 0.0, 65504.0, 1.0, f32::INFINITY, -70000.0, 1.0, 0.3];
+        let of = |format| {
+            let c = Counts::of_picture(&rgba, format);
+            (c.values, c.not_finite, c.saturated)
+        };
+        assert_eq!(of(FilmFormat::Rgba8), (12, 2, 4));
+        assert_eq!(of(FilmFormat::Rgba16f), (12, 2, 2));
+        assert_eq!(of(FilmFormat::Rgba32f), (12, 2, 0));
+        let lit = |first: f32, second: f32, n_lost: f32| LitRecord {
+            first: [first; 3],
+            second: [0.0, second, 0.0],
+            n_lost,
+            n_unresolved: 2.0,
+            ..LitRecord::default()
+        };
+        let mut counts = Counts::default();
+        counts.add_light(&[
+            lit(1.0, 0.0, 0.0),
+            lit(-0.1, 0.0, 3.0),
+            lit(f32::NAN, -1.0, 0.0),
+            lit(0.0, f32::INFINITY, 0.0),
+        ]);
+        assert_eq!((counts.facets, counts.facets_not_finite, counts.facets_negative), (4, 2, 2));
+        assert_eq!((counts.pairs_unresolved, counts.sources_lost), (8, 3));
+        assert!(Counts::default().text().contains("0 not finite, 0 at the format's end"), "zero is said as zero");
+    }
+}

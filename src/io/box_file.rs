@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::magnitude::{LEAST_EXTENT, shortest, wrong_coordinate, wrong_size};
+use super::suggest::shown;
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
 use crate::model::boxes::CloudBox;
@@ -65,10 +66,12 @@ fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<
     };
     let (fields, _) = line.fields()?;
     if let Some(extra) = fields.get(1) {
-        return Err(line.fault(extra.0, format!("expected {meaning} alone on its line, found more: `{}`", extra.1)));
+        return Err(
+            line.fault(extra.0, format!("expected {meaning} alone on its line, found more: `{}`", shown(extra.1)))
+        );
     }
     let (offset, word) = fields[0];
-    let n = word.parse().map_err(|_| line.fault(offset, format!("expected {meaning}, found `{word}`")))?;
+    let n = word.parse().map_err(|_| line.fault(offset, format!("expected {meaning}, found `{}`", shown(word))))?;
     Ok((n, line.place(offset)))
 }
 
@@ -120,7 +123,10 @@ impl<'a> Line<'a> {
         let coordinate = |i: usize| self.bounded(FIELDS[i], fields[i], &wrong_coordinate);
         let (offset, word) = fields[0];
         let n_particles = word.parse().map_err(|_| {
-            self.fault(offset, format!("particles: expected an integer from 0 to {}, found `{word}`", u32::MAX))
+            self.fault(
+                offset,
+                format!("particles: expected an integer from 0 to {}, found `{}`", u32::MAX, shown(word)),
+            )
         })?;
         Ok(CloudBox {
             n_particles,
@@ -136,15 +142,17 @@ impl<'a> Line<'a> {
         let v = self.number(name, field)?;
         match wrong(v) {
             None => Ok(v),
-            Some(expected) => Err(self.fault(field.0, format!("{name}: expected {expected}, found `{}`", field.1))),
+            Some(expected) => {
+                Err(self.fault(field.0, format!("{name}: expected {expected}, found `{}`", shown(field.1))))
+            }
         }
     }
 
     fn number(&self, name: &str, (offset, word): Field) -> Result<f64> {
         match word.parse::<f64>() {
             Ok(v) if v.is_finite() => Ok(v),
-            Ok(_) => Err(self.fault(offset, format!("{name}: expected a finite number, found `{word}`"))),
-            Err(_) => Err(self.fault(offset, format!("{name}: expected a number, found `{word}`"))),
+            Ok(_) => Err(self.fault(offset, format!("{name}: expected a finite number, found `{}`", shown(word)))),
+            Err(_) => Err(self.fault(offset, format!("{name}: expected a number, found `{}`", shown(word)))),
         }
     }
 }

@@ -7,7 +7,7 @@ use csv::{ReaderBuilder, StringRecord};
 use glam::DVec3;
 
 use super::magnitude::{LEAST, wrong_coordinate, wrong_size};
-use super::suggest::{did_you_mean, list};
+use super::suggest::{did_you_mean, list, shown};
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
 use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
@@ -127,7 +127,7 @@ impl Columns {
         for (i, name) in names.iter().enumerate() {
             if !COLUMNS.contains(name) {
                 let meant = did_you_mean(name, &COLUMNS);
-                return fault(i, format!("unknown column `{name}`{meant} (known: {})", list(&COLUMNS)));
+                return fault(i, format!("unknown column `{}`{meant} (known: {})", shown(name), list(&COLUMNS)));
             }
             if names[..i].contains(name) {
                 return fault(i, format!("column `{name}` stands twice"));
@@ -165,17 +165,16 @@ impl Columns {
     fn particle(&self, file: &File, row: &StringRecord) -> Result<Particle> {
         let number = |i: usize| {
             let word = row[i].trim();
-            word.parse()
-                .ok()
-                .filter(|v: &f64| v.is_finite())
-                .ok_or_else(|| Error::scene(file.place(row, i), format!("expected a finite number, found `{word}`")))
+            word.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
+                Error::scene(file.place(row, i), format!("expected a finite number, found `{}`", shown(word)))
+            })
         };
         let bounded = |i: usize, name: &str, wrong: &dyn Fn(f64) -> Option<String>| {
             let v = number(i)?;
             match wrong(v) {
                 None => Ok(v),
                 Some(expected) => {
-                    let what = format!("{name}: expected {expected}, found `{}`", row[i].trim());
+                    let what = format!("{name}: expected {expected}, found `{}`", shown(row[i].trim()));
                     Err(Error::scene(file.place(row, i), what))
                 }
             }

@@ -19,11 +19,20 @@ use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 use crate::model::texture::{Choice, GREATEST_STRENGTH, Texture};
 
+/// The text of a file that a scene names, by its path and what such a file begins with.
+pub type Files<'a> = dyn Fn(&Path, &str) -> Result<String> + 'a;
+
+/// Files as they lie on the disk.
+pub fn on_disk(path: &Path, first: &str) -> Result<String> {
+    read_text(path, DATA_LIMIT, first)
+}
+
 /// What a cloud's keys refer to.
 pub struct CloudReader<'a> {
     folder: &'a Path,
     materials: &'a [Material],
     seed: Option<u32>,
+    files: &'a Files<'a>,
     /// Of every file read, in order.
     pub digests: Vec<[u8; 32]>,
 }
@@ -46,15 +55,20 @@ enum SourceKind {
 
 impl<'a> CloudReader<'a> {
     /// Files are looked for in `folder`; `seed` N gives cloud i the seed N + i.
-    pub fn new(folder: &'a Path, materials: &'a [Material], seed: Option<u32>) -> CloudReader<'a> {
-        CloudReader { folder, materials, seed, digests: Vec::new() }
+    pub fn new(
+        folder: &'a Path,
+        materials: &'a [Material],
+        seed: Option<u32>,
+        files: &'a Files<'a>,
+    ) -> CloudReader<'a> {
+        CloudReader { folder, materials, seed, files, digests: Vec::new() }
     }
 
     /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
     /// it; what is wrong inside stays where it is.
     fn read_named(&mut self, s: &mut Section, first: &str) -> Result<(String, PathBuf)> {
         let path = self.folder.join(s.required_string("file")?);
-        let text = read_text(&path, DATA_LIMIT, first).map_err(|e| match e {
+        let text = (self.files)(&path, first).map_err(|e| match e {
             Error::Io { path, what } => s.fault("file", format!("{}: {what}", path.display())),
             other => other,
         })?;

@@ -9,8 +9,10 @@ use sha2::{Digest, Sha256};
 
 use super::magnitude::{GREATEST, is_carried_place, shortest};
 use super::scene_clouds::{CloudReader, deal, read_cloud};
+pub use super::scene_clouds::{Files, on_disk};
 use super::scene_phases::PhaseSpec;
 pub use super::scene_sections::MAX_SIDE;
+use super::suggest::shown;
 use super::toml_section::Section;
 use super::toml_tree::Document;
 use super::{scene_lights, scene_phases, scene_sections, scene_surfaces};
@@ -66,15 +68,32 @@ const ROOT_KEYS: &[&str] = &[
 /// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
 /// N + i, whatever the scene says.
 pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
-    load_document(Document::read(path)?, path, overrides, seed)
+    load_document(Document::read(path)?, path, overrides, seed, &on_disk)
 }
 
 /// The same of a text; `path` is what errors call it, and files that it names lie beside that.
 pub fn parse(text: String, path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
-    load_document(Document::parse(text, path)?, path, overrides, seed)
+    parse_beside(text, path, overrides, seed, &on_disk)
 }
 
-fn load_document(mut file: Document, path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
+/// The same with the files that it names from elsewhere.
+pub fn parse_beside(
+    text: String,
+    path: &Path,
+    overrides: &[String],
+    seed: Option<u32>,
+    files: &Files,
+) -> Result<LoadedScene> {
+    load_document(Document::parse(text, path)?, path, overrides, seed, files)
+}
+
+fn load_document(
+    mut file: Document,
+    path: &Path,
+    overrides: &[String],
+    seed: Option<u32>,
+    files: &Files,
+) -> Result<LoadedScene> {
     file.default_to("light", scene_lights::DEFAULT_LIGHTS);
     file.default_to("material", scene_lights::DEFAULT_MATERIAL);
     let mut document = file.clone();
@@ -88,7 +107,7 @@ fn load_document(mut file: Document, path: &Path, overrides: &[String], seed: Op
         scene_phases::set_frames(&mut document, n_frames)?;
         scene_phases::set_frames(&mut file, n_frames)?;
     }
-    let mut read = read_document(&document, path, seed)?;
+    let mut read = read_document(&document, path, seed, files)?;
     let mut hashed = vec![read.resolved.to_string()];
     let mut phases = Vec::new();
     for spec in &specs {
@@ -96,8 +115,8 @@ fn load_document(mut file: Document, path: &Path, overrides: &[String], seed: Op
         spec.apply(&mut document)?;
         document.apply(overrides)?;
         // What is wrong may lie in a line that is right without the phase.
-        let of_phase =
-            read_document(&document, path, seed).map_err(|e| e.within(&format!("phase \"{}\"", spec.name)))?;
+        let of_phase = read_document(&document, path, seed, files)
+            .map_err(|e| e.within(&format!("phase \"{}\"", shown(&spec.name))))?;
         hashed.push(of_phase.resolved.to_string());
         read.digests.extend(of_phase.digests);
         read.warnings.extend(of_phase.warnings);
@@ -124,7 +143,7 @@ struct Read {
     warnings: Vec<String>,
 }
 
-fn read_document(document: &Document, path: &Path, seed: Option<u32>) -> Result<Read> {
+fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &Files) -> Result<Read> {
     let mut root = Section::root(document)?;
     root.expect_keys(ROOT_KEYS, &[])?;
     let title = root.string("title", "")?;
@@ -142,7 +161,7 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>) -> Result<
     let lighting = scene_sections::read_lighting(&mut root, &exponents)?;
     let surfaces = scene_surfaces::read_surfaces(&mut root, &materials)?;
 
-    let mut reader = CloudReader::new(path.parent().unwrap_or(Path::new("")), &materials, seed);
+    let mut reader = CloudReader::new(path.parent().unwrap_or(Path::new("")), &materials, seed, files);
     let mut clouds = Vec::new();
     let mut resolved_clouds = Vec::new();
     for (i, mut section) in root.sections("cloud")?.into_iter().enumerate() {

@@ -4,7 +4,7 @@ use glam::DVec3;
 use serde_json::json;
 
 use super::magnitude::{AMOUNT, COORDINATE, GREATEST, GREATEST_EXPONENT, GREATEST_SHARE, LEAST_LIGHT_RADIUS};
-use super::suggest::{did_you_mean, list};
+use super::suggest::{did_you_mean, list_given, shown};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::light::Light;
@@ -108,7 +108,7 @@ pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<
         s.expect_keys(&["name", "kd", "ks", "ns", "path"], &[])?;
         let name = s.required_string("name")?;
         if let Some(i) = materials.iter().position(|m| m.name == name) {
-            return Err(s.fault("name", format!("`{name}` is already the name of material {i}")));
+            return Err(s.fault("name", format!("`{}` is already the name of material {i}", shown(&name))));
         }
         let keys = match s.has("path") {
             true => read_edits(&mut s)?,
@@ -169,14 +169,17 @@ pub fn material_named(s: &mut Section, materials: &[Material]) -> Result<usize> 
         let meant = did_you_mean(&name, &names);
         let meant = if meant.is_empty() { ";".to_owned() } else { meant };
         match names.is_empty() {
-            true => s.fault("material", format!("unknown material `{name}`; the scene has none")),
-            false => s.fault("material", format!("unknown material `{name}`{meant} the scene has {}", list(&names))),
+            true => s.fault("material", format!("unknown material `{}`; the scene has none", shown(&name))),
+            false => s.fault(
+                "material",
+                format!("unknown material `{}`{meant} the scene has {}", shown(&name), list_given(&names)),
+            ),
         }
     })
 }
 
 fn warn(s: &Section, material: &Material, warnings: &mut Vec<String>) {
-    let (at, name) = (s.place("ks"), &material.name);
+    let (at, name) = (s.place("ks"), shown(&material.name));
     let albedo = material.greatest_albedo();
     if albedo > 1.0 {
         warnings.push(format!(

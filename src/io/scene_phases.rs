@@ -3,7 +3,7 @@
 
 use serde_json::{Value as Json, json};
 
-use super::suggest::list;
+use super::suggest::{list, shown};
 use super::toml_override::put;
 use super::toml_section::Section;
 use super::toml_tree::{Document, Entry, Node, Origin, Table, Value};
@@ -11,6 +11,9 @@ use crate::error::{Error, Result};
 
 /// What is the same in every phase.
 const NOT_IN_A_PHASE: [&str; 3] = ["title", "time", "phase"];
+
+/// Each is a scene of its own, made from the whole file: without end, they would take the file's length squared.
+const MAX_PHASES: usize = 256;
 
 /// One phase as the file has it.
 pub struct PhaseSpec {
@@ -33,7 +36,7 @@ impl PhaseSpec {
             let segments: Vec<&str> = path.iter().map(String::as_str).collect();
             let at = document.source.place(node.origin);
             put(&mut document.root, &segments, 0, node.clone())
-                .map_err(|what| Error::scene(at, format!("phase \"{}\": {what}", self.name)))?;
+                .map_err(|what| Error::scene(at, format!("phase \"{}\": {what}", shown(&self.name))))?;
         }
         Ok(())
     }
@@ -43,11 +46,15 @@ impl PhaseSpec {
 pub fn read_phases(document: &Document) -> Result<Vec<PhaseSpec>> {
     let root = Section::root(document)?;
     let mut phases: Vec<PhaseSpec> = Vec::new();
-    for mut s in root.sections("phase")? {
+    let sections = root.sections("phase")?;
+    if sections.len() > MAX_PHASES {
+        return Err(root.fault("phase", format!("expected at most {MAX_PHASES} phases, found {}", sections.len())));
+    }
+    for mut s in sections {
         s.expect_keys(&["name", "frames", "set"], &[])?;
         let name = s.required_string("name")?;
         if phases.iter().any(|p| p.name == name) {
-            return Err(s.fault("name", format!("\"{name}\" is another phase's name already")));
+            return Err(s.fault("name", format!("\"{}\" is another phase's name already", shown(&name))));
         }
         s.require("frames", &"a number of frames")?;
         let n_frames = s.u32("frames", 1, 1, u32::MAX)?;
@@ -58,7 +65,7 @@ pub fn read_phases(document: &Document) -> Result<Vec<PhaseSpec>> {
             Some(other) => return Err(s.fault("set", format!("expected a table of keys, found {}", other.describe()))),
         }
         if let Some((path, node)) = sets.iter().find(|(path, _)| NOT_IN_A_PHASE.contains(&path[0].as_str())) {
-            let what = format!("`set.{}`: a phase cannot set {}", path.join("."), list(&NOT_IN_A_PHASE));
+            let what = format!("`set.{}`: a phase cannot set {}", shown(&path.join(".")), list(&NOT_IN_A_PHASE));
             return Err(Error::scene(document.source.place(node.origin), what));
         }
         let resolved = sets.iter().map(|(path, node)| (path.join("."), plain(&node.value)));

@@ -1,4 +1,4 @@
-//! "did you mean": the known name nearest to a mistyped one.
+//! "did you mean": the known name nearest to a mistyped one; and words of an input in messages.
 
 /// The known name within a third of its length in edits (at least one, so that `x1` still finds `x`).
 pub fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
@@ -10,7 +10,29 @@ pub fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
 
 /// `; did you mean …?`, or nothing.
 pub fn did_you_mean(typed: &str, known: &[&str]) -> String {
-    nearest(typed, known).map_or(String::new(), |name| format!("; did you mean `{name}`?"))
+    nearest(typed, known).map_or(String::new(), |name| format!("; did you mean `{}`?", shown(name)))
+}
+
+/// A word of an input in a message: cut where it is long, without characters that a terminal would obey.
+pub fn shown(word: &str) -> String {
+    const LONGEST: usize = 80;
+    let mut shown = String::new();
+    for (i, c) in word.chars().enumerate() {
+        if i == LONGEST {
+            shown.push('…');
+            break;
+        }
+        if c.is_control() { shown.extend(c.escape_debug()) } else { shown.push(c) }
+    }
+    shown
+}
+
+/// Names that an input gave, for a message: the first ones.
+pub fn list_given(names: &[&str]) -> String {
+    const MOST: usize = 16;
+    let some: Vec<String> = names.iter().take(MOST).map(|name| format!("`{}`", shown(name))).collect();
+    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
+    some.join(", ") + &more
 }
 
 /// Names for a message: `a`, `b`, `c`.
@@ -50,6 +72,15 @@ mod tests {
         assert_eq!(edits("kitten", "sitting"), 3);
         assert_eq!(edits("widht", "width"), 1);
         assert_eq!(edits("same", "same"), 0);
+    }
+
+    #[test]
+    fn words_are_shown_short_and_obey_no_terminal() {
+        assert_eq!(shown("a\u{1b}[31m\nä\u{7f}"), "a\\u{1b}[31m\\nä\\u{7f}");
+        assert_eq!(shown(&"é".repeat(80)), "é".repeat(80));
+        assert_eq!(shown(&"é".repeat(70_000)), format!("{}…", "é".repeat(80)));
+        assert_eq!(list_given(&["a", "b\n"]), "`a`, `b\\n`");
+        assert!(list_given(&["x"; 99]).ends_with("`x` and 83 more"));
     }
 
     #[test]

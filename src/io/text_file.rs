@@ -10,6 +10,10 @@ use crate::error::{Error, Place, Result};
 pub const SCENE_LIMIT: u64 = 4 << 20;
 /// Box files and particle lists: 64 MiB is about a million particles as text.
 pub const DATA_LIMIT: u64 = 64 << 20;
+/// Results as JSON: a study of ten thousand configurations. As a tree it takes up to a hundred times its text.
+pub const RECORD_LIMIT: u64 = 16 << 20;
+/// Results as tables: two million frames of 250 bytes.
+pub const TABLE_LIMIT: u64 = 512 << 20;
 
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
@@ -50,6 +54,18 @@ pub fn line_column(text: &str, offset: usize) -> (usize, usize) {
     let before = &text[..end];
     let line_start = before.rfind('\n').map_or(0, |i| i + 1);
     (before.bytes().filter(|b| *b == b'\n').count() + 1, before[line_start..].chars().count() + 1)
+}
+
+/// The text of a result that nimbus wrote; whether it is one is for its reader to say.
+pub fn read_result(path: &Path, limit: u64) -> Result<String> {
+    let about = fs::metadata(path).map_err(|cause| Error::io(path, cause))?;
+    if !about.is_file() {
+        return Err(Error::io(path, "is not a regular file"));
+    }
+    if about.len() > limit {
+        return Err(Error::io(path, too_large(about.len(), limit)));
+    }
+    fs::read_to_string(path).map_err(|cause| Error::io(path, cause))
 }
 
 fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {

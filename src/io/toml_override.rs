@@ -3,6 +3,7 @@
 
 use toml::de::DeValue;
 
+use super::suggest::shown;
 use super::toml_depth::{MAX_DOTS, too_deep};
 use super::toml_tree::{Document, Entry, Node, Origin, OutOfRange, TOO_DEEP, Table, Value, convert};
 use crate::error::{Error, Result};
@@ -53,7 +54,7 @@ pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> 
         *node = value;
         return Ok(());
     };
-    let here = || segments[..i].join(".");
+    let here = || shown(&segments[..i].join("."));
     match &mut node.value {
         Value::Table(table) => put_in_table(table, segments, i, value),
         Value::Array(list) if *segment == "*" && !list.is_empty() => {
@@ -64,7 +65,7 @@ pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> 
             let item = segment.parse().ok().and_then(|k: usize| list.get_mut(k));
             let item = item.ok_or_else(|| match n {
                 0 => format!("`{}` is empty", here()),
-                _ => format!("`{}`: expected a number from 0 to {}, or *, found `{segment}`", here(), n - 1),
+                _ => format!("`{}`: expected a number from 0 to {}, or *, found `{}`", here(), n - 1, shown(segment)),
             })?;
             put(item, segments, i + 1, value)
         }
@@ -77,7 +78,7 @@ fn put_in_table(table: &mut Table, segments: &[&str], i: usize, value: Node) -> 
     if !table.contains_key(segments[i])
         && segments.get(i + 1).is_some_and(|next| *next == "*" || next.parse::<usize>().is_ok())
     {
-        return Err(format!("the scene has no `{}`", segments[..=i].join(".")));
+        return Err(format!("the scene has no `{}`", shown(&segments[..=i].join("."))));
     }
     let empty = || Entry { key_origin: origin, node: Node { origin, value: Value::Table(Table::new()) } };
     put(&mut table.entry(segments[i].to_owned()).or_insert_with(empty).node, segments, i + 1, value)

@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde_json::{Map, Value as Json, json};
 
 use super::magnitude::shortest;
-use super::suggest::{did_you_mean, list};
+use super::suggest::{did_you_mean, list, shown};
 use super::toml_tree::{Document, Node, Origin, Source, Table, Value};
 use crate::error::{Error, Place, Result};
 
@@ -85,7 +85,7 @@ impl<'a> Section<'a> {
             Origin::Default => (2, 0),
         });
         let Some((key, entry)) = first else { return Ok(()) };
-        let name = self.name(key);
+        let name = self.name(&shown(key));
         let what = if later.contains(&key.as_str()) {
             format!("`{name}` belongs to a later version of nimbus; this one knows {}", list(known))
         } else {
@@ -262,7 +262,7 @@ impl<'a> Section<'a> {
             if later.contains(&name.as_str()) {
                 format!("`{name}` belongs to a later version of nimbus; this one knows {}", list(&names))
             } else {
-                format!("unknown value `{name}`{} known here: {}", suggestion(&name, &names), list(&names))
+                format!("unknown value `{}`{} known here: {}", shown(&name), suggestion(&name, &names), list(&names))
             },
         ))
     }

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::suggest::shown;
 use super::text_file::{self, line_column};
 use super::toml_depth::too_deep;
 use crate::error::{Error, Place, Result};
@@ -118,7 +119,7 @@ impl Source {
                 let (line, column) = line_column(&self.text, offset);
                 Place::line(&self.path, line, column)
             }
-            Origin::Override(i) => Place { source: format!("--set {}", self.overrides[i]), line: 0, column: 0 },
+            Origin::Override(i) => Place { source: format!("--set {}", shown(&self.overrides[i])), line: 0, column: 0 },
             Origin::Default => Place::file(&self.path),
         }
     }

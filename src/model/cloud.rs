@@ -129,7 +129,8 @@ impl Cloud {
                         mass_max: mass(kappa, sigma_max),
                         gust_reach,
                     };
-                    i_first += b.n_particles;
+                    // Of more particles than can be numbered only the bounds are of use: such a scene is refused.
+                    i_first = i_first.wrapping_add(b.n_particles);
                     group
                 })
                 .collect(),

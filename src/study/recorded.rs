@@ -8,6 +8,7 @@ use csv::StringRecord;
 
 use super::records::{FRAMES_FILE, RUN_FILE, Run, case_name, read_run};
 use crate::error::{Error, Result};
+use crate::io::text_file::{TABLE_LIMIT, read_result};
 
 /// A results folder.
 #[derive(Debug, Clone)]
@@ -47,8 +48,13 @@ pub fn read_results(folder: &Path) -> Result<Recorded> {
     }
     let run = read_run(folder)?;
     let path = folder.join(FRAMES_FILE);
-    let text = fs::read_to_string(&path).map_err(|cause| Error::io(&path, cause))?;
-    let mut by_mode = read_frames(&path, &text)?;
+    let text = read_result(&path, TABLE_LIMIT)?;
+    join(run, &text, &path)
+}
+
+/// A run and the text of its `frames.csv`; `path` is for messages.
+pub fn join(run: Run, text: &str, path: &Path) -> Result<Recorded> {
+    let mut by_mode = read_frames(path, text)?;
     let mut modes = Vec::new();
     for (case, mode) in run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (c, m))) {
         let name = mode_name(&case.name(), &mode.threading, mode.skip);
@@ -58,12 +64,12 @@ pub fn read_results(folder: &Path) -> Result<Recorded> {
             let wanted = mode.frames;
             let what =
                 format!("holds {n} timed {name} frames and {RUN_FILE} names {wanted}: cut off, or another run's");
-            return Err(Error::io(&path, what));
+            return Err(Error::io(path, what));
         }
         modes.extend(timed);
     }
     match by_mode.keys().next() {
-        Some(other) => Err(Error::io(&path, format!("holds {other} frames, of which {RUN_FILE} knows nothing"))),
+        Some(other) => Err(Error::io(path, format!("holds {other} frames, of which {RUN_FILE} knows nothing"))),
         None => Ok(Recorded { run, modes }),
     }
 }

@@ -18,6 +18,7 @@ use super::overlap::Overlap;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::folder::{check_writable, replace_files};
+use crate::io::text_file::{RECORD_LIMIT, read_result};
 use crate::measure::lows::Lows;
 use crate::measure::stats::Summary;
 
@@ -303,18 +304,22 @@ pub fn write_run(path: &Path, run: &Run) -> Result<()> {
 /// Reads `run.json`, or the `run.json` in a folder.
 pub fn read_run(path: &Path) -> Result<Run> {
     let path = if path.is_dir() { path.join(RUN_FILE) } else { path.to_owned() };
-    let text = fs::read_to_string(&path).map_err(|cause| Error::io(&path, cause))?;
-    let broken = |cause| Error::io(&path, format!("not JSON, or not all of it: {cause}"));
-    let value: serde_json::Value = serde_json::from_str(&text).map_err(broken)?;
+    parse_run(&read_result(&path, RECORD_LIMIT)?, &path)
+}
+
+/// A `run.json` from its text; `path` is for messages.
+pub fn parse_run(text: &str, path: &Path) -> Result<Run> {
+    let broken = |cause| Error::io(path, format!("not JSON, or not all of it: {cause}"));
+    let value: serde_json::Value = serde_json::from_str(text).map_err(broken)?;
     // The version is looked at first: of another version any other complaint would mislead.
     match value.get("schema").and_then(serde_json::Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}
         Some(version) => {
-            return Err(Error::io(&path, format!("results of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
+            return Err(Error::io(path, format!("results of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
         }
-        None => return Err(Error::io(&path, "not a run.json of nimbus: it names no schema version")),
+        None => return Err(Error::io(path, "not a run.json of nimbus: it names no schema version")),
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(&path, format!("not a run.json of nimbus: {cause}")))
+    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a run.json of nimbus: {cause}")))
 }
 
 pub fn write_frames(path: &Path, pass_names: &[String], rows: &[FrameRow]) -> Result<()> {

@@ -34,8 +34,8 @@ struct Bar {
 
 /// ms that an average frame spends in a pass: its median while it runs, in the share of the frames that run it.
 pub fn ms_of_frame(pass: &Pass) -> Option<f64> {
-    let n = pass.n_run + pass.n_skipped;
-    pass.p50_ms.filter(|ms| ms.is_finite() && n > 0).map(|ms| ms * pass.n_run as f64 / n as f64)
+    let n = pass.n_run as f64 + pass.n_skipped as f64;
+    pass.p50_ms.filter(|ms| ms.is_finite() && n > 0.0).map(|ms| ms * pass.n_run as f64 / n)
 }
 
 /// The chart of a run; None where no pass was timed.
@@ -84,7 +84,7 @@ fn parts(mode: &Mode, passes: &[String]) -> Vec<f64> {
 fn says(name: &str, mode: &Mode) -> String {
     let line = |p: &Pass| {
         let ms = ms_of_frame(p).filter(|ms| *ms > 0.0)?;
-        let n = p.n_run + p.n_skipped;
+        let n = p.n_run.saturating_add(p.n_skipped);
         let ran = if p.n_skipped > 0 { format!(", ran in {} of {n} frames", p.n_run) } else { String::new() };
         Some(format!("{}: {} ms{ran}", p.name, number(ms)))
     };

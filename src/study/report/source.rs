@@ -1,11 +1,11 @@
 //! What a report is made of: results on disk, whole and of this nimbus' schema, or one message that says what is wrong.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use crate::error::{Error, Result};
+use crate::io::text_file::{RECORD_LIMIT, read_result};
 use crate::study::ledger::records::{LEDGER_FILE, Ledger, SCHEMA_VERSION};
 use crate::study::recorded::{Recorded, read_results};
 use crate::study::records::RUN_FILE;
@@ -56,15 +56,15 @@ fn source(folder: &Path, file: &str, name: String) -> Result<Source> {
     let found = match file {
         RUN_FILE => Found::Bench(Box::new(read_results(folder)?)),
         STUDY_FILE => Found::Study(Box::new(read_study(folder)?)),
-        _ => Found::Ledger(Box::new(read_ledger(&path)?)),
+        _ => Found::Ledger(Box::new(parse_ledger(&read_result(&path, RECORD_LIMIT)?, &path)?)),
     };
     Ok(Source { name, folder: folder.to_owned(), found })
 }
 
-fn read_ledger(path: &Path) -> Result<Ledger> {
-    let text = fs::read_to_string(path).map_err(|cause| Error::io(path, cause))?;
+/// A `ledger.json` from its text; `path` is for messages.
+pub fn parse_ledger(text: &str, path: &Path) -> Result<Ledger> {
     let broken = |cause| Error::io(path, format!("not JSON, or not all of it: {cause}"));
-    let value: Value = serde_json::from_str(&text).map_err(broken)?;
+    let value: Value = serde_json::from_str(text).map_err(broken)?;
     // The version is looked at first: of another version any other complaint would mislead.
     match value.get("schema").and_then(Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}

@@ -13,6 +13,7 @@ use super::turns::Turn;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::folder::replace_files;
+use crate::io::text_file::{RECORD_LIMIT, TABLE_LIMIT, read_result};
 use crate::study::provenance::Figure;
 
 pub const CONFIGURATIONS_FILE: &str = "configurations.csv";
@@ -133,37 +134,59 @@ pub fn csv_row(c: &Configuration) -> CsvRow {
     }
 }
 
+/// What no study writes: rounds are counted from 0, and what took no finite time was not timed.
+fn check_row(row: &TimeRow) -> std::result::Result<(), String> {
+    let times = [Some(row.frame_ms), row.gpu_ms];
+    if let Some(ms) = times.into_iter().flatten().find(|ms| !ms.is_finite()) {
+        return Err(format!("turn {}: expected a finite time in ms, found {ms}", row.turn));
+    }
+    if u32::try_from(row.round).is_err() {
+        return Err(format!("turn {}: expected a round from 0 to {}, found {}", row.turn, u32::MAX, row.round));
+    }
+    Ok(())
+}
+
 /// Reads `study.json` in `folder`.
 pub fn read_study(folder: &Path) -> Result<Study> {
     let path = if folder.is_dir() { folder.join(STUDY_FILE) } else { folder.to_owned() };
-    let text = fs::read_to_string(&path).map_err(|cause| Error::io(&path, cause))?;
-    let value: serde_json::Value = serde_json::from_str(&text)
-        .map_err(|cause| Error::io(&path, format!("not JSON, or not all of it: {cause}")))?;
+    parse_study(&read_result(&path, RECORD_LIMIT)?, &path)
+}
+
+/// A `study.json` from its text; `path` is for messages.
+pub fn parse_study(text: &str, path: &Path) -> Result<Study> {
+    let value: serde_json::Value =
+        serde_json::from_str(text).map_err(|cause| Error::io(path, format!("not JSON, or not all of it: {cause}")))?;
     match value.get("schema").and_then(serde_json::Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}
         Some(version) => {
-            return Err(Error::io(&path, format!("a study of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
+            return Err(Error::io(path, format!("a study of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
         }
-        None => return Err(Error::io(&path, "not a study.json of nimbus: it names no schema version")),
+        None => return Err(Error::io(path, "not a study.json of nimbus: it names no schema version")),
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(&path, format!("not a study.json of nimbus: {cause}")))
+    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a study.json of nimbus: {cause}")))
 }
 
 /// What an earlier run in `folder` found, to be gone on with.
 pub fn read_found(folder: &Path) -> Result<(Study, Found)> {
     let study = read_study(folder)?;
     let path = folder.join(TIMES_FILE);
-    let mut reader = csv::Reader::from_path(&path).map_err(|cause| Error::io(&path, cause))?;
+    parse_found(study, &read_result(&path, TABLE_LIMIT)?, &path)
+}
+
+/// The same of a study and the text of its `times.csv`; `path` is for messages.
+pub fn parse_found(study: Study, text: &str, path: &Path) -> Result<(Study, Found)> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
     let mut turns: Vec<Turn> = Vec::new();
     let mut i_last = None;
     for row in reader.deserialize::<TimeRow>() {
-        let row = row.map_err(|cause| Error::io(&path, cause))?;
+        let row = row.map_err(|cause| Error::io(path, cause))?;
         if row.configuration >= study.configurations.len() {
             return Err(Error::io(
-                &path,
+                path,
                 format!("names configuration {}; {STUDY_FILE} has none such", row.configuration),
             ));
         }
+        check_row(&row).map_err(|what| Error::io(path, what))?;
         if i_last.replace(row.turn) != Some(row.turn) {
             let (i_configuration, i_round) = (row.configuration, row.round);
             turns.push(Turn { i_configuration, i_round, gpu_ms: Vec::new(), frame_ms: Vec::new() });

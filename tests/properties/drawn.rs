@@ -1,0 +1,115 @@
+//! Small pictures of scenes of a few particles: of numbers, opaque at most, and the same to the byte whether frames leave out
+//! what they need not do or not.
+
+use std::cell::RefCell;
+
+use glam::DVec3;
+use nimbus::frame::serial;
+use nimbus::model::boxes::{CloudBox, Form};
+use nimbus::model::cloud::{Cloud, CloudSource, Particle};
+use nimbus::model::growth::Growth;
+use nimbus::model::gust::Gust;
+use nimbus::model::scene::Scene;
+use nimbus::model::texture::Texture;
+use nimbus::study::stage::DeviceChoice;
+use nimbus::study::stress::Desk;
+use proptest::collection::vec;
+use proptest::prelude::*;
+
+use super::check;
+
+const N_FRAMES: u32 = 3;
+
+/// A scene without its clouds, and these.
+type Made = (String, Vec<Particle>, Option<CloudBox>, bool);
+
+fn blob() -> impl Strategy<Value = Particle> {
+    let place = [-4.0..4.0, -3.0..3.0, -4.0..4.0].prop_map(DVec3::from_array);
+    let color = [0.0..1.0, 0.0..1.0, 0.0..1.0].prop_map(DVec3::from_array);
+    (place, 0.01..1.5, prop_oneof![Just(0.0), 0.01..50.0], color).prop_map(|(position, sigma, kappa, color)| Particle {
+        position,
+        sigma,
+        kappa,
+        color,
+    })
+}
+
+fn some_box() -> impl Strategy<Value = Option<CloudBox>> {
+    let of = |(n_particles, extent, radius_max): (u32, [f64; 3], f64)| CloudBox {
+        n_particles,
+        extent: DVec3::from_array(extent),
+        center: DVec3::ZERO,
+        radius_max,
+    };
+    proptest::option::of((1..16u32, [0.1..3.0, 0.1..3.0, 0.1..3.0], 0.1..1.5).prop_map(of))
+}
+
+fn scene() -> impl Strategy<Value = Made> {
+    let modes = prop_oneof![2 => Just("none"), 1 => Just("first"), 1 => Just("two-reflection")];
+    let paths = prop_oneof![Just("sprites"), Just("tiles")];
+    let formats = prop_oneof![Just("rgba8"), Just("rgba16f"), Just("rgba32f")];
+    let steps = prop_oneof![Just("0.0"), Just("0.4")];
+    let text = (modes, paths, formats, steps, 8..24u32, 2.0..12.0).prop_map(|(mode, path, format, step, grid, z)| {
+        format!(
+            "[film]\nwidth = 24\nheight = 18\nformat = '{format}'\n[camera]\nposition = [0, 1, {z}]\n\
+             [time]\nstep_s = {step}\n[lighting]\nmode = '{mode}'\ngrid = {grid}\n[draw]\npath = '{path}'\n"
+        )
+    });
+    (text, vec(blob(), 0..25), some_box(), any::<bool>())
+}
+
+fn cloud_of(source: CloudSource, gust: Gust) -> Cloud {
+    let (growth, texture) = (Growth::NONE, Texture::NONE);
+    Cloud { source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, texture, i_material: 0, seed: 5 }
+}
+
+fn with_clouds(desk: &Desk, (text, list, one_box, is_stirred): Made) -> Scene {
+    let mut scene = desk.scene(&text).expect("a scene");
+    let stirred = Gust { amplitude: 0.2, length: 2.0, period_s: 3.0, n_waves: 4 };
+    let gust = if is_stirred { stirred } else { Gust::CALM };
+    scene.clouds.push(cloud_of(CloudSource::Particles(list), gust));
+    if let Some(one_box) = one_box {
+        let (form, boxes) = (Form::Centred, vec![one_box]);
+        let source = CloudSource::Boxes { boxes, form, optical_depth: 1.3, radius_scale: 1.0 };
+        scene.clouds.push(cloud_of(source, gust));
+    }
+    scene
+}
+
+/// Colours and bytes of every frame.
+fn frames(desk: &Desk, scene: &Scene, skip: bool) -> nimbus::error::Result<Vec<(Vec<f32>, Vec<u8>)>> {
+    let mut player = desk.player(scene, skip)?;
+    let mut all = Vec::new();
+    serial::run(&mut player.game, &mut player.renderer, 0..N_FRAMES, &mut |_, renderer| {
+        all.push((renderer.image()?, renderer.image_bytes()?));
+        Ok(true)
+    })?;
+    Ok(all)
+}
+
+#[test]
+fn pictures_are_numbers_and_the_same_whatever_is_left_out() {
+    let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
+    let desk = RefCell::new(Some(Desk::open(&choice).expect("a Vulkan 1.3 device")));
+    let n_seen = std::cell::Cell::new(0);
+    check(24, scene(), |made| {
+        let desk = desk.borrow();
+        let desk = desk.as_ref().expect("it is closed at the end");
+        let scene = with_clouds(desk, made);
+        let drawn = |skip| frames(desk, &scene, skip).map_err(|e| TestCaseError::fail(e.to_string()));
+        let (some, all) = (drawn(true)?, drawn(false)?);
+        prop_assert_eq!(some.len(), N_FRAMES as usize);
+        for (i, ((rgba, bytes), (_, bytes_of_all))) in some.iter().zip(&all).enumerate() {
+            for pixel in rgba.chunks_exact(4) {
+                prop_assert!(pixel.iter().all(|v| v.is_finite() && *v >= 0.0), "frame {i}: {pixel:?}");
+                prop_assert!(pixel[3] <= 1.0, "frame {i}: {pixel:?}");
+            }
+            prop_assert!(bytes == bytes_of_all, "frame {i}: other bytes where nothing is left out");
+            n_seen.set(n_seen.get() + usize::from(bytes.iter().any(|b| *b != 0)));
+        }
+        Ok(())
+    });
+    // An empty picture would be the same, too.
+    assert!(n_seen.get() > 24, "something is drawn in {} frames", n_seen.get());
+    desk.into_inner().expect("a desk").close().expect("nothing said by validation");
+}

@@ -26,7 +26,7 @@ const FAULTS: &[Fault] = &[
     (
         "no cut of what a huge argument is reduced to",
         "include/functions.glsl",
-        "r = clamp(r, -0.5 * PI, 0.5 * PI);",
+        "r = clamp(r, -1.58, 1.58);",
         "",
         "functions/sine-far",
     ),

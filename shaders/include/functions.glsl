@@ -11,8 +11,9 @@ float sine(float x) {
     r -= k * 0.0009670257568359375;
     r -= k * 6.2771141529083251953e-07;
     r -= k * 1.2154201256553420e-10;
-    // A huge argument reduces to anything; what is out of range is cut so that the result stays a sine.
-    r = clamp(r, -0.5 * PI, 0.5 * PI);
+    // k is off by one where x is nearer to a half than its rounding, and r then beyond pi/2 by up to 2 u |x| = 0.0062; a huge
+    // argument reduces to anything: what is further out is cut so that the result stays a sine.
+    r = clamp(r, -1.58, 1.58);
     float s = r * r;
     float u = 2.6083159809786593541503e-06;
     u = u * s - 0.0001981069071916863322258;

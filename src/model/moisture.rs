@@ -16,7 +16,7 @@ fn log_saturation(t_k: f64) -> f64 {
     } else if t_k.is_infinite() {
         LATENT_HEAT / R_VAPOUR / T0_K
     } else {
-        LATENT_HEAT / R_VAPOUR * ((t_k - T0_K) / T0_K) / t_k
+        LATENT_HEAT / R_VAPOUR / T0_K * ((t_k - T0_K) / t_k)
     }
 }
 

@@ -170,7 +170,7 @@ fn black(desk: &mut Desk) -> Result<Found> {
         for v in lit.first.iter().chain(&lit.second).chain(&lit.indirect) {
             c.add(f64::from(*v), 0.0, 0.0, || format!("light of facet {i}"));
         }
-        c.expect(lit.direct[0].is_finite(), || format!("what facet {i} receives"));
+        c.holds(lit.direct[0].is_finite(), || format!("what facet {i} receives"));
     }
     Ok(c.into())
 }
@@ -250,7 +250,7 @@ fn more_than_samples(_: &mut Desk) -> Result<Found> {
     let mut c = Comparison::default();
     for range in [[1.0, 1.0 + 1e-9], [49.0, 51.0], [0.0, 1000.0]] {
         let basis = Basis::new(range, 4096, Sampling::Log);
-        c.expect(basis.n_bases() >= 2 && basis.n_bases() < 4096, || {
+        c.holds(basis.n_bases() >= 2 && basis.n_bases() < 4096, || {
             format!("some bases of {range:?}, found {}", basis.n_bases())
         });
         for (i, v) in basis.vectors().iter().enumerate() {
@@ -264,7 +264,7 @@ fn more_than_samples(_: &mut Desk) -> Result<Found> {
         c.add(odd as f64, 0.0, 0.0, || format!("numbers of vectors that are not finite, {range:?}"));
         for ns in basis.spread(9) {
             // Every vector that differs is there: what is left is the sampling's.
-            c.expect(basis.error(ns) < 1e-3, || format!("error of n = {ns}: {:e}", basis.error(ns)));
+            c.holds(basis.error(ns) < 1e-3, || format!("error of n = {ns}: {:e}", basis.error(ns)));
         }
     }
     Ok(c.into())
@@ -279,7 +279,7 @@ fn negative(desk: &mut Desk) -> Result<Found> {
     let c = first_of(desk, &scene, [0.0, 0.2, NS], &table)?;
     let mut c = c;
     let n_negative = (0..N_NODES).filter(|i| table[*i] < 0.0).count();
-    c.expect(n_negative > 0, || "that the lobe is negative somewhere".to_owned());
+    c.holds(n_negative > 0, || "that the lobe is negative somewhere".to_owned());
     Ok(c.remark(format!("{n_negative} of {N_NODES} nodes below 0")).into())
 }
 

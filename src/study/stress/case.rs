@@ -82,13 +82,13 @@ impl Comparison {
     }
 
     /// Adds what must be so: 1 where it is and 0 where it is not, against 1.
-    pub fn expect(&mut self, holds: bool, what: impl FnOnce() -> String) {
-        self.add(f64::from(u8::from(holds)), 1.0, 0.0, what);
+    pub fn holds(&mut self, is_so: bool, what: impl FnOnce() -> String) {
+        self.add(f64::from(u8::from(is_so)), 1.0, 0.0, what);
     }
 
     /// Adds what must be the same to the bit.
     pub fn same<T: PartialEq>(&mut self, a: &[T], b: &[T], what: &str) {
-        self.expect(a.len() == b.len(), || format!("{what}: {} and {} of them", a.len(), b.len()));
+        self.holds(a.len() == b.len(), || format!("{what}: {} and {} of them", a.len(), b.len()));
         let n_other = a.iter().zip(b).filter(|(a, b)| a != b).count();
         self.add(n_other as f64, 0.0, 0.0, || format!("{what}: how many of {} differ", a.len()));
     }

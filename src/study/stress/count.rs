@@ -98,7 +98,7 @@ fn at_the_eye(_: &mut Desk) -> Result<Found> {
 fn nothing(c: &mut Comparison, drawn: &Drawn, what: &str) {
     let (end, scale, last) = told(1000, drawn);
     c.add(f64::from(end), 0.0, 0.0, || format!("particles {what}"));
-    c.expect(scale.is_finite() && last.is_finite(), || format!("finite factors {what}"));
+    c.holds(scale.is_finite() && last.is_finite(), || format!("finite factors {what}"));
 }
 
 fn nowhere(_: &mut Desk) -> Result<Found> {
@@ -126,7 +126,7 @@ fn most(_: &mut Desk) -> Result<Found> {
         c.add(f64::from(drawn.n) - 1.0 + drawn.last_weight, x, 2f64.powi(-52) * x, || {
             format!("count of share {share}")
         });
-        c.expect(drawn.last_weight > 0.0 && drawn.last_weight <= 1.0, || {
+        c.holds(drawn.last_weight > 0.0 && drawn.last_weight <= 1.0, || {
             format!("the last one's weight of share {share}")
         });
     }

@@ -379,7 +379,7 @@ fn normalize_ends(desk: &mut Desk) -> Result<Found> {
     for (x, y) in inputs.iter().zip(found) {
         let length = y[..3].iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
         c.add((length - 1.0).max(0.0), 0.0, 18.0 * U_F32, || format!("of {x:?}"));
-        c.expect(length.is_finite(), || format!("a finite vector of {x:?}"));
+        c.holds(length.is_finite(), || format!("a finite vector of {x:?}"));
     }
     Ok(c.into())
 }

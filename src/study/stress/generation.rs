@@ -125,8 +125,8 @@ fn particles(desk: &mut Desk, b: CloudBox) -> Result<Found> {
             n_open += 1;
             continue;
         }
-        c.expect(status & !FOLDED == truth.n_attempts, || format!("attempts of particle {i}"));
-        c.expect((status & FOLDED != 0) == truth.folded, || format!("fold of particle {i}"));
+        c.holds(status & !FOLDED == truth.n_attempts, || format!("attempts of particle {i}"));
+        c.holds((status & FOLDED != 0) == truth.folded, || format!("fold of particle {i}"));
         for axis in 0..3 {
             // Below f32's least normal number products may be flushed.
             let bound = bound.position[axis] + f64::from(f32::MIN_POSITIVE);
@@ -139,7 +139,7 @@ fn particles(desk: &mut Desk, b: CloudBox) -> Result<Found> {
         });
     }
     // Of a box without extent it decides all; of any other something must be left to compare.
-    c.expect(n_open < records.len() || b.extent == DVec3::ZERO, || "that not all is left to rounding".to_owned());
+    c.holds(n_open < records.len() || b.extent == DVec3::ZERO, || "that not all is left to rounding".to_owned());
     Ok(c.remark(format!("{n_folded} folded; of {n_open} rounding decides")).into())
 }
 
@@ -159,7 +159,7 @@ fn spread(desk: &mut Desk, b: CloudBox) -> Result<Found> {
     let mut n_folded = 0;
     for (i, (record, status)) in (0u32..).zip(records.iter().zip(&status)) {
         is_inside(&mut c, record, &b, i);
-        c.expect(record.sigma.is_finite() && record.kappa.is_finite(), || format!("a finite particle {i}"));
+        c.holds(record.sigma.is_finite() && record.kappa.is_finite(), || format!("a finite particle {i}"));
         if status & FOLDED != 0 {
             n_folded += 1;
             continue;
@@ -182,14 +182,14 @@ fn folded(desk: &mut Desk) -> Result<Found> {
     let [mut found, mut expected] = [0u32; 2];
     for (i, (record, status)) in (0u32..).zip(records.iter().zip(&status)) {
         is_inside(&mut c, record, &b, i);
-        c.expect(status & !FOLDED <= MAX_ATTEMPTS, || format!("attempts of particle {i}"));
+        c.holds(status & !FOLDED <= MAX_ATTEMPTS, || format!("attempts of particle {i}"));
         if particle_bound(&b, 0, SEED, Form::Centred, i, U_F32).decided {
             found += u32::from(status & FOLDED != 0);
             expected += u32::from(generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i).folded);
         }
     }
     c.add(f64::from(found), f64::from(expected), 0.0, || "folded particles".to_owned());
-    c.expect(expected > 0, || "that some are folded".to_owned());
+    c.holds(expected > 0, || "that some are folded".to_owned());
     Ok(c.remark(format!("{found} folded")).into())
 }
 
@@ -250,8 +250,8 @@ fn far(desk: &mut Desk, at: f64) -> Result<Found> {
             });
         }
     }
-    c.expect(played.n_odd() == 0, || "a finite picture".to_owned());
-    c.expect(played.rgba.iter().any(|v| *v > 0.1), || "that something is drawn".to_owned());
+    c.holds(played.n_odd() == 0, || "a finite picture".to_owned());
+    c.holds(played.rgba.iter().any(|v| *v > 0.1), || "that something is drawn".to_owned());
     Ok(c.into())
 }
 
@@ -276,7 +276,7 @@ fn too_many(desk: &mut Desk) -> Result<Found> {
         Ok(_) => None,
     };
     let mut c = Comparison::default();
-    c.expect(refused.is_some(), || "that it is refused".to_owned());
+    c.holds(refused.is_some(), || "that it is refused".to_owned());
     c.add(desk.device().allocated_bytes() as f64, before as f64, 0.0, || "bytes that are left allocated".to_owned());
     Ok(c.remark(refused.unwrap_or_default()).into())
 }

@@ -200,7 +200,7 @@ fn split(desk: &mut Desk) -> Result<Found> {
             g.normal == f.normal && (0..3).all(|k| (g.position[k] - f.position[k]).abs() < 1e-5)
         };
         let found = other.facets.iter().position(same);
-        c.expect(found.is_some(), || format!("a facet at {:?}", f.position));
+        c.holds(found.is_some(), || format!("a facet at {:?}", f.position));
         for (a, b) in found.iter().flat_map(|&i| l.second.iter().zip(&other.lit[i].second)) {
             c.add(f64::from(*b), f64::from(*a), bound, || format!("L2 of the facet at {:?}", f.position));
         }

@@ -77,11 +77,11 @@ fn keys(desk: &mut Desk) -> Result<Found> {
         // 23 and 9 bits of the key as floats' last ones: a word that is no number would not come through.
         let key = y[0].to_bits() << 9 | (y[1].to_bits() & 0x1ff);
         c.add(f64::from(key), f64::from(key32(*z)), 0.0, || format!("key of depth {z:e}"));
-        c.expect(key >= last, || format!("the order of depth {z:e}"));
+        c.holds(key >= last, || format!("the order of depth {z:e}"));
         last = key;
         // Where the step is on the brink rounding decides.
         let (low, high) = (key16(f64::from(*z) + 1e-6, RADIUS), key16(f64::from(*z) - 1e-6, RADIUS));
-        c.expect((f64::from(low)..=f64::from(high)).contains(&f64::from(y[2])), || {
+        c.holds((f64::from(low)..=f64::from(high)).contains(&f64::from(y[2])), || {
             format!("16 bits of depth {z:e}: {}", y[2])
         });
     }

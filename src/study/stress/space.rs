@@ -129,7 +129,7 @@ fn far_exactly(desk: &mut Desk) -> Result<Found> {
     let mut c = Comparison::default();
     c.same(&here.bytes, &there.bytes, "bytes of the picture");
     c.same(&here.placed, &there.placed, "places");
-    c.expect(here.bytes.iter().any(|b| *b != 0), || "that something is drawn".to_owned());
+    c.holds(here.bytes.iter().any(|b| *b != 0), || "that something is drawn".to_owned());
     Ok(c.into())
 }
 
@@ -251,7 +251,7 @@ fn near_plane(desk: &mut Desk) -> Result<Found> {
                 )?;
                 let played = desk.play(&scene, 0)?;
                 let found = played.rgba.iter().any(|v| *v != 0.0);
-                c.expect(found == drawn, || format!("{path}, near {near}: drawn {found} at {beyond:e} beyond"));
+                c.holds(found == drawn, || format!("{path}, near {near}: drawn {found} at {beyond:e} beyond"));
                 c.add(played.n_odd() as f64, 0.0, 0.0, || format!("numbers that are not finite, {path}, near {near}"));
             }
         }
@@ -271,7 +271,7 @@ fn eye_inside(desk: &mut Desk) -> Result<Found> {
             let played = desk.play(&scene, 0)?;
             c.add(played.n_odd() as f64, 0.0, 0.0, || format!("numbers that are not finite, {path}, sigma {sigma}"));
             let within = played.rgba.chunks_exact(4).all(|p| (0.0..=1.0).contains(&p[3]));
-            c.expect(within, || format!("alpha within 0 and 1, {path}, sigma {sigma}"));
+            c.holds(within, || format!("alpha within 0 and 1, {path}, sigma {sigma}"));
         }
     }
     Ok(c.into())
@@ -300,8 +300,8 @@ fn long_targets(desk: &mut Desk) -> Result<Found> {
             c.add(played.n_odd() as f64, 0.0, 0.0, || {
                 format!("numbers that are not finite, {path}, {width} x {height}")
             });
-            c.expect(alpha(4095) > 0.5, || format!("a blob in the middle, {path}, {width} x {height}"));
-            c.expect(alpha(0) == 0.0 && alpha(8190) == 0.0, || {
+            c.holds(alpha(4095) > 0.5, || format!("a blob in the middle, {path}, {width} x {height}"));
+            c.holds(alpha(0) == 0.0 && alpha(8190) == 0.0, || {
                 format!("nothing at the ends, {path}, {width} x {height}")
             });
         }
@@ -318,7 +318,7 @@ fn large_target(desk: &mut Desk) -> Result<Found> {
     let mut player = match desk.player(&scene, false) {
         Ok(player) => player,
         Err(Error::Limit { what }) => {
-            c.expect(true, || "a limit".to_owned());
+            c.holds(true, || "a limit".to_owned());
             return Ok(c.remark(format!("refused: {what}")).into());
         }
         Err(error) => return Err(error),
@@ -349,7 +349,7 @@ fn no_camera(desk: &mut Desk) -> Result<Found> {
         scene.camera.keys.iter_mut().for_each(|k| (k.position, k.target) = (position, target));
         let frame = desk.player(&scene, false).and_then(|mut player| player.game.step(0).map(|_| ()));
         // Bad input, and no fault of the device.
-        c.expect(frame.is_err_and(|e| e.exit_code() == 2), || format!("an error of a camera of {what}"));
+        c.holds(frame.is_err_and(|e| e.exit_code() == 2), || format!("an error of a camera of {what}"));
     }
     Ok(c.into())
 }

@@ -78,7 +78,7 @@ fn floor_under(desk: &Desk, lighting: &str, lights: &str, y: f64, particles: Vec
 fn direct(c: &mut Comparison, played: &Played) -> f64 {
     let is_good =
         |l: &crate::layout::facet::LitRecord| l.direct.iter().chain(&l.first).all(|v| v.is_finite() && *v >= 0.0);
-    c.expect(played.lit.iter().all(is_good), || "light that is finite and not negative".to_owned());
+    c.holds(played.lit.iter().all(is_good), || "light that is finite and not negative".to_owned());
     f64::from(played.lit[0].direct[0])
 }
 
@@ -126,7 +126,7 @@ fn flat_grid(desk: &mut Desk) -> Result<Found> {
     let played = desk.play(&scene, 0)?;
     let mut c = Comparison::default();
     direct(&mut c, &played);
-    c.expect(played.lit.iter().any(|l| l.direct[0] > 0.1) && played.lit.iter().any(|l| l.direct[0] < 0.9), || {
+    c.holds(played.lit.iter().any(|l| l.direct[0] > 0.1) && played.lit.iter().any(|l| l.direct[0] < 0.9), || {
         "light and shadow".to_owned()
     });
     for (i, lit) in played.lit.iter().enumerate() {
@@ -168,7 +168,7 @@ fn along_faces(desk: &mut Desk) -> Result<Found> {
             let played = desk.play(&scene, 0)?;
             direct(&mut c, &played);
             let some = played.lit.iter().any(|l| l.direct[0] > 1e-3);
-            c.expect(some || offset > 1.0, || format!("that something is lit along {direction}"));
+            c.holds(some || offset > 1.0, || format!("that something is lit along {direction}"));
             for (i, lit) in played.lit.iter().enumerate() {
                 let beyond = (f64::from(lit.direct[0]) - 1.0).max(0.0);
                 c.add(beyond, 0.0, 4.0 * U_F32, || format!("facet {i} in light along {direction}"));
@@ -196,12 +196,12 @@ fn proportional(desk: &mut Desk) -> Result<Found> {
             let off = |x: f64| (8.0 + 20.0 * x) * U_F32 * if x < 1e-3 { 2.0 } else { 1.0 };
             match truth < 60.0 {
                 true => c.add(*now, truth, off(*now) + 10f64.sqrt() * off(*before), at),
-                false => c.expect(*now > 55.0, at),
+                false => c.holds(*now > 55.0, at),
             }
         }
         before = Some(depths);
     }
     let last = before.unwrap_or_default();
-    c.expect(last.iter().any(|d| *d > 55.0) && last.iter().any(|d| *d < 1.0), || "shadow and light".to_owned());
+    c.holds(last.iter().any(|d| *d > 55.0) && last.iter().any(|d| *d < 1.0), || "shadow and light".to_owned());
     Ok(c.into())
 }

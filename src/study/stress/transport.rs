@@ -118,7 +118,7 @@ fn noon(desk: &Desk, surfaces: Vec<Surface>) -> Result<Scene> {
 fn second(c: &mut Comparison, played: &Played) -> Vec<f64> {
     let of = |(i, lit): (usize, &crate::layout::facet::LitRecord)| {
         let all = lit.second.iter().chain(&lit.indirect).chain(&lit.first);
-        c.expect(all.clone().all(|v| v.is_finite() && *v >= 0.0), || {
+        c.holds(all.clone().all(|v| v.is_finite() && *v >= 0.0), || {
             format!("light of facet {i}, finite and not negative")
         });
         f64::from(lit.second.iter().copied().fold(0.0, f32::max))
@@ -166,13 +166,13 @@ fn touching(desk: &mut Desk) -> Result<Found> {
     second(&mut c, &played);
     let most = truth.second.iter().map(|l| l.max_element()).fold(0.0, f64::max);
     for (i, (lit, truth)) in played.lit.iter().zip(&truth.second).enumerate() {
-        c.expect(f64::from(lit.unresolved) < 0.01 * most, || {
+        c.holds(f64::from(lit.unresolved) < 0.01 * most, || {
             format!("facet {i}, resolved but for {:e}", lit.unresolved)
         });
         let bound = 0.01 * most + f64::from(lit.unresolved);
         c.add(f64::from(lit.second[0]), truth.x, bound, || format!("L2 of facet {i}"));
     }
-    c.expect(most > 0.0, || "that there is some".to_owned());
+    c.holds(most > 0.0, || "that there is some".to_owned());
     Ok(c.into())
 }
 
@@ -184,7 +184,7 @@ fn crossing(desk: &mut Desk) -> Result<Found> {
     // Of a hemisphere of the brightest L1 a facet receives pi of it.
     let brightest = played.lit.iter().map(|l| f64::from(l.first[0])).fold(0.0, f64::max);
     let lit = second(&mut c, &played);
-    c.expect(lit.iter().any(|l| *l > 0.01 * brightest), || "that there is a second reflection".to_owned());
+    c.holds(lit.iter().any(|l| *l > 0.01 * brightest), || "that there is a second reflection".to_owned());
     for (i, l) in lit.into_iter().enumerate() {
         c.add((l - 0.5 * brightest).max(0.0), 0.0, 1e-3 * brightest, || {
             format!("L2 of facet {i} beyond K_d of the brightest")
@@ -216,7 +216,7 @@ fn scaled(desk: &mut Desk, k: i32) -> Result<Found> {
     let light = |p: &Played| p.lit.iter().map(|l| (l.first, l.second, l.indirect)).collect::<Vec<_>>();
     c.same(&light(&one), &light(&other), "light of facets");
     let lit = second(&mut c, &one);
-    c.expect(lit.iter().any(|l| *l > 0.0), || "that there is a second reflection".to_owned());
+    c.holds(lit.iter().any(|l| *l > 0.0), || "that there is a second reflection".to_owned());
     Ok(c.into())
 }
 
@@ -252,7 +252,7 @@ fn one_point(desk: &mut Desk) -> Result<Found> {
     let mut c = Comparison::default();
     let lit = second(&mut c, &played);
     // Surfaces' facets come first.
-    c.expect(lit[36..].iter().all(|l| *l > 0.0), || "that the floor lights all of them".to_owned());
+    c.holds(lit[36..].iter().all(|l| *l > 0.0), || "that the floor lights all of them".to_owned());
     c.add(played.n_odd() as f64, 0.0, 0.0, || "numbers of the picture that are not finite".to_owned());
     Ok(c.into())
 }
@@ -264,7 +264,7 @@ fn tree_one_point(desk: &mut Desk) -> Result<Found> {
     let mut c = Comparison::default();
     let (exact, tree) = (second(&mut c, &exact), second(&mut c, &tree));
     let most = exact.iter().copied().fold(0.0, f64::max);
-    c.expect(most > 0.0, || "that there is a second reflection".to_owned());
+    c.holds(most > 0.0, || "that there is a second reflection".to_owned());
     for (i, (a, b)) in exact.iter().zip(&tree).enumerate() {
         c.add(*b, *a, 2.0 * (f64::from(N) + 32.0) * U_F32 * most, || format!("L2 of facet {i}"));
     }

@@ -13,7 +13,7 @@ pub struct StressArgs {
     /// Cases to run, by what their names begin with; all without
     #[arg(value_name = "CASE")]
     pub cases: Vec<String>,
-    /// Say in a line each what the cases try, and run none
+    /// Say what the cases try and what is allowed, and run none
     #[arg(long, conflicts_with_all = ["json", "csv"])]
     pub list: bool,
     /// JSON in place of the table

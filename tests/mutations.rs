@@ -136,6 +136,20 @@ const FAULTS: &[Fault] = &[
         "(t + 1e-7) * (1.0 - t * (1.0 / 2.0)",
         "functions/one-minus-exp",
     ),
+    (
+        "a guard of lengths that are not short",
+        "include/functions.glsl",
+        "max(dot(o, o), 1e-30)",
+        "max(dot(o, o), 1e-2)",
+        "functions/normalize",
+    ),
+    (
+        "a guard of half vectors that are there",
+        "include/lobe.glsl",
+        "max(dot(h, h), 1e-30)",
+        "max(dot(h, h), 1e-4)",
+        "functions/half-vector",
+    ),
     ("pi forgotten in what a diffuse surface sends", "first.comp", "0.318309886183791", "1.0", "brdf/exponent-0"),
 ];
 

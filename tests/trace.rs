@@ -135,9 +135,9 @@ fn zones_nest_and_passes_lie_in_their_frames() {
         assert_eq!((count(&drawing, name), count("thread game", name)), (n, n), "{name}");
     }
     // After each loop its last frame is read back, and after the last one facets and light, each once more recorded,
-    // submitted and waited for; and to count what is odd the picture, particles and status, made anew, facets and light.
+    // submitted and waited for; and to count what is odd the picture, status, facets and light.
     for (name, extra) in
-        [("render step", 0), ("plan", 0), ("upload", 0), ("record", 10), ("submit", 10), ("read back", 3)]
+        [("render step", 0), ("plan", 0), ("upload", 0), ("record", 8), ("submit", 8), ("read back", 3)]
     {
         let want = if name == "read back" { extra } else { 2 * n + extra };
         assert_eq!(count(&drawing, name), want, "{name}");

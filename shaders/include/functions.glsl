@@ -63,3 +63,6 @@ float one_minus_exp(float t) {
     }
     return 1.0 - exp(-t);
 }
+
+// A direction, and 0 where there is none.
+vec3 unit(vec3 o) { return o * inversesqrt(max(dot(o, o), 1e-30)); }

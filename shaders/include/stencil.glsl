@@ -111,9 +111,6 @@ vec4 quarters(Stencil s, Stencil by) {
     return vec4(low.x + low.y, low.z + low.w, high.x + high.y, high.z + high.w);
 }
 
-// A direction, and 0 where there is none.
-vec3 unit(vec3 o) { return o * inversesqrt(max(dot(o, o), 1e-30)); }
-
 // The middle of quarter q.
 vec3 quarter_at(Cell cell, uint q) {
     return cell.middle + ((q & 1u) == 0u ? -0.5 : 0.5) * cell.u + ((q & 2u) == 0u ? -0.5 : 0.5) * cell.v;

@@ -52,6 +52,12 @@ impl Renderer {
         Ok((particles, download(device, &mut self.host, &self.buffers.status, n)?))
     }
 
+    /// Each particle's status as `generate` left it; 0 where it is of no box. No frame may be in flight.
+    pub fn status(&mut self, device: &Device) -> Result<Vec<u32>> {
+        self.check_alone()?;
+        download(device, &mut self.host, &self.buffers.status, self.settings.n_particles)
+    }
+
     /// What a pass that does nothing measures on the device, ns: median of several. None without timestamps.
     pub fn empty_scope_ns(&mut self) -> Result<Option<f64>> {
         const N_SCOPES: usize = 15;

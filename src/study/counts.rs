@@ -37,14 +37,10 @@ impl Counts {
     pub fn of(stage: &mut Stage) -> Result<Counts> {
         let rgba = stage.renderer.image()?;
         let mut counts = Counts::of_picture(&rgba, stage.scene.film.format);
-        let status = stage.renderer.generate_now(&stage.device)?.1;
-        let has_boxes =
-            stage.scene.clouds.iter().any(|c| matches!(c.source, crate::model::cloud::CloudSource::Boxes { .. }));
-        if has_boxes {
-            // Of lists there are no attempts.
-            counts.particles = status.iter().filter(|s| **s & !FOLDED != 0).count() as u64;
-            counts.folded = status.iter().filter(|s| **s & FOLDED != 0).count() as u64;
-        }
+        let status = stage.renderer.status(&stage.device)?;
+        // Of lists there are no attempts.
+        counts.particles = status.iter().filter(|s| **s & !FOLDED != 0).count() as u64;
+        counts.folded = status.iter().filter(|s| **s & FOLDED != 0).count() as u64;
         if stage.scene.lighting.mode != LightingMode::None {
             counts.add_light(&stage.renderer.facets(&stage.device)?.1);
         }

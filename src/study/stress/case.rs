@@ -73,7 +73,9 @@ impl Comparison {
             error => error,
         };
         self.n += 1;
-        self.n_beyond += usize::from(error > bound || bound.is_nan());
+        // What is no number is beyond any bound, an infinite one among them.
+        let is_within = error <= bound && error.is_finite();
+        self.n_beyond += usize::from(!is_within);
         let share = if error == 0.0 { 0.0 } else { error / bound };
         // The first one stands for all that are exact.
         if self.worst.as_ref().is_none_or(|worst| share > worst.share()) {
@@ -155,7 +157,8 @@ mod tests {
         {
             let mut c = Comparison::default();
             c.add(value, truth, 1e300, String::new);
-            assert_eq!(c.n_beyond, 1, "{value} {truth}");
+            c.add(value, truth, f64::INFINITY, String::new);
+            assert_eq!(c.n_beyond, 2, "{value} {truth}");
         }
         let mut c = Comparison::default();
         c.add(f64::NAN, f64::NAN, 0.0, String::new);

@@ -277,17 +277,15 @@ fn one_minus_exp(desk: &mut Desk) -> Result<Found> {
 const NO_TABLE: [(&str, &[f32]); 1] = [("table", &[0.0; 2])];
 
 fn half_vector(desk: &mut Desk) -> Result<Found> {
-    // The normal (0, 0, 1), one way upright in the xz plane, the other at an angle beyond it, both rounded.
+    // The normal (0, 0, 1), and two ways in the xz plane on either side of one at an angle to it: near to each other, and, at each
+    // fourth place, next to opposite, so that their sum is down to 1e-6 long. Rounded.
     let inputs: Vec<[f32; 4]> = (0..100_000)
         .map(|i| {
-            let angle = 1e-6 * (PI / 2.0 * 1e6f64).powf(f64::from(i) / 100_000.0);
-            let other = 0.3 * f64::from(i % 7);
-            [
-                (angle + other).sin() as f32,
-                (angle + other).cos() as f32,
-                (angle - other).sin() as f32,
-                (angle - other).cos() as f32,
-            ]
+            let share = f64::from(i) / 100_000.0;
+            let angle = 1e-6 * (PI / 2.0 * 1e6f64).powf(share);
+            let apart = if i % 4 == 0 { FRAC_PI_2 - 1e-6 * 1e5f64.powf(share) } else { 0.3 * f64::from(i % 7) };
+            let (a, b) = (angle + apart, angle - apart);
+            [a.sin() as f32, a.cos() as f32, b.sin() as f32, b.cos() as f32]
         })
         .collect();
     // The table stays bound where it is looked at.
@@ -299,7 +297,8 @@ fn half_vector(desk: &mut Desk) -> Result<Found> {
         let [ax, az, bx, bz] = x.map(f64::from);
         let (hx, hz) = (ax + bx, az + bz);
         let length = hx.hypot(hz);
-        let chord = (hx / length).hypot(1.0 - hz / length);
+        // Where they are opposite to the bit there is no half vector, and the chord is the normal.
+        let chord = if length > 0.0 { (hx / length).hypot(1.0 - hz / length) } else { 1.0 };
         let truth = 0.5 * chord * chord;
         let off = 15.6 * U_F32;
         c.add(f64::from(y[0]), truth, chord * off + 0.5 * off * off + 4.0 * U_F32 * truth, || {
@@ -353,12 +352,11 @@ fn vectors(low: f64, high: f64) -> Vec<[f32; 4]> {
     (0..50_000).map(of).map(|[x, y, z]| [x, y, z, 0.0]).collect()
 }
 
-/// As stencil.glsl and lobe.glsl have it: by the inverse root of a square that is kept above 1e-30.
-const UNIT: &str = "vec3 o = x.xyz; return vec4(o * inversesqrt(max(dot(o, o), 1e-30)), 0.0);";
+const UNIT: &str = "return vec4(unit(x.xyz), 0.0);";
 
 fn normalize(desk: &mut Desk) -> Result<Found> {
     let inputs = vectors(1e-14, 1e18);
-    let found = desk.probe(&[], UNIT, &inputs)?;
+    let found = desk.probe(&FUNCTIONS, UNIT, &inputs)?;
     let mut c = Comparison::default();
     for (x, y) in inputs.iter().zip(found) {
         let v = glam::DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
@@ -374,7 +372,7 @@ fn normalize(desk: &mut Desk) -> Result<Found> {
 fn normalize_ends(desk: &mut Desk) -> Result<Found> {
     let mut inputs = vectors(1e-38, 1e-15);
     inputs.push([0.0; 4]);
-    let found = desk.probe(&[], UNIT, &inputs)?;
+    let found = desk.probe(&FUNCTIONS, UNIT, &inputs)?;
     let mut c = Comparison::default();
     for (x, y) in inputs.iter().zip(found) {
         let length = y[..3].iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();

@@ -25,6 +25,7 @@ use nimbus::gpu::Compiler;
 use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
 use nimbus::model::scene::Scene;
+use nimbus::model::sort_bits::SortBits;
 use nimbus::reference::sort::order;
 use nimbus::reference::sprites::{Behind, View};
 use nimbus::reference::threshold::cut;
@@ -76,7 +77,7 @@ fn frame(gpu: &Gpu, compiler: &Compiler, scene: &Scene) -> Frame {
         View { width: scene.film.width, height: scene.film.height, cutoff, threshold, smallest, ..picture.view };
     picture.placed = renderer.placed(&gpu.device).expect("places");
     picture.particles = renderer.generate_now(&gpu.device).expect("particles").0;
-    if scene.draw.sort_bits == 16 {
+    if scene.draw.sort_bits == SortBits::Narrow {
         // As the device rounds it: along an axis the depth itself is exact.
         assert_eq!(camera.forward, [0.0, 0.0, -1.0]);
         let steps = (65536.0 / (2.0 * radius)) as f32;

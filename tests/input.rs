@@ -13,6 +13,7 @@ use nimbus::model::cloud::CloudSource;
 use nimbus::model::film::ToneMap;
 use nimbus::model::light::Light;
 use nimbus::model::scene::{Simulate, Threading};
+use nimbus::model::sort_bits::SortBits;
 use scene_text::{BOXES, CLOUD, assert_message, assert_table, folder, good, load_with, message, to_toml};
 use serde_json::json;
 
@@ -26,7 +27,7 @@ fn a_cloud_alone_is_a_complete_scene() {
     assert_eq!(scene.camera.fov_y_rad, 45f64.to_radians());
     assert_eq!((scene.time.step_s, scene.time.n_frames), (0.0333, 300));
     assert_eq!((scene.lighting.grid, scene.lighting.step, scene.lighting.forward), (64, 1.0, 0.85));
-    assert_eq!((scene.draw.cutoff, scene.draw.sort_bits), (3.0, 32));
+    assert_eq!((scene.draw.cutoff, scene.draw.sort_bits), (3.0, SortBits::Auto));
     assert_eq!((scene.threads.mode, scene.threads.simulate), (Threading::Parallel, Simulate::Gpu));
     let [Light::Directional { direction, irradiance }, Light::Sky { constant, .. }] = scene.lights[..] else {
         panic!("{:?}", scene.lights)
@@ -204,7 +205,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
                 "exponents": [1.0, 256.0], "gather": "auto", "theta": 0.4, "facets_per_cloud": 0,
                 "pair_size": 0.5, "pair_levels": 6, "pair_steps": 16, "summation": "plain", "precision": "f32",
             },
-            "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": 3.0, "threshold": 0.0, "chunks": 0, "cull": "on", "smallest": 0.0, "sort_bits": 32, "resolution": 1.0, "error": 1.0 / 1020.0, "count": "all", "count_a": 280.0, "count_d0": 1.0,
+            "draw": { "path": "tiles", "impostors": "off", "impostor_error": 0.5, "cutoff": 3.0, "threshold": 0.0, "chunks": 0, "cull": "on", "smallest": 0.0, "sort_bits": "auto", "resolution": 1.0, "error": 1.0 / 1020.0, "count": "all", "count_a": 280.0, "count_d0": 1.0,
                       "count_normalised": false, "count_conserve": true, "particles": 0, "texture_seed": 1 },
             "threads": { "mode": "parallel", "simulate": "gpu" },
             "light": [

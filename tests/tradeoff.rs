@@ -11,6 +11,7 @@ use std::sync::atomic::AtomicBool;
 use nimbus::error::{Error, Result};
 use nimbus::io::scene_file::load;
 use nimbus::model::scene::Scene;
+use nimbus::model::sort_bits::SortBits;
 use nimbus::study::against::Reference;
 use nimbus::study::cases::Axis;
 use nimbus::study::pixels::Pixels;
@@ -54,7 +55,7 @@ impl Law {
 
 impl Subject for Law {
     fn add(&mut self, scene: &Arc<Scene>) {
-        self.of.push((scene.draw.cutoff, scene.draw.sort_bits == 16));
+        self.of.push((scene.draw.cutoff, scene.draw.sort_bits == SortBits::Narrow));
     }
 
     fn picture(&mut self, i: usize) -> Result<Vec<f32>> {

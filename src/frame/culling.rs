@@ -53,7 +53,7 @@ impl Culling {
             f64::from(height) * f64::from(packet.camera.tan_y) / (f64::from(size[1]) * f64::from(camera.tan_y));
         let smallest = s.smallest * pixels;
         let view = View { camera: &camera, width, height, cutoff, threshold, smallest };
-        let order = Order { radius: packet.radius, n_bits: s.sort_bits, sort_tile: TILE, splat_block: BLOCK };
+        let order = Order { radius: packet.radius, n_bits: packet.sort_bits, sort_tile: TILE, splat_block: BLOCK };
         let buffers = [b.placed.buffer(), &b.particles, &b.i_group, &b.drawn.buffer, &b.entries, kept];
         self.cull.record(rec, buffers, &view, &order, s.n_particles)
     }
@@ -82,10 +82,10 @@ pub(super) fn record_sort(
 ) -> Result<()> {
     let Some(kept) = &b.kept else {
         let buffers = [b.placed.buffer(), &b.i_group, &b.drawn.buffer, &b.entries];
-        sort.record_keys(rec, buffers, packet.camera.forward, s.n_particles, packet.radius, s.sort_bits)?;
-        return sort.record(rec, &b.entries, packet.n_drawn, s.sort_bits);
+        sort.record_keys(rec, buffers, packet.camera.forward, s.n_particles, packet.radius, packet.sort_bits)?;
+        return sort.record(rec, &b.entries, packet.n_drawn, packet.sort_bits);
     };
     let counts = Counts { buffer: kept, i_count: KeptRecord::I_COUNT, i_groups: KeptRecord::I_SORT };
     // Both key widths take an even number of passes, so the result lies where it began.
-    sort.record_counted(rec, &b.entries, s.sort_bits, counts).map(|_| ())
+    sort.record_counted(rec, &b.entries, packet.sort_bits, counts).map(|_| ())
 }

@@ -146,9 +146,16 @@ impl Game {
             grid: GridRecord::from(&setting.grid),
             heaviest: heaviest_blob(&grown),
             radius: setting.radius,
+            sort_bits: self.sort_bits(&grown, setting.radius),
             extents: self.extents(&grown, &origins),
             game_ms: super::ms(begin, Instant::now()),
         })
+    }
+
+    /// Of the sort's keys.
+    fn sort_bits(&self, groups: &[Group], radius: f64) -> u32 {
+        let sigmas = groups.iter().filter(|g| g.n_particles > 0).map(|g| g.sigma_mean);
+        self.scene.draw.sort_bits.of(radius, sigmas.fold(f64::INFINITY, f64::min))
     }
 
     /// Where the groups are that a shell may show.

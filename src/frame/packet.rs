@@ -41,6 +41,8 @@ pub struct Packet {
     pub heaviest: f64,
     /// Bounds |view depth| relative to the lighting origin.
     pub radius: f64,
+    /// Of the sort's keys: 16 or 32.
+    pub sort_bits: u32,
     /// Where each group's particles are, where what is far may be shown from a picture of it; else none.
     pub extents: Vec<Extent>,
 }

@@ -243,7 +243,9 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     // How dense they are does not order them.
     let same_names =
         same(&|a, b| a.drawn.iter().map(|d| (d.shift, d.end)).eq(b.drawn.iter().map(|d| (d.shift, d.end))));
-    let same_order = still && same_names && same(&|a, b| a.camera.forward == b.camera.forward && a.radius == b.radius);
+    let same_order = still
+        && same_names
+        && same(&|a, b| a.camera.forward == b.camera.forward && (a.radius, a.sort_bits) == (b.radius, b.sort_bits));
     let same_view = same(&|a, b| a.camera == b.camera);
     // What is kept depends on all of the camera, and on how dense particles are.
     let same_kept = same_order && same_drawn && same_view;

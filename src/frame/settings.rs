@@ -13,7 +13,6 @@ pub(super) struct Settings {
     pub n_surfaces: u32,
     pub step_cells: f64,
     pub forward: f64,
-    pub sort_bits: u32,
     pub texture_seed: u32,
     pub cutoff: f64,
     pub threshold: f64,
@@ -37,7 +36,6 @@ impl Settings {
             step_cells: scene.lighting.step,
             // Without particles there is nothing to march through.
             forward: if n_particles > 0 { scene.lighting.forward } else { 1.0 },
-            sort_bits: scene.draw.sort_bits,
             texture_seed: scene.draw.texture_seed,
             cutoff: scene.draw.cutoff,
             threshold: scene.draw.threshold.bound(),

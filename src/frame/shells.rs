@@ -36,7 +36,6 @@ pub struct Rules {
     /// Of the shell's picture.
     pub shell_size: [u32; 2],
     cutoff: f64,
-    sort_bits: u32,
     /// Pixels.
     error: f64,
 }
@@ -44,13 +43,7 @@ pub struct Rules {
 impl Rules {
     pub fn of(scene: &Scene) -> Rules {
         let size = [scene.film.width, scene.film.height];
-        Rules {
-            size,
-            shell_size: shell_size(size),
-            cutoff: scene.draw.cutoff,
-            sort_bits: scene.draw.sort_bits,
-            error: scene.draw.impostor_error,
-        }
+        Rules { size, shell_size: shell_size(size), cutoff: scene.draw.cutoff, error: scene.draw.impostor_error }
     }
 }
 
@@ -205,7 +198,7 @@ impl Keeper {
             packet.extents.iter().map(|e| (e, depths(e, now))).filter(|(_, d)| d[1] >= cut).collect();
         let sigma = beyond.iter().map(|(e, _)| e.sigma_max).fold(0.0, f64::max);
         let lengths = now.eye.abs().element_sum() + packet.radius;
-        let (last_key, quantum) = last_key(cut + now.eye.dot(now.forward), packet.radius, self.rules.sort_bits)?;
+        let (last_key, quantum) = last_key(cut + now.eye.dot(now.forward), packet.radius, packet.sort_bits)?;
         let nearest = cut - quantum - ROUNDING * lengths;
         let farthest = beyond.iter().map(|(_, d)| d[1]).fold(nearest, f64::max) + ROUNDING * lengths;
         let least = beyond.iter().map(|(e, d)| e.sigma_mean / d[1]).fold(f64::INFINITY, f64::min);

@@ -16,6 +16,7 @@ use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
 use crate::model::scene::{MAX_CHUNKS, MAX_PAIR_LEVELS, Simulate, Threading, Threads, Time};
+use crate::model::sort_bits::SortBits;
 use crate::model::sums::{Precision, Summation, Sums};
 
 /// The greatest image side that every Vulkan 1.x desktop device offers (maxImageDimension2D).
@@ -198,10 +199,7 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
         let found = if let Least::Of(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
         return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {found}")));
     }
-    let sort_bits = s.u32("sort_bits", 32, 16, 32)?;
-    if sort_bits != 16 && sort_bits != 32 {
-        return Err(s.fault("sort_bits", format!("expected 16 or 32, found {sort_bits}")));
-    }
+    let sort_bits = read_sort_bits(&mut s)?;
     let resolution = read_resolution(&mut s)?;
     if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Least::NOTHING) {
         let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
@@ -290,6 +288,22 @@ fn read_resolution(s: &mut Section) -> Result<Resolution> {
             Err(s.fault("resolution", format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe())))
         }
     }
+}
+
+/// 16, 32 or "auto".
+fn read_sort_bits(s: &mut Section) -> Result<SortBits> {
+    let bits = match s.value("sort_bits").map(|node| &node.value) {
+        None => SortBits::Auto,
+        Some(Value::String(text)) if text == "auto" => SortBits::Auto,
+        Some(Value::Integer(16)) => SortBits::Narrow,
+        Some(Value::Integer(32)) => SortBits::Wide,
+        Some(found) => {
+            let what = format!("expected 16, 32 or \"auto\", found {}", found.describe());
+            return Err(s.fault("sort_bits", what));
+        }
+    };
+    s.record("sort_bits", bits.number().map_or(json!("auto"), |n| json!(n)));
+    Ok(bits)
 }
 
 /// A number of chunks, or "auto".

@@ -20,6 +20,7 @@ pub mod pairings;
 pub mod philox;
 pub mod resolution;
 pub mod scene;
+pub mod sort_bits;
 pub mod sums;
 pub mod surface;
 pub mod texture;

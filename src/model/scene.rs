@@ -13,6 +13,7 @@ use super::least::Least;
 use super::light::Light;
 use super::material::Material;
 use super::resolution::{Resolution, SmallPicture};
+use super::sort_bits::SortBits;
 use super::sums::Sums;
 use super::surface::Surface;
 
@@ -193,8 +194,7 @@ pub struct Draw {
     pub cull: Cull,
     /// Where particles are left out, also those whose σ is narrower than so many pixels.
     pub smallest: Least,
-    /// Bits of the sort key: 16 or 32.
-    pub sort_bits: u32,
+    pub sort_bits: SortBits,
     /// How many particles are drawn of a cloud; `None`: all.
     pub count: Option<Count>,
     /// Of the pool of textures.

@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
+use crate::model::sort_bits::SortBits;
 use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
 use crate::reference::sprites::{Behind, View};
@@ -96,7 +97,7 @@ impl Against {
             threshold: Least::Of(0.0),
             cull: Cull::On,
             smallest: Least::Of(0.0),
-            sort_bits: 32,
+            sort_bits: SortBits::Wide,
             count: None,
             ..scene.draw
         };

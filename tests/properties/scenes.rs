@@ -83,7 +83,7 @@ pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
                 ("path", quoted(&["sprites", "tiles", "auto"])),
                 ("cutoff", number(0.5, 8.0)),
                 ("threshold", prop_oneof![number(0.0, 0.99), Just("'auto'".to_owned())].boxed()),
-                ("sort_bits", select(&["16", "32"][..]).prop_map(str::to_owned).boxed()),
+                ("sort_bits", select(&["16", "32", "'auto'"][..]).prop_map(str::to_owned).boxed()),
                 ("resolution", select(&["1.0", "0.5", "0.25", "'auto'"][..]).prop_map(str::to_owned).boxed()),
                 ("error", number(0.0, 0.9)),
                 ("texture_seed", integer(0, u32::MAX)),

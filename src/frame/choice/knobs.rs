@@ -120,6 +120,7 @@ fn named<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::sort_bits::SortBits;
 
     /// Everything that can be "auto" is.
     const ASKED: Draw = Draw {
@@ -133,7 +134,7 @@ mod tests {
         threshold: Least::Auto,
         cull: Cull::Auto,
         smallest: Least::Auto,
-        sort_bits: 32,
+        sort_bits: SortBits::Wide,
         count: None,
         texture_seed: 1,
         n_particles: 0,

@@ -47,6 +47,7 @@ fn packet() -> Packet {
         grid: GridRecord::default(),
         heaviest: 1.0,
         radius: 1.0,
+        sort_bits: 32,
         extents: vec![],
     }
 }

@@ -2,7 +2,7 @@ use super::*;
 use std::sync::Arc;
 use std::time::Instant;
 
-const RULES: Rules = Rules { size: [160, 120], shell_size: [200, 150], cutoff: 3.0, sort_bits: 32, error: 0.5 };
+const RULES: Rules = Rules { size: [160, 120], shell_size: [200, 150], cutoff: 3.0, error: 0.5 };
 
 /// Some clouds before an eye at (x, 0, z) that looks along −z.
 fn packet(x: f64, z: f64) -> Packet {
@@ -41,6 +41,7 @@ fn packet(x: f64, z: f64) -> Packet {
         grid: Default::default(),
         heaviest: 1.0,
         radius: 12.0,
+        sort_bits: 32,
         extents: (0..20).map(extent).collect(),
     }
 }

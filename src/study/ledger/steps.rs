@@ -7,6 +7,7 @@ use crate::model::film::FilmFormat;
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
+use crate::model::sort_bits::SortBits;
 
 /// An approximation, and the scene without it.
 pub struct Step {
@@ -84,7 +85,12 @@ const ALL: [(&str, What, Describe, Lift); 10] = [
             }
         },
     ),
-    ("sort bits", What::Particles, |s| s.draw.sort_bits.to_string(), |s| s.draw.sort_bits = 32),
+    (
+        "sort bits",
+        What::Particles,
+        |s| s.draw.sort_bits.number().map_or("auto".into(), |n| n.to_string()),
+        |s| s.draw.sort_bits = SortBits::Wide,
+    ),
     (
         "count",
         What::Particles,

@@ -1,6 +1,7 @@
 //! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data (CDF-5) and NetCDF-4 (HDF5).
 
 use std::fs::{self, File};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -36,7 +37,10 @@ pub struct NetCdf {
 /// # Errors
 /// What is no readable NetCDF file, and why.
 pub fn open(path: &Path) -> Result<NetCdf> {
-    let about = fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    let about = fs::metadata(path).map_err(|e| match e.kind() {
+        ErrorKind::NotFound => Error::io(path, "no such file"),
+        _ => Error::io(path, e),
+    })?;
     if about.is_dir() {
         return Err(Error::io(path, "is a folder, expected a NetCDF file"));
     }

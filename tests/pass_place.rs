@@ -23,7 +23,7 @@ fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
     let particle = |i: u32, spread: f64| {
         let [a, b, c, d] = uniforms(0x91ace, 0, i, 0);
         let position = spread * (DVec3::new(a, b, c) - 0.5) + 1e4;
-        Particle { position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
+        Particle { aspect: 1.0, position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
     };
     let cloud = |n: u32, spread: f64, position, wind| Cloud {
         source: CloudSource::Particles((0..n).map(|i| particle(i, spread)).collect()),

@@ -1,6 +1,6 @@
 // The records of src/layout/, in std430. tests/layout.rs compares names, offsets and sizes.
 
-struct Particle { vec3 position; float sigma; vec3 color; float kappa; };
+struct Particle { vec3 position; float sigma; vec3 color; float kappa; float aspect; float unused; vec2 unused_too; };
 struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uint seed; uint i_box; uint i_first; uint n_particles; uint form; uint unused; };
 struct Placed { vec3 position; float sigma; };
 struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 center; uint i_mode; uint n_modes; float scale; uvec2 unused; };
@@ -22,7 +22,7 @@ struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
 struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; uint n_sources; };
 struct Node { uint n_nodes; };
 struct Light { vec3 toward; uint kind; vec3 energy; float constant; vec3 position; float radius; float cone_scale; float cone_offset; vec2 unused; };
-struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; };
+struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; float aspect; float inv_aspect; vec2 unused; };
 struct Camera { vec3 eye; float tan_x; vec3 right; float tan_y; vec3 up; float near; vec3 forward; float unused; };
 
 // In place of a particle's number: an entry that draws nothing.

@@ -1,4 +1,4 @@
-//! WRF's output: which variables mean what, and a step of them as a grid with extinction (docs/model.md §14).
+//! WRF's output: which variables mean what, and a step of them as a grid with extinction (docs/model.md §15).
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,4 @@
-//! Temperature, humidity and density of air, in the formulas and with the constants of wrf-python (NCAR), docs/model.md §14.
+//! Temperature, humidity and density of air, in the formulas and with the constants of wrf-python (NCAR), docs/model.md §15.
 
 /// m/s², of geopotential to height.
 pub const GRAVITY: f64 = 9.81;

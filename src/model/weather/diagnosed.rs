@@ -1,4 +1,4 @@
-//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §14. Whatever shows them says "diagnosed".
+//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §15. Whatever shows them says "diagnosed".
 
 use super::air::{EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, relative_humidity, saturation_ratio};
 use super::extinction::single_moment_phase;

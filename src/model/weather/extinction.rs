@@ -1,4 +1,4 @@
-//! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of spheres, docs/model.md §14.
+//! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of spheres, docs/model.md §15.
 
 use super::air::MELTING_K;
 

@@ -1,4 +1,4 @@
-//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's (docs/model.md §14).
+//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's (docs/model.md §15).
 
 use std::f64::consts::{PI, TAU};
 
@@ -12,7 +12,7 @@ use super::places::CellSeed;
 pub const THIN: f64 = 1e-3;
 pub const AFFORDED: usize = 10;
 /// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other, narrower ones leave gaps between
-/// themselves (docs/model.md §14 has the errors).
+/// themselves (docs/model.md §15 has the errors).
 pub const SPREAD: f64 = 0.45;
 /// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear columns, and what is missing at an
 /// edge between two clouds is small.
@@ -195,7 +195,7 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
 
 /// Columns row by row from the south, there and back, so that each lies beside the one before it.
 fn there_and_back(shape: Shape) -> Vec<usize> {
-    let along = |j: usize, i: usize| j * shape.nx + if j % 2 == 0 { i } else { shape.nx - 1 - i };
+    let along = |j: usize, i: usize| j * shape.nx + if j.is_multiple_of(2) { i } else { shape.nx - 1 - i };
     (0..shape.ny).flat_map(|j| (0..shape.nx).map(move |i| along(j, i))).collect()
 }
 

@@ -185,7 +185,12 @@ impl Container for NetCdf {
         let selections =
             start.iter().zip(count).map(|(s, c)| NcSliceInfoElem::Slice { start: *s, end: s + c, step: 1 }).collect();
         let read = self.file.read_variable_slice_as_f64(name, &NcSliceInfo { selections });
-        let numbers: Vec<f64> = read.map_err(|e| format!("cannot be read: {e}"))?.iter().copied().collect();
+        let read = read.map_err(|e| format!("cannot be read: {e}"))?;
+        // Not copied: a step of the largest grid is 128 MiB a variable.
+        let numbers = match read.is_standard_layout() {
+            true => read.into_raw_vec_and_offset().0,
+            false => read.iter().copied().collect(),
+        };
         if numbers.len() as u64 != n {
             return Err(format!("damaged: {} values where {n} are declared", numbers.len()));
         }

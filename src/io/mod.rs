@@ -19,6 +19,7 @@ pub mod image;
 pub mod magnitude;
 pub mod particle_file;
 mod scene_clouds;
+mod scene_disc;
 pub mod scene_file;
 mod scene_lights;
 mod scene_phases;

@@ -7,6 +7,7 @@ use serde_json::json;
 use sha2::{Digest, Sha256};
 
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
+use super::scene_disc::{self, read_disc};
 use super::scene_lights::material_named;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
@@ -51,6 +52,7 @@ const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_dept
 enum SourceKind {
     Boxes,
     Particles,
+    Disc,
 }
 
 impl<'a> CloudReader<'a> {
@@ -87,9 +89,9 @@ impl<'a> CloudReader<'a> {
 }
 
 pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> Result<Cloud> {
-    let from = [("boxes", SourceKind::Boxes), ("particles", SourceKind::Particles)];
+    let from = [("boxes", SourceKind::Boxes), ("particles", SourceKind::Particles), ("disc", SourceKind::Disc)];
     let mut lines = Vec::new();
-    let source = match s.required_choice("from", &from, &["disc", "weather"])? {
+    let source = match s.required_choice("from", &from, &["weather"])? {
         SourceKind::Boxes => read_boxes(s, reader)?,
         SourceKind::Particles => {
             s.expect_keys(LIST_KEYS, &[])?;
@@ -98,19 +100,24 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             lines = of_particles;
             CloudSource::Particles(particles)
         }
+        SourceKind::Disc => {
+            s.expect_keys(scene_disc::KEYS, &[])?;
+            CloudSource::Disc(read_disc(s)?)
+        }
     };
+    let is_disc = matches!(source, CloudSource::Disc(_));
     let cloud = Cloud {
         source,
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
-        growth: read_growth(s)?,
+        growth: if is_disc { Growth::NONE } else { read_growth(s)? },
         texture: read_texture(s)?,
         i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
     if let Some(what) = magnitude::beyond(&cloud, &lines) {
-        return Err(s.fault("file", what));
+        return Err(s.fault(if is_disc { "from" } else { "file" }, what));
     }
     match magnitude::grown_beyond(&cloud) {
         Some(what) => Err(s.fault("grow_to", what)),
@@ -168,7 +175,7 @@ pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
 fn boxes_of(cloud: &mut Cloud) -> &mut [CloudBox] {
     match &mut cloud.source {
         CloudSource::Boxes { boxes, .. } => boxes,
-        CloudSource::Particles(_) => &mut [],
+        CloudSource::Particles(_) | CloudSource::Disc(_) => &mut [],
     }
 }
 

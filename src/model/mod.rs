@@ -6,6 +6,7 @@ pub mod boxes;
 pub mod camera;
 pub mod cloud;
 pub mod count;
+pub mod disc;
 pub mod film;
 pub mod grid;
 pub mod growth;

@@ -6,13 +6,15 @@ use glam::DVec3;
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
+use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, is_carried_place, shortest};
+use super::scene_air::{put_on_base, read_base};
 use super::scene_disc::{self, read_disc};
 use super::scene_lights::material_named;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
+use crate::model::air::Air;
 use crate::model::boxes::{CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
@@ -32,6 +34,7 @@ pub fn on_disk(path: &Path, first: &str) -> Result<String> {
 pub struct CloudReader<'a> {
     folder: &'a Path,
     materials: &'a [Material],
+    air: &'a Air,
     seed: Option<u32>,
     files: &'a Files<'a>,
     /// Of every file read, in order.
@@ -41,7 +44,7 @@ pub struct CloudReader<'a> {
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "texture_strength", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
+        &[$($own,)* "material", "texture", "texture_strength", "position", "base", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
     };
 }
 
@@ -59,11 +62,11 @@ impl<'a> CloudReader<'a> {
     /// Files are looked for in `folder`; `seed` N gives cloud i the seed N + i.
     pub fn new(
         folder: &'a Path,
-        materials: &'a [Material],
+        (materials, air): (&'a [Material], &'a Air),
         seed: Option<u32>,
         files: &'a Files<'a>,
     ) -> CloudReader<'a> {
-        CloudReader { folder, materials, seed, files, digests: Vec::new() }
+        CloudReader { folder, materials, air, seed, files, digests: Vec::new() }
     }
 
     /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
@@ -102,11 +105,13 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         }
         SourceKind::Disc => {
             s.expect_keys(scene_disc::KEYS, &[])?;
-            CloudSource::Disc(read_disc(s)?)
+            CloudSource::Disc(read_disc(s, reader.air)?)
         }
     };
     let is_disc = matches!(source, CloudSource::Disc(_));
-    let cloud = Cloud {
+    // Of a disc it is where its particles condense.
+    let base = if is_disc { None } else { read_base(s)?.height(reader.air) };
+    let mut cloud = Cloud {
         source,
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
@@ -116,6 +121,13 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
+    if let Some(base) = base {
+        put_on_base(&mut cloud, base);
+        if !is_carried_place(cloud.position) {
+            let what = format!("puts the cloud's origin too far: expected at most {}", shortest(GREATEST));
+            return Err(s.fault("base", what));
+        }
+    }
     if let Some(what) = magnitude::beyond(&cloud, &lines) {
         return Err(s.fault(if is_disc { "from" } else { "file" }, what));
     }

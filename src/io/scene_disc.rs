@@ -1,12 +1,12 @@
 //! A cloud's keys where its particles come from a disc (docs/model.md §2).
 
 use glam::DVec3;
-use serde_json::json;
 
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
+use super::scene_air::{Base, read_base};
 use super::toml_section::{Bounds, Section};
-use super::toml_tree::Value;
 use crate::error::Result;
+use crate::model::air::Air;
 use crate::model::disc::{Condensation, Dilution, Disc, GREATEST_SPREAD, LEAST_FADE};
 
 /// Without growth: the particles grow themselves.
@@ -48,7 +48,7 @@ const SPREAD: Bounds = Bounds::Within(0.0, GREATEST_SPREAD);
 const SHARE: Bounds = Bounds::Within(0.0, 1.0);
 const FADE: Bounds = Bounds::Within(LEAST_FADE, 1.0);
 
-pub fn read_disc(s: &mut Section) -> Result<Disc> {
+pub fn read_disc(s: &mut Section, air: &Air) -> Result<Disc> {
     Ok(Disc {
         n_particles: s.u32("particles", 1000, 0, u32::MAX)?,
         radius: s.f64("radius", 1.0, AMOUNT)?,
@@ -67,26 +67,16 @@ pub fn read_disc(s: &mut Section) -> Result<Disc> {
         dilution: s.choice("dilution", "mass", &Dilution::NAMES, &[])?,
         fade_in: s.f64("fade_in", 0.2, FADE)?,
         fade_out: s.f64("fade_out", 0.4, FADE)?,
-        condensation: read_condensation(s)?,
+        condensation: read_condensation(s, air)?,
     })
 }
 
-fn read_condensation(s: &mut Section) -> Result<Option<Condensation>> {
+fn read_condensation(s: &mut Section, air: &Air) -> Result<Option<Condensation>> {
     let over = s.f64("base_over", 0.5, DIVISOR)?;
-    let lift = s.f64("base_lift", 0.0, AMOUNT)?;
-    let base = match s.value("base").map(|node| &node.value) {
-        None => None,
-        Some(Value::String(text)) if text == "none" => None,
-        Some(Value::String(_)) => {
-            let found = s.value("base").map_or(String::new(), |node| node.value.describe());
-            return Err(s.fault("base", format!("expected {COORDINATE} or \"none\", found {found}")));
-        }
-        Some(_) => Some(s.f64("base", 0.0, COORDINATE)?),
-    };
-    if base.is_none() {
-        s.record("base", json!("none"));
-    }
+    let base = read_base(s)?;
+    // Of clouds whose base is the air's the lift is, too.
+    let lift = s.f64("base_lift", if base == Base::Condensation { air.lift() } else { 0.0 }, AMOUNT)?;
     // Of the scene; the law counts from the disc.
     let y = s.vec3("position", DVec3::ZERO, COORDINATE)?.y;
-    Ok(base.map(|base| Condensation { base: base - y, over, lift }))
+    Ok(base.height(air).map(|base| Condensation { base: base - y, over, lift }))
 }

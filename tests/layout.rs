@@ -12,6 +12,7 @@ use nimbus::gpu::reflect::{BindingKind, Member, Reflection, Struct, reflect};
 use nimbus::gpu::shader::Optimize;
 use nimbus::gpu::{Buffer, Compiler, Place};
 use nimbus::layout::cull::KeptRecord;
+use nimbus::layout::disc::DiscRecord;
 use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
@@ -21,7 +22,7 @@ use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecor
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{
-    self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, morton, place, second, sort,
+    self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place, second, sort,
     sprites,
 };
 use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
@@ -29,9 +30,10 @@ use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
 
-const RECORDS: [Record; 24] = [
+const RECORDS: [Record; 25] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
+    ("Disc", DiscRecord::FIELDS, size_of::<DiscRecord>()),
     ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
     ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
     ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
@@ -58,7 +60,7 @@ const RECORDS: [Record; 24] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 43] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 44] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -109,6 +111,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 43] = [
     ("impostors.frag", impostors::Push::FIELDS, &[T]),
     ("impostors.vert", impostors::Push::FIELDS, &[]),
     ("impostors_part.comp", impostors::PartPush::FIELDS, &[B(8), B(4), B(8), B(8)]),
+    ("live.comp", live::Push::FIELDS, &[R("Disc"), R("Particle")]),
     ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
     ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
     ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),

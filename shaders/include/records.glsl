@@ -2,6 +2,7 @@
 
 struct Particle { vec3 position; float sigma; vec3 color; float kappa; float aspect; float unused; vec2 unused_too; };
 struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uint seed; uint i_box; uint i_first; uint n_particles; uint form; uint unused; };
+struct Disc { vec3 center; float radius; vec3 drift; float outflow; float sigma; float sigma_spread; float rise; float warmth_spread; float core; float life_spread; float cooling; float growth; float kappa; float inv_fade_in; float inv_fade_out; float base; float inv_over; float lift; uint dilution; uint seed; uint i_first; uint n_particles; uint generation; uint phase; };
 struct Placed { vec3 position; float sigma; };
 struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 center; uint i_mode; uint n_modes; float scale; uvec2 unused; };
 struct Drawn { uint shift; uint end; float kappa_scale; float last_weight; };

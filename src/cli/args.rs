@@ -275,6 +275,9 @@ pub struct InspectArgs {
     #[arg(long, value_enum, value_name = "WHAT", num_args = 0..=1, default_missing_value = "table")]
     #[arg(conflicts_with_all = ["reference", "frame"])]
     pub basis: Option<BasisArg>,
+    /// The scene's air: humidity, dew point, and where its clouds have their bases; needs no device
+    #[arg(long, conflicts_with_all = ["boxes", "particles", "facets", "plan", "basis", "reference"])]
+    pub air: bool,
     /// The f64 reference's values in place of the device's
     #[arg(long, conflicts_with = "plan")]
     pub reference: bool,

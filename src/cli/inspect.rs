@@ -5,7 +5,7 @@ use super::{check_time, device_choice, load, output, say_notes, say_sizes};
 use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::study::stage::Stage;
-use crate::study::{basis, inspect};
+use crate::study::{air, basis, inspect};
 
 /// Frames that `--plan` shows: the first does everything, the second shows what a step of time changes, the third that
 /// it goes on so.
@@ -17,6 +17,9 @@ pub fn run(args: &InspectArgs) -> Result<()> {
     let scene = load(&args.scene, &args.options)?.at_frame(i_frame);
     if let Some(what) = args.basis {
         return print_basis(&basis::report(&scene), what, args);
+    }
+    if args.air {
+        return output::rows(&[air::row(&scene)], args.json);
     }
     check_time(&scene, scene.time.at(args.frame.unwrap_or(0)))?;
     let spinner = output::spinner("inspecting", args.options.quiet);

@@ -8,6 +8,7 @@ use tracing::info_span;
 
 use super::drawn::drawn;
 use super::exchange::is_glossy;
+use super::lives::{disc_records, discs, lived};
 use super::packet::{Extent, Packet};
 use super::tensor::{Shape, basis_of, is_edited, kind_of};
 use crate::error::{Error, Place, Result};
@@ -119,14 +120,18 @@ impl Game {
         // What a shell has must not depend on where the camera looks.
         let culls = self.culls && self.scene.draw.impostors == Impostors::Off;
         let (drawn, n_drawn) = info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, culls));
-        let placed = self
-            .rest
+        let lived = self.lived(time_s);
+        let placed = lived
             .as_ref()
+            .or(self.rest.as_ref())
             .map(|rest| info_span!("place particles").in_scope(|| self.place(rest, &grown, &origins, time_s)));
         // The device moves nothing that is placed already.
-        let modes = match placed {
-            Some(_) => vec![],
-            None => self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect(),
+        let (modes, discs) = match placed {
+            Some(_) => (vec![], vec![]),
+            None => (
+                self.modes.iter().flatten().map(|m| ModeRecord::new(m, time_s)).collect(),
+                disc_records(&self.scene, &self.groups, time_s),
+            ),
         };
         Ok(Packet {
             i_frame,
@@ -137,6 +142,8 @@ impl Game {
             drawn,
             n_drawn,
             modes,
+            discs,
+            lived,
             placed,
             table: self.table_at(time_s),
             coefficients: self.coefficients(time_s),
@@ -150,6 +157,12 @@ impl Game {
             extents: self.extents(&grown, &origins),
             game_ms: super::ms(begin, Instant::now()),
         })
+    }
+
+    /// Every particle relative to its group, where this thread moves them and some are of discs.
+    fn lived(&self, time_s: f64) -> Option<Vec<ParticleRecord>> {
+        let rest = self.rest.as_ref().filter(|_| discs(&self.scene).next().is_some())?;
+        Some(info_span!("live").in_scope(|| lived(&self.scene, &self.groups, rest, time_s)))
     }
 
     /// Of the sort's keys.

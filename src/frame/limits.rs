@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
 use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, TargetFormat, storage_bytes};
 use crate::gpu::reflect::BindingKind;
+use crate::layout::disc::DiscRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::TexturedRecord;
@@ -25,6 +26,7 @@ use super::buffers::has_second;
 use super::culling::culls;
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
+use super::lives::{discs, lives_on_host};
 use super::plan::Tensors;
 use super::shells::shell_size;
 use super::tensor::Shape;
@@ -91,6 +93,12 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the scene's particles", n, size(size_of::<ParticleRecord>())),
         ("the particles' places", n, size(size_of::<PlacedRecord>())),
         ("the particles' places, as uploaded", IN_FLIGHT as u64 * n, size(size_of::<PlacedRecord>())),
+        (
+            "the particles, as uploaded",
+            if lives_on_host(scene) { IN_FLIGHT as u64 * n } else { 0 },
+            size(size_of::<ParticleRecord>()),
+        ),
+        ("the discs", discs(scene).count() as u64, size(size_of::<DiscRecord>())),
         ("the particles' groups", n, 4),
         ("the particles' generation status", n, 4),
         ("the facets", scene.n_facets(), size(size_of::<FacetRecord>())),
@@ -189,7 +197,7 @@ pub fn tensors(shape: &Shape, limits: &Limits, free: u64) -> Tensors {
 /// room for a cube.
 pub fn n_cells_max(scene: &Scene) -> u64 {
     let side = u64::from(scene.lighting.grid.min(MAX_CELLS));
-    let stands_still = scene.clouds.iter().all(|c| c.wind == DVec3::ZERO && c.growth.is_none());
+    let stands_still = scene.clouds.iter().all(|c| c.drift() == DVec3::ZERO && c.growth.is_none());
     match scene.bounds(&scene.groups(), scene.time.start_s, DEPOSIT_CUT_SIGMA) {
         Some((low, high)) if stands_still => {
             let half = 0.5 * (high - low);

@@ -13,6 +13,7 @@ pub mod game;
 pub mod grouping;
 mod impostors;
 pub mod limits;
+pub mod lives;
 pub mod packet;
 pub mod parallel;
 pub mod plan;

@@ -5,9 +5,10 @@ use std::time::Instant;
 
 use glam::DVec3;
 
+use crate::layout::disc::DiscRecord;
 use crate::layout::facet::{RegionBoundsRecord, RegionRecord};
 use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
-use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, PlacedRecord};
+use crate::layout::particle::{DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 
 #[derive(Debug, Clone)]
 pub struct Packet {
@@ -25,6 +26,10 @@ pub struct Packet {
     pub n_drawn: u32,
     /// Gusts of all clouds, one after the other; none where the game thread moves the particles.
     pub modes: Vec<ModeRecord>,
+    /// Discs at this time; none where the game thread moves the particles.
+    pub discs: Vec<DiscRecord>,
+    /// Every particle relative to its group, where the game thread moves the particles and some are of discs.
+    pub lived: Option<Vec<ParticleRecord>>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
     /// Where each region's Morton cells lie.

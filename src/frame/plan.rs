@@ -16,6 +16,7 @@ use crate::model::scene::{DrawPath, Scene};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pass {
     Generate,
+    Live,
     Place,
     Grid,
     Morton,
@@ -35,8 +36,9 @@ pub enum Pass {
 }
 
 impl Pass {
-    pub const ALL: [Pass; 17] = [
+    pub const ALL: [Pass; 18] = [
         Pass::Generate,
+        Pass::Live,
         Pass::Place,
         Pass::Grid,
         Pass::Morton,
@@ -59,6 +61,7 @@ impl Pass {
     pub fn name(self) -> &'static str {
         let names = [
             "generate",
+            "live",
             "place",
             "grid",
             "morton",
@@ -169,6 +172,8 @@ impl Plan {
 pub struct Traits {
     /// Some particles come from boxes.
     pub has_boxes: bool,
+    /// Some come from discs.
+    pub has_discs: bool,
     pub n_particles: u32,
     pub n_facets: u32,
     /// `lighting.mode` is not "none".
@@ -220,8 +225,9 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let is_made = last.is_some() && (traits.skip || traits.keeps_made);
     let last = last.filter(|_| traits.skip);
     let same = |f: &dyn Fn(&Packet, &Packet) -> bool| last.is_some_and(|l| f(l, next));
-    let still =
-        same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
+    let same_life = same(&|a, b| a.discs == b.discs && a.lived == b.lived);
+    let still = same_life
+        && same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
     let same_grid = still && same(&|a, b| a.grid == b.grid);
     let same_places = still && same(&|a, b| a.bounds == b.bounds);
     let same_geometry =
@@ -260,6 +266,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     };
     let mut decisions = [
         if traits.has_boxes { unless(is_made, "the boxes are the same") } else { skip("no boxes to fill") },
+        if traits.has_discs { unless(same_life, "no time has passed") } else { skip("no discs") },
         unless(still, "nothing moved"),
         lighting(same_grid, "nothing moved"),
         if traits.grouped { unless(same_places, "nothing moved") } else { skip("a facet a particle") },
@@ -297,7 +304,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
     ];
     if traits.n_particles == 0 {
-        let of_particles = [Pass::Generate, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort];
+        let of_particles = [Pass::Generate, Pass::Live, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort];
         for pass in of_particles.into_iter().chain([Pass::Texture, Pass::Impostors]) {
             decisions[pass as usize] = skip("no particles");
         }

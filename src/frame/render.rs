@@ -11,6 +11,7 @@ use super::drawing::Drawing;
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::feed::IN_FLIGHT;
 use super::grouping::{Grouping, is_grouped};
+use super::lives::{Lives, discs};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, pass, plan};
 use super::relay::Relay;
@@ -39,6 +40,8 @@ pub struct Renderer {
     pub(super) host: Commands,
     pub(super) in_flight: VecDeque<InFlight>,
     pub(super) generate: Generate,
+    /// None where there are no discs.
+    lives: Option<Lives>,
     place: PlacePass,
     grid: Grid,
     facets: Facets,
@@ -122,6 +125,7 @@ impl Renderer {
             host,
             in_flight: VecDeque::with_capacity(IN_FLIGHT),
             generate: Generate::new(device, compiler)?,
+            lives: Lives::of_scene(device, compiler, scene)?,
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler, scene.has_ellipsoids())?,
@@ -140,6 +144,7 @@ impl Renderer {
             settings,
             traits: Traits {
                 has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
+                has_discs: discs(scene).next().is_some(),
                 n_particles,
                 n_facets: scene.n_facets() as u32,
                 lit,
@@ -249,6 +254,9 @@ impl Renderer {
 
     fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
         self.buffers.write(slot, packet)?;
+        if let Some(lives) = &mut self.lives {
+            lives.write(slot, packet)?;
+        }
         if let Some(grouping) = &mut self.grouping {
             grouping.write(slot, packet)?;
         }
@@ -265,6 +273,7 @@ impl Renderer {
     fn record(&mut self, slot: usize, packet: &Packet, plan: &Plan) -> Result<()> {
         let Renderer {
             generate,
+            lives,
             place,
             grid,
             facets,
@@ -286,11 +295,13 @@ impl Renderer {
         frames[slot].record(Barriers::Placed, |rec| {
             b.record_feeds(rec, slot);
             grouping.iter().for_each(|g| g.record_feeds(rec, slot));
+            lives.iter().for_each(|l| l.record_feeds(rec, slot));
             second.iter().for_each(|s| s.record_feeds(rec, slot));
             tensor.iter().for_each(|t| t.record_feeds(rec, slot));
             pass(rec, plan, Pass::Generate, |rec| {
                 generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS)
             })?;
+            pass(rec, plan, Pass::Live, |rec| lives.iter().try_for_each(|l| l.record(rec, slot, &b.particles)))?;
             pass(rec, plan, Pass::Place, |rec| match &b.placed {
                 Placed::ByHost(feed) => {
                     feed.record(rec, slot);

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use super::toml_section::Bounds;
 use crate::model::cloud::{Cloud, CloudSource, Group, SIGMA_PER_RADIUS, mass};
+use crate::model::disc::Disc;
 
 /// Coordinates, lengths, times, κ, optical depths, irradiance, colours.
 pub const GREATEST: f64 = 1e15;
@@ -86,6 +87,7 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
                 .or_else(|| too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &|g| g.mass_max))
                 .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_widest()))
         }
+        CloudSource::Disc(disc) => groups.first().and_then(|group| disc_beyond(disc, group)),
         CloudSource::Particles(list) => {
             let (i, heaviest) = list
                 .iter()
@@ -127,10 +129,26 @@ pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
 /// Of the blobs, or the boxes' greatest blobs, that have a size; infinite where none has.
 fn least_sigma(cloud: &Cloud) -> f64 {
     let sigmas: Vec<f64> = match &cloud.source {
-        CloudSource::Boxes { .. } => cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect(),
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) => cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect(),
         CloudSource::Particles(list) => list.iter().map(|p| p.sigma * p.aspect.min(1.0)).collect(),
     };
     sigmas.into_iter().filter(|sigma| *sigma > 0.0).fold(f64::INFINITY, f64::min)
+}
+
+/// What of a disc's particles, anywhere in their lives, the device could not carry.
+fn disc_beyond(disc: &Disc, group: &Group) -> Option<String> {
+    let lift = disc.condensation.map_or(0.0, |c| c.lift * disc.warmth);
+    let wrong = |what: &str, most: f64, found: f64| {
+        let expected = shortest(most);
+        (found > most).then(|| format!("its particles' {what}: expected at most {expected}, found {}", rounded(found)))
+    };
+    wrong("places", GREATEST, (group.center.abs() + group.half_extent).max_element())
+        .or_else(|| wrong("σ", GREATEST, group.sigma_max))
+        .or_else(|| wrong("κ = optical_depth / (√(2π) σ)", GREATEST, group.kappa_max))
+        .or_else(|| wrong("κ (2π)^{3/2} σ³", GREATEST_PRODUCT, group.mass_max))
+        .or_else(|| wrong("κ σ", GREATEST_PRODUCT, group.kappa_max * group.sigma_max))
+        .or_else(|| wrong("buoyancy · warmth · cooling time", GREATEST_PRODUCT, disc.rise()))
+        .or_else(|| wrong("warmth · base_lift", GREATEST_PRODUCT, lift))
 }
 
 fn too_great(groups: &[Group], what: &str, greatest: f64, of: &dyn Fn(&Group) -> f64) -> Option<String> {

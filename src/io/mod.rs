@@ -8,7 +8,7 @@
 //! A scene is read in three steps, each with one subject: [`toml_tree`] turns text into a tree in which every
 //! key and value knows its origin, [`toml_override`] lays `--set` over it, and [`toml_section`] takes values
 //! out of it, checks them and writes down what they came to (the *resolved scene* that results carry).
-//! `scene_sections`, `scene_lights` and `scene_clouds` say what a scene's keys mean, `scene_phases` which of them parts of
+//! `scene_sections`, `scene_air`, `scene_lights`, `scene_clouds` and `scene_disc` say what a scene's keys mean, `scene_phases` which of them parts of
 //! a run set anew, and [`magnitude`] how great and
 //! how small their numbers may be.
 
@@ -18,7 +18,9 @@ pub mod folder;
 pub mod image;
 pub mod magnitude;
 pub mod particle_file;
+mod scene_air;
 mod scene_clouds;
+mod scene_disc;
 pub mod scene_file;
 mod scene_lights;
 mod scene_phases;

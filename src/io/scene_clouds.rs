@@ -6,12 +6,15 @@ use glam::DVec3;
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use super::magnitude::{AMOUNT, COORDINATE, DIVISOR};
+use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, is_carried_place, shortest};
+use super::scene_air::{put_on_base, read_base};
+use super::scene_disc::{self, read_disc};
 use super::scene_lights::material_named;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
+use crate::model::air::Air;
 use crate::model::boxes::{CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
@@ -31,6 +34,7 @@ pub fn on_disk(path: &Path, first: &str) -> Result<String> {
 pub struct CloudReader<'a> {
     folder: &'a Path,
     materials: &'a [Material],
+    air: &'a Air,
     seed: Option<u32>,
     files: &'a Files<'a>,
     /// Of every file read, in order.
@@ -40,7 +44,7 @@ pub struct CloudReader<'a> {
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "texture_strength", "position", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
+        &[$($own,)* "material", "texture", "texture_strength", "position", "base", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
     };
 }
 
@@ -51,17 +55,18 @@ const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_dept
 enum SourceKind {
     Boxes,
     Particles,
+    Disc,
 }
 
 impl<'a> CloudReader<'a> {
     /// Files are looked for in `folder`; `seed` N gives cloud i the seed N + i.
     pub fn new(
         folder: &'a Path,
-        materials: &'a [Material],
+        (materials, air): (&'a [Material], &'a Air),
         seed: Option<u32>,
         files: &'a Files<'a>,
     ) -> CloudReader<'a> {
-        CloudReader { folder, materials, seed, files, digests: Vec::new() }
+        CloudReader { folder, materials, air, seed, files, digests: Vec::new() }
     }
 
     /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
@@ -87,9 +92,9 @@ impl<'a> CloudReader<'a> {
 }
 
 pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> Result<Cloud> {
-    let from = [("boxes", SourceKind::Boxes), ("particles", SourceKind::Particles)];
+    let from = [("boxes", SourceKind::Boxes), ("particles", SourceKind::Particles), ("disc", SourceKind::Disc)];
     let mut lines = Vec::new();
-    let source = match s.required_choice("from", &from, &["disc", "weather"])? {
+    let source = match s.required_choice("from", &from, &["weather"])? {
         SourceKind::Boxes => read_boxes(s, reader)?,
         SourceKind::Particles => {
             s.expect_keys(LIST_KEYS, &[])?;
@@ -98,19 +103,33 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             lines = of_particles;
             CloudSource::Particles(particles)
         }
+        SourceKind::Disc => {
+            s.expect_keys(scene_disc::KEYS, &[])?;
+            CloudSource::Disc(read_disc(s, reader.air)?)
+        }
     };
-    let cloud = Cloud {
+    let is_disc = matches!(source, CloudSource::Disc(_));
+    // Of a disc it is where its particles condense.
+    let base = if is_disc { None } else { read_base(s)?.height(reader.air) };
+    let mut cloud = Cloud {
         source,
         position: s.vec3("position", DVec3::ZERO, COORDINATE)?,
         wind: s.vec3("wind", DVec3::ZERO, COORDINATE)?,
         gust: read_gust(s)?,
-        growth: read_growth(s)?,
+        growth: if is_disc { Growth::NONE } else { read_growth(s)? },
         texture: read_texture(s)?,
         i_material: material_named(s, reader.materials)?,
         seed: reader.read_seed(s, i_cloud)?,
     };
+    if let Some(base) = base {
+        put_on_base(&mut cloud, base);
+        if !is_carried_place(cloud.position) {
+            let what = format!("puts the cloud's origin too far: expected at most {}", shortest(GREATEST));
+            return Err(s.fault("base", what));
+        }
+    }
     if let Some(what) = magnitude::beyond(&cloud, &lines) {
-        return Err(s.fault("file", what));
+        return Err(s.fault(if is_disc { "from" } else { "file" }, what));
     }
     match magnitude::grown_beyond(&cloud) {
         Some(what) => Err(s.fault("grow_to", what)),
@@ -168,7 +187,7 @@ pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
 fn boxes_of(cloud: &mut Cloud) -> &mut [CloudBox] {
     match &mut cloud.source {
         CloudSource::Boxes { boxes, .. } => boxes,
-        CloudSource::Particles(_) => &mut [],
+        CloudSource::Particles(_) | CloudSource::Disc(_) => &mut [],
     }
 }
 

@@ -15,7 +15,7 @@ pub use super::scene_sections::MAX_SIDE;
 use super::suggest::shown;
 use super::toml_section::Section;
 use super::toml_tree::Document;
-use super::{scene_lights, scene_phases, scene_sections, scene_surfaces};
+use super::{scene_air, scene_lights, scene_phases, scene_sections, scene_surfaces};
 use crate::error::{Error, Place, Result};
 use crate::model::scene::Scene;
 
@@ -62,7 +62,8 @@ impl LoadedScene {
 }
 
 const ROOT_KEYS: &[&str] = &[
-    "title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "cloud", "phase",
+    "title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "air", "cloud",
+    "phase",
 ];
 
 /// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
@@ -161,7 +162,8 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &Fi
     let lighting = scene_sections::read_lighting(&mut root, &exponents)?;
     let surfaces = scene_surfaces::read_surfaces(&mut root, &materials)?;
 
-    let mut reader = CloudReader::new(path.parent().unwrap_or(Path::new("")), &materials, seed, files);
+    let air = scene_air::read_air(&mut root)?;
+    let mut reader = CloudReader::new(path.parent().unwrap_or(Path::new("")), (&materials, &air), seed, files);
     let mut clouds = Vec::new();
     let mut resolved_clouds = Vec::new();
     for (i, mut section) in root.sections("cloud")?.into_iter().enumerate() {
@@ -187,7 +189,7 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &Fi
     let digests = reader.digests;
     root.record("cloud", json!(resolved_clouds));
 
-    let scene = Scene { title, film, camera, time, lighting, draw, threads, lights, materials, surfaces, clouds };
+    let scene = Scene { title, film, camera, time, lighting, draw, threads, lights, materials, surfaces, clouds, air };
     // Particles are numbered in u32, on the device as in the model.
     if u32::try_from(scene.n_particles() + scene.n_surface_facets()).is_err() {
         return Err(Error::scene(

@@ -2,6 +2,7 @@
 //! compares names, offsets and sizes.
 
 pub mod cull;
+pub mod disc;
 pub mod facet;
 pub mod frame;
 pub mod particle;

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
+use super::disc::Disc;
 use super::growth::Growth;
 use super::gust::Gust;
 use super::texture::Texture;
@@ -21,7 +22,8 @@ pub struct Cloud {
     pub source: CloudSource,
     /// Of the cloud's own origin at time 0, in the scene.
     pub position: DVec3,
-    /// Scene units per second; the cloud's origin at time t is position + wind·t.
+    /// Scene units per second; the cloud's origin at time t is position + wind·t. A disc stands still, and the wind carries its
+    /// particles from where they were born.
     pub wind: DVec3,
     pub gust: Gust,
     pub growth: Growth,
@@ -38,6 +40,8 @@ pub enum CloudSource {
     Boxes { boxes: Vec<CloudBox>, form: Form, optical_depth: f64, radius_scale: f64 },
     /// A list of blobs as given.
     Particles(Vec<Particle>),
+    /// Particles that are born on a disc, live and are born anew.
+    Disc(Disc),
 }
 
 /// One Gaussian blob of extinction, relative to its cloud's position.
@@ -84,7 +88,12 @@ pub struct Group {
 impl Cloud {
     /// The cloud's origin at `time_s`.
     pub fn origin_at(&self, time_s: f64) -> DVec3 {
-        self.position + self.wind * time_s
+        self.position + self.drift() * time_s
+    }
+
+    /// Speed of the cloud's origin.
+    pub fn drift(&self) -> DVec3 {
+        if matches!(self.source, CloudSource::Disc(_)) { DVec3::ZERO } else { self.wind }
     }
 
     /// The cloud's own centre, relative to its origin: the mean of its groups' centres by particle count.
@@ -97,6 +106,7 @@ impl Cloud {
             }
             CloudSource::Particles(list) if list.is_empty() => DVec3::ZERO,
             CloudSource::Particles(list) => list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64,
+            CloudSource::Disc(disc) => disc.center(self.wind),
         }
     }
 
@@ -104,13 +114,14 @@ impl Cloud {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => boxes.iter().map(|b| u64::from(b.n_particles)).sum(),
             CloudSource::Particles(list) => list.len() as u64,
+            CloudSource::Disc(disc) => u64::from(disc.n_particles),
         }
     }
 
     pub fn n_groups(&self) -> u64 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => boxes.len() as u64,
-            CloudSource::Particles(_) => 1,
+            CloudSource::Particles(_) | CloudSource::Disc(_) => 1,
         }
     }
 
@@ -146,6 +157,9 @@ impl Cloud {
                 .collect(),
             CloudSource::Particles(list) => {
                 vec![Group { cloud_center, gust_reach, ..list_group(list, i_cloud, i_first) }]
+            }
+            CloudSource::Disc(disc) => {
+                vec![Group { cloud_center, gust_reach, ..disc_group(disc, self.wind, i_cloud, i_first) }]
             }
         }
     }
@@ -237,6 +251,26 @@ fn aspects(list: &[Particle]) -> [f64; 3] {
     let [least, greatest] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
     // Of equal ones exactly that, whatever their sum rounds to.
     [least, (all().sum::<f64>() / list.len() as f64).clamp(least, greatest), greatest]
+}
+
+/// Bounds over the whole life, so that they stand still.
+fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
+    let (low, high) = disc.bounds(wind);
+    Group {
+        i_cloud,
+        i_first,
+        n_particles: disc.n_particles,
+        center: 0.5 * (low + high),
+        cloud_center: DVec3::ZERO,
+        scale: 1.0,
+        half_extent: 0.5 * (high - low),
+        sigma_max: disc.sigma_max(),
+        sigma_mean: disc.sigma_mean(),
+        aspects: [1.0; 3],
+        kappa_max: disc.kappa(),
+        mass_max: disc.mass_max(),
+        gust_reach: 0.0,
+    }
 }
 
 #[cfg(test)]

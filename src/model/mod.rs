@@ -1,11 +1,13 @@
 //! What is drawn and lit, as plain f64 data and pure functions: no files, no GPU.
 //! Lengths are scene units, angles radians, times seconds, radiance and irradiance linear RGB.
 
+pub mod air;
 pub mod basis;
 pub mod boxes;
 pub mod camera;
 pub mod cloud;
 pub mod count;
+pub mod disc;
 pub mod film;
 pub mod grid;
 pub mod growth;

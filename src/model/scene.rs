@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use glam::{DVec2, DVec3};
 
+use super::air::Air;
 use super::basis::Sampling;
 use super::camera::Camera;
 use super::cloud::{Cloud, CloudSource, Group, runs};
@@ -30,6 +31,7 @@ pub struct Scene {
     pub materials: Vec<Material>,
     pub surfaces: Vec<Surface>,
     pub clouds: Vec<Cloud>,
+    pub air: Air,
 }
 
 /// Fixed steps: frame n is at start_s + n·step_s on every machine.

@@ -9,6 +9,7 @@ pub mod first;
 pub mod generate;
 pub mod grid;
 pub mod impostors;
+pub mod live;
 pub mod morton;
 pub mod place;
 pub mod second;
@@ -75,6 +76,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/upsample.glsl",
     "include/veil.glsl",
     "include/walk.glsl",
+    "live.comp",
     "morton_key.comp",
     "morton_order.comp",
     "place.comp",

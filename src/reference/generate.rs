@@ -159,7 +159,7 @@ pub fn generate_box(
     (0..b.n_particles).map(|i| generate_particle(b, i_box, seed, form, optical_depth, radius_scale, i)).collect()
 }
 
-/// All particles of a cloud in the order of its groups.
+/// All particles of a cloud in the order of its groups; of a disc those of time 0.
 pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
     match &cloud.source {
         CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
@@ -171,6 +171,7 @@ pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
             let groups = cloud.groups(0, 0);
             list.iter().map(|p| given(p, groups.first())).collect()
         }
+        CloudSource::Disc(_) => super::live::cloud(cloud, 0.0),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Measures a scene: runs it, compares it with the references, and writes down what came out.
 
 pub mod against;
+pub mod air;
 pub mod basis;
 pub mod bench;
 pub mod beside;

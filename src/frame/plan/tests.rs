@@ -6,6 +6,7 @@ use std::time::Instant;
 
 const TRAITS: Traits = Traits {
     has_boxes: true,
+    has_discs: false,
     n_particles: 7,
     n_facets: 7,
     lit: true,
@@ -24,8 +25,16 @@ const TRAITS: Traits = Traits {
 };
 const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
 /// With every pass.
-const ALL_TRAITS: Traits =
-    Traits { grouped: true, textured: true, n_surfaces: 1, impostors: true, culls: true, shrunk: true, ..KEPT };
+const ALL_TRAITS: Traits = Traits {
+    has_discs: true,
+    grouped: true,
+    textured: true,
+    n_surfaces: 1,
+    impostors: true,
+    culls: true,
+    shrunk: true,
+    ..KEPT
+};
 
 fn packet() -> Packet {
     Packet {
@@ -38,6 +47,8 @@ fn packet() -> Packet {
         drawn: vec![DrawnRecord::default()],
         n_drawn: 0,
         modes: vec![],
+        discs: vec![],
+        lived: None,
         placed: None,
         bounds: vec![Default::default()],
         regions: vec![RegionRecord::default()],

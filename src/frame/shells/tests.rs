@@ -32,6 +32,8 @@ fn packet(x: f64, z: f64) -> Packet {
         drawn: vec![],
         n_drawn: 8000,
         modes: vec![],
+        discs: vec![],
+        lived: None,
         placed: None,
         bounds: vec![],
         regions: vec![],

@@ -1,0 +1,105 @@
+//! The particles of discs, new in every frame: by the pass `live`, or by the game thread where it moves the particles.
+
+use super::feed::{Feed, IN_FLIGHT};
+use super::packet::Packet;
+use crate::error::Result;
+use crate::gpu::{Buffer, Compiler, Device, Place, Recorder};
+use crate::layout::disc::DiscRecord;
+use crate::layout::particle::ParticleRecord;
+use crate::model::cloud::{Cloud, CloudSource, Group};
+use crate::model::disc::Disc;
+use crate::model::scene::{Scene, Simulate};
+use crate::passes::live::Live;
+
+/// The scene's discs, in order, with their clouds' numbers.
+pub fn discs(scene: &Scene) -> impl Iterator<Item = (usize, &Cloud, &Disc)> {
+    scene.clouds.iter().enumerate().filter_map(|(i, cloud)| match &cloud.source {
+        CloudSource::Disc(disc) => Some((i, cloud, disc)),
+        _ => None,
+    })
+}
+
+/// Whether the game thread computes the particles of discs.
+pub fn lives_on_host(scene: &Scene) -> bool {
+    scene.threads.simulate == Simulate::Cpu && discs(scene).next().is_some()
+}
+
+/// A record a disc, at `time_s`.
+pub fn disc_records(scene: &Scene, groups: &[Group], time_s: f64) -> Vec<DiscRecord> {
+    let of = |(i, cloud, disc): (usize, &Cloud, &Disc)| {
+        let group = groups.iter().find(|g| g.i_cloud == i)?;
+        Some(DiscRecord::new(disc, group, cloud.seed, cloud.wind, disc.turn_at(time_s)))
+    };
+    discs(scene).filter_map(of).collect()
+}
+
+/// All particles relative to their groups at `time_s`: those of discs computed, the others as they are in `rest`.
+pub fn lived(scene: &Scene, groups: &[Group], rest: &[ParticleRecord], time_s: f64) -> Vec<ParticleRecord> {
+    let mut lived = rest.to_vec();
+    for (i, cloud, disc) in discs(scene) {
+        let turn = disc.turn_at(time_s);
+        for group in groups.iter().filter(|g| g.i_cloud == i) {
+            let first = group.i_first as usize;
+            for (slot, record) in (0..).zip(&mut lived[first..first + group.n_particles as usize]) {
+                *record = ParticleRecord::new(&disc.particle(cloud.seed, cloud.wind, slot, turn), group);
+            }
+        }
+    }
+    lived
+}
+
+pub(super) enum Lives {
+    ByDevice {
+        live: Live,
+        discs: Box<Feed>,
+        /// Particles of each.
+        counts: Vec<u32>,
+    },
+    /// Staging buffers of all particles.
+    ByHost([Buffer; IN_FLIGHT]),
+}
+
+impl Lives {
+    /// None where the scene has no discs.
+    pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene) -> Result<Option<Lives>> {
+        let counts: Vec<u32> = discs(scene).map(|(_, _, disc)| disc.n_particles).collect();
+        if counts.is_empty() {
+            return Ok(None);
+        }
+        if lives_on_host(scene) {
+            let n = scene.n_particles();
+            let staging = |name| Buffer::new::<ParticleRecord>(device, name, n, Place::Upload);
+            return Ok(Some(Lives::ByHost([staging("live.upload0")?, staging("live.upload1")?])));
+        }
+        let discs = Box::new(Feed::new::<DiscRecord>(device, "live.discs", counts.len() as u64)?);
+        Ok(Some(Lives::ByDevice { live: Live::new(device, compiler)?, discs, counts }))
+    }
+
+    pub fn write(&mut self, slot: usize, packet: &Packet) -> Result<()> {
+        match (self, &packet.lived) {
+            (Lives::ByDevice { discs, .. }, _) => discs.write(slot, &packet.discs),
+            (Lives::ByHost(staging), Some(lived)) => staging[slot].write(lived),
+            (Lives::ByHost(_), None) => Ok(()),
+        }
+    }
+
+    /// Copies what every frame brings along to where shaders read it.
+    pub fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
+        if let Lives::ByDevice { discs, .. } = self {
+            discs.record(rec, slot);
+        }
+    }
+
+    pub fn record(&self, rec: &mut Recorder<'_>, slot: usize, particles: &Buffer) -> Result<()> {
+        match self {
+            Lives::ByDevice { live, discs, counts } => {
+                let mut each = (0..).zip(counts).filter(|(_, n)| **n > 0);
+                each.try_for_each(|(i, n)| live.record(rec, [&discs.buffer, particles], i, *n))
+            }
+            Lives::ByHost(staging) => {
+                rec.copy(&staging[slot], particles);
+                Ok(())
+            }
+        }
+    }
+}

@@ -1,0 +1,112 @@
+//! Particles of discs and their life, model.md §2, in f64: written from the page. In: a cloud and a time. Out: its particles
+//! relative to their group's centre.
+
+use glam::DVec3;
+
+use super::generate::{self, Generated};
+use crate::model::cloud::{Cloud, CloudSource, SIGMA_PER_RADIUS};
+use crate::model::disc::{Dilution, Disc};
+use crate::model::philox::{philox4x32_10, uniform};
+
+/// "disc".
+const STREAM: u32 = u32::from_be_bytes(*b"disc");
+
+/// What a time comes to in a slot: which of its particles lives, and the share of the period since its birth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Age {
+    pub generation: u32,
+    pub share: f64,
+}
+
+/// Of slot `i`: t/L in units of 2⁻³², whole periods apart, with the slot's own phase added.
+pub fn age(period_s: f64, time_s: f64, i: u32) -> Age {
+    // With the remainder from the division itself, which is exact, in integers wide enough for both.
+    let rest = time_s.rem_euclid(period_s);
+    let whole = ((time_s - rest) / period_s).round() as i128;
+    let ticks = (whole << 32) + (rest / period_s * 2f64.powi(32)).floor() as i128;
+    // Bits of i behind the point, in reverse.
+    let phase: u64 = (0..32).filter(|b| i >> b & 1 == 1).map(|b| 1 << (31 - b)).sum();
+    let sum = ticks + i128::from(phase);
+    Age { generation: (sum >> 32) as u32, share: (sum & 0xFFFF_FFFF) as f64 / 2f64.powi(32) }
+}
+
+/// A particle of a disc, with what it was born with: for the laws that tests hold it to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alive {
+    pub age: Age,
+    /// u₁ … u₇.
+    pub u: [f64; 7],
+    /// Relative to the disc's centre.
+    pub birth: DVec3,
+    pub position: DVec3,
+    /// At birth, and now.
+    pub sigmas: [f64; 2],
+    /// What is left of its warmth, K.
+    pub warmth: f64,
+    /// Share of its own lifetime that it has lived.
+    pub lived: f64,
+    pub kappa: f64,
+}
+
+/// Slot `i` of a disc whose cloud has `seed` and `wind`.
+pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> Alive {
+    let age = age(disc.period_s, time_s, i);
+    let words = |k| philox4x32_10([seed, STREAM], [i, age.generation, k, STREAM]).map(uniform);
+    let ([u1, u2, u3, u4], [u5, u6, u7, _]) = (words(0), words(1));
+    let turn = std::f64::consts::TAU;
+    let lifetime = disc.period_s * (1.0 - disc.life_spread * u5);
+    let a = (age.share * disc.period_s).min(lifetime);
+    let birth = disc.radius * u1.sqrt() * DVec3::new((turn * u2).cos(), 0.0, (turn * u2).sin());
+    let warmth_born = disc.warmth * (1.0 + disc.warmth_spread * (2.0 * u4 - 1.0)) * (1.0 - disc.core * u1);
+    let speed = disc.outflow * u6.sqrt() * DVec3::new((turn * u7).cos(), 0.0, (turn * u7).sin())
+        + disc.buoyancy * warmth_born * DVec3::Y;
+    let t = disc.cooling_s;
+    let way = -t * (-a / t).exp_m1();
+    let position = birth + wind * a + speed * way;
+    let born = disc.sigma * (1.0 + disc.sigma_spread * (2.0 * u3 - 1.0));
+    let sigma = born + disc.entrainment * SIGMA_PER_RADIUS * speed.y * way;
+    let warmth = warmth_born * (-a / t).exp();
+    let lived = a / lifetime;
+    let kappa_0 = disc.optical_depth / ((2.0 * std::f64::consts::PI).sqrt() * disc.sigma);
+    let diluted = match disc.dilution {
+        Dilution::Mass => (born / sigma).powi(3),
+        Dilution::Depth => born / sigma,
+        Dilution::None => 1.0,
+    };
+    let faded = smoothstep(lived / disc.fade_in) * smoothstep((1.0 - lived) / disc.fade_out);
+    let condensed = match &disc.condensation {
+        Some(c) => smoothstep((position.y - c.base - c.lift * warmth) / c.over),
+        None => 1.0,
+    };
+    let kappa = kappa_0 * diluted * faded * condensed;
+    Alive { age, u: [u1, u2, u3, u4, u5, u6, u7], birth, position, sigmas: [born, sigma], warmth, lived, kappa }
+}
+
+fn smoothstep(v: f64) -> f64 {
+    if v <= 0.0 {
+        0.0
+    } else if v >= 1.0 {
+        1.0
+    } else {
+        3.0 * v.powi(2) - 2.0 * v.powi(3)
+    }
+}
+
+/// All particles of a cloud in the order of its groups, at `time_s`, which is that of discs alone.
+pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
+    let CloudSource::Disc(disc) = &cloud.source else { return generate::cloud(cloud) };
+    let center = cloud.groups(0, 0).first().map_or(DVec3::ZERO, |g| g.center);
+    let of = |i| {
+        let p = alive(disc, cloud.seed, cloud.wind, i, time_s);
+        Generated { aspect: 1.0,
+            position: p.position - center,
+            radius: p.sigmas[1] / SIGMA_PER_RADIUS,
+            sigma: p.sigmas[1],
+            kappa: p.kappa,
+            n_attempts: 0,
+            folded: false,
+            margin: f64::INFINITY,
+        }
+    };
+    (0..disc.n_particles).map(of).collect()
+}

@@ -95,7 +95,10 @@ fn clouds_of_katrina() {
     let greatest = ground.dx_m.iter().copied().fold(0.0, f64::max);
     assert!((least - 9012.833).abs() < 1e-2 && (greatest - 9284.602).abs() < 1e-2, "{least} {greatest}");
     let (north, east) = of_step(0).middle.expect("a place");
-    assert!((north.to_degrees() - 23.79386).abs() < 1e-5 && (east.to_degrees() + 89.49471).abs() < 1e-5, "{north} {east}");
+    assert!(
+        (north.to_degrees() - 23.79386).abs() < 1e-5 && (east.to_degrees() + 89.49471).abs() < 1e-5,
+        "{north} {east}"
+    );
 }
 
 #[test]

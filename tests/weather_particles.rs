@@ -6,6 +6,7 @@ use glam::DVec3;
 use nimbus::io::weather::wrf::{self, Step};
 use nimbus::model::weather::columns::{at_points, of_blobs, of_cells, transmittance_rms};
 use nimbus::model::weather::grid::{Grid, Ground, Shape};
+use nimbus::model::weather::interval::{Interval, Moment};
 use nimbus::model::weather::particles::{Layout, THIN, WeatherBlob};
 
 fn step(name: &str, i_step: usize) -> Step {
@@ -15,6 +16,10 @@ fn step(name: &str, i_step: usize) -> Step {
 
 fn mass(grid: &Grid, extinction: &[f64]) -> f64 {
     of_cells(grid, extinction).iter().enumerate().map(|(i, depth)| depth * grid.ground.area_m2(i)).sum()
+}
+
+fn moment(step: &Step) -> Moment<'_> {
+    Moment { grid: &step.grid, extinction: &step.extinction }
 }
 
 fn blobs_of(step: &Step, n: usize, seed: u32) -> (Layout, Vec<WeatherBlob>) {
@@ -180,4 +185,39 @@ fn a_layout_for_two_steps_serves_all_moments_between() {
     let middle = a.grid.toward(&b.grid, 0.5);
     let i = middle.shape().cell(20, 500);
     assert!((middle.middle_m(i) - 0.5 * (a.grid.middle_m(i) + b.grid.middle_m(i))).abs() < 1e-9);
+}
+
+#[test]
+fn an_interval_goes_from_one_step_to_the_next() {
+    let (a, b) = (step("supercell.nc", 0), step("supercell.nc", 1));
+    let interval = Interval::between(moment(&a), moment(&b), 20_000, 4);
+    let at = |weight: f64| (0..interval.len()).map(|i| interval.blob(i, weight)).collect::<Vec<_>>();
+    let whole = |blobs: &[WeatherBlob]| blobs.iter().map(WeatherBlob::mass).sum::<f64>();
+    let (first, last) = (mass(&a.grid, &a.extinction), mass(&b.grid, &b.extinction));
+    for (weight, expected) in [(0.0, first), (0.25, 0.75 * first + 0.25 * last), (1.0, last)] {
+        assert!((whole(&at(weight)) / expected - 1.0).abs() < 1e-9, "{weight}");
+    }
+    let ends = (at(0.0), at(1.0));
+    for (i, blob) in at(0.5).iter().enumerate() {
+        let middle = 0.5 * (ends.0[i].position + ends.1[i].position);
+        assert!((blob.position - middle).length() < 1e-6 && blob.kappa >= 0.0);
+        // Only heights change, and those by what the air does in two minutes.
+        assert!((ends.0[i].position - ends.1[i].position).length() < 500.0);
+    }
+    let alone = Interval::alone(moment(&a), 20_000, 4);
+    assert_eq!(alone.blob(7, 0.9), blobs_of(&a, 20_000, 4).1[7]);
+    assert!(!alone.is_empty() && alone.len() == 20_000);
+}
+
+#[test]
+fn exaggeration_keeps_what_is_seen_from_above() {
+    let step = step("katrina.nc", 1);
+    let (_, blobs) = blobs_of(&step, 2000, 1);
+    let tall: Vec<WeatherBlob> = blobs.iter().map(|b| b.exaggerated(5.0)).collect();
+    for (a, b) in of_blobs(&step.grid, &blobs).iter().zip(of_blobs(&step.grid, &tall)) {
+        assert!((a - b).abs() <= 1e-12 * a);
+    }
+    assert!(
+        (tall[3].position.y / blobs[3].position.y - 5.0).abs() < 1e-12 && tall[3].position.x == blobs[3].position.x
+    );
 }

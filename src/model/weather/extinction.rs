@@ -1,6 +1,6 @@
 //! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of spheres, docs/model.md §15.
 
-use super::air::MELTING_K;
+use crate::model::moisture::T0_K;
 
 /// What a cloud is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +23,7 @@ impl Phase {
 
 /// What cloud water is at a temperature, where a scheme has one ratio for both (WSM3): ice below 273.15 K.
 pub fn single_moment_phase(t_k: f64) -> Phase {
-    if t_k < MELTING_K { ICE } else { LIQUID }
+    if t_k < T0_K { ICE } else { LIQUID }
 }
 
 /// Values that are no mixing ratios, and what became of them.

@@ -8,6 +8,7 @@ pub mod columns;
 pub mod diagnosed;
 pub mod extinction;
 pub mod grid;
+pub mod interval;
 pub mod particles;
 pub mod places;
 pub mod statistics;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::args::WeatherArgs;
 use super::output;
 use crate::error::Result;
-use crate::io::weather::container::{Container, Variable};
+use crate::io::weather::container::Variable;
 use crate::io::weather::wrf::{self, Clouds, WeatherFile};
 use crate::model::weather::statistics::{self, CloudStatistics};
 use crate::model::weather::{steps, sun};

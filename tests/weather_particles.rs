@@ -208,16 +208,3 @@ fn an_interval_goes_from_one_step_to_the_next() {
     assert_eq!(alone.blob(7, 0.9), blobs_of(&a, 20_000, 4).1[7]);
     assert!(!alone.is_empty() && alone.len() == 20_000);
 }
-
-#[test]
-fn exaggeration_keeps_what_is_seen_from_above() {
-    let step = step("katrina.nc", 1);
-    let (_, blobs) = blobs_of(&step, 2000, 1);
-    let tall: Vec<WeatherBlob> = blobs.iter().map(|b| b.exaggerated(5.0)).collect();
-    for (a, b) in of_blobs(&step.grid, &blobs).iter().zip(of_blobs(&step.grid, &tall)) {
-        assert!((a - b).abs() <= 1e-12 * a);
-    }
-    assert!(
-        (tall[3].position.y / blobs[3].position.y - 5.0).abs() < 1e-12 && tall[3].position.x == blobs[3].position.x
-    );
-}

@@ -38,14 +38,6 @@ impl WeatherBlob {
     pub fn mass(&self) -> f64 {
         self.kappa * TAU * (2.0 * PI).sqrt() * self.sigma_xy * self.sigma_xy * self.sigma_z
     }
-
-    /// The blob where heights are drawn `factor` times as great: straight up it is as deep as before.
-    pub fn exaggerated(mut self, factor: f64) -> Self {
-        self.position.y *= factor;
-        self.sigma_z *= factor;
-        self.kappa /= factor;
-        self
-    }
 }
 
 /// Which blob of which cell.

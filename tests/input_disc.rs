@@ -36,7 +36,9 @@ fn a_disc_alone_is_a_complete_cloud() {
     assert_eq!((scene.n_particles(), disc(cloud).period_s, disc(cloud).dilution), (1000, 20.0, Dilution::Mass));
     assert_eq!((disc(cloud).condensation, cloud.growth.is_none()), (None, true));
     // Its keys one by one.
-    let scene = good(&format!("{DISC}particles = 7\nlifetime_s = 3\ndilution = 'none'\nwind = [1, 0, 0]\nposition = [0, 2, 0]\n"));
+    let scene = good(&format!(
+        "{DISC}particles = 7\nlifetime_s = 3\ndilution = 'none'\nwind = [1, 0, 0]\nposition = [0, 2, 0]\n"
+    ));
     let cloud = &scene.clouds[0];
     assert_eq!((disc(cloud).n_particles, disc(cloud).period_s, disc(cloud).dilution), (7, 3.0, Dilution::None));
     // It stands still in the wind, and so do its bounds.
@@ -92,12 +94,18 @@ fn what_a_disc_or_air_cannot_be_is_refused_by_key() {
         ("fade_in = 0", "`cloud.0.fade_in`: expected a number from 0.01 to 1"),
         ("warmth_k = -1", "`cloud.0.warmth_k`: expected a number from 0 to 1e15"),
         ("dilution = 'masse'", "`cloud.0.dilution`: unknown value `masse`; did you mean `mass`?"),
-        ("base = 'lcm'", "`cloud.0.base`: expected a number from -1e15 to 1e15, \"lcl\" or \"none\", found string \"lcm\""),
+        (
+            "base = 'lcm'",
+            "`cloud.0.base`: expected a number from -1e15 to 1e15, \"lcl\" or \"none\", found string \"lcm\"",
+        ),
         ("base = true", "`cloud.0.base`: expected a number, found boolean true"),
         ("wind = [1e15, 0, 0]", "`cloud.0.from`: its particles' places: expected at most 1e15, found 2.000e16"),
         ("sigma = 1e15\nsigma_spread = 0.5", "its particles' σ: expected at most 1e15, found 1.500e15"),
         ("sigma = 1e-15\noptical_depth = 10", "its particles' κ = optical_depth / (√(2π) σ): expected at most 1e15"),
-        ("outflow = 1e15\nlifetime_s = 1e-15\nsigma = 1e14\noptical_depth = 1e15", "κ (2π)^{3/2} σ³: expected at most 1e37"),
+        (
+            "outflow = 1e15\nlifetime_s = 1e-15\nsigma = 1e14\noptical_depth = 1e15",
+            "κ (2π)^{3/2} σ³: expected at most 1e37",
+        ),
     ] {
         let said = message(&format!("{DISC}{text}\n"));
         assert!(said.contains(what), "{text}: {said}");
@@ -109,7 +117,10 @@ fn what_a_disc_or_air_cannot_be_is_refused_by_key() {
         ("humidity = 0.5\ndew_point_c = 3", "either a `humidity` or a `dew_point_c`, not both"),
         ("dew_point_c = 21", "`air.dew_point_c`: expected at most the temperature, found 21"),
         ("temperature_c = 50\ndew_point_c = -80", "makes a humidity of"),
-        ("saturation = 'magnus'", "`air.saturation`: unknown value `magnus`; known here: `constant`, `linear`, `bolton`"),
+        (
+            "saturation = 'magnus'",
+            "`air.saturation`: unknown value `magnus`; known here: `constant`, `linear`, `bolton`",
+        ),
         ("metres_per_unit = 1e-15", "`air.metres_per_unit`: puts the clouds' bases at"),
         ("moisture = 1", "unknown key `air.moisture`"),
     ] {

@@ -16,6 +16,7 @@ layout(local_size_x = TILE_INVOCATIONS) in;
 // As in sprites.vert.
 layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 5) const uint THRESHOLD = 0;
+layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 
 // `smallest`: slopes that sigma must span from the eye.
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float inv_threshold; float smallest; uint n_particles; uint width; uint height; } push;
@@ -38,6 +39,10 @@ bool is_kept(uint i) {
     if (WEIGHTED != 0) {
         tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
     }
+    Shape shape = shape_of(push.camera, ELLIPSOIDS != 0 ? particles[i].aspect : 1.0);
+    if (ELLIPSOIDS != 0) {
+        tau *= shape.wider;
+    }
     float reach = push.cutoff;
     bool is_dense = tau > 0.0;
     if (THRESHOLD != 0) {
@@ -45,9 +50,17 @@ bool is_kept(uint i) {
         is_dense = is_dense && cut > 0.0;
         reach = sqrt(2.0 * max(cut, 0.0));
     }
-    uvec4 pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach * sigma, uvec2(push.width, push.height));
+    uvec2 size = uvec2(push.width, push.height);
+    uvec4 pixels;
+    float widest = sigma;
+    if (ELLIPSOIDS != 0) {
+        pixels = silhouette_of(shape, push.camera, push.pixel, v, GROWTH * reach * sigma, size);
+        widest *= shape.wider;
+    } else {
+        pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach * sigma, size);
+    }
     bool is_in = pixels.x < pixels.y && pixels.z < pixels.w;
-    return i < group.end && v.z >= push.camera.near && is_dense && sigma >= push.smallest * v.z && is_in;
+    return i < group.end && v.z >= push.camera.near && is_dense && widest >= push.smallest * v.z && is_in;
 }
 
 void main() {

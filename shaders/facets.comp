@@ -26,9 +26,10 @@ void main() {
         Group group = groups[i_group[i]];
         // The light on a small blob is that of the blobs it lies among: on its own scale it would be a speck.
         float scale = max(sigma, group.sigma_mean);
-        vec3 n = normal_at(p, scale, group.cloud_center);
-        float area = area_of(sigma, particles[i].kappa);
+        float aspect = particles[i].aspect;
+        vec3 n = normal_at(p, scale, aspect, group.cloud_center);
+        float area = area_of(sigma, aspect, particles[i].kappa);
         facets[push.i_first_facet + i] =
-            Facet(p + SHELL_SIGMA * scale * n, area, n, group.i_region, particles[i].color, 0u);
+            Facet(shell_at(p, scale, aspect, n), area, n, group.i_region, particles[i].color, 0u);
     }
 }

@@ -29,14 +29,14 @@ struct Sums { float mass; vec3 position; float sigma_mean; float area; vec3 colo
 
 float mass_of(uint i) {
     float sigma = placed[i].sigma;
-    return particles[i].kappa * sigma * sigma * sigma;
+    return particles[i].kappa * sigma * sigma * sigma * particles[i].aspect;
 }
 
 Sums sums_of(Run run, uint first, float sigma_first) {
     Sums s = Sums(0.0, vec3(0.0), 0.0, 0.0, vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
         uint i = order[k];
-        float m = mass_of(i), a = area_of(placed[i].sigma, particles[i].kappa);
+        float m = mass_of(i), a = area_of(placed[i].sigma, particles[i].aspect, particles[i].kappa);
         vec3 p = placed[i].position - placed[first].position;
         vec3 c = particles[i].color - particles[first].color;
         float sigma = groups[i_group[i]].sigma_mean - sigma_first;
@@ -52,15 +52,21 @@ Sums sums_of(Run run, uint first, float sigma_first) {
     return s;
 }
 
-// sigma_g^2 about the mean position.
-float spread_of(Run run, vec3 p, bool by_mass) {
-    float sum = 0.0, weight = 0.0;
+// sigma_g^2 about the mean position: x, or of ellipsoids along x and z, and along y.
+vec2 spread_of(Run run, vec3 p, bool by_mass) {
+    vec2 sum = vec2(0.0);
+    float weight = 0.0;
     for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
         uint i = order[k];
         float m = by_mass ? mass_of(i) : 1.0;
         float sigma = placed[i].sigma;
         vec3 d = placed[i].position - p;
-        sum += m * (sigma * sigma + dot(d, d) * (1.0 / 3.0));
+#if ELLIPSOIDS
+        float high = particles[i].aspect * sigma;
+        sum += m * vec2(sigma * sigma + 0.5 * (d.x * d.x + d.z * d.z), high * high + d.y * d.y);
+#else
+        sum.x += m * (sigma * sigma + dot(d, d) * (1.0 / 3.0));
+#endif
         weight += m;
     }
     return sum / weight;
@@ -78,11 +84,17 @@ void main() {
         vec3 p = placed[first].position + (by_mass ? s.position / s.mass : s.plain_position * n_inverse);
         float sigma_mean = group.sigma_mean + (by_mass ? s.sigma_mean / s.mass : s.plain_sigma * n_inverse);
         vec3 color = particles[first].color + (by_area ? s.color / s.area : s.plain_color * n_inverse);
-        float sigma = run.n_particles > 1u ? sqrt(spread_of(run, p, by_mass)) : placed[first].sigma;
+        vec2 spread = run.n_particles > 1u ? sqrt(spread_of(run, p, by_mass)) : vec2(placed[first].sigma, 0.0);
+        float sigma = spread.x;
+#if ELLIPSOIDS
+        float aspect = run.n_particles > 1u ? (sigma > 0.0 ? clamp(spread.y / sigma, LEAST_ASPECT, 1.0 / LEAST_ASPECT) : 1.0) : particles[first].aspect;
+#else
+        float aspect = 1.0;
+#endif
         float scale = max(sigma, sigma_mean);
-        vec3 n = normal_at(p, scale, group.cloud_center);
+        vec3 n = normal_at(p, scale, aspect, group.cloud_center);
         uint facet = push.i_first_facet + g;
-        facets[facet] = Facet(p + SHELL_SIGMA * scale * n, s.area, n, group.i_region, color, 0u);
+        facets[facet] = Facet(shell_at(p, scale, aspect, n), s.area, n, group.i_region, color, 0u);
         for (uint k = run.i_first; k < run.i_first + run.n_particles; ++k) {
             i_facet[order[k]] = facet;
         }

@@ -37,17 +37,20 @@ float weight(float a, float b) {
 void main() {
     for (uint p = gl_WorkGroupID.x; p < push.n_particles; p += gl_NumWorkGroups.x) {
         Placed blob = placed[p];
-        float sigma = blob.sigma;
-        float mass = particles[p].kappa * MASS_FACTOR * sigma * sigma * sigma;
+        float aspect = particles[p].aspect;
+        float mass = particles[p].kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma * aspect;
+        vec3 sigma = blob.sigma * vec3(1.0, aspect, 1.0);
+        vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
+        vec3 inv_edges = push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0);
         vec3 x = blob.position - push.grid.low;
         ivec3 last = ivec3(push.grid.n_cells) - 1;
-        ivec3 begin = clamp(ivec3(floor((x - CUT_SIGMA * sigma) * push.grid.inv_cell)), ivec3(0), last);
-        ivec3 end = clamp(ivec3(floor((x + CUT_SIGMA * sigma) * push.grid.inv_cell)), begin, last);
+        ivec3 begin = clamp(ivec3(floor((x - CUT_SIGMA * sigma) * inv_edges)), ivec3(0), last);
+        ivec3 end = clamp(ivec3(floor((x + CUT_SIGMA * sigma) * inv_edges)), begin, last);
         if (mass > 0.0) {
             for (int axis = 0; axis < 3; ++axis) {
                 for (int i = begin[axis] + int(gl_LocalInvocationID.x); i <= end[axis]; i += int(gl_WorkGroupSize.x)) {
-                    float a = (float(i) * push.grid.cell - x[axis]) / sigma;
-                    float b = (float(i + 1) * push.grid.cell - x[axis]) / sigma;
+                    float a = (float(i) * edges[axis] - x[axis]) / sigma[axis];
+                    float b = (float(i + 1) * edges[axis] - x[axis]) / sigma[axis];
                     weights[axis][i - begin[axis]] = weight(a, b);
                 }
             }

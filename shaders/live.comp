@@ -57,6 +57,6 @@ void main() {
         float faded = smooth_rise(lived * d.inv_fade_in) * smooth_rise((1.0 - lived) * d.inv_fade_out);
         float above = position.y - d.base - d.lift * warm * (1.0 - cooled);
         float condensed = d.inv_over > 0.0 ? smooth_rise(above * d.inv_over) : 1.0;
-        particles[d.i_first + slot] = Particle(position - d.center, sigma, vec3(1.0), d.kappa * diluted * faded * condensed);
+        particles[d.i_first + slot] = Particle(position - d.center, sigma, vec3(1.0), d.kappa * diluted * faded * condensed, 1.0, 0.0, vec2(0.0));
     }
 }

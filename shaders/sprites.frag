@@ -6,6 +6,7 @@
 
 layout(constant_id = 4) const uint TEXTURED = 0;
 layout(constant_id = 5) const uint THRESHOLD = 0;
+layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 
 layout(binding = 8) uniform usamplerBuffer pool;
 #define SHEET_PIXELS
@@ -21,6 +22,7 @@ layout(location = 2) flat in vec4 in_turn;
 layout(location = 3) flat in uvec2 in_place;
 layout(location = 4) flat in vec3 in_gain;
 layout(location = 5) flat in float in_cut;
+layout(location = 6) flat in vec4 in_conic;
 layout(location = 0) out vec4 out_color;
 
 void main() {
@@ -33,13 +35,27 @@ void main() {
     // b^2/(2 sigma^2)
     float e = in_blob.z * (dot(delta, delta) + twist * twist) / (1.0 + dot(ray, ray));
     float cut = THRESHOLD != 0 ? in_cut : 0.5 * push.cutoff * push.cutoff;
+    float tau = in_blob.w;
+    if (ELLIPSOIDS != 0) {
+        // |M d|^2, and |d|/|M d|: a ray is as long within the ball as it is made to be.
+        vec3 d = vec3(ray, 1.0), y = vec3(push.camera.right.y, push.camera.up.y, push.camera.forward.y);
+        float up = dot(y, d);
+        vec3 across = d - up * y;
+        float rest = dot(across, across), white = rest + in_conic.w * up * up;
+        e = (in_conic.x * delta.x * delta.x + in_conic.y * delta.x * delta.y + in_conic.z * delta.y * delta.y) / white;
+        tau *= sqrt((rest + up * up) / white);
+        cut = 0.5 * push.cutoff * push.cutoff;
+        if (THRESHOLD != 0) {
+            cut = min(cut, log(tau * push.inv_threshold));
+        }
+    }
     float alpha = 0.0;
     if (e <= cut) {
         float exponent = -e;
         if (TEXTURED != 0) {
             exponent += sheet_exponent(delta, in_turn, in_place, in_gain);
         }
-        alpha = one_minus_exp(in_blob.w * exp(exponent));
+        alpha = one_minus_exp(tau * exp(exponent));
     }
     out_color = vec4(in_radiance * alpha, alpha);
 }

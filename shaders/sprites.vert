@@ -21,6 +21,8 @@ layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 4) const uint TEXTURED = 0;
 // 1: a sprite ends where its optical depth falls under a threshold.
 layout(constant_id = 5) const uint THRESHOLD = 0;
+// 1: some blobs are ellipsoids.
+layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; uint i_first; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
@@ -40,6 +42,8 @@ layout(location = 3) flat out uvec2 out_place;
 layout(location = 4) flat out vec3 out_gain;
 // b^2/(2 sigma^2) where it ends; only where there is a threshold.
 layout(location = 5) flat out float out_cut;
+// Its conic and 1/a^2; only of ellipsoids.
+layout(location = 6) flat out vec4 out_conic;
 
 void main() {
     uint i = entries[push.i_first + gl_InstanceIndex].y;
@@ -56,7 +60,13 @@ void main() {
         Drawn group = drawn[i_group[i]];
         tau *= group.kappa_scale * (i + 1u == group.end ? group.last_weight : 1.0);
     }
-    out_blob = vec4(v.xy / v.z, 0.5 * (v.z / sigma) * (v.z / sigma), tau);
+    float scale = 0.5 * (v.z / sigma) * (v.z / sigma);
+    out_blob = vec4(v.xy / v.z, scale, tau);
+    Shape shape = shape_of(push.camera, ELLIPSOIDS != 0 ? particles[i].aspect : 1.0);
+    if (ELLIPSOIDS != 0) {
+        out_conic = vec4(conic_of(shape, v.xy / v.z, scale), shape.inverse);
+        tau *= shape.wider;
+    }
     Sheet sheet = Sheet(vec4(0.0), uvec2(0), vec3(0.0));
     if (TEXTURED != 0) {
         sheet = sheet_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
@@ -79,8 +89,16 @@ void main() {
         return;
     }
     float r = GROWTH * reach * sigma;
-    vec2 x = (tangents(v.x, v.z, r) + vec2(-SNAP, SNAP) * push.pixel.x) / push.camera.tan_x;
-    vec2 y = (tangents(v.y, v.z, r) + vec2(-SNAP, SNAP) * push.pixel.y) / push.camera.tan_y;
+    vec2 across, upward;
+    if (ELLIPSOIDS != 0) {
+        across = tangents_of(shape, v, 0, r);
+        upward = tangents_of(shape, v, 1, r);
+    } else {
+        across = tangents(v.x, v.z, r);
+        upward = tangents(v.y, v.z, r);
+    }
+    vec2 x = (across + vec2(-SNAP, SNAP) * push.pixel.x) / push.camera.tan_x;
+    vec2 y = (upward + vec2(-SNAP, SNAP) * push.pixel.y) / push.camera.tan_y;
     // Only what lies on the screen: huge quads cost the rasteriser its accuracy.
     x = clamp(x, -1.0, 1.0);
     y = clamp(y, -1.0, 1.0);

@@ -44,6 +44,14 @@ layout(binding = 9) uniform usamplerBuffer pool;
 #include "texture.glsl"
 #endif
 
+// Some splats are ellipsoids.
+#ifndef ELLIPSOIDS
+#define ELLIPSOIDS 0
+#endif
+#if ELLIPSOIDS
+layout(binding = 10) uniform usamplerBuffer conics;
+#endif
+
 // 0: the round is the only one, and no state is kept.
 #ifndef ROUNDS
 #define ROUNDS 0
@@ -54,7 +62,7 @@ layout(local_size_x = INVOCATIONS) in;
 const uint RUN = 8;
 const uint TILE_WIDTH = RUN * (INVOCATIONS / ROWS);
 
-layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; float inv_threshold; } push;
+layout(push_constant) uniform Push { vec2 tangents; vec2 pixel; uint width; uint height; uint n_bins_x; uint i_round; float cut; float saturated; float inv_threshold; float y_right; float y_up; float y_forward; } push;
 layout(binding = 0) uniform usamplerBuffer splats;
 layout(std430, binding = 1) readonly buffer Pairs { uvec2 pairs[]; };
 layout(std430, binding = 2) readonly buffer Rounds { Round rounds[]; };
@@ -91,7 +99,7 @@ bool all_agree(bool b) { return subgroupAll(b); }
 #else
 shared uint said[INVOCATIONS];
 // As words: what is no float stays what it is.
-shared uvec4 given[2 + 3 * TEXTURED][INVOCATIONS];
+shared uvec4 given[2 + 3 * TEXTURED + ELLIPSOIDS][INVOCATIONS];
 
 uint append(uint n, bool hit, uint r) {
     uint t = gl_LocalInvocationID.x;
@@ -130,7 +138,13 @@ float opacity(float t) { return one_minus_exp(t); }
 
 // The row of pixels that an invocation owns, while it is composed.
 float x_of[RUN];
+#if ELLIPSOIDS
+// |ray|^2 across the scene's y, and along it.
+float across[RUN];
+float along[RUN];
+#else
 float inv_norm[RUN];
+#endif
 // -cut, and what lets less through is full: push constants would be fetched anew for every splat.
 float least;
 float full;
@@ -157,12 +171,20 @@ struct Loaded {
     // Log2 of its level's side.
     uint side;
 #endif
+#if ELLIPSOIDS
+    vec4 conic;
+#endif
 };
 
 void compose(Loaded splat, float y) {
     vec4 place = splat.place, light = splat.light;
     vec2 s = place.xy;
     float dy = y - s.y;
+#if ELLIPSOIDS
+    vec4 conic = splat.conic;
+    float a = -conic.x, b = -conic.y * dy, c = -conic.z * dy * dy;
+    float lowest = least;
+#else
     // -scale (dx^2 + dy^2 + (s.x dy - s.y dx)^2) as a polynomial of dx.
     float a = -place.z * (1.0 + s.y * s.y), b = 2.0 * place.z * s.x * s.y * dy, c = -place.z * (1.0 + s.x * s.x) * dy * dy;
 #if THRESHOLD
@@ -170,16 +192,28 @@ void compose(Loaded splat, float y) {
 #else
     float lowest = least;
 #endif
+#endif
     // Step by step for all pixels, so that what waits for a result stands apart from it.
-    float dx[RUN], e[RUN], tau[RUN], passed[RUN];
+    float dx[RUN], e[RUN], deep[RUN], tau[RUN], passed[RUN];
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         dx[j] = x_of[j] - s.x;
+#if ELLIPSOIDS
+        float inv_white = 1.0 / (across[j] + conic.w * along[j]);
+        e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_white;
+        // What a ray through the centre meets.
+        deep[j] = place.w * sqrt((across[j] + along[j]) * inv_white);
+#else
         e[j] = ((a * dx[j] + b) * dx[j] + c) * inv_norm[j];
+        deep[j] = place.w;
+#endif
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         // What is left out is a pixel's own affair: it must not depend on who else is drawn.
         passed[j] = 1.0 - opaque[j];
         bool is_seen = e[j] >= lowest && !(passed[j] < full);
+#if ELLIPSOIDS && THRESHOLD
+        is_seen = is_seen && e[j] >= -log2(deep[j] * inv_threshold);
+#endif
 #if BEHIND
         is_seen = is_seen && light.w >= depth_of[j];
 #endif
@@ -188,7 +222,7 @@ void compose(Loaded splat, float y) {
         e[j] = clamp(e[j], -125.0, 125.0);
 #endif
         // By its bits: llvmpipe takes twice as long to choose between two floats.
-        tau[j] = uintBitsToFloat(floatBitsToUint(place.w * power_of_two(e[j])) & (is_seen ? ~0u : 0u));
+        tau[j] = uintBitsToFloat(floatBitsToUint(deep[j] * power_of_two(e[j])) & (is_seen ? ~0u : 0u));
     }
     [[unroll]] for (uint j = 0; j < RUN; ++j) {
         tau[j] = opacity(tau[j]);
@@ -209,6 +243,9 @@ Loaded load_splat(int r) {
     splat.gain = texelFetch(sheets, 3 * r + 1);
     splat.side = texelFetch(sheets, 3 * r + 2).x;
 #endif
+#if ELLIPSOIDS
+    splat.conic = uintBitsToFloat(texelFetch(conics, r));
+#endif
     return splat;
 }
 
@@ -222,6 +259,9 @@ Loaded of_invocation(Loaded splat, uint m) {
     splat.gain = subgroupShuffle(splat.gain, m);
     splat.side = subgroupShuffle(splat.side, m);
 #endif
+#if ELLIPSOIDS
+    splat.conic = subgroupShuffle(splat.conic, m);
+#endif
     return splat;
 }
 #else
@@ -232,6 +272,9 @@ void give(Loaded splat, uint t) {
     given[2][t] = floatBitsToUint(splat.turn);
     given[3][t] = splat.gain;
     given[4][t] = uvec4(splat.side);
+#endif
+#if ELLIPSOIDS
+    given[2 + 3 * TEXTURED][t] = floatBitsToUint(splat.conic);
 #endif
     barrier();
 }
@@ -244,6 +287,9 @@ Loaded of_invocation(uint m) {
     splat.turn = uintBitsToFloat(given[2][m]);
     splat.gain = given[3][m];
     splat.side = given[4][m].x;
+#endif
+#if ELLIPSOIDS
+    splat.conic = uintBitsToFloat(given[2 + 3 * TEXTURED][m]);
 #endif
     return splat;
 }
@@ -315,7 +361,15 @@ void draw_tile(uvec4 range, uint i_tile) {
         float x = (float(at.x + j) + 0.5) * push.pixel.x - push.tangents.x;
         uint p = row + min(at.x + j, push.width - 1u);
         x_of[j] = x;
+#if ELLIPSOIDS
+        vec3 ray = vec3(x, y, 1.0), upward = vec3(push.y_right, push.y_up, push.y_forward);
+        float up = dot(upward, ray);
+        vec3 rest = ray - up * upward;
+        across[j] = dot(rest, rest);
+        along[j] = up * up;
+#else
         inv_norm[j] = 1.0 / (1.0 + x * x + y * y);
+#endif
 #if ROUNDS
         vec4 before = state[p];
         color[j] = before.xyz;

@@ -11,6 +11,7 @@ layout(local_size_x = 256) in;
 
 // As in sprites.vert.
 layout(constant_id = 5) const uint THRESHOLD = 0;
+layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 
 layout(push_constant) uniform Push { vec2 tangents; vec2 tile; uint n_bins_x; uint i_round; float cut; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Reaches { uvec2 reach[]; };
@@ -78,7 +79,11 @@ void main() {
         // A bit each of four rows, spread to the first bits of four groups of four.
         uint spread = (rows & 1u) | (rows & 2u) << 3 | (rows & 4u) << 6 | (rows & 8u) << 9;
         vec2 corner = vec2(float(4 * bin.x) * push.tile.x - push.tangents.x, push.tangents.y - float(4 * bin.y + 4) * push.tile.y);
-        uint tiles = spread * columns & near(center, scale, cut, corner);
+        uint tiles = spread * columns;
+        if (ELLIPSOIDS == 0) {
+            // Of ellipsoids the rectangle alone decides.
+            tiles &= near(center, scale, cut, corner);
+        }
         pairs[at + k] = uvec2(bin.y * push.n_bins_x + bin.x | tiles << BIN_BITS, r);
         bool wraps = bin.x == last.x;
         bin = wraps ? uvec2(first.x, bin.y + 1u) : uvec2(bin.x + 1u, bin.y);

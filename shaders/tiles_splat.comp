@@ -27,10 +27,11 @@ layout(constant_id = 2) const uint GROUPED = 0;
 layout(constant_id = 3) const uint WEIGHTED = 0;
 layout(constant_id = 4) const uint TEXTURED = 0;
 layout(constant_id = 5) const uint THRESHOLD = 0;
+layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
-// By texels, which llvmpipe fetches for all invocations at once: a Placed is one, a Particle two, a Lit four.
+// By texels, which llvmpipe fetches for all invocations at once: a Placed is one, a Particle three, a Lit four.
 layout(binding = 1) uniform usamplerBuffer placed;
 layout(binding = 2) uniform usamplerBuffer particles;
 layout(binding = 3) uniform usamplerBuffer lit;
@@ -48,6 +49,8 @@ layout(std430, binding = 11) writeonly buffer Blocks { uint n_pairs[]; };
 layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
 
 layout(std430, binding = 13) readonly buffer KeptOnes { Kept kept[]; };
+// Of ellipsoids: the conic, in powers of two, and 1/a^2.
+layout(std430, binding = 14) writeonly buffer Conics { vec4 conics[]; };
 
 #if !ONE_SUBGROUP
 shared uint sums[INVOCATIONS];
@@ -61,7 +64,7 @@ uint project(uint i, uint r) {
     if (i == NO_PARTICLE) {
         return 0u;
     }
-    vec4 place = uintBitsToFloat(texelFetch(placed, int(i))), shade = uintBitsToFloat(texelFetch(particles, int(2 * i + 1)));
+    vec4 place = uintBitsToFloat(texelFetch(placed, int(i))), shade = uintBitsToFloat(texelFetch(particles, int(3 * i + 1)));
     vec3 v = along_camera(push.camera, place.xyz - push.camera.eye);
     float sigma = place.w;
     float tau = SQRT_TAU * shade.w * sigma;
@@ -72,16 +75,28 @@ uint project(uint i, uint r) {
     if (!(v.z >= push.camera.near) || !(tau > 0.0)) {
         return 0u;
     }
+    float deepest = tau;
+    Shape shape;
+    if (ELLIPSOIDS != 0) {
+        shape = shape_of(push.camera, uintBitsToFloat(texelFetch(particles, int(3 * i + 2)).x));
+        deepest *= shape.wider;
+    }
     float reach_in_sigma = push.cutoff;
     if (THRESHOLD != 0) {
-        float cut = min(0.5 * push.cutoff * push.cutoff, log(tau * push.inv_threshold));
+        float cut = min(0.5 * push.cutoff * push.cutoff, log(deepest * push.inv_threshold));
         if (!(cut > 0.0)) {
             return 0u;
         }
         reach_in_sigma = sqrt(2.0 * cut);
     }
     vec2 s = v.xy / v.z;
-    uvec4 pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, uvec2(push.width, push.height));
+    uvec2 size = uvec2(push.width, push.height);
+    uvec4 pixels;
+    if (ELLIPSOIDS != 0) {
+        pixels = silhouette_of(shape, push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
+    } else {
+        pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
+    }
     uvec2 columns = pixels.xy, rows = pixels.zw;
     if (columns.x == columns.y || rows.x == rows.y) {
         return 0u;
@@ -96,6 +111,9 @@ uint project(uint i, uint r) {
     // A Splat, by fours.
     splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));
     splats[2 * r + 1] = floatBitsToUint(vec4(radiance, push.camera.near / v.z));
+    if (ELLIPSOIDS != 0) {
+        conics[r] = vec4(conic_of(shape, s, scale), shape.inverse);
+    }
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
     if (TEXTURED != 0) {
         Sheet sheet = sheet_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);

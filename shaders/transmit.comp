@@ -48,7 +48,7 @@ Way way_to(Light light, vec3 p) {
 // misses the box.
 WEIGHTS2 crossing(PLACE p, PLACE d, WEIGHT distance) {
     PLACE low = push.grid.low;
-    PLACE high = low + push.grid.cell * PLACE(push.grid.n_cells);
+    PLACE high = low + cell_edges() * PLACE(push.grid.n_cells);
     WEIGHT enter = 0.0, leave = distance;
     for (int axis = 0; axis < 3; ++axis) {
         if (d[axis] != 0.0) {
@@ -69,11 +69,13 @@ float through_the_cloud(PLACE p, Way way) {
     WEIGHT length_total = part.y - part.x;
     // Where no light is lost there is nothing to march for, nor where the way misses the box.
     bool is_marched = push.backward > 0.0 && length_total > 0.0;
-    uint n = is_marched ? clamp(uint(ceil(length_total / push.step_length)), 1u, push.max_steps) : 0u;
+    // Of cubes as it is: a unit vector's length is 1 but for its rounding.
+    WEIGHT step_length = push.grid.aspect == 1.0 ? WEIGHT(push.step_length) : push.step_length / in_widths(d);
+    uint n = is_marched ? clamp(uint(ceil(length_total / step_length)), 1u, push.max_steps) : 0u;
     SUM1 tau = EMPTY1;
     for (uint j = 0; j < n; ++j) {
-        WEIGHT t0 = WEIGHT(j) * push.step_length;
-        WEIGHT ds = min(WEIGHT(push.step_length), length_total - t0);
+        WEIGHT t0 = WEIGHT(j) * step_length;
+        WEIGHT ds = min(step_length, length_total - t0);
         ADD(tau, density_at(p + (part.x + (t0 + 0.5 * ds)) * d) * ds);
     }
     // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing. There is none of doubles.

@@ -21,7 +21,7 @@ use sha2::{Digest, Sha256};
 /// What validation says of place followed by the grid's deposit, which reads what place wrote; recorded and never
 /// submitted.
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
-    let spec = GridSpec { n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
+    let spec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
     let grid = grid::Grid::new(&gpu.device, &gpu.compiler, spec.n_total()).unwrap();
     let (particles, i_group) = (gpu.buffer::<ParticleRecord>(64), gpu.buffer::<u32>(64));

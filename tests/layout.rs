@@ -146,7 +146,23 @@ const INTERFACES: [(&str, &[Field], &[Element]); 44] = [
     (
         "tiles_splat.comp",
         tiles::SplatPush::FIELDS,
-        &[B(8), T, T, T, B(4), B(4), R("Drawn"), R("Textured"), B(16), B(8), B(4), B(4), R("SplatSheet"), R("Kept")],
+        &[
+            B(8),
+            T,
+            T,
+            T,
+            B(4),
+            B(4),
+            R("Drawn"),
+            R("Textured"),
+            B(16),
+            B(8),
+            B(4),
+            B(4),
+            R("SplatSheet"),
+            R("Kept"),
+            B(16),
+        ],
     ),
     ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
     ("upsample.comp", upsample::Push::FIELDS, &[T, B(4)]),
@@ -296,10 +312,11 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
     let to = Buffer::new::<u32>(&gpu.device, "test.to", words.len() as u64, Place::Readback).unwrap();
     gpu.run(|rec| rec.dispatch_groups(&kernel, &[&from, &to], &(), 3));
     assert_eq!(to.read::<u32>(words.len()).unwrap(), words);
-    // tiles_splat.comp takes the last half of a Particle and of a Lit, and writes a Splat by fours.
+    // tiles_splat.comp takes the second of a Particle's three texels and the last half of a Lit, and writes a Splat by fours.
     let texels =
         [size_of::<PlacedRecord>(), size_of::<ParticleRecord>(), size_of::<LitRecord>(), size_of::<SplatRecord>()];
-    assert_eq!(texels, [16, 32, 64, 32]);
+    assert_eq!(texels, [16, 48, 64, 32]);
+    assert!(text_of("tiles_splat.comp").contains("texelFetch(particles, int(3 * i + 1))"));
     assert!(text_of("tiles_splat.comp").contains("texelFetch(lit, 4 * facet + 2)"));
     let gather = text_of("include/gather.glsl");
     for (record, n_texels) in

@@ -115,6 +115,23 @@ fn tiles_give_the_same_bytes_in_every_mode() {
 }
 
 #[test]
+fn ellipsoids_give_the_same_bytes_in_every_mode() {
+    let flat = |more: &[&str]| {
+        let set: Vec<String> = more.iter().map(|s| (*s).to_owned()).collect();
+        scene_file::load(Path::new("tests/data/flat.toml"), &set, None).expect("the scene loads").scene
+    };
+    for more in [&[][..], &["lighting.facets_per_cloud=20", "draw.path='sprites'"]] {
+        let first = images(run(flat(more), Threading::Serial, true));
+        assert!(first == images(run(flat(more), Threading::Parallel, true)), "parallel");
+        assert!(first == images(run(flat(more), Threading::Serial, false)), "no skip");
+        let by_host = [more, &["threads.simulate='cpu'"]].concat();
+        let placed = images(run(flat(&by_host), Threading::Parallel, true));
+        assert!(placed == images(run(flat(&by_host), Threading::Serial, false)), "placed by the host, no skip");
+        assert!(first.windows(2).all(|w| w[0] != w[1]));
+    }
+}
+
+#[test]
 fn every_way_to_sum_gives_the_same_bytes_in_every_mode() {
     let summed = |[summation, precision]: [&str; 2]| {
         let set = [format!("lighting.summation='{summation}'"), format!("lighting.precision='{precision}'")];

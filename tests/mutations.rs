@@ -96,8 +96,8 @@ const FAULTS: &[Fault] = &[
     (
         "optical depth for opacity",
         "sprites.frag",
-        "one_minus_exp(in_blob.w * exp(exponent))",
-        "in_blob.w * exp(exponent)",
+        "one_minus_exp(tau * exp(exponent))",
+        "tau * exp(exponent)",
         "space/narrow",
     ),
     ("growth forgotten", "place.comp", "sigma * group.scale", "sigma", "space/late-growth"),
@@ -106,8 +106,8 @@ const FAULTS: &[Fault] = &[
     (
         "the grid's mass by the square of sigma",
         "grid_deposit.comp",
-        "sigma * sigma * sigma",
-        "sigma * sigma",
+        "blob.sigma * blob.sigma * blob.sigma",
+        "blob.sigma * blob.sigma",
         "transmittance/inside",
     ),
     (

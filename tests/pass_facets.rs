@@ -12,7 +12,7 @@ use nimbus::model::cloud::runs;
 use nimbus::reference::facets::{CONDITIONING, Facet, Members, bunch, grouped};
 use nimbus::reference::morton;
 use nimbus::reference::rounding::DIVISION_ERROR;
-use shells::{AREA_ERROR, Around, LENGTH_ERROR, N_PER_CLOUD, N_SURFACE_FACETS, REGIONS, SIGMA_MEANS, Scene, U, color};
+use shells::{Around, LENGTH_ERROR, N_PER_CLOUD, N_SURFACE_FACETS, REGIONS, SIGMA_MEANS, Scene, U, color};
 
 struct Compared {
     values: Vec<Vec<f64>>,
@@ -81,6 +81,41 @@ fn facets_are_within_bounds_that_grow_as_the_gradient_vanishes() {
     assert!(bounds[bounds.len() / 2] < 1e-3 && by_center > 10 && by_slope > 1000 && by_center + by_slope < 2990);
     assert_eq!((made[11].area, made[12].area), (0.0, 0.0));
     assert_eq!(scene.run(&mut gpu, &compiler), (cells, made));
+}
+
+#[test]
+fn facets_of_ellipsoids_are_within_their_bounds() {
+    let mut gpu = Gpu::new();
+    let compiler = Compiler::new(nimbus::passes::sources(), Compiler::default_cache()).unwrap();
+    for aspect in [0.2, 2.5] {
+        let scene = Scene::of_shape(aspect);
+        let (cells, made) = scene.run(&mut gpu, &compiler);
+        let compared = compare(&scene, &cells, &made);
+        assert!(compared.labels_right);
+        for (k, what) in QUANTITIES.into_iter().enumerate() {
+            assert_within_and_say(what, &compared.values[k], &compared.truths[k], &compared.bounds[k]);
+        }
+        let mut bounds = compared.bounds[0].clone();
+        bounds.sort_by(f64::total_cmp);
+        println!("{aspect}: normals' bounds: median {:e}", bounds[bounds.len() / 2]);
+        assert!(bounds[bounds.len() / 2] < 1e-2);
+        for counts in [[100, 400], [1, 1499]] {
+            let runs = Runs::new(&scene, counts);
+            let (cells, made, _) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
+            let ratios = compare_runs(&runs.truth(&scene, &cells), &made).unwrap();
+            println!("{aspect}, {counts:?}: error/bound {ratios:.3?}");
+        }
+    }
+    let scene = Scene::of_shape(0.2);
+    for (from, to) in [
+        ("gradient /= axes;", ""),
+        ("aspect * aspect * n.y", "aspect * n.y"),
+        ("tau *= aspect / wider;", "tau *= aspect;"),
+        ("scale * (axes * d)", "scale * d"),
+    ] {
+        let (cells, made) = scene.run(&mut gpu, &Gpu::wrong_compiler("include/shell.glsl", from, to));
+        assert!(!compare(&scene, &cells, &made).is_right(), "{to} was not noticed");
+    }
 }
 
 #[test]
@@ -159,9 +194,10 @@ fn run_bounds(scene: &Scene, cells: &[f64], m: &Members<'_>, run: &[u32], facet:
         (2.0 * weight + (2.0 * n + 3.0 + DIVISION_ERROR) * U) * reach + U * (value + reach)
     };
     let greatest = |of: &dyn Fn(usize) -> f64| run.iter().map(|i| of(*i as usize)).fold(0.0, f64::max);
-    let (b, first) = (bunch(m, run), run[0] as usize);
-    // κσ³: three products.
-    let by_mass = 3.0 * U;
+    let ellipsoids = scene.has_ellipsoids();
+    let (b, first) = (bunch(m, run, ellipsoids), run[0] as usize);
+    // κσ³a: four products.
+    let by_mass = 4.0 * U;
     let reach = greatest(&|i| (m.blobs[i].position - m.blobs[first].position).length());
     let p_error = if run.len() == 1 { 0.0 } else { mean(by_mass, reach, b.position.length()) };
     // σ² + |p − p̄|²/3: p̄'s error and the difference's rounding enter the square, whose five operations and the sum round;
@@ -169,17 +205,26 @@ fn run_bounds(scene: &Scene, cells: &[f64], m: &Members<'_>, run: &[u32], facet:
     let far = greatest(&|i| (m.blobs[i].position - b.position).length());
     let d = p_error + U * far;
     let square =
-        (2.0 * by_mass + (2.0 * n + 8.0 + DIVISION_ERROR) * U) * b.sigma.powi(2) + (2.0 * far * d + d * d) / 3.0;
-    // |√a − √b| ≤ |a − b|/√a, and ≤ √|a − b|.
-    let spread = (square / b.sigma).min(square.sqrt()) + (4.0 + DIVISION_ERROR) * U * b.sigma;
+        |sigma: f64| (2.0 * by_mass + (2.0 * n + 8.0 + DIVISION_ERROR) * U) * sigma.powi(2) + (2.0 * far * d + d * d);
+    // |√a − √b| ≤ |a − b|/√a, and ≤ √|a − b|. Of balls a third of what the distance is off counts, of ellipsoids half along x and z, and all along y.
+    let share = if ellipsoids { 0.5 } else { 1.0 / 3.0 };
+    let root = |sigma: f64, square: f64| (square / sigma).min(square.sqrt()) + (4.0 + DIVISION_ERROR) * U * sigma;
+    let of = |sigma: f64, share: f64| root(sigma, square(sigma) - (1.0 - share) * (2.0 * far * d + d * d));
+    let spread = of(b.sigma, share);
+    let high = b.sigma * b.aspect;
+    let aspect_error = match (run.len(), ellipsoids) {
+        (1, _) | (_, false) => 0.0,
+        _ => (of(high, 1.0) + b.aspect * spread) / (b.sigma - spread) + DIVISION_ERROR * U * b.aspect,
+    };
     let means = greatest(&|i| (m.sigma_means[i] - m.sigma_means[first]).abs());
     let scale_error = if run.len() == 1 { 0.0 } else { spread.max(mean(by_mass, means, b.sigma_mean)) };
-    let around = Around { p: b.position, p_error, scale: b.sigma.max(b.sigma_mean), scale_error };
+    let scale = b.sigma.max(b.sigma_mean);
+    let around = Around { p: b.position, p_error, scale, scale_error, aspect: b.aspect, aspect_error };
     let normal = scene.normal_bound(cells, &around, facet);
     let position = around.shell_bound(normal, facet).max_element();
     let colors = greatest(&|i| (m.colors[i] - m.colors[first]).length());
-    let color = if run.len() == 1 { 0.0 } else { mean(AREA_ERROR, colors, b.color.length()) };
-    [normal, position, facet.area * (AREA_ERROR + n * U), color]
+    let color = if run.len() == 1 { 0.0 } else { mean(scene.area_error(), colors, b.color.length()) };
+    [normal, position, facet.area * (scene.area_error() + n * U), color]
 }
 
 /// Greatest error/bound of normal, position, area and colour, or what is wrong.

@@ -278,7 +278,15 @@ fn given_groups_and_empty_lists_are_left_alone() {
     list[3].i_first = 170;
     i_group.splice(100.., [vec![2; 70], vec![3; 50]].concat());
     assert_eq!(list[2].form, FORM_GIVEN);
-    let before = ParticleRecord { position: [7.0, 8.0, 9.0], sigma: 4.0, color: [0.1, 0.2, 0.3], kappa: 5.0 };
+    let before = ParticleRecord {
+        aspect: 1.0,
+        unused: 0.0,
+        unused_too: [0.0; 2],
+        position: [7.0, 8.0, 9.0],
+        sigma: 4.0,
+        color: [0.1, 0.2, 0.3],
+        kappa: 5.0,
+    };
     let (list, i_group) = (gpu.upload(&list), gpu.upload(&i_group));
     let (particles, status) = (gpu.upload(&[before; 220]), gpu.upload(&[77u32; 220]));
     let buffers = [&list, &i_group, &particles, &status];

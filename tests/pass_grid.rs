@@ -13,7 +13,7 @@ use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
 use nimbus::reference::generate::{generate_box, uniforms};
-use nimbus::reference::grid::{axis_weights, deposit, mass};
+use nimbus::reference::grid::{axis_weights, deposit};
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32, erf_bound};
 
 const U: f64 = U_F32;
@@ -30,29 +30,33 @@ impl Scene {
     fn new(spec: &GridSpec, blobs: &[Blob]) -> Scene {
         let record = GridRecord::from(spec);
         let low = Vec3::from_array(record.low).as_dvec3();
-        let spec = GridSpec { n_cells: spec.n_cells, cell: f64::from(record.cell), low };
+        let (cell, aspect) = (f64::from(record.cell), f64::from(record.aspect));
+        let spec = GridSpec { n_cells: spec.n_cells, cell, aspect, low };
         let f32 = |b: &Blob| Blob {
             position: b.position.as_vec3().as_dvec3(),
+            aspect: f64::from(b.aspect as f32),
             sigma: f64::from(b.sigma as f32),
             kappa: f64::from(b.kappa as f32),
         };
         let blobs: Vec<Blob> = blobs.iter().map(f32).collect();
-        let heaviest = blobs.iter().map(mass).fold(0.0, f64::max);
+        let heaviest = blobs.iter().map(Blob::mass).fold(0.0, f64::max);
         Scene { spec, record, blobs, heaviest }
     }
 
     fn fitted(blobs: &[Blob], n: u32) -> Scene {
-        let reach = |b: &Blob| DVec3::splat(DEPOSIT_CUT_SIGMA * b.sigma);
+        let reach = |b: &Blob| DEPOSIT_CUT_SIGMA * b.sigma * b.axes();
         let low = blobs.iter().map(|b| b.position - reach(b)).reduce(DVec3::min).unwrap();
         let high = blobs.iter().map(|b| b.position + reach(b)).reduce(DVec3::max).unwrap();
-        Scene::new(&GridSpec::fit(low, high, n), blobs)
+        let aspect = blobs.iter().map(|b| b.aspect).sum::<f64>() / blobs.len() as f64;
+        Scene::new(&GridSpec::fit_cells(low, high, n, aspect), blobs)
     }
 
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
         let pass = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
         let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
-        let particle = |b: &Blob| ParticleRecord { kappa: b.kappa as f32, ..ParticleRecord::default() };
+        let particle =
+            |b: &Blob| ParticleRecord { kappa: b.kappa as f32, aspect: b.aspect as f32, ..ParticleRecord::default() };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
         let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
         let density = gpu.buffer::<f32>(n_cells);
@@ -65,12 +69,12 @@ impl Scene {
     fn bounds(&self) -> Vec<f64> {
         let n = self.spec.n_cells.as_usizevec3();
         let mut bounds = vec![0.0; n.x * n.y * n.z];
-        let volume = self.spec.cell.powi(3);
+        let volume = self.spec.cell_volume();
         let quantum = self.heaviest / 2f64.powi(31) / volume;
         for blob in self.blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0) {
             let axis = |k: usize| self.axis(blob, k, n[k]);
             let (x, y, z) = (axis(0), axis(1), axis(2));
-            let density = mass(blob) / volume;
+            let density = blob.mass() / volume;
             for &(k, wz, ez) in &z {
                 for &(j, wy, ey) in &y {
                     for &(i, wx, ex) in &x {
@@ -87,18 +91,23 @@ impl Scene {
 
     /// (cell, weight, its bound) of the cells that a blob can meet along an axis.
     fn axis(&self, blob: &Blob, k: usize, n: usize) -> Vec<(usize, f64, f64)> {
-        let (p, sigma, low, cell) = (blob.position[k], blob.sigma, self.spec.low[k], self.spec.cell);
+        let (p, sigma) = (blob.position[k], (blob.sigma * blob.axes())[k]);
+        let (low, cell) = (self.spec.low[k], self.spec.edges()[k]);
         let (first, weights) = axis_weights(p, sigma, low, cell, n);
         let x = p - low;
         let face = |i: usize| (cell * i as f64 - x) / sigma;
-        // A face in σ: i·cell and x are rounded, their difference, and the quotient errs by a division's error.
+        // A face in σ: i·cell and x are rounded, their difference, and the quotient errs by a division's error. Of ellipsoids σ and
+        // the cell are products themselves.
+        let of_shape = if blob.aspect != 1.0 || self.spec.aspect != 1.0 { 1.0 } else { 0.0 };
         let face_error = |i: usize| {
             let at = cell * i as f64;
-            (U * (at.abs() + x.abs() + (at - x).abs()) / sigma + DIVISION_ERROR * U * face(i).abs()) * (1.0 + 8.0 * U)
+            (U * ((1.0 + of_shape) * at.abs() + x.abs() + (at - x).abs()) / sigma
+                + (DIVISION_ERROR + of_shape) * U * face(i).abs())
+                * (1.0 + 8.0 * U)
         };
         // The ends of the range: x, 3σ, their sum, 1/h and the product are rounded once each. A cell left out or let in
         // lies that near to the cut, where the density is φ(3).
-        let range_error = 5.0 * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
+        let range_error = (5.0 + 3.0 * of_shape) * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
         let weight = |i: usize| if (first..first + weights.len()).contains(&i) { weights[i - first] } else { 0.0 };
         let beyond = |v: f64, e: f64| v.abs() - e >= DEPOSIT_CUT_SIGMA;
         let of = |i: usize| {
@@ -120,10 +129,10 @@ impl Scene {
 const SHARE: f64 = 0.5 / 0.997_300_203_936_739_8;
 /// The normal density at 3σ over erf(3/√2).
 const PHI_3: f64 = 4.44e-3;
-/// Roundings of a deposit that are relative: the mass 5 (4 products, a constant), quanta a mass 2, the product with the
+/// Roundings of a deposit that are relative: the mass 6 (5 products, a constant), quanta a mass 2, the product with the
 /// share and the share's two 3, adding ½ before the cut to whole quanta 1; and of the sum: two words to f32, their
-/// sum, the density of a quantum and its product 5.
-const ROUNDINGS: f64 = 16.0;
+/// sum, the density of a quantum (one more for the cells' shape) and its product 6.
+const ROUNDINGS: f64 = 18.0;
 
 /// Error of erf(c/√2), c the face `a` cut to ±3 that is itself off by `e`.
 fn erf_error(a: f64, e: f64) -> f64 {
@@ -141,9 +150,15 @@ fn scattered(n: u32) -> Vec<Blob> {
     let blob = |i: u32| {
         let ([a, b, c, d], [e, ..]) = (uniforms(0x64123, 0, i, 0), uniforms(0x64123, 1, i, 0));
         let position = DVec3::new(20.0 * a - 8.0, 12.0 * b, 9.0 * c - 40.0);
-        Blob { position, sigma: 0.004 * 500f64.powf(d), kappa: 10f64.powf(3.0 * e - 2.0) }
+        Blob { aspect: 1.0, position, sigma: 0.004 * 500f64.powf(d), kappa: 10f64.powf(3.0 * e - 2.0) }
     };
     (0..n).map(blob).collect()
+}
+
+/// The same, from a fiftieth to five times as high as wide.
+fn ellipsoids(n: u32) -> Vec<Blob> {
+    let shaped = |(b, i): (Blob, u32)| Blob { aspect: 0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0]), ..b };
+    scattered(n).into_iter().zip(0..).map(shaped).collect()
 }
 
 fn paper() -> Vec<Blob> {
@@ -153,7 +168,7 @@ fn paper() -> Vec<Blob> {
         let center = b.center;
         generate_box(b, i, 1, Form::Centred, 1.0, 0.6)
             .into_iter()
-            .map(move |g| Blob { position: center + g.position, sigma: g.sigma, kappa: g.kappa })
+            .map(move |g| Blob { aspect: g.aspect, position: center + g.position, sigma: g.sigma, kappa: g.kappa })
             .collect::<Vec<_>>()
     };
     boxes.iter().zip(0..).flat_map(of_box).collect()
@@ -167,7 +182,7 @@ fn at_the_cut() -> Vec<Blob> {
         let sigma = 0.02 + 0.1 * a;
         // Cells of 1 from 0 on: the face at 5 lies 3σ(1 ± 1e-6) away.
         let x = 5.0 - 3.0 * sigma * (1.0 + 2e-6 * (b - 0.5));
-        Blob { position: DVec3::new(x, 4.5, 3.5), sigma, kappa: 1.0 / sigma.powi(3) }
+        Blob { aspect: 1.0, position: DVec3::new(x, 4.5, 3.5), sigma, kappa: 1.0 / sigma.powi(3) }
     };
     (0..4000).map(blob).collect()
 }
@@ -177,10 +192,11 @@ fn compiler() -> Compiler {
 }
 
 fn scenes() -> Vec<(&'static str, Scene)> {
-    let at = |x: f64, sigma, kappa| Blob { position: DVec3::splat(x), sigma, kappa };
-    let cells = GridSpec { n_cells: UVec3::splat(9), cell: 1.0, low: DVec3::ZERO };
+    let at = |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::splat(x), sigma, kappa };
+    let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(9), cell: 1.0, low: DVec3::ZERO };
     vec![
         ("scattered", Scene::fitted(&scattered(3000), 48)),
+        ("ellipsoids", Scene::fitted(&ellipsoids(3000), 48)),
         ("the paper's 554", Scene::fitted(&paper(), 64)),
         ("at the cut", Scene::new(&cells, &at_the_cut())),
         ("a speck", Scene::new(&cells, &[at(4.5, 1e-4, 3.0)])),
@@ -211,11 +227,11 @@ fn every_cell_is_within_its_bound() {
 #[test]
 fn mass_is_kept() {
     let mut gpu = Gpu::new();
-    for blobs in [scattered(3000), paper()] {
+    for blobs in [scattered(3000), ellipsoids(3000), paper()] {
         let scene = Scene::fitted(&blobs, 64);
-        let volume = scene.spec.cell.powi(3);
+        let volume = scene.spec.cell_volume();
         let values = scene.run(&mut gpu, &compiler());
-        let (found, expected) = (values.iter().sum::<f64>() * volume, scene.blobs.iter().map(mass).sum::<f64>());
+        let (found, expected) = (values.iter().sum::<f64>() * volume, scene.blobs.iter().map(Blob::mass).sum::<f64>());
         let bound = scene.bounds().iter().sum::<f64>() * volume;
         println!("mass {found} of {expected}, relative error {:e}", found / expected - 1.0);
         // Every cell's bound at once, and f64's own: the weights of one axis cannot err all to one side, but may.
@@ -239,8 +255,8 @@ fn sums_do_not_depend_on_the_order_nor_on_the_run() {
 fn two_words_hold_what_overflows_one() {
     // A hundred times the heaviest particle in one cell: 100·2³¹ quanta.
     let mut gpu = Gpu::new();
-    let cells = GridSpec { n_cells: UVec3::splat(3), cell: 1.0, low: DVec3::ZERO };
-    let scene = Scene::new(&cells, &[Blob { position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100]);
+    let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(3), cell: 1.0, low: DVec3::ZERO };
+    let scene = Scene::new(&cells, &[Blob { aspect: 1.0, position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100]);
     let values = scene.run(&mut gpu, &compiler());
     let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
     assert_within_and_say("overflow", &values, &truths, &bounds);

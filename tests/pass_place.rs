@@ -23,7 +23,7 @@ fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
     let particle = |i: u32, spread: f64| {
         let [a, b, c, d] = uniforms(0x91ace, 0, i, 0);
         let position = spread * (DVec3::new(a, b, c) - 0.5) + 1e4;
-        Particle { position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
+        Particle { aspect: 1.0, position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
     };
     let cloud = |n: u32, spread: f64, position, wind| Cloud {
         source: CloudSource::Particles((0..n).map(|i| particle(i, spread)).collect()),
@@ -67,7 +67,7 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
     let (positions, sigmas): (Vec<DVec3>, Vec<f64>) = given.map(|g| (g.position, g.sigma)).unzip();
     let list = |c: &Cloud, g: &Group| match &c.source {
         CloudSource::Particles(list) => list.iter().map(|p| ParticleRecord::new(p, g)).collect::<Vec<_>>(),
-        CloudSource::Boxes { .. } => vec![],
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) => vec![],
     };
     let particles = clouds.iter().zip(&groups).flat_map(|(c, g)| list(c, g)).collect();
     let i_group = groups.iter().zip(0..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();

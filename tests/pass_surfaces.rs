@@ -335,7 +335,7 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut gpu = Gpu::new();
     let format = TargetFormat::Rgba16f;
     let over = |behind| Sprites::new(&gpu.device, &gpu.compiler, format, false, behind).expect("sprites");
-    let (alone, behind) = (over([false; 5]), over([true, false, false, false, false]));
+    let (alone, behind) = (over([false; 6]), over([true, false, false, false, false, false]));
     let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format, false).expect("surfaces");
     let mut color = Image::color_target(&gpu.device, "test.target", 8, 4, format).expect("a target");
     let mut depth = Image::depth(&gpu.device, "test.depth", 8, 4).expect("depth");

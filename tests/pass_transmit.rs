@@ -21,12 +21,20 @@ use harness::{Gpu, assert_within};
 use nimbus::model::light::Light;
 use nimbus::passes::transmit::Transmit;
 use sums::PLAIN;
-use ways::{case, in_cloud, room, sun};
+use ways::{Case, case, case_of_cells, in_cloud, room, sun};
 
 #[test]
 fn marches_agree_with_the_reference_at_every_step_size() {
+    agree_at_every_step_size(case());
+}
+
+#[test]
+fn through_flat_cells_too() {
+    agree_at_every_step_size(case_of_cells(0.25));
+}
+
+fn agree_at_every_step_size(case: Case) {
     let mut gpu = Gpu::new();
-    let case = case();
     // The outermost cells hold nothing: without that the density would jump at the hull of the centres.
     let n = case.spec.n_cells.as_usizevec3();
     let outer = |i: usize| {

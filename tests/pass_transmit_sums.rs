@@ -28,7 +28,7 @@ use ways::{Case, case, in_cloud, room, sun};
 fn block() -> Case {
     let mut r = Random(23);
     let n = UVec3::new(40, 12, 12);
-    let spec = GridSpec { n_cells: n, cell: 0.5, low: DVec3::new(-10.0, -3.0, -3.0) };
+    let spec = GridSpec { aspect: 1.0, n_cells: n, cell: 0.5, low: DVec3::new(-10.0, -3.0, -3.0) };
     let cell = |i: u32| [i % n.x, i / n.x % n.y, i / (n.x * n.y)];
     let inner = |c: [u32; 3]| (0..3).all(|k| c[k] > 0 && c[k] + 1 < n[k]);
     let density = (0..n.x * n.y * n.z).map(|i| if inner(cell(i)) { 0.1 } else { 0.0 }).collect();

@@ -256,7 +256,7 @@ fn scattered(n: u32, nearest: f64) -> (Vec<Blob>, Vec<DVec3>) {
         let [a, b, c, d] = lots(2 * i);
         let depth = nearest + 8.0 * f64::from(n - i) / f64::from(n);
         let position = DVec3::new((2.0 * a - 1.0) * depth, (2.0 * b - 1.0) * depth, -depth);
-        Blob { position, sigma: 0.1 + c, kappa: 0.4 * d }
+        Blob { aspect: 1.0, position, sigma: 0.1 + c, kappa: 0.4 * d }
     };
     let color = |i: u32| DVec3::from_slice(&lots(2 * i + 1)[..3]);
     ((0..n).map(blob).collect(), (0..n).map(color).collect())
@@ -264,7 +264,7 @@ fn scattered(n: u32, nearest: f64) -> (Vec<Blob>, Vec<DVec3>) {
 
 #[test]
 fn one_blob_at_two_pixels() {
-    let blob = Blob { position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
+    let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
     let color = DVec3::new(0.2, 0.5, 2.0);
     let image = render(&view(5, 3), &[blob], &[color], &[0]);
     // Centre pixel: b = 0, τ = √(2π)κσ. Column 3 of the middle row: direction (2·3.5/5 − 1)·5/3 = 2/3 to the
@@ -280,13 +280,13 @@ fn one_blob_at_two_pixels() {
     let raised = Blob { position: blob.position + DVec3::X + DVec3::Y, ..blob };
     let image = render(&moved, &[raised], &[color], &[0]);
     assert!(image[2][3] > image[12][3]);
-    assert!((alpha(&blob, 0.0) + (-0.6 * SQRT_TAU).exp_m1()).abs() < 1e-15);
+    assert!((alpha(blob.deepest()) + (-0.6 * SQRT_TAU).exp_m1()).abs() < 1e-15);
 }
 
 #[test]
 fn what_is_behind_near_or_absent_is_not_drawn() {
     let zeros = vec![[0.0; 4]; 15];
-    let at = |z| Blob { position: DVec3::Z * z, sigma: 1.0, kappa: 0.6 };
+    let at = |z| Blob { aspect: 1.0, position: DVec3::Z * z, sigma: 1.0, kappa: 0.6 };
     for z in [3.0, 0.0, -0.0999, f64::NAN] {
         assert_eq!(render(&view(5, 3), &[at(z)], &[DVec3::ONE], &[0]), zeros);
     }
@@ -311,7 +311,7 @@ fn equal_colors_hide_the_order_and_equal_layers_multiply() {
     for (a, b) in a.iter().zip(&b) {
         assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-13) && (a[2] - 0.9 * a[3]).abs() < 1e-13);
     }
-    let layer = Blob { position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
+    let layer = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
     let image = render(&view, &[layer; 7], &[color; 7], &[0, 1, 2, 3, 4, 5, 6]);
     let one = render(&view, &[layer], &[color], &[0]);
     assert!(image.iter().zip(&one).all(|(n, one)| (n[3] - (1.0 - (1.0 - one[3]).powi(7))).abs() < 1e-14));
@@ -321,8 +321,8 @@ fn equal_colors_hide_the_order_and_equal_layers_multiply() {
 fn layers(view: &View, blobs: &[Blob], radiance: &[DVec3], i: u32, j: u32) -> Vec<(f64, DVec3)> {
     let d = view.ray(i, j);
     let seen = blobs.iter().zip(radiance).filter(|(b, _)| b.position.dot(view.pose.forward) >= view.near);
-    let with_b = seen.map(|(blob, l)| (blob, l, blob.position.cross(d).length() / d.length()));
-    with_b.filter(|(blob, _, b)| *b <= view.cutoff * blob.sigma).map(|(blob, l, b)| (alpha(blob, b), *l)).collect()
+    let lines = seen.map(|(blob, l)| (blob.along(blob.position, d), *l));
+    lines.filter(|(line, _)| line.off <= view.cutoff).map(|(line, l)| (alpha(line.tau()), l)).collect()
 }
 
 #[test]
@@ -375,12 +375,12 @@ fn half_float_targets_stay_within_their_bound() {
 fn a_sprites_edge_may_fall_either_way() {
     // b = 2.4 at column 4 (see above): the cut at 3σ lies 1e-7 inside, then outside.
     for sigma in [0.8 * (1.0 - 1e-7), 0.8 * (1.0 + 1e-7)] {
-        let blob = Blob { position: DVec3::NEG_Z * 3.0, sigma, kappa: 0.6 };
+        let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma, kappa: 0.6 };
         let bound = |edge| {
             let rounding = Rounding::of(FilmFormat::Rgba32f, 0.0, edge);
             render_with_bound(&view(5, 3), &[blob], &[DVec3::ONE], &[0], &rounding).1[9][3]
         };
-        let step = alpha(&blob, 2.4);
+        let step = alpha(blob.deepest() * (-0.5 * (2.4 / sigma).powi(2)).exp());
         assert!(bound(1e-8) < 1e-6 && (bound(1e-6) - step).abs() < 1e-6);
     }
     let kappa = box_kappa(&one_box(1, DVec3::ONE, 2.0), Form::Centred, 1.0, 1.0);

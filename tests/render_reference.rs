@@ -26,6 +26,8 @@ fn temp() -> tempfile::TempDir {
 const PLAIN: &str = "cloud.0.texture=\"none\"";
 const CUBES: [&str; 3] = ["scenes/cubes-554.toml", "--size", "100x75"];
 
+const FLAT: [&str; 3] = ["tests/data/flat.toml", "--size", "100x75"];
+
 /// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one way. A pixel on a sprite's
 /// edge may be drawn or not: e^{−4.5} of its α.
 const RMSE_OF_F32: f64 = 1e-5;
@@ -41,6 +43,10 @@ fn the_thin_reference_is_what_the_device_draws() {
         ("later, with wind", [&CUBES[..], &["--time", "3", "--set", "cloud.0.wind=[0.5,0,0]"]].concat()),
         ("facets of many particles", [&CUBES[..], &["--set", "lighting.facets_per_cloud=50"]].concat()),
         ("fewer by distance", [&CUBES[..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=20"]].concat()),
+        ("ellipsoids", FLAT.to_vec()),
+        ("ellipsoids that grow", [&FLAT[..], &["--time", "2", "--set", "cloud.0.grow_to=1.5"]].concat()),
+        ("facets of many ellipsoids", [&FLAT[..], &["--set", "lighting.facets_per_cloud=20"]].concat()),
+        ("ellipsoids in chunks", [&FLAT[..], &["--set", "draw.path=\"sprites\"", "--set", "draw.chunks=3"]].concat()),
         ("surfaces that nothing lights", vec!["scenes/ground.toml", "--size", "80x60", "--set", unlit]),
     ] {
         render(&dir, "thin.exr", &scene, &["--reference", "thin"]);

@@ -28,6 +28,46 @@ vec2 tangents(float a, float z, float r) {
     return vec2(-1e9, 1e9);
 }
 
+// An ellipsoid with an axis along y (docs/model.md §14): what its aspect a and the camera make of it.
+struct Shape {
+    // The scene's y along the camera's right, up and forward.
+    vec3 y;
+    // a^2, and 1/a^2.
+    float square, inverse;
+    // Greatest depth of a line through its centre over that of one across, and the widest sigma over that.
+    float wider;
+};
+
+Shape shape_of(Camera camera, float aspect) {
+    return Shape(vec3(camera.right.y, camera.up.y, camera.forward.y), aspect * aspect, 1.0 / (aspect * aspect), max(aspect, 1.0));
+}
+
+// |M v|^2, M = diag(1, 1/a, 1) along the scene's axes, of v along the camera's: what stands across y by itself, as the two may differ by
+// orders of magnitude.
+float white_square(Shape shape, vec3 v) {
+    float up = dot(shape.y, v);
+    vec3 across = v - up * shape.y;
+    return dot(across, across) + shape.inverse * up * up;
+}
+
+// Slopes of the two tangents as `tangents` gives them, along right (k = 0) or up (1): planes through the eye touch where (n.c)^2 = r^2 n.S n, S
+// the ellipsoid's matrix and n = (1, -slope).
+vec2 tangents_of(Shape shape, vec3 v, int k, float r) {
+    float more = shape.square - 1.0;
+    float s_xx = 1.0 + more * shape.y[k] * shape.y[k], s_zz = 1.0 + more * shape.y.z * shape.y.z;
+    float s_xz = more * shape.y[k] * shape.y.z;
+    // As they are at depth 1: no square of a length leaves what f32 holds.
+    float s = v[k] / v.z, q = r / v.z, q2 = q * q;
+    float a = 1.0 - q2 * s_zz;
+    if (v.z > 0.0 && a > 0.0) {
+        float b = s - q2 * s_xz;
+        // b^2 - a c over q^2: what cancels is left out.
+        float root = q * sqrt(max(s_xx + s_zz * s * s - 2.0 * s_xz * s - q2 * (s_xx * s_zz - s_xz * s_xz), 0.0));
+        return vec2((b - root) / a, (b + root) / a);
+    }
+    return vec2(-1e9, 1e9);
+}
+
 // The first pixel and the one after the last whose centres lie within [low, high], in pixels from the first one's edge.
 uvec2 pixels_within(float low, float high, uint n) {
     vec2 at = vec2(ceil(low - 0.5 - SNAP), floor(high + 0.5 + SNAP));
@@ -41,4 +81,24 @@ uvec4 silhouette(Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
     vec2 x = (tangents(v.x, v.z, r) + camera.tan_x) / pixel.x;
     vec2 y = (camera.tan_y - tangents(v.y, v.z, r).yx) / pixel.y;
     return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
+}
+
+// The same of an ellipsoid out to r, its sigma along x and z times whatever reach.
+uvec4 silhouette_of(Shape shape, Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
+    vec2 x = (tangents_of(shape, v, 0, r) + camera.tan_x) / pixel.x;
+    vec2 y = (camera.tan_y - tangents_of(shape, v, 1, r).yx) / pixel.y;
+    return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
+}
+
+// z^2/(2 sigma^2) |M' (delta.y, -delta.x, s.x delta.y - s.y delta.x)|^2, M' = M's cofactors, is b^2/(2 sigma^2) |M ray|^2 of a ray delta from the centre's slopes s,
+// b where the ellipsoid is made a ball of sigma: as (xx, 2 xy, yy) of delta, times `scale` in place of z^2/(2 sigma^2).
+vec3 conic_of(Shape shape, vec2 s, float scale) {
+    // What a unit of delta along each axis makes of the cross product of centre and ray.
+    vec3 x = vec3(0.0, 1.0, -s.y), y = vec3(-1.0, 0.0, s.x);
+    float up_x = dot(shape.y, x), up_y = dot(shape.y, y);
+    vec3 across_x = x - up_x * shape.y, across_y = y - up_y * shape.y;
+    return scale * vec3(
+        shape.inverse * dot(across_x, across_x) + up_x * up_x,
+        2.0 * (shape.inverse * dot(across_x, across_y) + up_x * up_y),
+        shape.inverse * dot(across_y, across_y) + up_y * up_y);
 }

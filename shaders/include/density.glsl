@@ -10,14 +10,20 @@
 #define WEIGHT double
 #define WEIGHTS2 dvec2
 #define WEIGHTS4 dvec4
-#define IN_CELLS(x) ((x) / double(push.grid.cell))
+#define IN_CELLS(x) ((x) / double(push.grid.cell) * dvec3(1.0, push.grid.inv_aspect, 1.0))
 #else
 #define PLACE vec3
 #define WEIGHT float
 #define WEIGHTS2 vec2
 #define WEIGHTS4 vec4
-#define IN_CELLS(x) (x) * push.grid.inv_cell
+#define IN_CELLS(x) ((x) * push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0))
 #endif
+
+// Edges of a cell.
+PLACE cell_edges() { return push.grid.cell * PLACE(1.0, push.grid.aspect, 1.0); }
+
+// Lengths along d as cells are wide: of a unit vector 1 where cells are cubes.
+WEIGHT in_widths(PLACE d) { return length(PLACE(d.x, d.y * push.grid.inv_aspect, d.z)); }
 
 float cell_at(int c) { return texelFetch(density, c).x; }
 

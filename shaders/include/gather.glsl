@@ -148,7 +148,7 @@ void shade_all(inout Stencil seen, Pairing pairing, Veil veil, vec3 p, Cell cell
 float attenuation(vec3 p, vec3 q, bool wanted) {
     vec3 d = q - p;
     vec3 low = push.grid.low;
-    vec3 high = low + push.grid.cell * vec3(push.grid.n_cells);
+    vec3 high = low + cell_edges() * vec3(push.grid.n_cells);
     // A way along an axis' planes divides by zero: the infinities sort themselves out, 0/0 is kept out.
     vec3 inverse = 1.0 / mix(d, vec3(1e-30), equal(d, vec3(0.0)));
     vec3 a = (low - p) * inverse, b = (high - p) * inverse;
@@ -157,7 +157,7 @@ float attenuation(vec3 p, vec3 q, bool wanted) {
     float leave = min(min(farther.x, farther.y), min(farther.z, 1.0));
     float part = max(leave - enter, 0.0);
     float distance = part * length(d);
-    uint n = wanted && distance > 0.0 ? clamp(uint(ceil(distance / push.step_length)), 1u, push.pair_steps) : 0u;
+    uint n = wanted && distance > 0.0 ? clamp(uint(ceil(part * in_widths(d) / push.step_length)), 1u, push.pair_steps) : 0u;
     float sum = 0.0;
     for (uint k = 0; k < n; ++k) {
         sum += density_at(p + d * (enter + part * (float(k) + 0.5) / float(n)));

@@ -1,6 +1,6 @@
 // The records of src/layout/, in std430. tests/layout.rs compares names, offsets and sizes.
 
-struct Particle { vec3 position; float sigma; vec3 color; float kappa; };
+struct Particle { vec3 position; float sigma; vec3 color; float kappa; float aspect; float unused; vec2 unused_too; };
 struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uint seed; uint i_box; uint i_first; uint n_particles; uint form; uint unused; };
 struct Disc { vec3 center; float radius; vec3 drift; float outflow; float sigma; float sigma_spread; float rise; float warmth_spread; float core; float life_spread; float cooling; float growth; float kappa; float inv_fade_in; float inv_fade_out; float base; float inv_over; float lift; uint dilution; uint seed; uint i_first; uint n_particles; uint generation; uint phase; };
 struct Placed { vec3 position; float sigma; };
@@ -23,7 +23,7 @@ struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
 struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; uint n_sources; };
 struct Node { uint n_nodes; };
 struct Light { vec3 toward; uint kind; vec3 energy; float constant; vec3 position; float radius; float cone_scale; float cone_offset; vec2 unused; };
-struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; };
+struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; float aspect; float inv_aspect; vec2 unused; };
 struct Camera { vec3 eye; float tan_x; vec3 right; float tan_y; vec3 up; float near; vec3 forward; float unused; };
 
 // In place of a particle's number: an entry that draws nothing.

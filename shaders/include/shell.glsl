@@ -2,6 +2,11 @@
 
 #include "density.glsl"
 
+// 1: blobs may be ellipsoids (docs/model.md §14).
+#ifndef ELLIPSOIDS
+#define ELLIPSOIDS 0
+#endif
+
 const float SHELL_SIGMA = 1.5;
 // Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard deviation s, here 2 sigma, to
 // degree 5.
@@ -9,6 +14,8 @@ const float SMOOTH_SIGMA = 4.47213595499958;
 const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;
+// No blob is flatter, nor its inverse higher.
+const float LEAST_ASPECT = 1e-3;
 
 vec3 unit_or(vec3 v, vec3 otherwise) {
     float l = length(v);
@@ -16,7 +23,10 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
 }
 
 // Against the gradient of the density smoothed to 2 scale where that is well conditioned, else away from the centre.
-vec3 normal_at(vec3 p, float scale, vec3 cloud_center) {
+vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
+#if ELLIPSOIDS
+    vec3 axes = vec3(1.0, aspect, 1.0);
+#endif
     vec3 gradient = vec3(0.0);
     float sum = 0.0;
     // A quadrature of degree 5 on the sphere: 6 axes and 8 diagonals.
@@ -31,19 +41,45 @@ vec3 normal_at(vec3 p, float scale, vec3 cloud_center) {
             d = vec3((k & 1) == 0 ? 1.0 : -1.0, (k & 2) == 0 ? 1.0 : -1.0, k < 10 ? 1.0 : -1.0) * 0.57735026919;
             w = 3.0 / 40.0;
         }
+#if ELLIPSOIDS
+        float rho = w * density_at(p + SMOOTH_SIGMA * scale * (axes * d));
+#else
         float rho = w * density_at(p + SMOOTH_SIGMA * scale * d);
+#endif
         gradient += rho * d;
         sum += rho;
     }
     float slope = length(gradient);
     float condition = sum > 0.0 ? slope / sum : 0.0;
+#if ELLIPSOIDS
+    // The gradient is of what is stretched to a ball.
+    gradient /= axes;
+    slope = length(gradient);
+#endif
     vec3 outward = unit_or(p - cloud_center, vec3(0.0, 1.0, 0.0));
     float t = smoothstep(CONDITION_LOW, CONDITION_HIGH, condition);
     return t > 0.0 ? unit_or(t * (-gradient / slope) + (1.0 - t) * outward, outward) : outward;
 }
 
-// pi R^2 (1 - e^-tau) of a blob, R = 3 sigma.
-float area_of(float sigma, float kappa) {
+// Where the shell of a blob about p has the normal n.
+vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
+#if ELLIPSOIDS
+    vec3 to = vec3(n.x, aspect * aspect * n.y, n.z);
+    return p + SHELL_SIGMA * scale / sqrt(dot(n, to)) * to;
+#else
+    return p + SHELL_SIGMA * scale * n;
+#endif
+}
+
+// pi R^2 (1 - e^-tau) of a blob, R = 3 sigma; of an ellipsoid the mean over all directions it is seen from.
+float area_of(float sigma, float aspect, float kappa) {
     float radius = 3.0 * sigma;
-    return PI * radius * radius * one_minus_exp(SQRT_TAU * kappa * sigma);
+    float area = PI * radius * radius, tau = SQRT_TAU * kappa * sigma;
+#if ELLIPSOIDS
+    // Knud Thomsen's formula for an ellipsoid's surface, a quarter of which is that mean.
+    float wider = exp2(log2((1.0 + 2.0 * exp2(1.6075 * log2(aspect))) / 3.0) / 1.6075);
+    area *= wider;
+    tau *= aspect / wider;
+#endif
+    return area * one_minus_exp(tau);
 }

@@ -3,6 +3,7 @@
 mod results;
 mod stress;
 mod study;
+mod weather;
 
 use std::path::PathBuf;
 
@@ -12,13 +13,14 @@ use crate::io::scene_file::MAX_SIDE;
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
+pub use weather::WeatherArgs;
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
 #[derive(Debug, Parser)]
 #[command(version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
     nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus report before after -o report.html\n  \
-    nimbus inspect scenes/cubes-554.toml\n  nimbus devices\n\n\
+    nimbus inspect scenes/cubes-554.toml\n  nimbus weather scenes/weather/katrina.nc\n  nimbus devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  101 a fault of nimbus itself; 130 interrupted.")]
 pub struct Args {
     #[command(subcommand)]
@@ -98,6 +100,19 @@ pub enum Command {
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
     Devices(DevicesArgs),
+    /// Say what is in a weather file, and what clouds there are in it
+    ///
+    /// Reads output of WRF as NetCDF of every kind (classic, 64-bit offset, CDF-5, NetCDF-4) and prints variables, steps with
+    /// their times, map, and of every step the clouds: how many cells have some, the greatest extinction and the greatest optical
+    /// depth straight up, base and top. Needs no Vulkan device.
+    ///
+    /// Extinction is 3/2 q ρ/(ρ_x r_x), summed over cloud water (10 µm droplets), ice (30 µm) and snow (100 µm); rain and graupel are left
+    /// out. Where a file has none of the three, clouds are diagnosed from relative humidity, and the output says so
+    /// (docs/model.md §14).
+    ///
+    /// P, PB, T, PH, PHB and the attributes DX and DY are needed; what else is missing is told. What is negative, NaN or a
+    /// fill value among mixing ratios is counted and taken for none; elsewhere it is an error.
+    Weather(WeatherArgs),
 }
 
 /// What every command with a scene takes.

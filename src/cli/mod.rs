@@ -17,6 +17,7 @@ mod report;
 mod stress;
 mod tradeoff;
 mod tradeoff_table;
+mod weather;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -59,6 +60,7 @@ pub fn main() -> ExitCode {
         Command::Stress(a) => stress::run(a, &STOP, &GRACEFUL),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
+        Command::Weather(a) => weather::run(a),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -45,7 +45,7 @@ impl Chunks {
         [width, height]: [u32; 2],
         format: TargetFormat,
         [n_max, n_chunks]: [u32; 2],
-        variant: [bool; 5],
+        variant: [bool; 6],
     ) -> Result<Chunks> {
         let named = |error| match error {
             Error::Limit { what } => {

@@ -31,7 +31,10 @@ impl Culling {
         if !culls(scene) {
             return Ok(None);
         }
-        let (n, variant) = (scene.n_particles() as u32, [scene.draw.count.is_some(), scene.draw.threshold.is_some()]);
+        let (n, variant) = (
+            scene.n_particles() as u32,
+            [scene.draw.count.is_some(), scene.draw.threshold.is_some(), scene.has_ellipsoids()],
+        );
         let count = |name| Buffer::new::<KeptRecord>(device, name, 1, Place::Readback);
         let counts = [count("cull.count.even")?, count("cull.count.odd")?];
         Ok(Some(Culling { cull: Cull::new(device, compiler, n, variant)?, counts }))

@@ -74,7 +74,9 @@ impl Drawing {
         let has_tiles = has_blobs && path == DrawPath::Tiles;
         let behind = !scene.surfaces.is_empty();
         let counted = scene.draw.count.is_some();
-        let variant = [behind, is_grouped(scene), counted, scene.is_textured(), scene.draw.threshold.is_some()];
+        let [textured, threshold, ellipsoids] =
+            [scene.is_textured(), scene.draw.threshold.is_some(), scene.has_ellipsoids()];
+        let variant = [behind, is_grouped(scene), counted, textured, threshold, ellipsoids];
         let shells = scene.draw.impostors != ImpostorMode::Off;
         let [_, of_shells @ ..] = variant;
         let impostors = || Impostors::new(device, compiler, scene, format, (lit, of_shells));
@@ -84,9 +86,9 @@ impl Drawing {
             _ => 0,
         };
         let chunks = || {
-            let [grouped, counted, textured, threshold] = of_shells;
+            let [grouped, counted, textured, threshold, ellipsoids] = of_shells;
             let (size, n) = ([film.width, film.height], [scene.n_particles() as u32, n_chunks]);
-            Chunks::new(device, compiler, size, format, n, [lit, grouped, counted, textured, threshold])
+            Chunks::new(device, compiler, size, format, n, [lit, grouped, counted, textured, threshold, ellipsoids])
         };
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
         let scenery = || -> Result<(Surfaces, Image)> {

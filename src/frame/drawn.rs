@@ -20,8 +20,10 @@ pub fn drawn(scene: &Scene, groups: &[Group], setting: &Setting, culls: bool) ->
     let mut n_drawn = 0;
     let of = |group: &Group| {
         let origin = scene.clouds[group.i_cloud].origin_at(setting.time_s) - eye;
-        let half = group.half_extent + DVec3::splat(group.gust_reach);
-        let radius = scene.draw.cutoff * group.sigma_max;
+        // Of an ellipsoid what it reaches farther along some axis than along its shortest is added to the box.
+        let reach = scene.draw.cutoff * group.sigma_bounds();
+        let radius = reach.min_element();
+        let half = group.half_extent + DVec3::splat(group.gust_reach) + (reach - DVec3::splat(radius));
         let in_view = !culls || frustum.may_show(origin + group.center, half, radius, lengths);
         let drawn = match scene.draw.count {
             _ if !in_view => Drawn::NOTHING,

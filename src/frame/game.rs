@@ -70,7 +70,7 @@ impl Setting {
             scene.lighting_bounds(groups, time_s, DEPOSIT_CUT_SIGMA).unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let light_origin = 0.5 * (low + high);
         let half = 0.5 * (high - low);
-        let grid = GridSpec::fit(-half, half, scene.lighting.grid);
+        let grid = GridSpec::fit_cells(-half, half, scene.lighting.grid, Scene::mean_aspect(groups));
         Ok(Setting { time_s, pose, light_origin, grid, radius: half.length() })
     }
 }
@@ -167,7 +167,7 @@ impl Game {
 
     /// Of the sort's keys.
     fn sort_bits(&self, groups: &[Group], radius: f64) -> u32 {
-        let sigmas = groups.iter().filter(|g| g.n_particles > 0).map(|g| g.sigma_mean);
+        let sigmas = groups.iter().filter(|g| g.n_particles > 0).map(|g| g.sigma_mean * g.aspects[0].min(1.0));
         self.scene.draw.sort_bits.of(radius, sigmas.fold(f64::INFINITY, f64::min))
     }
 
@@ -179,8 +179,8 @@ impl Game {
         let of = |g: &Group| Extent {
             center: origins[g.i_cloud] + g.center,
             half: g.half_extent + DVec3::splat(g.gust_reach),
-            sigma_max: g.sigma_max,
-            sigma_mean: g.sigma_mean,
+            sigma_max: g.sigma_widest(),
+            sigma_mean: g.sigma_mean * g.aspects[0].min(1.0),
             n_particles: g.n_particles,
         };
         groups.iter().filter(|g| g.n_particles > 0).map(of).collect()

@@ -51,15 +51,21 @@ impl Impostors {
         compiler: &Compiler,
         scene: &Scene,
         format: TargetFormat,
-        (lit, variant): (bool, [bool; 4]),
+        (lit, variant): (bool, [bool; 5]),
     ) -> Result<Impostors> {
         let rules = Rules::of(scene);
         let ([width, height], n) = (rules.shell_size, scene.n_particles());
-        let [grouped, counted, textured, threshold] = variant;
+        let [grouped, counted, textured, threshold, ellipsoids] = variant;
         let of_sprites = || -> Result<OfSprites> {
             let n_texels = u64::from(width) * u64::from(height);
             Ok(OfSprites {
-                sprites: Sprites::new(device, compiler, FORMAT, lit, [false, grouped, counted, textured, threshold])?,
+                sprites: Sprites::new(
+                    device,
+                    compiler,
+                    FORMAT,
+                    lit,
+                    [false, grouped, counted, textured, threshold, ellipsoids],
+                )?,
                 image: Image::color_target(device, "impostors.drawn", width, height, FORMAT).map_err(|e| match e {
                     Error::Limit { what } => Error::limit(format!("draw.impostors: {what}")),
                     e => e,

@@ -220,10 +220,10 @@ pub fn target_format(format: FilmFormat) -> TargetFormat {
 pub fn n_deposits(scene: &Scene) -> f64 {
     let groups = scene.groups();
     let Some((low, high)) = scene.bounds(&groups, scene.time.start_s, DEPOSIT_CUT_SIGMA) else { return 0.0 };
-    let grid = GridSpec::fit(low, high, scene.lighting.grid);
+    let grid = GridSpec::fit_cells(low, high, scene.lighting.grid, Scene::mean_aspect(&groups));
     let blob = |g: &Group| {
-        let across = 2.0 * DEPOSIT_CUT_SIGMA * g.sigma_mean / grid.cell + 1.0;
-        let covered = DVec3::splat(across).min(grid.n_cells.as_dvec3());
+        let sigma = g.sigma_mean * DVec3::new(1.0, g.aspects[1], 1.0);
+        let covered = (2.0 * DEPOSIT_CUT_SIGMA * sigma / grid.edges() + 1.0).min(grid.n_cells.as_dvec3());
         f64::from(g.n_particles) * covered.x * covered.y * covered.z
     };
     scene.grown(&groups, scene.time.start_s).iter().map(blob).sum()

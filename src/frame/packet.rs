@@ -58,6 +58,7 @@ pub struct Extent {
     /// Relative to the lighting origin; their centres are within ± half of it.
     pub center: DVec3,
     pub half: DVec3,
+    /// In the direction that they are widest in; and the mean of the narrowest.
     pub sigma_max: f64,
     pub sigma_mean: f64,
     pub n_particles: u32,

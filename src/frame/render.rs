@@ -128,7 +128,7 @@ impl Renderer {
             lives: Lives::of_scene(device, compiler, scene)?,
             place: PlacePass::new(device, compiler)?,
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
-            facets: Facets::new(device, compiler)?,
+            facets: Facets::new(device, compiler, scene.has_ellipsoids())?,
             grouping,
             transmit: Transmit::new(device, compiler, has_second(scene), &scene.lighting.sums.into())?,
             first: First::new(device, compiler)?,

@@ -48,8 +48,8 @@ impl Tiling {
         [width, height]: [u32; 2],
         (format, behind): (TargetFormat, bool),
     ) -> Result<Tiling> {
-        // A particle is two texels, the light of a facet four.
-        let n_texels = (2 * scene.n_particles()).max(4 * scene.n_facets());
+        // A particle is three texels, the light of a facet four.
+        let n_texels = (3 * scene.n_particles()).max(4 * scene.n_facets());
         if n_texels > device.limits().max_texels {
             return Err(Error::limit(format!(
                 "draw.path = \"tiles\": {n_texels} texels of particles or facets are wanted, this device takes {} at most \
@@ -97,6 +97,7 @@ impl Tiling {
 fn variant(scene: &Scene, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
+        ellipsoids: scene.has_ellipsoids(),
         threshold: scene.draw.threshold.is_some(),
         lit: scene.lighting.mode != LightingMode::None,
         grouped: is_grouped(scene),
@@ -121,7 +122,7 @@ fn tau_most(scene: &Scene) -> f64 {
         let growth = scene.clouds[g.i_cloud].growth.to.max(1.0);
         // One particle stands for all of its group at most.
         let denser = if scene.draw.count.is_some_and(|c| c.conserve) { f64::from(g.n_particles) } else { 1.0 };
-        SQRT_TAU * g.kappa_max * g.sigma_max * growth * denser
+        SQRT_TAU * g.kappa_max * g.sigma_widest() * growth * denser
     };
     scene.groups().iter().map(of).fold(0.0, f64::max)
 }

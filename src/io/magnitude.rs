@@ -85,12 +85,15 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
             let kappa = "κ = optical_depth / (√(2π) σ)";
             too_great(&groups, kappa, GREATEST, &|g| g.kappa_max)
                 .or_else(|| too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &|g| g.mass_max))
-                .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_max))
+                .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_widest()))
         }
         CloudSource::Disc(disc) => groups.first().and_then(|group| disc_beyond(disc, group)),
         CloudSource::Particles(list) => {
-            let (i, heaviest) =
-                list.iter().map(|p| mass(p.kappa, p.sigma)).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+            let (i, heaviest) = list
+                .iter()
+                .map(|p| mass(p.kappa, p.sigma) * p.aspect)
+                .enumerate()
+                .max_by(|a, b| a.1.total_cmp(&b.1))?;
             if heaviest <= GREATEST_PRODUCT {
                 return None;
             }
@@ -113,9 +116,9 @@ pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
     let least = least_sigma(cloud) * to;
     // As great as a cloud may be that does not grow.
     expected("places", 2.0 * GREATEST, places)
-        .or_else(|| expected("σ", GREATEST, greatest(&|g| g.sigma_max)))
+        .or_else(|| expected("σ", GREATEST, greatest(&|g| g.sigma_widest())))
         .or_else(|| expected("κ (2π)^{3/2} σ³", GREATEST_PRODUCT, greatest(&|g| g.mass_max)))
-        .or_else(|| expected("κ σ", GREATEST_PRODUCT, greatest(&|g| g.kappa_max * g.sigma_max)))
+        .or_else(|| expected("κ σ", GREATEST_PRODUCT, greatest(&|g| g.kappa_max * g.sigma_widest())))
         .or_else(|| {
             let (low, found) = (shortest(LEAST * SIGMA_PER_RADIUS), rounded(least));
             (least < LEAST * SIGMA_PER_RADIUS).then(|| format!("σ, shrunk: expected at least {low}, found {found}"))
@@ -127,7 +130,7 @@ pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
 fn least_sigma(cloud: &Cloud) -> f64 {
     let sigmas: Vec<f64> = match &cloud.source {
         CloudSource::Boxes { .. } | CloudSource::Disc(_) => cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect(),
-        CloudSource::Particles(list) => list.iter().map(|p| p.sigma).collect(),
+        CloudSource::Particles(list) => list.iter().map(|p| p.sigma * p.aspect.min(1.0)).collect(),
     };
     sigmas.into_iter().filter(|sigma| *sigma > 0.0).fold(f64::INFINITY, f64::min)
 }
@@ -155,7 +158,7 @@ fn too_great(groups: &[Group], what: &str, greatest: f64, of: &dyn Fn(&Group) ->
 }
 
 /// A computed number in a message: its last digits say nothing.
-fn rounded(v: f64) -> String {
+pub fn rounded(v: f64) -> String {
     format!("{v:.3e}")
 }
 

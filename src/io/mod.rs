@@ -1,7 +1,7 @@
 //! Text and containers to plain data, and results to files.
 //!
 //! What goes in: a scene ([`scene_file`]), which names box files ([`box_file`]) and particle lists
-//! ([`particle_file`]). What comes out: images ([`image`]); every result is written through [`atomic`], so that
+//! ([`particle_file`]); weather models' output ([`weather`]). What comes out: images ([`image`]); every result is written through [`atomic`], so that
 //! a file is either the old one or the new one whole, and files that belong together through [`folder`].
 //!
 //! Every complaint about an input says file:line:column, or the `--set` argument, and what was expected.
@@ -32,3 +32,4 @@ mod toml_depth;
 pub mod toml_override;
 pub mod toml_section;
 pub mod toml_tree;
+pub mod weather;

@@ -1,18 +1,18 @@
-//! Particle lists: CSV with the header `x,y,z,sigma,kappa[,r,g,b]` in any order; `radius` may stand for
-//! sigma = radius / 3.
+//! Particle lists: CSV with the header `x,y,z,sigma,kappa[,sigma_y][,r,g,b]` in any order; `radius` may stand for
+//! sigma = radius / 3. With `sigma_y` sigma is that along x and z alone.
 
 use std::path::Path;
 
 use csv::{ReaderBuilder, StringRecord};
 use glam::DVec3;
 
-use super::magnitude::{LEAST, wrong_coordinate, wrong_size};
+use super::magnitude::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::suggest::{did_you_mean, list, shown};
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
-use crate::model::cloud::{Particle, SIGMA_PER_RADIUS};
+use crate::model::cloud::{LEAST_ASPECT, Particle, SIGMA_PER_RADIUS};
 
-const COLUMNS: [&str; 9] = ["x", "y", "z", "sigma", "radius", "kappa", "r", "g", "b"];
+const COLUMNS: [&str; 10] = ["x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b"];
 
 /// What a particle list begins with.
 pub const FIRST: &str = "a header x,y,z,sigma,kappa[,r,g,b]";
@@ -113,6 +113,7 @@ struct Columns {
     sigma: usize,
     /// Factor from the column to σ: 1, or 1/3 of a radius.
     sigma_factor: f64,
+    sigma_y: Option<usize>,
     kappa: usize,
     color: Option<[usize; 3]>,
 }
@@ -157,6 +158,7 @@ impl Columns {
             position: [need("x")?, need("y")?, need("z")?],
             sigma,
             sigma_factor,
+            sigma_y: find("sigma_y"),
             kappa: need("kappa")?,
             color,
         })
@@ -183,9 +185,17 @@ impl Columns {
         let coordinate = |i: usize, name: &str| bounded(i, name, &wrong_coordinate);
         let [x, y, z] = self.position;
         let name = if self.sigma_factor == 1.0 { "sigma" } else { "radius" };
+        let sigma = bounded(self.sigma, name, &|v| wrong_size(v, LEAST))? * self.sigma_factor;
+        let aspect = match self.sigma_y {
+            // Without a size there is no shape.
+            Some(_) if sigma == 0.0 => 1.0,
+            Some(i) => bounded(i, "sigma_y", &|v| wrong_height(v, sigma))? / sigma,
+            None => 1.0,
+        };
         Ok(Particle {
             position: DVec3::new(coordinate(x, "x")?, coordinate(y, "y")?, coordinate(z, "z")?),
-            sigma: bounded(self.sigma, name, &|v| wrong_size(v, LEAST))? * self.sigma_factor,
+            sigma,
+            aspect,
             kappa: size(self.kappa, "kappa")?,
             color: match self.color {
                 None => DVec3::ONE,
@@ -193,6 +203,16 @@ impl Columns {
             },
         })
     }
+}
+
+/// What is expected of σ along y, where `v` is none, beside `sigma` along x and z.
+fn wrong_height(v: f64, sigma: f64) -> Option<String> {
+    let expected = || {
+        let [low, high] = [LEAST_ASPECT, 1.0 / LEAST_ASPECT].map(|of| rounded(of * sigma));
+        format!("a number from {low} to {high}, a thousandth to a thousand times the other")
+    };
+    let within = LEAST_ASPECT * (1.0 - 1e-12)..=(1.0 + 1e-12) / LEAST_ASPECT;
+    (!within.contains(&(v / sigma))).then(expected)
 }
 
 #[cfg(test)]
@@ -207,8 +227,10 @@ mod tests {
     fn columns_come_in_any_order_and_colour_is_optional() {
         let list = good("kappa, b,g,r, radius,z,y,x\n2,0.3,0.2,0.1,6,-3,2,1\n");
         let position = DVec3::new(1.0, 2.0, -3.0);
-        let expected = Particle { position, sigma: 2.0, kappa: 2.0, color: DVec3::new(0.1, 0.2, 0.3) };
+        let expected = Particle { aspect: 1.0, position, sigma: 2.0, kappa: 2.0, color: DVec3::new(0.1, 0.2, 0.3) };
         assert_eq!(list, [expected]);
+        let flat = good("x,y,z,sigma,sigma_y,kappa\n1,2,-3,2,0.5,2\n0,0,0,0,7,1\n");
+        assert_eq!([flat[0].aspect, flat[1].aspect], [0.25, 1.0]);
         let plain = good("\n\"x\",y,z,sigma,kappa\r\n\r\n1,2,-3, 2.0 ,\"2\"\r\n \r\n");
         assert_eq!(plain, [Particle { color: DVec3::ONE, ..expected }]);
         assert_eq!(good("x,y,z,sigma,kappa"), []);
@@ -218,7 +240,7 @@ mod tests {
 
     #[test]
     fn faults_have_their_place_and_say_what_was_expected() {
-        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `kappa`, `r`, `g`, `b`)";
+        let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `sigma_y`, `kappa`, `r`, `g`, `b`)";
         let row = |row: &str| format!("x,y,z,sigma,kappa\n0,0,0,1,1\r\n\r\n{row}\n");
         for (text, expected) in [
             ("x,y,z,sigma,kapa".to_owned(), format!("1:13: unknown column `kapa`; did you mean `kappa`? {known}")),
@@ -231,6 +253,11 @@ mod tests {
             ("\n1,2,3,4,5\n".to_owned(), "2:1: expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned()),
             (row("0,0,0,1"), "4:8: expected 5 fields as in the header, found 4".to_owned()),
             (row("0,0,0,1,1,7"), "4:11: expected 5 fields as in the header, found 6".to_owned()),
+            (
+                "x,y,z,sigma,sigma_y,kappa\n0,0,0,2,0.001,1".to_owned(),
+                "2:9: sigma_y: expected a number from 2.000e-3 to 2.000e3, a thousandth to a thousand times the other, found `0.001`"
+                    .to_owned(),
+            ),
             (row("0,0,zero,1,1"), "4:5: expected a finite number, found `zero`".to_owned()),
             (row("0,0,,1,1"), "4:5: expected a finite number, found ``".to_owned()),
             (row("0,\"0\", inf,1,1"), "4:8: expected a finite number, found `inf`".to_owned()),

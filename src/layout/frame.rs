@@ -73,6 +73,10 @@ record! {
         cell: f32,
         n_cells: [u32; 3],
         inv_cell: f32,
+        /// Of the cells: their edge along y over those along x and z, and its inverse.
+        aspect: f32,
+        inv_aspect: f32,
+        unused: [f32; 2],
     }
 }
 
@@ -83,6 +87,9 @@ impl From<&GridSpec> for GridRecord {
             cell: grid.cell as f32,
             n_cells: grid.n_cells.to_array(),
             inv_cell: (1.0 / grid.cell) as f32,
+            aspect: grid.aspect as f32,
+            inv_aspect: (1.0 / grid.aspect) as f32,
+            unused: [0.0; 2],
         }
     }
 }

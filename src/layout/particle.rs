@@ -16,6 +16,10 @@ record! {
         sigma: f32,
         color: [f32; 3],
         kappa: f32,
+        /// σ along y over that along x and z.
+        aspect: f32,
+        unused: f32,
+        unused_too: [f32; 2],
     }
 }
 
@@ -57,6 +61,9 @@ impl ParticleRecord {
             sigma: particle.sigma as f32,
             color: particle.color.as_vec3().to_array(),
             kappa: particle.kappa as f32,
+            aspect: particle.aspect as f32,
+            unused: 0.0,
+            unused_too: [0.0; 2],
         }
     }
 }

@@ -11,6 +11,9 @@ use super::texture::Texture;
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
 pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
 
+/// Blobs' σ along y over those along x and z are no less, nor their inverses.
+pub const LEAST_ASPECT: f64 = 1e-3;
+
 /// √(2π): optical depth through a blob's centre is √(2π) κ σ.
 pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
 
@@ -45,7 +48,10 @@ pub enum CloudSource {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Particle {
     pub position: DVec3,
+    /// Along x and z.
     pub sigma: f64,
+    /// σ along y over that along x and z (docs/model.md §14); 1: a ball.
+    pub aspect: f64,
     /// Peak extinction per unit length.
     pub kappa: f64,
     /// Linear RGB: radiance where the lighting mode is "none", a factor on the material's K_d otherwise.
@@ -67,10 +73,13 @@ pub struct Group {
     pub scale: f64,
     /// Positions lie within center ± half_extent.
     pub half_extent: DVec3,
+    /// σ along x and z.
     pub sigma_max: f64,
     pub sigma_mean: f64,
+    /// Blobs' σ along y over those along x and z: the least, the mean and the greatest.
+    pub aspects: [f64; 3],
     pub kappa_max: f64,
-    /// Greatest mass κ (2π)^{3/2} σ³ of a blob.
+    /// Greatest mass κ (2π)^{3/2} σ² σ_y of a blob.
     pub mass_max: f64,
     /// How far the cloud's gusts carry a particle at most.
     pub gust_reach: f64,
@@ -136,6 +145,7 @@ impl Cloud {
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
+                        aspects: [1.0; 3],
                         kappa_max: kappa,
                         mass_max: mass(kappa, sigma_max),
                         gust_reach,
@@ -156,6 +166,21 @@ impl Cloud {
 }
 
 impl Group {
+    /// Bounds its blobs' σ along every axis.
+    pub fn sigma_bounds(&self) -> DVec3 {
+        DVec3::new(self.sigma_max, self.sigma_max * self.aspects[2], self.sigma_max)
+    }
+
+    /// Bounds its blobs' σ in every direction.
+    pub fn sigma_widest(&self) -> f64 {
+        self.sigma_bounds().max_element()
+    }
+
+    /// Whether some blob is no ball.
+    pub fn has_ellipsoids(&self) -> bool {
+        self.n_particles > 0 && self.aspects != [1.0; 3]
+    }
+
     /// The group in its cloud grown to `scale`: every place x is at c + s (x − c), c the cloud's centre, every length s times
     /// as long, κ the same. To the bit as it was where nothing has grown.
     pub fn grown(&self, scale: f64) -> Group {
@@ -187,7 +212,7 @@ pub fn runs(n: u64, n_runs: u64) -> impl Iterator<Item = (u64, u64)> {
     (0..n_runs).map(move |g| (bound(g), bound(g + 1)))
 }
 
-/// Integral of a blob's extinction, κ (2π)^{3/2} σ³.
+/// Integral of a ball's extinction, κ (2π)^{3/2} σ³; of a blob's that times its aspect.
 pub fn mass(kappa: f64, sigma: f64) -> f64 {
     kappa * (SQRT_TAU * sigma).powi(3)
 }
@@ -210,10 +235,22 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
+        aspects: aspects(list),
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
-        mass_max: list.iter().map(|p| mass(p.kappa, p.sigma)).fold(0.0, f64::max),
+        mass_max: list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).fold(0.0, f64::max),
         gust_reach: 0.0,
     }
+}
+
+/// Least, mean and greatest.
+fn aspects(list: &[Particle]) -> [f64; 3] {
+    if list.is_empty() {
+        return [1.0; 3];
+    }
+    let all = || list.iter().map(|p| p.aspect);
+    let [least, greatest] = [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)];
+    // Of equal ones exactly that, whatever their sum rounds to.
+    [least, (all().sum::<f64>() / list.len() as f64).clamp(least, greatest), greatest]
 }
 
 /// Bounds over the whole life, so that they stand still.
@@ -229,6 +266,7 @@ fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
         half_extent: 0.5 * (high - low),
         sigma_max: disc.sigma_max(),
         sigma_mean: disc.sigma_mean(),
+        aspects: [1.0; 3],
         kappa_max: disc.kappa(),
         mass_max: disc.mass_max(),
         gust_reach: 0.0,
@@ -284,7 +322,8 @@ mod tests {
 
     #[test]
     fn a_grown_group_is_similar_about_the_clouds_centre() {
-        let blob = |x: f64, sigma| Particle { position: DVec3::X * x, sigma, kappa: 2.0, color: DVec3::ONE };
+        let blob =
+            |x: f64, sigma| Particle { aspect: 1.0, position: DVec3::X * x, sigma, kappa: 2.0, color: DVec3::ONE };
         // Mean position 2, bounds from 0 to 5.
         let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
         let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
@@ -311,7 +350,7 @@ mod tests {
 
     #[test]
     fn the_heaviest_blob_is_a_blob_and_not_two_maxima() {
-        let blob = |sigma, kappa| Particle { position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
+        let blob = |sigma, kappa| Particle { aspect: 1.0, position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
         let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
         let (gust, growth) = (Gust::CALM, Growth::NONE);
         let cloud = Cloud {

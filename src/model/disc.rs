@@ -192,7 +192,7 @@ impl Disc {
             smooth((position.y - c.base - c.lift * warmth_left) / c.over)
         });
         let diluted = (born / sigma).powi(self.dilution.exponent() as i32);
-        Particle { position, sigma, kappa: self.kappa() * diluted * fades * condensed, color: DVec3::ONE }
+        Particle { aspect: 1.0, position, sigma, kappa: self.kappa() * diluted * fades * condensed, color: DVec3::ONE }
     }
 }
 

@@ -1,5 +1,5 @@
-//! The density grid of model.md §8: cubic cells over everything that attenuates light, positions relative to
-//! the lighting origin.
+//! The density grid of model.md §8: cells over everything that attenuates light, positions relative to the lighting origin. Cells are
+//! cubes where blobs are balls, and as flat as they are on the mean elsewhere (docs/model.md §14).
 
 use glam::{DVec3, UVec3};
 
@@ -26,25 +26,33 @@ pub fn least_step(n: u32) -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridSpec {
     pub n_cells: UVec3,
-    /// Edge of the cubic cells.
+    /// Edge of the cells along x and z.
     pub cell: f64,
+    /// Their edge along y over that; 1: cubes.
+    pub aspect: f64,
     /// Low corner of cell (0, 0, 0).
     pub low: DVec3,
 }
 
 impl GridSpec {
-    /// The grid whose longest axis has `n` cells, margin included, and covers `low`..`high`.
+    /// The grid of cubes whose longest axis has `n` cells, margin included, and covers `low`..`high`.
     pub fn fit(low: DVec3, high: DVec3, n: u32) -> GridSpec {
+        GridSpec::fit_cells(low, high, n, 1.0)
+    }
+
+    /// The same of cells `aspect` times as high as wide: no axis has more than `n` cells.
+    pub fn fit_cells(low: DVec3, high: DVec3, n: u32, aspect: f64) -> GridSpec {
         // Bounds without extent still need a cell: 1 unit, since there is no other length to take.
-        let extent = (high - low).max(DVec3::ZERO);
+        let shape = DVec3::new(1.0, aspect, 1.0);
+        let extent = (high - low).max(DVec3::ZERO) / shape;
         let longest = extent.max_element();
         let longest = if longest > 0.0 { longest } else { 1.0 };
         let inner = n.clamp(2 * MARGIN_CELLS + 1, MAX_CELLS) - 2 * MARGIN_CELLS;
         let cell = longest / f64::from(inner);
         let cells = (extent / cell - 1e-9).ceil().as_uvec3().clamp(UVec3::ONE, UVec3::splat(inner));
         let n_cells = cells + UVec3::splat(2 * MARGIN_CELLS);
-        let low = 0.5 * (low + high) - 0.5 * cell * n_cells.as_dvec3();
-        GridSpec { n_cells, cell, low }
+        let low = 0.5 * (low + high) - 0.5 * cell * shape * n_cells.as_dvec3();
+        GridSpec { n_cells, cell, aspect, low }
     }
 
     pub fn n_total(&self) -> u64 {
@@ -52,7 +60,21 @@ impl GridSpec {
     }
 
     pub fn high(&self) -> DVec3 {
-        self.low + self.cell * self.n_cells.as_dvec3()
+        self.low + self.edges() * self.n_cells.as_dvec3()
+    }
+
+    /// Edges of a cell.
+    pub fn edges(&self) -> DVec3 {
+        self.cell * DVec3::new(1.0, self.aspect, 1.0)
+    }
+
+    pub fn cell_volume(&self) -> f64 {
+        self.cell.powi(3) * self.aspect
+    }
+
+    /// Cells' widths that a unit along `d` passes: 1/cell where cells are cubes and `d` is a unit vector.
+    pub fn cells_along(&self, d: DVec3) -> f64 {
+        (d / self.edges()).length()
     }
 }
 

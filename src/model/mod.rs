@@ -28,3 +28,4 @@ pub mod surface;
 pub mod texture;
 pub mod tree;
 pub mod visibility;
+pub mod weather;

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::air::Air;
 use super::basis::Sampling;
 use super::camera::Camera;
-use super::cloud::{Cloud, Group, runs};
+use super::cloud::{Cloud, CloudSource, Group, runs};
 use super::count::Count;
 use super::film::Film;
 use super::least::Least;
@@ -283,6 +283,23 @@ impl Scene {
         }
     }
 
+    /// Whether some blobs are no balls.
+    pub fn has_ellipsoids(&self) -> bool {
+        let of = |c: &Cloud| {
+            matches!(c.source, CloudSource::Particles(_)) && c.groups(0, 0).iter().any(Group::has_ellipsoids)
+        };
+        self.clouds.iter().any(of)
+    }
+
+    /// σ along y over that along x and z of all blobs of `groups`, their mean.
+    pub fn mean_aspect(groups: &[Group]) -> f64 {
+        let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();
+        match groups.iter().any(Group::has_ellipsoids) {
+            true => groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n,
+            false => 1.0,
+        }
+    }
+
     /// Whether some cloud's particles have textures.
     pub fn is_textured(&self) -> bool {
         self.clouds.iter().any(|c| !c.texture.is_none())
@@ -371,7 +388,7 @@ impl Scene {
         let cloud = &self.clouds[group.i_cloud];
         let group = group.grown(cloud.growth.at(time_s));
         let center = cloud.origin_at(time_s) + group.center;
-        let reach = group.half_extent + DVec3::splat(n_sigma * group.sigma_max + group.gust_reach);
+        let reach = group.half_extent + n_sigma * group.sigma_bounds() + DVec3::splat(group.gust_reach);
         (center - reach, center + reach)
     }
 }

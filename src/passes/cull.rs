@@ -76,13 +76,18 @@ pub struct Cull {
 }
 
 impl Cull {
-    /// Room for `n_max` particles. `weighted`: κ has factors; `threshold`: there is one.
-    pub fn new(device: &Device, compiler: &Compiler, n_max: u32, [weighted, threshold]: [bool; 2]) -> Result<Cull> {
+    /// Room for `n_max` particles. `weighted`: κ has factors; `threshold`: there is one; `ellipsoids`: not all are balls.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        n_max: u32,
+        [weighted, threshold, ellipsoids]: [bool; 3],
+    ) -> Result<Cull> {
         // One subgroup a tile: it waits for itself alone.
         let invocations = device.limits().subgroup_size.clamp(8, 32);
         let together = device.limits().is_one_subgroup(invocations);
         let macros = [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", u32::from(together))];
-        let constants = [(3, u32::from(weighted)), (5, u32::from(threshold))];
+        let constants = [(3, u32::from(weighted)), (5, u32::from(threshold)), (6, u32::from(ellipsoids))];
         let n_tiles = u64::from(n_max.div_ceil(TILE));
         Ok(Cull {
             test: Kernel::with_macros(device, compiler, "cull.test", TestPush::FIELDS, &constants, &macros)?,

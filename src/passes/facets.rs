@@ -30,10 +30,13 @@ pub struct Facets {
 }
 
 impl Facets {
-    pub fn new(device: &Device, compiler: &Compiler) -> Result<Facets> {
+    /// `ellipsoids`: not all blobs are balls.
+    pub fn new(device: &Device, compiler: &Compiler, ellipsoids: bool) -> Result<Facets> {
+        let macros = [("ELLIPSOIDS", u32::from(ellipsoids))];
+        let kernel = |name, fields| Kernel::with_macros(device, compiler, name, fields, &[], &macros);
         Ok(Facets {
-            kernel: Kernel::new(device, compiler, "facets", Push::FIELDS, &[])?,
-            groups: Kernel::new(device, compiler, "facets.groups", GroupsPush::FIELDS, &[])?,
+            kernel: kernel("facets", Push::FIELDS)?,
+            groups: kernel("facets.groups", GroupsPush::FIELDS)?,
             surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
         })
     }

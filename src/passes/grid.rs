@@ -61,7 +61,7 @@ impl Grid {
         let push = DepositPush { grid: *grid, n_particles, quanta_per_mass: quanta_per_mass as f32 };
         rec.dispatch_groups(&self.deposit, &[placed, particles, &self.sums], &push, n_particles)?;
         let n_cells = grid.n_cells.iter().product();
-        let volume = f64::from(grid.cell).powi(3);
+        let volume = f64::from(grid.cell).powi(3) * f64::from(grid.aspect);
         let density_per_quantum = (heaviest / QUANTA_OF_HEAVIEST / volume) as f32;
         rec.dispatch(&self.resolve, &[&self.sums, density], &ResolvePush { n_cells, density_per_quantum }, n_cells)
     }

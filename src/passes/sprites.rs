@@ -31,15 +31,15 @@ pub struct Chunk<'a> {
 impl Sprites {
     /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
     /// depth; else the target is cleared. `grouped`: facets stand for several particles. `weighted`: κ has factors.
-    /// `textured`: some groups have textures. `threshold`: there is one.
+    /// `textured`: some groups have textures. `threshold`: there is one. `ellipsoids`: not all are balls.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
         lit: bool,
-        [behind, grouped, weighted, textured, threshold]: [bool; 5],
+        [behind, grouped, weighted, textured, threshold, ellipsoids]: [bool; 6],
     ) -> Result<Sprites> {
-        let constants = constants([lit, behind, grouped, weighted, textured, threshold]);
+        let constants = constants([lit, behind, grouped, weighted, textured, threshold, ellipsoids]);
         let meet = if behind { Meet::OverNearer } else { Meet::Over };
         let pipeline = DrawPipeline::new(device, compiler, "sprites", Push::FIELDS, &constants, (format, meet))?;
         Ok(Sprites { pipeline })
@@ -50,9 +50,9 @@ impl Sprites {
         device: &Device,
         compiler: &Compiler,
         format: TargetFormat,
-        [lit, grouped, weighted, textured, threshold]: [bool; 5],
+        [lit, grouped, weighted, textured, threshold, ellipsoids]: [bool; 6],
     ) -> Result<Sprites> {
-        let constants = constants([lit, true, grouped, weighted, textured, threshold]);
+        let constants = constants([lit, true, grouped, weighted, textured, threshold, ellipsoids]);
         let pipeline =
             DrawPipeline::new(device, compiler, "sprites", Push::FIELDS, &constants, (format, Meet::UnderNearer))?;
         Ok(Sprites { pipeline })
@@ -111,6 +111,6 @@ impl Sprites {
     }
 }
 
-fn constants(of: [bool; 6]) -> Vec<(u32, u32)> {
+fn constants(of: [bool; 7]) -> Vec<(u32, u32)> {
     (0..).zip(of.map(u32::from)).collect()
 }

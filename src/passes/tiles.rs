@@ -72,6 +72,10 @@ record! {
         cut: f32,
         saturated: f32,
         inv_threshold: f32,
+        /// The scene's y along right, up and forward.
+        y_right: f32,
+        y_up: f32,
+        y_forward: f32,
     }
 }
 
@@ -94,6 +98,8 @@ pub struct Variant {
     pub grouped: bool,
     /// Some splats have textures.
     pub textured: bool,
+    /// Not all blobs are balls.
+    pub ellipsoids: bool,
     pub weighted: bool,
     pub format: TargetFormat,
     /// Surfaces are drawn, too, or what is far.
@@ -143,6 +149,8 @@ pub struct Tiles {
     splats: Buffer,
     /// What of them is textured.
     sheets: Buffer,
+    /// What of them is an ellipsoid.
+    conics: Buffer,
     before: Buffer,
     reaches: Buffer,
     blocks: Buffer,
@@ -212,7 +220,8 @@ impl Tiles {
         let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
             .map(|(k, v)| (k, u32::from(v)));
         let threshold = u32::from(variant.threshold);
-        let of_splat = [&constants[..], &[(5, threshold)]].concat();
+        let of_pairs = [(5, threshold), (6, u32::from(variant.ellipsoids))];
+        let of_splat = [&constants[..], &of_pairs].concat();
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
         let pixel_words = (variant.format.bytes_per_pixel() / 4) as u32;
         let together = if division.width.is_multiple_of(4 / pixel_words) { 4 / pixel_words } else { 1 };
@@ -222,6 +231,7 @@ impl Tiles {
             ("ONE_SUBGROUP", u32::from(!variant.portable && device.limits().is_one_subgroup(division.invocations))),
             ("THIN", u32::from(variant.tau_most <= 0.125 && !variant.textured)),
             ("TEXTURED", u32::from(variant.textured)),
+            ("ELLIPSOIDS", u32::from(variant.ellipsoids)),
             ("THRESHOLD", threshold),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", together),
@@ -234,18 +244,21 @@ impl Tiles {
         };
         let buffer = |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
         let n_state = if n_rounds > 1 { division.n_pixels() } else { 1 };
-        let n_sheets = if variant.textured { u64::from(n_max) } else { 1 };
+        let [n_sheets, n_conics] =
+            [variant.textured, variant.ellipsoids].map(|are| if are { u64::from(n_max) } else { 1 });
         let n_under = if variant.behind { division.n_pixels() } else { 1 };
         Ok(Tiles {
             splat: Kernel::with_macros(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat, &macros[..3])?,
             rounds: Kernel::new(device, compiler, "tiles.rounds", RoundsPush::FIELDS, &[])?,
             clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
-            pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &[(5, threshold)])?,
+            pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &of_pairs)?,
             ranges: Kernel::new(device, compiler, "tiles.ranges", RangesPush::FIELDS, &[])?,
             alone: compose(0)?,
             compose: if n_rounds > 1 { Some(compose(1)?) } else { None },
             division,
-            n_bindings: if variant.textured {
+            n_bindings: if variant.ellipsoids {
+                11
+            } else if variant.textured {
                 10
             } else if variant.behind {
                 8
@@ -259,6 +272,7 @@ impl Tiles {
             known: Buffer::new::<KeptRecord>(device, "tiles.known", 1, Place::Device)?,
             splats: Buffer::new::<SplatRecord>(device, "tiles.splats", u64::from(n_max), Place::Device)?,
             sheets: Buffer::new::<SplatSheetRecord>(device, "tiles.sheets", n_sheets, Place::Device)?,
+            conics: buffer("tiles.conics", n_conics, 4)?,
             reaches: buffer("tiles.reaches", n_max.into(), 2)?,
             before: buffer("tiles.before", n_max.into(), 1)?,
             blocks: buffer("tiles.blocks", n_blocks.into(), 1)?,
@@ -312,9 +326,9 @@ impl Tiles {
             rec.update(&self.known, &KeptRecord::of(n, BLOCK));
         }
         let kept = self.kept(n_splats);
-        let Tiles { splats, reaches, before, blocks, sheets, .. } = self;
+        let Tiles { splats, reaches, before, blocks, sheets, conics, .. } = self;
         let from = [entries, placed, particles, lit, i_facet, i_group, drawn, textured];
-        let buffers = [&from[..], &[splats, reaches, before, blocks, sheets, kept]].concat();
+        let buffers = [&from[..], &[splats, reaches, before, blocks, sheets, kept, conics]].concat();
         rec.dispatch_counted(&self.splat, &buffers, &push, (kept, KeptRecord::I_SPLAT))?;
         let push = RoundsPush {
             n_rounds: self.n_rounds,
@@ -393,6 +407,9 @@ impl Tiles {
             cut: cut(view.cutoff),
             saturated: view.saturated as f32,
             inv_threshold: inverse(view.threshold),
+            y_right: view.camera.right[1],
+            y_up: view.camera.up[1],
+            y_forward: view.camera.forward[1],
         };
         let buffers = [
             &self.splats,
@@ -405,6 +422,7 @@ impl Tiles {
             &self.depths,
             &self.sheets,
             pool,
+            &self.conics,
         ];
         let buffers = &buffers[..self.n_bindings];
         if i_round == 0 {

@@ -56,7 +56,7 @@ mod tests {
     };
 
     fn layer(z: f64, tau: f64) -> Blob {
-        Blob { position: DVec3::new(0.0, 0.0, -z), sigma: 0.5, kappa: tau / (SQRT_TAU * 0.5) }
+        Blob { aspect: 1.0, position: DVec3::new(0.0, 0.0, -z), sigma: 0.5, kappa: tau / (SQRT_TAU * 0.5) }
     }
 
     fn drawn(blobs: &[Blob], colors: &[DVec3], rounding: Rounding, behind: Behind) -> ([f64; 4], [f64; 4]) {

@@ -1,8 +1,10 @@
 //! Which particles can show in a pixel at all, model.md §11 "cull".
 //! In: blobs and eye relative to O. Out: of each whether it is kept.
 
+use glam::DVec3;
+
 use super::Blob;
-use super::sprites::{View, slopes};
+use super::sprites::View;
 
 /// What a GPU may do with a particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,14 +47,14 @@ fn shows(view: &View, blob: &Blob, slack: &Slack) -> bool {
     let c = blob.position - view.pose.position;
     let (depth, off) = (c.dot(view.pose.forward), slack.depth * c.length());
     let (above, off_size) = view.above_smallest(blob, c, slack.depth);
-    let cut = view.cut(blob) + if view.threshold > 0.0 { slack.log } else { 0.0 };
+    let cut = view.cut(blob.deepest()) + if view.threshold > 0.0 { slack.log } else { 0.0 };
     if !(depth + off >= view.near && blob.kappa * blob.sigma > 0.0 && cut > 0.0 && above + off_size >= 0.0) {
         return false;
     }
-    let reach = (1.0 + slack.growth) * (2.0 * cut.min(0.5 * view.cutoff * view.cutoff)).sqrt() * blob.sigma;
+    let reach = (1.0 + slack.growth) * (2.0 * cut.min(0.5 * view.cutoff * view.cutoff)).sqrt();
     let (half_x, half_y) = view.half_slopes();
-    let holds = |side: f64, half: f64, n: u32| {
-        let (low, high) = slopes(side, depth, reach);
+    let holds = |side: DVec3, half: f64, n: u32| {
+        let (low, high) = blob.slopes(c, [side, view.pose.forward], reach);
         // In pixels from the first one's edge; centres lie at i + ½.
         let at = |s: f64| 0.5 * (s / half + 1.0) * f64::from(n);
         let first = (at(low) - slack.pixels - 0.5).ceil().max(0.0);
@@ -60,14 +62,13 @@ fn shows(view: &View, blob: &Blob, slack: &Slack) -> bool {
         first <= last
     };
     // A row and its mirror image are alike but for their number.
-    holds(c.dot(view.pose.right), half_x, view.width) && holds(-c.dot(view.pose.up), half_y, view.height)
+    holds(view.pose.right, half_x, view.width) && holds(-view.pose.up, half_y, view.height)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::camera::Pose;
-    use glam::DVec3;
 
     /// Four columns and two rows of slopes ½ wide: centres at ±¼, ±¾ and ±¼.
     const VIEW: View = View {
@@ -83,7 +84,7 @@ mod tests {
     };
 
     fn of(x: f64, y: f64, z: f64, sigma: f64) -> Fate {
-        fate(&VIEW, &Blob { position: DVec3::new(x, y, -z), sigma, kappa: 1.0 }, &Slack::NONE)
+        fate(&VIEW, &Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma, kappa: 1.0 }, &Slack::NONE)
     }
 
     #[test]
@@ -102,7 +103,7 @@ mod tests {
 
     #[test]
     fn what_is_too_thin_or_too_small_is_left_and_near_decisions_are_open() {
-        let blob = Blob { position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
+        let blob = Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
         let of = |view: View, slack: f64| {
             fate(&view, &blob, &Slack { depth: slack, log: slack, growth: slack, pixels: slack })
         };

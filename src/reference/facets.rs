@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::Blob;
 use super::area::mean::each;
 use super::grid::{density, sample};
-use crate::model::cloud::{SIGMA_PER_RADIUS, SQRT_TAU};
+use crate::model::cloud::{LEAST_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
 /// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard deviation s = 2σ to degree 5.
@@ -46,31 +46,33 @@ pub fn directions() -> [(DVec3, f64); 14] {
     })
 }
 
-/// G = Σ w ρ(p + 2√5 σ d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ d).
-pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64) -> (DVec3, f64) {
-    gradient_of(|x| sample(spec, cells, x), p, sigma)
+/// G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d); A = diag(1, a, 1)
+/// makes of the sphere the blob's own shape, and the gradient is one in the space where that is a ball (§14).
+pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
+    gradient_of(|x| sample(spec, cells, x), p, sigma, aspect)
 }
 
 /// The same of any density ρ.
-fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64) -> (DVec3, f64) {
+fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
+    let axes = DVec3::new(1.0, aspect, 1.0);
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
-        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * d);
+        let density = w * density(p + GRADIENT_RADIUS_SIGMA * sigma * axes * d);
         (g + density * d, s + density)
     })
 }
 
 /// Unit normal and conditioning q of a blob at `p` in a cloud about `center`.
-pub fn normal(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, center: DVec3) -> (DVec3, f64) {
-    toward_less(gradient(spec, cells, p, sigma), p, center)
+pub fn normal(spec: &GridSpec, cells: &[f64], p: DVec3, [sigma, aspect]: [f64; 2], center: DVec3) -> (DVec3, f64) {
+    toward_less(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
 }
 
 /// The unit normal down the gradient G beside S, and q.
-fn toward_less((g, s): (DVec3, f64), p: DVec3, center: DVec3) -> (DVec3, f64) {
+fn toward_less((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
     let t = smoothstep(CONDITIONING, q);
     // t > 0 only where q > 0, hence |G| > 0.
-    let down = if t > 0.0 { -g.normalize() } else { DVec3::ZERO };
+    let down = if t > 0.0 { -(g / DVec3::new(1.0, aspect, 1.0)).normalize() } else { DVec3::ZERO };
     ((t * down + (1.0 - t) * away).try_normalize().unwrap_or(away), q)
 }
 
@@ -80,10 +82,20 @@ pub fn smoothstep(ends: (f64, f64), x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// π R² (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ.
-pub fn area(sigma: f64, kappa: f64) -> f64 {
-    let radius = sigma / SIGMA_PER_RADIUS;
-    -PI * radius * radius * libm::expm1(-SQRT_TAU * kappa * sigma)
+/// π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w, w the mean of an ellipsoid's areas, seen from all directions, over that of a ball of R: by
+/// Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p = 1.6075, within 1.1 % of a quarter of its surface.
+pub fn area(blob: &Blob) -> f64 {
+    const P: f64 = 1.6075;
+    let radius = blob.sigma / SIGMA_PER_RADIUS;
+    let wider = ((1.0 + 2.0 * blob.aspect.powf(P)) / 3.0).powf(1.0 / P);
+    let depth = SQRT_TAU * blob.kappa * blob.sigma * blob.aspect / wider;
+    -PI * radius * radius * wider * libm::expm1(-depth)
+}
+
+/// Where the shell of 1.5 σ of a blob about `p` has the normal `n`.
+fn shell(p: DVec3, [sigma, aspect]: [f64; 2], n: DVec3) -> DVec3 {
+    let to = DVec3::new(n.x, aspect * aspect * n.y, n.z);
+    p + SHELL_SIGMA * sigma / n.dot(to).sqrt() * to
 }
 
 /// One facet a blob. `sigma_means[j]` is the mean σ of blob j's group, which bounds the scale of its facet from below;
@@ -96,7 +108,7 @@ pub fn facets(
     regions: &[u32],
     cloud_centers: &[DVec3],
 ) -> Vec<Facet> {
-    let of = |p: DVec3, sigma: f64| gradient(spec, cells, p, sigma);
+    let of = |p: DVec3, [sigma, aspect]: [f64; 2]| gradient(spec, cells, p, sigma, aspect);
     let facet = |(i, blob): (usize, &Blob)| {
         let center = cloud_centers[regions[i] as usize];
         facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
@@ -106,7 +118,7 @@ pub fn facets(
 
 /// One facet a blob, its normal from the blobs' own density Σ κ e^{−|x − p|²/2σ²} in place of a grid's.
 pub fn closed(blobs: &[Blob], sigma_means: &[f64], regions: &[u32], cloud_centers: &[DVec3]) -> Vec<Facet> {
-    let of = |p: DVec3, sigma: f64| gradient_of(|x| density(blobs, x), p, sigma);
+    let of = |p: DVec3, [sigma, aspect]: [f64; 2]| gradient_of(|x| density(blobs, x), p, sigma, aspect);
     each(blobs.len(), |i| {
         let (blob, center) = (&blobs[i], cloud_centers[regions[i] as usize]);
         facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
@@ -118,11 +130,11 @@ fn facet_of(
     scale: f64,
     region: u32,
     center: DVec3,
-    gradient: impl Fn(DVec3, f64) -> (DVec3, f64),
+    gradient: impl Fn(DVec3, [f64; 2]) -> (DVec3, f64),
 ) -> Facet {
-    let (normal, conditioning) = toward_less(gradient(blob.position, scale), blob.position, center);
-    let position = blob.position + SHELL_SIGMA * scale * normal;
-    Facet { position, normal, area: area(blob.sigma, blob.kappa), region, conditioning }
+    let shape = [scale, blob.aspect];
+    let (normal, conditioning) = toward_less(gradient(blob.position, shape), blob.aspect, blob.position, center);
+    Facet { position: shell(blob.position, shape, normal), normal, area: area(blob), region, conditioning }
 }
 
 /// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for [`facets`].
@@ -137,10 +149,12 @@ pub struct Members<'a> {
 /// What a run of particles is as one blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bunch {
-    /// p̄ = Σ m p/Σ m, m = κσ³.
+    /// p̄ = Σ m p/Σ m, m = κσ³a.
     pub position: DVec3,
-    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m).
+    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m); where some blobs are ellipsoids √(Σ m (σ² + (x² + z²)/2)/Σ m) of p − p̄.
     pub sigma: f64,
+    /// √(Σ m (a²σ² + y²)/Σ m) over that, or 1.
+    pub aspect: f64,
     /// Mean σ̄ of the members' groups, by mass.
     pub sigma_mean: f64,
     pub area: f64,
@@ -156,17 +170,29 @@ fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
     weights.into_iter().map(|w| if sum > 0.0 { w / sum } else { equal }).collect()
 }
 
-/// The particles `run` as one.
-pub fn bunch(m: &Members<'_>, run: &[u32]) -> Bunch {
+/// The particles `run` as one; `ellipsoids`: some of the scene's blobs are no balls.
+pub fn bunch(m: &Members<'_>, run: &[u32], ellipsoids: bool) -> Bunch {
     let at = |i: &u32| m.blobs[*i as usize];
-    let by_mass = weights(run.iter().map(|i| at(i).kappa * at(i).sigma.powi(3)));
-    let areas: Vec<f64> = run.iter().map(|i| area(at(i).sigma, at(i).kappa)).collect();
+    let by_mass = weights(run.iter().map(|i| at(i).mass()));
+    let areas: Vec<f64> = run.iter().map(|i| area(&at(i))).collect();
     let by_area = weights(areas.iter().copied());
     let position: DVec3 = run.iter().zip(&by_mass).map(|(i, w)| *w * at(i).position).sum();
-    let spread = |(i, w): (&u32, &f64)| w * (at(i).sigma.powi(2) + (at(i).position - position).length_squared() / 3.0);
+    let spread = |of: &dyn Fn(Blob, DVec3) -> f64| {
+        run.iter().zip(&by_mass).map(|(i, w)| w * of(at(i), at(i).position - position)).sum::<f64>().sqrt()
+    };
+    let (sigma, aspect) = match (run, ellipsoids) {
+        ([one], _) => (at(one).sigma, at(one).aspect),
+        (_, false) => (spread(&|b, d| b.sigma.powi(2) + d.length_squared() / 3.0), 1.0),
+        (_, true) => {
+            let wide = spread(&|b, d| b.sigma.powi(2) + 0.5 * (d.x * d.x + d.z * d.z));
+            let high = spread(&|b, d| (b.aspect * b.sigma).powi(2) + d.y * d.y);
+            (wide, if wide > 0.0 { (high / wide).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT) } else { 1.0 })
+        }
+    };
     Bunch {
         position,
-        sigma: run.iter().zip(&by_mass).map(spread).sum::<f64>().sqrt(),
+        sigma,
+        aspect,
         sigma_mean: run.iter().zip(&by_mass).map(|(i, w)| w * m.sigma_means[*i as usize]).sum(),
         area: areas.iter().sum(),
         color: run.iter().zip(&by_area).map(|(i, w)| *w * m.colors[*i as usize]).sum(),
@@ -182,13 +208,13 @@ pub fn grouped(
     order: &[u32],
     runs: &[(u64, u64)],
 ) -> Vec<(Facet, DVec3)> {
+    let ellipsoids = members.blobs.iter().any(|b| b.aspect != 1.0);
     let of = |&(first, end): &(u64, u64)| {
         let run = &order[first as usize..end as usize];
-        let b = bunch(members, run);
-        let (scale, region) = (b.sigma.max(b.sigma_mean), members.regions[run[0] as usize]);
-        let (normal, conditioning) = normal(spec, cells, b.position, scale, cloud_centers[region as usize]);
-        let position = b.position + SHELL_SIGMA * scale * normal;
-        (Facet { position, normal, area: b.area, region, conditioning }, b.color)
+        let b = bunch(members, run, ellipsoids);
+        let (shape, region) = ([b.sigma.max(b.sigma_mean), b.aspect], members.regions[run[0] as usize]);
+        let (normal, conditioning) = normal(spec, cells, b.position, shape, cloud_centers[region as usize]);
+        (Facet { position: shell(b.position, shape, normal), normal, area: b.area, region, conditioning }, b.color)
     };
     runs.iter().map(of).collect()
 }
@@ -199,10 +225,10 @@ mod tests {
     use crate::reference::grid::deposit;
     use glam::UVec3;
 
-    const SPEC: GridSpec = GridSpec { n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
+    const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
 
     fn ball() -> Vec<f64> {
-        deposit(&SPEC, &[Blob { position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
+        deposit(&SPEC, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
     }
 
     #[test]
@@ -228,7 +254,7 @@ mod tests {
         let at = |i: usize, axis: u32| -4.9 + 0.2 * (i / 50usize.pow(axis) % 50) as f64;
         let cells: Vec<f64> = (0..125_000).map(|i| 3.0 + 0.2 * at(i, 0) - 0.1 * at(i, 2)).collect();
         let p = DVec3::new(0.33, -0.71, 0.52);
-        let (g, s) = gradient(&SPEC, &cells, p, 0.6);
+        let (g, s) = gradient(&SPEC, &cells, p, 0.6, 1.0);
         let r = 2.0 * 5f64.sqrt() * 0.6;
         assert!((g - r / 3.0 * DVec3::new(0.2, 0.0, -0.1)).length() < 1e-13);
         assert!((s - (3.0 + 0.066 - 0.052)).abs() < 1e-13);
@@ -238,7 +264,7 @@ mod tests {
     fn normals_of_a_ball_point_outward_wherever_the_cloud_is_centred() {
         let cells = ball();
         for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)] {
-            let (n, q) = normal(&SPEC, &cells, p, 0.4, DVec3::new(3.0, 3.0, -3.0));
+            let (n, q) = normal(&SPEC, &cells, p, [0.4, 1.0], DVec3::new(3.0, 3.0, -3.0));
             // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction is off by what the deposit's
             // cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below one degree.
             assert!(q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(), "{p} {n} {q}");
@@ -250,8 +276,8 @@ mod tests {
         // Of one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and exactly so by symmetry on an
         // axis. Far from all blobs only the cloud's centre is left.
         let blobs = [
-            Blob { position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
-            Blob { sigma: 0.4, position: DVec3::X, kappa: 0.0 },
+            Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
+            Blob { aspect: 1.0, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
         ];
         let facets = closed(&blobs, &[0.4, 0.4], &[0, 0], &[DVec3::new(0.0, 9.0, 0.0)]);
         assert!((facets[1].normal - DVec3::X).length() < 1e-12 && facets[1].conditioning > CONDITIONING.1);
@@ -268,7 +294,7 @@ mod tests {
     #[test]
     fn normals_blend_without_a_jump() {
         let cells = ball();
-        let at = |k: i32| normal(&SPEC, &cells, DVec3::X * 1e-3 * f64::from(k), 0.3, DVec3::NEG_Y * 20.0);
+        let at = |k: i32| normal(&SPEC, &cells, DVec3::X * 1e-3 * f64::from(k), [0.3, 1.0], DVec3::NEG_Y * 20.0);
         // q grows by some (2√5·0.3/3)/1.2² = 0.31 a unit, t by at most 1.5/0.08 times that, and the normal turns from +y
         // to ±x by at most twice dt: 1.2e-2 a step of 1e-3.
         for k in -1500..1500 {
@@ -283,7 +309,7 @@ mod tests {
 
     #[test]
     fn a_facet_lies_on_its_shell_and_without_direction_faces_up() {
-        let blob = Blob { position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
+        let blob = Blob { aspect: 1.0, position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
         let empty = vec![0.0; 125_000];
         let facets = facets(&SPEC, &empty, &[blob, blob], &[0.0; 2], &[1, 0], &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE]);
         assert_eq!((facets[0].normal, facets[0].conditioning, facets[0].region), (DVec3::Y, 0.0, 1));
@@ -295,19 +321,19 @@ mod tests {
 
     #[test]
     fn a_run_is_one_blob_of_its_members() {
-        let blob = |x: f64, sigma, kappa| Blob { position: DVec3::X * x, sigma, kappa };
+        let blob = |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::X * x, sigma, kappa };
         // Masses 2·1³ and 1·2³, 1 to 4: p̄ = 4, σ_g² = ((1 + 16/3) + 4 (4 + 1/3))/5 = 71/15.
         let blobs = [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
         let colors = [DVec3::X, DVec3::Y, DVec3::ZERO, DVec3::ONE];
         let members = Members { blobs: &blobs, sigma_means: &[1.0, 6.0, 2.0, 4.0], regions: &[0; 4], colors: &colors };
-        let b = bunch(&members, &[0, 1]);
+        let b = bunch(&members, &[0, 1], false);
         assert!((b.position - DVec3::X * 4.0).length() < 1e-14 && (b.sigma_mean - 5.0).abs() < 1e-14);
         assert!((b.sigma.powi(2) - 71.0 / 15.0).abs() < 1e-14);
-        let (a0, a1) = (area(1.0, 2.0), area(2.0, 1.0));
+        let (a0, a1) = (area(&blobs[0]), area(&blobs[1]));
         assert!((b.area - a0 - a1).abs() < 1e-13);
         assert!((b.color - DVec3::new(a0, a1, 0.0) / (a0 + a1)).length() < 1e-15);
         // Neither of the last two has mass or area: they count alike.
-        let b = bunch(&members, &[2, 3]);
+        let b = bunch(&members, &[2, 3], false);
         assert_eq!((b.position, b.sigma_mean, b.area, b.color), (DVec3::X * 2.0, 3.0, 0.0, DVec3::splat(0.5)));
         // (0 + 1)/2 + 1/3.
         assert!((b.sigma.powi(2) - 5.0 / 6.0).abs() < 1e-15);
@@ -316,7 +342,7 @@ mod tests {
     #[test]
     fn runs_of_one_are_the_particles_facets() {
         let cells = ball();
-        let blob = |x: f64| Blob { position: DVec3::new(x, 0.4, -0.3), sigma: 0.3 + 0.1 * x, kappa: 1.0 };
+        let blob = |x: f64| Blob { aspect: 1.0, position: DVec3::new(x, 0.4, -0.3), sigma: 0.3 + 0.1 * x, kappa: 1.0 };
         let (blobs, means, regions) = ([blob(0.5), blob(-1.0), blob(2.0)], [0.1, 0.4, 0.2], [0, 1, 1]);
         let centers = [DVec3::Y, DVec3::Z];
         let colors = [DVec3::X; 3];

@@ -17,6 +17,7 @@ pub struct Generated {
     /// R of P (11), before `radius_scale`.
     pub radius: f64,
     pub sigma: f64,
+    pub aspect: f64,
     pub kappa: f64,
     /// Attempts made, the kept one included; 0 where a particle was given and not generated.
     pub n_attempts: u32,
@@ -138,6 +139,7 @@ pub fn generate_particle(
         position,
         radius,
         sigma: radius * radius_scale * SIGMA_PER_RADIUS,
+        aspect: 1.0,
         kappa: box_kappa(b, form, optical_depth, radius_scale),
         n_attempts: accepted_at.map_or(MAX_ATTEMPTS, |a| a + 1),
         folded: accepted_at.is_none(),
@@ -179,6 +181,7 @@ fn given(p: &Particle, group: Option<&Group>) -> Generated {
         position: p.position - group.map_or(DVec3::ZERO, |g| g.center),
         radius: p.sigma / SIGMA_PER_RADIUS,
         sigma: p.sigma,
+        aspect: p.aspect,
         kappa: p.kappa,
         n_attempts: 0,
         folded: false,

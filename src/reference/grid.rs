@@ -1,4 +1,4 @@
-//! The density grid, model.md §8 and §11 "grid", "sample": blobs' mass deposited conservatively into cubic
+//! The density grid, model.md §8 and §11 "grid", "sample": blobs' mass deposited conservatively into
 //! cells, sampled trilinearly; and the closed form of the optical depth that the grid approximates.
 //! Densities are extinction per unit length; cell (x, y, z) is at index x + n_x (y + n_y z).
 
@@ -8,23 +8,18 @@ use glam::DVec3;
 use libm::{erf, erfc};
 
 use super::Blob;
-use crate::model::cloud::SQRT_TAU;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
-
-/// m = ∫ρ dV = κ (2π)^{3/2} σ³ of one blob.
-pub fn mass(blob: &Blob) -> f64 {
-    blob.kappa * (SQRT_TAU * blob.sigma).powi(3)
-}
 
 /// Density of every cell. A blob none of whose cells exist, or with σ = 0 or κ = 0, deposits nothing.
 pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     let n = spec.n_cells.as_usizevec3();
     let mut cells = vec![0.0; n.x * n.y * n.z];
-    let volume = spec.cell.powi(3);
+    let (edges, volume) = (spec.edges(), spec.cell_volume());
     for blob in blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0) {
-        let axis = |i: usize| axis_weights(blob.position[i], blob.sigma, spec.low[i], spec.cell, n[i]);
+        let sigma = blob.sigma * blob.axes();
+        let axis = |i: usize| axis_weights(blob.position[i], sigma[i], spec.low[i], edges[i], n[i]);
         let ((x0, wx), (y0, wy), (z0, wz)) = (axis(0), axis(1), axis(2));
-        let density = mass(blob) / volume;
+        let density = blob.mass() / volume;
         for (z, wz) in (z0..).zip(&wz) {
             for (y, wy) in (y0..).zip(&wy) {
                 let row = n.x * (y + n.y * z);
@@ -76,7 +71,7 @@ fn normal_share(a: f64, b: f64) -> f64 {
 /// Density at `p`: trilinear between cell centres, 0 outside the hull of the outermost ones.
 pub fn sample(spec: &GridSpec, cells: &[f64], p: DVec3) -> f64 {
     let n = spec.n_cells.as_usizevec3();
-    let at = (p - spec.low) / spec.cell - DVec3::splat(0.5);
+    let at = (p - spec.low) / spec.edges() - DVec3::splat(0.5);
     let greatest = spec.n_cells.as_dvec3() - DVec3::ONE;
     if !(at.cmpge(DVec3::ZERO).all() && at.cmple(greatest).all()) {
         return 0.0;
@@ -96,7 +91,7 @@ pub fn sample(spec: &GridSpec, cells: &[f64], p: DVec3) -> f64 {
 /// ρ = Σ κ e^{−|x − p|²/2σ²} itself, closed form.
 pub fn density(blobs: &[Blob], x: DVec3) -> f64 {
     let of_blob = |blob: &Blob| {
-        let r2 = (x - blob.position).length_squared() / (blob.sigma * blob.sigma);
+        let r2 = blob.whiten(x - blob.position).length_squared() / (blob.sigma * blob.sigma);
         if r2 > UNSEEN { 0.0 } else { blob.kappa * (-0.5 * r2).exp() }
     };
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
@@ -112,13 +107,14 @@ const UNSEEN: f64 = 100.0;
 pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f64 {
     let of_blob = |blob: &Blob| {
         let c = blob.position - p;
-        let s0 = c.dot(d);
-        let b2 = c.cross(d).length_squared() / (blob.sigma * blob.sigma);
-        if b2 > UNSEEN {
+        let line = blob.along(c, d);
+        if line.off * line.off > UNSEEN {
             return 0.0;
         }
-        let share = normal_share(-s0 / blob.sigma, (length - s0) / blob.sigma);
-        SQRT_TAU * blob.kappa * blob.sigma * (-0.5 * b2).exp() * share
+        let white = blob.whiten(d);
+        // The foot of the centre, and σ, along the line.
+        let (foot, sigma) = (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
+        line.tau() * normal_share(-foot / sigma, (length - foot) / sigma)
     };
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
 }
@@ -126,15 +122,16 @@ pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::cloud::SQRT_TAU;
     use crate::reference::{facets, transmit};
     use glam::UVec3;
 
     fn spec(n: u32, cell: f64, low: f64) -> GridSpec {
-        GridSpec { n_cells: UVec3::splat(n), cell, low: DVec3::splat(low) }
+        GridSpec { aspect: 1.0, n_cells: UVec3::splat(n), cell, low: DVec3::splat(low) }
     }
 
     fn blob(x: f64, sigma: f64, kappa: f64) -> Blob {
-        Blob { position: DVec3::new(x, 0.3, -0.2), sigma, kappa }
+        Blob { aspect: 1.0, position: DVec3::new(x, 0.3, -0.2), sigma, kappa }
     }
 
     #[test]
@@ -151,10 +148,10 @@ mod tests {
             blob(f64::NAN, 1.0, 1.0),
         ];
         let all = deposit(&spec, &blobs);
-        let total = all.iter().sum::<f64>() * spec.cell.powi(3);
+        let total = all.iter().sum::<f64>() * spec.cell_volume();
         // Of the third the grid keeps what lies below x = 5, an eighth of σ beyond its centre: Φ within the cut.
         let inside = 0.5 + 0.5 * erf(0.125 * FRAC_1_SQRT_2) / erf(3.0 * FRAC_1_SQRT_2);
-        let expected = mass(&blobs[0]) + mass(&blobs[1]) + inside * mass(&blobs[2]);
+        let expected = blobs[0].mass() + blobs[1].mass() + inside * blobs[2].mass();
         // 8000 cells, each a few roundings of 1e-16 of its own value.
         assert!((total / expected - 1.0).abs() < 1e-12);
         let first = deposit(&spec, &blobs[..1]);
@@ -166,7 +163,7 @@ mod tests {
     #[test]
     fn a_small_blob_lies_in_its_cell_or_is_halved_by_a_face() {
         // m = κ(√(2π)σ)³, by hand for κ = 2, σ = 0.1: 2·0.0157496… in one cell of volume 8.
-        let one = Blob { position: DVec3::splat(1.0), sigma: 0.1, kappa: 2.0 };
+        let one = Blob { aspect: 1.0, position: DVec3::splat(1.0), sigma: 0.1, kappa: 2.0 };
         let cells = deposit(&spec(3, 2.0, -2.0), &[one]);
         assert!((cells[13] * 8.0 - 2.0 * 0.015_749_609_945_722_4).abs() < 1e-13);
         assert_eq!(cells.iter().filter(|&&c| c > 0.0).count(), 1);
@@ -208,7 +205,7 @@ mod tests {
 
     #[test]
     fn samples_are_trilinear_and_end_at_the_last_centre() {
-        let spec = GridSpec { n_cells: UVec3::new(2, 3, 1), cell: 2.0, low: DVec3::new(-1.0, 0.0, 0.0) };
+        let spec = GridSpec { aspect: 1.0, n_cells: UVec3::new(2, 3, 1), cell: 2.0, low: DVec3::new(-1.0, 0.0, 0.0) };
         // Cell values x + 10 y at centres x = 0, 2; y = 1, 3, 5; z = 1.
         let cells = [0.0, 1.0, 10.0, 11.0, 20.0, 21.0];
         let at = |x, y, z| sample(&spec, &cells, DVec3::new(x, y, z));
@@ -221,7 +218,7 @@ mod tests {
 
     #[test]
     fn optical_depth_through_blobs() {
-        let b = Blob { position: DVec3::new(1.0, 2.0, 3.0), sigma: 0.5, kappa: 1.2 };
+        let b = Blob { aspect: 1.0, position: DVec3::new(1.0, 2.0, 3.0), sigma: 0.5, kappa: 1.2 };
         let through = SQRT_TAU * 1.2 * 0.5;
         let tau = |p: DVec3, d, length| optical_depth_exact(&[b], p, d, length);
         // Relative errors of erf and exp: a few 1e-16.
@@ -242,8 +239,9 @@ mod tests {
             let cell = sigma / f64::from(cells_per_sigma);
             // The blob sits on the centre of the middle cell, at every resolution.
             let n = 2 * 4 * cells_per_sigma + 1;
-            let spec = GridSpec { n_cells: UVec3::splat(n), cell, low: DVec3::splat(-0.5 * cell * f64::from(n)) };
-            let blob = Blob { position: DVec3::ZERO, sigma, kappa };
+            let spec =
+                GridSpec { aspect: 1.0, n_cells: UVec3::splat(n), cell, low: DVec3::splat(-0.5 * cell * f64::from(n)) };
+            let blob = Blob { aspect: 1.0, position: DVec3::ZERO, sigma, kappa };
             let cells = deposit(&spec, &[blob]);
             let start = DVec3::X * spec.low.x;
             let tau = transmit::optical_depth(&spec, &cells, start, DVec3::X, f64::INFINITY, 0.5);
@@ -265,12 +263,12 @@ mod tests {
     #[test]
     fn far_from_the_grid_there_is_no_density() {
         let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32);
-        let cells = deposit(&spec, &[Blob { position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
+        let cells = deposit(&spec, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
         let density = cells.iter().sum::<f64>() * spec.cell.powi(3);
-        assert!((density / mass(&Blob { position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }) - 1.0).abs() < 1e-12);
+        assert!((density / SQRT_TAU.powi(3) - 1.0).abs() < 1e-12);
         assert_eq!(sample(&spec, &cells, DVec3::splat(9.0)), 0.0);
         // Along the grid's diagonal density falls from the centre: no facet of it turns inward.
-        let q = facets::gradient(&spec, &cells, DVec3::ONE, 0.5).0;
+        let q = facets::gradient(&spec, &cells, DVec3::ONE, 0.5, 1.0).0;
         assert!(q.x < 0.0 && (q.x - q.y).abs() < 1e-12);
     }
 }

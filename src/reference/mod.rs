@@ -4,6 +4,7 @@
 //! it exactly what the GPU had and so measure one stage alone.
 
 pub mod area;
+pub mod blob;
 pub mod chunks;
 pub mod contract;
 pub mod count;
@@ -30,13 +31,4 @@ pub mod upsample;
 pub mod upsample_bound;
 pub mod volume;
 
-use glam::DVec3;
-
-/// One Gaussian blob of extinction, ρ(x) = κ exp(−|x − p|²/2σ²), its position relative to the lighting origin.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Blob {
-    pub position: DVec3,
-    pub sigma: f64,
-    /// Peak extinction per unit length.
-    pub kappa: f64,
-}
+pub use blob::Blob;

@@ -92,7 +92,11 @@ pub fn regions(groups: &[Group]) -> Vec<u32> {
 
 /// Generated particles at their placed positions.
 pub fn blobs(generated: &[Generated], placed: &[DVec3]) -> Vec<Blob> {
-    generated.iter().zip(placed).map(|(g, &position)| Blob { position, sigma: g.sigma, kappa: g.kappa }).collect()
+    generated
+        .iter()
+        .zip(placed)
+        .map(|(g, &position)| Blob { position, sigma: g.sigma, aspect: g.aspect, kappa: g.kappa })
+        .collect()
 }
 
 #[cfg(test)]
@@ -105,7 +109,7 @@ mod tests {
 
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
-        let particle = |x| Particle { position: DVec3::X * x, sigma: 1.0, kappa: 1.0, color: DVec3::ONE };
+        let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 1.0, kappa: 1.0, color: DVec3::ONE };
         let cloud = |list, y, wind| Cloud {
             source: CloudSource::Particles(list),
             position: DVec3::Y * y,
@@ -134,12 +138,12 @@ mod tests {
         let bound = placed_bound(DVec3::ONE, DVec3::splat(-4.0), DVec3::splat(10.0), 0.125);
         assert_eq!(bound, DVec3::splat(1.5 + 11.5 / 8.0));
         assert_eq!(cloud_centers(&clouds, 10.0, origin)[0], offsets[0]);
-        assert_eq!(blobs(&generated, &placed)[1], Blob { position: placed[1], sigma: 1.0, kappa: 1.0 });
+        assert_eq!(blobs(&generated, &placed)[1], Blob { aspect: 1.0, position: placed[1], sigma: 1.0, kappa: 1.0 });
     }
 
     #[test]
     fn a_cloud_grows_about_its_own_centre() {
-        let particle = |x| Particle { position: DVec3::X * x, sigma: 0.5, kappa: 1.0, color: DVec3::ONE };
+        let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 0.5, kappa: 1.0, color: DVec3::ONE };
         let cloud = Cloud {
             source: CloudSource::Particles(vec![particle(0.0), particle(0.0), particle(6.0)]),
             position: DVec3::Y,

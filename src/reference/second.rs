@@ -204,7 +204,8 @@ impl Exchange<'_> {
         };
         let length = (leave - enter) * d.length();
         let turn = self.turn(d.length());
-        let off = MARCH * turn + 2.0 * moved * (1.0 / self.spec.cell + 1.0 / d.length().max(LEAST_DISTANCE));
+        let off =
+            MARCH * turn + 2.0 * moved * (1.0 / self.spec.edges().min_element() + 1.0 / d.length().max(LEAST_DISTANCE));
         let by = |n: u32| {
             let at = |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
             let sum: f64 = (0..n).map(|k| sample(self.spec, self.cells, at(k))).sum();
@@ -212,7 +213,8 @@ impl Exchange<'_> {
             Known { value: (-depth).exp(), error: (-depth).exp() * depth * off }
         };
         // A length that rounding takes past a whole number of steps has another number of them.
-        let steps = |length: f64| ((length / (self.step * self.spec.cell)).ceil() as u32).clamp(1, self.pairs.steps);
+        let step = self.step / self.spec.cells_along(d.normalize_or(DVec3::X));
+        let steps = |length: f64| ((length / step).ceil() as u32).clamp(1, self.pairs.steps);
         let (n, slack) = (steps(length), self.slack() + moved + length * ROUNDINGS * U);
         let others = [steps(length - slack), steps(length + slack)].into_iter().filter(|other| *other != n);
         others.fold(by(n), |known, other| known.or(by(other)))

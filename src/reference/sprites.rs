@@ -6,7 +6,6 @@ use glam::{DVec2, DVec3};
 
 use super::Blob;
 use crate::model::camera::Pose;
-use crate::model::cloud::SQRT_TAU;
 use crate::model::film::FilmFormat;
 
 /// What a picture is taken with; `pose.position` is the eye relative to O.
@@ -95,9 +94,9 @@ impl View {
         (tan * f64::from(self.width) / f64::from(self.height), tan)
     }
 
-    /// b²/2σ² where a sprite ends (model.md §11 "threshold"); where it is not above 0 nothing is drawn.
-    pub fn cut(&self, blob: &Blob) -> f64 {
-        let tau = SQRT_TAU * blob.kappa * blob.sigma;
+    /// b²/2σ² where a sprite ends whose centre has the optical depth `tau` (model.md §11 "threshold"); where it is not above 0
+    /// nothing is drawn.
+    pub fn cut(&self, tau: f64) -> f64 {
         // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves out.
         (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
     }
@@ -106,7 +105,7 @@ impl View {
     /// is drawn (model.md §11 "cull"). And how far a GPU's answer may lie from it, `depth` as in [`Rounding`].
     pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
         let width = self.smallest * self.pixel();
-        (blob.sigma - width * c.dot(self.pose.forward), width * depth * c.length())
+        (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())
     }
 
     /// Direction through the centre of pixel (column `i`, row `j` from the top); its view depth is 1.
@@ -127,13 +126,11 @@ impl View {
         2.0 * self.half_slopes().1 / f64::from(self.height)
     }
 
-    /// Columns and rows (from, to; to excluded) outside which no ray comes within `reach` of offset `c` from the
-    /// eye. May be too large, never too small.
-    pub(super) fn rectangle(&self, c: DVec3, reach: f64) -> [(u32, u32); 2] {
-        let depth = c.dot(self.pose.forward);
+    /// Columns and rows (from, to; to excluded) outside which no ray meets `blob`, `c` off the eye, out to `reach` σ. May be too
+    /// large, never too small.
+    pub(super) fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let (slope_x, slope_y) = self.half_slopes();
-        let x = slopes(c.dot(self.pose.right), depth, reach);
-        let y = slopes(c.dot(self.pose.up), depth, reach);
+        let [x, y] = [self.pose.right, self.pose.up].map(|side| blob.slopes(c, [side, self.pose.forward], reach));
         let pixels = |(low, high): (f64, f64), slope: f64, n: u32| {
             let at = |s: f64| 0.5 * (s / slope + 1.0) * f64::from(n);
             // One pixel to either side for the rounding of the tangents; `as` saturates, and min keeps it inside.
@@ -143,21 +140,6 @@ impl View {
         // Rows count downward.
         [pixels(x, slope_x, self.width), pixels((-y.1, -y.0), slope_y, self.height)]
     }
-}
-
-/// Slopes between which lines through the eye can touch a disc of radius `reach` at (`side`, `depth`).
-pub(super) fn slopes(side: f64, depth: f64, reach: f64) -> (f64, f64) {
-    const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
-    let sine = reach / side.hypot(depth);
-    if sine.is_nan() || sine >= 1.0 {
-        return ALL;
-    }
-    let (mid, spread) = (side.atan2(depth), sine.asin());
-    // A disc that reaches beside or behind the eye is touched by lines of either sign.
-    if mid.abs() + spread >= std::f64::consts::FRAC_PI_2 {
-        return ALL;
-    }
-    ((mid - spread).tan(), (mid + spread).tan())
 }
 
 /// One pixel while it is composed.
@@ -281,9 +263,9 @@ fn draw(
     if !(depth >= view.near && blob.sigma > 0.0) {
         return;
     }
-    let cut = view.cut(blob);
-    let slack = r.slack(cut);
-    if cut + slack <= 0.0 {
+    let most = view.cut(blob.deepest());
+    let reach = (2.0 * (most + r.slack(most)).max(0.0)).sqrt();
+    if reach <= 0.0 {
         return;
     }
     let (above, off_size) = view.above_smallest(blob, c, r.depth);
@@ -292,18 +274,19 @@ fn draw(
     }
     let of_size = above.abs() < off_size;
     let n_rows = (band.len() / view.width as usize) as u32;
-    let [columns, rows] = view.rectangle(c, (2.0 * (cut + slack)).sqrt() * blob.sigma);
+    let [columns, rows] = view.rectangle(blob, c, reach);
     for row in rows.0.max(first_row)..rows.1.min(first_row + n_rows) {
         for column in columns.0..columns.1 {
             let pixel = &mut band[((row - first_row) * view.width + column) as usize];
             let d = view.ray(column, row);
-            let b = c.cross(d).length() / d.length();
-            let delta = view.slopes_of(d) - view.slopes_of(c);
-            let alpha = alpha(&Blob { kappa: factor(delta) * blob.kappa, ..*blob }, b);
+            let line = blob.along(c, d);
+            let (cut, delta) = (view.cut(line.depth), view.slopes_of(d) - view.slopes_of(c));
+            let slack = r.slack(cut);
+            let alpha = alpha(factor(delta) * line.tau());
             let (behind, behind_bound) = pixel.behind;
             // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
             // stands behind decides likewise.
-            let beyond = 0.5 * (b / blob.sigma).powi(2) - cut;
+            let beyond = 0.5 * line.off.powi(2) - cut;
             let (on_edge, at_behind) = (beyond.abs() <= slack, (depth - behind).abs() < behind_bound);
             let is_in = beyond <= 0.0 && cut > 0.0;
             if (!is_in && !on_edge) || (depth > behind && !at_behind) {
@@ -315,15 +298,15 @@ fn draw(
     }
 }
 
-/// α = 1 − e^{−τ}, τ = √(2π) κ σ exp(−b²/2σ²), of a ray that passes a blob's centre at distance `b`.
-pub fn alpha(blob: &Blob, b: f64) -> f64 {
-    let x = b / blob.sigma;
-    -libm::expm1(-SQRT_TAU * blob.kappa * blob.sigma * (-0.5 * x * x).exp())
+/// α = 1 − e^{−τ}.
+pub fn alpha(tau: f64) -> f64 {
+    -libm::expm1(-tau)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::cloud::SQRT_TAU;
 
     /// Eye at the origin, looking along −z, one pixel.
     const VIEW: View = View {
@@ -341,7 +324,7 @@ mod tests {
     fn what_stands_behind_shows_through_and_hides() {
         // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at depth 4.
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
-        let at = |z: f64| Blob { position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
+        let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let (blobs, colors) = ([at(2.0), at(4.0)], [DVec3::X, DVec3::Y]);
         let over = |depth: f64, depth_bound: f64| {
             let behind = Behind { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..Behind::NOTHING };

@@ -1,11 +1,8 @@
 //! What a threshold and a smallest size leave out of a picture, model.md §11 "threshold" and "cull", in f64.
 //! In: blobs and eye relative to O. Out: of every pixel the layers that are cut, and their optical depth.
 
-use glam::DVec3;
-
 use super::Blob;
 use super::sprites::{Behind, Factor, View};
-use crate::model::cloud::SQRT_TAU;
 
 /// What is cut of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -43,20 +40,22 @@ pub fn cut(view: &View, behind: &[Behind], blobs: &[Blob], factor: Option<Factor
         if !(depth >= view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
             continue;
         }
-        // Nothing is left of what is too small.
         let is_large = view.above_smallest(blob, c, 0.0).0 >= 0.0;
-        let (from, to) = (if is_large { view.cut(blob) } else { 0.0 }, whole.cut(blob));
-        let [columns, rows] = view.rectangle(c, (2.0 * to).sqrt() * blob.sigma);
+        let to = whole.cut(blob.deepest());
+        let [columns, rows] = view.rectangle(blob, c, (2.0 * to).sqrt());
         for row in rows.0..rows.1 {
             for column in columns.0..columns.1 {
                 let i = (row * view.width + column) as usize;
                 let ray = view.ray(column, row);
-                let e = exponent(blob, c, ray);
+                let line = blob.along(c, ray);
+                let e = 0.5 * line.off.powi(2);
+                // Nothing is left of what is too small.
+                let from = if is_large { view.cut(line.depth) } else { 0.0 };
                 if (e > from || from <= 0.0) && e <= to && depth <= behind[i].depth {
                     let delta = view.slopes_of(ray) - view.slopes_of(c);
                     let factor = factor.map_or(1.0, |f| f(k, delta));
                     pixels[i].n_layers += 1;
-                    pixels[i].tau += factor * SQRT_TAU * blob.kappa * blob.sigma * (-e).exp();
+                    pixels[i].tau += factor * line.tau();
                 }
             }
         }
@@ -64,15 +63,12 @@ pub fn cut(view: &View, behind: &[Behind], blobs: &[Blob], factor: Option<Factor
     pixels
 }
 
-/// b²/2σ² of the ray along `d` from an eye that the blob is `c` off.
-fn exponent(blob: &Blob, c: DVec3, d: DVec3) -> f64 {
-    0.5 * (c.cross(d).length() / (d.length() * blob.sigma)).powi(2)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::model::camera::Pose;
+    use crate::model::cloud::SQRT_TAU;
+    use glam::DVec3;
 
     #[test]
     fn what_lies_between_the_threshold_and_the_cutoff_is_counted() {
@@ -81,7 +77,7 @@ mod tests {
         let (fov_y_rad, smallest) = (2.0 * 0.5f64.atan(), 0.0);
         let view = View { width: 3, height: 1, pose, fov_y_rad, near: 0.5, cutoff: 3.0, threshold: 0.1, smallest };
         // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.
-        let blob = |tau: f64| Blob { position: DVec3::NEG_Z * 2.0, sigma: 1.0, kappa: tau / SQRT_TAU };
+        let blob = |tau: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * 2.0, sigma: 1.0, kappa: tau / SQRT_TAU };
         let of = |blobs: &[Blob], depth: f64| cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None);
         let nothing = Cut::default();
         // τ = 0.2/e there: below the threshold. 0.3/e: not. 0.09: nowhere above it.

@@ -110,8 +110,9 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind, layer: Layer) -> Co
             continue;
         }
         let of_size = above.abs() < off_size;
-        let (b, cut) = (c.cross(ray).length() / ray.length(), view.cut(blob));
-        let beyond = 0.5 * (b / blob.sigma).powi(2) - cut;
+        let line = blob.along(c, ray);
+        let cut = view.cut(line.depth);
+        let beyond = 0.5 * line.off.powi(2) - cut;
         let (is_in, on_edge) = (beyond <= 0.0 && cut > 0.0, beyond.abs() <= r.slack(cut));
         let at_behind = (depth - under.depth).abs() < under.depth_bound;
         if (!is_in && !on_edge) || (depth > under.depth && !at_behind) {
@@ -119,7 +120,7 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind, layer: Layer) -> Co
         }
         let delta = view.slopes_of(ray) - view.slopes_of(c);
         let factor = factor.map_or(1.0, |f| f(k, delta));
-        let alpha = alpha(&Blob { kappa: factor * blob.kappa, ..*blob }, b);
+        let alpha = alpha(factor * line.tau());
         let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
         let drawn = if is_in && depth <= under.depth && above >= 0.0 { alpha } else { 0.0 };
         layer(&mut pixel, drawn, off, radiance[k]);
@@ -140,6 +141,7 @@ mod tests {
         let view =
             View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0, threshold: 0.0, smallest: 0.0 };
         let at = |x: f64, z: f64, tau: f64| Blob {
+            aspect: 1.0,
             position: DVec3::new(x, 0.1, -z),
             sigma: 0.5,
             kappa: tau / (SQRT_TAU * 0.5),

@@ -50,23 +50,23 @@ pub fn crossing(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64) -> Option<(f
     (enter <= leave && leave.is_finite()).then_some((enter, leave))
 }
 
-/// Number of march steps over `length`, the last one shorter; `step` is in cells.
-pub fn n_steps(spec: &GridSpec, length: f64, step: f64) -> u32 {
+/// Number of march steps of `step` over `length`, the last one shorter.
+pub fn n_steps(length: f64, step: f64) -> u32 {
     // `as` saturates; NaN (0/0) becomes 0 and then 1.
-    ((length / (step * spec.cell)).ceil() as u32).clamp(1, MAX_STEPS)
+    ((length / step).ceil() as u32).clamp(1, MAX_STEPS)
 }
 
 /// τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`: steps of `step` cells from where the way enters the grid's
 /// box, the last one shorter, so that τ is continuous in the length; x_k is the middle of step k.
 pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, distance: f64, step: f64) -> f64 {
     let Some((enter, leave)) = crossing(spec, p, d, distance) else { return 0.0 };
-    let length = leave - enter;
+    let (length, step) = (leave - enter, step / spec.cells_along(d));
     let of_step = |k: u32| {
-        let from = f64::from(k) * step * spec.cell;
-        let s = (step * spec.cell).min(length - from);
+        let from = f64::from(k) * step;
+        let s = step.min(length - from);
         sample(spec, cells, p + (enter + (from + 0.5 * s)) * d) * s
     };
-    (0..n_steps(spec, length, step)).map(of_step).sum()
+    (0..n_steps(length, step)).map(of_step).sum()
 }
 
 impl Obstacles<'_> {
@@ -105,7 +105,7 @@ mod tests {
     use glam::UVec3;
 
     /// 8 × 4 × 4 cells of edge ½, low corner at the origin.
-    const SPEC: GridSpec = GridSpec { n_cells: UVec3::new(8, 4, 4), cell: 0.5, low: DVec3::ZERO };
+    const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::new(8, 4, 4), cell: 0.5, low: DVec3::ZERO };
     const SUN: Light = Light::Directional { direction: DVec3::NEG_X, irradiance: DVec3::ONE };
 
     fn transmittance(cells: &[f64], positions: &[DVec3], light: Light, forward: f64) -> Vec<f64> {
@@ -188,8 +188,8 @@ mod tests {
         assert_eq!(all.transmittance(&receivers, &[SUN, sky]), expected);
         let leave = crossing(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0), f64::INFINITY);
         assert_eq!(leave, Some((0.0, 0.25 / 0.6)));
-        assert_eq!([n_steps(&SPEC, 3.75, 0.5), n_steps(&SPEC, 3.76, 0.5), n_steps(&SPEC, 0.0, 0.5)], [15, 16, 1]);
-        assert_eq!(n_steps(&SPEC, 3.75, 1e-9), MAX_STEPS);
+        assert_eq!([n_steps(3.75, 0.25), n_steps(3.76, 0.25), n_steps(0.0, 0.25)], [15, 16, 1]);
+        assert_eq!(n_steps(3.75, 1e-9), MAX_STEPS);
     }
 
     #[test]

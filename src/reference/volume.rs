@@ -10,7 +10,6 @@ use glam::DVec3;
 
 use super::Blob;
 use super::sprites::{Behind, View};
-use crate::model::cloud::SQRT_TAU;
 use piece::{March, Ray};
 
 /// One pixel: premultiplied colour and alpha.
@@ -62,9 +61,9 @@ impl<'a> Volume<'a> {
     pub fn new(view: &View, blobs: &'a [Blob], radiance: &'a [DVec3]) -> Volume<'a> {
         let omitted = OMITTED / blobs.len().max(1) as f64;
         let place = |blob: &Blob| {
-            let reach = reach(SQRT_TAU * blob.kappa * blob.sigma, omitted) * blob.sigma;
+            let reach = reach(blob.deepest(), omitted);
             match reach > 0.0 {
-                true => view.rectangle(blob.position - view.pose.position, reach),
+                true => view.rectangle(blob, blob.position - view.pose.position, reach),
                 false => [(0, 0); 2],
             }
         };
@@ -95,10 +94,10 @@ impl<'a> Volume<'a> {
     /// Blob `k` along `ray` from the near plane to `end`, where it is there at all.
     fn pass(&self, k: usize, ray: DVec3, end: f64) -> Option<Passed> {
         let blob = &self.blobs[k];
-        let (c, length) = (blob.position - self.view.pose.position, ray.length());
-        let x = c.cross(ray).length() / (length * blob.sigma);
-        let depth = SQRT_TAU * blob.kappa * blob.sigma * (-0.5 * x * x).exp();
-        let (center, width) = (c.dot(ray) / (length * length), blob.sigma / length);
+        let c = blob.position - self.view.pose.position;
+        let depth = blob.along(c, ray).tau();
+        let white = blob.whiten(ray);
+        let (center, width) = (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         let reach = reach(depth, self.omitted) * width;
         let (from, to) = ((center - reach).max(self.view.near), (center + reach).min(end));
         (from < to).then_some(Passed { center, width, depth, radiance: self.radiance[k], from, to })

@@ -27,6 +27,22 @@ pub struct March<'a> {
 }
 
 impl March<'_> {
+    /// A cell's: along y a product where it is no cube.
+    fn edge(&self, axis: usize) -> Bounded {
+        let cell = Bounded::exact(self.spec.cell);
+        if axis == 1 && self.spec.aspect != 1.0 { cell.times(Bounded::exact(self.spec.aspect)) } else { cell }
+    }
+
+    /// How much shorter than `step` cells a step along `d` is: the length of d where the cells are cubes.
+    fn in_widths(&self, d: [Bounded; 3]) -> Bounded {
+        if self.spec.aspect == 1.0 {
+            return Bounded::exact(1.0);
+        }
+        let up = d[1].times(Bounded::once(1.0 / self.spec.aspect));
+        let [x, y, z] = [d[0], up, d[2]].map(Bounded::squared);
+        x.plus(y).plus(z).root()
+    }
+
     /// Where the way enters the box and leaves it or ends: high = low + cell·n, then a difference and a quotient, and the
     /// greatest of those that enter, the least of those that leave.
     fn crossing(&self, p: [f32; 3], d: [Bounded; 3], distance: Bounded) -> [Bounded; 2] {
@@ -35,7 +51,7 @@ impl March<'_> {
         for i in (0..3).filter(|&i| d[i].value != 0.0) {
             let n = f64::from(self.spec.n_cells[i]);
             let low = exact(self.spec.low[i]);
-            let high = low.plus(exact(self.spec.cell).times(exact(n)));
+            let high = low.plus(self.edge(i).times(exact(n)));
             let [a, b] = [low, high].map(|side| side.minus(exact(f64::from(p[i]))).over(d[i]));
             let (first, second) = if a.value < b.value { (a, b) } else { (b, a) };
             enter.push(first);
@@ -68,7 +84,8 @@ impl March<'_> {
         let [enter, leave] = self.crossing(p, way.toward, distance);
         let length = leave.minus(enter);
         let s = Bounded::once(step * self.spec.cell);
-        let n = transmit::n_steps(self.spec, length.value, step);
+        let s = if self.spec.aspect == 1.0 { s } else { s.over(self.in_widths(way.toward)) };
+        let n = transmit::n_steps(length.value, s.value);
         let mut terms = vec![];
         let mut last_error = 0.0;
         for k in 0..n {
@@ -103,9 +120,11 @@ impl March<'_> {
         let Some((enter, leave)) = transmit::crossing(self.spec, double(p), way.toward, way.distance) else {
             return Bounded::exact(0.0);
         };
-        let (length, s) = (leave - enter, step * self.spec.cell);
-        let rounded = (f64::from(s as f32) - s).abs();
-        let n = transmit::n_steps(self.spec, length, step);
+        let (length, s) = (leave - enter, step / self.spec.cells_along(way.toward));
+        // The step is an f32 number; where cells are no cubes so is 1/aspect, which it is divided by.
+        let rounded = (f64::from((step * self.spec.cell) as f32) / (step * self.spec.cell) - 1.0).abs() * s
+            + if self.spec.aspect == 1.0 { 0.0 } else { bounded::U * s };
+        let n = transmit::n_steps(length, s);
         let scale = self.spec.low.abs().max_element() + enter.abs() + length;
         let mut terms = vec![];
         let mut last_error = 0.0;
@@ -131,6 +150,12 @@ impl March<'_> {
         Bounded { error: tau.error + if beside { last_error + densest * short } else { 0.0 }, ..tau }
     }
 
+    /// A length from the grid's corner, in cells.
+    fn in_cells(&self, x: Bounded, axis: usize) -> Bounded {
+        let wide = x.times(Bounded::once(1.0 / self.spec.cell));
+        if axis == 1 && self.spec.aspect != 1.0 { wide.times(Bounded::once(1.0 / self.spec.aspect)) } else { wide }
+    }
+
     /// Trilinear density: what the position's error makes of it, by the steepest slope among the cells around; and the
     /// rounding of three levels of (1 − f) a + f b, three operations each, of numbers that are not negative. `u`: unit
     /// round-off, 0 where no f32 is rounded.
@@ -138,11 +163,12 @@ impl March<'_> {
         let value = nimbus::reference::grid::sample(self.spec, self.cells, DVec3::from(x.map(|x| x.value)));
         let exact = Bounded::exact;
         let g = [0, 1, 2].map(|i| match u > 0.0 {
-            true => x[i].minus(exact(self.spec.low[i])).times(Bounded::once(1.0 / self.spec.cell)).minus(exact(0.5)),
-            false => Bounded {
-                value: (x[i].value - self.spec.low[i]) / self.spec.cell - 0.5,
-                error: x[i].error / self.spec.cell,
-            },
+            true => self.in_cells(x[i].minus(exact(self.spec.low[i])), i).minus(exact(0.5)),
+            false => {
+                let (edge, at) = (self.spec.edges()[i], x[i].value - self.spec.low[i]);
+                let shape = if i == 1 && self.spec.aspect != 1.0 { bounded::U * (at / edge).abs() } else { 0.0 };
+                Bounded { value: at / edge - 0.5, error: x[i].error / edge + shape }
+            }
         });
         let base = IVec3::from(g.map(|g| g.value.floor() as i32));
         let (slopes, any) = self.slopes(base);

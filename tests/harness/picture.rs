@@ -114,8 +114,29 @@ impl Picture {
         let shade = 0.5 + 0.4 * (self.placed.len() as f32).sin();
         self.placed.push(PlacedRecord { position: position.as_vec3().to_array(), sigma: sigma as f32 });
         let color = [1.0, shade, 1.5 - shade];
-        self.particles.push(ParticleRecord { position: [0.0; 3], sigma: sigma as f32, color, kappa });
+        self.particles.push(ParticleRecord {
+            aspect: 1.0,
+            unused: 0.0,
+            unused_too: [0.0; 2],
+            position: [0.0; 3],
+            sigma: sigma as f32,
+            color,
+            kappa,
+        });
         self
+    }
+
+    /// The last blob's σ along y is `aspect` times that along x and z.
+    pub fn shaped(mut self, aspect: f64) -> Picture {
+        if let Some(last) = self.particles.last_mut() {
+            last.aspect = aspect as f32;
+        }
+        self
+    }
+
+    /// Whether some blob is no ball.
+    pub fn has_ellipsoids(&self) -> bool {
+        self.particles.iter().any(|p| p.aspect != 1.0)
     }
 
     /// The eye's offset `x` right, `y` up, `z` forward in the scene.
@@ -128,6 +149,7 @@ impl Picture {
         let blob = |(p, q): (&PlacedRecord, &ParticleRecord)| Blob {
             position: double(p.position),
             sigma: f64::from(p.sigma),
+            aspect: f64::from(q.aspect),
             kappa: f64::from(q.kappa),
         };
         let blobs = self.placed.iter().zip(&self.particles).map(blob);
@@ -256,13 +278,12 @@ impl Picture {
                     self.view.pixel(),
                 )
             });
-            let cut = self.view.cut(blob);
-            let cut_error = self.cut_error(sprite.tau);
             for j in 0..self.view.height {
                 for i in 0..self.view.width {
                     let d = self.view.ray(i, j);
-                    let b = c.cross(d).length() / d.length();
-                    let at_cut = 0.5 * (b / blob.sigma).powi(2) - cut;
+                    let line = blob.along(c, d);
+                    let cut = self.view.cut(line.depth);
+                    let at_cut = 0.5 * line.off.powi(2) - cut;
                     if at_cut > 0.2 * cut.max(1.0) {
                         continue;
                     }
@@ -270,6 +291,8 @@ impl Picture {
                         true => sprite.tiled_exponent(self.ray(i, j)),
                         false => sprite.exponent(self.ray(i, j)),
                     };
+                    let tau = sprite.deep(self.ray(i, j));
+                    let cut_error = self.cut_error(tau);
                     // The cut: e <= cutoff²/2, three roundings; or the threshold's.
                     if at_cut > -0.2 * cut.max(1.0) {
                         let error = if tiled { std::f64::consts::LN_2 * e.error } else { e.error };
@@ -283,7 +306,7 @@ impl Picture {
                         (None, true) => e.scaled(-1.0).exp2(),
                         (Some(sheet), true) => e.scaled(-1.0).plus(log2_e.times(sheet)).exp2(),
                     };
-                    let t = sprite.tau.times(factor);
+                    let t = tau.times(factor);
                     let true_alpha = -libm::expm1(-t.value);
                     // d(1 − e^{−t})/dt = e^{−t}.
                     let off = (-(t.value - t.error)).exp() * t.error + ONE_MINUS_EXP * true_alpha;
@@ -334,7 +357,9 @@ impl Picture {
         let tau = Bounded::once(SQRT_TAU).times(Bounded::exact(blob.kappa)).times(Bounded::exact(blob.sigma));
         let one = Bounded::exact(1.0);
         let tau = if self.drawn.is_some() { tau.times(one).times(one) } else { tau };
-        Sprite { s: [slope(pose.right), slope(pose.up)], z: z_sigmas.squared().scaled(0.5), tau }
+        let ellipsoid =
+            self.has_ellipsoids().then(|| Ellipsoid::new(blob.aspect, [pose.right.y, pose.up.y, pose.forward.y]));
+        Sprite { s: [slope(pose.right), slope(pose.up)], z: z_sigmas.squared().scaled(0.5), tau, ellipsoid }
     }
 }
 
@@ -343,6 +368,44 @@ pub struct Sprite {
     pub s: [Bounded; 2],
     pub z: Bounded,
     pub tau: Bounded,
+    pub ellipsoid: Option<Ellipsoid>,
+}
+
+/// What the shaders' shape_of says.
+#[derive(Debug, Clone, Copy)]
+pub struct Ellipsoid {
+    y: [Bounded; 3],
+    /// 1/a².
+    inverse: Bounded,
+}
+
+impl Ellipsoid {
+    fn new(aspect: f64, y: [f64; 3]) -> Ellipsoid {
+        let square = Bounded::exact(aspect).squared();
+        Ellipsoid { y: y.map(Bounded::once), inverse: Bounded::exact(1.0).over(square) }
+    }
+
+    /// Along y, and across it.
+    fn parts(&self, v: [Bounded; 3]) -> (Bounded, [Bounded; 3]) {
+        let up = dot(self.y, v);
+        (up, [0, 1, 2].map(|k| v[k].minus(up.times(self.y[k]))))
+    }
+
+    /// conic_of.
+    fn conic(&self, s: [Bounded; 2], scale: Bounded) -> [Bounded; 3] {
+        let (zero, one) = (Bounded::exact(0.0), Bounded::exact(1.0));
+        let (up_x, x) = self.parts([zero, one, s[1].scaled(-1.0)]);
+        let (up_y, y) = self.parts([one.scaled(-1.0), zero, s[0]]);
+        let entry = |a: [Bounded; 3], b: [Bounded; 3], up: Bounded| scale.times(self.inverse.times(dot(a, b)).plus(up));
+        [entry(x, x, up_x.squared()), entry(x, y, up_x.times(up_y)).scaled(2.0), entry(y, y, up_y.squared())]
+    }
+
+    /// |d|² across y and along it, and |M d|².
+    fn squares(&self, ray: [Bounded; 2]) -> [Bounded; 3] {
+        let (up, across) = self.parts([ray[0], ray[1], Bounded::exact(1.0)]);
+        let (rest, along) = (dot(across, across), up.squared());
+        [rest, along, rest.plus(self.inverse.times(along))]
+    }
 }
 
 impl Sprite {
@@ -350,11 +413,29 @@ impl Sprite {
         [ray[0].minus(self.s[0]), ray[1].minus(self.s[1])]
     }
 
+    /// τ of a ray through the centre in this direction.
+    fn deep(&self, ray: [Bounded; 2]) -> Bounded {
+        let Some(e) = &self.ellipsoid else { return self.tau };
+        let [rest, along, white] = e.squares(ray);
+        self.tau.times(rest.plus(along).over(white).root())
+    }
+
+    /// b²/2σ² by the conic, times whatever `scale` is more than z²/2σ².
+    fn by_conic(&self, e: &Ellipsoid, ray: [Bounded; 2], scale: Bounded) -> Bounded {
+        let ([xx, xy, yy], [dx, dy]) = (e.conic(self.s, scale), self.difference(ray));
+        let sum = xx.times(dx).times(dx).plus(xy.times(dx).times(dy)).plus(yy.times(dy).times(dy));
+        // A product more where it is divided by way of an inverse.
+        sum.times(Bounded::exact(1.0).over(e.squares(ray)[2]))
+    }
+
     /// The same in powers of two, as `tiles` evaluates it: a polynomial along the row over the norm.
     fn tiled_exponent(&self, ray: [Bounded; 2]) -> Bounded {
         let (one, s) = (Bounded::exact(1.0), &self.s);
         // log2 e is one more factor.
         let scale = self.z.times(Bounded::once(std::f64::consts::LOG2_E));
+        if let Some(e) = &self.ellipsoid {
+            return self.by_conic(e, ray, scale);
+        }
         let [dx, dy] = [ray[0].minus(s[0]), ray[1].minus(s[1])];
         let a = scale.times(one.plus(s[1].squared()));
         let b = scale.scaled(-2.0).times(s[0]).times(s[1]).times(dy);
@@ -365,6 +446,9 @@ impl Sprite {
 
     /// b²/2σ² as the fragment shader evaluates it.
     fn exponent(&self, ray: [Bounded; 2]) -> Bounded {
+        if let Some(e) = &self.ellipsoid {
+            return self.by_conic(e, ray, self.z);
+        }
         let d = self.difference(ray);
         let twist = self.s[0].times(d[1]).minus(self.s[1].times(d[0]));
         let above = d[0].squared().plus(d[1].squared()).plus(twist.squared());

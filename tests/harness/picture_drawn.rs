@@ -8,11 +8,11 @@ use nimbus::frame::tiling::Tiling;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Recorder, Start, Target};
 use nimbus::layout::frame::CameraRecord;
-use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::passes::sprites::Sprites;
 use nimbus::passes::surfaces::Surfaces;
 use nimbus::passes::tiles::{self, Division, Variant};
+use nimbus::reference::Blob;
 
 use super::{Picture, Tiled, Way};
 use crate::bounded::U;
@@ -101,16 +101,17 @@ impl Picture {
         let (lit, behind) = (self.lit.is_some(), self.scenery.is_some());
         let [grouped, weighted] = [self.i_facet.is_some(), self.drawn.is_some()];
         let [textured, threshold] = [self.textured.is_some(), self.view.threshold > 0.0];
+        let ellipsoids = self.has_ellipsoids();
         match way {
             Way::Sprites => {
-                let variant = [behind, grouped, weighted, textured, threshold];
+                let variant = [behind, grouped, weighted, textured, threshold, ellipsoids];
                 Made::Sprites(Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites"))
             }
             Way::Tiles(tiled) => Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated),
             Way::Chunks(n_chunks, saturated) => {
                 // Room for more than there are, as where some are culled.
                 let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
-                let variant = [lit, grouped, weighted, textured, threshold];
+                let variant = [lit, grouped, weighted, textured, threshold, ellipsoids];
                 let chunks = Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant);
                 Made::Chunks(Box::new(chunks.expect("chunks")), saturated)
             }
@@ -179,8 +180,9 @@ impl Picture {
     fn tiling(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, tiled: &Tiled) -> Tiling {
         let division = Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
         let blobs = self.blobs();
-        let tau_most = blobs.iter().map(|b| SQRT_TAU * b.kappa * b.sigma).fold(0.0, f64::max);
+        let tau_most = blobs.iter().map(Blob::deepest).fold(0.0, f64::max);
         let variant = Variant {
+            ellipsoids: self.has_ellipsoids(),
             lit: self.lit.is_some(),
             grouped: self.i_facet.is_some(),
             textured: self.textured.is_some(),

@@ -13,7 +13,6 @@ use nimbus::reference::facets::{
     CONDITIONING, Facet, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets, gradient, smoothstep,
 };
 use nimbus::reference::generate::uniforms;
-use nimbus::reference::grid::mass;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 use crate::harness::Gpu;
@@ -56,16 +55,24 @@ fn f32_of(v: DVec3) -> DVec3 {
 impl Scene {
     /// Two balls of blobs, one fine and one coarse, and a few blobs in the empty space around.
     pub fn new() -> Scene {
-        let spec = GridSpec { n_cells: UVec3::new(60, 40, 44), cell: 0.25, low: DVec3::new(-7.0, -5.0, -5.5) };
+        Scene::of_shape(1.0)
+    }
+
+    /// The same of blobs from a third of `aspect` to `aspect` times as high as wide, if that is not 1, in cells as flat.
+    pub fn of_shape(aspect: f64) -> Scene {
+        let n_cells = UVec3::new(60, (40.0 / aspect) as u32, 44);
+        let spec = GridSpec { aspect, n_cells, cell: 0.25, low: DVec3::new(-7.0, -5.0, -5.5) };
         let record = GridRecord::from(&spec);
-        let spec = GridSpec { low: Vec3::from_array(record.low).as_dvec3(), cell: f64::from(record.cell), ..spec };
+        let (cell, low) = (f64::from(record.cell), Vec3::from_array(record.low).as_dvec3());
+        let spec = GridSpec { low, cell, aspect: f64::from(record.aspect), ..spec };
         let centers = [DVec3::new(-3.0, 0.1, 0.0), DVec3::new(3.2, -0.3, 0.2)];
         let blob = |i: u32| {
             let [a, b, c, d] = uniforms(0xface, 0, i, 0);
             let spread = if i.is_multiple_of(50) { 4.5 } else { 2.0 };
             let position = centers[(i / N_PER_CLOUD) as usize] + spread * (DVec3::new(a, b, c) * 2.0 - 1.0);
             let sigma = f64::from((0.05 + 0.5 * d * d) as f32);
-            Blob { position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }
+            let aspect = if aspect == 1.0 { 1.0 } else { f64::from((aspect * (1.0 - 2.0 / 3.0 * c)) as f32) };
+            Blob { aspect, position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }
         };
         let mut blobs: Vec<Blob> = (0..3000).map(blob).collect();
         // In the middle of their cloud, without size, without extinction, far outside.
@@ -85,6 +92,10 @@ impl Scene {
         Scene { spec, record, blobs, groups: [0, 1, 2, 3].map(group), i_group }
     }
 
+    pub fn has_ellipsoids(&self) -> bool {
+        self.blobs.iter().any(|b| b.aspect != 1.0)
+    }
+
     /// The GPU's density and facets.
     pub fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> (Vec<f64>, Vec<FacetRecord>) {
         let (density, made, _) = self.run_groups(gpu, compiler, &[], &[]);
@@ -101,15 +112,19 @@ impl Scene {
     ) -> (Vec<f64>, Vec<FacetRecord>, Vec<u32>) {
         let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
         let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
-        let pass = Facets::new(&gpu.device, compiler).unwrap();
+        let pass = Facets::new(&gpu.device, compiler, self.has_ellipsoids()).unwrap();
         let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
-        let particle =
-            |b: &Blob| ParticleRecord { kappa: b.kappa as f32, color: color(b), ..ParticleRecord::default() };
+        let particle = |b: &Blob| ParticleRecord {
+            kappa: b.kappa as f32,
+            color: color(b),
+            aspect: b.aspect as f32,
+            ..ParticleRecord::default()
+        };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
         let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
         let (i_group, groups) = (gpu.upload(&self.i_group), gpu.upload(&self.groups));
         let (density, made) = (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(N_SURFACE_FACETS + n));
-        let heaviest = self.blobs.iter().map(mass).fold(0.0, f64::max);
+        let heaviest = self.blobs.iter().map(Blob::mass).fold(0.0, f64::max);
         let run = |r: &(u64, u64)| RunRecord { i_first: r.0 as u32, n_particles: (r.1 - r.0) as u32 };
         let records: Vec<RunRecord> = runs.iter().map(run).collect();
         let (order, records, i_facet) = (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
@@ -149,12 +164,12 @@ impl Scene {
     /// interpolations then round numbers below the greatest cell around, twice each, and a difference three times.
     fn sample_error(&self, cells: &[f64], p: DVec3, sigma: f64, astray: f64) -> f64 {
         let n = self.spec.n_cells.as_ivec3();
-        let g = (p - self.spec.low) / self.spec.cell - 0.5;
-        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded; less ½.
+        let edges = self.spec.edges();
+        let g = (p - self.spec.low) / edges - 0.5;
+        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded, and along y 1/a likewise; less ½.
         let reach = p.abs() + 3.0 * GRADIENT_RADIUS_SIGMA * sigma;
         let e =
-            (U * (reach + (p - self.spec.low).abs() * 3.0) / self.spec.cell + U * g.abs() + astray / self.spec.cell)
-                * (1.0 + 8.0 * U);
+            (U * (reach + (p - self.spec.low).abs() * 5.0) / edges + U * g.abs() + astray / edges) * (1.0 + 8.0 * U);
         // All cells that the sample or one beside it can meet.
         let (from, to) = ((g - e).floor().as_ivec3(), (g + e).floor().as_ivec3() + 1);
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
@@ -171,25 +186,34 @@ impl Scene {
         (high - low) * e.element_sum() + 15.0 * U * high
     }
 
+    /// Relative error of an area; an ellipsoid's mean width takes two logarithms and two exponentials beside: with |log2 a| < 6 and
+    /// 3 ulp a logarithm, 2⁻²¹ about 1, and 3 + 2|x| an exponential, 320 roundings in all, that of its depth among them.
+    pub fn area_error(&self) -> f64 {
+        AREA_ERROR + if self.has_ellipsoids() { 320.0 * U } else { 0.0 }
+    }
+
     /// Bounds on normal, position and area of blob `i`.
     pub fn bound(&self, cells: &[f64], i: usize, facet: &Facet) -> (f64, DVec3, f64) {
         let blob = &self.blobs[i];
         let scale = blob.sigma.max(f64::from(SIGMA_MEANS[self.i_group[i] as usize]));
-        let around = Around { p: blob.position, p_error: 0.0, scale, scale_error: 0.0 };
+        let around =
+            Around { p: blob.position, p_error: 0.0, scale, scale_error: 0.0, aspect: blob.aspect, aspect_error: 0.0 };
         let normal = self.normal_bound(cells, &around, facet);
-        (normal, around.shell_bound(normal, facet), facet.area * AREA_ERROR)
+        (normal, around.shell_bound(normal, facet), facet.area * self.area_error())
     }
 
     /// Bound on the normal that `facet` has around a point.
     pub fn normal_bound(&self, cells: &[f64], at: &Around, facet: &Facet) -> f64 {
         let center = self.centers()[facet.region as usize];
-        let (g, s) = gradient(&self.spec, cells, at.p, at.scale);
+        let axes = DVec3::new(1.0, at.aspect, 1.0);
+        let (g, s) = gradient(&self.spec, cells, at.p, at.scale, at.aspect);
         // Where a sample is taken off its place.
-        let astray = at.p_error + GRADIENT_RADIUS_SIGMA * at.scale_error;
+        let scale_error = at.scale_error * at.aspect.max(1.0) + at.scale * at.aspect_error;
+        let astray = at.p_error + GRADIENT_RADIUS_SIGMA * scale_error;
         // Σ w δρ over the directions, and 14 sums and a product each of the running total.
         let sampled = |(d, w): &(DVec3, f64)| {
-            let p = at.p + GRADIENT_RADIUS_SIGMA * at.scale * *d;
-            w * self.sample_error(cells, p, at.scale, astray)
+            let p = at.p + GRADIENT_RADIUS_SIGMA * at.scale * axes * *d;
+            w * self.sample_error(cells, p, at.scale * at.aspect.max(1.0), astray)
         };
         let dg = directions().iter().map(sampled).sum::<f64>() + 18.0 * U * s;
         let to_center = (at.p - center).length();
@@ -212,8 +236,12 @@ impl Scene {
             } else {
                 // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the blend
                 // v = t·down + (1−t)·away, whose own length divides.
-                let d_down = 2.0 * 3f64.sqrt() * dg / g.length() + U * (LENGTH_ERROR + DIVISION_ERROR);
-                let blend = t * -g.normalize_or_zero() + (1.0 - t) * away;
+                // Of an ellipsoid what is off is stretched with it; the quotient by a is rounded, and a may be off.
+                let down = -(g / axes);
+                let wrong = dg + g.y.abs() * (at.aspect_error / at.aspect + DIVISION_ERROR * U);
+                let d_down = 2.0 * 3f64.sqrt() * wrong / axes.min_element().min(1.0) / down.length()
+                    + U * (LENGTH_ERROR + DIVISION_ERROR);
+                let blend = t * down.normalize_or_zero() + (1.0 - t) * away;
                 let dv = (t + dt) * d_down + dt * 2.0 + (1.0 - t + dt) * d_away + 4.0 * U;
                 2.0 * dv / (blend.length() - dv).max(1e-9) + U * (LENGTH_ERROR + DIVISION_ERROR)
             }
@@ -229,14 +257,23 @@ pub struct Around {
     pub p_error: f64,
     pub scale: f64,
     pub scale_error: f64,
+    pub aspect: f64,
+    pub aspect_error: f64,
 }
 
 impl Around {
     pub fn shell_bound(&self, normal: f64, facet: &Facet) -> DVec3 {
-        let shell = SHELL_SIGMA * (self.scale + self.scale_error);
+        // Of an ellipsoid Σn/√(nᵀΣn), Σ = diag(1, a², 1), is at most max(1, a) long and changes by no more than twice max(1, a²)/min(1, a) of
+        // what n does, and by 2 max(1, a) of what a does; eight roundings more, and the root's.
+        let a = self.aspect;
+        let (wide, steep) = (a.max(1.0), if a == 1.0 { 1.0 } else { 2.0 * a.max(1.0).powi(2) / a.min(1.0) });
+        let more = if a == 1.0 { 0.0 } else { 8.0 + LENGTH_ERROR + DIVISION_ERROR };
+        let shell = SHELL_SIGMA * (self.scale + self.scale_error) * wide;
         // 1.5σ, its product with n, and the sum.
-        let inherited = self.p_error + SHELL_SIGMA * self.scale_error + shell * normal;
-        let rounded = 3.0 * shell + facet.position.abs() + self.p.abs() + 2.0 * inherited;
+        let inherited = self.p_error
+            + SHELL_SIGMA * self.scale_error * wide
+            + SHELL_SIGMA * self.scale * (steep * normal + 2.0 * wide * self.aspect_error);
+        let rounded = (3.0 + more) * shell + facet.position.abs() + self.p.abs() + 2.0 * inherited;
         inherited * DVec3::ONE + U * rounded
     }
 }

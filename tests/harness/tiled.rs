@@ -19,7 +19,7 @@ impl Picture {
             let d = view.ray(i, j);
             let covers = |b: &&Blob| {
                 let c = b.position - view.pose.position;
-                c.dot(view.pose.forward) >= view.near && c.cross(d).length() <= view.cutoff * b.sigma * d.length()
+                c.dot(view.pose.forward) >= view.near && b.along(c, d).off <= view.cutoff
             };
             blobs.iter().filter(covers).count()
         };

@@ -40,9 +40,15 @@ pub fn in_cloud(position: [f32; 3]) -> FacetRecord {
 
 /// Blobs in a slab of cells that are no power of two, suns from all sides and the sky. Facets inside the grid.
 pub fn case() -> Case {
+    case_of_cells(1.0)
+}
+
+/// The same of blobs, and cells, so many times as high as wide.
+pub fn case_of_cells(aspect: f64) -> Case {
     let mut r = Random(21);
     let blobs: Vec<Blob> = (0..25)
         .map(|_| Blob {
+            aspect,
             position: DVec3::new(
                 f64::from(r.within(-3.0, 3.0)),
                 f64::from(r.within(-1.0, 1.0)),
@@ -53,8 +59,10 @@ pub fn case() -> Case {
         })
         .collect();
     let reach = DVec3::splat(2.1);
-    let fit = GridSpec::fit(DVec3::new(-3.0, -1.0, -2.0) - reach, DVec3::new(3.0, 1.0, 2.0) + reach, 48);
-    let spec = GridSpec { cell: f64::from(fit.cell as f32), low: fit.low.as_vec3().as_dvec3(), ..fit };
+    let (low, high) = (DVec3::new(-3.0, -1.0, -2.0) - reach, DVec3::new(3.0, 1.0, 2.0) + reach);
+    let fit = GridSpec::fit_cells(low, high, 48, aspect);
+    let aspect = f64::from(fit.aspect as f32);
+    let spec = GridSpec { cell: f64::from(fit.cell as f32), low: fit.low.as_vec3().as_dvec3(), aspect, ..fit };
     let density = deposit(&spec, &blobs).iter().map(|&v| v as f32).collect();
     let (low, high) = (spec.low, spec.high());
     let position = |r: &mut Random| [0, 1, 2].map(|i| r.within(low[i] + 1e-4, high[i] - 1e-4));

@@ -27,6 +27,7 @@ fn blob() -> impl Strategy<Value = Particle> {
     let place = [-4.0..4.0, -3.0..3.0, -4.0..4.0].prop_map(DVec3::from_array);
     let color = [0.0..1.0, 0.0..1.0, 0.0..1.0].prop_map(DVec3::from_array);
     (place, 0.01..1.5, prop_oneof![Just(0.0), 0.01..50.0], color).prop_map(|(position, sigma, kappa, color)| Particle {
+        aspect: 1.0,
         position,
         sigma,
         kappa,

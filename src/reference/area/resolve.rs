@@ -8,7 +8,6 @@ use super::adaptive::Cell;
 use super::clip::WHOLE;
 use super::visibility::{Rect, Source, source_of};
 use super::{Reach, Scenery, Seen};
-use crate::model::cloud::SQRT_TAU;
 use crate::model::light::{LEAST_PENUMBRA, Light};
 use crate::reference::Blob;
 
@@ -192,17 +191,18 @@ fn blobs_are_resolved(scenery: &Scenery, ball: &Ball, end: Source, relative: f64
         Source::Toward(d) => (d, f64::INFINITY),
     };
     let matters = |blob: &&Blob| {
-        let depth = (1.0 - scenery.forward) * SQRT_TAU * blob.kappa * blob.sigma;
+        let depth = (1.0 - scenery.forward) * blob.deepest();
         blob.sigma > 0.0 && depth > relative
     };
     scenery.blobs.iter().filter(matters).all(|blob| {
         let offset = blob.position - ball.center;
+        let reach = BLOB_REACH * blob.widest();
         let along = offset.dot(way);
         // Rays from the ball to a point close in on it; those to a direction stay as wide as the ball.
         let radius = ball.radius * (1.0 - along.clamp(0.0, length) / length);
-        let before = along > -BLOB_REACH * blob.sigma - ball.radius;
-        let before_end = along < length + BLOB_REACH * blob.sigma;
-        let near = (offset - along * way).length() < BLOB_REACH * blob.sigma + radius;
-        !(before && before_end && near) || radius <= BLOB_WIDTHS * blob.sigma
+        let before = along > -reach - ball.radius;
+        let before_end = along < length + reach;
+        let near = (offset - along * way).length() < reach + radius;
+        !(before && before_end && near) || radius <= BLOB_WIDTHS * blob.narrowest()
     })
 }

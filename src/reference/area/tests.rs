@@ -158,7 +158,7 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
     }
     // A wide blob, seen through its centre by every ray within a small lamp: e^{−τ}, τ hardly varying with direction.
     let small = rect(at(0.0, 200.0, 0.0), 0.1 * DVec3::X, 0.1 * DVec3::Z);
-    let blob = Blob { position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
+    let blob = Blob { aspect: 1.0, position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
     let ratio = second(&[small], &[blob]).irradiance.x / second(&[small], &[]).irradiance.x;
     // b ≤ 0.07 at the blob: b²/2σ² < 1e-4.
     assert!((ratio / (-2.506_628_274_631f64).exp() - 1.0).abs() < 2.6e-4, "{ratio}");
@@ -248,8 +248,8 @@ fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {
 #[test]
 fn quadrature_and_paths_agree_in_random_scenes() {
     let blobs = [
-        Blob { position: at(0.2, 0.3, -0.4), sigma: 0.4, kappa: 1.5 },
-        Blob { position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
+        Blob { aspect: 1.0, position: at(0.2, 0.3, -0.4), sigma: 0.4, kappa: 1.5 },
+        Blob { aspect: 1.0, position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
     ];
     let discs = [
         Disc { position: at(0.1, 1.9, 0.2), normal: at(0.6, -0.8, 0.0), area: 0.4, kd: at(0.9, 0.8, 0.7) },

@@ -161,7 +161,7 @@ mod tests {
 
     #[test]
     fn blobs_by_hand() {
-        let blob = Blob { position: DVec3::ZERO, sigma: 2.0, kappa: 0.5 };
+        let blob = Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 2.0, kappa: 0.5 };
         let depth = |p: DVec3, s| -transmittance(&[blob], 0.0, p, s).ln();
         // Through the centre √(2π)κσ = √(2π); from the centre on half of it.
         let whole = 2.506_628_274_631_000_5;

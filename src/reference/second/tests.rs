@@ -12,7 +12,7 @@ use crate::model::pairings::pairings;
 use crate::model::surface::Surface;
 use crate::reference::area::{Accuracy, Receiver, Scenery};
 
-const SPEC: GridSpec = GridSpec { n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
+const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };
 const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
 

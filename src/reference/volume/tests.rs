@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::*;
 use crate::model::camera::Pose;
+use crate::model::cloud::SQRT_TAU;
 use crate::reference::sprites;
 
 /// Eye at the origin, looking along −z. Of one pixel or of three by three the middle one's ray is the axis.
@@ -22,7 +23,7 @@ fn view(n: u32) -> View {
 
 /// A blob at depth `z` on the axis whose optical depth through the centre is `tau`.
 fn blob(z: f64, sigma: f64, tau: f64) -> Blob {
-    Blob { position: DVec3::NEG_Z * z, sigma, kappa: tau / (SQRT_TAU * sigma) }
+    Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma, kappa: tau / (SQRT_TAU * sigma) }
 }
 
 fn one_pixel(blobs: &[Blob], colors: &[DVec3], behind: Behind) -> Pixel {
@@ -145,7 +146,7 @@ fn crowd(n: u32, scale: f64) -> (Vec<Blob>, Vec<DVec3>) {
         let position = DVec3::new(x, y, -(2.0 + 2.0 * lot(k, 2)));
         let sigma = 0.03 + 0.5 * lot(k, 3) * lot(k, 3);
         let kappa = scale * lot(k, 4) / (SQRT_TAU * sigma);
-        (Blob { position, sigma, kappa }, 3.0 * DVec3::new(lot(k, 5), lot(k, 6), lot(k, 5) * lot(k, 2)))
+        (Blob { aspect: 1.0, position, sigma, kappa }, 3.0 * DVec3::new(lot(k, 5), lot(k, 6), lot(k, 5) * lot(k, 2)))
     };
     (0..n).map(one).unzip()
 }

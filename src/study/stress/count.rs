@@ -66,6 +66,7 @@ fn told(n: u32, drawn: &Drawn) -> (u32, f64, f64) {
 
 fn group(n: u32) -> Group {
     Group {
+        aspects: [1.0; 3],
         i_cloud: 0,
         i_first: 0,
         n_particles: n,

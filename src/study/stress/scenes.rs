@@ -63,7 +63,13 @@ pub fn one_box(n_particles: u32, extent: [f64; 3], radius_max: f64) -> CloudBox 
 
 /// A white blob whose optical depth through the centre is `tau`.
 pub fn blob(position: [f64; 3], sigma: f64, tau: f64) -> Particle {
-    Particle { position: DVec3::from_array(position), sigma, kappa: tau / (SQRT_TAU * sigma), color: DVec3::ONE }
+    Particle {
+        aspect: 1.0,
+        position: DVec3::from_array(position),
+        sigma,
+        kappa: tau / (SQRT_TAU * sigma),
+        color: DVec3::ONE,
+    }
 }
 
 /// Some hundred blobs in a ball of radius 2, of several sizes and colours.

@@ -105,7 +105,8 @@ fn forward(desk: &mut Desk) -> Result<Found> {
 fn no_extent(desk: &mut Desk) -> Result<Found> {
     let mut c = Comparison::default();
     for at in [[0.0; 3], [0.0, 1e-3, 0.0], [1e6, -2.0, 5.0]] {
-        let point = Particle { position: DVec3::from_array(at), sigma: 0.0, kappa: 1.0, color: DVec3::ONE };
+        let point =
+            Particle { aspect: 1.0, position: DVec3::from_array(at), sigma: 0.0, kappa: 1.0, color: DVec3::ONE };
         let scene = floor_under(desk, "", NOON, -3.0, vec![point])?;
         let played = desk.play(&scene, 0)?;
         let found = direct(&mut c, &played);

@@ -1,0 +1,25 @@
+//! `nimbus weather`, as typed.
+
+use std::path::PathBuf;
+
+use clap::Args as ClapArgs;
+
+#[derive(Debug, ClapArgs)]
+#[command(after_help = "What is in a file, and one of its steps alone:\n  \
+    nimbus weather scenes/weather/katrina.nc\n  nimbus weather scenes/weather/supercell.nc --step 2\n\n\
+    The greatest optical depth of every step:\n  \
+    nimbus weather scenes/weather/katrina.nc --json | jq '.steps[].clouds.greatest_depth'\n\n\
+    Exit codes: 0 done; 2 no such file, or none that clouds can be made of.")]
+pub struct WeatherArgs {
+    /// Weather file: output of WRF (wrfout_d01_…)
+    pub file: PathBuf,
+    /// Clouds of this step alone, counted from 0; the others are not read
+    #[arg(long, value_name = "N")]
+    pub step: Option<usize>,
+    /// JSON in place of the tables
+    #[arg(long)]
+    pub json: bool,
+    /// No notes, no progress
+    #[arg(short, long)]
+    pub quiet: bool,
+}

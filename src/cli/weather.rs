@@ -1,0 +1,233 @@
+//! `nimbus weather FILE`.
+
+use serde::Serialize;
+
+use super::args::WeatherArgs;
+use super::output;
+use crate::error::Result;
+use crate::io::weather::container::{Container, Variable};
+use crate::io::weather::wrf::{self, Clouds, WeatherFile};
+use crate::model::weather::statistics::{self, CloudStatistics};
+use crate::model::weather::{steps, sun};
+
+pub fn run(args: &WeatherArgs) -> Result<()> {
+    let file = wrf::open(&args.file)?;
+    let wanted = match args.step {
+        Some(i_step) => i_step..i_step + 1,
+        None => 0..file.n_steps,
+    };
+    let progress = output::late_progress(wanted.len() as u64, "reading steps", args.quiet);
+    let mut of_steps = Vec::with_capacity(wanted.len());
+    for i_step in wanted {
+        of_steps.push(step_row(&file, i_step)?);
+        progress.advance();
+    }
+    drop(progress);
+    let found = Found { about: about(&file, &args.file.display().to_string()), steps: of_steps };
+    if args.json {
+        return output::object(&found);
+    }
+    output::text(&describe(&found, args.quiet))
+}
+
+#[derive(Serialize)]
+struct Found {
+    #[serde(flatten)]
+    about: About,
+    steps: Vec<StepRow>,
+}
+
+#[derive(Serialize)]
+struct About {
+    file: String,
+    container: &'static str,
+    title: Option<String>,
+    grid: GridRow,
+    n_steps: usize,
+    /// "given" or "diagnosed".
+    clouds: &'static str,
+    notes: Vec<String>,
+    variables: Vec<VariableRow>,
+}
+
+#[derive(Serialize)]
+struct GridRow {
+    nx: usize,
+    ny: usize,
+    nz: usize,
+    dx_m: f64,
+    dy_m: f64,
+    /// As the file names it.
+    projection: String,
+    /// Without a map.
+    idealised: bool,
+    latitude_deg: Option<f64>,
+    longitude_deg: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct VariableRow {
+    name: String,
+    r#type: String,
+    dimensions: Vec<DimensionRow>,
+    units: String,
+    description: String,
+}
+
+#[derive(Serialize)]
+struct DimensionRow {
+    name: String,
+    length: u64,
+}
+
+#[derive(Serialize)]
+struct StepRow {
+    step: usize,
+    time: Option<String>,
+    /// Degrees above the horizon, and from north over east, in the domain's middle.
+    sun_elevation_deg: Option<f64>,
+    sun_azimuth_deg: Option<f64>,
+    clouds: CloudRow,
+    /// Mixing ratios below 0, and those that are NaN or fill values.
+    negative: u64,
+    missing: u64,
+}
+
+#[derive(Serialize)]
+struct CloudRow {
+    cells: usize,
+    columns: usize,
+    greatest_extinction_per_m: f64,
+    greatest_depth: f64,
+    mean_opacity: f64,
+    base_m: Option<f64>,
+    top_m: Option<f64>,
+}
+
+impl From<CloudStatistics> for CloudRow {
+    fn from(s: CloudStatistics) -> Self {
+        CloudRow {
+            cells: s.n_cells,
+            columns: s.n_columns,
+            greatest_extinction_per_m: s.greatest_extinction,
+            greatest_depth: s.greatest_depth,
+            mean_opacity: s.mean_opacity,
+            base_m: s.base_and_top_m.map(|(base, _)| base),
+            top_m: s.base_and_top_m.map(|(_, top)| top),
+        }
+    }
+}
+
+fn about(file: &WeatherFile, name: &str) -> About {
+    let container = file.container();
+    let projection = file.text("MAP_PROJ_CHAR").filter(|text| !text.is_empty());
+    About {
+        file: name.to_owned(),
+        container: container.kind(),
+        title: file.text("TITLE").map(plain),
+        grid: GridRow {
+            nx: file.shape.nx,
+            ny: file.shape.ny,
+            nz: file.shape.nz,
+            dx_m: file.spacing_m.0,
+            dy_m: file.spacing_m.1,
+            projection: plain(projection.unwrap_or(if file.is_idealised { "none" } else { "unknown" })),
+            idealised: file.is_idealised,
+            latitude_deg: file.middle.map(|(latitude, _)| latitude.to_degrees()),
+            longitude_deg: file.middle.map(|(_, longitude)| longitude.to_degrees()),
+        },
+        n_steps: file.n_steps,
+        clouds: if file.clouds == Clouds::Given { "given" } else { "diagnosed" },
+        notes: file.notes.clone(),
+        variables: container.variables().iter().map(variable_row).collect(),
+    }
+}
+
+fn variable_row(v: &Variable) -> VariableRow {
+    let text = |name| plain(v.text(name).unwrap_or_default());
+    let dimension = |name: &str, length| DimensionRow { name: plain(name), length };
+    VariableRow {
+        name: plain(&v.name),
+        r#type: v.kind.clone(),
+        dimensions: v.dimensions.iter().map(|d| dimension(&d.name, d.length)).collect(),
+        units: text("units"),
+        description: text("description"),
+    }
+}
+
+/// What a file says, short and without characters that a terminal would obey.
+fn plain(text: &str) -> String {
+    text.chars().take(80).flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
+}
+
+fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
+    let step = file.step(i_step)?;
+    let time_s = file.times_s.as_ref().map(|times| times[i_step]);
+    let toward = time_s.zip(file.middle).map(|(time_s, (north, east))| sun::toward(time_s, north, east));
+    Ok(StepRow {
+        step: i_step,
+        time: time_s.map(steps::format),
+        sun_elevation_deg: toward.map(|d| d.y.asin().to_degrees()),
+        sun_azimuth_deg: toward.map(|d| d.x.atan2(-d.z).to_degrees().rem_euclid(360.0)),
+        clouds: statistics::of(&step.grid, &step.extinction).into(),
+        negative: step.oddities.n_negative,
+        missing: step.oddities.n_missing,
+    })
+}
+
+fn describe(found: &Found, quiet: bool) -> String {
+    let (a, g) = (&found.about, &found.about.grid);
+    let mut out = format!("{}: {}, {}\n", a.file, a.container, a.title.as_deref().unwrap_or("no title"));
+    let middle = match (g.latitude_deg, g.longitude_deg) {
+        (Some(north), Some(east)) => format!(", middle at {north:.2}° N {east:.2}° E"),
+        _ => String::new(),
+    };
+    let map = if g.idealised { "idealised, no map".to_owned() } else { format!("map {}", g.projection) };
+    out += &format!("{} x {} columns of {} x {} m, {} levels; {map}{middle}\n", g.nx, g.ny, g.dx_m, g.dy_m, g.nz);
+    let source = if a.clouds == "given" { "the file's mixing ratios" } else { "relative humidity: diagnosed" };
+    out += &format!("clouds from {source}\n");
+    for note in a.notes.iter().filter(|_| !quiet) {
+        out += &format!("note: {note}\n");
+    }
+    out +=
+        &format!("\n{}\n{}", output::table(&variables(&a.variables)), output::table(&clouds(&found.steps, a.clouds)));
+    out
+}
+
+fn variables(rows: &[VariableRow]) -> Vec<Vec<String>> {
+    let mut table = vec![["variable", "type", "shape", "units"].map(str::to_owned).to_vec()];
+    for v in rows {
+        let shape: Vec<String> = v.dimensions.iter().map(|d| d.length.to_string()).collect();
+        table.push(vec![v.name.clone(), v.r#type.clone(), shape.join(" x "), v.units.clone()]);
+    }
+    table
+}
+
+fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
+    let cells = if source == "given" { "cloudy cells" } else { "diagnosed cells" };
+    let header =
+        ["step", "time (UTC)", "sun", cells, "columns", "max 1/m", "max depth", "opacity", "base m", "top m", "odd"];
+    let mut table = vec![header.map(str::to_owned).to_vec()];
+    let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
+    for r in rows {
+        let c = &r.clouds;
+        let odd = match (r.negative, r.missing) {
+            (0, 0) => "0".to_owned(),
+            (negative, missing) => format!("{negative} negative, {missing} missing"),
+        };
+        table.push(vec![
+            r.step.to_string(),
+            or_none(r.time.clone()),
+            or_none(r.sun_elevation_deg.map(|degrees| format!("{degrees:.1}°"))),
+            if c.cells == 0 { "no cloud".to_owned() } else { c.cells.to_string() },
+            c.columns.to_string(),
+            format!("{:.4}", c.greatest_extinction_per_m),
+            format!("{:.2}", c.greatest_depth),
+            format!("{:.4}", c.mean_opacity),
+            or_none(c.base_m.map(|m| format!("{m:.0}"))),
+            or_none(c.top_m.map(|m| format!("{m:.0}"))),
+            odd,
+        ]);
+    }
+    table
+}

@@ -1,0 +1,15 @@
+//! Clouds of a weather model as plain arrays: from pressure, temperature and mixing ratios on WRF's grid to extinction in m⁻¹,
+//! and from that to blobs (docs/model.md §14). No files: `io::weather` reads them.
+//!
+//! Arrays are ordered as in the files: level by level from the ground, in each row by row from the south, in each from the west.
+
+pub mod air;
+pub mod columns;
+pub mod diagnosed;
+pub mod extinction;
+pub mod grid;
+pub mod particles;
+pub mod places;
+pub mod statistics;
+pub mod steps;
+pub mod sun;

@@ -1,0 +1,205 @@
+//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's (docs/model.md §14).
+
+use std::f64::consts::{PI, TAU};
+
+use glam::DVec3;
+
+use super::grid::Grid;
+use super::places::CellSeed;
+
+/// A column thinner than this optical depth may be without blobs: 0.1 % of the light. Its mass goes to the next column that has.
+pub const THIN: f64 = 1e-3;
+/// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other, narrower ones leave gaps between
+/// themselves (docs/model.md §14 has the errors).
+pub const SPREAD: f64 = 0.45;
+/// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear columns, and what is missing at an
+/// edge between two clouds is small.
+pub const INSET: f64 = 0.5;
+/// σ of what is spread evenly over a length of 1: 1/√12.
+const EVEN: f64 = 0.288_675_134_594_812_9;
+/// σ_z over the thickness of a cell that several blobs share: their heights, over half of it, bring the rest of the variance, 1/16 + 1/48 = 1/12.
+const THICKNESS: f64 = 0.25;
+
+/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²). Metres: x east, y up from sea level, z south, from
+/// the middle of the domain.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeatherBlob {
+    pub position: DVec3,
+    pub sigma_xy: f64,
+    pub sigma_z: f64,
+    /// Peak extinction, m⁻¹.
+    pub kappa: f64,
+}
+
+impl WeatherBlob {
+    /// ∫ of the extinction over all space, m².
+    pub fn mass(&self) -> f64 {
+        self.kappa * TAU * (2.0 * PI).sqrt() * self.sigma_xy * self.sigma_xy * self.sigma_z
+    }
+}
+
+/// Which blob of which cell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Place {
+    pub i_cell: u32,
+    pub number: u32,
+}
+
+/// Which cells have how many blobs, and which cell's blobs hold a cell's mass. It stands for one step, or for all moments between two,
+/// over which blobs keep their places and only their extinction changes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    seed: u32,
+    n_blobs: Vec<u32>,
+    /// For every cell the cell whose blobs hold its mass; itself where it has some.
+    hosts: Vec<u32>,
+    /// In the order that a first part of which stands for all.
+    places: Vec<Place>,
+}
+
+impl Layout {
+    /// `n` blobs, by 1 − e^{−τ} of the cells; of several moments each cell has the greatest weight that it has in any of them.
+    pub fn new(grid: &Grid, moments: &[&[f64]], n: usize, seed: u32) -> Self {
+        let depths = greatest_depths(grid, moments);
+        let n_blobs = allocate(grid, &depths, n);
+        let hosts = hosts(grid, &depths, &n_blobs);
+        let mut ordered: Vec<(f64, Place)> = Vec::with_capacity(n);
+        for (i_cell, &n_here) in (0u32..).zip(&n_blobs) {
+            if n_here > 0 {
+                let cell = CellSeed::new(seed, i_cell);
+                ordered.extend((0..n_here).map(|number| (cell.order(number, n_here), Place { i_cell, number })));
+            }
+        }
+        ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let places = ordered.into_iter().map(|(_, place)| place).collect();
+        Layout { seed, n_blobs, hosts, places }
+    }
+
+    pub fn places(&self) -> &[Place] {
+        &self.places
+    }
+
+    /// Blobs of each cell.
+    pub fn n_blobs(&self) -> &[u32] {
+        &self.n_blobs
+    }
+
+    /// The blobs that hold the extinction of `extinction`, m⁻¹ a cell, on `grid`: together ∫ β dV of it, and of each cell or of
+    /// those whose host it is its own. Linear in `extinction`.
+    pub fn blobs(&self, grid: &Grid, extinction: &[f64]) -> Vec<WeatherBlob> {
+        let n_columns = grid.shape().n_columns();
+        let mut masses = vec![0.0; extinction.len()];
+        for (i, beta) in extinction.iter().enumerate().filter(|(_, beta)| **beta > 0.0) {
+            masses[self.hosts[i] as usize] += beta * grid.thickness_m(i) * grid.ground.area_m2(i % n_columns);
+        }
+        self.places.iter().map(|place| self.blob(grid, *place, masses[place.i_cell as usize])).collect()
+    }
+
+    fn blob(&self, grid: &Grid, place: Place, mass_of_cell: f64) -> WeatherBlob {
+        let (i, n) = (place.i_cell as usize, f64::from(self.n_blobs[place.i_cell as usize]));
+        let i_column = i % grid.shape().n_columns();
+        let ground = &grid.ground;
+        let (dx, dy, thickness) = (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
+        let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(EVEN * dx.min(dy));
+        let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
+        // Of centres and σ together the variance is the cell's: centres keep to its middle by as much as blobs are wide.
+        let room = |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
+        let inside = |size: f64| (room(size, sigma_xy) - 2.0 * INSET * sigma_xy).max(0.0);
+        let room = DVec3::new(inside(dx), room(thickness, sigma_z), inside(dy));
+        let middle = DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
+        let position = middle + room * CellSeed::new(self.seed, place.i_cell).place(place.number);
+        let mut blob = WeatherBlob { position, sigma_xy, sigma_z, kappa: 1.0 };
+        blob.kappa = mass_of_cell / n / blob.mass();
+        blob
+    }
+}
+
+/// Optical depth upward of every cell, the greatest of all moments.
+fn greatest_depths(grid: &Grid, moments: &[&[f64]]) -> Vec<f64> {
+    let greatest = |i: usize| moments.iter().map(|m| m[i]).fold(0.0, f64::max);
+    (0..grid.shape().n_cells()).map(|i| greatest(i) * grid.thickness_m(i)).collect()
+}
+
+/// How many blobs each cell has: those of a column by largest remainder of Σ 1 − e^{−τ}, at least one unless it is [`THIN`] and as
+/// long as `n` suffices; those of its cells by rounding the running sum, so that thin cells have one together.
+fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
+    let shape = grid.shape();
+    let n_columns = shape.n_columns();
+    let mut weights = vec![0.0; n_columns];
+    let mut of_columns = vec![0.0; n_columns];
+    for (i, depth) in depths.iter().enumerate() {
+        weights[i % n_columns] += -(-depth).exp_m1();
+        of_columns[i % n_columns] += depth;
+    }
+    let mut n_blobs = vec![0u32; depths.len()];
+    for (i_column, &n_column) in deal(&weights, &of_columns, n).iter().enumerate() {
+        let (mut sum, mut n_before) = (0.0, 0);
+        for k in 0..shape.nz {
+            let i = shape.cell(k, i_column);
+            sum += -(-depths[i]).exp_m1();
+            // The last sum is the weight itself, to the bit.
+            let n_until = if n_column == 0 { 0 } else { (n_column as f64 * (sum / weights[i_column]) + 0.5) as u32 };
+            n_blobs[i] = n_until - n_before;
+            n_before = n_until;
+        }
+    }
+    n_blobs
+}
+
+/// `n` things dealt by weight, whole ones by largest remainder (ties to the first); first one to each that is not thin, where there are
+/// enough.
+fn deal(weights: &[f64], depths: &[f64], n: usize) -> Vec<usize> {
+    let total: f64 = weights.iter().sum();
+    if total <= 0.0 {
+        return vec![0; weights.len()];
+    }
+    let is_entitled = |i: usize| depths[i] >= THIN;
+    let n_entitled = (0..weights.len()).filter(|&i| is_entitled(i)).count();
+    let first = |i: usize| usize::from(n_entitled <= n && is_entitled(i));
+    let left = n - if n_entitled <= n { n_entitled } else { 0 };
+    // What each is still due; where all are due nothing more, it goes by weight.
+    let due: Vec<f64> =
+        (0..weights.len()).map(|i| (n as f64 * weights[i] / total - first(i) as f64).max(0.0)).collect();
+    let due = if due.iter().sum::<f64>() > 0.0 { due } else { weights.to_vec() };
+    let sum: f64 = due.iter().sum();
+    let quotas: Vec<f64> = due.iter().map(|d| left as f64 * d / sum).collect();
+    let mut dealt: Vec<usize> = quotas.iter().enumerate().map(|(i, q)| first(i) + q.floor() as usize).collect();
+    let mut remainders: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
+    remainders
+        .sort_by(|&a, &b| (quotas[b] - quotas[b].floor()).total_cmp(&(quotas[a] - quotas[a].floor())).then(a.cmp(&b)));
+    let n_dealt: usize = dealt.iter().sum();
+    for &i in remainders.iter().cycle().take(n.saturating_sub(n_dealt)) {
+        dealt[i] += 1;
+    }
+    dealt
+}
+
+/// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column; else of the next column that has
+/// some, row by row and there and back.
+fn hosts(grid: &Grid, depths: &[f64], n_blobs: &[u32]) -> Vec<u32> {
+    let shape = grid.shape();
+    let n_columns = shape.n_columns();
+    let has_some = |i_column: usize| (0..shape.nz).any(|k| n_blobs[shape.cell(k, i_column)] > 0);
+    let there_and_back = |at: usize| {
+        let (j, i) = (at / shape.nx, at % shape.nx);
+        j * shape.nx + if j % 2 == 0 { i } else { shape.nx - 1 - i }
+    };
+    // For every column the one that holds its mass, in order, those after the last from there backwards.
+    let mut holders = vec![None; n_columns];
+    for order in [(0..n_columns).rev().collect::<Vec<_>>(), (0..n_columns).collect()] {
+        let mut next = None;
+        for i_column in order.into_iter().map(there_and_back) {
+            next = if has_some(i_column) { Some(i_column) } else { holders[i_column].or(next) };
+            holders[i_column] = next;
+        }
+    }
+    let mut hosts: Vec<u32> = (0..depths.len() as u32).collect();
+    for (i, host) in hosts.iter_mut().enumerate().filter(|(i, _)| n_blobs[*i] == 0 && depths[*i] > 0.0) {
+        let Some(holder) = holders[i % n_columns] else { continue };
+        let k = i / n_columns;
+        let with_some = (0..shape.nz).filter(|&k| n_blobs[shape.cell(k, holder)] > 0);
+        let nearest = with_some.min_by_key(|other| other.abs_diff(k));
+        *host = nearest.map_or(i, |k| shape.cell(k, holder)) as u32;
+    }
+    hosts
+}

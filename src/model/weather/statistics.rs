@@ -1,0 +1,49 @@
+//! What there is of clouds in a step, for people.
+
+use super::columns;
+use super::grid::Grid;
+
+/// Cells of less extinction, m⁻¹, hold no cloud that can be seen: through 10 km of it 99 % of the light come.
+pub const FAINT: f64 = 1e-6;
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CloudStatistics {
+    /// Cells of more than [`FAINT`].
+    pub n_cells: usize,
+    /// Columns that have such a cell.
+    pub n_columns: usize,
+    /// m⁻¹.
+    pub greatest_extinction: f64,
+    /// Straight up through a column.
+    pub greatest_depth: f64,
+    /// Mean over the columns of 1 − e^{−τ}.
+    pub mean_opacity: f64,
+    /// Lowest bottom and highest top of such a cell, m above sea level.
+    pub base_and_top_m: Option<(f64, f64)>,
+    /// ∫ β dV over the domain, m².
+    pub mass_m2: f64,
+}
+
+pub fn of(grid: &Grid, extinction: &[f64]) -> CloudStatistics {
+    let shape = grid.shape();
+    let n = shape.n_columns();
+    let depths = columns::of_cells(grid, extinction);
+    let mut has_cloud = vec![false; n];
+    let mut base_and_top_m: Option<(f64, f64)> = None;
+    let mut n_cells = 0;
+    for i in extinction.iter().enumerate().filter(|(_, beta)| **beta > FAINT).map(|(i, _)| i) {
+        n_cells += 1;
+        has_cloud[i % n] = true;
+        let (base, top) = base_and_top_m.unwrap_or((f64::INFINITY, f64::NEG_INFINITY));
+        base_and_top_m = Some((base.min(grid.bottom_m(i)), top.max(grid.top_m(i))));
+    }
+    CloudStatistics {
+        n_cells,
+        n_columns: has_cloud.iter().filter(|has| **has).count(),
+        greatest_extinction: extinction.iter().copied().fold(0.0, f64::max),
+        greatest_depth: depths.iter().copied().fold(0.0, f64::max),
+        mean_opacity: depths.iter().map(|depth| -(-depth).exp_m1()).sum::<f64>() / n as f64,
+        base_and_top_m,
+        mass_m2: depths.iter().enumerate().map(|(i, depth)| depth * grid.ground.area_m2(i)).sum(),
+    }
+}

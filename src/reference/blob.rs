@@ -1,0 +1,171 @@
+//! One Gaussian blob of extinction, model.md §14: a ball, or an ellipsoid with an axis along y. What a line through it meets, and
+//! between which slopes it is seen, in f64.
+
+use glam::{DMat2, DVec2, DVec3};
+
+use crate::model::cloud::SQRT_TAU;
+
+/// ρ(x) = κ exp(−|M (x − p)|²/2σ²), M = diag(1, 1/a, 1), its position relative to the lighting origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Blob {
+    pub position: DVec3,
+    /// Along x and z.
+    pub sigma: f64,
+    /// a: σ along y over that; 1: a ball.
+    pub aspect: f64,
+    /// Peak extinction per unit length.
+    pub kappa: f64,
+}
+
+/// What a whole line through a blob meets.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// b/σ, where the blob is made a ball: τ falls off as e^{−b²/2σ²}.
+    pub off: f64,
+    /// τ of a line of that direction through the centre.
+    pub depth: f64,
+}
+
+impl Line {
+    /// τ of the line.
+    pub fn tau(&self) -> f64 {
+        self.depth * (-0.5 * self.off * self.off).exp()
+    }
+}
+
+impl Blob {
+    /// (1, a, 1).
+    pub fn axes(&self) -> DVec3 {
+        DVec3::new(1.0, self.aspect, 1.0)
+    }
+
+    /// M v: the blob is a ball of σ among such.
+    pub fn whiten(&self, v: DVec3) -> DVec3 {
+        v / self.axes()
+    }
+
+    /// σ in the direction that it is widest in.
+    pub fn widest(&self) -> f64 {
+        self.sigma * self.aspect.max(1.0)
+    }
+
+    /// And narrowest.
+    pub fn narrowest(&self) -> f64 {
+        self.sigma * self.aspect.min(1.0)
+    }
+
+    /// √(2π) κ σ max(1, a): no line meets more.
+    pub fn deepest(&self) -> f64 {
+        SQRT_TAU * self.kappa * self.widest()
+    }
+
+    /// m = ∫ρ dV = κ (2π)^{3/2} σ³ a.
+    pub fn mass(&self) -> f64 {
+        self.kappa * (SQRT_TAU * self.sigma).powi(3) * self.aspect
+    }
+
+    /// The line along `d`, of any length, that passes the centre off by `c`.
+    pub fn along(&self, c: DVec3, d: DVec3) -> Line {
+        let (white, ray) = (self.whiten(c), self.whiten(d));
+        let off = white.cross(ray).length() / (ray.length() * self.sigma);
+        Line { off, depth: SQRT_TAU * self.kappa * self.sigma * (d.length() / ray.length()) }
+    }
+
+    /// Between which slopes along `side` over those along `forward`, unit vectors, lines through the eye can meet the blob out to `reach`
+    /// σ; `c` is its place from there. All where it reaches beside the eye, or is behind.
+    pub fn slopes(&self, c: DVec3, [side, forward]: [DVec3; 2], reach: f64) -> (f64, f64) {
+        let at = DVec2::new(c.dot(side), c.dot(forward));
+        if self.aspect == 1.0 {
+            return disc_slopes(at, reach * self.sigma);
+        }
+        // Of the planes n·x = 0 those touch it that have (n·c)² = nᵀ S n, S its matrix: n = (1, −slope).
+        let r = reach * self.sigma;
+        let [s, f] = [side, forward].map(|axis| r * axis * self.axes());
+        let shape = DMat2::from_cols(DVec2::new(s.dot(s), s.dot(f)), DVec2::new(s.dot(f), f.dot(f)));
+        let (x, z) = (at.x, at.y);
+        let a = z * z - shape.col(1).y;
+        if !(a > 0.0 && z > 0.0) {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        let b = x * z - shape.col(0).y;
+        let c = x * x - shape.col(0).x;
+        let root = (b * b - a * c).max(0.0).sqrt();
+        ((b - root) / a, (b + root) / a)
+    }
+}
+
+/// Slopes between which lines through the eye can touch a disc of radius `reach` at (side, depth).
+fn disc_slopes(at: DVec2, reach: f64) -> (f64, f64) {
+    const ALL: (f64, f64) = (f64::NEG_INFINITY, f64::INFINITY);
+    let sine = reach / at.x.hypot(at.y);
+    if sine.is_nan() || sine >= 1.0 {
+        return ALL;
+    }
+    let (mid, spread) = (at.x.atan2(at.y), sine.asin());
+    // A disc that reaches beside or behind the eye is touched by lines of either sign.
+    if mid.abs() + spread >= std::f64::consts::FRAC_PI_2 {
+        return ALL;
+    }
+    ((mid - spread).tan(), (mid + spread).tan())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blob(aspect: f64) -> Blob {
+        Blob { position: DVec3::ZERO, sigma: 2.0, aspect, kappa: 0.5 }
+    }
+
+    #[test]
+    fn depths_are_the_integrals_along_lines() {
+        // By sums along the line: dense trapezoids of a Gaussian are exact to rounding.
+        let integral = |blob: &Blob, c: DVec3, d: DVec3| {
+            let unit = d.normalize();
+            let step = 0.01;
+            let rho = |t: f64| {
+                let x = blob.whiten(t * unit - c);
+                blob.kappa * (-0.5 * x.length_squared() / blob.sigma.powi(2)).exp()
+            };
+            (-20_000..=20_000).map(|k| step * rho(step * f64::from(k))).sum::<f64>()
+        };
+        for (aspect, c, d) in [
+            (1.0, DVec3::new(0.5, 1.0, 9.0), DVec3::Z),
+            (0.1, DVec3::new(1.0, 0.1, 5.0), DVec3::new(0.1, 0.05, 3.0)),
+            (0.05, DVec3::new(0.3, 0.02, -1.0), DVec3::Y),
+            (3.0, DVec3::new(-1.0, 2.0, 4.0), DVec3::new(1.0, -2.0, 0.5)),
+        ] {
+            let blob = blob(aspect);
+            let line = blob.along(c, d);
+            assert!((line.tau() / integral(&blob, c, d) - 1.0).abs() < 1e-10, "{aspect} {line:?}");
+            assert!(line.depth <= blob.deepest() * (1.0 + 1e-15));
+        }
+        // Along y it is a times as deep as across.
+        assert!((blob(0.1).along(DVec3::ZERO, DVec3::Y * 7.0).depth / (0.1 * SQRT_TAU) - 1.0).abs() < 1e-15);
+        assert_eq!(blob(0.1).along(DVec3::ZERO, DVec3::X).depth, SQRT_TAU);
+    }
+
+    #[test]
+    fn slopes_touch_the_silhouette() {
+        let axes = [DVec3::new(0.6, 0.8, 0.0), DVec3::new(0.8, -0.6, 0.0)];
+        for aspect in [0.2, 0.999_999_999, 1.0, 4.0] {
+            let (blob, c) = (blob(aspect), 40.0 * axes[1] + 7.0 * axes[0] + DVec3::Z);
+            let (low, high) = blob.slopes(c, axes, 3.0);
+            for (slope, name) in [(low, "low"), (high, "high")] {
+                // Of all lines with that slope, whatever their third one, the nearest passes at 3 σ.
+                let ray = |third: f64| axes[1] + slope * axes[0] + third * DVec3::Z;
+                let off = (-40_000..40_000)
+                    .map(|k| blob.along(c, ray(2.5e-5 * f64::from(k))).off)
+                    .fold(f64::INFINITY, f64::min);
+                assert!((off - 3.0).abs() < 1e-5, "{aspect} {name} {off}");
+            }
+        }
+        // A flat one above the eye's height, beside, around and behind it.
+        let flat = |c: DVec3| blob(0.1).slopes(c, [DVec3::Y, DVec3::Z], 3.0);
+        let (low, high) = flat(DVec3::new(0.0, 1.0, 20.0));
+        assert!(low < 1.0 / 20.0 && high > 1.0 / 20.0 && high < 0.2, "{low} {high}");
+        for c in [DVec3::new(0.0, 1.0, 5.9), DVec3::ZERO, DVec3::new(0.0, 1.0, -20.0)] {
+            assert_eq!(flat(c), (f64::NEG_INFINITY, f64::INFINITY));
+        }
+    }
+}

@@ -1,0 +1,179 @@
+//! Blobs that are no balls (docs/model.md §14) in every way that draws, against the f64 reference, within bounds that follow the shaders'
+//! own evaluation of their conics.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+#[path = "harness/mixed.rs"]
+mod mixed;
+#[path = "harness/picture.rs"]
+mod picture;
+#[path = "harness/scenery.rs"]
+mod scenery;
+#[path = "harness/sheets.rs"]
+mod sheets;
+#[path = "harness/tiled.rs"]
+mod tiled;
+
+use bounded::{Random, greatest_ratio};
+use glam::DVec3;
+use harness::{Gpu, assert_within};
+use mixed::{cases, front};
+use nimbus::frame::tiling::saturated;
+use nimbus::gpu::Compiler;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::model::film::FilmFormat;
+use nimbus::passes;
+use picture::{FORMATS, Picture, Tiled, Way};
+
+const F32: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
+
+fn tiled(gpu: &Gpu, format: FilmFormat, portable: bool) -> Tiled {
+    let invocations = passes::tiles::invocations(gpu.device.limits());
+    Tiled { invocations, portable, most_pairs: None, most_tiles: None, saturated: saturated(format) }
+}
+
+/// What is drawn, what should be, and how far the two may be apart.
+fn drawn(
+    gpu: &mut Gpu,
+    compiler: Option<&Compiler>,
+    picture: &Picture,
+    (target, format): (TargetFormat, FilmFormat),
+    way: Way,
+) -> [Vec<f64>; 3] {
+    let values = picture.draw_by(gpu, compiler, target, way);
+    let (truths, bounds) = match way {
+        Way::Sprites => picture.truth(format),
+        Way::Tiles(tiled) => picture.tiled_truth(format, tiled.saturated),
+        Way::Chunks(_, saturated) => picture.chunked_truth(format, saturated),
+    };
+    [values, truths, bounds]
+}
+
+/// Every blob of `picture` from a `most`-th to `most` times as high as wide.
+fn shaped(picture: &Picture, seed: u64, most: f32) -> Picture {
+    let (mut picture, mut random) = (picture.clone(), Random(seed));
+    for particle in &mut picture.particles {
+        particle.aspect = most.powf(random.within(-1.0, 1.0));
+    }
+    picture
+}
+
+#[test]
+fn ellipsoids_of_all_kinds() {
+    let mut gpu = Gpu::new();
+    for (i, (what, picture, _)) in cases().into_iter().enumerate() {
+        let picture = shaped(&picture, i as u64, 10.0);
+        let formats = if picture.placed.len() > 100 { &FORMATS[1..2] } else { &FORMATS[..] };
+        for (target, format) in formats.iter().copied() {
+            // Every third one without what subgroups can do.
+            let by_tiles = Way::Tiles(tiled(&gpu, format, i.is_multiple_of(3)));
+            for way in [Way::Sprites, by_tiles, Way::Chunks(5, saturated(format))] {
+                let [values, truths, bounds] = drawn(&mut gpu, None, &picture, (target, format), way);
+                println!("{what}, {format:?}, {way:?}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
+                assert_within(&what, &values, &truths, &bounds);
+            }
+        }
+    }
+}
+
+/// Flat ones, as cells of the weather are, seen from beside, above and within, with a threshold and without.
+fn decks(threshold: f64) -> Vec<(&'static str, Picture)> {
+    let mut random = Random(8);
+    let mut blobs = || {
+        let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
+        let at = DVec3::new(within(-4.0, 4.0), within(-0.4, 0.4), within(-4.0, 4.0));
+        (at, within(0.3, 1.2), within(0.05, 2.0), within(0.02, 0.08))
+    };
+    let all: Vec<_> = (0..60).map(|_| blobs()).collect();
+    let seen = |eye: DVec3, target: DVec3, fov: f64| {
+        let mut picture = Picture::new(eye, target, fov, 0.05);
+        picture.view.threshold = threshold;
+        all.iter().fold(picture, |p, (at, sigma, tau, aspect)| p.blob(*at, *sigma, *tau).shaped(*aspect))
+    };
+    vec![
+        ("beside", seen(DVec3::new(0.3, 0.2, 9.0), DVec3::ZERO, 50.0)),
+        ("above", seen(DVec3::new(0.5, 12.0, 3.0), DVec3::ZERO, 45.0)),
+        ("within", seen(DVec3::new(0.1, 0.05, 0.2), DVec3::new(3.0, 0.4, -2.0), 90.0)),
+        ("tall", shaped(&seen(DVec3::new(0.3, 2.0, 14.0), DVec3::ZERO, 50.0), 5, 6.0)),
+    ]
+}
+
+#[test]
+fn decks_from_all_sides() {
+    let mut gpu = Gpu::new();
+    for threshold in [0.0, 0.01] {
+        for (what, picture) in decks(threshold) {
+            for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false)), Way::Chunks(7, saturated(F32.1))] {
+                let [values, truths, bounds] = drawn(&mut gpu, None, &picture, F32, way);
+                println!("{what}, {way:?}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
+                assert_within(what, &values, &truths, &bounds);
+                // The bound says something where most of the picture is.
+                let mut sorted = bounds.clone();
+                sorted.sort_by(f64::total_cmp);
+                assert!(sorted[sorted.len() / 2] < 1e-3, "{what}: {:e}", sorted[sorted.len() / 2]);
+                assert!(truths.iter().any(|t| *t > 0.2));
+            }
+        }
+    }
+}
+
+#[test]
+fn among_ellipsoids_balls_are_what_they_are_by_themselves() {
+    let mut gpu = Gpu::new();
+    let balls = front();
+    let balls = balls.clone().blob(balls.at(0.3, -0.2, 5.0), 0.6, 1.0).blob(balls.at(-0.5, 0.4, 6.0), 1.1, 0.4);
+    // A blob of no depth makes all be drawn as ellipsoids are.
+    let among = balls.clone().blob(balls.at(0.0, 0.0, 9.0), 0.5, 0.0).shaped(0.5);
+    for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false))] {
+        let [values, _, _] = drawn(&mut gpu, None, &among, F32, way);
+        let [alone, _, bounds] = drawn(&mut gpu, None, &balls, F32, way);
+        assert!(values != vec![0.0; values.len()]);
+        assert_within("balls", &values, &alone, &bounds.iter().map(|b| 8.0 * b).collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn wrong_ellipsoids_are_noticed() {
+    let mut gpu = Gpu::new();
+    let sprites = [
+        (
+            "include/blob.glsl",
+            "shape.inverse * dot(across_x, across_x) + up_x * up_x",
+            "dot(across_x, across_x) + up_x * up_x",
+        ),
+        (
+            "include/blob.glsl",
+            "2.0 * (shape.inverse * dot(across_x, across_y)",
+            "(shape.inverse * dot(across_x, across_y)",
+        ),
+        ("include/blob.glsl", "float more = shape.square - 1.0;", "float more = 0.0;"),
+        ("sprites.frag", "tau *= sqrt((rest + up * up) / white);", ""),
+        ("sprites.frag", "rest + in_conic.w * up * up", "rest + up * up"),
+        ("sprites.vert", "upward = tangents_of(shape, v, 1, r);", "upward = tangents_of(shape, v, 0, r);"),
+    ];
+    let tiles = [
+        (
+            "include/blob.glsl",
+            "shape.inverse * dot(across_x, across_x) + up_x * up_x",
+            "dot(across_x, across_x) + up_x * up_x",
+        ),
+        ("include/blob.glsl", "float more = shape.square - 1.0;", "float more = 0.0;"),
+        ("tiles.comp", "across[j] + conic.w * along[j]", "across[j] + along[j]"),
+        ("tiles.comp", "deep[j] = place.w * sqrt((across[j] + along[j]) * inv_white);", "deep[j] = place.w;"),
+        ("tiles_splat.comp", "int(3 * i + 2)).x", "int(3 * i + 2)).y"),
+    ];
+    let of = |way: Way, mutations: &[(&str, &str, &str)], gpu: &mut Gpu| {
+        for (file, from, to) in mutations {
+            let compiler = Gpu::wrong_compiler(file, from, to);
+            let is_noticed = decks(0.0).iter().any(|(_, picture)| {
+                let [values, truths, bounds] = drawn(gpu, Some(&compiler), picture, F32, way);
+                greatest_ratio(&values, &truths, &bounds) > 1.0
+            });
+            assert!(is_noticed, "{file}: {to} was not noticed");
+        }
+    };
+    of(Way::Sprites, &sprites, &mut gpu);
+    let way = Way::Tiles(tiled(&gpu, F32.1, false));
+    of(way, &tiles, &mut gpu);
+}

@@ -98,7 +98,8 @@ pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
     let center = cloud.groups(0, 0).first().map_or(DVec3::ZERO, |g| g.center);
     let of = |i| {
         let p = alive(disc, cloud.seed, cloud.wind, i, time_s);
-        Generated { aspect: 1.0,
+        Generated {
+            aspect: 1.0,
             position: p.position - center,
             radius: p.sigmas[1] / SIGMA_PER_RADIUS,
             sigma: p.sigmas[1],

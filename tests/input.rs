@@ -214,9 +214,10 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             ],
             "material": [{ "name": "cloud", "kd": [0.9, 0.9, 0.9], "ks": [0.0, 0.0, 0.0], "ns": 8.0 }],
             "surface": [],
+            "air": { "temperature_c": 20.0, "humidity": 0.6, "pressure_hpa": 1013.25, "saturation": "bolton", "ice": false, "metres_per_unit": 250.0, "ground": 0.0 },
             "cloud": [{
                 "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none", "texture_strength": 1.0,
-                "position": [0.0, 0.0, 0.0], "wind": [0.0, 0.0, 0.0],
+                "position": [0.0, 0.0, 0.0], "base": "none", "wind": [0.0, 0.0, 0.0],
                 "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "grow_to": 1.0, "grow_time_s": 60.0, "material": "cloud", "facing": "outward", "seed": 1,
             }],
         })

@@ -104,7 +104,8 @@ fn magnus(a: f64, pole_k: f64, t_k: f64) -> f64 {
 /// ln(a/b), also where the quotient is near 1.
 fn log_ratio(a: f64, b: f64) -> f64 {
     let d = (a - b) / b;
-    if d.abs() < 0.5 { libm::log1p(d) } else { (a / b).ln() }
+    // Of the least numbers the quotient would be 0.
+    if d.abs() < 0.5 { libm::log1p(d) } else { a.ln() - b.ln() }
 }
 
 /// Constants of the air that is lifted, SI.

@@ -9,6 +9,7 @@ mod desk;
 mod determinism;
 mod functions;
 mod generation;
+mod live;
 mod metamorphic;
 mod moisture;
 mod run;
@@ -24,9 +25,10 @@ pub use run::run_case;
 
 /// Every case, family by family.
 pub fn cases() -> Vec<Case> {
-    let families: [&[Case]; 12] = [
+    let families: [&[Case]; 13] = [
         functions::CASES,
         generation::CASES,
+        live::CASES,
         count::CASES,
         moisture::CASES,
         brdf::CASES,

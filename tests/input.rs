@@ -218,7 +218,7 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
             "cloud": [{
                 "from": "boxes", "file": "b.dat", "form": "centred", "optical_depth": 1.0, "radius_scale": 1.0, "texture": "none", "texture_strength": 1.0,
                 "position": [0.0, 0.0, 0.0], "base": "none", "wind": [0.0, 0.0, 0.0],
-                "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "grow_to": 1.0, "grow_time_s": 60.0, "material": "cloud", "seed": 1,
+                "gust": 0.0, "gust_length": 4.0, "gust_period_s": 8.0, "gust_waves": 16, "grow_to": 1.0, "grow_time_s": 60.0, "material": "cloud", "facing": "outward", "seed": 1,
             }],
         })
     );

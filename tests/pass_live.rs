@@ -45,7 +45,7 @@ fn plume(n_particles: u32, dilution: Dilution) -> Disc {
 
 /// Three clouds: a plume in the wind, one without a base that is diluted otherwise and far off, one that does nothing but stand.
 fn clouds() -> Vec<Cloud> {
-    let cloud = |disc, wind, position| Cloud {
+    let cloud = |disc, wind, position| Cloud { facing: nimbus::model::cloud::Facing::Outward,
         source: CloudSource::Disc(disc),
         position,
         wind,

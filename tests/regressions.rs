@@ -12,6 +12,7 @@ use std::thread;
 use std::time::Duration;
 
 use nimbus::error::Error;
+use nimbus::io::weather::wrf;
 use nimbus::io::{box_file, particle_file, scene_file};
 use nimbus::study::report::source;
 use nimbus::study::tradeoff::files::read_found;
@@ -96,17 +97,31 @@ fn results() {
     assert_as_listed("results", readers::results);
 }
 
+#[test]
+fn weather_files() {
+    assert_as_listed("weather", readers::weather);
+}
+
 /// Every input as a file of every kind, as it would be typed: what is no text, too, and zero bytes.
 #[test]
 fn files_are_read_or_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     let no_text: Vec<Vec<u8>> = vec![vec![0xff, 0xfe, 0], vec![0; 4096], b"\xed\xa0\x80".to_vec(), vec![0xc3]];
-    let found = ["scene_file", "box_file", "particle_list", "results"].map(inputs).into_iter().flatten();
+    let found = ["scene_file", "box_file", "particle_list", "results", "weather"].map(inputs).into_iter().flatten();
     for (i, bytes) in found.map(|(_, bytes)| bytes).chain(no_text).enumerate() {
         let folder = dir.path().join(i.to_string());
         fs::create_dir(&folder).expect("a folder");
-        let names =
-            ["scene.toml", "b.dat", "p.csv", "run.json", "frames.csv", "study.json", "times.csv", "ledger.json"];
+        let names = [
+            "scene.toml",
+            "b.dat",
+            "p.csv",
+            "run.json",
+            "frames.csv",
+            "study.json",
+            "times.csv",
+            "ledger.json",
+            "w.nc",
+        ];
         for name in names {
             fs::write(folder.join(name), &bytes).expect("written");
         }
@@ -126,6 +141,7 @@ fn read_all(folder: &Path) -> Vec<Error> {
         box_file::read(&path("b.dat")).err(),
         particle_file::read(&path("p.csv")).err(),
         read_found(folder).err(),
+        wrf::open(&path("w.nc")).err(),
     ];
     results.into_iter().chain(others).flatten().collect()
 }

@@ -108,7 +108,7 @@ pub enum Command {
     ///
     /// Extinction is 3/2 q ρ/(ρ_x r_x), summed over cloud water (10 µm droplets), ice (30 µm) and snow (100 µm); rain and graupel are left
     /// out. Where a file has none of the three, clouds are diagnosed from relative humidity, and the output says so
-    /// (docs/model.md §14).
+    /// (docs/model.md §15).
     ///
     /// P, PB, T, PH, PHB and the attributes DX and DY are needed; what else is missing is told. What is negative, NaN or a
     /// fill value among mixing ratios is counted and taken for none; elsewhere it is an error.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::args::WeatherArgs;
 use super::output;
 use crate::error::Result;
-use crate::io::weather::container::{Container, Variable};
+use crate::io::weather::container::Variable;
 use crate::io::weather::wrf::{self, Clouds, WeatherFile};
 use crate::model::weather::statistics::{self, CloudStatistics};
 use crate::model::weather::{steps, sun};
@@ -61,8 +61,6 @@ struct GridRow {
     projection: String,
     /// Without a map.
     idealised: bool,
-    latitude_deg: Option<f64>,
-    longitude_deg: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -84,6 +82,9 @@ struct DimensionRow {
 struct StepRow {
     step: usize,
     time: Option<String>,
+    /// The domain's middle.
+    latitude_deg: Option<f64>,
+    longitude_deg: Option<f64>,
     /// Degrees above the horizon, and from north over east, in the domain's middle.
     sun_elevation_deg: Option<f64>,
     sun_azimuth_deg: Option<f64>,
@@ -133,8 +134,6 @@ fn about(file: &WeatherFile, name: &str) -> About {
             dy_m: file.spacing_m.1,
             projection: plain(projection.unwrap_or(if file.is_idealised { "none" } else { "unknown" })),
             idealised: file.is_idealised,
-            latitude_deg: file.middle.map(|(latitude, _)| latitude.to_degrees()),
-            longitude_deg: file.middle.map(|(_, longitude)| longitude.to_degrees()),
         },
         n_steps: file.n_steps,
         clouds: if file.clouds == Clouds::Given { "given" } else { "diagnosed" },
@@ -163,10 +162,12 @@ fn plain(text: &str) -> String {
 fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
     let step = file.step(i_step)?;
     let time_s = file.times_s.as_ref().map(|times| times[i_step]);
-    let toward = time_s.zip(file.middle).map(|(time_s, (north, east))| sun::toward(time_s, north, east));
+    let toward = time_s.zip(step.middle).map(|(time_s, (north, east))| sun::toward(time_s, north, east));
     Ok(StepRow {
         step: i_step,
         time: time_s.map(steps::format),
+        latitude_deg: step.middle.map(|(latitude, _)| latitude.to_degrees()),
+        longitude_deg: step.middle.map(|(_, longitude)| longitude.to_degrees()),
         sun_elevation_deg: toward.map(|d| d.y.asin().to_degrees()),
         sun_azimuth_deg: toward.map(|d| d.x.atan2(-d.z).to_degrees().rem_euclid(360.0)),
         clouds: statistics::of(&step.grid, &step.extinction).into(),
@@ -178,12 +179,8 @@ fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
 fn describe(found: &Found, quiet: bool) -> String {
     let (a, g) = (&found.about, &found.about.grid);
     let mut out = format!("{}: {}, {}\n", a.file, a.container, a.title.as_deref().unwrap_or("no title"));
-    let middle = match (g.latitude_deg, g.longitude_deg) {
-        (Some(north), Some(east)) => format!(", middle at {north:.2}° N {east:.2}° E"),
-        _ => String::new(),
-    };
     let map = if g.idealised { "idealised, no map".to_owned() } else { format!("map {}", g.projection) };
-    out += &format!("{} x {} columns of {} x {} m, {} levels; {map}{middle}\n", g.nx, g.ny, g.dx_m, g.dy_m, g.nz);
+    out += &format!("{} x {} columns of {} x {} m, {} levels; {map}\n", g.nx, g.ny, g.dx_m, g.dy_m, g.nz);
     let source = if a.clouds == "given" { "the file's mixing ratios" } else { "relative humidity: diagnosed" };
     out += &format!("clouds from {source}\n");
     for note in a.notes.iter().filter(|_| !quiet) {
@@ -205,8 +202,20 @@ fn variables(rows: &[VariableRow]) -> Vec<Vec<String>> {
 
 fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
     let cells = if source == "given" { "cloudy cells" } else { "diagnosed cells" };
-    let header =
-        ["step", "time (UTC)", "sun", cells, "columns", "max 1/m", "max depth", "opacity", "base m", "top m", "odd"];
+    let header = [
+        "step",
+        "time (UTC)",
+        "middle",
+        "sun",
+        cells,
+        "columns",
+        "max 1/m",
+        "max depth",
+        "opacity",
+        "base m",
+        "top m",
+        "odd",
+    ];
     let mut table = vec![header.map(str::to_owned).to_vec()];
     let or_none = |text: Option<String>| text.unwrap_or_else(|| "-".to_owned());
     for r in rows {
@@ -218,6 +227,7 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
         table.push(vec![
             r.step.to_string(),
             or_none(r.time.clone()),
+            or_none(r.latitude_deg.zip(r.longitude_deg).map(|(north, east)| format!("{north:.1}° N {east:.1}° E"))),
             or_none(r.sun_elevation_deg.map(|degrees| format!("{degrees:.1}°"))),
             if c.cells == 0 { "no cloud".to_owned() } else { c.cells.to_string() },
             c.columns.to_string(),

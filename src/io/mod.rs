@@ -8,7 +8,7 @@
 //! A scene is read in three steps, each with one subject: [`toml_tree`] turns text into a tree in which every
 //! key and value knows its origin, [`toml_override`] lays `--set` over it, and [`toml_section`] takes values
 //! out of it, checks them and writes down what they came to (the *resolved scene* that results carry).
-//! `scene_sections`, `scene_air`, `scene_lights`, `scene_clouds` and `scene_disc` say what a scene's keys mean, `scene_phases` which of them parts of
+//! `scene_sections`, `scene_air`, `scene_lights`, `scene_clouds`, `scene_disc` and `scene_weather` say what a scene's keys mean, `scene_phases` which of them parts of
 //! a run set anew, and [`magnitude`] how great and
 //! how small their numbers may be.
 
@@ -26,6 +26,7 @@ mod scene_lights;
 mod scene_phases;
 mod scene_sections;
 mod scene_surfaces;
+mod scene_weather;
 mod suggest;
 pub mod text_file;
 mod toml_depth;

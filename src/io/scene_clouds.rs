@@ -10,24 +10,48 @@ use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, is_carried_place, 
 use super::scene_air::{put_on_base, read_base};
 use super::scene_disc::{self, read_disc};
 use super::scene_lights::material_named;
+use super::scene_weather;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
+use super::weather::wrf::{self, WeatherFile};
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
 use crate::model::air::Air;
 use crate::model::boxes::{CloudBox, Form};
-use crate::model::cloud::{Cloud, CloudSource};
+use crate::model::cloud::{Cloud, CloudSource, Facing};
 use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 use crate::model::texture::{Choice, GREATEST_STRENGTH, Texture};
 
-/// The text of a file that a scene names, by its path and what such a file begins with.
-pub type Files<'a> = dyn Fn(&Path, &str) -> Result<String> + 'a;
+/// The files that a scene names.
+pub trait Files {
+    /// The text of one, by its path and what such a file begins with.
+    fn text(&self, path: &Path, first: &str) -> Result<String>;
+
+    /// A weather file, opened.
+    fn weather(&self, path: &Path) -> Result<WeatherFile> {
+        Err(Error::Io { path: path.to_owned(), what: "weather files are read from the disk alone".to_owned() })
+    }
+}
+
+impl<F: Fn(&Path, &str) -> Result<String>> Files for F {
+    fn text(&self, path: &Path, first: &str) -> Result<String> {
+        self(path, first)
+    }
+}
 
 /// Files as they lie on the disk.
-pub fn on_disk(path: &Path, first: &str) -> Result<String> {
-    read_text(path, DATA_LIMIT, first)
+pub struct OnDisk;
+
+impl Files for OnDisk {
+    fn text(&self, path: &Path, first: &str) -> Result<String> {
+        read_text(path, DATA_LIMIT, first)
+    }
+
+    fn weather(&self, path: &Path) -> Result<WeatherFile> {
+        wrf::open(path)
+    }
 }
 
 /// What a cloud's keys refer to.
@@ -36,19 +60,22 @@ pub struct CloudReader<'a> {
     materials: &'a [Material],
     air: &'a Air,
     seed: Option<u32>,
-    files: &'a Files<'a>,
+    files: &'a dyn Files,
     /// Of every file read, in order.
     pub digests: Vec<[u8; 32]>,
+    /// What the user should know of what was read.
+    pub notes: Vec<String>,
 }
 
 /// Keys of every cloud, after those of its source.
 macro_rules! with_cloud_keys {
     ($($own:literal),*) => {
-        &[$($own,)* "material", "texture", "texture_strength", "position", "base", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
+        &[$($own,)* "material", "facing", "texture", "texture_strength", "position", "base", "wind", "gust", "gust_length", "gust_period_s", "gust_waves", "grow_to", "grow_time_s", "seed"]
     };
 }
 
 const LIST_KEYS: &[&str] = with_cloud_keys!["from", "file"];
+const WEATHER_KEYS: &[&str] = with_cloud_keys!["from", "file", "step", "particles", "exaggeration"];
 const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_depth", "radius_scale"];
 
 #[derive(Clone, Copy)]
@@ -56,6 +83,7 @@ enum SourceKind {
     Boxes,
     Particles,
     Disc,
+    Weather,
 }
 
 impl<'a> CloudReader<'a> {
@@ -64,21 +92,30 @@ impl<'a> CloudReader<'a> {
         folder: &'a Path,
         (materials, air): (&'a [Material], &'a Air),
         seed: Option<u32>,
-        files: &'a Files<'a>,
+        files: &'a dyn Files,
     ) -> CloudReader<'a> {
-        CloudReader { folder, materials, air, seed, files, digests: Vec::new() }
+        CloudReader { folder, materials, air, seed, files, digests: Vec::new(), notes: Vec::new() }
     }
 
     /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
     /// it; what is wrong inside stays where it is.
     fn read_named(&mut self, s: &mut Section, first: &str) -> Result<(String, PathBuf)> {
         let path = self.folder.join(s.required_string("file")?);
-        let text = (self.files)(&path, first).map_err(|e| match e {
+        let text = self.files.text(&path, first).map_err(|e| match e {
             Error::Io { path, what } => s.fault("file", format!("{}: {what}", path.display())),
             other => other,
         })?;
         self.digests.push(Sha256::digest(&text).into());
         Ok((text, path))
+    }
+
+    /// The weather file that `file` names, as [`CloudReader::read_named`] reports it.
+    fn read_weather(&self, s: &mut Section) -> Result<WeatherFile> {
+        let path = self.folder.join(s.required_string("file")?);
+        self.files.weather(&path).map_err(|e| match e {
+            Error::Io { path, what } => s.fault("file", format!("{}: {what}", path.display())),
+            other => other,
+        })
     }
 
     fn read_seed(&self, s: &mut Section, i_cloud: usize) -> Result<u32> {
@@ -92,9 +129,15 @@ impl<'a> CloudReader<'a> {
 }
 
 pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> Result<Cloud> {
-    let from = [("boxes", SourceKind::Boxes), ("particles", SourceKind::Particles), ("disc", SourceKind::Disc)];
+    let from = [
+        ("boxes", SourceKind::Boxes),
+        ("particles", SourceKind::Particles),
+        ("disc", SourceKind::Disc),
+        ("weather", SourceKind::Weather),
+    ];
     let mut lines = Vec::new();
-    let source = match s.required_choice("from", &from, &["weather"])? {
+    let kind = s.required_choice("from", &from, &[])?;
+    let source = match kind {
         SourceKind::Boxes => read_boxes(s, reader)?,
         SourceKind::Particles => {
             s.expect_keys(LIST_KEYS, &[])?;
@@ -107,8 +150,18 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             s.expect_keys(scene_disc::KEYS, &[])?;
             CloudSource::Disc(read_disc(s, reader.air)?)
         }
+        SourceKind::Weather => {
+            s.expect_keys(WEATHER_KEYS, &[])?;
+            let file = reader.read_weather(s)?;
+            let keys = scene_weather::read_keys(s, &file)?;
+            reader.notes.extend(scene_weather::notes(&file).into_iter().map(|note| format!("cloud {i_cloud}: {note}")));
+            let particles = scene_weather::particles(&file, &keys, reader.read_seed(s, i_cloud)?)?;
+            reader.digests.push(scene_weather::digest(&particles));
+            CloudSource::Particles(particles)
+        }
     };
     let is_disc = matches!(source, CloudSource::Disc(_));
+    let is_weather = matches!(kind, SourceKind::Weather);
     // Of a disc it is where its particles condense.
     let base = if is_disc { None } else { read_base(s)?.height(reader.air) };
     let mut cloud = Cloud {
@@ -119,6 +172,7 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         growth: if is_disc { Growth::NONE } else { read_growth(s)? },
         texture: read_texture(s)?,
         i_material: material_named(s, reader.materials)?,
+        facing: s.choice("facing", if is_weather { "up" } else { "outward" }, &Facing::NAMES, &[])?,
         seed: reader.read_seed(s, i_cloud)?,
     };
     if let Some(base) = base {
@@ -220,7 +274,7 @@ mod tests {
         let boxes = counts.iter().map(b).collect();
         let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        Cloud {
+        Cloud { facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::ZERO,
             wind: DVec3::ZERO,

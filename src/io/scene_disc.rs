@@ -33,6 +33,7 @@ pub const KEYS: &[&str] = &[
     "base_over",
     "base_lift",
     "material",
+    "facing",
     "texture",
     "texture_strength",
     "position",

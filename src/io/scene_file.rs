@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 
 use super::magnitude::{GREATEST, is_carried_place, shortest};
 use super::scene_clouds::{CloudReader, deal, read_cloud};
-pub use super::scene_clouds::{Files, on_disk};
+pub use super::scene_clouds::{Files, OnDisk};
 use super::scene_phases::PhaseSpec;
 pub use super::scene_sections::MAX_SIDE;
 use super::suggest::shown;
@@ -69,12 +69,12 @@ const ROOT_KEYS: &[&str] = &[
 /// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
 /// N + i, whatever the scene says.
 pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
-    load_document(Document::read(path)?, path, overrides, seed, &on_disk)
+    load_document(Document::read(path)?, path, overrides, seed, &OnDisk)
 }
 
 /// The same of a text; `path` is what errors call it, and files that it names lie beside that.
 pub fn parse(text: String, path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
-    parse_beside(text, path, overrides, seed, &on_disk)
+    parse_beside(text, path, overrides, seed, &OnDisk)
 }
 
 /// The same with the files that it names from elsewhere.
@@ -83,7 +83,7 @@ pub fn parse_beside(
     path: &Path,
     overrides: &[String],
     seed: Option<u32>,
-    files: &Files,
+    files: &dyn Files,
 ) -> Result<LoadedScene> {
     load_document(Document::parse(text, path)?, path, overrides, seed, files)
 }
@@ -93,7 +93,7 @@ fn load_document(
     path: &Path,
     overrides: &[String],
     seed: Option<u32>,
-    files: &Files,
+    files: &dyn Files,
 ) -> Result<LoadedScene> {
     file.default_to("light", scene_lights::DEFAULT_LIGHTS);
     file.default_to("material", scene_lights::DEFAULT_MATERIAL);
@@ -144,7 +144,7 @@ struct Read {
     warnings: Vec<String>,
 }
 
-fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &Files) -> Result<Read> {
+fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &dyn Files) -> Result<Read> {
     let mut root = Section::root(document)?;
     root.expect_keys(ROOT_KEYS, &[])?;
     let title = root.string("title", "")?;
@@ -187,6 +187,7 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &Fi
         })?;
     }
     let digests = reader.digests;
+    warnings.extend(reader.notes);
     root.record("cloud", json!(resolved_clouds));
 
     let scene = Scene { title, film, camera, time, lighting, draw, threads, lights, materials, surfaces, clouds, air };

@@ -9,6 +9,7 @@ use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::light::Light;
 use crate::model::material::{Brdf, Material, MaterialKey};
+use crate::model::weather::{steps, sun};
 
 /// What lights a scene without any `[[light]]`: a sun from the upper right, and the sky.
 pub const DEFAULT_LIGHTS: &str = r#"
@@ -34,18 +35,25 @@ enum Kind {
     Point,
     Spot,
     Sky,
+    Sun,
 }
 
 pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
     let mut lights = Vec::new();
     let mut resolved = Vec::new();
     for mut s in root.sections("light")? {
-        let kinds =
-            [("directional", Kind::Directional), ("point", Kind::Point), ("spot", Kind::Spot), ("sky", Kind::Sky)];
+        let kinds = [
+            ("directional", Kind::Directional),
+            ("point", Kind::Point),
+            ("spot", Kind::Spot),
+            ("sky", Kind::Sky),
+            ("sun", Kind::Sun),
+        ];
         lights.push(match s.required_choice("kind", &kinds, &[])? {
             Kind::Directional => read_directional(&mut s)?,
             Kind::Point => read_point(&mut s)?,
             Kind::Spot => read_spot(&mut s)?,
+            Kind::Sun => read_sun(&mut s)?,
             Kind::Sky => {
                 s.expect_keys(&["kind", "irradiance", "constant"], &[])?;
                 let irradiance = s.required_vec3("irradiance", AMOUNT)?;
@@ -99,6 +107,24 @@ fn read_direction(s: &mut Section) -> Result<DVec3> {
 fn read_directional(s: &mut Section) -> Result<Light> {
     s.expect_keys(&["kind", "direction", "irradiance"], &[])?;
     Ok(Light::Directional { direction: read_direction(s)?, irradiance: s.required_vec3("irradiance", AMOUNT)? })
+}
+
+/// A directional light from where the sun stands; x is east and z south.
+fn read_sun(s: &mut Section) -> Result<Light> {
+    s.expect_keys(&["kind", "date", "latitude_deg", "longitude_deg", "irradiance"], &[])?;
+    let date = s.required_string("date")?;
+    let Some(time_s) = steps::parse(&date) else {
+        let what = format!("expected a time such as \"2005-08-28 18:00:00\" (UTC), found {}", shown(&date));
+        return Err(s.fault("date", what));
+    };
+    let latitude = s.f64("latitude_deg", 0.0, Bounds::Within(-90.0, 90.0))?.to_radians();
+    let longitude = s.f64("longitude_deg", 0.0, Bounds::Within(-180.0, 360.0))?.to_radians();
+    let toward = sun::toward(time_s, latitude, longitude);
+    if toward.y <= 0.0 {
+        let below = -toward.y.asin().to_degrees();
+        return Err(s.fault("date", format!("expected a time of day: the sun is {below:.1}° below the horizon then")));
+    }
+    Ok(Light::Directional { direction: -toward, irradiance: s.required_vec3("irradiance", AMOUNT)? })
 }
 
 pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<Vec<Material>> {

@@ -117,7 +117,7 @@ record! {
         /// Cloud origin(t) + group centre, as it has grown, − lighting origin.
         offset: [f32; 3],
         i_region: u32,
-        /// The cloud's centre relative to the lighting origin.
+        /// What its facets look away from relative to the lighting origin: the cloud's centre, or far below that.
         cloud_center: [f32; 3],
         /// Mean σ of the group's particles, as they have grown.
         sigma_mean: f32,
@@ -139,7 +139,7 @@ impl GroupRecord {
         GroupRecord {
             offset: (origin_from_light + group.center).as_vec3().to_array(),
             i_region,
-            cloud_center: (origin_from_light + group.cloud_center).as_vec3().to_array(),
+            cloud_center: (origin_from_light + group.facing_from).as_vec3().to_array(),
             sigma_mean: group.sigma_mean as f32,
             center: group.center.as_vec3().to_array(),
             i_mode,

@@ -30,8 +30,26 @@ pub struct Cloud {
     pub texture: Texture,
     /// Index into the scene's materials.
     pub i_material: usize,
+    pub facing: Facing,
     pub seed: u32,
 }
+
+/// Which way a cloud's facets look where the density around them has no direction (docs/model.md §11 "facets").
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Facing {
+    /// Away from the cloud's centre.
+    Outward,
+    /// Of clouds that are layers, or many.
+    Up,
+}
+
+impl Facing {
+    pub const NAMES: [(&'static str, Facing); 2] = [("outward", Facing::Outward), ("up", Facing::Up)];
+}
+
+/// So far below a cloud lies what its facets look away from where they look up: directions differ by the cloud's extent over
+/// that.
+const FAR_BELOW: f64 = 1e9;
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum CloudSource {
@@ -69,6 +87,8 @@ pub struct Group {
     pub center: DVec3,
     /// The cloud's own centre, relative to its origin: what it grows about.
     pub cloud_center: DVec3,
+    /// What its facets look away from, relative to the cloud's origin.
+    pub facing_from: DVec3,
     /// Lengths over those at time 0: 1 but in what [`Group::grown`] gives.
     pub scale: f64,
     /// Positions lie within center ± half_extent.
@@ -110,6 +130,14 @@ impl Cloud {
         }
     }
 
+    /// What the cloud's facets look away from, relative to its origin.
+    pub fn facing_from(&self) -> DVec3 {
+        match self.facing {
+            Facing::Outward => self.center(),
+            Facing::Up => self.center() - FAR_BELOW.max(self.center().abs().max_element()) * DVec3::Y,
+        }
+    }
+
     pub fn n_particles(&self) -> u64 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => boxes.iter().map(|b| u64::from(b.n_particles)).sum(),
@@ -128,7 +156,7 @@ impl Cloud {
     /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups, so that a
     /// group's number is its box's number.
     pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
-        let (cloud_center, gust_reach) = (self.center(), self.gust.reach());
+        let (cloud_center, facing_from, gust_reach) = (self.center(), self.facing_from(), self.gust.reach());
         match &self.source {
             CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
                 .iter()
@@ -141,6 +169,7 @@ impl Cloud {
                         n_particles: b.n_particles,
                         center: b.center,
                         cloud_center,
+                        facing_from,
                         scale: 1.0,
                         half_extent: 0.5 * b.extent,
                         sigma_max,
@@ -156,10 +185,10 @@ impl Cloud {
                 })
                 .collect(),
             CloudSource::Particles(list) => {
-                vec![Group { cloud_center, gust_reach, ..list_group(list, i_cloud, i_first) }]
+                vec![Group { cloud_center, facing_from, gust_reach, ..list_group(list, i_cloud, i_first) }]
             }
             CloudSource::Disc(disc) => {
-                vec![Group { cloud_center, gust_reach, ..disc_group(disc, self.wind, i_cloud, i_first) }]
+                vec![Group { cloud_center, facing_from, gust_reach, ..disc_group(disc, self.wind, i_cloud, i_first) }]
             }
         }
     }
@@ -231,6 +260,7 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         n_particles: list.len() as u32,
         center: 0.5 * (low + high),
         cloud_center: DVec3::ZERO,
+        facing_from: DVec3::ZERO,
         scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
@@ -262,6 +292,7 @@ fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
         n_particles: disc.n_particles,
         center: 0.5 * (low + high),
         cloud_center: DVec3::ZERO,
+        facing_from: DVec3::ZERO,
         scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: disc.sigma_max(),
@@ -304,7 +335,7 @@ mod tests {
             radius_scale: 1.0,
         };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        let cloud = Cloud {
+        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::ZERO,
             wind: DVec3::X,
@@ -327,7 +358,7 @@ mod tests {
         // Mean position 2, bounds from 0 to 5.
         let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
         let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
-        let cloud = Cloud {
+        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::Y,
             wind: DVec3::ZERO,
@@ -353,7 +384,7 @@ mod tests {
         let blob = |sigma, kappa| Particle { aspect: 1.0, position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
         let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        let cloud = Cloud {
+        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::ZERO,
             wind: DVec3::ZERO,

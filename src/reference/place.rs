@@ -46,7 +46,7 @@ pub fn offsets(groups: &[Group], clouds: &[Cloud], time_s: f64, origin: DVec3) -
 
 /// Centre of every cloud relative to O at `time_s`: what the facets' fallback normal points away from.
 pub fn cloud_centers(clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
-    clouds.iter().map(|c| c.origin_at(time_s) + c.center() - origin).collect()
+    clouds.iter().map(|c| c.origin_at(time_s) + c.facing_from() - origin).collect()
 }
 
 /// Placed positions (of grown ones): particle k of group g at positions[g.i_first + k] + offsets[g].
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
         let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 1.0, kappa: 1.0, color: DVec3::ONE };
-        let cloud = |list, y, wind| Cloud {
+        let cloud = |list, y, wind| Cloud { facing: crate::model::cloud::Facing::Outward,
             source: CloudSource::Particles(list),
             position: DVec3::Y * y,
             wind,
@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn a_cloud_grows_about_its_own_centre() {
         let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 0.5, kappa: 1.0, color: DVec3::ONE };
-        let cloud = Cloud {
+        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
             source: CloudSource::Particles(vec![particle(0.0), particle(0.0), particle(6.0)]),
             position: DVec3::Y,
             wind: DVec3::Z,

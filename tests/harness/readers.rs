@@ -9,7 +9,9 @@ use std::sync::Arc;
 use nimbus::error::{Error, Place, Result};
 use nimbus::frame::game::Game;
 use nimbus::io::scene_file::{LoadedScene, parse_beside};
+use nimbus::io::weather::{netcdf, wrf};
 use nimbus::io::{box_file, particle_file};
+use nimbus::model::weather::particles::Layout;
 use nimbus::study::compare::compare_modes;
 use nimbus::study::recorded;
 use nimbus::study::records::parse_run;
@@ -134,6 +136,21 @@ pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
         return Err(errors.join(" | "));
     }
     found.into_iter().try_for_each(show)
+}
+
+/// A weather file and its first steps.
+pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
+    const MOST_STEPS: usize = 4;
+    let container = netcdf::from_bytes(bytes.to_vec())?;
+    let file = wrf::from_container(Box::new(container), Path::new("w.nc")).map_err(|e| clean(&e, &[]))?;
+    for i_step in 0..file.n_steps.min(MOST_STEPS) {
+        let step = file.step(i_step).map_err(|e| clean(&e, &[]))?;
+        let layout = Layout::new(&step.grid, &[&step.extinction], 100, 1);
+        for blob in layout.blobs(&step.grid, &step.extinction) {
+            assert!(blob.position.is_finite() && blob.kappa >= 0.0 && blob.kappa.is_finite(), "{blob:?}");
+        }
+    }
+    Ok(())
 }
 
 /// A page of a result and, once more, of itself; two benches are compared as `nimbus compare` does.

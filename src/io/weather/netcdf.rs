@@ -1,6 +1,7 @@
 //! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data (CDF-5) and NetCDF-4 (HDF5).
 
 use std::fs::{self, File};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -36,7 +37,10 @@ pub struct NetCdf {
 /// # Errors
 /// What is no readable NetCDF file, and why.
 pub fn open(path: &Path) -> Result<NetCdf> {
-    let about = fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    let about = fs::metadata(path).map_err(|e| match e.kind() {
+        ErrorKind::NotFound => Error::io(path, "no such file"),
+        _ => Error::io(path, e),
+    })?;
     if about.is_dir() {
         return Err(Error::io(path, "is a folder, expected a NetCDF file"));
     }
@@ -181,7 +185,12 @@ impl Container for NetCdf {
         let selections =
             start.iter().zip(count).map(|(s, c)| NcSliceInfoElem::Slice { start: *s, end: s + c, step: 1 }).collect();
         let read = self.file.read_variable_slice_as_f64(name, &NcSliceInfo { selections });
-        let numbers: Vec<f64> = read.map_err(|e| format!("cannot be read: {e}"))?.iter().copied().collect();
+        let read = read.map_err(|e| format!("cannot be read: {e}"))?;
+        // Not copied: a step of the largest grid is 128 MiB a variable.
+        let numbers = match read.is_standard_layout() {
+            true => read.into_raw_vec_and_offset().0,
+            false => read.iter().copied().collect(),
+        };
         if numbers.len() as u64 != n {
             return Err(format!("damaged: {} values where {n} are declared", numbers.len()));
         }

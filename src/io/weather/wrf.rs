@@ -1,4 +1,4 @@
-//! WRF's output: which variables mean what, and a step of them as a grid with extinction (docs/model.md §14).
+//! WRF's output: which variables mean what, and a step of them as a grid with extinction (docs/model.md §15).
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ use crate::model::weather::diagnosed::{self, Air};
 use crate::model::weather::extinction::{ICE, LIQUID, Oddities, Phase, SNOW, add, single_moment_phase};
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
-/// Cells of a step at most: 500 × 500 × 67. A step takes 32 bytes of memory a cell, and 24 more while it is read.
+/// Cells of a step at most: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more while it is read: less than 1 GiB.
 pub const MOST_CELLS: u64 = 1 << 24;
 /// m; sizes of WRF's cells, from a large eddy to a globe's degree.
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
@@ -61,8 +61,6 @@ pub struct WeatherFile {
     /// Without a map: MAP_PROJ is 0.
     pub is_idealised: bool,
     pub clouds: Clouds,
-    /// Radians north and east in the domain's middle; None of an idealised file.
-    pub middle: Option<(f64, f64)>,
     /// What was taken otherwise than the file says, and what is not in it.
     pub notes: Vec<String>,
     fields: Fields,
@@ -78,6 +76,8 @@ struct Fields {
     condensates: Vec<(Field, Phase)>,
     factors: [Option<Field>; 2],
     terrain: Option<Field>,
+    latitude: Option<Field>,
+    longitude: Option<Field>,
     /// WSM3 without QICE: cloud water is ice where it is cold.
     is_single_moment: bool,
 }
@@ -93,6 +93,9 @@ pub struct Step {
     pub vapour: Vec<f64>,
     /// Height of the ground, m, a column each; None where the file has none.
     pub terrain_m: Option<Vec<f64>>,
+    /// Radians north and east in the domain's middle, which moves where a nest follows a storm; None of an idealised file, whose
+    /// are 0.
+    pub middle: Option<(f64, f64)>,
     pub oddities: Oddities,
 }
 
@@ -140,9 +143,8 @@ fn understand(container: Box<dyn Container>, path: &Path) -> std::result::Result
         return Err("QCLOUD, QICE, QSNOW and QVAPOR are missing: expected one of the first three, or QVAPOR to diagnose clouds from".to_owned());
     }
     let times_s = wrf_clock::times(file, n_steps)?;
-    let middle = middle(file, shape, n_steps, is_idealised)?;
     let path = path.to_owned();
-    Ok(WeatherFile { container, path, shape, n_steps, times_s, spacing_m, is_idealised, clouds, middle, notes, fields })
+    Ok(WeatherFile { container, path, shape, n_steps, times_s, spacing_m, is_idealised, clouds, notes, fields })
 }
 
 /// "QICE is", "QICE and QSNOW are".
@@ -183,28 +185,6 @@ fn spacing(file: &dyn Container, name: &str) -> std::result::Result<f64, String>
         Some(spacing) => Err(format!("attribute {name} is {spacing}: {expected}")),
         None => Err(format!("attribute {name} is missing: {expected}")),
     }
-}
-
-/// Latitude and longitude in the middle of the first step; of an idealised file, whose are 0, there is none.
-fn middle(
-    file: &dyn Container,
-    shape: Shape,
-    n_steps: usize,
-    is_idealised: bool,
-) -> std::result::Result<Option<(f64, f64)>, String> {
-    let i_middle = shape.ny / 2 * shape.nx + shape.nx / 2;
-    let at = |name| -> std::result::Result<Option<f64>, String> {
-        let field = Field::find(file, name, Extent::Columns, DEGREE, shape, n_steps)?;
-        Ok(match field {
-            Some(field) => Some(field.read(file, shape, 0)?[i_middle]).filter(|degrees| degrees.abs() <= 360.0),
-            None => None,
-        })
-    };
-    if is_idealised {
-        return Ok(None);
-    }
-    let (latitude, longitude) = (at("XLAT")?.filter(|degrees| degrees.abs() <= 90.0), at("XLONG")?);
-    Ok(latitude.zip(longitude).map(|(north, east)| (north.to_radians(), east.to_radians())))
 }
 
 impl Fields {
@@ -266,6 +246,8 @@ impl Fields {
             condensates,
             factors,
             terrain: optional("HGT", Extent::Columns, METRE)?,
+            latitude: optional("XLAT", Extent::Columns, DEGREE)?,
+            longitude: optional("XLONG", Extent::Columns, DEGREE)?,
             is_single_moment,
         })
     }
@@ -312,8 +294,7 @@ impl WeatherFile {
             Some(field) => ratios(field.read(file, shape, i_step)?, &mut oddities),
             None => vec![0.0; shape.n_cells()],
         };
-        let dry_density: Vec<f64> =
-            (0..shape.n_cells()).map(|i| air::dry_density(pressure_pa[i], temperature_k[i], vapour[i])).collect();
+        let dry_density = |i: usize| air::dry_density(pressure_pa[i], temperature_k[i], vapour[i]);
         let extinction = match self.clouds {
             Clouds::Given => {
                 let mut extinction = vec![0.0; shape.n_cells()];
@@ -321,24 +302,33 @@ impl WeatherFile {
                     let read = field.read(file, shape, i_step)?;
                     let is_both = fields.is_single_moment && field.name == "QCLOUD";
                     let phase_of = |i: usize| if is_both { single_moment_phase(temperature_k[i]) } else { *phase };
-                    let odd = add(&mut extinction, &read, &dry_density, phase_of, |ratio| ratio > GREATEST_RATIO);
+                    let odd = add(&mut extinction, &read, dry_density, phase_of, |ratio| ratio > GREATEST_RATIO);
                     oddities.n_negative += odd.n_negative;
                     oddities.n_missing += odd.n_missing;
                 }
                 extinction
             }
             Clouds::Diagnosed => {
-                let air = Air {
-                    pressure_pa: &pressure_pa,
-                    temperature_k: &temperature_k,
-                    vapour: &vapour,
-                    dry_density: &dry_density,
-                };
+                let air = Air { pressure_pa: &pressure_pa, temperature_k: &temperature_k, vapour: &vapour };
                 diagnosed::extinction(&grid, air)
             }
         };
+        let middle = self.middle(i_step)?;
         let terrain_m = fields.terrain.as_ref().map(whole).transpose()?;
-        Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, terrain_m, oddities })
+        Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, terrain_m, middle, oddities })
+    }
+
+    fn middle(&self, i_step: usize) -> std::result::Result<Option<(f64, f64)>, String> {
+        let i_middle = self.shape.ny / 2 * self.shape.nx + self.shape.nx / 2;
+        let at = |field: &Option<Field>, greatest: f64| match field {
+            Some(field) => {
+                let degrees = field.read(self.container.as_ref(), self.shape, i_step)?[i_middle];
+                Ok((degrees.abs() <= greatest).then_some(degrees.to_radians()))
+            }
+            None => Ok::<_, String>(None),
+        };
+        let (latitude, longitude) = (at(&self.fields.latitude, 90.0)?, at(&self.fields.longitude, 360.0)?);
+        Ok(latitude.zip(longitude).filter(|_| !self.is_idealised))
     }
 
     /// Where a step's cells are.

@@ -1,4 +1,6 @@
-//! Temperature, humidity and density of air, in the formulas and with the constants of wrf-python (NCAR), docs/model.md §14.
+//! Temperature, humidity and density of air, in the formulas and with the constants of wrf-python (NCAR), docs/model.md §15.
+
+use crate::model::moisture::{Saturation, Vapour};
 
 /// m/s², of geopotential to height.
 pub const GRAVITY: f64 = 9.81;
@@ -12,8 +14,6 @@ pub const THETA_BASE_K: f64 = 300.0;
 pub const P0_PA: f64 = 1e5;
 /// Molecular weights, water over dry air.
 pub const EPSILON: f64 = 0.622;
-/// Ice melts, K.
-pub const MELTING_K: f64 = 273.15;
 /// No air of the earth is outside, K: what is there is no temperature. Bolton's formula has a pole at 29.65 K.
 pub const TEMPERATURES_K: (f64, f64) = (100.0, 400.0);
 /// The same of pressure, Pa; WRF's tops lie above 100 Pa.
@@ -24,9 +24,12 @@ pub fn temperature(perturbation_k: f64, p_pa: f64) -> f64 {
     (perturbation_k + THETA_BASE_K) * (p_pa / P0_PA).powf(2.0 / 7.0)
 }
 
-/// Saturation vapour pressure over water, Pa: Bolton 1980 (10), with wrf-python's constants.
+/// What wrf-python takes at every temperature: Bolton over water, whose formula and constants are the same.
+const WATER: Vapour = Vapour { saturation: Saturation::Bolton, ice: false };
+
+/// Saturation vapour pressure over water, Pa: Bolton 1980 (10).
 pub fn saturation_pa(t_k: f64) -> f64 {
-    611.2 * (17.67 * (t_k - MELTING_K) / (t_k - 29.65)).exp()
+    WATER.saturation(t_k)
 }
 
 /// Mixing ratio of saturated air, kg/kg, ε E/(p − (1 − ε) E): wrf-python's, whose 1 − ε makes q/q_s what a specific humidity's
@@ -63,7 +66,7 @@ mod tests {
         assert!((temperature(0.0, 5e4) - 246.1005).abs() < 1e-3);
         // Bolton 1980, table 1, which his (10) keeps within 0.3 %: 6.112 hPa at 0 °C, 23.37 at 20 °C, 42.43 at 30 °C, 0.1891 at −40 °C.
         for (celsius, hpa) in [(0.0, 6.112), (20.0, 23.37), (30.0, 42.43), (-40.0, 0.1891)] {
-            let e = saturation_pa(MELTING_K + celsius) / 100.0;
+            let e = saturation_pa(273.15 + celsius) / 100.0;
             assert!((e / hpa - 1.0).abs() < 3e-3, "{celsius} °C: {e}");
         }
         // Dry air at 0 °C and 1000 hPa: 1e5/(287 · 273.15) = 1.275607 kg/m³; 1 % of vapour takes 1/(1 + 0.01/0.622) of it.

@@ -1,6 +1,6 @@
-//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §14. Whatever shows them says "diagnosed".
+//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §15. Whatever shows them says "diagnosed".
 
-use super::air::{EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, relative_humidity, saturation_ratio};
+use super::air::{EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, relative_humidity, saturation_ratio};
 use super::extinction::single_moment_phase;
 use super::grid::Grid;
 
@@ -39,7 +39,6 @@ pub struct Air<'a> {
     pub temperature_k: &'a [f64],
     /// kg/kg.
     pub vapour: &'a [f64],
-    pub dry_density: &'a [f64],
 }
 
 /// Extinction in m⁻¹ of every cell: [`fraction`] times water that grows adiabatically from the lowest humid cell of the layer.
@@ -61,7 +60,7 @@ pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
             let grown = ADIABATIC_SHARE * condensed_per_metre(p, t) * grid.thickness_m(i);
             let within = (below + 0.5 * grown).min(GREATEST_RATIO);
             below += grown;
-            extinction[i] = covered * single_moment_phase(t).extinction(within, air.dry_density[i]);
+            extinction[i] = covered * single_moment_phase(t).extinction(within, dry_density(p, t, air.vapour[i]));
         }
     }
     extinction
@@ -99,14 +98,15 @@ mod tests {
         let saturated = saturation_ratio(p, t);
         // Dry, humid, humid, dry, humid.
         let vapour = [0.5, 1.0, 1.0, 0.5, 1.0].map(|f| f * saturated);
-        let air = Air { pressure_pa: &[p; 5], temperature_k: &[t; 5], vapour: &vapour, dry_density: &[1.0; 5] };
+        let air = Air { pressure_pa: &[p; 5], temperature_k: &[t; 5], vapour: &vapour };
         let beta = extinction(&grid, air);
-        // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m: 0.15 m⁻¹ a g/kg.
-        assert!((beta[1] - 0.15 * 0.09444).abs() < 1e-4, "{beta:?}");
+        // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m; 0.15 m⁻¹ a g/kg in 1 kg/m³, of which there are
+        // 9e4/(287 · 283.15 (1 + 8.524e-3/0.622)) = 1.0925.
+        assert!((beta[1] - 0.15 * 1.0925 * 0.09444).abs() < 1e-5, "{beta:?}");
         assert!((beta[2] / beta[1] - 3.0).abs() < 1e-12);
         assert_eq!((beta[0], beta[3], beta[4]), (0.0, 0.0, beta[1]));
         // A kilometre deep it is what it may be at most.
         let deep = Grid { heights_m: vec![0.0, 1e3, 2e3, 3e3, 4e3, 5e3], ..grid };
-        assert!((extinction(&deep, air)[2] - 0.15 * 0.5).abs() < 1e-12);
+        assert!((extinction(&deep, air)[2] - 0.15 * 1.0925 * 0.5).abs() < 1e-5);
     }
 }

@@ -1,6 +1,6 @@
-//! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of spheres, docs/model.md §14.
+//! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of spheres, docs/model.md §15.
 
-use super::air::MELTING_K;
+use crate::model::moisture::T0_K;
 
 /// What a cloud is made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,7 +23,7 @@ impl Phase {
 
 /// What cloud water is at a temperature, where a scheme has one ratio for both (WSM3): ice below 273.15 K.
 pub fn single_moment_phase(t_k: f64) -> Phase {
-    if t_k < MELTING_K { ICE } else { LIQUID }
+    if t_k < T0_K { ICE } else { LIQUID }
 }
 
 /// Values that are no mixing ratios, and what became of them.
@@ -46,7 +46,7 @@ impl Oddities {
 pub fn add(
     extinction: &mut [f64],
     ratios: &[f64],
-    dry_density: &[f64],
+    dry_density: impl Fn(usize) -> f64,
     phase_of: impl Fn(usize) -> Phase,
     is_missing: impl Fn(f64) -> bool,
 ) -> Oddities {
@@ -57,7 +57,7 @@ pub fn add(
         } else if ratio < 0.0 {
             odd.n_negative += 1;
         } else {
-            *beta += phase_of(i).extinction(ratio, dry_density[i]);
+            *beta += phase_of(i).extinction(ratio, dry_density(i));
         }
     }
     odd
@@ -81,7 +81,7 @@ mod tests {
     fn what_is_no_ratio_is_counted_and_brings_nothing() {
         let mut beta = vec![1.0; 6];
         let ratios = [1e-3, -1e-9, f64::NAN, f64::INFINITY, 9.969e36, 0.0];
-        let odd = add(&mut beta, &ratios, &[1.0; 6], |_| LIQUID, |q| q > 1e30);
+        let odd = add(&mut beta, &ratios, |_| 1.0, |_| LIQUID, |q| q > 1e30);
         assert_eq!(odd, Oddities { n_negative: 1, n_missing: 3 });
         assert!((beta[0] - 1.15).abs() < 1e-15);
         assert_eq!(beta[1..], [1.0; 5]);

@@ -1,5 +1,5 @@
 //! Clouds of a weather model as plain arrays: from pressure, temperature and mixing ratios on WRF's grid to extinction in m⁻¹,
-//! and from that to blobs (docs/model.md §14). No files: `io::weather` reads them.
+//! and from that to blobs (docs/model.md §15). No files: `io::weather` reads them.
 //!
 //! Arrays are ordered as in the files: level by level from the ground, in each row by row from the south, in each from the west.
 
@@ -8,6 +8,7 @@ pub mod columns;
 pub mod diagnosed;
 pub mod extinction;
 pub mod grid;
+pub mod interval;
 pub mod particles;
 pub mod places;
 pub mod statistics;

@@ -1,16 +1,18 @@
-//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's (docs/model.md §14).
+//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's (docs/model.md §15).
 
 use std::f64::consts::{PI, TAU};
 
 use glam::DVec3;
 
-use super::grid::Grid;
+use super::grid::{Grid, Shape};
 use super::places::CellSeed;
 
-/// A column thinner than this optical depth may be without blobs: 0.1 % of the light. Its mass goes to the next column that has.
+/// A column thinner than this optical depth, 0.1 % of the light, may be without blobs where more than one in [`AFFORDED`] would go to see
+/// that every column has one. Its mass goes to the next column that has.
 pub const THIN: f64 = 1e-3;
+pub const AFFORDED: usize = 10;
 /// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other, narrower ones leave gaps between
-/// themselves (docs/model.md §14 has the errors).
+/// themselves (docs/model.md §15 has the errors).
 pub const SPREAD: f64 = 0.45;
 /// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear columns, and what is missing at an
 /// edge between two clouds is small.
@@ -35,6 +37,14 @@ impl WeatherBlob {
     /// ∫ of the extinction over all space, m².
     pub fn mass(&self) -> f64 {
         self.kappa * TAU * (2.0 * PI).sqrt() * self.sigma_xy * self.sigma_xy * self.sigma_z
+    }
+
+    /// The blob where heights are drawn `factor` times as great: straight up it is as deep as before.
+    pub fn exaggerated(mut self, factor: f64) -> Self {
+        self.position.y *= factor;
+        self.sigma_z *= factor;
+        self.kappa /= factor;
+        self
     }
 }
 
@@ -120,8 +130,8 @@ fn greatest_depths(grid: &Grid, moments: &[&[f64]]) -> Vec<f64> {
     (0..grid.shape().n_cells()).map(|i| greatest(i) * grid.thickness_m(i)).collect()
 }
 
-/// How many blobs each cell has: those of a column by largest remainder of Σ 1 − e^{−τ}, at least one unless it is [`THIN`] and as
-/// long as `n` suffices; those of its cells by rounding the running sum, so that thin cells have one together.
+/// How many blobs each cell has: those of its column are dealt by Σ 1 − e^{−τ}, and those of the column's cells by rounding the running
+/// sum, so that thin cells have one together.
 fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
@@ -132,7 +142,7 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
         of_columns[i % n_columns] += depth;
     }
     let mut n_blobs = vec![0u32; depths.len()];
-    for (i_column, &n_column) in deal(&weights, &of_columns, n).iter().enumerate() {
+    for (i_column, &n_column) in deal(&weights, &of_columns, n, &there_and_back(shape)).iter().enumerate() {
         let (mut sum, mut n_before) = (0.0, 0);
         for k in 0..shape.nz {
             let i = shape.cell(k, i_column);
@@ -146,32 +156,55 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     n_blobs
 }
 
-/// `n` things dealt by weight, whole ones by largest remainder (ties to the first); first one to each that is not thin, where there are
-/// enough.
-fn deal(weights: &[f64], depths: &[f64], n: usize) -> Vec<usize> {
+/// `n` things dealt by weight. Where there are enough, one to each that is not thin, and of the rest whole ones by largest remainder (ties
+/// to the first); to the others by rounding the running sum in `order`, so that some neighbours have one together.
+fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize> {
+    let mut dealt = vec![0; weights.len()];
     let total: f64 = weights.iter().sum();
     if total <= 0.0 {
-        return vec![0; weights.len()];
+        return dealt;
     }
-    let is_entitled = |i: usize| depths[i] >= THIN;
-    let n_entitled = (0..weights.len()).filter(|&i| is_entitled(i)).count();
-    let first = |i: usize| usize::from(n_entitled <= n && is_entitled(i));
-    let left = n - if n_entitled <= n { n_entitled } else { 0 };
-    // What each is still due; where all are due nothing more, it goes by weight.
-    let due: Vec<f64> =
-        (0..weights.len()).map(|i| (n as f64 * weights[i] / total - first(i) as f64).max(0.0)).collect();
-    let due = if due.iter().sum::<f64>() > 0.0 { due } else { weights.to_vec() };
-    let sum: f64 = due.iter().sum();
-    let quotas: Vec<f64> = due.iter().map(|d| left as f64 * d / sum).collect();
-    let mut dealt: Vec<usize> = quotas.iter().enumerate().map(|(i, q)| first(i) + q.floor() as usize).collect();
-    let mut remainders: Vec<usize> = (0..weights.len()).filter(|&i| weights[i] > 0.0).collect();
-    remainders
-        .sort_by(|&a, &b| (quotas[b] - quotas[b].floor()).total_cmp(&(quotas[a] - quotas[a].floor())).then(a.cmp(&b)));
-    let n_dealt: usize = dealt.iter().sum();
-    for &i in remainders.iter().cycle().take(n.saturating_sub(n_dealt)) {
-        dealt[i] += 1;
+    // Columns without a cloud are never due anything.
+    let n_cloudy = weights.iter().filter(|weight| **weight > 0.0).count();
+    let least = if n_cloudy <= n / AFFORDED { f64::MIN_POSITIVE } else { THIN };
+    let n_thick = depths.iter().filter(|depth| **depth >= least).count();
+    let is_thick = |i: usize| n_thick <= n && depths[i] >= least;
+    let (mut sum, mut n_thin) = (0.0, 0);
+    for &i in order.iter().filter(|i| !is_thick(**i)) {
+        sum += weights[i];
+        let n_until = (n as f64 * (sum / total) + 0.5) as usize;
+        dealt[i] = n_until - n_thin;
+        n_thin = n_until;
+    }
+    if n_thick > n || n_thick == 0 {
+        // By rounding the last sum may come short of all.
+        if let Some(&i) = order.iter().rev().find(|i| weights[**i] > 0.0) {
+            dealt[i] += n.saturating_sub(n_thin);
+        }
+        return dealt;
+    }
+    let n_thin = n_thin.min(n - n_thick);
+    let left = n - n_thin - n_thick;
+    let thick: Vec<usize> = (0..weights.len()).filter(|&i| is_thick(i)).collect();
+    // What each is due beyond the one that it has; where that is nothing for all, it goes by weight.
+    let due: Vec<f64> = thick.iter().map(|&i| (n as f64 * weights[i] / total - 1.0).max(0.0)).collect();
+    let due = if due.iter().sum::<f64>() > 0.0 { due } else { thick.iter().map(|&i| weights[i]).collect() };
+    let due_together: f64 = due.iter().sum();
+    let quotas: Vec<f64> = due.iter().map(|d| left as f64 * (d / due_together)).collect();
+    let mut by_remainder: Vec<usize> = (0..thick.len()).collect();
+    by_remainder.sort_by(|&a, &b| quotas[b].fract().total_cmp(&quotas[a].fract()).then(a.cmp(&b)));
+    let n_whole: usize = quotas.iter().map(|q| *q as usize).sum();
+    thick.iter().zip(&quotas).for_each(|(&i, quota)| dealt[i] = 1 + *quota as usize);
+    for &i in by_remainder.iter().take(left.saturating_sub(n_whole)) {
+        dealt[thick[i]] += 1;
     }
     dealt
+}
+
+/// Columns row by row from the south, there and back, so that each lies beside the one before it.
+fn there_and_back(shape: Shape) -> Vec<usize> {
+    let along = |j: usize, i: usize| j * shape.nx + if j.is_multiple_of(2) { i } else { shape.nx - 1 - i };
+    (0..shape.ny).flat_map(|j| (0..shape.nx).map(move |i| along(j, i))).collect()
 }
 
 /// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column; else of the next column that has
@@ -180,15 +213,13 @@ fn hosts(grid: &Grid, depths: &[f64], n_blobs: &[u32]) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
     let has_some = |i_column: usize| (0..shape.nz).any(|k| n_blobs[shape.cell(k, i_column)] > 0);
-    let there_and_back = |at: usize| {
-        let (j, i) = (at / shape.nx, at % shape.nx);
-        j * shape.nx + if j % 2 == 0 { i } else { shape.nx - 1 - i }
-    };
     // For every column the one that holds its mass, in order, those after the last from there backwards.
     let mut holders = vec![None; n_columns];
-    for order in [(0..n_columns).rev().collect::<Vec<_>>(), (0..n_columns).collect()] {
+    let order = there_and_back(shape);
+    let backwards: Vec<usize> = order.iter().rev().copied().collect();
+    for order in [backwards, order] {
         let mut next = None;
-        for i_column in order.into_iter().map(there_and_back) {
+        for i_column in order {
             next = if has_some(i_column) { Some(i_column) } else { holders[i_column].or(next) };
             holders[i_column] = next;
         }

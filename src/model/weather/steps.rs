@@ -1,7 +1,7 @@
 //! The times of a file's steps: their text, their order, and between which of them a moment lies.
 
 /// Steps further apart are not interpolated, s: clouds on fixed seeds are off by half of their spread between steps 10 minutes
-/// apart, and by three quarters between steps 3 hours apart (docs/model.md §14).
+/// apart, and by three quarters between steps 3 hours apart (docs/model.md §15).
 pub const LONGEST_INTERPOLATED_S: f64 = 600.0;
 
 const SECONDS_A_DAY: f64 = 86_400.0;

@@ -1,0 +1,89 @@
+//! A cloud's keys where its particles come from a weather file (docs/model.md §15).
+
+use glam::DVec3;
+use sha2::{Digest, Sha256};
+
+use super::magnitude::GREATEST;
+use super::toml_section::{Bounds, Section};
+use super::weather::wrf::{Clouds, WeatherFile};
+use crate::error::Result;
+use crate::model::cloud::{LEAST_ASPECT, Particle};
+use crate::model::weather::particles::{Layout, WeatherBlob};
+
+/// Most blobs of a file: some 48 bytes each.
+const MOST_PARTICLES: u32 = 20_000_000;
+
+/// What a scene asks of a weather file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeatherKeys {
+    pub i_step: usize,
+    pub n_particles: u32,
+    /// Heights over those of the file.
+    pub exaggeration: f64,
+}
+
+/// The keys but `file`, which `file` is.
+pub fn read_keys(s: &mut Section, file: &WeatherFile) -> Result<WeatherKeys> {
+    let last = u32::try_from(file.n_steps.saturating_sub(1)).unwrap_or(u32::MAX);
+    let i_step = s.u32("step", 0, 0, last)? as usize;
+    let n_particles = s.u32("particles", 20_000, 1, MOST_PARTICLES)?;
+    let exaggeration = s.f64("exaggeration", 1.0, Bounds::Within(0.01, 100.0))?;
+    Ok(WeatherKeys { i_step, n_particles, exaggeration })
+}
+
+/// What whoever looks at the picture has to know of a cloud's file.
+pub fn notes(file: &WeatherFile) -> Vec<String> {
+    let diagnosed = || "the file has no cloud water: its clouds are diagnosed from relative humidity".to_owned();
+    (file.clouds == Clouds::Diagnosed).then(diagnosed).into_iter().collect()
+}
+
+/// The blobs of a step, relative to sea level in the domain's middle: metres, x east, y up, z south.
+pub fn particles(file: &WeatherFile, keys: &WeatherKeys, seed: u32) -> Result<Vec<Particle>> {
+    let step = file.step(keys.i_step)?;
+    let layout = Layout::new(&step.grid, &[&step.extinction], keys.n_particles as usize, seed);
+    let blobs = layout.blobs(&step.grid, &step.extinction);
+    Ok(blobs.iter().filter(|b| b.kappa > 0.0).map(|blob| particle(blob, keys.exaggeration)).collect())
+}
+
+/// With heights so many times as great and κ as many times less: what a column takes of the light stays.
+fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
+    let shape = DVec3::new(1.0, exaggeration, 1.0);
+    let aspect = (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT);
+    // Where the aspect is cut the mass stays.
+    let kappa = blob.kappa * blob.sigma_z / (aspect * blob.sigma_xy);
+    Particle {
+        position: (blob.position * shape).clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST)),
+        sigma: blob.sigma_xy,
+        aspect,
+        kappa,
+        color: DVec3::ONE,
+    }
+}
+
+/// What a scene's hash knows of a file: the particles that it gave.
+pub fn digest(particles: &[Particle]) -> [u8; 32] {
+    let mut hash = Sha256::new();
+    for p in particles {
+        let [x, y, z] = p.position.to_array();
+        [x, y, z, p.sigma, p.aspect, p.kappa].iter().for_each(|v| hash.update(v.to_le_bytes()));
+    }
+    hash.finalize().into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exaggerated_blobs_keep_their_mass_and_what_a_column_takes() {
+        let blob =
+            WeatherBlob { position: DVec3::new(7.0, 300.0, -2.0), sigma_xy: 4000.0, sigma_z: 100.0, kappa: 0.02 };
+        for (exaggeration, aspect) in [(1.0, 0.025), (10.0, 0.25), (0.01, 1e-3)] {
+            let p = particle(&blob, exaggeration);
+            assert!((p.aspect / aspect - 1.0).abs() < 1e-12, "{p:?}");
+            assert!((p.position - DVec3::new(7.0, 300.0 * exaggeration, -2.0)).length() < 1e-9);
+            // kappa sigma_y, and so the depth of the vertical through its centre.
+            assert!((p.kappa * p.aspect * p.sigma / (blob.kappa * blob.sigma_z) - 1.0).abs() < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! The blobs of all moments between two steps, or of one step alone: laid out once, and then as cheap as a mean of two numbers a blob.
+
+use super::grid::Grid;
+use super::particles::{Layout, WeatherBlob};
+
+/// What a step says of its clouds.
+#[derive(Debug, Clone, Copy)]
+pub struct Moment<'a> {
+    pub grid: &'a Grid,
+    /// m⁻¹, a cell each.
+    pub extinction: &'a [f64],
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interval {
+    from: Vec<WeatherBlob>,
+    /// None where a step stands alone.
+    to: Option<Vec<WeatherBlob>>,
+}
+
+impl Interval {
+    /// A step that nothing is interpolated with.
+    pub fn alone(step: Moment, n: usize, seed: u32) -> Self {
+        let layout = Layout::new(step.grid, &[step.extinction], n, seed);
+        Interval { from: layout.blobs(step.grid, step.extinction), to: None }
+    }
+
+    /// From a step to the next one, on a grid of the same shape.
+    pub fn between(a: Moment, b: Moment, n: usize, seed: u32) -> Self {
+        let layout = Layout::new(a.grid, &[a.extinction, b.extinction], n, seed);
+        Interval { from: layout.blobs(a.grid, a.extinction), to: Some(layout.blobs(b.grid, b.extinction)) }
+    }
+
+    pub fn len(&self) -> usize {
+        self.from.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.from.is_empty()
+    }
+
+    /// A blob `weight` of the way from the first step to the second: place, widths and mass are linear in it, so that the clouds' mass is.
+    pub fn blob(&self, i: usize, weight: f64) -> WeatherBlob {
+        let from = self.from[i];
+        let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else { return from };
+        let mix = |a: f64, b: f64| a + weight * (b - a);
+        let mut blob = WeatherBlob {
+            position: from.position.lerp(to.position, weight),
+            sigma_xy: mix(from.sigma_xy, to.sigma_xy),
+            sigma_z: mix(from.sigma_z, to.sigma_z),
+            kappa: 1.0,
+        };
+        blob.kappa = mix(from.mass(), to.mass()) / blob.mass();
+        blob
+    }
+}

@@ -1,0 +1,124 @@
+//! Clouds of weather files in scenes: what of the file the particles keep, and how such scenes are drawn.
+
+#[path = "harness/program.rs"]
+mod program;
+
+use std::path::Path;
+
+use glam::DVec3;
+use nimbus::io::scene_file;
+use nimbus::io::weather::wrf;
+use nimbus::model::cloud::{CloudSource, Facing, Particle};
+use nimbus::model::light::Light;
+use nimbus::model::scene::Scene;
+use program::run;
+
+const KATRINA: &str = "
+[[cloud]]
+from = 'weather'
+file = 'scenes/weather/katrina.nc'
+";
+
+fn load(text: &str) -> nimbus::error::Result<Scene> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scene.toml");
+    scene_file::parse(text.to_owned(), &path, &[], None).map(|loaded| loaded.scene)
+}
+
+fn list(scene: &Scene) -> &[Particle] {
+    match &scene.clouds[0].source {
+        CloudSource::Particles(list) => list,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// κ (2π)^{3/2} σ² σ_y of all.
+fn mass(list: &[Particle]) -> f64 {
+    let of = |p: &Particle| p.kappa * (2.0 * std::f64::consts::PI).powf(1.5) * p.sigma.powi(3) * p.aspect;
+    list.iter().map(of).sum()
+}
+
+#[test]
+fn particles_hold_the_files_extinction_whatever_the_exaggeration() {
+    let file = wrf::open(&Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/katrina.nc")).expect("the file");
+    let step = file.step(2).expect("a step");
+    let n_columns = step.grid.shape().n_columns();
+    let of = |(i, beta): (usize, &f64)| beta * step.grid.thickness_m(i) * step.grid.ground.area_m2(i % n_columns);
+    let truth: f64 = step.extinction.iter().enumerate().map(of).sum();
+    for exaggeration in ["1", "7.5"] {
+        let scene = load(&format!("{KATRINA}step = 2\nparticles = 5000\nexaggeration = {exaggeration}")).expect("a scene");
+        let found = mass(list(&scene));
+        // 0.1 % is what is promised; the sums are f64's.
+        assert!((found / truth - 1.0).abs() < 1e-9, "{exaggeration}: {found:e} of {truth:e}");
+        assert!(list(&scene).len() <= 5000 && list(&scene).len() > 4000);
+        assert!(list(&scene).iter().all(|p| p.position.is_finite() && p.sigma > 0.0 && p.aspect > 0.0));
+        assert_eq!(scene.clouds[0].facing, Facing::Up);
+        assert!(scene.has_ellipsoids());
+    }
+    // Another step, and another seed, are other particles.
+    let first = load(&format!("{KATRINA}particles = 500")).expect("a scene");
+    for other in ["step = 1", "seed = 9"] {
+        assert_ne!(list(&first), list(&load(&format!("{KATRINA}particles = 500\n{other}")).expect("a scene")), "{other}");
+    }
+}
+
+#[test]
+fn the_sun_stands_where_the_almanac_has_it() {
+    // Greenwich at noon on the June solstice: 62.0° high (90° - 51.48° + 23.44°), within the equation of time's 2 minutes in the south.
+    let sun = |more: &str| load(&format!("{KATRINA}particles = 10\n[[light]]\nkind = 'sun'\nirradiance = [1, 1, 1]\n{more}"));
+    let scene = sun("date = '2024-06-20 12:00:00'\nlatitude_deg = 51.48\nlongitude_deg = 0.0").expect("a scene");
+    let Light::Directional { direction, .. } = scene.lights[0] else { panic!("{:?}", scene.lights) };
+    assert!(((-direction.y).asin().to_degrees() - 61.95).abs() < 0.1, "{direction}");
+    // South is +z: the sun's light comes from there.
+    assert!(direction.normalize().dot(DVec3::new(0.0, -0.8826, -0.4701)) > 0.9999, "{direction}");
+    for (more, expected) in [
+        ("date = '2024-06-20 00:00:00'\nlatitude_deg = 51.48", "the sun is 15.1° below the horizon"),
+        ("date = 'noon'", "expected a time such as \"2005-08-28 18:00:00\" (UTC), found noon"),
+        ("date = '2024-06-20 12:00:00'\nlatitude_deg = 95", "expected a number from -90 to 90, found 95"),
+    ] {
+        let what = sun(more).expect_err(more).to_string();
+        assert!(what.contains(expected), "{what}");
+    }
+}
+
+#[test]
+fn what_is_wrong_with_a_file_is_told_with_its_place() {
+    let of = |more: &str, file: &str| load(&KATRINA.replace("scenes/weather/katrina.nc", file).replace("\n[[", &format!("{more}\n[["))).unwrap_err().to_string();
+    let what = of("", "scenes/weather/none.nc");
+    assert!(what.contains("scene.toml:4") && what.contains("none.nc"), "{what}");
+    let what = of("", "scenes/hello.csv");
+    assert!(what.contains("hello.csv"), "{what}");
+    let what = load(&format!("{KATRINA}step = 4")).unwrap_err().to_string();
+    assert!(what.contains("`cloud.0.step`: expected an integer from 0 to 3, found 4"), "{what}");
+}
+
+#[test]
+fn weather_is_drawn_and_benched_like_every_other_scene() {
+    for scene in ["scenes/katrina.toml", "scenes/supercell.toml"] {
+        let set = ["--size", "80x60", "--set", "cloud.0.particles=2000", "--set", "lighting.grid=24", "--validation"];
+        let dir = tempfile::tempdir().expect("a folder");
+        let out = dir.path().join("w.png");
+        let output = run(&[&["render", scene, "-q", "-o", &out.to_string_lossy()], &set[..]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let output = run(&[&["bench", scene, "-q", "--json", "--frames", "3", "--rounds", "2"], &set[..]].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
+fn the_device_draws_what_the_reference_has() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| dir.path().join(name).to_string_lossy().into_owned();
+    let base = ["scenes/katrina.toml", "-q", "--json", "--force", "--size", "64x48", "--set", "cloud.0.particles=1500"];
+    let more = ["--set", "lighting.grid=24", "--set", "film.format=\"rgba32f\"", "--set", "lighting.mode=\"first\""];
+    let render = |name: &str, of: &[&str]| {
+        let output = run(&[&["render", "-o", &path(name)], &base[..], &more, of].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    render("thin.exr", &["--reference", "thin"]);
+    render("drawn.exr", &[]);
+    let (rmse, max) = program::differ(&dir, "thin.exr", "drawn.exr");
+    println!("RMSE {rmse:.1e}, greatest {max:.1e}");
+    // Normals of thin sheets are ill conditioned where the density has no direction: f32 turns some by more than elsewhere, and a
+    // facet's light with them.
+    assert!(rmse < 1e-3, "{rmse:e}");
+}

@@ -56,7 +56,7 @@ const FAULTS: &[Fault] = &[
     ("no interpolation between the table's nodes", "include/lobe.glsl", "t - float(i))", "0.0)", "functions/lobe"),
     ("nine rounds of Philox and not ten", "include/philox.glsl", "i < 10", "i < 9", "generation/unit"),
     ("a slot's phase forgotten", "live.comp", "d.phase + bitfieldReverse(slot)", "d.phase", "live/late"),
-    ("lives that do not end early", "live.comp", ", life);", ", 1.0);", "live/dead"),
+    ("a death that is not faded", "live.comp", "smooth_rise((1.0 - lived) * d.inv_fade_out)", "1.0", "live/dead"),
     ("what is outside is left there", "generate.comp", "inside ? v : fold(v, h)", "v", "generation/needle"),
     (
         "one attempt more than there may be",

@@ -286,3 +286,20 @@ fn a_wrong_shader_is_noticed() {
         assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{to} was not noticed");
     }
 }
+
+#[test]
+fn a_grid_without_room_is_refused() {
+    let mut gpu = Gpu::new();
+    let scene = Scene::fitted(&scattered(10), 24);
+    let n_cells = scene.spec.n_total();
+    let pass = Grid::new(&gpu.device, &compiler(), n_cells - 1).unwrap();
+    let (placed, particles) = (gpu.buffer::<PlacedRecord>(10), gpu.buffer::<ParticleRecord>(10));
+    let density = gpu.buffer::<f32>(n_cells as usize);
+    let mut what = String::new();
+    gpu.run(|rec| {
+        let refused = pass.record(rec, [&placed, &particles, &density], &scene.record, 10, scene.heaviest);
+        what = refused.expect_err("no room").to_string();
+        Ok(())
+    });
+    assert_eq!(what, format!("a density grid of {n_cells} cells, where there is room for {}", n_cells - 1));
+}

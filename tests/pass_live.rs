@@ -45,7 +45,8 @@ fn plume(n_particles: u32, dilution: Dilution) -> Disc {
 
 /// Three clouds: a plume in the wind, one without a base that is diluted otherwise and far off, one that does nothing but stand.
 fn clouds() -> Vec<Cloud> {
-    let cloud = |disc, wind, position| Cloud { facing: nimbus::model::cloud::Facing::Outward,
+    let cloud = |disc, wind, position| Cloud {
+        facing: nimbus::model::cloud::Facing::Outward,
         source: CloudSource::Disc(disc),
         position,
         wind,
@@ -181,9 +182,9 @@ fn compare(clouds: &[Cloud], made: &[ParticleRecord], time_s: f64) -> [Compared;
             let (position, sigma, kappa) = bounds(cloud, &group, &truth);
             let record = &made[(group.i_first + i) as usize];
             assert_eq!(record.color, [1.0; 3]);
-            for axis in 0..3 {
+            for (axis, bounded) in position.into_iter().enumerate() {
                 let exact = truth.position[axis] - group.center[axis];
-                compared[0].add(record.position[axis], exact, position[axis]);
+                compared[0].add(record.position[axis], exact, bounded);
             }
             compared[1].add(record.sigma, truth.sigmas[1], sigma);
             compared[2].add(record.kappa, truth.kappa, kappa);

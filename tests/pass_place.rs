@@ -25,7 +25,8 @@ fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
         let position = spread * (DVec3::new(a, b, c) - 0.5) + 1e4;
         Particle { aspect: 1.0, position, sigma: 0.1 + d, kappa: 1.0, color: DVec3::ONE }
     };
-    let cloud = |n: u32, spread: f64, position, wind| Cloud { facing: nimbus::model::cloud::Facing::Outward,
+    let cloud = |n: u32, spread: f64, position, wind| Cloud {
+        facing: nimbus::model::cloud::Facing::Outward,
         source: CloudSource::Particles((0..n).map(|i| particle(i, spread)).collect()),
         position,
         wind,

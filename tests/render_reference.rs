@@ -44,6 +44,8 @@ fn the_thin_reference_is_what_the_device_draws() {
         ("facets of many particles", [&CUBES[..], &["--set", "lighting.facets_per_cloud=50"]].concat()),
         ("fewer by distance", [&CUBES[..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=20"]].concat()),
         ("ellipsoids", FLAT.to_vec()),
+        // Of a scene that stands still the grid has no more room than it needs.
+        ("ellipsoids that stand still", [&FLAT[..], &["--set", "cloud.0.wind=[0,0,0]"]].concat()),
         ("ellipsoids that grow", [&FLAT[..], &["--time", "2", "--set", "cloud.0.grow_to=1.5"]].concat()),
         ("facets of many ellipsoids", [&FLAT[..], &["--set", "lighting.facets_per_cloud=20"]].concat()),
         ("ellipsoids in chunks", [&FLAT[..], &["--set", "draw.path=\"sprites\"", "--set", "draw.chunks=3"]].concat()),

@@ -45,7 +45,8 @@ fn particles_hold_the_files_extinction_whatever_the_exaggeration() {
     let of = |(i, beta): (usize, &f64)| beta * step.grid.thickness_m(i) * step.grid.ground.area_m2(i % n_columns);
     let truth: f64 = step.extinction.iter().enumerate().map(of).sum();
     for exaggeration in ["1", "7.5"] {
-        let scene = load(&format!("{KATRINA}step = 2\nparticles = 5000\nexaggeration = {exaggeration}")).expect("a scene");
+        let scene =
+            load(&format!("{KATRINA}step = 2\nparticles = 5000\nexaggeration = {exaggeration}")).expect("a scene");
         let found = mass(list(&scene));
         // 0.1 % is what is promised; the sums are f64's.
         assert!((found / truth - 1.0).abs() < 1e-9, "{exaggeration}: {found:e} of {truth:e}");
@@ -57,14 +58,19 @@ fn particles_hold_the_files_extinction_whatever_the_exaggeration() {
     // Another step, and another seed, are other particles.
     let first = load(&format!("{KATRINA}particles = 500")).expect("a scene");
     for other in ["step = 1", "seed = 9"] {
-        assert_ne!(list(&first), list(&load(&format!("{KATRINA}particles = 500\n{other}")).expect("a scene")), "{other}");
+        assert_ne!(
+            list(&first),
+            list(&load(&format!("{KATRINA}particles = 500\n{other}")).expect("a scene")),
+            "{other}"
+        );
     }
 }
 
 #[test]
 fn the_sun_stands_where_the_almanac_has_it() {
     // Greenwich at noon on the June solstice: 62.0° high (90° - 51.48° + 23.44°), within the equation of time's 2 minutes in the south.
-    let sun = |more: &str| load(&format!("{KATRINA}particles = 10\n[[light]]\nkind = 'sun'\nirradiance = [1, 1, 1]\n{more}"));
+    let sun =
+        |more: &str| load(&format!("{KATRINA}particles = 10\n[[light]]\nkind = 'sun'\nirradiance = [1, 1, 1]\n{more}"));
     let scene = sun("date = '2024-06-20 12:00:00'\nlatitude_deg = 51.48\nlongitude_deg = 0.0").expect("a scene");
     let Light::Directional { direction, .. } = scene.lights[0] else { panic!("{:?}", scene.lights) };
     assert!(((-direction.y).asin().to_degrees() - 61.95).abs() < 0.1, "{direction}");
@@ -82,7 +88,11 @@ fn the_sun_stands_where_the_almanac_has_it() {
 
 #[test]
 fn what_is_wrong_with_a_file_is_told_with_its_place() {
-    let of = |more: &str, file: &str| load(&KATRINA.replace("scenes/weather/katrina.nc", file).replace("\n[[", &format!("{more}\n[["))).unwrap_err().to_string();
+    let of = |more: &str, file: &str| {
+        load(&KATRINA.replace("scenes/weather/katrina.nc", file).replace("\n[[", &format!("{more}\n[[")))
+            .unwrap_err()
+            .to_string()
+    };
     let what = of("", "scenes/weather/none.nc");
     assert!(what.contains("scene.toml:4") && what.contains("none.nc"), "{what}");
     let what = of("", "scenes/hello.csv");

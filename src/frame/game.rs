@@ -70,7 +70,7 @@ impl Setting {
             scene.lighting_bounds(groups, time_s, DEPOSIT_CUT_SIGMA).unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let light_origin = 0.5 * (low + high);
         let half = 0.5 * (high - low);
-        let grid = GridSpec::fit_cells(-half, half, scene.lighting.grid, Scene::mean_aspect(groups));
+        let grid = scene.density_grid(groups, half);
         Ok(Setting { time_s, pose, light_origin, grid, radius: half.length() })
     }
 }

@@ -15,7 +15,7 @@ use crate::layout::second::{PackedRecord, SourceRecord};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
-use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec, MAX_CELLS};
+use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use crate::model::resolution::{Resolution, SmallPicture};
 use crate::model::scene::{Chunks, DrawPath, Impostors, LightingMode, MAX_CHUNKS, Scene};
 use crate::model::sums::Precision;
@@ -198,11 +198,9 @@ pub fn tensors(shape: &Shape, limits: &Limits, free: u64) -> Tensors {
 pub fn n_cells_max(scene: &Scene) -> u64 {
     let side = u64::from(scene.lighting.grid.min(MAX_CELLS));
     let stands_still = scene.clouds.iter().all(|c| c.drift() == DVec3::ZERO && c.growth.is_none());
-    match scene.bounds(&scene.groups(), scene.time.start_s, DEPOSIT_CUT_SIGMA) {
-        Some((low, high)) if stands_still => {
-            let half = 0.5 * (high - low);
-            GridSpec::fit(-half, half, scene.lighting.grid).n_total()
-        }
+    let groups = scene.groups();
+    match scene.bounds(&groups, scene.time.start_s, DEPOSIT_CUT_SIGMA) {
+        Some((low, high)) if stands_still => scene.density_grid(&groups, 0.5 * (high - low)).n_total(),
         _ => side * side * side,
     }
 }
@@ -220,7 +218,7 @@ pub fn target_format(format: FilmFormat) -> TargetFormat {
 pub fn n_deposits(scene: &Scene) -> f64 {
     let groups = scene.groups();
     let Some((low, high)) = scene.bounds(&groups, scene.time.start_s, DEPOSIT_CUT_SIGMA) else { return 0.0 };
-    let grid = GridSpec::fit_cells(low, high, scene.lighting.grid, Scene::mean_aspect(&groups));
+    let grid = scene.density_grid(&groups, 0.5 * (high - low));
     let blob = |g: &Group| {
         let sigma = g.sigma_mean * DVec3::new(1.0, g.aspects[1], 1.0);
         let covered = (2.0 * DEPOSIT_CUT_SIGMA * sigma / grid.edges() + 1.0).min(grid.n_cells.as_dvec3());

@@ -274,7 +274,8 @@ mod tests {
         let boxes = counts.iter().map(b).collect();
         let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        Cloud { facing: crate::model::cloud::Facing::Outward,
+        Cloud {
+            facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::ZERO,
             wind: DVec3::ZERO,

@@ -335,7 +335,8 @@ mod tests {
             radius_scale: 1.0,
         };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
+        let cloud = Cloud {
+            facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::ZERO,
             wind: DVec3::X,
@@ -358,7 +359,8 @@ mod tests {
         // Mean position 2, bounds from 0 to 5.
         let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
         let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
-        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
+        let cloud = Cloud {
+            facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::Y,
             wind: DVec3::ZERO,
@@ -384,7 +386,8 @@ mod tests {
         let blob = |sigma, kappa| Particle { aspect: 1.0, position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
         let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
         let (gust, growth) = (Gust::CALM, Growth::NONE);
-        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
+        let cloud = Cloud {
+            facing: crate::model::cloud::Facing::Outward,
             source,
             position: DVec3::ZERO,
             wind: DVec3::ZERO,

@@ -7,9 +7,10 @@ use glam::{DVec2, DVec3};
 use super::air::Air;
 use super::basis::Sampling;
 use super::camera::Camera;
-use super::cloud::{Cloud, CloudSource, Group, runs};
+use super::cloud::{Cloud, CloudSource, Group, LEAST_ASPECT, runs};
 use super::count::Count;
 use super::film::Film;
+use super::grid::GridSpec;
 use super::least::Least;
 use super::light::Light;
 use super::material::Material;
@@ -291,13 +292,21 @@ impl Scene {
         self.clouds.iter().any(of)
     }
 
-    /// σ along y over that along x and z of all blobs of `groups`, their mean.
-    pub fn mean_aspect(groups: &[Group]) -> f64 {
-        let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();
-        match groups.iter().any(Group::has_ellipsoids) {
-            true => groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n,
-            false => 1.0,
+    /// The density grid over what lies within ± `half` of its middle.
+    pub fn density_grid(&self, groups: &[Group], half: DVec3) -> GridSpec {
+        GridSpec::fit_cells(-half, half, self.lighting.grid, Scene::cell_aspect(groups, 2.0 * half))
+    }
+
+    /// Heights of the density grid's cells over their widths: 1 where all blobs of `groups` are balls; else as flat as they are on the
+    /// mean, or as all of the bounds (their extent given) is, whichever is flatter.
+    fn cell_aspect(groups: &[Group], extent: DVec3) -> f64 {
+        if !groups.iter().any(Group::has_ellipsoids) {
+            return 1.0;
         }
+        let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();
+        let mean = groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n;
+        let flat = extent.y / extent.x.max(extent.z);
+        if flat > 0.0 { mean.min(flat) } else { mean }.clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT)
     }
 
     /// Whether some cloud's particles have textures.

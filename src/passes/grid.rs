@@ -4,7 +4,7 @@
 //! Law: mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a weight's 2.5e-6 (erf's formula 3e-7,
 //! the rest its rounding) at the most, some 1e-6 measured, and half a quantum of the fixed-point sum a deposit.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
@@ -25,6 +25,8 @@ pub struct Grid {
     deposit: Kernel,
     resolve: Kernel,
     sums: Buffer,
+    /// Cells that there is room for.
+    room: u64,
 }
 
 impl Grid {
@@ -43,6 +45,7 @@ impl Grid {
             )?,
             resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS, &[])?,
             sums: Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, Place::Device)?,
+            room: n_cells,
         })
     }
 
@@ -56,6 +59,13 @@ impl Grid {
         n_particles: u32,
         heaviest: f64,
     ) -> Result<()> {
+        let n_wanted = grid.n_cells.iter().map(|n| u64::from(*n)).product::<u64>();
+        if n_wanted > self.room {
+            return Err(Error::limit(format!(
+                "a density grid of {n_wanted} cells, where there is room for {}",
+                self.room
+            )));
+        }
         rec.fill(&self.sums, 0);
         let quanta_per_mass = if heaviest > 0.0 { QUANTA_OF_HEAVIEST / heaviest } else { 0.0 };
         let push = DepositPush { grid: *grid, n_particles, quanta_per_mass: quanta_per_mass as f32 };

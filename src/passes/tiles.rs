@@ -11,10 +11,8 @@ use crate::error::{Error, Result};
 use crate::gpu::device::Limits;
 use crate::gpu::memory::{TargetFormat, has_depth24};
 use crate::gpu::{Amount, Buffer, Compiler, Device, Kernel, Place, Recorder, Target};
-use crate::layout::cull::KeptRecord;
-use crate::layout::frame::CameraRecord;
-use crate::layout::record;
 use crate::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
+use crate::layout::{cull::KeptRecord, frame::CameraRecord, record};
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
 

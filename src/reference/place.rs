@@ -110,7 +110,8 @@ mod tests {
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
         let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 1.0, kappa: 1.0, color: DVec3::ONE };
-        let cloud = |list, y, wind| Cloud { facing: crate::model::cloud::Facing::Outward,
+        let cloud = |list, y, wind| Cloud {
+            facing: crate::model::cloud::Facing::Outward,
             source: CloudSource::Particles(list),
             position: DVec3::Y * y,
             wind,
@@ -144,7 +145,8 @@ mod tests {
     #[test]
     fn a_cloud_grows_about_its_own_centre() {
         let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 0.5, kappa: 1.0, color: DVec3::ONE };
-        let cloud = Cloud { facing: crate::model::cloud::Facing::Outward,
+        let cloud = Cloud {
+            facing: crate::model::cloud::Facing::Outward,
             source: CloudSource::Particles(vec![particle(0.0), particle(0.0), particle(6.0)]),
             position: DVec3::Y,
             wind: DVec3::Z,

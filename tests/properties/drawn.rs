@@ -61,7 +61,17 @@ fn scene() -> impl Strategy<Value = Made> {
 
 fn cloud_of(source: CloudSource, gust: Gust) -> Cloud {
     let (growth, texture) = (Growth::NONE, Texture::NONE);
-    Cloud { facing: nimbus::model::cloud::Facing::Outward, source, position: DVec3::ZERO, wind: DVec3::ZERO, gust, growth, texture, i_material: 0, seed: 5 }
+    Cloud {
+        facing: nimbus::model::cloud::Facing::Outward,
+        source,
+        position: DVec3::ZERO,
+        wind: DVec3::ZERO,
+        gust,
+        growth,
+        texture,
+        i_material: 0,
+        seed: 5,
+    }
 }
 
 fn with_clouds(desk: &Desk, (text, list, one_box, is_stirred): Made) -> Scene {

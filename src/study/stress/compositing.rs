@@ -160,7 +160,8 @@ fn alternating(desk: &mut Desk) -> Result<Found> {
     let mut c = Comparison::default();
     for path in [SPRITES, TILES] {
         let thin = channel(&draw(desk, path, vec![all[199]])?, MIDDLE, 3);
-        let played = draw(desk, path, all.clone())?;
+        // Of 32 bits, which have a sign; those of 16 count from the farthest.
+        let played = draw(desk, &format!("{path}\nsort_bits = 32"), all.clone())?;
         let last = all[198].color;
         let truth = [(1.0 - thin) * last.x, thin, (1.0 - thin) * last.z, 1.0];
         for (k, truth) in truth.into_iter().enumerate() {

@@ -65,7 +65,8 @@ fn told(n: u32, drawn: &Drawn) -> (u32, f64, f64) {
 }
 
 fn group(n: u32) -> Group {
-    Group { facing_from: glam::DVec3::ZERO,
+    Group {
+        facing_from: glam::DVec3::ZERO,
         aspects: [1.0; 3],
         i_cloud: 0,
         i_first: 0,

@@ -30,7 +30,8 @@ pub const SEED: u32 = 9;
 pub const OPTICAL_DEPTH: f64 = 1.3;
 
 pub fn cloud_of(source: CloudSource) -> Cloud {
-    Cloud { facing: crate::model::cloud::Facing::Outward,
+    Cloud {
+        facing: crate::model::cloud::Facing::Outward,
         source,
         position: DVec3::ZERO,
         wind: DVec3::ZERO,

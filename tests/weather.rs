@@ -1,4 +1,5 @@
-//! What is read of weather files: WRF's chain against numbers computed elsewhere, every kind of NetCDF, and a step alone.
+//! What is read of weather files: WRF's chain against numbers computed elsewhere, every kind of NetCDF, and a step
+//! alone.
 
 #[path = "harness/weather_files.rs"]
 mod weather_files;
@@ -27,9 +28,10 @@ fn made(made: &Made) -> WeatherFile {
 /// Step, level, row, column; pressure (Pa), temperature (K), relative humidity (%), height (m).
 type Point = (usize, usize, usize, usize, f64, f64, f64, f64);
 
-/// Computed from the same files by another program: Python 3.11, netCDF4 1.7 (the C library reads) and numpy in f64, with the formulas and
-/// constants of wrf-python 1.3 (fortran/wrf_user.f90: DCOMPUTETK, DCOMPUTERH; destag; g = 9.81, R_d = 287, c_p = 7 R_d/2, EZERO = 6.112,
-/// ESLCON1 = 17.67, ESLCON2 = 29.65, EPS = 0.622; relative humidity cut to 0..100 %), printed to the digits given here.
+/// Computed from the same files by another program: Python 3.11, netCDF4 1.7 (the C library reads) and numpy in f64,
+/// with the formulas and constants of wrf-python 1.3 (fortran/wrf_user.f90: DCOMPUTETK, DCOMPUTERH; destag; g = 9.81,
+/// R_d = 287, c_p = 7 R_d/2, EZERO = 6.112, ESLCON1 = 17.67, ESLCON2 = 29.65, EPS = 0.622; relative humidity cut to
+/// 0..100 %), printed to the digits given here.
 const KATRINA: [Point; 4] = [
     (0, 0, 0, 0, 99707.695, 301.0280, 88.8498, 30.211),
     (0, 5, 24, 24, 92038.461, 297.0551, 84.4297, 697.083),
@@ -61,7 +63,8 @@ fn pressure_temperature_humidity_and_height_are_those_of_wrf_python() {
             );
         }
     }
-    // Saturation alone, by hand: 611.2 e^{17.67 · 25/268.5} = 3167.2 Pa at 25 °C; 0.622 · 3167.2/(100000 − 0.378 · 3167.2).
+    // Saturation alone, by hand: 611.2 e^{17.67 · 25/268.5} = 3167.2 Pa at 25 °C; 0.622 · 3167.2/(100000 − 0.378 ·
+    // 3167.2).
     assert!((saturation_pa(298.15) - 3167.2).abs() < 0.5 && (saturation_ratio(1e5, 298.15) - 0.019939).abs() < 1e-5);
 }
 
@@ -115,7 +118,8 @@ fn clouds_of_a_supercell_have_ice_and_snow_and_no_map() {
 fn every_kind_of_netcdf_gives_the_same_step() {
     let kinds = [(1, "NetCDF classic"), (2, "NetCDF 64-bit offset"), (5, "NetCDF 64-bit data (CDF-5)")];
     let first = made(&Made::wrf(1, 3)).step(2).expect("a step");
-    // 1.5 · 2e-4 ρ/(1000 · 1e-5) of cells in which ρ is the gas law's: θ = 297 K and q_v = 0.005 at level 1, p = 1e5 e^{−750/8000}.
+    // 1.5 · 2e-4 ρ/(1000 · 1e-5) of cells in which ρ is the gas law's: θ = 297 K and q_v = 0.005 at level 1, p = 1e5
+    // e^{−750/8000}.
     let p = f64::from(1e5f32 * (-1.5f32 * 500.0 / 8000.0).exp());
     let density = p / (287.0 * 297.0 * (p / 1e5f64).powf(2.0 / 7.0) * (1.0 + 0.005 / 0.622));
     let at = NX * NY;
@@ -223,8 +227,8 @@ fn told(file: &str, name: &str) -> Option<u64> {
     text.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next()?.parse().ok())
 }
 
-/// 61 steps of 300 MB: opens in under 5 s, holds less than 300 MB, and a step reads a 61st. Writes the file first, which is why it is
-/// not run by itself: cargo test --release --test weather -- --ignored --nocapture
+/// 61 steps of 300 MB: opens in under 5 s, holds less than 300 MB, and a step reads a 61st. Writes the file first,
+/// which is why it is not run by itself: cargo test --release --test weather -- --ignored --nocapture
 #[test]
 #[ignore = "writes a file of 300 MB"]
 fn a_large_file_is_read_step_by_step() {

@@ -1,5 +1,5 @@
-//! Bad weather files: each is refused with one message that says what, where and what was expected, and none crashes, hangs or takes
-//! memory without end.
+//! Bad weather files: each is refused with one message that says what, where and what was expected, and none crashes,
+//! hangs or takes memory without end.
 
 #[path = "harness/readers.rs"]
 mod readers;
@@ -207,8 +207,8 @@ fn small_netcdf4() -> Vec<u8> {
     fs::read(path).expect("a file")
 }
 
-/// A file of each kind, cut off everywhere: in its header, at its last step, by one byte. NetCDF-4 tells by its superblock, the others by
-/// what their header declares.
+/// A file of each kind, cut off everywhere: in its header, at its last step, by one byte. NetCDF-4 tells by its
+/// superblock, the others by what their header declares.
 #[test]
 fn files_that_are_cut_off() {
     let whole = small_netcdf4();

@@ -1,4 +1,5 @@
-//! Blobs that stand for a file's cells: their mass, their columns' transmittance, their order, and what stays as time goes on.
+//! Blobs that stand for a file's cells: their mass, their columns' transmittance, their order, and what stays as time
+//! goes on.
 
 use std::path::Path;
 
@@ -37,8 +38,9 @@ fn plain_grid(nx: usize, ny: usize, nz: usize) -> Grid {
     Grid::new(ground, heights).expect("a grid")
 }
 
-/// Katrina at 100 000: mass to 0.1 %, transmittance of the columns' mean optical depth within 0.055 RMS (0.037 to 0.048 are measured),
-/// and light at points, 16 a column, which sees gaps and seams between blobs, too, within 0.02 (0.013 to 0.017).
+/// Katrina at 100 000: mass to 0.1 %, transmittance of the columns' mean optical depth within 0.055 RMS (0.037 to 0.048
+/// are measured), and light at points, 16 a column, which sees gaps and seams between blobs, too, within 0.02 (0.013 to
+/// 0.017).
 #[test]
 fn columns_of_katrina_let_through_what_the_file_says() {
     for i_step in 0..4 {
@@ -80,7 +82,8 @@ fn every_column_keeps_its_mass() {
 #[test]
 fn few_blobs_still_have_all_of_the_mass() {
     let step = step("katrina.nc", 0);
-    for n in [0, 1, 2, 50, 500] {
+    // About as many as there are columns with clouds, where the ways of dealing meet.
+    for n in [0, 1, 2, 50, 2000, 5469, 5470].into_iter().chain((420..560).step_by(5)) {
         let (_, blobs) = blobs_of(&step, n, 1);
         let whole: f64 = blobs.iter().map(WeatherBlob::mass).sum();
         let expected = if n == 0 { 0.0 } else { mass(&step.grid, &step.extinction) };
@@ -91,7 +94,8 @@ fn few_blobs_still_have_all_of_the_mass() {
     assert_eq!(Layout::new(&clear, &[&[0.0; 18]], 1000, 1).blobs(&clear, &[0.0; 18]), []);
 }
 
-/// Cells of equal 1 − e^{−τ} have equally many blobs; a thick one no more than 1/(1 − e^{−τ}) times those of a thin one.
+/// Cells of equal 1 − e^{−τ} have equally many blobs; a thick one no more than 1/(1 − e^{−τ}) times those of a thin
+/// one.
 #[test]
 fn blobs_go_by_what_cells_hide() {
     let grid = plain_grid(4, 1, 1);
@@ -119,7 +123,8 @@ fn a_blob_alone_is_as_wide_as_its_cell() {
     assert!((blob.kappa - 2.6394e-3).abs() < 1e-6, "{}", blob.kappa);
 }
 
-/// Erf over the cells: a blob on the corner of four has a quarter in each, and one far inside all of its mass in its own.
+/// Erf over the cells: a blob on the corner of four has a quarter in each, and one far inside all of its mass in its
+/// own.
 #[test]
 fn footprints_are_divided_among_columns() {
     let grid = plain_grid(6, 6, 1);
@@ -149,7 +154,8 @@ fn blobs_lie_in_their_cells_and_a_first_part_stands_for_all() {
         assert!(from.abs().cmple(half).all(), "{from} {half}");
         assert!(blob.kappa.is_finite() && blob.kappa >= 0.0 && blob.sigma_z > 0.0);
     }
-    // A tenth of the blobs has a tenth of the mass within what blobs of unequal mass scatter by, and lies as all of them do.
+    // A tenth of the blobs has a tenth of the mass within what blobs of unequal mass scatter by, and lies as all of
+    // them do.
     let of = |part: &[WeatherBlob]| {
         let mass: f64 = part.iter().map(WeatherBlob::mass).sum();
         (mass, part.iter().map(|b| b.position * b.mass()).sum::<DVec3>() / mass)
@@ -207,17 +213,4 @@ fn an_interval_goes_from_one_step_to_the_next() {
     let alone = Interval::alone(moment(&a), 20_000, 4);
     assert_eq!(alone.blob(7, 0.9), blobs_of(&a, 20_000, 4).1[7]);
     assert!(!alone.is_empty() && alone.len() == 20_000);
-}
-
-#[test]
-fn exaggeration_keeps_what_is_seen_from_above() {
-    let step = step("katrina.nc", 1);
-    let (_, blobs) = blobs_of(&step, 2000, 1);
-    let tall: Vec<WeatherBlob> = blobs.iter().map(|b| b.exaggerated(5.0)).collect();
-    for (a, b) in of_blobs(&step.grid, &blobs).iter().zip(of_blobs(&step.grid, &tall)) {
-        assert!((a - b).abs() <= 1e-12 * a);
-    }
-    assert!(
-        (tall[3].position.y / blobs[3].position.y - 5.0).abs() < 1e-12 && tall[3].position.x == blobs[3].position.x
-    );
 }

@@ -1,5 +1,5 @@
-//! Weather files made by hand: NetCDF classic in its three versions ("The NetCDF Classic Format Specification"), and within it a small
-//! WRF file that a test changes.
+//! Weather files made by hand: NetCDF classic in its three versions ("The NetCDF Classic Format Specification"), and
+//! within it a small WRF file that a test changes.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -40,7 +40,8 @@ pub const NY: usize = 3;
 pub const NZ: usize = 5;
 
 impl Made {
-    /// A whole WRF file of 4 x 3 columns and 5 levels of 500 m, with a cloud on the second and third level of three columns.
+    /// A whole WRF file of 4 x 3 columns and 5 levels of 500 m, with a cloud on the second and third level of three
+    /// columns.
     pub fn wrf(version: u8, n_steps: u32) -> Self {
         Made::wrf_of(version, n_steps, [NX, NY, NZ])
     }

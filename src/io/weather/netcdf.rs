@@ -1,4 +1,5 @@
-//! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data (CDF-5) and NetCDF-4 (HDF5).
+//! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data (CDF-5) and NetCDF-4
+//! (HDF5).
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -17,8 +18,8 @@ use crate::error::{Error, Place, Result};
 const MOST_NUMBERS: u64 = 1 << 25;
 /// Most characters of a variable of text: a year of steps has less than 1 MiB.
 const MOST_CHARACTERS: u64 = 8 << 20;
-/// Largest chunk and largest part, bytes: f32 or f64 of [`MOST_NUMBERS`]. What a damaged file asks for is more, and refused before it is
-/// made room for.
+/// Largest chunk and largest part, bytes: f32 or f64 of [`MOST_NUMBERS`]. What a damaged file asks for is more, and
+/// refused before it is made room for.
 const MOST_BYTES: usize = (MOST_NUMBERS as usize) * 8;
 const MOST_HEADER_BYTES: usize = 16 << 20;
 /// Unpacked chunks that are kept, for variables whose chunks hold several steps.
@@ -113,7 +114,8 @@ fn check_begin(storage: &DynStorage) -> std::result::Result<(), String> {
     }
 }
 
-/// Where an HDF5 file says that it ends ("HDF5 File Format Specification" 3.0, II.A): the third address of its superblock.
+/// Where an HDF5 file says that it ends ("HDF5 File Format Specification" 3.0, II.A): the third address of its
+/// superblock.
 fn superblock_end(begin: &[u8]) -> Option<u64> {
     let begin_of_addresses = |version: u8| match version {
         0 => Some((13, 24)),

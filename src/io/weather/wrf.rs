@@ -12,7 +12,8 @@ use crate::model::weather::diagnosed::{self, Air};
 use crate::model::weather::extinction::{ICE, LIQUID, Oddities, Phase, SNOW, add, single_moment_phase};
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
-/// Cells of a step at most: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more while it is read: less than 1 GiB.
+/// Cells of a step at most: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more while it is read: less
+/// than 1 GiB.
 pub const MOST_CELLS: u64 = 1 << 24;
 /// m; sizes of WRF's cells, from a large eddy to a globe's degree.
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
@@ -93,8 +94,8 @@ pub struct Step {
     pub vapour: Vec<f64>,
     /// Height of the ground, m, a column each; None where the file has none.
     pub terrain_m: Option<Vec<f64>>,
-    /// Radians north and east in the domain's middle, which moves where a nest follows a storm; None of an idealised file, whose
-    /// are 0.
+    /// Radians north and east in the domain's middle, which moves where a nest follows a storm; None of an idealised
+    /// file, whose are 0.
     pub middle: Option<(f64, f64)>,
     pub oddities: Oddities,
 }
@@ -187,6 +188,22 @@ fn spacing(file: &dyn Container, name: &str) -> std::result::Result<f64, String>
     }
 }
 
+fn condensates(
+    file: &dyn Container,
+    shape: Shape,
+    n_steps: usize,
+    notes: &mut Vec<String>,
+) -> std::result::Result<Vec<(Field, Phase)>, String> {
+    let mut found = Vec::new();
+    for (name, phase) in CLOUDS {
+        match Field::find(file, name, Extent::Cells, RATIO, shape, n_steps)? {
+            Some(field) => found.push((field, phase)),
+            None => notes.push(format!("{name} is missing")),
+        }
+    }
+    Ok(found)
+}
+
 impl Fields {
     fn find(
         file: &dyn Container,
@@ -202,13 +219,7 @@ impl Fields {
         if vapour.is_none() {
             notes.push("QVAPOR is missing: the air is taken to be dry".to_owned());
         }
-        let mut condensates = Vec::new();
-        for (name, phase) in CLOUDS {
-            match optional(name, Extent::Cells, RATIO)? {
-                Some(field) => condensates.push((field, phase)),
-                None => notes.push(format!("{name} is missing")),
-            }
-        }
+        let condensates = condensates(file, shape, n_steps, notes)?;
         let has = |name: &str| condensates.iter().any(|(field, _)| field.name == name);
         let scheme = number(file.attributes(), "MP_PHYSICS");
         let is_single_moment = scheme == Some(SINGLE_MOMENT_SCHEME) && has("QCLOUD") && !has("QICE");

@@ -6,8 +6,8 @@ use crate::model::weather::steps::{first_out_of_order, format, parse};
 /// Steps that a file may have: two years of 10 minutes.
 pub const MOST_STEPS: u64 = 105_408;
 
-/// Seconds from 1970-01-01 UTC of every step, rising; from Times, else from XTIME. None where the file has neither and needs none, as it
-/// has one step.
+/// Seconds from 1970-01-01 UTC of every step, rising; from Times, else from XTIME. None where the file has neither and
+/// needs none, as it has one step.
 ///
 /// # Errors
 /// What is wrong, with the variable and the step.

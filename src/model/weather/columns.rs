@@ -20,8 +20,8 @@ pub fn of_cells(grid: &Grid, extinction: &[f64]) -> Vec<f64> {
     depths
 }
 
-/// The blobs' optical depth straight up, its mean over the area of each column: every blob's mass over the area, by the share of its
-/// footprint that lies within (a product of differences of erf).
+/// The blobs' optical depth straight up, its mean over the area of each column: every blob's mass over the area, by the
+/// share of its footprint that lies within (a product of differences of erf).
 pub fn of_blobs(grid: &Grid, blobs: &[WeatherBlob]) -> Vec<f64> {
     let ground = &grid.ground;
     let mut depths = vec![0.0; ground.shape.n_columns()];
@@ -40,7 +40,8 @@ pub fn of_blobs(grid: &Grid, blobs: &[WeatherBlob]) -> Vec<f64> {
     depths
 }
 
-/// The blobs' optical depth straight up at `side`² points of each column, in the middles of equal parts; a column's lie together.
+/// The blobs' optical depth straight up at `side`² points of each column, in the middles of equal parts; a column's lie
+/// together.
 pub fn at_points(grid: &Grid, blobs: &[WeatherBlob], side: usize) -> Vec<f64> {
     let ground = &grid.ground;
     let n_points = side * side;

@@ -15,7 +15,8 @@ pub const ICE: Phase = Phase { density_kg_m3: 917.0, radius_m: 30e-6 };
 pub const SNOW: Phase = Phase { density_kg_m3: 917.0, radius_m: 100e-6 };
 
 impl Phase {
-    /// β = 3/2 q ρ_d/(ρ_x r_x): of spheres much larger than the wavelength, whose cross section for extinction is twice their own.
+    /// β = 3/2 q ρ_d/(ρ_x r_x): of spheres much larger than the wavelength, whose cross section for extinction is twice
+    /// their own.
     pub fn extinction(self, ratio: f64, dry_density: f64) -> f64 {
         1.5 * ratio * dry_density / (self.density_kg_m3 * self.radius_m)
     }

@@ -1,4 +1,5 @@
-//! Where WRF's cells are: their sizes on the ground from the map factors, their bottoms and tops from staggered heights.
+//! Where WRF's cells are: their sizes on the ground from the map factors, their bottoms and tops from staggered
+//! heights.
 
 /// Cells along west–east, south–north and upward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,15 +31,15 @@ pub struct Ground {
     /// Sizes of the columns, m: the file's spacing over the map factor there.
     pub dx_m: Vec<f64>,
     pub dy_m: Vec<f64>,
-    /// Their centres, m east and m south of the domain's centre: sizes added up along rows and columns, so that every column
-    /// has its own size; rows are then shifted against each other by what map factors differ.
+    /// Their centres, m east and m south of the domain's centre: sizes added up along rows and columns, so that every
+    /// column has its own size; rows are then shifted against each other by what map factors differ.
     pub east_m: Vec<f64>,
     pub south_m: Vec<f64>,
 }
 
 impl Ground {
-    /// From the file's spacing and its map factors, a column each; a factor of 0 is that of an idealised file, which has no map,
-    /// if `is_idealised`.
+    /// From the file's spacing and its map factors, a column each; a factor of 0 is that of an idealised file, which
+    /// has no map, if `is_idealised`.
     ///
     /// # Errors
     /// What a spacing or a factor should be.

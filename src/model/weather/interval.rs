@@ -1,4 +1,5 @@
-//! The blobs of all moments between two steps, or of one step alone: laid out once, and then as cheap as a mean of two numbers a blob.
+//! The blobs of all moments between two steps, or of one step alone: laid out once, and then as cheap as a mean of two
+//! numbers a blob.
 
 use super::grid::Grid;
 use super::particles::{Layout, WeatherBlob};
@@ -39,7 +40,8 @@ impl Interval {
         self.from.is_empty()
     }
 
-    /// A blob `weight` of the way from the first step to the second: place, widths and mass are linear in it, so that the clouds' mass is.
+    /// A blob `weight` of the way from the first step to the second: place, widths and mass are linear in it, so that
+    /// the clouds' mass is.
     pub fn blob(&self, i: usize, weight: f64) -> WeatherBlob {
         let from = self.from[i];
         let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else { return from };

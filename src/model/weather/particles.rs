@@ -1,4 +1,5 @@
-//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's (docs/model.md §15).
+//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's
+//! (docs/model.md §15).
 
 use std::f64::consts::{PI, TAU};
 
@@ -7,23 +8,24 @@ use glam::DVec3;
 use super::grid::{Grid, Shape};
 use super::places::CellSeed;
 
-/// A column thinner than this optical depth, 0.1 % of the light, may be without blobs where more than one in [`AFFORDED`] would go to see
-/// that every column has one. Its mass goes to the next column that has.
+/// A column thinner than this optical depth, 0.1 % of the light, may be without blobs where more than one in
+/// [`AFFORDED`] would go to see that every column has one. Its mass goes to the next column that has.
 pub const THIN: f64 = 1e-3;
 pub const AFFORDED: usize = 10;
-/// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other, narrower ones leave gaps between
-/// themselves (docs/model.md §15 has the errors).
+/// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other, narrower ones leave gaps
+/// between themselves (docs/model.md §15 has the errors).
 pub const SPREAD: f64 = 0.45;
-/// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear columns, and what is missing at an
-/// edge between two clouds is small.
+/// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear columns, and what is
+/// missing at an edge between two clouds is small.
 pub const INSET: f64 = 0.5;
 /// σ of what is spread evenly over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
-/// σ_z over the thickness of a cell that several blobs share: their heights, over half of it, bring the rest of the variance, 1/16 + 1/48 = 1/12.
+/// σ_z over the thickness of a cell that several blobs share: their heights, over half of it, bring the rest of the
+/// variance, 1/16 + 1/48 = 1/12.
 const THICKNESS: f64 = 0.25;
 
-/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²). Metres: x east, y up from sea level, z south, from
-/// the middle of the domain.
+/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²). Metres: x east, y up from sea level, z
+/// south, from the middle of the domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeatherBlob {
     pub position: DVec3,
@@ -38,14 +40,6 @@ impl WeatherBlob {
     pub fn mass(&self) -> f64 {
         self.kappa * TAU * (2.0 * PI).sqrt() * self.sigma_xy * self.sigma_xy * self.sigma_z
     }
-
-    /// The blob where heights are drawn `factor` times as great: straight up it is as deep as before.
-    pub fn exaggerated(mut self, factor: f64) -> Self {
-        self.position.y *= factor;
-        self.sigma_z *= factor;
-        self.kappa /= factor;
-        self
-    }
 }
 
 /// Which blob of which cell.
@@ -55,8 +49,8 @@ pub struct Place {
     pub number: u32,
 }
 
-/// Which cells have how many blobs, and which cell's blobs hold a cell's mass. It stands for one step, or for all moments between two,
-/// over which blobs keep their places and only their extinction changes.
+/// Which cells have how many blobs, and which cell's blobs hold a cell's mass. It stands for one step, or for all
+/// moments between two, over which blobs keep their places and only their extinction changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     seed: u32,
@@ -68,7 +62,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// `n` blobs, by 1 − e^{−τ} of the cells; of several moments each cell has the greatest weight that it has in any of them.
+    /// `n` blobs, by 1 − e^{−τ} of the cells; of several moments each cell has the greatest weight that it has in any
+    /// of them.
     pub fn new(grid: &Grid, moments: &[&[f64]], n: usize, seed: u32) -> Self {
         let depths = greatest_depths(grid, moments);
         let n_blobs = allocate(grid, &depths, n);
@@ -94,8 +89,9 @@ impl Layout {
         &self.n_blobs
     }
 
-    /// The blobs that hold the extinction of `extinction`, m⁻¹ a cell, on `grid`: together ∫ β dV of it, and of each cell or of
-    /// those whose host it is its own. Linear in `extinction`.
+    /// The blobs that hold the extinction of `extinction`, m⁻¹ a cell, on `grid`: together ∫ β dV of it, and of each
+    /// cell or of those whose host it is its own. Linear in `extinction`, which has clouds only where one of the
+    /// moments has that the layout was made for.
     pub fn blobs(&self, grid: &Grid, extinction: &[f64]) -> Vec<WeatherBlob> {
         let n_columns = grid.shape().n_columns();
         let mut masses = vec![0.0; extinction.len()];
@@ -112,7 +108,8 @@ impl Layout {
         let (dx, dy, thickness) = (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
         let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(EVEN * dx.min(dy));
         let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
-        // Of centres and σ together the variance is the cell's: centres keep to its middle by as much as blobs are wide.
+        // Of centres and σ together the variance is the cell's: centres keep to its middle by as much as blobs are
+        // wide.
         let room = |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
         let inside = |size: f64| (room(size, sigma_xy) - 2.0 * INSET * sigma_xy).max(0.0);
         let room = DVec3::new(inside(dx), room(thickness, sigma_z), inside(dy));
@@ -130,8 +127,8 @@ fn greatest_depths(grid: &Grid, moments: &[&[f64]]) -> Vec<f64> {
     (0..grid.shape().n_cells()).map(|i| greatest(i) * grid.thickness_m(i)).collect()
 }
 
-/// How many blobs each cell has: those of its column are dealt by Σ 1 − e^{−τ}, and those of the column's cells by rounding the running
-/// sum, so that thin cells have one together.
+/// How many blobs each cell has: those of its column are dealt by Σ 1 − e^{−τ}, and those of the column's cells by
+/// rounding the running sum, so that thin cells have one together.
 fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
@@ -156,8 +153,9 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     n_blobs
 }
 
-/// `n` things dealt by weight. Where there are enough, one to each that is not thin, and of the rest whole ones by largest remainder (ties
-/// to the first); to the others by rounding the running sum in `order`, so that some neighbours have one together.
+/// `n` things dealt by weight. Where there are enough, one to each that is not thin, and of the rest whole ones by
+/// largest remainder (ties to the first); to the others by rounding the running sum in `order`, so that some neighbours
+/// have one together.
 fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize> {
     let mut dealt = vec![0; weights.len()];
     let total: f64 = weights.iter().sum();
@@ -170,9 +168,10 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
     let n_thick = depths.iter().filter(|depth| **depth >= least).count();
     let is_thick = |i: usize| n_thick <= n && depths[i] >= least;
     let (mut sum, mut n_thin) = (0.0, 0);
+    let room = if n_thick <= n { n - n_thick } else { n };
     for &i in order.iter().filter(|i| !is_thick(**i)) {
         sum += weights[i];
-        let n_until = (n as f64 * (sum / total) + 0.5) as usize;
+        let n_until = ((n as f64 * (sum / total) + 0.5) as usize).min(room);
         dealt[i] = n_until - n_thin;
         n_thin = n_until;
     }
@@ -183,8 +182,7 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
         }
         return dealt;
     }
-    let n_thin = n_thin.min(n - n_thick);
-    let left = n - n_thin - n_thick;
+    let left = room - n_thin;
     let thick: Vec<usize> = (0..weights.len()).filter(|&i| is_thick(i)).collect();
     // What each is due beyond the one that it has; where that is nothing for all, it goes by weight.
     let due: Vec<f64> = thick.iter().map(|&i| (n as f64 * weights[i] / total - 1.0).max(0.0)).collect();
@@ -207,8 +205,8 @@ fn there_and_back(shape: Shape) -> Vec<usize> {
     (0..shape.ny).flat_map(|j| (0..shape.nx).map(move |i| along(j, i))).collect()
 }
 
-/// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column; else of the next column that has
-/// some, row by row and there and back.
+/// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column; else of the next
+/// column that has some, row by row and there and back.
 fn hosts(grid: &Grid, depths: &[f64], n_blobs: &[u32]) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();

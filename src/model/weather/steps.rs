@@ -1,13 +1,13 @@
 //! The times of a file's steps: their text, their order, and between which of them a moment lies.
 
-/// Steps further apart are not interpolated, s: clouds on fixed seeds are off by half of their spread between steps 10 minutes
-/// apart, and by three quarters between steps 3 hours apart (docs/model.md §15).
+/// Steps further apart are not interpolated, s: clouds on fixed seeds are off by half of their spread between steps 10
+/// minutes apart, and by three quarters between steps 3 hours apart (docs/model.md §15).
 pub const LONGEST_INTERPOLATED_S: f64 = 600.0;
 
 const SECONDS_A_DAY: f64 = 86_400.0;
 
-/// Days from 1970-01-01 of a date of the Gregorian calendar, extended backwards: the algorithm of Hinnant, "chrono-compatible
-/// low-level date algorithms".
+/// Days from 1970-01-01 of a date of the Gregorian calendar, extended backwards: the algorithm of Hinnant,
+/// "chrono-compatible low-level date algorithms".
 pub fn days(year: i64, month: u32, day: u32) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let era = year.div_euclid(400);
@@ -82,8 +82,9 @@ pub struct Between {
     pub weight: f64,
 }
 
-/// Between which of the steps at `times_s`, rising, `t_s` lies: linear where they are at most [`LONGEST_INTERPOLATED_S`] apart,
-/// else the one before. The first step stands for all before it, the last for all after it. None of no steps or of NaN.
+/// Between which of the steps at `times_s`, rising, `t_s` lies: linear where they are at most
+/// [`LONGEST_INTERPOLATED_S`] apart, else the one before. The first step stands for all before it, the last for all
+/// after it. None of no steps or of NaN.
 pub fn between(times_s: &[f64], t_s: f64) -> Option<Between> {
     if times_s.is_empty() || t_s.is_nan() {
         return None;

@@ -1,6 +1,6 @@
-//! Where the sun stands: the low-precision formulas of the Astronomical Almanac as Michalsky, "The Astronomical Almanac's
-//! algorithm for approximate solar position (1950–2050)", Solar Energy 40 (1988), gives them: 0.01° in those years. No refraction
-//! and no parallax.
+//! Where the sun stands: the low-precision formulas of the Astronomical Almanac as Michalsky, "The Astronomical
+//! Almanac's algorithm for approximate solar position (1950–2050)", Solar Energy 40 (1988), gives them: 0.01° in those
+//! years. No refraction and no parallax.
 
 use glam::DVec3;
 
@@ -18,7 +18,8 @@ pub fn equatorial(time_s: f64) -> (f64, f64) {
     (ascension.rem_euclid(std::f64::consts::TAU), (obliquity.sin() * ecliptic.sin()).asin())
 }
 
-/// The unit vector toward the sun, x east, y up, z south, from `latitude` and `longitude` (radians, north and east positive).
+/// The unit vector toward the sun, x east, y up, z south, from `latitude` and `longitude` (radians, north and east
+/// positive).
 pub fn toward(time_s: f64, latitude: f64, longitude: f64) -> DVec3 {
     let (ascension, declination) = equatorial(time_s);
     let n = time_s / 86_400.0 - J2000_DAYS;

@@ -111,8 +111,7 @@ fn a_camera_that_looks_nowhere_or_runs_backward_is_refused() {
 }
 
 #[test]
-fn what_later_versions_bring_is_called_so_and_its_only_present_value_is_accepted() {
-    assert_table(include_str!("data/later-versions.txt"));
+fn defaults_may_be_written_out() {
     good("[draw]\nresolution = 1.0\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\ntexture = 'none'");
     good("[draw]\nresolution = 1");
 }

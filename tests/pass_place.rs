@@ -68,7 +68,7 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
     let (positions, sigmas): (Vec<DVec3>, Vec<f64>) = given.map(|g| (g.position, g.sigma)).unzip();
     let list = |c: &Cloud, g: &Group| match &c.source {
         CloudSource::Particles(list) => list.iter().map(|p| ParticleRecord::new(p, g)).collect::<Vec<_>>(),
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) => vec![],
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => vec![],
     };
     let particles = clouds.iter().zip(&groups).flat_map(|(c, g)| list(c, g)).collect();
     let i_group = groups.iter().zip(0..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();

@@ -66,6 +66,57 @@ fn particles_hold_the_files_extinction_whatever_the_exaggeration() {
     }
 }
 
+const SUPERCELL: &str = "
+[threads]
+simulate = 'cpu'
+[[cloud]]
+from = 'weather'
+file = 'scenes/weather/supercell.nc'
+particles = 3000
+speed = 60
+";
+
+/// The particles of a cloud that moves.
+fn at(scene: &Scene, time_s: f64) -> std::sync::Arc<Vec<Particle>> {
+    match &scene.clouds[0].source {
+        CloudSource::Moving(m) => m.mover.at(time_s).expect("a moment"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn between_steps_masses_run_straight_and_particles_stay_who_they_are() {
+    let scene = load(SUPERCELL).expect("a scene");
+    // Steps of 120 s at 60 s a second: at 0, 2 and 4 s, and for ever before and after.
+    let [first, second, third] = [0.0, 2.0, 4.0].map(|t| at(&scene, t));
+    assert!(first != second && second != third);
+    assert_eq!([at(&scene, -7.0), at(&scene, 1e6)], [first.clone(), third.clone()]);
+    for (t, a, b, share) in [(0.5, &first, &second, 0.25), (3.0, &second, &third, 0.5)] {
+        let now = at(&scene, t);
+        assert_eq!((now.len(), a.len()), (3000, 3000));
+        let expected = (1.0 - share) * mass(a) + share * mass(b);
+        assert!((mass(&now) / expected - 1.0).abs() < 1e-12, "{t}");
+        // Whose places differ by the levels' heights alone.
+        assert!(now.iter().zip(a.iter()).all(|(p, q)| (p.position - q.position).length() < 100.0));
+        assert_eq!(at(&scene, t), now, "again");
+    }
+    // A step's own extinction: as a scene has it that stands still, but for who has how much of it.
+    let still = load(&SUPERCELL.replace("speed = 60", "step = 1")).expect("a scene");
+    assert!((mass(&second) / mass(list(&still)) - 1.0).abs() < 1e-9);
+    // All keep to the bounds that light and culling go by.
+    let group = scene.groups()[0];
+    for t in [0.0, 1.3, 4.0] {
+        for p in at(&scene, t).iter() {
+            assert!((p.position - group.center).abs().cmple(group.half_extent + 1e-6).all(), "{p:?}");
+            assert!(
+                p.sigma <= group.sigma_max * (1.0 + 1e-12) && p.sigma * p.aspect <= group.sigma_y_max * (1.0 + 1e-12)
+            );
+        }
+    }
+    let what = load(&SUPERCELL.replace("'cpu'", "'gpu'")).unwrap_err().to_string();
+    assert!(what.contains("`cloud.0.speed`: expected 0 where threads.simulate is \"gpu\""), "{what}");
+}
+
 #[test]
 fn the_sun_stands_where_the_almanac_has_it() {
     // Greenwich at noon on the June solstice: 62.0° high (90° - 51.48° + 23.44°), within the equation of time's 2 minutes in the south.
@@ -103,13 +154,18 @@ fn what_is_wrong_with_a_file_is_told_with_its_place() {
 
 #[test]
 fn weather_is_drawn_and_benched_like_every_other_scene() {
-    for scene in ["scenes/katrina.toml", "scenes/supercell.toml"] {
+    for (scene, speed) in [("scenes/katrina.toml", "0"), ("scenes/supercell.toml", "30")] {
+        let speed = format!("cloud.0.speed={speed}");
+        let cpu = ["--set", "threads.simulate=\"cpu\"", "--set", &speed];
         let set = ["--size", "80x60", "--set", "cloud.0.particles=2000", "--set", "lighting.grid=24", "--validation"];
+        let set = [&set[..], &cpu].concat();
         let dir = tempfile::tempdir().expect("a folder");
         let out = dir.path().join("w.png");
         let output = run(&[&["render", scene, "-q", "-o", &out.to_string_lossy()], &set[..]].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let output = run(&[&["bench", scene, "-q", "--json", "--frames", "3", "--rounds", "2"], &set[..]].concat());
+        let output =
+            run(&[&["bench", scene, "-q", "--json", "--frames", "3", "--repeat", "2", "--warmup", "2"], &set[..]]
+                .concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
 }
@@ -128,6 +184,19 @@ fn the_device_draws_what_the_reference_has() {
     render("drawn.exr", &[]);
     let (rmse, max) = program::differ(&dir, "thin.exr", "drawn.exr");
     println!("RMSE {rmse:.1e}, greatest {max:.1e}");
+    // The same halfway between two steps.
+    let moving = ["--time", "1", "--set", "cloud.0.file=\"weather/supercell.nc\"", "--set", "cloud.0.exaggeration=1"];
+    let moving = [&moving[..], &["--set", "cloud.0.step=0", "--set", "cloud.0.speed=60"]].concat();
+    let moving =
+        [&moving[..], &["--set", "threads.simulate=\"cpu\"", "--set", "camera.position=[-30000,5000,55000]"]].concat();
+    let moving = [&moving[..], &["--set", "camera.target=[0,7000,0]"]].concat();
+    render("thin.exr", &[&["--reference", "thin"], &moving[..]].concat());
+    render("drawn.exr", &moving);
+    let (moved, _) = program::differ(&dir, "thin.exr", "drawn.exr");
+    println!("moving: RMSE {moved:.1e}");
+    assert!(moved < 1e-3, "{moved:e}");
+    render("still.exr", &[&moving[..], &["--set", "cloud.0.speed=0"]].concat());
+    assert!(program::differ(&dir, "still.exr", "drawn.exr").0 > 1e-3, "another time is another picture");
     // Normals of thin sheets are ill conditioned where the density has no direction: f32 turns some by more than elsewhere, and a
     // facet's light with them.
     assert!(rmse < 1e-3, "{rmse:e}");

@@ -207,7 +207,9 @@ fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
                     records.push(BoxRecord::new(b, &law, i_box, groups[records.len()].i_first));
                 }
             }
-            CloudSource::Particles(_) | CloudSource::Disc(_) => records.push(BoxRecord::given()),
+            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => {
+                records.push(BoxRecord::given())
+            }
         }
     }
     records

@@ -8,7 +8,7 @@ use tracing::info_span;
 
 use super::drawn::drawn;
 use super::exchange::is_glossy;
-use super::lives::{disc_records, discs, lived};
+use super::lives::{disc_records, lived, lives};
 use super::packet::{Extent, Packet};
 use super::tensor::{Shape, basis_of, is_edited, kind_of};
 use crate::error::{Error, Place, Result};
@@ -17,7 +17,7 @@ use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::{Group, heaviest_blob};
+use crate::model::cloud::{Group, heaviest_blob, mass};
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
@@ -120,7 +120,7 @@ impl Game {
         // What a shell has must not depend on where the camera looks.
         let culls = self.culls && self.scene.draw.impostors == Impostors::Off;
         let (drawn, n_drawn) = info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, culls));
-        let lived = self.lived(time_s);
+        let lived = self.lived(time_s)?;
         let placed = lived
             .as_ref()
             .or(self.rest.as_ref())
@@ -133,6 +133,7 @@ impl Game {
                 disc_records(&self.scene, &self.groups, time_s),
             ),
         };
+        let heaviest = self.heaviest(&grown, lived.as_ref());
         Ok(Packet {
             i_frame,
             time_s,
@@ -151,7 +152,7 @@ impl Game {
             regions: self.regions(time_s, setting.light_origin),
             lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
             grid: GridRecord::from(&setting.grid),
-            heaviest: heaviest_blob(&grown),
+            heaviest,
             radius: setting.radius,
             sort_bits: self.sort_bits(&grown, setting.radius),
             extents: self.extents(&grown, &origins),
@@ -160,9 +161,18 @@ impl Game {
     }
 
     /// Every particle relative to its group, where this thread moves them and some are of discs.
-    fn lived(&self, time_s: f64) -> Option<Vec<ParticleRecord>> {
-        let rest = self.rest.as_ref().filter(|_| discs(&self.scene).next().is_some())?;
-        Some(info_span!("live").in_scope(|| lived(&self.scene, &self.groups, rest, time_s)))
+    fn lived(&self, time_s: f64) -> Result<Option<Vec<ParticleRecord>>> {
+        let Some(rest) = self.rest.as_ref().filter(|_| lives(&self.scene)) else { return Ok(None) };
+        info_span!("live").in_scope(|| lived(&self.scene, &self.groups, rest, time_s)).map(Some)
+    }
+
+    /// Bounds every blob's mass: of those that somebody else moves as they are.
+    fn heaviest(&self, groups: &[Group], lived: Option<&Vec<ParticleRecord>>) -> f64 {
+        let mass_of = |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * f64::from(p.aspect);
+        let moved =
+            lived.filter(|_| self.scene.has_movers()).map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
+        let scale = groups.iter().map(|g| g.scale.powi(3)).fold(1.0, f64::max);
+        heaviest_blob(groups).max(scale * moved)
     }
 
     /// Of the sort's keys.

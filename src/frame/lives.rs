@@ -1,4 +1,5 @@
-//! The particles of discs, new in every frame: by the pass `live`, or by the game thread where it moves the particles.
+//! The particles of discs, new in every frame: by the pass `live`, or by the game thread where it moves the particles; and those that
+//! somebody else moves, by the game thread alone.
 
 use super::feed::{Feed, IN_FLIGHT};
 use super::packet::Packet;
@@ -19,9 +20,14 @@ pub fn discs(scene: &Scene) -> impl Iterator<Item = (usize, &Cloud, &Disc)> {
     })
 }
 
-/// Whether the game thread computes the particles of discs.
+/// Whether some particles are other ones in every frame.
+pub fn lives(scene: &Scene) -> bool {
+    discs(scene).next().is_some() || scene.has_movers()
+}
+
+/// Whether the game thread computes those.
 pub fn lives_on_host(scene: &Scene) -> bool {
-    scene.threads.simulate == Simulate::Cpu && discs(scene).next().is_some()
+    scene.threads.simulate == Simulate::Cpu && lives(scene)
 }
 
 /// A record a disc, at `time_s`.
@@ -33,9 +39,17 @@ pub fn disc_records(scene: &Scene, groups: &[Group], time_s: f64) -> Vec<DiscRec
     discs(scene).filter_map(of).collect()
 }
 
-/// All particles relative to their groups at `time_s`: those of discs computed, the others as they are in `rest`.
-pub fn lived(scene: &Scene, groups: &[Group], rest: &[ParticleRecord], time_s: f64) -> Vec<ParticleRecord> {
+/// All particles relative to their groups at `time_s`: those of discs computed, those that somebody else moves as they then are, the others
+/// as they are in `rest`.
+pub fn lived(scene: &Scene, groups: &[Group], rest: &[ParticleRecord], time_s: f64) -> Result<Vec<ParticleRecord>> {
     let mut lived = rest.to_vec();
+    for group in groups {
+        if let CloudSource::Moving(m) = &scene.clouds[group.i_cloud].source {
+            let (particles, first) = (m.mover.at(time_s)?, group.i_first as usize);
+            let records = &mut lived[first..first + group.n_particles as usize];
+            records.iter_mut().zip(particles.iter()).for_each(|(record, p)| *record = ParticleRecord::new(p, group));
+        }
+    }
     for (i, cloud, disc) in discs(scene) {
         let turn = disc.turn_at(time_s);
         for group in groups.iter().filter(|g| g.i_cloud == i) {
@@ -45,7 +59,7 @@ pub fn lived(scene: &Scene, groups: &[Group], rest: &[ParticleRecord], time_s: f
             }
         }
     }
-    lived
+    Ok(lived)
 }
 
 pub(super) enum Lives {
@@ -60,10 +74,10 @@ pub(super) enum Lives {
 }
 
 impl Lives {
-    /// None where the scene has no discs.
+    /// None where no particles are new in every frame.
     pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene) -> Result<Option<Lives>> {
         let counts: Vec<u32> = discs(scene).map(|(_, _, disc)| disc.n_particles).collect();
-        if counts.is_empty() {
+        if !lives(scene) {
             return Ok(None);
         }
         if lives_on_host(scene) {

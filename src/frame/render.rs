@@ -11,7 +11,7 @@ use super::drawing::Drawing;
 use super::exchange::{gathers_from_tree, is_glossy};
 use super::feed::IN_FLIGHT;
 use super::grouping::{Grouping, is_grouped};
-use super::lives::{Lives, discs};
+use super::lives::{Lives, lives};
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, pass, plan};
 use super::relay::Relay;
@@ -144,7 +144,7 @@ impl Renderer {
             settings,
             traits: Traits {
                 has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
-                has_discs: discs(scene).next().is_some(),
+                has_discs: lives(scene),
                 n_particles,
                 n_facets: scene.n_facets() as u32,
                 lit,

@@ -37,7 +37,7 @@ pub fn is_edited(scene: &Scene) -> bool {
 pub fn kind_of(scene: &Scene, i_region: usize) -> u32 {
     let Some(i_cloud) = i_region.checked_sub(scene.surfaces.len()) else { return REGION_SURFACE };
     match scene.clouds[i_cloud].source {
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) => REGION_CLOUD,
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => REGION_CLOUD,
         CloudSource::Particles(_) => REGION_COLORED,
     }
 }

@@ -118,6 +118,9 @@ pub fn saturated(format: FilmFormat) -> f64 {
 
 /// No blob of the scene has a greater optical depth at any time.
 fn tau_most(scene: &Scene) -> f64 {
+    if scene.has_movers() {
+        return f64::INFINITY;
+    }
     let of = |g: &Group| {
         let growth = scene.clouds[g.i_cloud].growth.to.max(1.0);
         // One particle stands for all of its group at most.

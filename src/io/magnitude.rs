@@ -88,6 +88,8 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
                 .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_widest()))
         }
         CloudSource::Disc(disc) => groups.first().and_then(|group| disc_beyond(disc, group)),
+        // Of a weather file whose numbers are those of air.
+        CloudSource::Moving(_) => None,
         CloudSource::Particles(list) => {
             let (i, heaviest) = list
                 .iter()
@@ -129,7 +131,9 @@ pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
 /// Of the blobs, or the boxes' greatest blobs, that have a size; infinite where none has.
 fn least_sigma(cloud: &Cloud) -> f64 {
     let sigmas: Vec<f64> = match &cloud.source {
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) => cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect(),
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => {
+            cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect()
+        }
         CloudSource::Particles(list) => list.iter().map(|p| p.sigma * p.aspect.min(1.0)).collect(),
     };
     sigmas.into_iter().filter(|sigma| *sigma > 0.0).fold(f64::INFINITY, f64::min)

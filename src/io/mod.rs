@@ -34,3 +34,4 @@ pub mod toml_override;
 pub mod toml_section;
 pub mod toml_tree;
 pub mod weather;
+mod weather_steps;

@@ -14,6 +14,7 @@ use super::scene_weather;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
 use super::weather::wrf::{self, WeatherFile};
+use super::weather_steps;
 use super::{box_file, magnitude, particle_file};
 use crate::error::{Error, Result};
 use crate::model::air::Air;
@@ -22,6 +23,7 @@ use crate::model::cloud::{Cloud, CloudSource, Facing};
 use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
+use crate::model::scene::Simulate;
 use crate::model::texture::{Choice, GREATEST_STRENGTH, Texture};
 
 /// The files that a scene names.
@@ -60,6 +62,7 @@ pub struct CloudReader<'a> {
     materials: &'a [Material],
     air: &'a Air,
     seed: Option<u32>,
+    simulate: Simulate,
     files: &'a dyn Files,
     /// Of every file read, in order.
     pub digests: Vec<[u8; 32]>,
@@ -75,7 +78,7 @@ macro_rules! with_cloud_keys {
 }
 
 const LIST_KEYS: &[&str] = with_cloud_keys!["from", "file"];
-const WEATHER_KEYS: &[&str] = with_cloud_keys!["from", "file", "step", "particles", "exaggeration"];
+const WEATHER_KEYS: &[&str] = with_cloud_keys!["from", "file", "step", "particles", "exaggeration", "speed"];
 const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_depth", "radius_scale"];
 
 #[derive(Clone, Copy)]
@@ -92,9 +95,10 @@ impl<'a> CloudReader<'a> {
         folder: &'a Path,
         (materials, air): (&'a [Material], &'a Air),
         seed: Option<u32>,
+        simulate: Simulate,
         files: &'a dyn Files,
     ) -> CloudReader<'a> {
-        CloudReader { folder, materials, air, seed, files, digests: Vec::new(), notes: Vec::new() }
+        CloudReader { folder, materials, air, seed, simulate, files, digests: Vec::new(), notes: Vec::new() }
     }
 
     /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
@@ -153,11 +157,15 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         SourceKind::Weather => {
             s.expect_keys(WEATHER_KEYS, &[])?;
             let file = reader.read_weather(s)?;
-            let keys = scene_weather::read_keys(s, &file)?;
+            let keys = scene_weather::read_keys(s, &file, reader.simulate)?;
             reader.notes.extend(scene_weather::notes(&file).into_iter().map(|note| format!("cloud {i_cloud}: {note}")));
-            let particles = scene_weather::particles(&file, &keys, reader.read_seed(s, i_cloud)?)?;
+            let seed = reader.read_seed(s, i_cloud)?;
+            let particles = scene_weather::particles(&file, &keys, seed)?;
             reader.digests.push(scene_weather::digest(&particles));
-            CloudSource::Particles(particles)
+            match keys.speed {
+                0.0 => CloudSource::Particles(particles),
+                speed => CloudSource::Moving(weather_steps::moving(file, keys, seed, speed)?),
+            }
         }
     };
     let is_disc = matches!(source, CloudSource::Disc(_));
@@ -241,7 +249,7 @@ pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
 fn boxes_of(cloud: &mut Cloud) -> &mut [CloudBox] {
     match &mut cloud.source {
         CloudSource::Boxes { boxes, .. } => boxes,
-        CloudSource::Particles(_) | CloudSource::Disc(_) => &mut [],
+        CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => &mut [],
     }
 }
 

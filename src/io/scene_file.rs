@@ -163,7 +163,8 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &dy
     let surfaces = scene_surfaces::read_surfaces(&mut root, &materials)?;
 
     let air = scene_air::read_air(&mut root)?;
-    let mut reader = CloudReader::new(path.parent().unwrap_or(Path::new("")), (&materials, &air), seed, files);
+    let mut reader =
+        CloudReader::new(path.parent().unwrap_or(Path::new("")), (&materials, &air), seed, threads.simulate, files);
     let mut clouds = Vec::new();
     let mut resolved_clouds = Vec::new();
     for (i, mut section) in root.sections("cloud")?.into_iter().enumerate() {

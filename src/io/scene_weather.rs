@@ -8,6 +8,7 @@ use super::toml_section::{Bounds, Section};
 use super::weather::wrf::{Clouds, WeatherFile};
 use crate::error::Result;
 use crate::model::cloud::{LEAST_ASPECT, Particle};
+use crate::model::scene::Simulate;
 use crate::model::weather::particles::{Layout, WeatherBlob};
 
 /// Most blobs of a file: some 48 bytes each.
@@ -20,15 +21,25 @@ pub struct WeatherKeys {
     pub n_particles: u32,
     /// Heights over those of the file.
     pub exaggeration: f64,
+    /// Seconds of the file in a second of the scene; 0: the step stands still.
+    pub speed: f64,
 }
 
+/// A day in a second.
+const GREATEST_SPEED: f64 = 86_400.0;
+
 /// The keys but `file`, which `file` is.
-pub fn read_keys(s: &mut Section, file: &WeatherFile) -> Result<WeatherKeys> {
+pub fn read_keys(s: &mut Section, file: &WeatherFile, simulate: Simulate) -> Result<WeatherKeys> {
     let last = u32::try_from(file.n_steps.saturating_sub(1)).unwrap_or(u32::MAX);
     let i_step = s.u32("step", 0, 0, last)? as usize;
     let n_particles = s.u32("particles", 20_000, 1, MOST_PARTICLES)?;
     let exaggeration = s.f64("exaggeration", 1.0, Bounds::Within(0.01, 100.0))?;
-    Ok(WeatherKeys { i_step, n_particles, exaggeration })
+    let speed = s.f64("speed", 0.0, Bounds::Within(-GREATEST_SPEED, GREATEST_SPEED))?;
+    if speed != 0.0 && simulate == Simulate::Gpu {
+        let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game thread that goes from step to step";
+        return Err(s.fault("speed", what));
+    }
+    Ok(WeatherKeys { i_step, n_particles, exaggeration, speed })
 }
 
 /// What whoever looks at the picture has to know of a cloud's file.
@@ -46,7 +57,7 @@ pub fn particles(file: &WeatherFile, keys: &WeatherKeys, seed: u32) -> Result<Ve
 }
 
 /// With heights so many times as great and κ as many times less: what a column takes of the light stays.
-fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
+pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     let shape = DVec3::new(1.0, exaggeration, 1.0);
     let aspect = (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT);
     // Where the aspect is cut the mass stays.

@@ -6,6 +6,7 @@ use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
 use super::disc::Disc;
 use super::growth::Growth;
 use super::gust::Gust;
+use super::moving::Moving;
 use super::texture::Texture;
 
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
@@ -60,6 +61,8 @@ pub enum CloudSource {
     Particles(Vec<Particle>),
     /// Particles that are born on a disc, live and are born anew.
     Disc(Disc),
+    /// Those of somebody else, anew at every time.
+    Moving(Moving),
 }
 
 /// One Gaussian blob of extinction, relative to its cloud's position.
@@ -95,6 +98,8 @@ pub struct Group {
     pub half_extent: DVec3,
     /// σ along x and z.
     pub sigma_max: f64,
+    /// And along y.
+    pub sigma_y_max: f64,
     pub sigma_mean: f64,
     /// Blobs' σ along y over those along x and z: the least, the mean and the greatest.
     pub aspects: [f64; 3],
@@ -127,6 +132,7 @@ impl Cloud {
             CloudSource::Particles(list) if list.is_empty() => DVec3::ZERO,
             CloudSource::Particles(list) => list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64,
             CloudSource::Disc(disc) => disc.center(self.wind),
+            CloudSource::Moving(m) => 0.5 * (m.low + m.high),
         }
     }
 
@@ -143,13 +149,14 @@ impl Cloud {
             CloudSource::Boxes { boxes, .. } => boxes.iter().map(|b| u64::from(b.n_particles)).sum(),
             CloudSource::Particles(list) => list.len() as u64,
             CloudSource::Disc(disc) => u64::from(disc.n_particles),
+            CloudSource::Moving(m) => u64::from(m.n_particles),
         }
     }
 
     pub fn n_groups(&self) -> u64 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => boxes.len() as u64,
-            CloudSource::Particles(_) | CloudSource::Disc(_) => 1,
+            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => 1,
         }
     }
 
@@ -173,6 +180,7 @@ impl Cloud {
                         scale: 1.0,
                         half_extent: 0.5 * b.extent,
                         sigma_max,
+                        sigma_y_max: sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
                         aspects: [1.0; 3],
                         kappa_max: kappa,
@@ -190,6 +198,9 @@ impl Cloud {
             CloudSource::Disc(disc) => {
                 vec![Group { cloud_center, facing_from, gust_reach, ..disc_group(disc, self.wind, i_cloud, i_first) }]
             }
+            CloudSource::Moving(m) => {
+                vec![Group { cloud_center, facing_from, gust_reach, ..moving_group(m, i_cloud, i_first) }]
+            }
         }
     }
 }
@@ -197,7 +208,7 @@ impl Cloud {
 impl Group {
     /// Bounds its blobs' σ along every axis.
     pub fn sigma_bounds(&self) -> DVec3 {
-        DVec3::new(self.sigma_max, self.sigma_max * self.aspects[2], self.sigma_max)
+        DVec3::new(self.sigma_max, self.sigma_y_max, self.sigma_max)
     }
 
     /// Bounds its blobs' σ in every direction.
@@ -221,6 +232,7 @@ impl Group {
             scale,
             half_extent: scale * self.half_extent,
             sigma_max: scale * self.sigma_max,
+            sigma_y_max: scale * self.sigma_y_max,
             sigma_mean: scale * self.sigma_mean,
             mass_max: scale.powi(3) * self.mass_max,
             ..*self
@@ -264,6 +276,7 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
+        sigma_y_max: list.iter().map(|p| p.sigma * p.aspect).fold(0.0, f64::max),
         sigma_mean: list.iter().map(|p| p.sigma).sum::<f64>() / list.len().max(1) as f64,
         aspects: aspects(list),
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
@@ -296,10 +309,31 @@ fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
         scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: disc.sigma_max(),
+        sigma_y_max: disc.sigma_max(),
         sigma_mean: disc.sigma_mean(),
         aspects: [1.0; 3],
         kappa_max: disc.kappa(),
         mass_max: disc.mass_max(),
+        gust_reach: 0.0,
+    }
+}
+
+fn moving_group(m: &Moving, i_cloud: usize, i_first: u32) -> Group {
+    Group {
+        i_cloud,
+        i_first,
+        n_particles: m.n_particles,
+        center: 0.5 * (m.low + m.high),
+        cloud_center: DVec3::ZERO,
+        facing_from: DVec3::ZERO,
+        scale: 1.0,
+        half_extent: 0.5 * (m.high - m.low),
+        sigma_max: m.sigma_max,
+        sigma_y_max: m.sigma_y_max,
+        sigma_mean: m.sigma_mean,
+        aspects: [LEAST_ASPECT, m.aspect_mean, 1.0 / LEAST_ASPECT],
+        kappa_max: m.kappa_max,
+        mass_max: m.mass_max,
         gust_reach: 0.0,
     }
 }

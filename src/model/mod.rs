@@ -18,6 +18,7 @@ pub mod least;
 pub mod light;
 pub mod material;
 pub mod moisture;
+pub mod moving;
 pub mod pairings;
 pub mod philox;
 pub mod resolution;

@@ -284,10 +284,17 @@ impl Scene {
         }
     }
 
+    /// Whether somebody else moves some particles.
+    pub fn has_movers(&self) -> bool {
+        self.clouds.iter().any(|c| matches!(c.source, CloudSource::Moving(_)))
+    }
+
     /// Whether some blobs are no balls.
     pub fn has_ellipsoids(&self) -> bool {
-        let of = |c: &Cloud| {
-            matches!(c.source, CloudSource::Particles(_)) && c.groups(0, 0).iter().any(Group::has_ellipsoids)
+        let of = |c: &Cloud| match c.source {
+            CloudSource::Particles(_) => c.groups(0, 0).iter().any(Group::has_ellipsoids),
+            CloudSource::Moving(_) => true,
+            CloudSource::Boxes { .. } | CloudSource::Disc(_) => false,
         };
         self.clouds.iter().any(of)
     }

@@ -171,12 +171,12 @@ pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
             let groups = cloud.groups(0, 0);
             list.iter().map(|p| given(p, groups.first())).collect()
         }
-        CloudSource::Disc(_) => super::live::cloud(cloud, 0.0),
+        CloudSource::Disc(_) | CloudSource::Moving(_) => super::live::cloud(cloud, 0.0),
     }
 }
 
 /// A particle of a list: nothing is drawn by lot, only its origin changes.
-fn given(p: &Particle, group: Option<&Group>) -> Generated {
+pub(super) fn given(p: &Particle, group: Option<&Group>) -> Generated {
     Generated {
         position: p.position - group.map_or(DVec3::ZERO, |g| g.center),
         radius: p.sigma / SIGMA_PER_RADIUS,

@@ -92,10 +92,19 @@ fn smoothstep(v: f64) -> f64 {
     }
 }
 
-/// All particles of a cloud in the order of its groups, at `time_s`, which is that of discs alone.
+/// All particles of a cloud in the order of its groups, at `time_s`, which is that of discs and of what is moved alone. What cannot be
+/// read has no particles: whoever asks has read it before.
 pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
-    let CloudSource::Disc(disc) = &cloud.source else { return generate::cloud(cloud) };
-    let center = cloud.groups(0, 0).first().map_or(DVec3::ZERO, |g| g.center);
+    let groups = cloud.groups(0, 0);
+    let disc = match &cloud.source {
+        CloudSource::Disc(disc) => disc,
+        CloudSource::Moving(m) => {
+            let particles = m.mover.at(time_s).unwrap_or_default();
+            return particles.iter().map(|p| generate::given(p, groups.first())).collect();
+        }
+        CloudSource::Boxes { .. } | CloudSource::Particles(_) => return generate::cloud(cloud),
+    };
+    let center = groups.first().map_or(DVec3::ZERO, |g| g.center);
     let of = |i| {
         let p = alive(disc, cloud.seed, cloud.wind, i, time_s);
         Generated {

@@ -58,6 +58,11 @@ impl Truth {
     pub fn unlit(scene: &Scene, time_s: f64) -> Result<Truth> {
         let groups = scene.groups();
         let setting = Setting::at(scene, &groups, time_s)?;
+        for cloud in &scene.clouds {
+            if let CloudSource::Moving(m) = &cloud.source {
+                m.mover.at(time_s)?;
+            }
+        }
         let alive = |c| reference::live::cloud(c, time_s);
         let generated: Vec<Generated> = scene.clouds.iter().flat_map(alive).collect();
         let offsets = reference::place::offsets(&groups, &scene.clouds, time_s, setting.light_origin);
@@ -216,7 +221,9 @@ fn facets_of(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_
 /// Every particle's own colour.
 pub fn colors(scene: &Scene) -> Vec<DVec3> {
     let of = |cloud: &crate::model::cloud::Cloud| match &cloud.source {
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) => vec![DVec3::ONE; cloud.n_particles() as usize],
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => {
+            vec![DVec3::ONE; cloud.n_particles() as usize]
+        }
         CloudSource::Particles(list) => list.iter().map(|p| p.color).collect(),
     };
     scene.clouds.iter().flat_map(of).collect()

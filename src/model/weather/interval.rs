@@ -22,14 +22,17 @@ pub struct Interval {
 impl Interval {
     /// A step that nothing is interpolated with.
     pub fn alone(step: Moment, n: usize, seed: u32) -> Self {
-        let layout = Layout::new(step.grid, &[step.extinction], n, seed);
-        Interval { from: layout.blobs(step.grid, step.extinction), to: None }
+        Interval::laid_out(&Layout::new(step.grid, &[step.extinction], n, seed), step, None)
     }
 
     /// From a step to the next one, on a grid of the same shape.
     pub fn between(a: Moment, b: Moment, n: usize, seed: u32) -> Self {
-        let layout = Layout::new(a.grid, &[a.extinction, b.extinction], n, seed);
-        Interval { from: layout.blobs(a.grid, a.extinction), to: Some(layout.blobs(b.grid, b.extinction)) }
+        Interval::laid_out(&Layout::new(a.grid, &[a.extinction, b.extinction], n, seed), a, Some(b))
+    }
+
+    /// The same by a layout that stands for more moments than these.
+    pub fn laid_out(layout: &Layout, a: Moment, b: Option<Moment>) -> Self {
+        Interval { from: layout.blobs(a.grid, a.extinction), to: b.map(|b| layout.blobs(b.grid, b.extinction)) }
     }
 
     pub fn len(&self) -> usize {

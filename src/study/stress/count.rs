@@ -76,6 +76,7 @@ fn group(n: u32) -> Group {
         scale: 1.0,
         half_extent: DVec3::ONE,
         sigma_max: 1.0,
+        sigma_y_max: 1.0,
         sigma_mean: 1.0,
         kappa_max: 1.0,
         mass_max: 1.0,

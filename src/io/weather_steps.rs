@@ -1,0 +1,167 @@
+//! A weather file's particles at any time: from step to step by straight lines where steps are near enough (docs/model.md §15 "Time").
+
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::DVec3;
+
+use super::scene_weather::{WeatherKeys, particle};
+use super::weather::wrf::{Step, WeatherFile};
+use crate::error::Result;
+use crate::model::cloud::{LEAST_ASPECT, Particle, mass};
+use crate::model::moving::{Mover, Moving};
+use crate::model::weather::interval::{Interval, Moment};
+use crate::model::weather::particles::Layout;
+use crate::model::weather::steps::{Between, LONGEST_INTERPOLATED_S, between};
+
+/// Files of so few steps are read whole, and one layout stands for all of them: nobody jumps from one interval to the next.
+const MOST_TOGETHER: usize = 8;
+/// Intervals that are kept: the one at hand, and the one before or after.
+const MOST_KEPT: usize = 2;
+/// How much farther than those that were looked at heights of other steps may reach.
+const MORE_HEIGHT: f64 = 1.05;
+
+pub struct Steps {
+    file: WeatherFile,
+    keys: WeatherKeys,
+    seed: u32,
+    times_s: Vec<f64>,
+    /// Seconds of the file in a second of the scene.
+    speed: f64,
+    /// Of all steps; None of a file of more than a few.
+    layout: Option<Layout>,
+    /// What all particles keep to.
+    low: DVec3,
+    high: DVec3,
+    sigma_max: f64,
+    sigma_y_max: f64,
+    /// By first and second step.
+    kept: Mutex<Vec<((usize, usize), Arc<Interval>)>>,
+}
+
+impl fmt::Debug for Steps {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Steps").field("keys", &self.keys).field("seed", &self.seed).field("speed", &self.speed).finish()
+    }
+}
+
+/// The particles of `file` from step `keys.i_step` at time 0 on, and their bounds.
+pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32, speed: f64) -> Result<Moving> {
+    let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
+    let wanted: Vec<usize> =
+        if file.n_steps <= MOST_TOGETHER { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
+    let steps: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
+    let all: Vec<&[f64]> = steps.iter().map(|s| s.extinction.as_slice()).collect();
+    let layout =
+        (file.n_steps <= MOST_TOGETHER).then(|| Layout::new(&steps[0].grid, &all, keys.n_particles as usize, seed));
+    let cells = |of: &dyn Fn(&Step, usize) -> f64, pick: fn(f64, f64) -> f64, from: f64| {
+        steps.iter().flat_map(|s| (0..s.grid.shape().n_cells()).map(|i| of(s, i))).fold(from, pick)
+    };
+    let stretch = keys.exaggeration;
+    let [bottom, top] = [
+        cells(&|s, i| s.grid.bottom_m(i), f64::min, f64::INFINITY),
+        cells(&|s, i| s.grid.top_m(i), f64::max, f64::NEG_INFINITY),
+    ];
+    let thickest = cells(&|s, i| s.grid.thickness_m(i), f64::max, 0.0);
+    let ground = &steps[0].grid.ground;
+    let edge = |middles: &[f64], sizes: &[f64], sign: f64| {
+        middles.iter().zip(sizes).map(|(m, size)| sign * m + 0.5 * size).fold(f64::NEG_INFINITY, f64::max) * sign
+    };
+    let more = (MORE_HEIGHT - 1.0) * (top - bottom);
+    let low = DVec3::new(
+        edge(&ground.east_m, &ground.dx_m, -1.0),
+        stretch * (bottom - more),
+        edge(&ground.south_m, &ground.dy_m, -1.0),
+    );
+    let high = DVec3::new(
+        edge(&ground.east_m, &ground.dx_m, 1.0),
+        stretch * (top + more),
+        edge(&ground.south_m, &ground.dy_m, 1.0),
+    );
+    let widest = ground.dx_m.iter().chain(&ground.dy_m).copied().fold(0.0, f64::max);
+    // A blob is no wider than what is spread evenly over its cell: 1/sqrt 12 of it.
+    let (sigma_max, sigma_y_max) = (widest / 12f64.sqrt(), MORE_HEIGHT * stretch * thickest / 12f64.sqrt());
+    let n_particles = keys.n_particles;
+    let kept = Mutex::new(vec![]);
+    let steps = Steps { file, keys, seed, times_s, speed, layout, low, high, sigma_max, sigma_y_max, kept };
+    let first = steps.at(0.0)?;
+    let mean = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).sum::<f64>() / first.len().max(1) as f64;
+    let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
+    Ok(Moving {
+        n_particles,
+        low,
+        high,
+        sigma_max,
+        sigma_y_max,
+        sigma_mean: mean(&|p| p.sigma),
+        aspect_mean: mean(&|p| p.aspect),
+        kappa_max: greatest(&|p| p.kappa),
+        mass_max: greatest(&|p| mass(p.kappa, p.sigma) * p.aspect),
+        mover: Arc::new(steps),
+    })
+}
+
+impl Mover for Steps {
+    fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
+        let file_s = self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.speed * time_s;
+        let at = between(&self.times_s, file_s).unwrap_or(Between { i: 0, j: 0, weight: 0.0 });
+        // An interval's first moment has the interval's layout, too.
+        let follows = at.i + 1 < self.times_s.len()
+            && self.times_s[at.i + 1] - self.times_s[at.i] <= LONGEST_INTERPOLATED_S
+            && file_s >= self.times_s[at.i];
+        let interval = self.of_steps(at.i, if follows { at.i + 1 } else { at.i })?;
+        let of = |i: usize| match i < interval.len() {
+            true => self.kept_to(particle(&interval.blob(i, at.weight), self.keys.exaggeration)),
+            false => self.nothing(),
+        };
+        Ok(Arc::new((0..self.keys.n_particles as usize).map(of).collect()))
+    }
+}
+
+impl Steps {
+    fn of_steps(&self, i: usize, j: usize) -> Result<Arc<Interval>> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, found)) = kept.iter().find(|(of, _)| *of == (i, j)) {
+            return Ok(found.clone());
+        }
+        let read = Arc::new(self.read(i, j)?);
+        kept.truncate(MOST_KEPT - 1);
+        kept.insert(0, ((i, j), read.clone()));
+        Ok(read)
+    }
+
+    fn read(&self, i: usize, j: usize) -> Result<Interval> {
+        let first = self.file.step(i)?;
+        let second = if i == j { None } else { Some(self.file.step(j)?) };
+        let (a, b) = (moment(&first), second.as_ref().map(moment));
+        let n = self.keys.n_particles as usize;
+        Ok(match (&self.layout, b) {
+            (Some(layout), b) => Interval::laid_out(layout, a, b),
+            (None, Some(b)) => Interval::between(a, b, n, self.seed),
+            (None, None) => Interval::alone(a, n, self.seed),
+        })
+    }
+
+    /// Within the bounds that the scene was told, with its mass.
+    fn kept_to(&self, p: Particle) -> Particle {
+        let sigma = p.sigma.min(self.sigma_max);
+        let aspect = p.aspect.min(self.sigma_y_max / sigma).max(LEAST_ASPECT);
+        let thinner = mass(p.kappa, p.sigma) * p.aspect / (mass(1.0, sigma) * aspect);
+        Particle { position: p.position.clamp(self.low, self.high), sigma, aspect, kappa: thinner, ..p }
+    }
+
+    /// In place of a particle that a layout does not need.
+    fn nothing(&self) -> Particle {
+        Particle {
+            position: 0.5 * (self.low + self.high),
+            sigma: self.sigma_max,
+            aspect: 1.0,
+            kappa: 0.0,
+            color: DVec3::ONE,
+        }
+    }
+}
+
+fn moment(step: &Step) -> Moment<'_> {
+    Moment { grid: &step.grid, extinction: &step.extinction }
+}

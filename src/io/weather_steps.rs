@@ -21,6 +21,9 @@ const MOST_KEPT: usize = 2;
 /// How much farther than those that were looked at heights of other steps may reach.
 const MORE_HEIGHT: f64 = 1.05;
 
+/// By first and second step.
+type Kept = ((usize, usize), Arc<Interval>);
+
 pub struct Steps {
     file: WeatherFile,
     keys: WeatherKeys,
@@ -35,8 +38,7 @@ pub struct Steps {
     high: DVec3,
     sigma_max: f64,
     sigma_y_max: f64,
-    /// By first and second step.
-    kept: Mutex<Vec<((usize, usize), Arc<Interval>)>>,
+    kept: Mutex<Vec<Kept>>,
 }
 
 impl fmt::Debug for Steps {
@@ -47,13 +49,17 @@ impl fmt::Debug for Steps {
 
 /// The particles of `file` from step `keys.i_step` at time 0 on, and their bounds.
 pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32, speed: f64) -> Result<Moving> {
+    moving_by(file, keys, seed, speed, MOST_TOGETHER)
+}
+
+fn moving_by(file: WeatherFile, keys: WeatherKeys, seed: u32, speed: f64, most_together: usize) -> Result<Moving> {
     let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
     let wanted: Vec<usize> =
-        if file.n_steps <= MOST_TOGETHER { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
+        if file.n_steps <= most_together { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
     let steps: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
     let all: Vec<&[f64]> = steps.iter().map(|s| s.extinction.as_slice()).collect();
     let layout =
-        (file.n_steps <= MOST_TOGETHER).then(|| Layout::new(&steps[0].grid, &all, keys.n_particles as usize, seed));
+        (file.n_steps <= most_together).then(|| Layout::new(&steps[0].grid, &all, keys.n_particles as usize, seed));
     let cells = |of: &dyn Fn(&Step, usize) -> f64, pick: fn(f64, f64) -> f64, from: f64| {
         steps.iter().flat_map(|s| (0..s.grid.shape().n_cells()).map(|i| of(s, i))).fold(from, pick)
     };
@@ -164,4 +170,39 @@ impl Steps {
 
 fn moment(step: &Step) -> Moment<'_> {
     Moment { grid: &step.grid, extinction: &step.extinction }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::io::weather::wrf;
+
+    #[test]
+    fn a_file_of_many_steps_is_laid_out_interval_by_interval() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
+        let keys = WeatherKeys { i_step: 0, n_particles: 2000, exaggeration: 2.0, speed: 60.0 };
+        let of = |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, keys.speed, most_together).unwrap();
+        let (many, few) = (of(0), of(MOST_TOGETHER));
+        let mass_of = |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
+        // Steps of 120 s: at 0, 2 and 4 s.
+        for t in [-1.0, 0.0, 0.7, 2.0, 3.1, 4.0, 9.0] {
+            let (a, b) = (many.mover.at(t).unwrap(), few.mover.at(t).unwrap());
+            assert_eq!((a.len(), b.len()), (2000, 2000));
+            assert!((mass_of(&a) / mass_of(&b) - 1.0).abs() < 1e-9, "{t}");
+            let within = |p: &Particle| p.position.cmpge(many.low).all() && p.position.cmple(many.high).all();
+            assert!(
+                a.iter().all(|p| within(p)
+                    && p.sigma <= many.sigma_max
+                    && p.sigma * p.aspect <= many.sigma_y_max * 1.000001)
+            );
+        }
+        // Within an interval particles stay who they are; from one to the next they may not.
+        let [a, b, c] = [0.0, 1.9, 2.0].map(|t| many.mover.at(t).unwrap());
+        let apart = |a: &[Particle], b: &[Particle]| {
+            a.iter().zip(b).map(|(p, q)| p.position.distance(q.position)).fold(0.0, f64::max)
+        };
+        assert!(apart(&a, &b) < 200.0 && apart(&b, &c) > 1000.0, "{} {}", apart(&a, &b), apart(&b, &c));
+    }
 }

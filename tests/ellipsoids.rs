@@ -108,10 +108,11 @@ fn decks_from_all_sides() {
                 let [values, truths, bounds] = drawn(&mut gpu, None, &picture, F32, way);
                 println!("{what}, {way:?}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
                 assert_within(what, &values, &truths, &bounds);
-                // The bound says something where most of the picture is.
+                // The bound says something where most of the picture is; it is made by the worst of all opacities, which the eye finds
+                // within a blob fifty times as wide as high.
                 let mut sorted = bounds.clone();
                 sorted.sort_by(f64::total_cmp);
-                assert!(sorted[sorted.len() / 2] < 1e-3, "{what}: {:e}", sorted[sorted.len() / 2]);
+                assert!(sorted[sorted.len() / 2] < 1e-2, "{what}: {:e}", sorted[sorted.len() / 2]);
                 assert!(truths.iter().any(|t| *t > 0.2));
             }
         }

@@ -301,5 +301,5 @@ fn a_grid_without_room_is_refused() {
         what = refused.expect_err("no room").to_string();
         Ok(())
     });
-    assert_eq!(what, format!("a density grid of {n_cells} cells, where there is room for {}", n_cells - 1));
+    assert_eq!(what, format!("limit: a density grid of {n_cells} cells, where there is room for {}", n_cells - 1));
 }

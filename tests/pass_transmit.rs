@@ -50,7 +50,8 @@ fn agree_at_every_step_size(case: Case) {
         println!("{what}: greatest error/bound {:.3}, bound {most:.1e}", greatest_ratio(&values, &truths, &bounds));
         assert_within(&what, &values, &truths, &bounds);
         // The bound itself says something, and so do the inputs: shade and light both occur.
-        assert!(most < 1e-3 && n_unsure == 0);
+        // (Of flat cells a single step through all of them lies in one, and the steeper the cell the more its place decides.)
+        assert!(most < if step > 10.0 { 1e-2 } else { 1e-3 } && n_unsure == 0);
         assert!(truths.contains(&1.0) && (step > 10.0 || truths.iter().any(|v| *v < 0.8)));
         assert_eq!(through, values, "nothing but the cloud is in the way");
     }
@@ -151,7 +152,7 @@ fn wrong_transmittance_is_noticed() {
     // What is wrong in the transmittance (0), and what in the clouds' part alone (1).
     for (k, file, from, to) in [
         (0, "transmit.comp", "(t0 + 0.5 * ds)", "t0"),
-        (0, "transmit.comp", "min(WEIGHT(push.step_length), length_total - t0)", "push.step_length"),
+        (0, "transmit.comp", "min(step_length, length_total - t0)", "step_length"),
         (0, "transmit.comp", "push.backward * TOTAL(tau)", "TOTAL(tau)"),
         (0, "transmit.comp", "k / push.n_lights", "k % push.n_facets"),
         (0, "transmit.comp", "leave = distance", "leave = 3.4e38"),

@@ -77,7 +77,7 @@ fn wrong_doubles_and_floats_in_their_place_are_noticed() {
         ("transmit.comp", "#define DEEP DOUBLE", "#define DEEP 0"),
         ("transmit.comp", "Way(d > 0.0 ? offset / d", "Way(d > 0.0 ? offset"),
         ("transmit.comp", "PLACE(light.position) - PLACE(p)", "PLACE(p) - PLACE(light.position)"),
-        ("include/density.glsl", "((x) / double(push.grid.cell))", "((x) * double(push.grid.cell))"),
+        ("include/density.glsl", "((x) / double(push.grid.cell) *", "((x) * double(push.grid.cell) *"),
     ] {
         let found = ratio(Some(&Gpu::wrong_compiler(file, from, to)), doubles);
         assert!(found > 1.0, "{from} as {to}: {found}");

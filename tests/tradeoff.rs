@@ -75,7 +75,8 @@ impl Subject for Law {
 }
 
 fn loaded(settings: &[Setting]) -> Result<Loaded> {
-    let overrides: Vec<String> = settings.iter().map(|s| format!("{}={}", s.key, s.value)).collect();
+    let mut overrides = vec!["draw.sort_bits=32".to_owned()];
+    overrides.extend(settings.iter().map(|s| format!("{}={}", s.key, s.value)));
     let loaded = load(Path::new("scenes/hello.toml"), &overrides, None)?;
     Ok(Loaded { scene: loaded.scene.into(), hash: loaded.hash })
 }

@@ -112,7 +112,8 @@ fn decks_from_all_sides() {
                 // within a blob fifty times as wide as high.
                 let mut sorted = bounds.clone();
                 sorted.sort_by(f64::total_cmp);
-                assert!(sorted[sorted.len() / 2] < 1e-2, "{what}: {:e}", sorted[sorted.len() / 2]);
+                let most = if what == "within" { 1e-2 } else { 1e-3 };
+                assert!(sorted[sorted.len() / 2] < most, "{what}: {:e}", sorted[sorted.len() / 2]);
                 assert!(truths.iter().any(|t| *t > 0.2));
             }
         }
@@ -127,10 +128,12 @@ fn among_ellipsoids_balls_are_what_they_are_by_themselves() {
     // A blob of no depth makes all be drawn as ellipsoids are.
     let among = balls.clone().blob(balls.at(0.0, 0.0, 9.0), 0.5, 0.0).shaped(0.5);
     for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false))] {
-        let [values, _, _] = drawn(&mut gpu, None, &among, F32, way);
+        let [values, _, own] = drawn(&mut gpu, None, &among, F32, way);
         let [alone, _, bounds] = drawn(&mut gpu, None, &balls, F32, way);
         assert!(values != vec![0.0; values.len()]);
-        assert_within("balls", &values, &alone, &bounds.iter().map(|b| 8.0 * b).collect::<Vec<_>>());
+        // One truth, and each within its bound of that.
+        let both: Vec<f64> = own.iter().zip(&bounds).map(|(a, b)| a + b).collect();
+        assert_within("balls", &values, &alone, &both);
     }
 }
 

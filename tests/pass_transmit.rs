@@ -50,8 +50,9 @@ fn agree_at_every_step_size(case: Case) {
         println!("{what}: greatest error/bound {:.3}, bound {most:.1e}", greatest_ratio(&values, &truths, &bounds));
         assert_within(&what, &values, &truths, &bounds);
         // The bound itself says something, and so do the inputs: shade and light both occur.
-        // (Of flat cells a single step through all of them lies in one, and the steeper the cell the more its place decides.)
-        assert!(most < if step > 10.0 { 1e-2 } else { 1e-3 } && n_unsure == 0);
+        // (Of flat cells a single step through all of them lies in one, and the flatter the cell the more its place decides.)
+        let flat_at_once = case.spec.aspect != 1.0 && step > 10.0;
+        assert!(most < if flat_at_once { 1e-2 } else { 1e-3 } && n_unsure == 0);
         assert!(truths.contains(&1.0) && (step > 10.0 || truths.iter().any(|v| *v < 0.8)));
         assert_eq!(through, values, "nothing but the cloud is in the way");
     }

@@ -160,11 +160,14 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             let keys = scene_weather::read_keys(s, &file, reader.simulate)?;
             reader.notes.extend(scene_weather::notes(&file).into_iter().map(|note| format!("cloud {i_cloud}: {note}")));
             let seed = reader.read_seed(s, i_cloud)?;
-            let particles = scene_weather::particles(&file, &keys, seed)?;
-            reader.digests.push(scene_weather::digest(&particles));
-            match keys.speed {
-                0.0 => CloudSource::Particles(particles),
-                speed => CloudSource::Moving(weather_steps::moving(file, keys, seed, speed)?),
+            if keys.speed != 0.0 {
+                // Whichever of its steps are asked for later.
+                reader.digests.push(file.digest()?);
+                CloudSource::Moving(weather_steps::moving(file, keys, seed)?)
+            } else {
+                let particles = scene_weather::particles(&file, &keys, seed)?;
+                reader.digests.push(scene_weather::digest(&particles));
+                CloudSource::Particles(particles)
             }
         }
     };

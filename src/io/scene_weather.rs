@@ -71,7 +71,7 @@ pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     }
 }
 
-/// What a scene's hash knows of a file: the particles that it gave.
+/// What a scene's hash knows of a file of which one step is drawn: the particles that it gave.
 pub fn digest(particles: &[Particle]) -> [u8; 32] {
     let mut hash = Sha256::new();
     for p in particles {

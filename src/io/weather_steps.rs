@@ -29,76 +29,41 @@ pub struct Steps {
     keys: WeatherKeys,
     seed: u32,
     times_s: Vec<f64>,
-    /// Seconds of the file in a second of the scene.
-    speed: f64,
     /// Of all steps; None of a file of more than a few.
     layout: Option<Layout>,
-    /// What all particles keep to.
-    low: DVec3,
-    high: DVec3,
-    sigma_max: f64,
-    sigma_y_max: f64,
+    bounds: Bounds,
     kept: Mutex<Vec<Kept>>,
 }
 
 impl fmt::Debug for Steps {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Steps").field("keys", &self.keys).field("seed", &self.seed).field("speed", &self.speed).finish()
+        f.debug_struct("Steps").field("keys", &self.keys).field("seed", &self.seed).finish()
     }
 }
 
 /// The particles of `file` from step `keys.i_step` at time 0 on, and their bounds.
-pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32, speed: f64) -> Result<Moving> {
-    moving_by(file, keys, seed, speed, MOST_TOGETHER)
+pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32) -> Result<Moving> {
+    moving_by(file, keys, seed, MOST_TOGETHER)
 }
 
-fn moving_by(file: WeatherFile, keys: WeatherKeys, seed: u32, speed: f64, most_together: usize) -> Result<Moving> {
+fn moving_by(file: WeatherFile, keys: WeatherKeys, seed: u32, most_together: usize) -> Result<Moving> {
     let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
-    let wanted: Vec<usize> =
-        if file.n_steps <= most_together { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
-    let steps: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
-    let all: Vec<&[f64]> = steps.iter().map(|s| s.extinction.as_slice()).collect();
-    let layout =
-        (file.n_steps <= most_together).then(|| Layout::new(&steps[0].grid, &all, keys.n_particles as usize, seed));
-    let cells = |of: &dyn Fn(&Step, usize) -> f64, pick: fn(f64, f64) -> f64, from: f64| {
-        steps.iter().flat_map(|s| (0..s.grid.shape().n_cells()).map(|i| of(s, i))).fold(from, pick)
-    };
-    let stretch = keys.exaggeration;
-    let [bottom, top] = [
-        cells(&|s, i| s.grid.bottom_m(i), f64::min, f64::INFINITY),
-        cells(&|s, i| s.grid.top_m(i), f64::max, f64::NEG_INFINITY),
-    ];
-    let thickest = cells(&|s, i| s.grid.thickness_m(i), f64::max, 0.0);
-    let ground = &steps[0].grid.ground;
-    let edge = |middles: &[f64], sizes: &[f64], sign: f64| {
-        middles.iter().zip(sizes).map(|(m, size)| sign * m + 0.5 * size).fold(f64::NEG_INFINITY, f64::max) * sign
-    };
-    let more = (MORE_HEIGHT - 1.0) * (top - bottom);
-    let low = DVec3::new(
-        edge(&ground.east_m, &ground.dx_m, -1.0),
-        stretch * (bottom - more),
-        edge(&ground.south_m, &ground.dy_m, -1.0),
-    );
-    let high = DVec3::new(
-        edge(&ground.east_m, &ground.dx_m, 1.0),
-        stretch * (top + more),
-        edge(&ground.south_m, &ground.dy_m, 1.0),
-    );
-    let widest = ground.dx_m.iter().chain(&ground.dy_m).copied().fold(0.0, f64::max);
-    // A blob is no wider than what is spread evenly over its cell: 1/sqrt 12 of it.
-    let (sigma_max, sigma_y_max) = (widest / 12f64.sqrt(), MORE_HEIGHT * stretch * thickest / 12f64.sqrt());
-    let n_particles = keys.n_particles;
-    let kept = Mutex::new(vec![]);
-    let steps = Steps { file, keys, seed, times_s, speed, layout, low, high, sigma_max, sigma_y_max, kept };
+    let is_small = file.n_steps <= most_together;
+    let wanted = if is_small { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
+    let read: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
+    let all: Vec<&[f64]> = read.iter().map(|s| s.extinction.as_slice()).collect();
+    let layout = is_small.then(|| Layout::new(&read[0].grid, &all, keys.n_particles as usize, seed));
+    let (bounds, kept) = (Bounds::of(&read, keys.exaggeration), Mutex::new(vec![]));
+    let steps = Steps { file, keys, seed, times_s, layout, bounds, kept };
     let first = steps.at(0.0)?;
     let mean = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).sum::<f64>() / first.len().max(1) as f64;
     let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
     Ok(Moving {
-        n_particles,
-        low,
-        high,
-        sigma_max,
-        sigma_y_max,
+        n_particles: keys.n_particles,
+        low: bounds.low,
+        high: bounds.high,
+        sigma_max: bounds.sigma,
+        sigma_y_max: bounds.sigma_y,
         sigma_mean: mean(&|p| p.sigma),
         aspect_mean: mean(&|p| p.aspect),
         kappa_max: greatest(&|p| p.kappa),
@@ -107,9 +72,48 @@ fn moving_by(file: WeatherFile, keys: WeatherKeys, seed: u32, speed: f64, most_t
     })
 }
 
+/// What all particles keep to at all times.
+#[derive(Debug, Clone, Copy)]
+struct Bounds {
+    low: DVec3,
+    high: DVec3,
+    sigma: f64,
+    sigma_y: f64,
+}
+
+impl Bounds {
+    /// Of what was looked at, and some more height for what was not; heights `stretch` times as great.
+    fn of(steps: &[Step], stretch: f64) -> Bounds {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (mut widest, mut thickest) = (0f64, 0f64);
+        for grid in steps.iter().map(|s| &s.grid) {
+            let (ground, n_columns) = (&grid.ground, grid.shape().n_columns());
+            for i in 0..grid.shape().n_cells() {
+                let k = i % n_columns;
+                let (x, z) = (ground.east_m[k], ground.south_m[k]);
+                let half = 0.5 * DVec3::new(ground.dx_m[k], 0.0, ground.dy_m[k]);
+                low = low.min(DVec3::new(x, grid.bottom_m(i), z) - half);
+                high = high.max(DVec3::new(x, grid.top_m(i), z) + half);
+                widest = widest.max(2.0 * half.max_element());
+                thickest = thickest.max(grid.thickness_m(i));
+            }
+        }
+        let more = DVec3::Y * (MORE_HEIGHT - 1.0) * (high.y - low.y);
+        let shape = DVec3::new(1.0, stretch, 1.0);
+        // A blob is no wider than what is spread evenly over its cell: 1/sqrt 12 of it.
+        let even = |size: f64| size / 12f64.sqrt();
+        Bounds {
+            low: shape * (low - more),
+            high: shape * (high + more),
+            sigma: even(widest),
+            sigma_y: even(MORE_HEIGHT * stretch * thickest),
+        }
+    }
+}
+
 impl Mover for Steps {
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
-        let file_s = self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.speed * time_s;
+        let file_s = self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.keys.speed * time_s;
         let at = between(&self.times_s, file_s).unwrap_or(Between { i: 0, j: 0, weight: 0.0 });
         // An interval's first moment has the interval's layout, too.
         let follows = at.i + 1 < self.times_s.len()
@@ -150,17 +154,17 @@ impl Steps {
 
     /// Within the bounds that the scene was told, with its mass.
     fn kept_to(&self, p: Particle) -> Particle {
-        let sigma = p.sigma.min(self.sigma_max);
-        let aspect = p.aspect.min(self.sigma_y_max / sigma).max(LEAST_ASPECT);
+        let sigma = p.sigma.min(self.bounds.sigma);
+        let aspect = p.aspect.min(self.bounds.sigma_y / sigma).max(LEAST_ASPECT);
         let thinner = mass(p.kappa, p.sigma) * p.aspect / (mass(1.0, sigma) * aspect);
-        Particle { position: p.position.clamp(self.low, self.high), sigma, aspect, kappa: thinner, ..p }
+        Particle { position: p.position.clamp(self.bounds.low, self.bounds.high), sigma, aspect, kappa: thinner, ..p }
     }
 
     /// In place of a particle that a layout does not need.
     fn nothing(&self) -> Particle {
         Particle {
-            position: 0.5 * (self.low + self.high),
-            sigma: self.sigma_max,
+            position: 0.5 * (self.bounds.low + self.bounds.high),
+            sigma: self.bounds.sigma,
             aspect: 1.0,
             kappa: 0.0,
             color: DVec3::ONE,
@@ -183,7 +187,7 @@ mod tests {
     fn a_file_of_many_steps_is_laid_out_interval_by_interval() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
         let keys = WeatherKeys { i_step: 0, n_particles: 2000, exaggeration: 2.0, speed: 60.0 };
-        let of = |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, keys.speed, most_together).unwrap();
+        let of = |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, most_together).unwrap();
         let (many, few) = (of(0), of(MOST_TOGETHER));
         let mass_of = |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
         // Steps of 120 s: at 0, 2 and 4 s.

@@ -1,4 +1,4 @@
-//! grid: the blobs' extinction on cubic cells.
+//! grid: the blobs' extinction on cells, cubes where blobs are balls.
 //!
 //! In: placed particles, their κ. Out: density (extinction per unit length), cell (x, y, z) at x + n_x (y + n_y z).
 //! Law: mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a weight's 2.5e-6 (erf's formula 3e-7,

@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use sha2::{Digest, Sha256};
+
 use super::container::{Container, number, text};
 use super::netcdf;
 use super::wrf_clock;
@@ -273,6 +275,17 @@ impl WeatherFile {
     /// The text of a global attribute.
     pub fn text(&self, name: &str) -> Option<&str> {
         text(self.container.attributes(), name)
+    }
+
+    /// SHA-256 of the whole file.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub fn digest(&self) -> Result<[u8; 32]> {
+        let lost = |e: std::io::Error| Error::Io { path: self.path.clone(), what: e.to_string() };
+        let (mut from, mut hash) = (std::fs::File::open(&self.path).map_err(lost)?, Sha256::new());
+        std::io::copy(&mut from, &mut hash).map_err(lost)?;
+        Ok(hash.finalize().into())
     }
 
     /// Reads a step; the others are not touched.

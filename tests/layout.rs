@@ -13,7 +13,9 @@ use nimbus::gpu::shader::Optimize;
 use nimbus::gpu::{Buffer, Compiler, Place};
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::disc::DiscRecord;
-use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
+use nimbus::layout::facet::{
+    FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE, REGION_TERRAIN,
+};
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
 use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
 use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
@@ -25,7 +27,7 @@ use nimbus::passes::{
     self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place, second, sort,
     sprites,
 };
-use nimbus::passes::{surfaces, texture, tiles, transmit, upsample};
+use nimbus::passes::{surfaces, terrain, texture, tiles, transmit, upsample};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -60,7 +62,7 @@ const RECORDS: [Record; 25] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 44] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 47] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -74,6 +76,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 44] = [
         &[R("Placed"), R("Particle"), B(4), R("Group"), F, B(4), R("Run"), R("Facet"), B(4)],
     ),
     ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, &[T, B(4), R("Facet")]),
+    ("facets_terrain.comp", facets::TerrainPush::FIELDS, &[T, R("Facet"), R("Facet")]),
     (
         "second_sources.comp",
         second::SourcesPush::FIELDS,
@@ -136,6 +139,8 @@ const INTERFACES: [(&str, &[Field], &[Element]); 44] = [
     ),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
+    ("terrain.frag", terrain::Push::FIELDS, &[]),
+    ("terrain.vert", terrain::Push::FIELDS, &[R("Region"), R("Facet"), R("Lit")]),
     ("texture_pack.comp", texture::PackPush::FIELDS, &[F, B(16)]),
     ("texture_transform.comp", texture::TransformPush::FIELDS, &[B(8)]),
     ("tiles.comp", tiles::Push::FIELDS, &[T, B(8), R("Round"), B(16), B(16), B(4)]),
@@ -363,6 +368,7 @@ fn shared_constants_have_one_value() {
         ("include/records.glsl", "REGION_SURFACE", f64::from(REGION_SURFACE)),
         ("include/records.glsl", "REGION_CLOUD", f64::from(REGION_CLOUD)),
         ("include/records.glsl", "REGION_COLORED", f64::from(REGION_COLORED)),
+        ("include/records.glsl", "REGION_TERRAIN", f64::from(REGION_TERRAIN)),
         ("include/records.glsl", "NO_LOBE", f64::from(NO_LOBE)),
         ("include/records.glsl", "NO_PARTICLE", f64::from(nimbus::layout::particle::NO_PARTICLE)),
         ("include/texture.glsl", "TEXTURE_STREAM", f64::from(0x7465_7874u32)),

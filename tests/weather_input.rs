@@ -28,7 +28,9 @@ fn said_of(bytes: &[u8]) -> String {
     fs::write(&path, bytes).expect("written");
     let error = match wrf::open(&path) {
         Err(error) => error,
-        Ok(file) => (0..file.n_steps).find_map(|i| file.step(i).err()).expect("an error"),
+        Ok(file) => {
+            (0..file.n_steps).find_map(|i| file.step(i).err().or_else(|| file.terrain(i).err())).expect("an error")
+        }
     };
     assert_eq!(error.exit_code(), 2, "{error}");
     let said = error.to_string();

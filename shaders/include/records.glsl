@@ -40,4 +40,5 @@ const uint LIGHT_POINT = 2;
 const uint REGION_SURFACE = 0;
 const uint REGION_CLOUD = 1;
 const uint REGION_COLORED = 2;
+const uint REGION_TERRAIN = 3;
 const uint NO_LOBE = 0xFFFFFFFFu;

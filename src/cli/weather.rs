@@ -89,6 +89,8 @@ struct StepRow {
     sun_elevation_deg: Option<f64>,
     sun_azimuth_deg: Option<f64>,
     clouds: CloudRow,
+    /// Least and greatest height of the ground; none where the file does not say.
+    ground_m: Option<[f64; 2]>,
     /// Mixing ratios below 0, and those that are NaN or fill values.
     negative: u64,
     missing: u64,
@@ -171,9 +173,14 @@ fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
         sun_elevation_deg: toward.map(|d| d.y.asin().to_degrees()),
         sun_azimuth_deg: toward.map(|d| d.x.atan2(-d.z).to_degrees().rem_euclid(360.0)),
         clouds: statistics::of(&step.grid, &step.extinction).into(),
+        ground_m: file.terrain(i_step)?.map(|(_, heights_m)| extent(&heights_m)),
         negative: step.oddities.n_negative,
         missing: step.oddities.n_missing,
     })
+}
+
+fn extent(numbers: &[f64]) -> [f64; 2] {
+    [numbers.iter().copied().fold(f64::INFINITY, f64::min), numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
 }
 
 fn describe(found: &Found, quiet: bool) -> String {
@@ -214,6 +221,7 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
         "opacity",
         "base m",
         "top m",
+        "ground m",
         "odd",
     ];
     let mut table = vec![header.map(str::to_owned).to_vec()];
@@ -236,6 +244,7 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
             format!("{:.4}", c.mean_opacity),
             or_none(c.base_m.map(|m| format!("{m:.0}"))),
             or_none(c.top_m.map(|m| format!("{m:.0}"))),
+            or_none(r.ground_m.map(|[least, greatest]| format!("{least:.0} to {greatest:.0}"))),
             odd,
         ]);
     }

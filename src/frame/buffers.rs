@@ -10,7 +10,6 @@ use crate::layout::particle::{BoxLaw, BoxRecord, DrawnRecord, GroupRecord, ModeR
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
-use crate::model::surface::Surface;
 use crate::passes::texture::POOL_TEXELS;
 
 use super::culling::culls;
@@ -43,6 +42,8 @@ pub struct Buffers {
     pub lit: Buffer,
     /// Region of each facet of a surface.
     pub i_region: Buffer,
+    /// The ground's facets, relative to their origins.
+    pub ground: Buffer,
     /// Lobes by material, then the basis' vectors, N_NODES numbers each.
     pub table: Feed,
     /// Facet of each particle, where facets stand for several.
@@ -116,6 +117,7 @@ impl Buffers {
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
+        let n_ground = scene.n_solid_facets() - scene.n_surface_facets();
         let (n_textured, n_texels) = if scene.is_textured() { (n_groups, POOL_TEXELS) } else { (0, 0) };
         let n_named = if is_grouped(scene) { n } else { 0 };
         let n_through = if has_second(scene) { n_facets * n_lights } else { 0 };
@@ -140,6 +142,7 @@ impl Buffers {
             lights: Feed::new::<LightRecord>(device, "transmit.lights", n_lights)?,
             transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
             i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
+            ground: Buffer::new::<FacetRecord>(device, "terrain.ground", n_ground, Place::Device)?,
             table: Feed::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64)?,
             through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
             lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
@@ -158,6 +161,7 @@ impl Buffers {
         let surfaces = scene.surfaces.iter().zip(0u32..);
         let i_region: Vec<u32> = surfaces.flat_map(|(s, i)| std::iter::repeat_n(i, s.n_facets() as usize)).collect();
         upload(device, commands, &i_region, &self.i_region)?;
+        upload(device, commands, &ground_records(scene), &self.ground)?;
         upload(device, commands, &box_records(scene, groups), &self.boxes)?;
         upload(device, commands, &i_group, &self.i_group)?;
         if scene.is_textured() {
@@ -186,13 +190,20 @@ pub fn has_second(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::TwoReflection
 }
 
-/// Surfaces that nothing lights show their materials' K_d, as particles show their colours.
+/// Surfaces and ground that nothing lights show their materials' K_d, as particles show their colours.
 fn unlit(scene: &Scene) -> Vec<LitRecord> {
-    let of = |s: &Surface| {
-        let first = scene.materials[s.i_material].at(scene.time.start_s).kd.as_vec3().to_array();
-        std::iter::repeat_n(LitRecord { first, ..LitRecord::default() }, s.n_facets() as usize)
+    let of = |(i_material, n_facets): (usize, u64)| {
+        let first = scene.materials[i_material].at(scene.time.start_s).kd.as_vec3().to_array();
+        std::iter::repeat_n(LitRecord { first, ..LitRecord::default() }, n_facets as usize)
     };
-    scene.surfaces.iter().flat_map(of).collect()
+    let surfaces = scene.surfaces.iter().map(|s| (s.i_material, s.n_facets()));
+    surfaces.chain(scene.terrains.iter().map(|t| (t.i_material, t.n_facets()))).flat_map(of).collect()
+}
+
+/// The facets of all grounds.
+fn ground_records(scene: &Scene) -> Vec<FacetRecord> {
+    let grounds = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
+    grounds.flat_map(|(t, i_region)| t.facets().map(move |f| FacetRecord::terrain(&f, i_region))).collect()
 }
 
 /// A record a group, in order.

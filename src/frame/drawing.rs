@@ -1,4 +1,4 @@
-//! What draws a frame's picture, and into what: surfaces first, over them the blobs, in one of two ways.
+//! What draws a frame's picture, and into what: surfaces and ground first, over them the blobs, in one of two ways.
 
 use super::buffers::Buffers;
 use super::chunks::{self, Chunks};
@@ -6,6 +6,7 @@ use super::feed::IN_FLIGHT;
 use super::impostors::Impostors;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, pass};
+use super::scenery::Scenery;
 use super::settings::Settings;
 use super::shrunk::Shrunk;
 use super::tiling::Tiling;
@@ -16,7 +17,6 @@ use crate::layout::frame::CameraRecord;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks as ChunkMode, DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
 use crate::passes::sprites::Sprites;
-use crate::passes::surfaces::Surfaces;
 use crate::passes::tiles::View;
 
 use super::grouping::is_grouped;
@@ -31,8 +31,8 @@ pub(super) struct Drawing {
     /// A frame that changes the picture draws into the one that the frame before has not. None where nothing is drawn by
     /// the graphics pipeline.
     targets: Option<[Image; IN_FLIGHT]>,
-    /// What draws the surfaces, and their depth; none where there are none.
-    scenery: Option<(Surfaces, Image)>,
+    /// What hides the blobs; none where nothing does.
+    scenery: Option<Scenery>,
     /// What is far, shown from a picture of it.
     impostors: Option<Impostors>,
     /// The smaller picture that the blobs are drawn into; None where it is the full one.
@@ -72,7 +72,7 @@ impl Drawing {
         let lit = scene.lighting.mode != LightingMode::None;
         let has_blobs = scene.draw.resolution == Resolution::Full;
         let has_tiles = has_blobs && path == DrawPath::Tiles;
-        let behind = !scene.surfaces.is_empty();
+        let behind = scene.has_solids();
         let counted = scene.draw.count.is_some();
         let [textured, threshold, ellipsoids] =
             [scene.is_textured(), scene.draw.threshold.is_some(), scene.has_ellipsoids()];
@@ -91,10 +91,7 @@ impl Drawing {
             Chunks::new(device, compiler, size, format, n, [lit, grouped, counted, textured, threshold, ellipsoids])
         };
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
-        let scenery = || -> Result<(Surfaces, Image)> {
-            let depth = Image::depth(device, "surfaces.depth", film.width, film.height)?;
-            Ok((Surfaces::new(device, compiler, format, depth_only)?, depth))
-        };
+        let scenery = || Scenery::new(device, compiler, scene, format, depth_only);
         Ok(Drawing {
             sprites: (has_sprites && n_chunks == 0)
                 .then(|| Sprites::new(device, compiler, format, lit, variant))
@@ -148,7 +145,9 @@ impl Drawing {
         s: &Settings,
     ) -> Result<()> {
         let path = if plan.runs(Pass::Tiles) { DrawPath::Tiles } else { DrawPath::Sprites };
-        pass(rec, plan, Pass::Surfaces, |rec| self.record_behind(rec, b, packet, s))?;
+        for solids in [Pass::Surfaces, Pass::Terrain] {
+            pass(rec, plan, solids, |rec| self.record_behind(rec, solids, b, packet, s))?;
+        }
         pass(rec, plan, Pass::Impostors, |rec| self.record_impostors(rec, path, b, packet, s))?;
         for (of, path) in [(Pass::Sprites, DrawPath::Sprites), (Pass::Tiles, DrawPath::Tiles)] {
             pass(rec, plan, of, |rec| self.record_over(rec, path, b, packet, s))?;
@@ -165,7 +164,7 @@ impl Drawing {
         s: &Settings,
     ) -> Result<()> {
         let (Some(impostors), Some(targets)) = (&mut self.impostors, &mut self.targets) else { return Ok(()) };
-        let depth = self.scenery.as_mut().map(|(_, depth)| depth);
+        let depth = self.scenery.as_mut().map(|scenery| &mut scenery.depth);
         let target = Target { color: &mut targets[self.i_picture], depth };
         impostors.record(rec, path, b, target, packet, s)
     }
@@ -179,16 +178,25 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        self.record_behind(rec, b, packet, s)?;
+        for solids in [Pass::Surfaces, Pass::Terrain] {
+            self.record_behind(rec, solids, b, packet, s)?;
+        }
         self.record_over(rec, path, b, packet, s)?;
         self.record_upsample(rec, path)
     }
 
-    /// The surfaces, and what the blobs' picture needs of them.
-    fn record_behind(&mut self, rec: &mut Recorder<'_>, b: &Buffers, packet: &Packet, s: &Settings) -> Result<()> {
-        self.record_surfaces(rec, b, &packet.camera, s)?;
+    /// What one of the passes draws that hide blobs, and what the blobs' picture needs of it.
+    fn record_behind(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        solids: Pass,
+        b: &Buffers,
+        packet: &Packet,
+        s: &Settings,
+    ) -> Result<()> {
+        self.record_solids(rec, solids, b, &packet.camera, s)?;
         match &mut self.shrunk {
-            Some(shrunk) => shrunk.record_surfaces(rec, b, packet, s),
+            Some(shrunk) => shrunk.record_solids(rec, solids, b, packet, s),
             None => Ok(()),
         }
     }
@@ -209,7 +217,7 @@ impl Drawing {
     }
 
     fn record_upsample(&mut self, rec: &mut Recorder<'_>, path: DrawPath) -> Result<()> {
-        let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
+        let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|scenery| &mut scenery.depth));
         let under = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match &mut self.shrunk {
             Some(shrunk) => shrunk.record(rec, path, i, under.filter(|under| under.depth.is_some())),
@@ -217,16 +225,16 @@ impl Drawing {
         }
     }
 
-    pub fn record_surfaces(
+    pub fn record_solids(
         &mut self,
         rec: &mut Recorder<'_>,
+        solids: Pass,
         b: &Buffers,
         camera: &CameraRecord,
         s: &Settings,
     ) -> Result<()> {
-        let (Some((surfaces, depth)), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(()) };
-        let target = Target { color: &mut targets[self.i_picture], depth: Some(depth) };
-        surfaces.record(rec, [&b.regions.buffer, &b.lit], target, camera, s.n_surfaces)
+        let (Some(scenery), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(()) };
+        scenery.record(rec, solids, b, &mut targets[self.i_picture], camera, s)
     }
 
     /// Draws the first `n_drawn` of what is sorted into the picture itself, over the shell where there is one.
@@ -238,10 +246,10 @@ impl Drawing {
         (n_drawn, camera): (u32, &CameraRecord),
         s: &Settings,
     ) -> Result<()> {
-        let counts = (b.amount(n_drawn), s.n_surface_facets);
+        let counts = (b.amount(n_drawn), s.n_solid_facets);
         let near = self.impostors.as_ref().and_then(Impostors::near);
         let buffers = near.map_or(b.of_sprites(), |near| b.of_sprites_from(near));
-        let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|(_, depth)| depth));
+        let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|scenery| &mut scenery.depth));
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {
             DrawPath::Tiles => {
@@ -283,10 +291,10 @@ impl Drawing {
         self.record_read(rec, path, self.i_picture, to);
     }
 
-    /// Copies the surfaces' depth.
+    /// Copies the depth of what hides blobs.
     pub fn record_copy_depth(&mut self, rec: &mut Recorder<'_>, to: &Buffer) {
-        if let Some((_, depth)) = &mut self.scenery {
-            rec.copy_image(depth, to);
+        if let Some(scenery) = &mut self.scenery {
+            rec.copy_image(&mut scenery.depth, to);
         }
     }
 }

@@ -150,7 +150,7 @@ const NARROW: f64 = 0.03;
 
 /// How a gather of the scene shares out its loops' turns.
 pub fn turns(scene: &Scene) -> Turns {
-    let from = pairings(&scene.surfaces, scene.clouds.len());
+    let from = pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len());
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len()).max().unwrap_or(0);
     let n_lights = scene.lights.len();
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps } else { 0 };
@@ -192,7 +192,8 @@ pub fn gathers_from_tree(scene: &Scene) -> bool {
 /// Facets of each region.
 pub fn region_sizes(scene: &Scene) -> Vec<u32> {
     let of_surfaces = scene.surfaces.iter().map(|s| s.n_facets() as u32);
-    of_surfaces.chain(scene.clouds.iter().map(|c| scene.n_cloud_facets(c) as u32)).collect()
+    let of_terrains = scene.terrains.iter().map(|t| t.n_facets() as u32);
+    of_surfaces.chain(of_terrains).chain(scene.clouds.iter().map(|c| scene.n_cloud_facets(c) as u32)).collect()
 }
 
 /// Whether a region's lobe is to be computed.
@@ -217,7 +218,7 @@ impl Lists {
         let roots: Vec<u32> = sizes.iter().map(|n| tree_of(&mut lists.tree, *n)).collect();
         let ends = roots.iter().skip(1).copied().chain([lists.tree.n_nodes.len() as u32]);
         let sources: Vec<(u32, u32)> = roots.iter().zip(ends).map(|(root, end)| (*root, end - root)).collect();
-        for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
+        for (i, from) in pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len()).iter().enumerate() {
             let i_pairing = lists.pairings.len() as u32;
             for pairing in from.iter().filter(|p| sizes[p.i_emitter] > 0) {
                 lists.push_pairing(pairing, sources[pairing.i_emitter]);

@@ -203,7 +203,7 @@ impl Game {
         self.scene.region_bounds(&self.groups, setting.time_s, DEPOSIT_CUT_SIGMA).into_iter().map(of).collect()
     }
 
-    /// The regions and their materials, surfaces before clouds.
+    /// The regions and their materials, surfaces before ground, both before clouds.
     fn regions(&self, time_s: f64, light_origin: DVec3) -> Vec<RegionRecord> {
         let scene = &self.scene;
         let mut i_facet = 0;
@@ -216,10 +216,13 @@ impl Game {
             let brdf = material.at(time_s);
             let mut record = match scene.surfaces.get(i) {
                 Some(surface) => RegionRecord::surface(surface, light_origin, &brdf, i_lobe(i), i_facet),
-                None => {
-                    let n_facets = scene.n_cloud_facets(&scene.clouds[i - scene.surfaces.len()]) as u32;
-                    RegionRecord::cloud(&brdf, i_lobe(i), i_facet, n_facets)
-                }
+                None => match scene.terrains.get(i - scene.surfaces.len()) {
+                    Some(terrain) => RegionRecord::terrain(terrain, light_origin, &brdf, i_lobe(i), i_facet),
+                    None => {
+                        let n_facets = scene.n_cloud_facets(&scene.clouds[i - scene.n_solids()]) as u32;
+                        RegionRecord::cloud(&brdf, i_lobe(i), i_facet, n_facets)
+                    }
+                },
             };
             i_facet += record.n_facets;
             record.kind = kind_of(scene, i);
@@ -253,7 +256,7 @@ impl Game {
     }
 
     fn group(&self, group: &Group, origin: DVec3) -> GroupRecord {
-        let i_region = (self.scene.surfaces.len() + group.i_cloud) as u32;
+        let i_region = (self.scene.n_solids() + group.i_cloud) as u32;
         let modes = (self.i_modes[group.i_cloud], self.modes[group.i_cloud].len() as u32);
         GroupRecord::new(group, i_region, origin, modes)
     }

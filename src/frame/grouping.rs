@@ -25,7 +25,7 @@ pub struct Grouping {
     runs: Buffer,
     bounds: Feed,
     n_particles: u32,
-    n_surface_facets: u32,
+    n_solid_facets: u32,
     n_runs: u32,
     n_regions: u32,
 }
@@ -48,7 +48,7 @@ impl Grouping {
             runs: Buffer::new::<RunRecord>(device, "facets.runs", runs.len() as u64, Place::Device)?,
             bounds: Feed::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64)?,
             n_particles: n as u32,
-            n_surface_facets: scene.n_surface_facets() as u32,
+            n_solid_facets: scene.n_solid_facets() as u32,
             n_runs: runs.len() as u32,
             n_regions: n_regions as u32,
         };
@@ -75,6 +75,6 @@ impl Grouping {
     pub fn record_facets(&self, rec: &mut Recorder<'_>, facets: &Facets, b: &Buffers, packet: &Packet) -> Result<()> {
         let [placed, particles, i_group, groups] = [b.placed.buffer(), &b.particles, &b.i_group, &b.groups.buffer];
         let buffers = [placed, particles, i_group, groups, &b.density, &self.order, &self.runs, &b.facets, &b.i_facet];
-        facets.record_groups(rec, buffers, &packet.grid, self.n_runs, self.n_surface_facets)
+        facets.record_groups(rec, buffers, &packet.grid, self.n_runs, self.n_solid_facets)
     }
 }

@@ -80,7 +80,7 @@ impl Impostors {
         };
         let entries = |name| Buffer::new::<[u32; 2]>(device, name, n, Place::Device);
         Ok(Impostors {
-            pass: passes::impostors::Impostors::new(device, compiler, format, !scene.surfaces.is_empty())?,
+            pass: passes::impostors::Impostors::new(device, compiler, format, scene.has_solids())?,
             keeper: Keeper::new(rules),
             now: Step::Nothing("there is no frame before"),
             sprites: (path != DrawPath::Tiles).then(of_sprites).transpose()?,
@@ -136,7 +136,7 @@ impl Impostors {
         let lists = [&b.entries, &self.members, &self.far, &self.near];
         self.pass.record_part(rec, lists, packet.n_drawn, is_new.then_some(kept.last_key))?;
         if is_new {
-            self.record_shell(rec, path, b, &kept, (Amount::Known(packet.n_drawn), s.n_surface_facets), s)?;
+            self.record_shell(rec, path, b, &kept, (Amount::Known(packet.n_drawn), s.n_solid_facets), s)?;
         }
         let texels = match (&self.tiling, &self.sprites) {
             (Some(tiling), _) if path == DrawPath::Tiles => &tiling.pictures[0],

@@ -81,7 +81,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
     let size = |record: usize| record as u64;
     let n_pixels = u64::from(scene.film.width) * u64::from(scene.film.height);
     let (n_small, is_auto) = (n_small_pixels(scene), scene.draw.resolution == Resolution::Auto);
-    let n_behind = if n_small > 0 && !scene.surfaces.is_empty() { n_pixels } else { 0 };
+    let n_behind = if n_small > 0 && scene.has_solids() { n_pixels } else { 0 };
     // What does not fit is not tried by "auto".
     let in_chunks = matches!(scene.draw.chunks, Chunks::Of(1..)) && scene.draw.path == DrawPath::Sprites;
     let n_composed = match in_chunks {
@@ -108,6 +108,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the second reflection's sources", n_sources, size(size_of::<SourceRecord>())),
         ("their flux by light", n_sources * scene.lights.len() as u64, 16),
         ("their light by points", n_sources * scene.lights.len() as u64, size(size_of::<PackedRecord>())),
+        ("the ground", scene.n_solid_facets() - scene.n_surface_facets(), size(size_of::<FacetRecord>())),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
         ("the bits of kept particles", if culls(scene) { n.div_ceil(32) } else { 0 }, 8),
@@ -124,7 +125,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the groups' textures", if scene.is_textured() { groups } else { 0 }, size(size_of::<TexturedRecord>())),
         ("the textures, as they are made", n_texels, 4),
         (TEXTURES, n_texels, 16),
-        ("the depth of surfaces", u64::from(!scene.surfaces.is_empty()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
+        ("the depth of surfaces", u64::from(scene.has_solids()) * n_pixels, DEPTH_BYTES_PER_PIXEL),
         ("the film, read back", n_pixels, pixel),
         (SHELL, n_shell_texels, 16),
         ("the shell, as it is drawn", n_shell_texels, 16),

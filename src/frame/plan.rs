@@ -29,6 +29,7 @@ pub enum Pass {
     Sort,
     Texture,
     Surfaces,
+    Terrain,
     Impostors,
     Sprites,
     Tiles,
@@ -36,7 +37,7 @@ pub enum Pass {
 }
 
 impl Pass {
-    pub const ALL: [Pass; 18] = [
+    pub const ALL: [Pass; 19] = [
         Pass::Generate,
         Pass::Live,
         Pass::Place,
@@ -51,6 +52,7 @@ impl Pass {
         Pass::Sort,
         Pass::Texture,
         Pass::Surfaces,
+        Pass::Terrain,
         Pass::Impostors,
         Pass::Sprites,
         Pass::Tiles,
@@ -74,6 +76,7 @@ impl Pass {
             "sort",
             "texture",
             "surfaces",
+            "terrain",
             "impostors",
             "sprites",
             "tiles",
@@ -186,6 +189,8 @@ pub struct Traits {
     pub textured: bool,
     /// Surfaces to draw.
     pub n_surfaces: u32,
+    /// And grounds.
+    pub n_terrains: u32,
     /// Some region has a lobe, and so what is seen of it depends on the eye.
     pub glossy: bool,
     pub tensors: Tensors,
@@ -294,6 +299,7 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         },
         if traits.textured { unless(is_made, "the pool is the same") } else { skip("no textures") },
         if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
+        if traits.n_terrains > 0 { unless(same_picture, "the picture is the same") } else { skip("no terrain") },
         match traits.impostors {
             false => skip("draw.impostors is \"off\""),
             true if !traits.skip => skip("nothing is used again with --no-skip"),

@@ -152,6 +152,7 @@ impl Renderer {
                 grouped,
                 textured,
                 n_surfaces: scene.surfaces.len() as u32,
+                n_terrains: scene.terrains.len() as u32,
                 glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
                 tensors,
                 impostors: scene.draw.impostors != Impostors::Off,
@@ -201,7 +202,7 @@ impl Renderer {
             self.drawing.decide(plan, &packet)
         });
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
-        if plan.runs(Pass::Surfaces) || plan.runs(Pass::Sprites) || plan.runs(Pass::Tiles) {
+        if plan.runs(Pass::Surfaces) || plan.runs(Pass::Terrain) || plan.runs(Pass::Sprites) || plan.runs(Pass::Tiles) {
             self.drawing.turn();
         }
         info_span!("upload").in_scope(|| self.write(slot, &packet))?;
@@ -321,10 +322,13 @@ impl Renderer {
                     Some(grouping) => grouping.record_facets(rec, facets, b, packet)?,
                     None => {
                         let buffers = [placed, &b.particles, &b.i_group, &b.groups.buffer, &b.density, &b.facets];
-                        facets.record(rec, buffers, &packet.grid, n, s.n_surface_facets)?;
+                        facets.record(rec, buffers, &packet.grid, n, s.n_solid_facets)?;
                     }
                 }
-                facets.record_surfaces(rec, [&b.regions.buffer, &b.i_region, &b.facets], s.n_surface_facets)
+                let n_surface_facets = s.n_surface_facets;
+                facets.record_surfaces(rec, [&b.regions.buffer, &b.i_region, &b.facets], n_surface_facets)?;
+                let n_ground = s.n_solid_facets - n_surface_facets;
+                facets.record_terrain(rec, [&b.regions.buffer, &b.ground, &b.facets], n_ground, n_surface_facets)
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
                 let buffers =

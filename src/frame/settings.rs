@@ -8,6 +8,7 @@ use crate::model::scene::Scene;
 pub(super) struct Settings {
     pub n_particles: u32,
     pub n_surface_facets: u32,
+    pub n_solid_facets: u32,
     pub n_facets: u32,
     pub n_lights: u32,
     pub n_surfaces: u32,
@@ -30,6 +31,7 @@ impl Settings {
         Settings {
             n_particles,
             n_surface_facets: scene.n_surface_facets() as u32,
+            n_solid_facets: scene.n_solid_facets() as u32,
             n_facets: scene.n_facets() as u32,
             n_lights: scene.lights.len() as u32,
             n_surfaces: scene.surfaces.len() as u32,

@@ -4,7 +4,7 @@
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
 use super::packet::{Extent, Packet};
-use crate::layout::facet::{REGION_SURFACE, RegionRecord};
+use crate::layout::facet::{REGION_SURFACE, REGION_TERRAIN, RegionRecord};
 use crate::layout::frame::CameraRecord;
 use crate::model::impostor::{Far, Shell, View};
 use crate::model::scene::Scene;
@@ -130,7 +130,8 @@ impl Keeper {
         let far = &kept.shell.far;
         let ratio = kept.shell.predict(now).map_or(0.0, |p| p.depth_ratio);
         let nearest = ratio * far.nearest;
-        let mut surfaces = packet.regions.iter().filter(|r| r.kind == REGION_SURFACE).peekable();
+        let mut surfaces =
+            packet.regions.iter().filter(|r| matches!(r.kind, REGION_SURFACE | REGION_TERRAIN)).peekable();
         if surfaces.peek().is_some() {
             let farthest = packet.extents.iter().map(|e| depths(e, now)[1]).fold(0.0, f64::max);
             if surfaces.any(|r| is_among(r, now, [nearest, farthest])) {
@@ -322,11 +323,14 @@ fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
     if matches!(key, k if k >= 0.0) { Some((key.min(65535.0) as u32, quantum)) } else { None }
 }
 
-/// Whether a surface is neither nearer nor farther than all of some depths.
+/// Whether a surface or ground is neither nearer nor farther than all of some depths.
 fn is_among(region: &RegionRecord, view: &View, [nearest, farthest]: [f64; 2]) -> bool {
     let f64s = |v: [f32; 3]| Vec3::from(v).as_dvec3();
     let z = (f64s(region.center) - view.eye).dot(view.forward);
-    let half = f64s(region.u).dot(view.forward).abs() + f64s(region.v).dot(view.forward).abs();
+    let half = match region.kind {
+        REGION_TERRAIN => (f64s(region.u) * view.forward).abs().element_sum(),
+        _ => f64s(region.u).dot(view.forward).abs() + f64s(region.v).dot(view.forward).abs(),
+    };
     let slack = ROUNDING * (z.abs() + half + view.eye.abs().element_sum());
     z + half + slack >= nearest && z - half - slack <= farthest
 }

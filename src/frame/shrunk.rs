@@ -4,6 +4,7 @@ use super::buffers::Buffers;
 use super::drawing::Drawing;
 use super::feed::IN_FLIGHT;
 use super::packet::Packet;
+use super::plan::Pass;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
@@ -34,7 +35,7 @@ impl Shrunk {
         let film = Film { width: small.size[0], height: small.size[1], ..scene.film };
         let draw = Draw { resolution: Resolution::Full, ..scene.draw };
         let smaller = Scene { film, draw, ..scene.clone() };
-        let behind = !scene.surfaces.is_empty();
+        let behind = scene.has_solids();
         let extents = Extents { full, small: small.size, offsets: small.offsets(), n: small.n };
         let n_full = u64::from(full[0]) * u64::from(full[1]);
         // Whole texels.
@@ -69,16 +70,17 @@ impl Shrunk {
         self.small.size
     }
 
-    /// What the small pixels see of the surfaces, for the blobs to be hidden by.
-    pub fn record_surfaces(
+    /// What the small pixels see of what one of the passes draws that hide blobs.
+    pub fn record_solids(
         &mut self,
         rec: &mut Recorder<'_>,
+        solids: Pass,
         b: &Buffers,
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
         let camera = self.camera(&packet.camera);
-        self.drawing.record_surfaces(rec, b, &camera, s)?;
+        self.drawing.record_solids(rec, solids, b, &camera, s)?;
         // The blobs may spend it.
         if let Some([_, small_depths, _]) = &self.surfaces {
             self.drawing.record_copy_depth(rec, small_depths);

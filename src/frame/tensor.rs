@@ -10,7 +10,7 @@ use super::plan::Tensors;
 use super::settings::Settings;
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
-use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
+use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE, REGION_TERRAIN};
 use crate::model::basis::Basis;
 use crate::model::cloud::CloudSource;
 use crate::model::material::Brdf;
@@ -35,7 +35,9 @@ pub fn is_edited(scene: &Scene) -> bool {
 
 /// The region's kind in its record.
 pub fn kind_of(scene: &Scene, i_region: usize) -> u32 {
-    let Some(i_cloud) = i_region.checked_sub(scene.surfaces.len()) else { return REGION_SURFACE };
+    let Some(i_other) = i_region.checked_sub(scene.surfaces.len()) else { return REGION_SURFACE };
+    // The ground's facets are to the light what a cloud's are.
+    let Some(i_cloud) = i_other.checked_sub(scene.terrains.len()) else { return REGION_TERRAIN };
     match scene.clouds[i_cloud].source {
         CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => REGION_CLOUD,
         CloudSource::Particles(_) => REGION_COLORED,
@@ -121,7 +123,7 @@ impl Shape {
         if !self.has_second {
             return spans;
         }
-        for (i, from) in pairings(&scene.surfaces, scene.clouds.len()).iter().enumerate() {
+        for (i, from) in pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len()).iter().enumerate() {
             let first = spans.len();
             // Nothing is written for an emitter without facets.
             for block in from.iter().filter(|p| sizes[p.i_emitter] > 0).map(|p| self.blocks[p.i_emitter]) {

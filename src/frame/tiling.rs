@@ -36,7 +36,7 @@ impl Tiling {
 
     /// For the pictures of `scene`.
     pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Tiling> {
-        let behind = !scene.surfaces.is_empty() || scene.draw.impostors != Impostors::Off;
+        let behind = scene.has_solids() || scene.draw.impostors != Impostors::Off;
         Tiling::of_size(device, compiler, scene, [scene.film.width, scene.film.height], (format, behind))
     }
 
@@ -103,7 +103,7 @@ fn variant(scene: &Scene, format: TargetFormat) -> Variant {
         grouped: is_grouped(scene),
         weighted: scene.draw.count.is_some(),
         format,
-        behind: !scene.surfaces.is_empty(),
+        behind: scene.has_solids(),
         tau_most: tau_most(scene),
         portable: false,
         most_pairs: None,

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::magnitude::{AMOUNT, COORDINATE, DIVISOR, GREATEST, is_carried_place, shortest};
 use super::scene_air::{put_on_base, read_base};
 use super::scene_disc::{self, read_disc};
-use super::scene_lights::material_named;
+use super::scene_lights::{ground_named, material_named};
 use super::scene_weather;
 use super::text_file::{DATA_LIMIT, read_text};
 use super::toml_section::{Bounds, Section};
@@ -24,6 +24,7 @@ use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 use crate::model::scene::Simulate;
+use crate::model::terrain::Terrain;
 use crate::model::texture::{Choice, GREATEST_STRENGTH, Texture};
 
 /// The files that a scene names.
@@ -68,6 +69,8 @@ pub struct CloudReader<'a> {
     pub digests: Vec<[u8; 32]>,
     /// What the user should know of what was read.
     pub notes: Vec<String>,
+    /// The ground under the clouds read so far.
+    pub terrains: Vec<Terrain>,
 }
 
 /// Keys of every cloud, after those of its source.
@@ -78,7 +81,7 @@ macro_rules! with_cloud_keys {
 }
 
 const LIST_KEYS: &[&str] = with_cloud_keys!["from", "file"];
-const WEATHER_KEYS: &[&str] = with_cloud_keys!["from", "file", "step", "particles", "exaggeration", "speed"];
+const WEATHER_KEYS: &[&str] = with_cloud_keys!["from", "file", "step", "particles", "exaggeration", "speed", "ground"];
 const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_depth", "radius_scale"];
 
 #[derive(Clone, Copy)]
@@ -98,7 +101,17 @@ impl<'a> CloudReader<'a> {
         simulate: Simulate,
         files: &'a dyn Files,
     ) -> CloudReader<'a> {
-        CloudReader { folder, materials, air, seed, simulate, files, digests: Vec::new(), notes: Vec::new() }
+        CloudReader {
+            folder,
+            materials,
+            air,
+            seed,
+            simulate,
+            files,
+            digests: Vec::new(),
+            notes: Vec::new(),
+            terrains: Vec::new(),
+        }
     }
 
     /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
@@ -160,6 +173,12 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             let keys = scene_weather::read_keys(s, &file, reader.simulate)?;
             reader.notes.extend(scene_weather::notes(&file).into_iter().map(|note| format!("cloud {i_cloud}: {note}")));
             let seed = reader.read_seed(s, i_cloud)?;
+            if let Some(i_material) = ground_named(s, reader.materials)? {
+                let origin = s.vec3("position", DVec3::ZERO, COORDINATE)?;
+                let terrain = scene_weather::terrain(s, &file, &keys, origin, i_material)?;
+                reader.digests.push(scene_weather::digest_of_ground(&terrain));
+                reader.terrains.push(terrain);
+            }
             if keys.speed != 0.0 {
                 // Whichever of its steps are asked for later.
                 reader.digests.push(file.digest()?);

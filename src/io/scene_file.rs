@@ -187,19 +187,33 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &dy
             Err(e) => e,
         })?;
     }
-    let digests = reader.digests;
+    let (digests, terrains) = (reader.digests, reader.terrains);
     warnings.extend(reader.notes);
     root.record("cloud", json!(resolved_clouds));
 
-    let scene = Scene { title, film, camera, time, lighting, draw, threads, lights, materials, surfaces, clouds, air };
+    let scene = Scene {
+        title,
+        film,
+        camera,
+        time,
+        lighting,
+        draw,
+        threads,
+        lights,
+        materials,
+        surfaces,
+        terrains,
+        clouds,
+        air,
+    };
     // Particles are numbered in u32, on the device as in the model.
-    if u32::try_from(scene.n_particles() + scene.n_surface_facets()).is_err() {
+    if u32::try_from(scene.n_particles() + scene.n_solid_facets()).is_err() {
         return Err(Error::scene(
             root.place("cloud"),
             format!(
-                "{} particles and {} facets of surfaces: at most {} together",
+                "{} particles and {} facets of surfaces and ground: at most {} together",
                 scene.n_particles(),
-                scene.n_surface_facets(),
+                scene.n_solid_facets(),
                 u32::MAX
             ),
         ));

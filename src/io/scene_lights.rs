@@ -188,18 +188,27 @@ fn read_edits(s: &mut Section) -> Result<Vec<MaterialKey>> {
 
 /// The material that the key `material` names; without it the only one, else the one called "cloud".
 pub fn material_named(s: &mut Section, materials: &[Material]) -> Result<usize> {
-    let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
-    let default = if names.len() == 1 { names[0] } else { "cloud" };
+    let default = if materials.len() == 1 { &materials[0].name } else { "cloud" };
     let name = s.string("material", default)?;
+    numbered(s, "material", &name, materials)
+}
+
+/// Of ground; None of "none", the default.
+pub fn ground_named(s: &mut Section, materials: &[Material]) -> Result<Option<usize>> {
+    let name = s.string("ground", "none")?;
+    if name == "none" { Ok(None) } else { numbered(s, "ground", &name, materials).map(Some) }
+}
+
+fn numbered(s: &mut Section, key: &str, name: &str, materials: &[Material]) -> Result<usize> {
+    let names: Vec<&str> = materials.iter().map(|m| m.name.as_str()).collect();
     names.iter().position(|known| *known == name).ok_or_else(|| {
-        let meant = did_you_mean(&name, &names);
+        let meant = did_you_mean(name, &names);
         let meant = if meant.is_empty() { ";".to_owned() } else { meant };
         match names.is_empty() {
-            true => s.fault("material", format!("unknown material `{}`; the scene has none", shown(&name))),
-            false => s.fault(
-                "material",
-                format!("unknown material `{}`{meant} the scene has {}", shown(&name), list_given(&names)),
-            ),
+            true => s.fault(key, format!("unknown material `{}`; the scene has none", shown(name))),
+            false => {
+                s.fault(key, format!("unknown material `{}`{meant} the scene has {}", shown(name), list_given(&names)))
+            }
         }
     })
 }

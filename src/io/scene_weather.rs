@@ -1,5 +1,7 @@
 //! A cloud's keys where its particles come from a weather file (docs/model.md §15).
 
+use std::sync::Arc;
+
 use glam::DVec3;
 use sha2::{Digest, Sha256};
 
@@ -9,6 +11,7 @@ use super::weather::wrf::{Clouds, WeatherFile};
 use crate::error::Result;
 use crate::model::cloud::{LEAST_ASPECT, Particle};
 use crate::model::scene::Simulate;
+use crate::model::terrain::Terrain;
 use crate::model::weather::particles::{Layout, WeatherBlob};
 
 /// Most blobs of a file: some 48 bytes each.
@@ -40,6 +43,30 @@ pub fn read_keys(s: &mut Section, file: &WeatherFile, simulate: Simulate) -> Res
         return Err(s.fault("speed", what));
     }
     Ok(WeatherKeys { i_step, n_particles, exaggeration, speed })
+}
+
+/// The ground of a step, HGT, under a cloud at `origin`, with heights as much exaggerated.
+pub fn terrain(
+    s: &mut Section,
+    file: &WeatherFile,
+    keys: &WeatherKeys,
+    origin: DVec3,
+    i_material: usize,
+) -> Result<Terrain> {
+    let (columns, rows) = (file.shape.nx, file.shape.ny);
+    if columns < 2 || rows < 2 {
+        let what = format!(
+            "expected \"none\": the file has {columns} x {rows} columns, and ground lies between 2 x 2 at least"
+        );
+        return Err(s.fault("ground", what));
+    }
+    let Some((ground, heights)) = file.terrain(keys.i_step)? else {
+        return Err(s.fault("ground", "expected \"none\": the file has no variable HGT"));
+    };
+    let at = |(k, height): (usize, &f64)| DVec3::new(ground.east_m[k], height * keys.exaggeration, ground.south_m[k]);
+    let points = heights.iter().enumerate().map(at).map(|p| p.clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST)));
+    let n = [columns as u32, rows as u32];
+    Ok(Terrain { origin, points: Arc::new(points.collect()), n, i_material })
 }
 
 /// What whoever looks at the picture has to know of a cloud's file.
@@ -78,6 +105,13 @@ pub fn digest(particles: &[Particle]) -> [u8; 32] {
         let [x, y, z] = p.position.to_array();
         [x, y, z, p.sigma, p.aspect, p.kappa].iter().for_each(|v| hash.update(v.to_le_bytes()));
     }
+    hash.finalize().into()
+}
+
+/// And of its ground.
+pub fn digest_of_ground(terrain: &Terrain) -> [u8; 32] {
+    let mut hash = Sha256::new();
+    terrain.points.iter().flat_map(|p| p.to_array()).for_each(|v| hash.update(v.to_le_bytes()));
     hash.finalize().into()
 }
 

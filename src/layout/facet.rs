@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::layout::record;
 use crate::model::material::Brdf;
 use crate::model::surface::Surface;
+use crate::model::terrain::{Terrain, TerrainFacet};
 
 record! {
     /// A lighting facet (model.md §5), position relative to the lighting origin.
@@ -16,6 +17,20 @@ record! {
         /// A factor on its material's K_d.
         color: [f32; 3],
         unused: u32,
+    }
+}
+
+impl FacetRecord {
+    /// Of ground, relative to the ground's origin.
+    pub fn terrain(facet: &TerrainFacet, i_region: u32) -> Self {
+        FacetRecord {
+            position: facet.position.as_vec3().to_array(),
+            area: facet.area as f32,
+            normal: facet.normal.as_vec3().to_array(),
+            i_region,
+            color: [1.0; 3],
+            unused: 0,
+        }
     }
 }
 
@@ -48,29 +63,31 @@ pub const REGION_SURFACE: u32 = 0;
 pub const REGION_CLOUD: u32 = 1;
 /// A cloud whose facets have colours of their own.
 pub const REGION_COLORED: u32 = 2;
+/// Ground, whose facets are to the light what a cloud's are: discs.
+pub const REGION_TERRAIN: u32 = 3;
 
 /// `i_lobe` of a region without a lobe.
 pub const NO_LOBE: u32 = u32::MAX;
 
 record! {
-    /// Facets of one material (C's R_i): a surface, with its rectangle, or a cloud.
+    /// Facets of one material (C's R_i): a surface, with its rectangle, ground, or a cloud.
     pub struct RegionRecord {
         kd: [f32; 3],
         kind: u32,
         ks: [f32; 3],
         /// Row of its lobe in the table of lobes.
         i_lobe: u32,
-        /// Of a surface, relative to the lighting origin.
+        /// Of a surface, or the ground's origin, relative to the lighting origin.
         center: [f32; 3],
         i_first_facet: u32,
-        /// Half axes.
+        /// Half axes; of ground how far it reaches from its origin along each axis.
         u: [f32; 3],
         n_facets: u32,
         v: [f32; 3],
-        /// Facets along u.
+        /// Facets along u, or of a row of ground.
         n_u: u32,
         normal: [f32; 3],
-        /// Facets along v.
+        /// Facets along v, or rows of ground.
         n_v: u32,
         /// 1/√n_s: half the width of its lobe in radians of γ, where it is narrowest over time.
         lobe_width: f32,
@@ -101,6 +118,19 @@ impl RegionRecord {
     /// The record without what a material's edit changes.
     pub fn geometry(&self) -> Self {
         RegionRecord { kd: [0.0; 3], ks: [0.0; 3], ..*self }
+    }
+
+    /// Ground; `origin` is the lighting origin.
+    pub fn terrain(terrain: &Terrain, origin: DVec3, brdf: &Brdf, i_lobe: u32, i_first_facet: u32) -> Self {
+        let (low, high) = terrain.extent();
+        RegionRecord {
+            kind: REGION_TERRAIN,
+            center: (terrain.origin - origin).as_vec3().to_array(),
+            u: low.abs().max(high.abs()).as_vec3().to_array(),
+            n_u: terrain.n[0],
+            n_v: terrain.n[1],
+            ..RegionRecord::cloud(brdf, i_lobe, i_first_facet, terrain.n_facets() as u32)
+        }
     }
 
     /// A surface; `origin` is the lighting origin.

@@ -26,6 +26,7 @@ pub mod scene;
 pub mod sort_bits;
 pub mod sums;
 pub mod surface;
+pub mod terrain;
 pub mod texture;
 pub mod tree;
 pub mod visibility;

@@ -17,9 +17,9 @@ pub struct Pairing {
 /// tolerance (2⁻²⁰) is larger, so nothing is left out that it would see.
 const IN_PLANE: f64 = 1e-9;
 
-/// For every region, surfaces before clouds, the regions whose light can reach it.
-pub fn pairings(surfaces: &[Surface], n_clouds: usize) -> Vec<Vec<Pairing>> {
-    let n = surfaces.len() + n_clouds;
+/// For every region, surfaces before the `n_others` (ground and clouds, which face every way), the regions whose light can reach it.
+pub fn pairings(surfaces: &[Surface], n_others: usize) -> Vec<Vec<Pairing>> {
+    let n = surfaces.len() + n_others;
     let of = |i: usize| (0..n).filter_map(|k| pairing(surfaces, i, k)).collect();
     (0..n).map(of).collect()
 }

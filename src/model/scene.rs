@@ -18,6 +18,7 @@ use super::resolution::{Resolution, SmallPicture};
 use super::sort_bits::SortBits;
 use super::sums::Sums;
 use super::surface::Surface;
+use super::terrain::Terrain;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
@@ -31,6 +32,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     pub materials: Vec<Material>,
     pub surfaces: Vec<Surface>,
+    /// The ground.
+    pub terrains: Vec<Terrain>,
     pub clouds: Vec<Cloud>,
     pub air: Air,
 }
@@ -326,9 +329,24 @@ impl Scene {
         groups.iter().map(|g| g.grown(self.clouds[g.i_cloud].growth.at(time_s))).collect()
     }
 
-    /// Facets of the surfaces, which come before those of the clouds.
+    /// Facets of the rectangles, which come before all others.
     pub fn n_surface_facets(&self) -> u64 {
         self.surfaces.iter().map(Surface::n_facets).sum()
+    }
+
+    /// Facets of rectangles and ground, which come before those of the clouds.
+    pub fn n_solid_facets(&self) -> u64 {
+        self.n_surface_facets() + self.terrains.iter().map(Terrain::n_facets).sum::<u64>()
+    }
+
+    /// Regions that are no clouds and come before them: rectangles, then ground.
+    pub fn n_solids(&self) -> usize {
+        self.surfaces.len() + self.terrains.len()
+    }
+
+    /// Whether anything is there that hides what is behind it.
+    pub fn has_solids(&self) -> bool {
+        self.n_solids() > 0
     }
 
     /// Facets of one cloud.
@@ -356,31 +374,36 @@ impl Scene {
     }
 
     pub fn n_facets(&self) -> u64 {
-        self.n_surface_facets() + self.clouds.iter().map(|c| self.n_cloud_facets(c)).sum::<u64>()
+        self.n_solid_facets() + self.clouds.iter().map(|c| self.n_cloud_facets(c)).sum::<u64>()
     }
 
-    /// Facets of one material each, C's R_i: the surfaces, then the clouds.
+    /// Facets of one material each, C's R_i: the surfaces, the ground, then the clouds.
     pub fn n_regions(&self) -> usize {
-        self.surfaces.len() + self.clouds.len()
+        self.n_solids() + self.clouds.len()
     }
 
     /// Index of the material of region `i`.
     pub fn region_i_material(&self, i: usize) -> usize {
         let of_surface = self.surfaces.get(i).map(|s| s.i_material);
-        of_surface.unwrap_or_else(|| self.clouds[i - self.surfaces.len()].i_material)
+        let of_terrain = || self.terrains.get(i - self.surfaces.len()).map(|t| t.i_material);
+        of_surface.or_else(of_terrain).unwrap_or_else(|| self.clouds[i - self.n_solids()].i_material)
     }
 
     pub fn region_material(&self, i: usize) -> &Material {
         &self.materials[self.region_i_material(i)]
     }
 
-    /// Bounds (low, high) of the clouds, as [`Scene::bounds`] has them; without particles, of the surfaces.
+    /// Bounds (low, high) of the clouds, as [`Scene::bounds`] has them; without particles, of surfaces and ground.
     pub fn lighting_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
-        let of_surfaces = || self.surfaces.iter().map(Surface::bounds).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-        self.bounds(groups, time_s, n_sigma).or_else(of_surfaces)
+        let of_solids = || self.solid_bounds().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        self.bounds(groups, time_s, n_sigma).or_else(of_solids)
     }
 
-    /// Bounds (low, high) of every region at `time_s`: of a surface its rectangle's, of a cloud as [`Scene::bounds`] has
+    fn solid_bounds(&self) -> impl Iterator<Item = (DVec3, DVec3)> + '_ {
+        self.surfaces.iter().map(Surface::bounds).chain(self.terrains.iter().map(Terrain::bounds))
+    }
+
+    /// Bounds (low, high) of every region at `time_s`: of a surface or ground its own, of a cloud as [`Scene::bounds`] has
     /// them, its origin where it has no particles.
     pub fn region_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Vec<(DVec3, DVec3)> {
         let mut of_clouds: Vec<_> = self.clouds.iter().map(|c| (c.origin_at(time_s), None)).collect();
@@ -391,7 +414,7 @@ impl Scene {
             *of_cloud = Some((low.min(l), high.max(h)));
         }
         let of_clouds = of_clouds.into_iter().map(|(origin, bounds)| bounds.unwrap_or((origin, origin)));
-        self.surfaces.iter().map(Surface::bounds).chain(of_clouds).collect()
+        self.solid_bounds().chain(of_clouds).collect()
     }
 
     /// Bounds (low, high) of all particles at `time_s`, blobs included out to `n_sigma` σ; `None` without particles.

@@ -1,4 +1,4 @@
-//! facets: what light falls on: the grids of the surfaces, and one facet a particle, or a run of particles in Morton order.
+//! facets: what light falls on: the grids of the surfaces, the points of the ground, and one facet a particle, or a run of particles in Morton order.
 //!
 //! In: regions (rectangles), placed particles, κ, groups, density grid, order and runs. Out: position, unit normal, area,
 //! region, colour; of runs each particle's facet.
@@ -23,10 +23,15 @@ record! {
     pub struct SurfacesPush { n_facets: u32 }
 }
 
+record! {
+    pub struct TerrainPush { n_facets: u32, i_first_facet: u32 }
+}
+
 pub struct Facets {
     kernel: Kernel,
     groups: Kernel,
     surfaces: Kernel,
+    terrain: Kernel,
 }
 
 impl Facets {
@@ -38,12 +43,26 @@ impl Facets {
             kernel: kernel("facets", Push::FIELDS)?,
             groups: kernel("facets.groups", GroupsPush::FIELDS)?,
             surfaces: Kernel::new(device, compiler, "facets.surfaces", SurfacesPush::FIELDS, &[])?,
+            terrain: Kernel::new(device, compiler, "facets.terrain", TerrainPush::FIELDS, &[])?,
         })
     }
 
     /// The first `n_facets` of `facets` (FacetRecord) from `regions` (RegionRecord); `i_region`: u32 by facet.
     pub fn record_surfaces(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 3], n_facets: u32) -> Result<()> {
         rec.dispatch(&self.surfaces, &buffers, &SurfacesPush { n_facets }, n_facets)
+    }
+
+    /// `n_facets` of `ground` (FacetRecord, relative to their grounds' origins) to `facets` from `i_first_facet` on, where
+    /// `regions` (RegionRecord) have their origins.
+    pub fn record_terrain(
+        &self,
+        rec: &mut Recorder<'_>,
+        [regions, ground, facets]: [&Buffer; 3],
+        n_facets: u32,
+        i_first_facet: u32,
+    ) -> Result<()> {
+        let push = TerrainPush { n_facets, i_first_facet };
+        rec.dispatch(&self.terrain, &[regions, ground, facets], &push, n_facets)
     }
 
     /// `placed`: PlacedRecord; `particles`: ParticleRecord; `i_group`: u32; `groups`: GroupRecord; `density`: f32;

@@ -16,6 +16,7 @@ pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
+pub mod terrain;
 pub mod texture;
 pub mod tiles;
 pub mod transmit;
@@ -39,6 +40,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "facets.comp",
     "facets_groups.comp",
     "facets_surfaces.comp",
+    "facets_terrain.comp",
     "first.comp",
     "first_tensor.comp",
     "generate.comp",
@@ -92,6 +94,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "sprites.vert",
     "surfaces.frag",
     "surfaces.vert",
+    "terrain.frag",
+    "terrain.vert",
     "texture_pack.comp",
     "texture_transform.comp",
     "tiles.comp",

@@ -23,6 +23,7 @@ pub mod second;
 pub mod sort;
 pub mod sprites;
 pub mod surfaces;
+pub mod terrain;
 pub mod texture;
 pub mod threshold;
 pub mod tiles;

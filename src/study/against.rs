@@ -241,11 +241,13 @@ pub(super) fn of_model(
             seen
         }),
     };
+    let (ground, discs) = discs.split_at(met.n_ground());
+    let behind = over(behind, scene, &truth, &view, ground, pixels);
     let radiance: Vec<DVec3> = discs.iter().map(|lit| lit.radiance).collect();
     let of_discs = root_mean_square(discs.iter().map(|lit| lit.error));
     let places: Vec<Behind> = behind.iter().map(|(b, _)| *b).collect();
     let found = volume(&Volume::new(&view, &truth.blobs, &radiance), pixels, &places, listener);
-    // Of a surface all may show, of particles as much as they hold back.
+    // Of a surface or ground all may show, of particles as much as they hold back.
     let error = |(p, (behind, e)): (&Pixel, &(Behind, f64))| {
         let through = if behind.color[3] > 0.0 { 1.0 } else { 0.0 };
         p.error + e * through + of_discs * p.color[3]
@@ -259,6 +261,27 @@ fn between(view: &View, placed: &[Surface], facets: &[Lit], pixels: &Pixels) -> 
     let radiance: Vec<DVec3> = facets.iter().map(|lit| lit.radiance).collect();
     let error = root_mean_square(facets.iter().map(|lit| lit.error));
     pixels.pick(&surfaces::render(view, placed, &radiance)).into_iter().map(|behind| (behind, error)).collect()
+}
+
+/// `behind`, and over it what is nearer of the ground, as it is drawn from the light of its points.
+fn over(
+    behind: Vec<(Behind, f64)>,
+    scene: &Scene,
+    truth: &Truth,
+    view: &View,
+    ground: &[Lit],
+    pixels: &Pixels,
+) -> Vec<(Behind, f64)> {
+    if ground.is_empty() {
+        return behind;
+    }
+    let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
+    let error = root_mean_square(ground.iter().map(|lit| lit.error));
+    let mut picture = vec![Behind::NOTHING; view.width as usize * view.height as usize];
+    picture::ground_over(&mut picture, scene, truth.setting.light_origin, view, &radiance);
+    let nearer =
+        |(other, seen): ((Behind, f64), Behind)| if seen.depth < other.0.depth { (seen, error) } else { other };
+    behind.into_iter().zip(pixels.pick(&picture)).map(nearer).collect()
 }
 
 /// The surface in a pixel, and what its radiance may be off; black from behind.

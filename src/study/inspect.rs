@@ -285,9 +285,9 @@ fn particle_row(index: usize, cloud: usize, p: DVec3, sigma: f64, kappa: f64, c:
     ParticleRow { index, cloud, x: p.x, y: p.y, z: p.z, radius, sigma, kappa, r: c.x, g: c.y, b: c.z }
 }
 
-/// L1 and L2 (the last two) are zero where the camera sees a surface's back.
+/// L1 and L2 (the last two) are zero where the camera sees a surface's or the ground's back.
 fn toward_camera(scene: &Scene, region: u32, to_eye: DVec3, normal: DVec3, lit: [DVec3; 4]) -> [DVec3; 4] {
-    let is_back = (region as usize) < scene.surfaces.len() && normal.dot(to_eye) <= 0.0;
+    let is_back = (region as usize) < scene.n_solids() && normal.dot(to_eye) <= 0.0;
     if is_back { [lit[0], lit[1], DVec3::ZERO, DVec3::ZERO] } else { lit }
 }
 

@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::truth::Truth;
+use super::truth::{Truth, ground};
 use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::scene::{LightingMode, Scene};
@@ -11,14 +11,17 @@ use crate::model::surface::Surface;
 use crate::reference::area::adaptive::Accuracy;
 use crate::reference::area::paths::Chance;
 use crate::reference::area::{Disc, Receiver, Scenery};
-use crate::reference::{facets, place};
+use crate::reference::facets::{self, Facet};
+use crate::reference::place;
 
 /// What a scene's light meets at one time, relative to the lighting origin.
 pub struct Met {
     pub surfaces: Vec<Surface>,
     brdfs: Vec<Brdf>,
     lights: Vec<Light>,
+    /// The ground's, then the particles'.
     discs: Vec<Disc>,
+    n_ground: usize,
     eye: DVec3,
 }
 
@@ -49,8 +52,12 @@ impl Met {
         let scales = place::sigma_means(&truth.groups, &scene.clouds, time_s);
         let facets = facets::closed(&truth.blobs, &scales, &regions, &centers);
         let n_surfaces = scene.surfaces.len();
-        let kd = |region: u32| scene.region_material(n_surfaces + region as usize).at(time_s).kd;
-        let disc = |(f, color): (&facets::Facet, &DVec3)| Disc {
+        let kd = |region: u32| scene.region_material(region as usize).at(time_s).kd;
+        let ground = ground(scene, origin);
+        let of_particles = facets.into_iter().map(|f| Facet { region: f.region + scene.n_solids() as u32, ..f });
+        let n_ground = ground.len();
+        let colors = std::iter::repeat_n(DVec3::ONE, n_ground).chain(truth.colors.iter().copied());
+        let disc = |(f, color): (Facet, DVec3)| Disc {
             position: f.position,
             normal: f.normal,
             area: f.area,
@@ -60,13 +67,20 @@ impl Met {
             surfaces: scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect(),
             brdfs: (0..n_surfaces).map(|i| scene.region_material(i).at(time_s)).collect(),
             lights: scene.lights.iter().map(|l| l.relative_to(origin)).collect(),
-            discs: facets.iter().zip(&truth.colors).map(disc).collect(),
+            discs: ground.into_iter().chain(of_particles).zip(colors).map(disc).collect(),
+            n_ground,
             eye: truth.setting.pose.position - origin,
         }
     }
 
+    /// Those of the ground and of the particles.
     pub fn n_discs(&self) -> usize {
         self.discs.len()
+    }
+
+    /// Those of the ground, which come first.
+    pub fn n_ground(&self) -> usize {
+        self.n_ground
     }
 }
 
@@ -85,7 +99,7 @@ impl<'a> ModelLight<'a> {
         ModelLight { scenery, eye: met.eye, n_reflections: n_reflections.unwrap_or(reflections_of(scene)) }
     }
 
-    /// Of particle `i`.
+    /// Of disc `i`.
     pub fn of_disc(&self, i: usize) -> Lit {
         self.of(&self.scenery.on_disc(i), i)
     }

@@ -9,12 +9,13 @@ use crate::model::cloud::Group;
 use crate::model::count::LEAST_DRAWN;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
+use crate::model::terrain::Terrain;
 use crate::reference::area::mean::each;
 use crate::reference::sprites::{Behind, Factor, Rounding, View};
 use crate::reference::texture::{Pool, Sheet, Textured};
 use crate::reference::threshold::{self, Cut};
 use crate::reference::volume::Volume;
-use crate::reference::{Blob, count, place, sort, sprites, surfaces};
+use crate::reference::{Blob, count, place, sort, sprites, surfaces, terrain};
 
 /// Which truth a picture is compared to (model.md §9).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,17 +135,35 @@ pub(super) fn view(scene: &Scene, truth: &Truth) -> View {
     }
 }
 
-/// The surfaces, a pixel each; where nothing is lit they show their materials' K_d, as particles show their colours.
+/// Surfaces and ground, a pixel each; where nothing is lit they show their materials' K_d, as particles show their colours.
 pub(super) fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
     let origin = truth.setting.light_origin;
     let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
     let placed: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
-    let kd = |s: &Surface| scene.materials[s.i_material].at(scene.time.start_s).kd;
+    let kd = |i_material: usize| scene.materials[i_material].at(scene.time.start_s).kd;
+    let all = |(i_material, n): (usize, u64)| std::iter::repeat_n(kd(i_material), n as usize);
+    let of_terrains = scene.terrains.iter().map(|t| (t.i_material, t.n_facets()));
     let facets: Vec<DVec3> = match scene.lighting.mode {
-        LightingMode::None => placed.iter().flat_map(|s| std::iter::repeat_n(kd(s), s.n_facets() as usize)).collect(),
-        _ => (0..scene.n_surface_facets() as usize).map(|i| truth.facet_radiance(i)).collect(),
+        LightingMode::None => {
+            placed.iter().map(|s| (s.i_material, s.n_facets())).chain(of_terrains).flat_map(all).collect()
+        }
+        _ => (0..scene.n_solid_facets() as usize).map(|i| truth.facet_radiance(i)).collect(),
     };
-    surfaces::render(view, &placed, &facets)
+    let (of_surfaces, of_terrains) = facets.split_at(scene.n_surface_facets() as usize);
+    let mut picture = surfaces::render(view, &placed, of_surfaces);
+    ground_over(&mut picture, scene, origin, view, of_terrains);
+    picture
+}
+
+/// Lays over `picture` what is nearer of the scene's ground; `radiance` by the points of all of it.
+pub(super) fn ground_over(picture: &mut [Behind], scene: &Scene, origin: DVec3, view: &View, radiance: &[DVec3]) {
+    let mut rest = radiance;
+    for terrain in &scene.terrains {
+        let (of, others) = rest.split_at(terrain.n_facets() as usize);
+        let placed = Terrain { origin: terrain.origin - origin, ..terrain.clone() };
+        terrain::render_over(picture, view, &placed, of);
+        rest = others;
+    }
 }
 
 /// The pool, and what every particle shows of it; nothing where the scene is plain.

@@ -103,8 +103,6 @@ impl Truth {
         } else {
             (reference::facets::facets(grid, &cells, &self.blobs, &scales, &regions, &centers), self.colors.clone())
         };
-        let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
-        let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
         let lighting = &scene.lighting;
         let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(self.setting.light_origin)).collect();
         let rectangles: Vec<Rectangle> =
@@ -116,10 +114,15 @@ impl Truth {
             step: lighting.step,
             forward: lighting.forward,
         };
-        // Surfaces are the first regions.
+        // Surfaces are the first regions, then comes the ground.
         for facet in &mut self.facets {
-            facet.region += scene.surfaces.len() as u32;
+            facet.region += scene.n_solids() as u32;
         }
+        let ground = ground(scene, self.setting.light_origin);
+        self.facet_colors.splice(0..0, std::iter::repeat_n(DVec3::ONE, ground.len()));
+        self.facets.splice(0..0, ground);
+        let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
+        let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
         let receivers: Vec<transmit::Receiver> =
             self.facets.iter().map(|f| transmit::Receiver { position: f.position, i_region: f.region }).collect();
         let transmittance = obstacles.transmittance(&receivers, &lights);
@@ -182,7 +185,7 @@ impl Truth {
         if self.facets.is_empty() {
             return self.colors.clone();
         }
-        let n_before = scene.n_surface_facets() as usize;
+        let n_before = scene.n_solid_facets() as usize;
         if !scene.groups_facets() {
             return (0..self.blobs.len()).map(|i| self.facet_radiance(n_before + i)).collect();
         }
@@ -198,11 +201,11 @@ impl Truth {
 
     /// The particles in Morton order, cloud by cloud.
     fn order(&self, scene: &Scene, i_cloud: &[u32]) -> Vec<u32> {
-        let (n_surfaces, origin) = (scene.surfaces.len() as u32, self.setting.light_origin);
+        let (n_solids, origin) = (scene.n_solids() as u32, self.setting.light_origin);
         let bounds = scene.region_bounds(&self.groups, self.setting.time_s, DEPOSIT_CUT_SIGMA);
         let bounds: Vec<_> = bounds.into_iter().map(|(low, high)| (low - origin, high - origin)).collect();
         let positions: Vec<DVec3> = self.blobs.iter().map(|b| b.position).collect();
-        let regions: Vec<u32> = i_cloud.iter().map(|i| n_surfaces + i).collect();
+        let regions: Vec<u32> = i_cloud.iter().map(|i| n_solids + i).collect();
         reference::morton::order(&positions, &regions, &bounds)
     }
 }
@@ -216,6 +219,12 @@ fn facets_of(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_
     let area = surface.area() / f64::from(n);
     let normal = surface.normal();
     (0..n).map(move |i| Facet { position: surface.facet_center(i), normal, area, region, conditioning: 1.0 })
+}
+
+/// Facets of the scene's ground, relative to `origin`.
+pub fn ground(scene: &Scene, origin: DVec3) -> Vec<Facet> {
+    let terrains = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
+    terrains.flat_map(|(t, region)| reference::terrain::facets(t, origin, region)).collect()
 }
 
 /// Every particle's own colour.

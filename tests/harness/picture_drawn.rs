@@ -85,7 +85,7 @@ impl Picture {
         }
     }
 
-    fn camera_record(&self) -> CameraRecord {
+    pub fn camera_record(&self) -> CameraRecord {
         let film = Film {
             width: self.view.width,
             height: self.view.height,

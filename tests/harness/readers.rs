@@ -149,6 +149,8 @@ pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
         for blob in layout.blobs(&step.grid, &step.extinction) {
             assert!(blob.position.is_finite() && blob.kappa >= 0.0 && blob.kappa.is_finite(), "{blob:?}");
         }
+        let ground = file.terrain(i_step).map_err(|e| clean(&e, &[]))?;
+        assert!(ground.iter().flat_map(|(_, heights_m)| heights_m).all(|h| h.abs() <= 200_000.0));
     }
     Ok(())
 }

@@ -94,8 +94,6 @@ pub struct Step {
     pub temperature_k: Vec<f64>,
     /// kg/kg.
     pub vapour: Vec<f64>,
-    /// Height of the ground, m, a column each; None where the file has none.
-    pub terrain_m: Option<Vec<f64>>,
     /// Radians north and east in the domain's middle, which moves where a nest follows a storm; None of an idealised
     /// file, whose are 0.
     pub middle: Option<(f64, f64)>,
@@ -293,6 +291,23 @@ impl WeatherFile {
     /// # Errors
     /// What of it is no weather: variable, step, and what was expected.
     pub fn step(&self, i_step: usize) -> Result<Step> {
+        self.of_step(i_step, &|| self.read_step(i_step))
+    }
+
+    /// The columns at a step and the ground's height in each, HGT, m; None where the file has no HGT. Nothing else is read.
+    ///
+    /// # Errors
+    /// As [`WeatherFile::step`].
+    pub fn terrain(&self, i_step: usize) -> Result<Option<(Ground, Vec<f64>)>> {
+        let read = |field: &Field| {
+            let heights_m = field.read_whole(self.container.as_ref(), self.shape, i_step)?;
+            within(&heights_m, HEIGHTS_M, "HGT", "m", self.shape, i_step)?;
+            Ok((self.ground(i_step)?, heights_m))
+        };
+        self.of_step(i_step, &|| self.fields.terrain.as_ref().map(read).transpose())
+    }
+
+    fn of_step<T>(&self, i_step: usize, read: &dyn Fn() -> std::result::Result<T, String>) -> Result<T> {
         if i_step >= self.n_steps {
             return Err(Error::usage(format!(
                 "step {i_step}: {} has steps 0 to {}",
@@ -300,7 +315,7 @@ impl WeatherFile {
                 self.n_steps - 1
             )));
         }
-        self.read_step(i_step).map_err(|what| Error::scene(Place::file(&self.path), what))
+        read().map_err(|what| Error::scene(Place::file(&self.path), what))
     }
 
     fn read_step(&self, i_step: usize) -> std::result::Result<Step, String> {
@@ -338,8 +353,7 @@ impl WeatherFile {
             }
         };
         let middle = self.middle(i_step)?;
-        let terrain_m = fields.terrain.as_ref().map(whole).transpose()?;
-        Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, terrain_m, middle, oddities })
+        Ok(Step { grid, extinction, pressure_pa, temperature_k, vapour, middle, oddities })
     }
 
     fn middle(&self, i_step: usize) -> std::result::Result<Option<(f64, f64)>, String> {
@@ -355,16 +369,22 @@ impl WeatherFile {
         Ok(latitude.zip(longitude).filter(|_| !self.is_idealised))
     }
 
-    /// Where a step's cells are.
-    fn grid(&self, i_step: usize) -> std::result::Result<Grid, String> {
-        let (file, shape, fields) = (self.container.as_ref(), self.shape, &self.fields);
+    /// Where a step's columns are.
+    fn ground(&self, i_step: usize) -> std::result::Result<Ground, String> {
+        let (shape, fields) = (self.shape, &self.fields);
         let factors = |field: &Option<Field>| match field {
-            Some(field) => field.read_whole(file, shape, i_step),
+            Some(field) => field.read_whole(self.container.as_ref(), shape, i_step),
             None => Ok(vec![1.0; shape.n_columns()]),
         };
         let [mx, my] = [factors(&fields.factors[0])?, factors(&fields.factors[1])?];
-        let ground = Ground::new(shape, self.spacing_m, (&mx, &my), self.is_idealised)
-            .map_err(|what| format!("variables MAPFAC_M, MAPFAC_MX, MAPFAC_MY, step {i_step}: {what}"))?;
+        Ground::new(shape, self.spacing_m, (&mx, &my), self.is_idealised)
+            .map_err(|what| format!("variables MAPFAC_M, MAPFAC_MX, MAPFAC_MY, step {i_step}: {what}"))
+    }
+
+    /// Where a step's cells are.
+    fn grid(&self, i_step: usize) -> std::result::Result<Grid, String> {
+        let (file, shape, fields) = (self.container.as_ref(), self.shape, &self.fields);
+        let ground = self.ground(i_step)?;
         let mut heights_m = fields.ph.read_whole(file, shape, i_step)?;
         let base = fields.phb.read_whole(file, shape, i_step)?;
         heights_m.iter_mut().zip(base).for_each(|(h, base)| *h = air::height(*h + base));
@@ -400,7 +420,7 @@ fn within(
         Some(i) => Err(format!(
             "step {i_step}: {what} is {} {unit} {}, expected {least} to {greatest}",
             numbers[i],
-            place(shape, i)
+            place(shape, numbers.len(), i)
         )),
     }
 }

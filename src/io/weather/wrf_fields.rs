@@ -101,7 +101,7 @@ impl Field {
         let numbers = self.read(file, shape, i_step)?;
         let Some(first) = numbers.iter().position(|n| n.is_nan()) else { return Ok(numbers) };
         let n_missing = numbers.iter().filter(|n| n.is_nan()).count();
-        let place = place(shape, first);
+        let place = place(shape, numbers.len(), first);
         Err(self.at(
             i_step,
             format!("{n_missing} values are NaN or fill values, the first {place}; expected a number everywhere"),
@@ -114,10 +114,11 @@ impl Field {
     }
 }
 
-/// "at level 3, row 2, column 1" of a value's number.
-pub fn place(shape: Shape, i: usize) -> String {
+/// "at level 3, row 2, column 1" of one of so many values; of one a column without the level.
+pub fn place(shape: Shape, n_numbers: usize, i: usize) -> String {
     let n = shape.n_columns();
-    format!("at level {}, row {}, column {}", i / n, i % n / shape.nx, i % shape.nx)
+    let level = if n_numbers == n { String::new() } else { format!("level {}, ", i / n) };
+    format!("at {level}row {}, column {}", i % n / shape.nx, i % shape.nx)
 }
 
 /// What turns a variable's unit into the first one of `units`; no unit is that one.

@@ -1,0 +1,82 @@
+//! What hides blobs: surfaces and ground, drawn before them, with their depth.
+
+use super::buffers::Buffers;
+use super::plan::Pass;
+use super::settings::Settings;
+use crate::error::Result;
+use crate::gpu::memory::TargetFormat;
+use crate::gpu::{Compiler, Device, Image, Recorder, Start, Target};
+use crate::layout::frame::CameraRecord;
+use crate::model::scene::Scene;
+use crate::passes::surfaces::Surfaces;
+use crate::passes::terrain::{Piece, Terrain};
+
+pub(super) struct Scenery {
+    /// None where there are none.
+    surfaces: Option<Surfaces>,
+    terrain: Option<(Terrain, Vec<Piece>)>,
+    pub depth: Image,
+}
+
+impl Scenery {
+    /// Of `scene`, which has something that hides.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        format: TargetFormat,
+        depth_only: bool,
+    ) -> Result<Scenery> {
+        let surfaces = || Surfaces::new(device, compiler, format, depth_only);
+        let terrain = || Ok((Terrain::new(device, compiler, format, depth_only)?, pieces(scene)));
+        Ok(Scenery {
+            surfaces: (!scene.surfaces.is_empty()).then(surfaces).transpose()?,
+            terrain: (!scene.terrains.is_empty()).then(terrain).transpose()?,
+            depth: Image::depth(device, "surfaces.depth", scene.film.width, scene.film.height)?,
+        })
+    }
+
+    /// What `solids` draws, into `color`: what comes first clears it.
+    pub fn record(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        solids: Pass,
+        b: &Buffers,
+        color: &mut Image,
+        camera: &CameraRecord,
+        s: &Settings,
+    ) -> Result<()> {
+        let Scenery { surfaces, terrain, depth } = self;
+        match (solids, &surfaces, &terrain) {
+            (Pass::Surfaces, Some(surfaces), _) => {
+                let target = Target { color, depth: Some(depth) };
+                surfaces.record(rec, [&b.regions.buffer, &b.lit], target, camera, s.n_surfaces)
+            }
+            (Pass::Terrain, before, Some((terrain, pieces))) => {
+                let mut start = if before.is_some() { Start::Load } else { Start::Clear };
+                for piece in pieces {
+                    let target = Target { color: &mut *color, depth: Some(&mut *depth) };
+                    let buffers = [&b.regions.buffer, &b.ground, &b.lit];
+                    terrain.record(
+                        rec,
+                        buffers,
+                        (target, std::mem::replace(&mut start, Start::Load)),
+                        camera,
+                        *piece,
+                    )?;
+                }
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+fn pieces(scene: &Scene) -> Vec<Piece> {
+    let of = |(terrain, i_region): (&crate::model::terrain::Terrain, u32)| Piece {
+        i_region,
+        i_first_ground: scene.n_surface_facets() as u32,
+        n_cells: terrain.n_cells() as u32,
+    };
+    scene.terrains.iter().zip(scene.surfaces.len() as u32..).map(of).collect()
+}

@@ -1,0 +1,131 @@
+//! Ground under clouds: heights over columns, a point a column, drawn as triangles between them and lit at them
+//! (docs/model.md §16).
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+/// Rows of points, each seen from above to the left of the next where one looks along a row: u along a row, v from row to row,
+/// u × v up.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Terrain {
+    /// In the scene.
+    pub origin: DVec3,
+    /// Relative to the origin, row after row.
+    pub points: Arc<Vec<DVec3>>,
+    /// Points along u, and rows: 2 at least.
+    pub n: [u32; 2],
+    /// Index into the scene's materials.
+    pub i_material: usize,
+}
+
+/// What stands for a point's surroundings in the light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TerrainFacet {
+    /// Relative to the terrain's origin.
+    pub position: DVec3,
+    /// Unit, upward.
+    pub normal: DVec3,
+    pub area: f64,
+}
+
+/// The two halves of a cell by their corners' numbers (0: low u, low v; 1: high u; 2: high v; 3: both): a corner, the one along u
+/// from it or back, the one along v or back. The first's corner and the second's lie across, so both have one front.
+pub const HALVES: [[usize; 3]; 2] = [[0, 1, 2], [3, 2, 1]];
+
+impl Terrain {
+    pub fn n_facets(&self) -> u64 {
+        self.n.iter().map(|n| u64::from(*n)).product()
+    }
+
+    /// Cells between four points each.
+    pub fn n_cells(&self) -> u64 {
+        self.n.iter().map(|n| u64::from(n.saturating_sub(1))).product()
+    }
+
+    /// Numbers of the points at the corners of cell `i`, in the order of [`HALVES`].
+    pub fn corners(&self, i: u32) -> [usize; 4] {
+        let n_u = self.n[0] as usize;
+        let (row, column) = (i as usize / (n_u - 1), i as usize % (n_u - 1));
+        let low = row * n_u + column;
+        [low, low + 1, low + n_u, low + n_u + 1]
+    }
+
+    /// The facet of point `i`: its normal and area by the differences to its neighbours on both sides, at the edges to the one.
+    pub fn facet(&self, i: u32) -> TerrainFacet {
+        let [n_u, n_v] = self.n;
+        let (column, row) = (i % n_u, i / n_u);
+        let at = |column: u32, row: u32| self.points[(row * n_u + column) as usize];
+        let along = |k: u32, n: u32| (k.saturating_sub(1), (k + 1).min(n - 1));
+        let ((west, east), (south, north)) = (along(column, n_u), along(row, n_v));
+        let u = 0.5 * (at(east, row) - at(west, row));
+        let v = 0.5 * (at(column, north) - at(column, south));
+        let across = u.cross(v);
+        TerrainFacet { position: at(column, row), normal: across.normalize_or(DVec3::Y), area: across.length() }
+    }
+
+    pub fn facets(&self) -> impl Iterator<Item = TerrainFacet> + '_ {
+        (0..self.n[0] * self.n[1]).map(|i| self.facet(i))
+    }
+
+    /// Low and high corner of what encloses it, in the scene.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let (low, high) = self.extent();
+        (self.origin + low, self.origin + high)
+    }
+
+    /// The same relative to the origin.
+    pub fn extent(&self) -> (DVec3, DVec3) {
+        let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        self.points.iter().fold(start, |(low, high), p| (low.min(*p), high.max(*p)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// u east, v north (−z), 3 by 4 points of height `h(x, north)`.
+    fn terrain(h: impl Fn(f64, f64) -> f64) -> Terrain {
+        let at = |k: u32| (f64::from(k % 3), 2.0 * f64::from(k / 3));
+        let points = (0..12).map(at).map(|(x, north)| DVec3::new(x, h(x, north), -north)).collect();
+        Terrain { origin: DVec3::new(10.0, 0.0, 0.0), points: Arc::new(points), n: [3, 4], i_material: 0 }
+    }
+
+    #[test]
+    fn a_plane_has_one_normal_and_its_whole_area() {
+        let flat = terrain(|_, _| 5.0);
+        assert!(flat.facets().all(|f| f.normal == DVec3::Y && f.position.y == 5.0));
+        // 2 by 6: middles 1 x 2, edges half of it, corners a quarter.
+        assert_eq!(flat.facets().map(|f| f.area).collect::<Vec<_>>()[..6], [0.5, 1.0, 0.5, 1.0, 2.0, 1.0]);
+        assert_eq!(flat.facets().map(|f| f.area).sum::<f64>(), 12.0);
+        // Rising eastward by 3/4: normal (−3, 4, 0)/5, area times 5/4.
+        let slope = terrain(|x, _| 0.75 * x);
+        for (f, g) in slope.facets().zip(flat.facets()) {
+            assert!((f.normal - DVec3::new(-0.6, 0.8, 0.0)).length() < 1e-15 && (f.area - 1.25 * g.area).abs() < 1e-15);
+        }
+        // And northward by 1: (0, 1, 1)/√2.
+        let north = terrain(|_, north| north);
+        assert!(north.facets().all(|f| (f.normal - DVec3::new(0.0, 0.5f64.sqrt(), 0.5f64.sqrt())).length() < 1e-15));
+        assert_eq!(slope.bounds(), (DVec3::new(10.0, 0.0, -6.0), DVec3::new(12.0, 1.5, 0.0)));
+    }
+
+    #[test]
+    fn cells_have_two_halves_of_one_front() {
+        let t = terrain(|x, north| x * north);
+        assert_eq!((t.n_cells(), t.corners(0), t.corners(5)), (6, [0, 1, 3, 4], [7, 8, 10, 11]));
+        for i in 0..6 {
+            let p = t.corners(i).map(|k| t.points[k]);
+            for [a, b, c] in HALVES {
+                assert!((p[b] - p[a]).cross(p[c] - p[a]).y > 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wall_between_neighbours_is_no_trouble() {
+        // All points of a row at one place: no area, and no NaN.
+        let t = Terrain { points: Arc::new(vec![DVec3::ZERO; 4]), n: [2, 2], ..terrain(|_, _| 0.0) };
+        assert!(t.facets().all(|f| f.normal == DVec3::Y && f.area == 0.0));
+    }
+}

@@ -1,0 +1,223 @@
+//! Ground of weather files in scenes: the device's picture against the f64 one, what it does to the light, and what is refused.
+
+#[path = "harness/program.rs"]
+mod program;
+#[path = "harness/weather_files.rs"]
+mod weather_files;
+
+use std::fs;
+
+use program::{differ, path, run};
+use tempfile::TempDir;
+use weather_files::{Data, Made};
+
+const NX: usize = 8;
+const NY: usize = 6;
+
+/// A mountain of 1500 m in the west of 8 x 6 columns of 1 km, and clouds over the east.
+fn file() -> Made {
+    Made::wrf_of(1, 1, [NX, NY, 5])
+        .with_floats("HGT", |h| {
+            for (k, h) in h.iter_mut().enumerate() {
+                let (x, north) = ((k % NX) as f32 - 1.5, (k / NX) as f32 - 2.2);
+                *h = 1500.0 * (-(x * x + north * north) / 3.0).exp();
+            }
+        })
+        .with_floats("QCLOUD", |q| {
+            q.iter_mut().enumerate().for_each(|(i, q)| *q = if i / (NX * NY) == 3 && i % NX > 3 { 2e-4 } else { 0.0 });
+        })
+}
+
+/// The folder with a scene of that file, whose cloud has `more` keys.
+fn scene_of(made: &Made, more: &str) -> TempDir {
+    let dir = tempfile::tempdir().expect("a folder");
+    fs::write(dir.path().join("w.nc"), made.bytes()).expect("a file");
+    let scene = format!(
+        r#"
+[film]
+width = 100
+height = 75
+format = "rgba32f"
+[camera]
+position = [1000.0, 5000.0, 9000.0]
+target = [0.0, 500.0, 0.0]
+near = 10.0
+[lighting]
+mode = "first"
+grid = 24
+step = 1.0
+[[light]]
+kind = "directional"
+direction = [-0.3, -1.0, 0.2]
+irradiance = [3.0, 2.9, 2.7]
+[[light]]
+kind = "sky"
+irradiance = [0.8, 0.87, 1.0]
+constant = 0.3
+[[material]]
+name = "cloud"
+[[material]]
+name = "rock"
+kd = [0.5, 0.4, 0.3]
+[[cloud]]
+from = "weather"
+file = "w.nc"
+particles = 120
+{more}
+"#
+    );
+    fs::write(dir.path().join("scene.toml"), scene).expect("a scene");
+    dir
+}
+
+fn render(dir: &TempDir, name: &str, more: &[&str]) {
+    let (scene, out) = (path(dir, "scene.toml"), path(dir, name));
+    let output = run(&[&["render", &scene, "-q", "--force", "-o", &out], more].concat());
+    assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// f32 lighting and drawing, as in tests/render_reference.rs; a pixel on the ground's rim may show it or not.
+const RMSE_OF_F32: f64 = 1e-5;
+
+#[test]
+fn the_device_draws_the_ground_as_the_reference_does() {
+    let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"\nexaggeration = 1.5");
+    let plate = "[[surface]]\ncenter = [3000.0, 400.0, 1000.0]\nu = [900.0, 0.0, 0.0]\nv = [0.0, 0.0, -900.0]\n\
+                 subdivide = [3, 3]\nmaterial = \"rock\"\n";
+    let scene = fs::read_to_string(dir.path().join("scene.toml")).expect("the scene");
+    let unlit = ["--set", "lighting.mode=\"none\""];
+    let two = ["--set", "lighting.mode=\"two-reflection\"", "--set", "lighting.gather=\"exact\""];
+    let few = [&two[..], &["--set", "lighting.facets_per_cloud=20"]].concat();
+    for (what, more) in [
+        ("one reflection", vec![]),
+        ("nothing lit", unlit.to_vec()),
+        ("two reflections", few),
+        ("from below", vec!["--set", "camera.position=[500,-3000,100]"]),
+        ("by sprites", vec!["--set", "draw.path=\"sprites\""]),
+        (
+            "far from the origin",
+            vec![
+                "--set",
+                "cloud.0.position=[5e7,0,0]",
+                "--set",
+                "camera.position=[50001000,5000,9000]",
+                "--set",
+                "camera.target=[50000000,500,0]",
+            ],
+        ),
+    ] {
+        // Surfaces' own light is another matter: the reference's is in closed form, the device's marched.
+        for plates in ["", plate].into_iter().take(if what == "nothing lit" { 2 } else { 1 }) {
+            fs::write(dir.path().join("scene.toml"), format!("{scene}{plates}")).expect("a scene");
+            render(&dir, "thin.exr", &[&["--reference", "thin"], &more[..]].concat());
+            render(&dir, "drawn.exr", &[&["--validation"], &more[..]].concat());
+            let (rmse, max) = differ(&dir, "thin.exr", "drawn.exr");
+            println!("{what}, {} plates: RMSE {rmse:.1e}, greatest {max:.1e}", plates.len().min(1));
+            // Pairs of facets err by more than rounding: 1 % of L2 is what lighting.pair_size is held to.
+            let most = if what == "two reflections" { 2e-3 } else { RMSE_OF_F32 };
+            assert!(rmse <= most, "{what}: {rmse:e}");
+        }
+    }
+}
+
+#[test]
+fn smaller_pictures_chunks_and_shells_have_the_ground_too() {
+    let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"\nexaggeration = 1.5");
+    render(&dir, "full.exr", &[]);
+    for (more, most) in [
+        (vec!["--set", "draw.path=\"sprites\"", "--set", "draw.chunks=3"], RMSE_OF_F32),
+        (vec!["--no-skip"], 0.0),
+        (vec!["--set", "draw.cull=\"off\""], 0.0),
+    ] {
+        render(&dir, "other.exr", &[&["--validation"], &more[..]].concat());
+        let (rmse, _) = differ(&dir, "full.exr", "other.exr");
+        println!("{more:?}: {rmse:.1e}");
+        assert!(rmse <= most, "{more:?}: {rmse:e}");
+    }
+    // In half the size no more is lost than without ground.
+    let loss = |more: &[&str]| {
+        render(&dir, "full.exr", more);
+        render(&dir, "half.exr", &[&["--validation", "--set", "draw.resolution=0.5"], more].concat());
+        differ(&dir, "full.exr", "half.exr").0
+    };
+    for more in [&[][..], &["--set", "draw.path=\"sprites\""]] {
+        let [with, without] = [loss(more), loss(&[more, &["--set", "cloud.0.ground=\"none\""]].concat())];
+        println!("half the size: {with:.1e}, without ground {without:.1e}");
+        assert!(with < 1.1 * without, "{with:e} {without:e}");
+    }
+    // A flight, in both loops, with impostors and without: the same bytes, and validation has nothing to say.
+    let bench = ["--frames", "4", "--repeat", "2", "--warmup", "1", "-q", "--validation"];
+    let scene = path(&dir, "scene.toml");
+    for more in [&["--set", "draw.impostors=\"on\""][..], &[]] {
+        let output = run(&[&["bench", &scene], &bench[..], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}
+
+#[test]
+fn clouds_throw_their_shadow_on_the_ground_and_it_lightens_them() {
+    let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"");
+    let facets = |more: &[&str]| -> Vec<[f64; 5]> {
+        let scene = path(&dir, "scene.toml");
+        let output = run(&[&["inspect", &scene, "--facets"], more].concat());
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let mut reader = csv::Reader::from_reader(&output.stdout[..]);
+        let names = reader.headers().expect("names").clone();
+        let column = |name: &str| names.iter().position(|n| n == name).expect(name);
+        let columns = ["region", "x", "y", "id_g", "ii_g"].map(column);
+        reader.records().map(|r| r.expect("a row")).map(|r| columns.map(|c| r[c].parse().expect("a number"))).collect()
+    };
+    let sun = ["--set", "light.1.irradiance=[0,0,0]", "--set", "lighting.mode=\"two-reflection\""];
+    let found = facets(&sun);
+    let ground: Vec<_> = found.iter().filter(|f| f[0] == 0.0).collect();
+    assert_eq!(ground.len(), NX * NY);
+    // The light comes from the west of above, so the shadow of the east half lies a little west of it: the easternmost two columns
+    // are in it, the plain of the middle west is not.
+    let cosine = 1.0 / (0.09f64 + 1.0 + 0.04).sqrt();
+    let in_shadow: Vec<f64> = ground.iter().filter(|f| f[1] > 1900.0 && f[1] < 3000.0).map(|f| f[3]).collect();
+    assert!(in_shadow.iter().all(|light| *light < 0.9 * 2.9 * cosine), "{in_shadow:?}");
+    let lit = ground.iter().filter(|f| f[1] < -3000.0 && f[2] < 100.0).map(|f| f[3] / (2.9 * cosine));
+    let lit: Vec<f64> = lit.collect();
+    assert!(!lit.is_empty() && lit.iter().all(|light| (light - 1.0).abs() < 0.15), "{lit:?}");
+    // The clouds have light from the ground, which they have not where it is black.
+    let of_clouds = |found: &[[f64; 5]]| found.iter().filter(|f| f[0] == 1.0).map(|f| f[4]).sum::<f64>();
+    let black = facets(&[&sun[..], &["--set", "material.1.kd=[0,0,0]"]].concat());
+    assert!(of_clouds(&found) > 1.05 * of_clouds(&black), "{} {}", of_clouds(&found), of_clouds(&black));
+}
+
+#[test]
+fn what_is_wrong_with_the_ground_is_told() {
+    let said = |made: &Made, more: &str| {
+        let dir = scene_of(made, &format!("material = \"cloud\"\n{more}"));
+        let output = run(&["render", &path(&dir, "scene.toml"), "-o", &path(&dir, "out.png")]);
+        assert_eq!(output.status.code(), Some(2));
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    for (made, more, expected) in [
+        (
+            file().without("HGT"),
+            "ground = \"rock\"",
+            "`cloud.0.ground`: expected \"none\": the file has no variable HGT",
+        ),
+        (file(), "ground = \"rok\"", "`cloud.0.ground`: unknown material `rok`; did you mean `rock`?"),
+        (file(), "ground = 3", "`cloud.0.ground`: expected a string, found integer 3"),
+        (
+            Made::wrf_of(1, 1, [4, 1, 5]),
+            "ground = \"rock\"",
+            "the file has 4 x 1 columns, and ground lies between 2 x 2",
+        ),
+        (file().with_floats("HGT", |h| h[9] = f32::NAN), "ground = \"rock\"", "w.nc: variable HGT, step 0"),
+        (
+            file().with_floats("HGT", |h| h[9] = 1e6),
+            "ground = \"rock\"",
+            "w.nc: step 0: HGT is 1000000 m at row 1, column 1, expected -1000 to 200000",
+        ),
+    ] {
+        let said = said(&made, more);
+        assert!(said.contains(expected), "{said}");
+    }
+    // Without a ground nobody asks for HGT.
+    let dir = scene_of(&file().with_floats("HGT", |h| h[9] = f32::NAN), "material = \"cloud\"");
+    render(&dir, "none.exr", &[]);
+    assert!(matches!(file().var("HGT").data, Data::Floats(_)));
+}

@@ -4,7 +4,7 @@
 //!
 //! `io` turns text into a `model` (plain f64 data and mathematics); `layout` turns the model into the f32 records
 //! that the GPU reads; `passes` are the GPU's stages, one a room, on `gpu`, which knows Vulkan and no cloud;
-//! `frame` runs them (game step → packet → render step); `study` measures; `cli` is what was typed. `reference`
+//! `frame` runs them (game step → packet → render step); `study` measures; `viewer` is what is changed by hand; `cli` is what was typed. `reference`
 //! holds the f64 twin of every pass, written from the mathematics, and meets the passes only in tests and studies.
 
 pub mod cli;
@@ -18,3 +18,4 @@ pub mod model;
 pub mod passes;
 pub mod reference;
 pub mod study;
+pub mod viewer;

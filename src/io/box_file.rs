@@ -1,10 +1,12 @@
 //! Box files, P Table 1: the number of particles, the number of boxes, then a line a box of
 //! `particles, x extent, y extent, z extent, x, y, z, radius`.
 
+use std::io::Write;
 use std::path::Path;
 
 use glam::DVec3;
 
+use super::atomic::write_atomic;
 use super::magnitude::{LEAST_EXTENT, shortest, wrong_coordinate, wrong_size};
 use super::suggest::shown;
 use super::text_file::{DATA_LIMIT, line_column, read_text};
@@ -48,6 +50,33 @@ pub fn format(boxes: &[CloudBox]) -> String {
         text += &format!("{}, {}\n", b.n_particles, numbers.join(", "));
     }
     text
+}
+
+/// [`format`], in place of what was there only once it is whole. More than [`parse`] is ever given is an
+/// [`Error::Limit`], and nothing is written.
+pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
+    let text = format(boxes);
+    if text.len() as u64 > DATA_LIMIT {
+        let n_bytes = text.len();
+        return Err(Error::limit(format!("a box file has at most {DATA_LIMIT} bytes, and this one {n_bytes}")));
+    }
+    // Through a link, or the link itself would be replaced.
+    let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    write_atomic(&place, |file| file.write_all(text.as_bytes()))
+}
+
+/// The first field of a box that [`parse`] would refuse, and what it would expect.
+pub fn wrong(b: &CloudBox) -> Option<String> {
+    let numbers = [b.extent.to_array(), b.center.to_array()].concat();
+    let mut checked = FIELDS[1..].iter().zip(numbers.into_iter().chain([b.radius_max])).enumerate();
+    checked.find_map(|(i, (name, v))| {
+        let expected = match i {
+            0..3 => wrong_size(v, LEAST_EXTENT),
+            3..6 => wrong_coordinate(v),
+            _ => wrong_size(v, 0.0),
+        };
+        expected.map(|expected| format!("{name}: expected {expected}, found {}", shortest(v)))
+    })
 }
 
 struct Line<'a> {

@@ -18,3 +18,4 @@ pub mod model;
 pub mod passes;
 pub mod reference;
 pub mod study;
+pub mod viewer;

@@ -4,11 +4,11 @@
 use std::fmt::Write;
 
 use nimbus::frame::choice::{Choice, Tried};
+use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::least::Least;
 use nimbus::model::resolution::Resolution;
 use nimbus::model::scene::{Cull, Draw, DrawPath, Scene};
-use nimbus::study::stage::{DeviceChoice, Stage};
 
 const ALL: [&str; 6] = [
     "draw.path='auto'",

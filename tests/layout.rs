@@ -27,7 +27,7 @@ use nimbus::passes::{
     self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place, second, sort,
     sprites,
 };
-use nimbus::passes::{surfaces, terrain, texture, tiles, transmit, upsample};
+use nimbus::passes::{present, surfaces, terrain, texture, tiles, transmit, upsample};
 
 /// A host record: GLSL's name of it, its fields, its size.
 type Record = (&'static str, &'static [Field], usize);
@@ -62,7 +62,7 @@ const RECORDS: [Record; 25] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 47] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 48] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -137,6 +137,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 47] = [
         sprites::Push::FIELDS,
         &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Textured")],
     ),
+    ("present.frag", present::Push::FIELDS, &[B(4)]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
     ("terrain.frag", terrain::Push::FIELDS, &[]),

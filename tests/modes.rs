@@ -174,8 +174,8 @@ fn smaller_pictures_give_the_same_bytes_in_every_mode() {
 #[test]
 fn the_faster_way_is_taken_and_named() {
     let stage = |path: &str| {
-        let choice = nimbus::study::stage::DeviceChoice { validation: true, ..Default::default() };
-        nimbus::study::stage::Stage::new(scene(&[path]), &choice, true).expect("a stage")
+        let choice = nimbus::frame::stage::DeviceChoice { validation: true, ..Default::default() };
+        nimbus::frame::stage::Stage::new(scene(&[path]), &choice, true).expect("a stage")
     };
     let mut auto = stage("draw.path='auto'");
     let choice = auto.choices.pop().expect("a choice");

@@ -1,8 +1,8 @@
 //! The stress suite finds faults: each of these shaders is wrong in one place, and a case that is named fails of it
 //! (docs/stability.md, "Faults that are found").
 
+use nimbus::frame::stage::DeviceChoice;
 use nimbus::passes;
-use nimbus::study::stage::DeviceChoice;
 use nimbus::study::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
 
 /// What is wrong, in which file, a text of it and what stands in its place, and the case that fails.

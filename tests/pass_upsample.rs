@@ -19,7 +19,9 @@ const FORMATS: [TargetFormat; 3] = [TargetFormat::Rgba8, TargetFormat::Rgba16f, 
 fn stored(format: TargetFormat, v: [f64; 4]) -> Vec<u32> {
     let half = |x: f64| u32::from(half::f16::from_f64(x).to_bits());
     match format {
-        TargetFormat::Rgba8 => vec![v.iter().rev().fold(0, |w, x| w << 8 | (255.0 * x).round() as u32)],
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
+            vec![v.iter().rev().fold(0, |w, x| w << 8 | (255.0 * x).round() as u32)]
+        }
         TargetFormat::Rgba16f => vec![half(v[0]) | half(v[1]) << 16, half(v[2]) | half(v[3]) << 16],
         TargetFormat::Rgba32f => v.map(|x| (x as f32).to_bits()).to_vec(),
     }
@@ -28,7 +30,7 @@ fn stored(format: TargetFormat, v: [f64; 4]) -> Vec<u32> {
 fn numbers(format: TargetFormat, words: &[u32]) -> Vec<f64> {
     let half = |w: u32| half::f16::from_bits(w as u16).to_f64();
     let of = |w: &u32| match format {
-        TargetFormat::Rgba8 => w.to_le_bytes().map(|b| f64::from(b) / 255.0).to_vec(),
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => w.to_le_bytes().map(|b| f64::from(b) / 255.0).to_vec(),
         TargetFormat::Rgba16f => vec![half(w & 0xffff), half(w >> 16)],
         TargetFormat::Rgba32f => vec![f64::from(f32::from_bits(*w))],
     };
@@ -39,7 +41,7 @@ fn numbers(format: TargetFormat, words: &[u32]) -> Vec<f64> {
 fn roundoff(format: TargetFormat, value: f64) -> f64 {
     match format {
         // Twice half a step.
-        TargetFormat::Rgba8 => 1.0 / 255.0,
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => 1.0 / 255.0,
         TargetFormat::Rgba16f => 2f64.powi(-10) * value.abs().max(2f64.powi(-14)),
         TargetFormat::Rgba32f => 2f64.powi(-126),
     }

@@ -10,9 +10,9 @@ use std::time::Instant;
 use nimbus::frame::FrameTimes;
 use nimbus::frame::plan::Pass;
 use nimbus::frame::render::Renderer;
+use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::scene::Threading;
-use nimbus::study::stage::{DeviceChoice, Stage};
 use sha2::{Digest, Sha256};
 
 /// Frames of each loop, where `NIMBUS_SOAK_FRAMES` names no other number.

@@ -5,13 +5,13 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 
+use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::gpu::{ClockFit, ClockPair};
 use nimbus::io::scene_file;
 use nimbus::measure::zones::{Collected, Zones};
 use nimbus::model::scene::Threading;
 use nimbus::study::bench::{self, BenchPlan, Sample};
 use nimbus::study::cases::cases;
-use nimbus::study::stage::{DeviceChoice, Stage};
 use nimbus::study::trace::{self, Beside};
 use serde_json::Value;
 use tracing_subscriber::layer::SubscriberExt;

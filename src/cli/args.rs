@@ -3,6 +3,8 @@
 mod results;
 mod stress;
 mod study;
+#[cfg(feature = "window")]
+mod view;
 mod weather;
 
 use std::path::PathBuf;
@@ -13,6 +15,8 @@ use crate::io::scene_file::MAX_SIDE;
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
+#[cfg(feature = "window")]
+pub use view::{PresentArg, ViewArgs};
 pub use weather::WeatherArgs;
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
@@ -20,7 +24,7 @@ pub use weather::WeatherArgs;
 #[command(version, propagate_version = true, max_term_width = 100)]
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
     nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus report before after -o report.html\n  \
-    nimbus inspect scenes/cubes-554.toml\n  nimbus weather scenes/weather/katrina.nc\n  nimbus devices\n\n\
+    nimbus inspect scenes/cubes-554.toml\n  nimbus view scenes/cubes-554.toml\n  nimbus weather scenes/weather/katrina.nc\n  nimbus devices\n\n\
     Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  101 a fault of nimbus itself; 130 interrupted.")]
 pub struct Args {
     #[command(subcommand)]
@@ -100,6 +104,13 @@ pub enum Command {
     Inspect(InspectArgs),
     /// List Vulkan devices, their limits, and which one nimbus uses
     Devices(DevicesArgs),
+    /// Look at a scene in a window: fly, turn what is drawn and how, read frame times
+    ///
+    /// Keys and mouse are printed when it opens and by "?". The loops are those that bench times, one after the other or side
+    /// by side, and "t" goes from one to the other; the window's title says how long their frames take, and when it is closed
+    /// all of them are summed up. "i" prints the render command that draws what is seen.
+    #[cfg(feature = "window")]
+    View(ViewArgs),
     /// Say what is in a weather file, and what clouds there are in it
     ///
     /// Reads output of WRF as NetCDF of every kind (classic, 64-bit offset, CDF-5, NetCDF-4) and prints variables, steps with

@@ -10,6 +10,7 @@ use super::args::{BenchArgs, ThreadingArg};
 use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
 use crate::frame::limits;
+use crate::frame::stage::Stage;
 use crate::gpu::ClockFit;
 use crate::io::atomic;
 use crate::measure::zones::Zones;
@@ -20,7 +21,6 @@ use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points, sweep_
 use crate::study::machine;
 use crate::study::outcome::pass_names;
 use crate::study::records::{self, Run};
-use crate::study::stage::Stage;
 use crate::study::trace;
 
 /// Of the device's clock beside the host's, before the frames and after them.

@@ -3,8 +3,8 @@
 use super::args::{BasisArg, InspectArgs};
 use super::{check_time, device_choice, load, output, say_notes, say_sizes};
 use crate::error::Result;
+use crate::frame::stage::Stage;
 use crate::model::scene::Scene;
-use crate::study::stage::Stage;
 use crate::study::{air, basis, inspect};
 
 /// Frames that `--plan` shows: the first does everything, the second shows what a step of time changes, the third that

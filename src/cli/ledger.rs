@@ -10,6 +10,7 @@ use super::render_reference::Shown;
 use super::{device_choice, load, output};
 use crate::error::{Error, Result};
 use crate::frame::limits;
+use crate::frame::stage::Bed;
 use crate::io::atomic::{check_place, write_atomic};
 use crate::study::against::Against;
 use crate::study::ledger::records::{LEDGER_FILE, Ledger, Row, SCHEMA_VERSION};
@@ -21,7 +22,6 @@ use crate::study::pixels::Pixels;
 use crate::study::plot;
 use crate::study::provenance::{Figure, Provenance};
 use crate::study::records::prepare_out_dir;
-use crate::study::stage::Bed;
 use crate::study::tradeoff::players::Frames;
 
 /// `graceful`: set, as rows that are finished are kept on Ctrl-C.

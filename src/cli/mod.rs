@@ -17,6 +17,8 @@ mod report;
 mod stress;
 mod tradeoff;
 mod tradeoff_table;
+#[cfg(feature = "window")]
+mod view;
 mod weather;
 
 use std::path::Path;
@@ -27,13 +29,13 @@ use clap::Parser;
 
 use crate::error::{Error, Result};
 use crate::frame::limits::advice;
+use crate::frame::stage::{DeviceChoice, Stage};
 use crate::io::atomic;
 use crate::io::magnitude::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
 use crate::study::basis::basis_warnings;
 use crate::study::inspect::light_notes;
-use crate::study::stage::{DeviceChoice, Stage};
 use args::{Args, Command, SceneArgs};
 
 /// Set by Ctrl-C where [`GRACEFUL`] is: the command looks at it between frames.
@@ -60,6 +62,11 @@ pub fn main() -> ExitCode {
         Command::Stress(a) => stress::run(a, &STOP, &GRACEFUL),
         Command::Inspect(a) => inspect::run(a),
         Command::Devices(a) => devices::run(a),
+        #[cfg(feature = "window")]
+        Command::View(a) => {
+            GRACEFUL.store(true, Ordering::Relaxed);
+            view::run(a, &STOP)
+        }
         Command::Weather(a) => weather::run(a),
     };
     match done {

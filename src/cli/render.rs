@@ -8,11 +8,11 @@ use super::{check_time, device_choice, load, output, refuse_existing, render_ref
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
+use crate::frame::stage::Stage;
 use crate::io::image::{self, ImageKind};
 use crate::model::film::FilmFormat;
 use crate::study::counts::Counts;
 use crate::study::machine::device_record;
-use crate::study::stage::Stage;
 
 pub fn run(args: &RenderArgs) -> Result<()> {
     // All that can be known to be wrong is said before any work.

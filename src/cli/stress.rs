@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::args::StressArgs;
 use super::output;
 use crate::error::{Error, Result};
+use crate::frame::stage::DeviceChoice;
 use crate::study::machine::{self, Cpu, Device};
-use crate::study::stage::DeviceChoice;
 use crate::study::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
 
 /// What `--json` prints; its form is docs/stress.schema.json.

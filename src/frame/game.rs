@@ -39,7 +39,12 @@ pub struct Game {
     rest: Option<Vec<ParticleRecord>>,
     /// Groups that cannot be in the picture are not drawn.
     culls: bool,
+    /// Where somebody looks from, in place of the scene's camera.
+    viewpoint: Option<Viewpoint>,
 }
+
+/// Asked for at every step, on the thread that plays; the width of the view and the near plane are the scene's.
+pub type Viewpoint = Box<dyn Fn() -> Pose + Send>;
 
 /// What a frame's time says of the scene, before it becomes records: shared with the references.
 #[derive(Debug, Clone)]
@@ -86,7 +91,7 @@ impl Game {
         let table = Arc::new(table(&scene, basis.as_ref(), scene.time.start_s));
         let n_bases = basis.as_ref().map_or(1, Basis::n_bases);
         let shape = is_edited(&scene).then(|| Shape::of(&scene, n_bases));
-        Game { scene, groups, modes, i_modes, basis, table, shape, rest, culls: true }
+        Game { scene, groups, modes, i_modes, basis, table, shape, rest, culls: true, viewpoint: None }
     }
 
     /// Whether groups that cannot be in the picture are left out of it, as they are unless told otherwise.
@@ -97,6 +102,11 @@ impl Game {
     /// The same for the next steps of a game that is under way.
     pub fn set_culling(&mut self, culls: bool) {
         self.culls = culls;
+    }
+
+    /// The same, seen from where `viewpoint` says.
+    pub fn seen_from(self, viewpoint: Viewpoint) -> Game {
+        Game { viewpoint: Some(viewpoint), ..self }
     }
 
     /// The same scene, drawn otherwise.
@@ -113,7 +123,10 @@ impl Game {
     pub fn step_at(&mut self, i_frame: u32, time_s: f64) -> Result<Packet> {
         let begin = Instant::now();
         let _zone = info_span!("game step").entered();
-        let setting = info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
+        let mut setting = info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
+        if let Some(viewpoint) = &self.viewpoint {
+            setting.pose = viewpoint();
+        }
         let origins: Vec<DVec3> =
             self.scene.clouds.iter().map(|c| c.origin_at(time_s) - setting.light_origin).collect();
         let grown = self.scene.grown(&self.groups, time_s);

@@ -25,6 +25,7 @@ pub mod serial;
 mod settings;
 mod shells;
 mod shrunk;
+pub mod stage;
 pub mod tensor;
 pub mod tiling;
 

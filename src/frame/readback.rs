@@ -5,8 +5,8 @@ use tracing::info_span;
 use super::buffers::download;
 use super::render::Renderer;
 use crate::error::{Error, Result};
-use crate::gpu::Device;
 use crate::gpu::memory::TargetFormat;
+use crate::gpu::{Buffer, Device, Recorder};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::model::boxes::MAX_ATTEMPTS;
@@ -14,7 +14,7 @@ use crate::model::boxes::MAX_ATTEMPTS;
 /// The numbers of a picture as it lies in a target.
 pub(super) fn floats(format: TargetFormat, bytes: Vec<u8>) -> Vec<f32> {
     match format {
-        TargetFormat::Rgba8 => bytes.into_iter().map(|b| f32::from(b) / 255.0).collect(),
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => bytes.into_iter().map(|b| f32::from(b) / 255.0).collect(),
         TargetFormat::Rgba16f => {
             let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
             halves.into_iter().map(half::f16::to_f32).collect()
@@ -38,6 +38,16 @@ impl Renderer {
             Ok(())
         })?;
         readback.read(settings.n_bytes() as usize)
+    }
+
+    /// Copies the picture of the last frame that ended, as it lies in the target: premultiplied linear RGBA, rows from the top.
+    pub fn record_picture(&mut self, rec: &mut Recorder<'_>, to: &Buffer) {
+        self.drawing.record_read(rec, self.traits.path, self.i_ended_picture, to);
+    }
+
+    /// Format of that, and its bytes.
+    pub fn picture_format(&self) -> (TargetFormat, u64) {
+        (self.settings.format, self.settings.n_bytes())
     }
 
     /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.

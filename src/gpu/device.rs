@@ -5,7 +5,7 @@ use std::mem::ManuallyDrop;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::calibration;
@@ -24,6 +24,8 @@ pub struct DeviceInfo {
     /// Why nimbus cannot use it, if it cannot.
     pub unusable: Option<String>,
     pub limits: Limits,
+    /// Whether it can show pictures in windows.
+    pub has_swapchain: bool,
     /// The extension by which the device's clock and the host's can be read at one moment, where there is one.
     pub calibrated_timestamps: Option<&'static CStr>,
     physical: vk::PhysicalDevice,
@@ -113,7 +115,7 @@ impl Device {
     /// integrated, virtual, CPU.
     pub fn open(instance: &Arc<Instance>, choice: Option<&str>) -> Result<Device> {
         let info = Self::choose(Self::list(instance)?, choice)?;
-        let raw = create(&instance.raw, &info)?;
+        let raw = create(instance, &info)?;
         let queue = unsafe { raw.get_device_queue(info.queue_family, 0) };
         let mut debug_settings = gpu_allocator::AllocatorDebugSettings::default();
         // Device::drop reports leaks itself, into the messages that tests read.
@@ -198,6 +200,11 @@ impl Device {
         unsafe { instance.get_physical_device_format_properties(self.info.physical, format) }.optimal_tiling_features
     }
 
+    #[cfg(feature = "window")]
+    pub(super) fn physical(&self) -> vk::PhysicalDevice {
+        self.info.physical
+    }
+
     pub(super) fn shared(&self) -> &Arc<Shared> {
         &self.shared
     }
@@ -247,6 +254,7 @@ impl Drop for Shared {
 
 fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> DeviceInfo {
     let calibrated_timestamps = calibration::probe(instance, physical);
+    let has_swapchain = has_extension(instance, physical, khr::swapchain::NAME);
     let instance = &instance.raw;
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut id = vk::PhysicalDeviceIDProperties::default();
@@ -305,6 +313,7 @@ fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> 
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
             timestamp_period_ns: f64::from(limits.timestamp_period),
         },
+        has_swapchain,
         calibrated_timestamps,
         physical,
         queue_family: family.unwrap_or(0) as u32,
@@ -338,7 +347,12 @@ fn unusable(
     needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
 }
 
-fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
+fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) };
+    extensions.is_ok_and(|all| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
+}
+
+fn create(instance: &Instance, info: &DeviceInfo) -> Result<ash::Device> {
     let priorities = [1.0];
     let queues =
         [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
@@ -350,12 +364,13 @@ fn create(instance: &ash::Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .shader_demote_to_helper_invocation(true)
         .subgroup_size_control(true)
         .compute_full_subgroups(true);
-    let extensions: Vec<_> = info.calibrated_timestamps.iter().map(|name| name.as_ptr()).collect();
+    let swapchain = (instance.has_surfaces && info.has_swapchain).then_some(khr::swapchain::NAME);
+    let extensions: Vec<_> = info.calibrated_timestamps.into_iter().chain(swapchain).map(CStr::as_ptr).collect();
     let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
     let features =
         vk::PhysicalDeviceFeatures::default().shader_int64(info.limits.words_64).shader_float64(info.limits.floats_64);
     let create = create.enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
-    unsafe { instance.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
+    unsafe { instance.raw.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
 }
 
 fn kind(t: vk::PhysicalDeviceType) -> &'static str {
@@ -407,6 +422,7 @@ mod tests {
             uuid: String::new(),
             unusable: None,
             limits,
+            has_swapchain: false,
             calibrated_timestamps: None,
             physical: vk::PhysicalDevice::null(),
             queue_family: 0,

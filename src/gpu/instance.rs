@@ -27,6 +27,8 @@ impl Messages {
 pub struct Instance {
     pub(super) raw: ash::Instance,
     pub(super) has_debug_utils: bool,
+    /// Devices may be asked to show pictures in windows.
+    pub(super) has_surfaces: bool,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Arc<Messages>,
     // Holds the loader's library open; dropped last.
@@ -37,6 +39,11 @@ impl Instance {
     /// An instance of Vulkan 1.3. With `validation` the Khronos layer runs with synchronization validation, and
     /// its absence is an error: a check that silently does not run is worse than none.
     pub fn new(validation: bool) -> Result<Arc<Instance>> {
+        Instance::with_extensions(validation, &[])
+    }
+
+    /// The same that can show pictures in windows, by the extensions which the window system `wanted`.
+    pub(super) fn with_extensions(validation: bool, wanted: &[&CStr]) -> Result<Arc<Instance>> {
         // SAFETY: the loader is a trusted system library; it is kept open as long as anything made from it.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
             Error::vulkan("loading libvulkan", format!("{e}; is the Vulkan loader installed? (tools/bootstrap)"))
@@ -54,7 +61,15 @@ impl Instance {
             .map_err(|e| Error::vulkan("vkEnumerateInstanceExtensionProperties", e))?;
         let has_debug_utils =
             validation || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        let raw = create(&entry, validation, has_debug_utils, &messages)?;
+        if let Some(missing) =
+            wanted.iter().find(|name| !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
+        {
+            let what = format!("the Vulkan loader lacks {}: no driver here shows pictures", missing.to_string_lossy());
+            return Err(Error::vulkan("window extensions", what));
+        }
+        let mut names = wanted.to_vec();
+        names.extend(has_debug_utils.then_some(ext::debug_utils::NAME));
+        let raw = create(&entry, validation, &names, &messages)?;
         let messenger = if validation {
             let debug = ext::debug_utils::Instance::new(&entry, &raw);
             let made = unsafe { debug.create_debug_utils_messenger(&messenger_info(&messages), None) };
@@ -68,7 +83,8 @@ impl Instance {
         } else {
             None
         };
-        Ok(Arc::new(Instance { raw, has_debug_utils, messenger, messages, entry }))
+        let has_surfaces = !wanted.is_empty();
+        Ok(Arc::new(Instance { raw, has_debug_utils, has_surfaces, messenger, messages, entry }))
     }
 
     pub fn messages(&self) -> &Arc<Messages> {
@@ -91,7 +107,7 @@ impl Drop for Instance {
 fn create(
     entry: &ash::Entry,
     validation: bool,
-    has_debug_utils: bool,
+    extensions: &[&CStr],
     messages: &Arc<Messages>,
 ) -> Result<ash::Instance> {
     let application = vk::ApplicationInfo::default()
@@ -99,7 +115,7 @@ fn create(
         .engine_name(c"nimbus")
         .api_version(vk::API_VERSION_1_3);
     let layers = if validation { vec![VALIDATION_LAYER.as_ptr()] } else { vec![] };
-    let extensions = if has_debug_utils { vec![ext::debug_utils::NAME.as_ptr()] } else { vec![] };
+    let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
     let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
     let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
     let mut messenger = messenger_info(messages);

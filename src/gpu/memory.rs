@@ -197,6 +197,8 @@ pub struct Image {
     pub(super) extent: vk::Extent2D,
     pub(super) range: vk::ImageSubresourceRange,
     allocation: Option<Allocation>,
+    /// A swapchain's, which owns it.
+    is_borrowed: bool,
     shared: Arc<Shared>,
 }
 
@@ -207,6 +209,8 @@ pub enum TargetFormat {
     Rgba8,
     Rgba16f,
     Rgba32f,
+    /// What windows mostly have; UNORM, too.
+    Bgra8,
 }
 
 impl TargetFormat {
@@ -215,12 +219,13 @@ impl TargetFormat {
             TargetFormat::Rgba8 => vk::Format::R8G8B8A8_UNORM,
             TargetFormat::Rgba16f => vk::Format::R16G16B16A16_SFLOAT,
             TargetFormat::Rgba32f => vk::Format::R32G32B32A32_SFLOAT,
+            TargetFormat::Bgra8 => vk::Format::B8G8R8A8_UNORM,
         }
     }
 
     pub fn bytes_per_pixel(self) -> u64 {
         match self {
-            TargetFormat::Rgba8 => 4,
+            TargetFormat::Rgba8 | TargetFormat::Bgra8 => 4,
             TargetFormat::Rgba16f => 8,
             TargetFormat::Rgba32f => 16,
         }
@@ -266,21 +271,43 @@ impl Image {
         let requirements = unsafe { shared.raw.get_image_memory_requirements(raw) };
         let (layout, view) = (vk::ImageLayout::UNDEFINED, vk::ImageView::null());
         let range = vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1);
-        let mut image = Image { raw, view, layout, extent, range, allocation: None, shared };
+        let mut image = Image { raw, view, layout, extent, range, allocation: None, is_borrowed: false, shared };
         let allocation = allocate(&image.shared, name, requirements, MemoryLocation::GpuOnly, false)?;
         let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
         image.allocation = Some(allocation);
         unsafe { image.shared.raw.bind_image_memory(raw, memory, offset) }
             .map_err(|e| Error::vulkan(format!("vkBindImageMemory {name}"), e))?;
+        image.make_view(name, format)?;
+        Ok(image)
+    }
+
+    /// An image of a swapchain, which must outlive it.
+    #[cfg(feature = "window")]
+    pub(super) fn of_swapchain(
+        shared: &Arc<Shared>,
+        name: &str,
+        raw: vk::Image,
+        extent: vk::Extent2D,
+        format: TargetFormat,
+    ) -> Result<Image> {
+        let range =
+            vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
+        let (layout, view, shared) = (vk::ImageLayout::UNDEFINED, vk::ImageView::null(), shared.clone());
+        let mut image = Image { raw, view, layout, extent, range, allocation: None, is_borrowed: true, shared };
+        image.make_view(name, format.raw())?;
+        Ok(image)
+    }
+
+    fn make_view(&mut self, name: &str, format: vk::Format) -> Result<()> {
         let view = vk::ImageViewCreateInfo::default()
-            .image(raw)
+            .image(self.raw)
             .view_type(vk::ImageViewType::TYPE_2D)
             .format(format)
-            .subresource_range(range);
-        image.view = unsafe { image.shared.raw.create_image_view(&view, None) }
+            .subresource_range(self.range);
+        self.view = unsafe { self.shared.raw.create_image_view(&view, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateImageView {name}"), e))?;
-        image.shared.name(image.view, name);
-        Ok(image)
+        self.shared.name(self.view, name);
+        Ok(())
     }
 
     /// Width and height in pixels.
@@ -298,7 +325,9 @@ impl Drop for Image {
         // SAFETY: as for buffers; a null view may be destroyed.
         unsafe {
             self.shared.raw.destroy_image_view(self.view, None);
-            self.shared.raw.destroy_image(self.raw, None);
+            if !self.is_borrowed {
+                self.shared.raw.destroy_image(self.raw, None);
+            }
         }
         free(&self.shared, self.allocation.take());
     }

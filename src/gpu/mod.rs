@@ -13,6 +13,8 @@ pub mod recorder;
 pub mod recorder_draw;
 pub mod reflect;
 pub mod shader;
+#[cfg(feature = "window")]
+pub mod swapchain;
 pub mod timer;
 
 pub use calibration::{ClockFit, ClockPair};
@@ -24,4 +26,6 @@ pub use memory::{Buffer, Image, Place};
 pub use recorder::{Amount, Barriers, Commands, Pending, Recorder};
 pub use recorder_draw::{Instances, Start, Target};
 pub use shader::{Compiler, Sources};
+#[cfg(feature = "window")]
+pub use swapchain::{PresentMode, Shown, Surface, Swapchain};
 pub use timer::ScopeTime;

@@ -127,12 +127,28 @@ impl Commands {
 
     /// Starts the recorded commands; returns at once.
     pub fn submit(&mut self) -> Result<Pending> {
+        self.submit_between(None, None)
+    }
+
+    /// The same, drawing once `ready` is signalled, and signalling `drawn` at its end.
+    pub(super) fn submit_between(
+        &mut self,
+        ready: Option<vk::Semaphore>,
+        drawn: Option<vk::Semaphore>,
+    ) -> Result<Pending> {
         let _zone = info_span!("submit").entered();
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
+        let at = |semaphore, stages| vk::SemaphoreSubmitInfo::default().semaphore(semaphore).stage_mask(stages);
+        let waits: Vec<_> =
+            ready.map(|s| at(s, vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)).into_iter().collect();
         let value = self.submitted + 1;
         let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.semaphore).value(value);
-        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let info = [vk::SubmitInfo2::default().command_buffer_infos(&buffers).signal_semaphore_infos(&signals)];
+        let mut signals = vec![signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        signals.extend(drawn.map(|s| at(s, vk::PipelineStageFlags2::ALL_COMMANDS)));
+        let info = [vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&waits)
+            .command_buffer_infos(&buffers)
+            .signal_semaphore_infos(&signals)];
         unsafe { self.shared.raw.queue_submit2(self.shared.queue, &info, vk::Fence::null()) }
             .map_err(|e| Error::vulkan(format!("vkQueueSubmit2 {}", self.name), e))?;
         self.submitted = value;

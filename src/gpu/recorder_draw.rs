@@ -110,6 +110,14 @@ impl Recorder<'_> {
         };
     }
 
+    /// Hands `image`, of a swapchain, to the window.
+    #[cfg(feature = "window")]
+    pub(super) fn show(&self, image: &mut Image) {
+        self.transition(image, vk::ImageLayout::PRESENT_SRC_KHR);
+        // What is in it is not wanted any more when it comes back.
+        image.layout = vk::ImageLayout::UNDEFINED;
+    }
+
     /// Orders the coming use of `image` after the last one, also where the layout stays: two draws into one target.
     /// Synchronization validation of 1.3.239 does not look at what dynamic rendering draws into, so no test would notice
     /// if those stood without.
@@ -128,7 +136,11 @@ impl Recorder<'_> {
             }
             _ => (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE),
         };
-        let (src_stage, src_access) = side(image.layout);
+        // An image of a swapchain is waited for where it is drawn into.
+        let (src_stage, src_access) = match image.layout {
+            vk::ImageLayout::UNDEFINED => (vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT, vk::AccessFlags2::NONE),
+            layout => side(layout),
+        };
         let (dst_stage, dst_access) = side(to);
         let barrier = vk::ImageMemoryBarrier2::default()
             .src_stage_mask(src_stage)

@@ -10,7 +10,7 @@ use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageForma
 
 use super::atomic::write_atomic;
 use crate::error::{Error, Result};
-use crate::model::film::Film;
+use crate::model::film::{Film, dither};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImageKind {
@@ -120,17 +120,6 @@ pub fn display_bytes(film: &Film, width: u32, height: u32, rgba: &[f32]) -> Vec<
 
 fn check_size(width: u32, height: u32, rgba: &[f32]) {
     assert_eq!(rgba.len() as u64, 4 * u64::from(width) * u64::from(height), "four floats a pixel");
-}
-
-/// What is added before rounding down: (B + ½)/64 with Bayer's 8×8 matrix B, between 0 and 1 and ½ on average,
-/// so it rounds to nearest with ±½ of a code value of ordered noise. A cloud is all soft gradients: rounded
-/// alone, steps of one code value show as bands. Ordered and not random, so that equal pixels give equal files;
-/// the same for all three channels, so that grey stays grey; and exact code values stay what they are.
-fn dither(x: usize, y: usize) -> f64 {
-    // Bits of x ^ y and y interleaved, the lowest first and the greatest weight: Bayer's recursion unrolled.
-    let (a, b) = ((x ^ y) & 7, y & 7);
-    let bayer = (0..3).fold(0, |sum, i| sum << 2 | (a >> i & 1) << 1 | (b >> i & 1));
-    (bayer as f64 + 0.5) / 64.0
 }
 
 #[cfg(test)]

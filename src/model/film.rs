@@ -86,6 +86,17 @@ pub fn srgb_encode(linear: f64) -> f64 {
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
+/// What is added before rounding down: (B + ½)/64 with Bayer's 8×8 matrix B, between 0 and 1 and ½ on average,
+/// so it rounds to nearest with ±½ of a code value of ordered noise. A cloud is all soft gradients: rounded
+/// alone, steps of one code value show as bands. Ordered and not random, so that equal pixels give equal files;
+/// the same for all three channels, so that grey stays grey; and exact code values stay what they are.
+pub fn dither(x: usize, y: usize) -> f64 {
+    // Bits of x ^ y and y interleaved, the lowest first and the greatest weight: Bayer's recursion unrolled.
+    let (a, b) = ((x ^ y) & 7, y & 7);
+    let bayer = (0..3).fold(0, |sum, i| sum << 2 | (a >> i & 1) << 1 | (b >> i & 1));
+    (bayer as f64 + 0.5) / 64.0
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

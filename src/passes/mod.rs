@@ -12,6 +12,7 @@ pub mod impostors;
 pub mod live;
 pub mod morton;
 pub mod place;
+pub mod present;
 pub mod second;
 pub mod sort;
 pub mod sprites;
@@ -82,6 +83,8 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "morton_key.comp",
     "morton_order.comp",
     "place.comp",
+    "present.frag",
+    "present.vert",
     "second_gather.comp",
     "second_merge.comp",
     "second_sources.comp",

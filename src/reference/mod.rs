@@ -18,6 +18,7 @@ pub mod live;
 pub mod morton;
 pub mod occlude;
 pub mod place;
+pub mod present;
 pub mod rounding;
 pub mod second;
 pub mod sort;

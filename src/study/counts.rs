@@ -3,8 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::stage::Stage;
 use crate::error::Result;
+use crate::frame::stage::Stage;
 use crate::layout::facet::LitRecord;
 use crate::model::film::FilmFormat;
 use crate::model::scene::LightingMode;

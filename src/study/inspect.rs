@@ -3,11 +3,11 @@
 use glam::{DVec3, Vec3};
 use serde::Serialize;
 
-use super::stage::Stage;
 use super::truth::{Truth, colors};
 use crate::error::{Error, Result};
 use crate::frame::game::Setting;
 use crate::frame::plan::Pass;
+use crate::frame::stage::Stage;
 use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;

@@ -23,7 +23,6 @@ pub mod provenance;
 pub mod recorded;
 pub mod records;
 pub mod report;
-pub mod stage;
 pub mod stress;
 pub mod trace;
 pub mod tradeoff;

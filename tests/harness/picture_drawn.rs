@@ -73,7 +73,7 @@ impl Picture {
             Ok(())
         });
         match format {
-            TargetFormat::Rgba8 => {
+            TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
                 readback.read::<u8>(n_numbers).expect("read").into_iter().map(|v| f64::from(v) / 255.0).collect()
             }
             TargetFormat::Rgba16f => {

@@ -5,13 +5,13 @@ use std::cell::RefCell;
 
 use glam::DVec3;
 use nimbus::frame::serial;
+use nimbus::frame::stage::DeviceChoice;
 use nimbus::model::boxes::{CloudBox, Form};
 use nimbus::model::cloud::{Cloud, CloudSource, Particle};
 use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::scene::Scene;
 use nimbus::model::texture::Texture;
-use nimbus::study::stage::DeviceChoice;
 use nimbus::study::stress::Desk;
 use proptest::collection::vec;
 use proptest::prelude::*;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use bytemuck::Pod;
 
 use crate::error::{Error, Result};
+use crate::frame::stage::{Bed, DeviceChoice, Player};
 use crate::gpu::{Buffer, Commands, Compiler, Device, Field, Kernel, Place, Recorder, Sources};
 use crate::io::scene_file::parse;
 use crate::layout::facet::{FacetRecord, LitRecord};
@@ -13,7 +14,6 @@ use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::layout::record;
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes;
-use crate::study::stage::{Bed, DeviceChoice, Player};
 
 record! {
     struct ProbePush { n: u32 }

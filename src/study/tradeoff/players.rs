@@ -7,9 +7,9 @@ use super::run::Subject;
 use super::turns::Turn;
 use crate::error::{Error, Result};
 use crate::frame::limits;
+use crate::frame::stage::{Bed, Player};
 use crate::layout::facet::LitRecord;
 use crate::model::scene::Scene;
-use crate::study::stage::{Bed, Player};
 
 /// How frames are timed.
 #[derive(Debug, Clone, Copy, PartialEq)]

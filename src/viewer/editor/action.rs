@@ -56,7 +56,7 @@ pub enum Edit {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Select {
-    /// As found by [`super::screen::pick`] or [`super::screen::pick_rectangle`]; the last one becomes active.
+    /// As found by [`super::viewport::pick`] or [`super::viewport::pick_rectangle`]; the last one becomes active.
     Boxes {
         boxes: Vec<usize>,
         how: How,

@@ -7,9 +7,9 @@ use super::Axis;
 use super::action::{Edit, Refusal};
 use super::document::{Document, volume};
 use super::mirror::mirrored;
-use super::screen::bounds;
 use super::selection::Selection;
 use super::state::{Scaling, Settings};
+use super::viewport::bounds;
 use crate::model::boxes::CloudBox;
 
 /// Unchecked: numbers may be beyond what a box file takes.

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Axis;
-use super::screen::Viewport;
+use super::viewport::Viewport;
 use crate::model::boxes::CloudBox;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -3,8 +3,8 @@
 
 use super::Axis;
 use super::document::{Document, is_same};
-use super::screen::bounds;
 use super::selection::Selection;
+use super::viewport::bounds;
 use crate::model::boxes::CloudBox;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

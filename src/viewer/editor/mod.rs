@@ -4,7 +4,7 @@
 //! [`session`] has the file: what is open, what is saved, what would be lost. [`state`] has what is edited: the
 //! [`document`], what is selected of it, the drag that is under way and the steps that can be undone. It takes an
 //! [`action`]; [`edits`], [`mirror`] and [`drag`] say what becomes of the boxes. A window draws what the state holds,
-//! asks [`screen`] and [`handles`] what lies under the pointer, [`shortcuts`] what a key means and [`numbers`] what was
+//! asks [`viewport`] and [`handles`] what lies under the pointer, [`shortcuts`] what a key means and [`numbers`] what was
 //! typed, and computes anew what [`document::Touched`] names.
 
 pub mod acceptance;
@@ -18,12 +18,12 @@ pub mod mirror;
 pub mod numbers;
 pub mod ray;
 pub mod recent;
-pub mod screen;
 pub mod selection;
 pub mod session;
 pub mod shortcuts;
 pub mod snap;
 pub mod state;
+pub mod viewport;
 
 #[cfg(test)]
 mod samples;

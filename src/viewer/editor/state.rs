@@ -11,9 +11,9 @@ use super::drag::Drag;
 use super::edits::edited;
 use super::handles::{Handle, Placed, placed};
 use super::history::{History, Snapshot};
-use super::screen::{Viewport, bounds};
 use super::selection::Selection;
 use super::snap::Snap;
+use super::viewport::{Viewport, bounds};
 use crate::model::boxes::CloudBox;
 
 /// All that is edited, and what is needed to undo it. Cheap to clone: documents are shared.

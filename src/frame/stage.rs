@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::choice::Choice;
+use super::choice::impostors::ImpostorChoice;
+use super::game::Game;
+use super::render::Renderer;
+use super::{OnFrame, parallel, serial};
 use crate::error::{Error, Result};
-use crate::frame::choice::Choice;
-use crate::frame::choice::impostors::ImpostorChoice;
-use crate::frame::game::Game;
-use crate::frame::render::Renderer;
-use crate::frame::{OnFrame, parallel, serial};
 use crate::gpu::{Compiler, Device, DeviceInfo, Instance, Sources};
 use crate::model::scene::{Impostors, Scene, Simulate, Threading};
 use crate::passes;
@@ -23,6 +23,17 @@ pub struct DeviceChoice {
     pub validation: bool,
     /// Buffers are full of NaN until something is written to them.
     pub poison: bool,
+}
+
+impl DeviceChoice {
+    /// The shaders that are to be used.
+    pub fn sources(&self) -> Result<Sources> {
+        let sources = passes::sources();
+        match &self.shaders {
+            Some(dir) => sources.with_dir(dir),
+            None => Ok(sources),
+        }
+    }
 }
 
 /// A device on which any number of scenes can be made ready side by side.
@@ -46,16 +57,16 @@ pub struct Player {
 
 impl Bed {
     pub fn open(choice: &DeviceChoice) -> Result<Bed> {
-        let mut sources = passes::sources();
-        if let Some(dir) = &choice.shaders {
-            sources = sources.with_dir(dir)?;
-        }
-        Bed::with_sources(choice, sources)
+        Bed::with_sources(choice, choice.sources()?)
     }
 
     /// With these shaders, whatever `choice` says of them.
     pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<Bed> {
-        let instance = Instance::new(choice.validation)?;
+        Bed::of_instance(Instance::new(choice.validation)?, choice, sources)
+    }
+
+    /// The same on an instance that is there.
+    pub fn of_instance(instance: Arc<Instance>, choice: &DeviceChoice, sources: Sources) -> Result<Bed> {
         let device = Device::open(&instance, choice.device.as_deref())?;
         if choice.poison {
             device.poison();

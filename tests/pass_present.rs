@@ -1,0 +1,152 @@
+//! present: code values of whole windows against the f64 law, in every format of the film.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+mod harness;
+
+use bounded::Random;
+use glam::{DVec3, DVec4};
+use half::f16;
+use harness::Gpu;
+use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::{Buffer, Compiler, Image, Place};
+use nimbus::model::film::{Film, FilmFormat, ToneMap};
+use nimbus::passes::present::{Present, Shown};
+use nimbus::reference::present::code_values;
+
+const SIZE: [u32; 2] = [70, 50];
+/// The window is larger, and the picture not in its corner.
+const WINDOW: [u32; 2] = [90, 64];
+const CORNER: [i32; 2] = [7, -3];
+
+/// Error of a display value: log2's 2^-21 near 1 is 4.8e-7, exp2's and the sums' roundings some 1e-6 more, the tone map's quotients
+/// as much; of 255 steps 3e-4, and ten times that where log2 of a small number loses a relative 2e-2 ulp.
+const OFF: f64 = 5e-3;
+
+fn film(format: FilmFormat, tone_map: ToneMap) -> Film {
+    let background = DVec3::new(0.16, 0.30, 0.55).as_vec3().as_dvec3();
+    Film { width: SIZE[0], height: SIZE[1], format, background, exposure: 1.25, tone_map }
+}
+
+/// Ramps over all magnitudes that show, what is beyond, and what is no number.
+fn pixels() -> Vec<[f32; 4]> {
+    let mut random = Random(3);
+    let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, -1.0, 1e-30, 65504.0, 1.0];
+    let n = (SIZE[0] * SIZE[1]) as usize;
+    let pixel = |i: usize| match i {
+        0..64 => [odd[i % 8], odd[i / 8], 0.25, 1.0],
+        _ => {
+            let scale = 10f64.powf(f64::from(random.within(-4.0, 1.0)));
+            [0; 4].map(|_| random.within(0.0, scale)).map(|v| if i.is_multiple_of(3) { v } else { v.min(1.0) })
+        }
+    };
+    (0..n).map(pixel).collect()
+}
+
+fn bytes_of(format: TargetFormat, pixels: &[[f32; 4]]) -> Vec<u8> {
+    let all = pixels.iter().flatten();
+    match format {
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => all.map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8).collect(),
+        TargetFormat::Rgba16f => all.flat_map(|v| f16::from_f32(*v).to_le_bytes()).collect(),
+        TargetFormat::Rgba32f => all.flat_map(|v| v.to_le_bytes()).collect(),
+    }
+}
+
+/// As the buffer has it.
+fn stored(format: TargetFormat, pixel: [f32; 4]) -> DVec4 {
+    DVec4::from(pixel.map(|v| match format {
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => f64::from((255.0 * v.clamp(0.0, 1.0)).round()) / 255.0,
+        TargetFormat::Rgba16f => f16::from_f32(v).to_f64(),
+        TargetFormat::Rgba32f => f64::from(v),
+    }))
+}
+
+/// Code values of the window.
+fn show(gpu: &mut Gpu, compiler: Option<&Compiler>, from: TargetFormat, film: &Film, into: TargetFormat) -> Vec<u8> {
+    let pass = Present::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), from, into).expect("present");
+    let picture = gpu.upload(&bytes_of(from, &pixels()));
+    let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into).expect("a window");
+    let n = 4 * window.n_pixels();
+    let read = Buffer::new::<u8>(&gpu.device, "test.codes", n, Place::Readback).expect("room");
+    let shown = Shown {
+        background: film.background.as_vec3().to_array(),
+        exposure: film.exposure as f32,
+        size: SIZE,
+        corner: CORNER,
+        is_neutral: film.tone_map == ToneMap::Neutral,
+    };
+    gpu.run(|rec| {
+        pass.record(rec, &picture, &mut window, &shown)?;
+        rec.copy_image(&mut window, &read);
+        Ok(())
+    });
+    read.read(n as usize).expect("codes")
+}
+
+/// The first pixel that is another than the law and rounding allow.
+fn first_wrong(film: &Film, from: TargetFormat, codes: &[u8]) -> Option<String> {
+    let pixels = pixels();
+    (0..WINDOW[1] as usize).flat_map(|y| (0..WINDOW[0] as usize).map(move |x| (x, y))).find_map(|(x, y)| {
+        let code = &codes[4 * (y * WINDOW[0] as usize + x)..][..4];
+        let (i, j) = (x as i64 - i64::from(CORNER[0]), y as i64 - i64::from(CORNER[1]));
+        let is_inside = (0..i64::from(SIZE[0])).contains(&i) && (0..i64::from(SIZE[1])).contains(&j);
+        let truth = if is_inside {
+            let (i, j) = (i as usize, j as usize);
+            code_values(film, i, j, stored(from, pixels[j * SIZE[0] as usize + i]))
+        } else {
+            DVec3::ZERO
+        };
+        let is_right = |k: usize| {
+            let within = |v: f64| v.floor().clamp(0.0, 255.0);
+            let off = if is_inside { OFF } else { 0.0 };
+            (within(truth[k] - off)..=within(truth[k] + off)).contains(&f64::from(code[k]))
+        };
+        let is_right = (0..3).all(is_right) && code[3] == 255;
+        (!is_right).then(|| format!("pixel ({x}, {y}): {code:?}, expected {truth}"))
+    })
+}
+
+const FORMATS: [(TargetFormat, FilmFormat); 3] = [
+    (TargetFormat::Rgba8, FilmFormat::Rgba8),
+    (TargetFormat::Rgba16f, FilmFormat::Rgba16f),
+    (TargetFormat::Rgba32f, FilmFormat::Rgba32f),
+];
+
+#[test]
+fn windows_show_what_files_have() {
+    let mut gpu = Gpu::new();
+    for (from, format) in FORMATS {
+        for tone_map in [ToneMap::Neutral, ToneMap::Clip] {
+            let film = film(format, tone_map);
+            let codes = show(&mut gpu, None, from, &film, TargetFormat::Rgba8);
+            assert_eq!(first_wrong(&film, from, &codes), None, "{format:?} {tone_map:?}");
+            // Windows that have blue first.
+            let mut swapped = show(&mut gpu, None, from, &film, TargetFormat::Bgra8);
+            swapped.chunks_exact_mut(4).for_each(|p| p.swap(0, 2));
+            assert!(swapped == codes);
+            // Hardly a pixel is left to rounding: no code value is off by more than the bound's share of a step.
+            let n_exact = pixels().len();
+            assert!(codes.chunks_exact(4).filter(|p| p[..3] != [0; 3]).count() > n_exact / 2);
+        }
+    }
+}
+
+#[test]
+fn wrong_windows_are_noticed() {
+    let mut gpu = Gpu::new();
+    let film = film(FilmFormat::Rgba16f, ToneMap::Neutral);
+    for (from, to) in [
+        ("push.exposure * (", "("),
+        ("/ 2.4", "/ 2.2"),
+        ("+ dither(uvec2(at))", "+ 0.5"),
+        ("(1.0 - pixel.a) * push.background", "push.background"),
+        ("- push.corner", ""),
+        ("START_COMPRESSION = 0.8", "START_COMPRESSION = 0.9"),
+        ("peak > 3e38 ? vec3(1.0) : ", ""),
+        ("words[2 * i + 1]", "words[2 * i]"),
+    ] {
+        let wrong = Gpu::wrong_compiler("present.frag", from, to);
+        let codes = show(&mut gpu, Some(&wrong), TargetFormat::Rgba16f, &film, TargetFormat::Rgba8);
+        assert!(first_wrong(&film, TargetFormat::Rgba16f, &codes).is_some(), "{to} was not noticed");
+    }
+}

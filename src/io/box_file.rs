@@ -262,6 +262,43 @@ mod tests {
     }
 
     #[test]
+    fn wrong_is_what_the_reader_refuses() {
+        let good = CloudBox { n_particles: 1, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+        let numbers = [0.0, -0.0, 1e-31, 1e-30, 1e-300, 3.0, -3.0, 1e15, -1e15, 1.1e15, 1e300, f64::NAN, f64::INFINITY];
+        let mut n_wrong = 0;
+        for v in numbers {
+            for i in 0..7 {
+                let mut b = good;
+                match i {
+                    0..3 => b.extent[i] = v,
+                    3..6 => b.center[i - 3] = v,
+                    _ => b.radius_max = v,
+                }
+                let refused = parse(&format(&[b]), Path::new("b")).err().map(|e| e.to_string());
+                assert_eq!(wrong(&b).is_some(), refused.is_some(), "{b:?}");
+                let named = wrong(&b).is_none_or(|what| what.starts_with(&format!("{}: expected ", FIELDS[i + 1])));
+                assert!(named, "{b:?}");
+                n_wrong += usize::from(refused.is_some());
+            }
+        }
+        // 1e-31 and 1e-300 three times, −3 and −1e15 four times, and four numbers everywhere.
+        assert_eq!(n_wrong, 3 + 3 + 4 + 4 + 4 * 7);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_still_leads_to_the_file_after_a_save() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("a.dat"), folder.path().join("link.dat"));
+        std::fs::write(&file, "0\n0\n").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        let b = CloudBox { n_particles: 4, extent: DVec3::ONE, center: DVec3::X, radius_max: 2.0 };
+        write(&link, &[b]).unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!((read(&file).unwrap(), std::fs::read_dir(folder.path()).unwrap().count()), (vec![b], 2));
+    }
+
+    #[test]
     fn what_is_written_reads_back_as_equal_bits() {
         // Knuth's MMIX generator, its high bits.
         let mut state = 1u64;

@@ -39,7 +39,7 @@ impl Document {
             return Err(Refusal(format!("expected at most {MOST_BOXES} boxes, found {}", self.boxes.len())));
         }
         let wrong = self.boxes.iter().enumerate().find_map(|(i, b)| box_file::wrong(b).map(|what| (i, what)));
-        wrong.map_or(Ok(()), |(i, what)| Err(Refusal(format!("box {}: {what}", i + 1))))
+        wrong.map_or(Ok(()), |(i, what)| Err(Refusal(format!("box {i}: {what}"))))
     }
 }
 
@@ -167,6 +167,6 @@ mod tests {
         let b = CloudBox { n_particles: u32::MAX, extent: DVec3::splat(-v), center: DVec3::splat(v), radius_max: -v };
         let line = box_file::format(&[b]).lines().nth(2).map(str::len);
         assert!(line.is_some_and(|n| n < 192), "{line:?}");
-        assert!(MOST_BOXES * 192 + 64 <= 64 << 20);
+        const { assert!(MOST_BOXES as u64 * 192 + 64 <= crate::io::text_file::DATA_LIMIT) };
     }
 }

@@ -75,12 +75,12 @@ fn with_density(document: &Document, selection: &Selection, density: f64) -> Res
         let b = &mut new.boxes[*i];
         let volume = volume(b);
         if volume == 0.0 {
-            return Err(Refusal(format!("box {} has no volume, so that no density gives it particles", i + 1)));
+            return Err(Refusal(format!("box {i} has no volume, so that no density gives it particles")));
         }
         let n = (density * volume).round();
         if !(0.0..=f64::from(u32::MAX)).contains(&n) {
             let most = u32::MAX;
-            return Err(Refusal(format!("box {}: density times volume: expected 0 to {most}, found {n}", i + 1)));
+            return Err(Refusal(format!("box {i}: density times volume: expected 0 to {most}, found {n}")));
         }
         b.n_particles = n as u32;
     }

@@ -6,7 +6,6 @@ use std::sync::Arc;
 
 use super::document::Document;
 use super::selection::Selection;
-use crate::model::boxes::CloudBox;
 
 /// Steps that are kept at most.
 pub const MOST_STEPS: usize = 1000;
@@ -80,7 +79,7 @@ impl History {
 impl Step {
     fn n_bytes(&self) -> usize {
         let Snapshot { document, selection } = &self.snapshot;
-        document.boxes.len() * size_of::<CloudBox>() + selection.boxes().len() * size_of::<usize>()
+        size_of_val(document.boxes.as_slice()) + size_of_val(selection.boxes())
     }
 }
 
@@ -88,6 +87,7 @@ impl Step {
 mod tests {
     use super::super::samples::document;
     use super::*;
+    use crate::model::boxes::CloudBox;
 
     fn snapshot(document: &Arc<Document>) -> Snapshot {
         Snapshot { document: document.clone(), selection: Selection::default() }

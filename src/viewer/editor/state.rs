@@ -130,7 +130,7 @@ impl Editor {
         Ok(match select {
             Select::Boxes { boxes, how } => {
                 if let Some(i) = boxes.iter().find(|i| **i >= n) {
-                    return Err(Refusal(format!("there is no box {}, the last is box {n}", i.saturating_add(1))));
+                    return Err(Refusal(format!("box: expected a number below {n}, found {i}")));
                 }
                 self.selection.with(boxes, *how)
             }

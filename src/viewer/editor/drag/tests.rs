@@ -155,7 +155,7 @@ fn a_drag_beyond_the_bounds_stays_where_it_was() {
         &[begin(Handle::MoveAxis(Axis::X), 9e14, 0.0), to(9.5e14, 0.0)],
     );
     let refusal = e.after(&to(2e15, 0.0)).map(|_| ()).unwrap_err();
-    assert_eq!(refusal.0, "box 1: x: expected a number from -1e15 to 1e15, found 2e15");
+    assert_eq!(refusal.0, "box 0: x: expected a number from -1e15 to 1e15, found 2e15");
     let e = after(&e, &[END]);
     assert_eq!((e.boxes()[0].center.x, e.history().n_undo()), (9.5e14, 1));
 }

@@ -57,14 +57,14 @@ fn a_density_sets_the_count() {
     assert!((document::density(&e.boxes()[0]).unwrap() - 198.0 / 7.917_719_681_6).abs() < 1e-9);
     assert_eq!(
         refused(&e, Edit::Density(1e300)),
-        "box 1: density times volume: expected 0 to 4294967295, found ".to_owned()
+        "box 0: density times volume: expected 0 to 4294967295, found ".to_owned()
             + &format!("{}", (1e300 * document::volume(&e.boxes()[0])).round())
     );
     for wrong in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(refused(&e, Edit::Density(wrong)).starts_with("box 1: density times volume: expected 0 to"));
+        assert!(refused(&e, Edit::Density(wrong)).starts_with("box 0: density times volume: expected 0 to"));
     }
     let flat = edited(&e, Edit::Extent(Axis::Z, 0.0));
-    assert_eq!(refused(&flat, Edit::Density(1.0)), "box 1 has no volume, so that no density gives it particles");
+    assert_eq!(refused(&flat, Edit::Density(1.0)), "box 0 has no volume, so that no density gives it particles");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn moving_and_scaling_by_numbers() {
     assert_eq!(scaled.boxes().iter().map(|b| b.center.x).collect::<Vec<_>>(), [2.0, 4.0, 6.0]);
     assert_eq!(scaled.boxes()[2].extent, DVec3::new(0.5, 1.0, 3.0));
     assert_eq!((scaled.boxes()[2].n_particles, scaled.boxes()[2].radius_max), (12, 2.0));
-    let message = "box 1: x extent: expected 0 or a number from 1e-30 to 1e15, found -1";
+    let message = "box 0: x extent: expected 0 or a number from 1e-30 to 1e15, found -1";
     assert_eq!(refused(&e, Edit::ScaleBy(DVec3::new(-1.0, 1.0, 1.0))), message);
 }
 
@@ -138,19 +138,19 @@ fn boxes_go_to_the_grid() {
 fn what_the_reader_refuses_is_refused_in_one_sentence_and_changes_nothing() {
     let e = selected(&editor(3), &[0, 2]);
     for (edit, message) in [
-        (Edit::Center(Axis::X, f64::NAN), "box 1: x: expected a number from -1e15 to 1e15, found NaN"),
-        (Edit::MoveBy(DVec3::Y * 1e300), "box 1: y: expected a number from -1e15 to 1e15, found 1e300"),
-        (Edit::Radius(-2.0), "box 1: radius: expected a number from 0 to 1e15, found -2"),
-        (Edit::Extent(Axis::Z, 1e-31), "box 1: z extent: expected 0 or a number from 1e-30 to 1e15, found 1e-31"),
+        (Edit::Center(Axis::X, f64::NAN), "box 0: x: expected a number from -1e15 to 1e15, found NaN"),
+        (Edit::MoveBy(DVec3::Y * 1e300), "box 0: y: expected a number from -1e15 to 1e15, found 1e300"),
+        (Edit::Radius(-2.0), "box 0: radius: expected a number from 0 to 1e15, found -2"),
+        (Edit::Extent(Axis::Z, 1e-31), "box 0: z extent: expected 0 or a number from 1e-30 to 1e15, found 1e-31"),
         (
             Edit::Add(CloudBox { extent: DVec3::splat(f64::INFINITY), ..unit_box() }),
-            "box 4: x extent: expected 0 or a number from 1e-30 to 1e15, found inf",
+            "box 3: x extent: expected 0 or a number from 1e-30 to 1e15, found inf",
         ),
     ] {
         assert_eq!(refused(&e, edit), message);
     }
     let wrong = Action::Select(Select::Boxes { boxes: vec![1, 3], how: How::Add });
-    assert_eq!(e.after(&wrong).map(|_| ()), Err(Refusal("there is no box 4, the last is box 3".to_owned())));
+    assert_eq!(e.after(&wrong).map(|_| ()), Err(Refusal("box: expected a number below 3, found 3".to_owned())));
     assert!(e.after(&Action::Set(Setting::Snap(Snap { on: true, step: 0.0 }))).is_err());
     // The copies of as many boxes as there may be are too many.
     let full = after(&Editor::new(vec![unit_box(); document::MOST_BOXES]), &[Action::Select(Select::All)]);

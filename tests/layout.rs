@@ -62,7 +62,7 @@ const RECORDS: [Record; 25] = [
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
 /// the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 48] = [
+const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
     ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
     ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
@@ -138,6 +138,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 48] = [
         &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Textured")],
     ),
     ("present.frag", present::Push::FIELDS, &[B(4)]),
+    ("present.vert", &[], &[]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
     ("terrain.frag", terrain::Push::FIELDS, &[]),

@@ -34,7 +34,8 @@ fn pixels() -> Vec<[f32; 4]> {
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, -1.0, 1e-30, 65504.0, 1.0];
     let n = (SIZE[0] * SIZE[1]) as usize;
     let pixel = |i: usize| match i {
-        0..64 => [odd[i % 8], odd[i / 8], 0.25, 1.0],
+        // In the fifth row: the first three are outside the window.
+        280..344 => [odd[i % 8], odd[(i - 280) / 8], 0.25, 1.0],
         _ => {
             let scale = 10f64.powf(f64::from(random.within(-4.0, 1.0)));
             [0; 4].map(|_| random.within(0.0, scale)).map(|v| if i.is_multiple_of(3) { v } else { v.min(1.0) })
@@ -55,7 +56,7 @@ fn bytes_of(format: TargetFormat, pixels: &[[f32; 4]]) -> Vec<u8> {
 /// As the buffer has it.
 fn stored(format: TargetFormat, pixel: [f32; 4]) -> DVec4 {
     DVec4::from(pixel.map(|v| match format {
-        TargetFormat::Rgba8 | TargetFormat::Bgra8 => f64::from((255.0 * v.clamp(0.0, 1.0)).round()) / 255.0,
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => f64::from((255.0 * v.clamp(0.0, 1.0)).round() as u8) / 255.0,
         TargetFormat::Rgba16f => f16::from_f32(v).to_f64(),
         TargetFormat::Rgba32f => f64::from(v),
     }))

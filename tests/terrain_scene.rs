@@ -9,7 +9,7 @@ use std::fs;
 
 use program::{differ, path, run};
 use tempfile::TempDir;
-use weather_files::{Data, Made};
+use weather_files::Made;
 
 const NX: usize = 8;
 const NY: usize = 6;
@@ -206,6 +206,9 @@ fn what_is_wrong_with_the_ground_is_told() {
             "ground = \"rock\"",
             "the file has 4 x 1 columns, and ground lies between 2 x 2",
         ),
+        (file(), "ground = \"rock\"\nbase = 300.0", "`cloud.0.ground`: expected \"none\" where a `base` or `grow_to`"),
+        (file(), "ground = \"rock\"\ngrow_to = 2.0", "`cloud.0.ground`: expected \"none\" where a `base` or `grow_to`"),
+        (file().with_units("HGT", "feet"), "ground = \"rock\"", "w.nc: variable HGT"),
         (file().with_floats("HGT", |h| h[9] = f32::NAN), "ground = \"rock\"", "w.nc: variable HGT, step 0"),
         (
             file().with_floats("HGT", |h| h[9] = 1e6),
@@ -219,5 +222,15 @@ fn what_is_wrong_with_the_ground_is_told() {
     // Without a ground nobody asks for HGT.
     let dir = scene_of(&file().with_floats("HGT", |h| h[9] = f32::NAN), "material = \"cloud\"");
     render(&dir, "none.exr", &[]);
-    assert!(matches!(file().var("HGT").data, Data::Floats(_)));
+    // And `nimbus weather` says what is wrong with it, and all the rest.
+    for (made, expected) in [
+        (file().with_floats("HGT", |h| h[9] = f32::NAN), "no ground: "),
+        (file().with_units("HGT", "feet"), "no ground: "),
+        (file(), "0 to 1"),
+    ] {
+        let dir = scene_of(&made, "");
+        let output = run(&["weather", &path(&dir, "w.nc")]);
+        let said = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && said.contains(expected), "{said}");
+    }
 }

@@ -120,6 +120,8 @@ fn between_steps_masses_run_straight_and_particles_stay_who_they_are() {
             );
         }
     }
+    let what = load(&SUPERCELL.replace("particles = 3000", "particles = 1")).unwrap_err().to_string();
+    assert!(what.contains("`cloud.0.particles`: expected 2 or more where `speed` is not 0"), "{what}");
     let what = load(&SUPERCELL.replace("'cpu'", "'gpu'")).unwrap_err().to_string();
     assert!(what.contains("`cloud.0.speed`: expected 0 where threads.simulate is \"gpu\""), "{what}");
 }

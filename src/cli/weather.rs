@@ -23,7 +23,8 @@ pub fn run(args: &WeatherArgs) -> Result<()> {
         progress.advance();
     }
     drop(progress);
-    let found = Found { about: about(&file, &args.file.display().to_string()), steps: of_steps };
+    let mut found = Found { about: about(&file, &args.file.display().to_string()), steps: of_steps };
+    found.about.notes.extend(notes(&found.steps));
     if args.json {
         return output::object(&found);
     }
@@ -89,8 +90,11 @@ struct StepRow {
     sun_elevation_deg: Option<f64>,
     sun_azimuth_deg: Option<f64>,
     clouds: CloudRow,
-    /// Least and greatest height of the ground; none where the file does not say.
+    /// Least and greatest height of the ground; none where the file does not say, or says what is none.
     ground_m: Option<[f64; 2]>,
+    /// What is wrong with it.
+    #[serde(skip)]
+    ground_fault: Option<String>,
     /// Mixing ratios below 0, and those that are NaN or fill values.
     negative: u64,
     missing: u64,
@@ -105,6 +109,8 @@ struct CloudRow {
     mean_opacity: f64,
     base_m: Option<f64>,
     top_m: Option<f64>,
+    /// With cloud in the highest level.
+    columns_to_the_top: usize,
 }
 
 impl From<CloudStatistics> for CloudRow {
@@ -117,6 +123,7 @@ impl From<CloudStatistics> for CloudRow {
             mean_opacity: s.mean_opacity,
             base_m: s.base_and_top_m.map(|(base, _)| base),
             top_m: s.base_and_top_m.map(|(_, top)| top),
+            columns_to_the_top: s.n_columns_to_the_top,
         }
     }
 }
@@ -163,6 +170,7 @@ fn plain(text: &str) -> String {
 
 fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
     let step = file.step(i_step)?;
+    let ground = file.terrain(i_step);
     let time_s = file.times_s.as_ref().map(|times| times[i_step]);
     let toward = time_s.zip(step.middle).map(|(time_s, (north, east))| sun::toward(time_s, north, east));
     Ok(StepRow {
@@ -173,10 +181,27 @@ fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
         sun_elevation_deg: toward.map(|d| d.y.asin().to_degrees()),
         sun_azimuth_deg: toward.map(|d| d.x.atan2(-d.z).to_degrees().rem_euclid(360.0)),
         clouds: statistics::of(&step.grid, &step.extinction).into(),
-        ground_m: file.terrain(i_step)?.map(|(_, heights_m)| extent(&heights_m)),
+        ground_m: ground.as_ref().ok().and_then(|found| found.as_ref()).map(|(_, heights_m)| extent(heights_m)),
+        ground_fault: ground.err().map(|e| e.to_string()),
         negative: step.oddities.n_negative,
         missing: step.oddities.n_missing,
     })
+}
+
+/// What the steps have that their figures do not say.
+fn notes(rows: &[StepRow]) -> Vec<String> {
+    let cut = rows.iter().max_by_key(|r| r.clouds.columns_to_the_top).filter(|r| r.clouds.columns_to_the_top > 0);
+    let cut = cut.map(|r| {
+        let (n, step) = (r.clouds.columns_to_the_top, r.step);
+        format!("at step {step} clouds of {n} columns reach the highest level: what is above is not in the file")
+    });
+    let fault = rows.iter().find_map(|r| r.ground_fault.clone()).map(|what| format!("no ground: {what}"));
+    cut.into_iter().chain(fault).collect()
+}
+
+/// A zero has no sign.
+fn whole(number: f64) -> String {
+    format!("{:.0}", if number.round() == 0.0 { 0.0 } else { number })
 }
 
 fn extent(numbers: &[f64]) -> [f64; 2] {
@@ -235,7 +260,12 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
         table.push(vec![
             r.step.to_string(),
             or_none(r.time.clone()),
-            or_none(r.latitude_deg.zip(r.longitude_deg).map(|(north, east)| format!("{north:.1}° N {east:.1}° E"))),
+            or_none(r.latitude_deg.zip(r.longitude_deg).map(|(north, east)| {
+                let side = |degrees: f64, ahead, behind| {
+                    format!("{:.1}° {}", degrees.abs(), if degrees < 0.0 { behind } else { ahead })
+                };
+                format!("{} {}", side(north, "N", "S"), side(east, "E", "W"))
+            })),
             or_none(r.sun_elevation_deg.map(|degrees| format!("{degrees:.1}°"))),
             if c.cells == 0 { "no cloud".to_owned() } else { c.cells.to_string() },
             c.columns.to_string(),
@@ -244,7 +274,7 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
             format!("{:.4}", c.mean_opacity),
             or_none(c.base_m.map(|m| format!("{m:.0}"))),
             or_none(c.top_m.map(|m| format!("{m:.0}"))),
-            or_none(r.ground_m.map(|[least, greatest]| format!("{least:.0} to {greatest:.0}"))),
+            or_none(r.ground_m.map(|[least, greatest]| format!("{} to {}", whole(least), whole(greatest)))),
             odd,
         ]);
     }

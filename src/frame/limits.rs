@@ -19,6 +19,7 @@ use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use crate::model::resolution::{Resolution, SmallPicture};
 use crate::model::scene::{Chunks, DrawPath, Impostors, LightingMode, MAX_CHUNKS, Scene};
 use crate::model::sums::Precision;
+use crate::model::terrain::Terrain;
 use crate::passes::second::LEAST_BLOCK;
 use crate::passes::texture::POOL_TEXELS;
 
@@ -101,6 +102,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the discs", discs(scene).count() as u64, size(size_of::<DiscRecord>())),
         ("the particles' groups", n, 4),
         ("the particles' generation status", n, 4),
+        ("the ground", scene.n_solid_facets() - scene.n_surface_facets(), size(size_of::<FacetRecord>())),
         ("the facets", scene.n_facets(), size(size_of::<FacetRecord>())),
         ("the facets' light", scene.n_facets(), size(size_of::<LitRecord>())),
         ("the transmittances", scene.n_facets() * scene.lights.len() as u64, 4),
@@ -108,7 +110,6 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
         ("the second reflection's sources", n_sources, size(size_of::<SourceRecord>())),
         ("their flux by light", n_sources * scene.lights.len() as u64, 16),
         ("their light by points", n_sources * scene.lights.len() as u64, size(size_of::<PackedRecord>())),
-        ("the ground", scene.n_solid_facets() - scene.n_surface_facets(), size(size_of::<FacetRecord>())),
         ("the regions", scene.n_regions() as u64, size(size_of::<RegionRecord>())),
         ("the sort's entries", 2 * n, 8),
         ("the bits of kept particles", if culls(scene) { n.div_ceil(32) } else { 0 }, 8),
@@ -229,7 +230,24 @@ pub fn n_deposits(scene: &Scene) -> f64 {
 }
 
 /// What a demanding scene should be told before it runs; nothing for most.
-pub fn advice(scene: &Scene) -> Option<String> {
+pub fn advice(scene: &Scene) -> Vec<String> {
+    [grid_advice(scene), ground_advice(scene)].into_iter().flatten().collect()
+}
+
+/// Where ground has so many points that each one's second reflection takes long.
+fn ground_advice(scene: &Scene) -> Option<String> {
+    /// Some seconds a frame on two cores of a software device, from clusters.
+    const MANY: u64 = 4096;
+    let n: u64 = scene.terrains.iter().map(Terrain::n_facets).sum();
+    (has_second(scene) && n > MANY).then(|| {
+        format!(
+            "the ground has {n} points, and each receives a second reflection: seconds a frame without a GPU; \
+             lighting.mode = \"first\" has its shadows without"
+        )
+    })
+}
+
+fn grid_advice(scene: &Scene) -> Option<String> {
     /// Some ten seconds on two cores of a software device.
     const MANY: f64 = 1e9;
     let n = n_deposits(scene);

@@ -34,4 +34,5 @@ pub mod toml_override;
 pub mod toml_section;
 pub mod toml_tree;
 pub mod weather;
+mod weather_spans;
 mod weather_steps;

@@ -153,6 +153,7 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         ("weather", SourceKind::Weather),
     ];
     let mut lines = Vec::new();
+    let n_terrains = reader.terrains.len();
     let kind = s.required_choice("from", &from, &[])?;
     let source = match kind {
         SourceKind::Boxes => read_boxes(s, reader)?,
@@ -205,6 +206,12 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         facing: s.choice("facing", if is_weather { "up" } else { "outward" }, &Facing::NAMES, &[])?,
         seed: reader.read_seed(s, i_cloud)?,
     };
+    let has_ground = reader.terrains.len() > n_terrains;
+    if has_ground && (base.is_some() || cloud.growth != Growth::NONE) {
+        return Err(
+            s.fault("ground", "expected \"none\" where a `base` or `grow_to` takes the cloud away from its heights")
+        );
+    }
     if let Some(base) = base {
         put_on_base(&mut cloud, base);
         if !is_carried_place(cloud.position) {

@@ -42,6 +42,11 @@ pub fn read_keys(s: &mut Section, file: &WeatherFile, simulate: Simulate) -> Res
         let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game thread that goes from step to step";
         return Err(s.fault("speed", what));
     }
+    if speed != 0.0 && n_particles < 2 {
+        return Err(
+            s.fault("particles", "expected 2 or more where `speed` is not 0: blobs of two steps fade into each other")
+        );
+    }
     Ok(WeatherKeys { i_step, n_particles, exaggeration, speed })
 }
 

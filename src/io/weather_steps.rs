@@ -1,43 +1,32 @@
 //! A weather file's particles at any time: from step to step by straight lines where steps are near enough (docs/model.md §15 "Time").
 
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::scene_weather::{WeatherKeys, particle};
 use super::weather::wrf::{Step, WeatherFile};
+use super::weather_spans::{MOST_TOGETHER, Spans};
 use crate::error::Result;
 use crate::model::cloud::{LEAST_ASPECT, Particle, mass};
 use crate::model::moving::{Mover, Moving};
-use crate::model::weather::interval::{Interval, Moment};
 use crate::model::weather::particles::Layout;
-use crate::model::weather::steps::{Between, LONGEST_INTERPOLATED_S, between};
+use crate::model::weather::steps::{Between, between};
 
-/// Files of so few steps are read whole, and one layout stands for all of them: nobody jumps from one interval to the next.
-const MOST_TOGETHER: usize = 8;
-/// Intervals that are kept: the one at hand, and the one before or after.
-const MOST_KEPT: usize = 2;
 /// How much farther than those that were looked at heights of other steps may reach.
 const MORE_HEIGHT: f64 = 1.05;
 
-/// By first and second step.
-type Kept = ((usize, usize), Arc<Interval>);
-
 pub struct Steps {
-    file: WeatherFile,
+    spans: Spans,
     keys: WeatherKeys,
-    seed: u32,
     times_s: Vec<f64>,
-    /// Of all steps; None of a file of more than a few.
-    layout: Option<Layout>,
     bounds: Bounds,
-    kept: Mutex<Vec<Kept>>,
 }
 
 impl fmt::Debug for Steps {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Steps").field("keys", &self.keys).field("seed", &self.seed).finish()
+        f.debug_struct("Steps").field("keys", &self.keys).finish_non_exhaustive()
     }
 }
 
@@ -53,8 +42,10 @@ fn moving_by(file: WeatherFile, keys: WeatherKeys, seed: u32, most_together: usi
     let read: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
     let all: Vec<&[f64]> = read.iter().map(|s| s.extinction.as_slice()).collect();
     let layout = is_small.then(|| Layout::new(&read[0].grid, &all, keys.n_particles as usize, seed));
-    let (bounds, kept) = (Bounds::of(&read, keys.exaggeration), Mutex::new(vec![]));
-    let steps = Steps { file, keys, seed, times_s, layout, bounds, kept };
+    let bounds = Bounds::of(&read, keys.exaggeration);
+    let slots = (keys.n_particles as usize, seed);
+    let spans = Spans::new(file, times_s.clone(), slots, layout, keys.speed < 0.0);
+    let steps = Steps { spans, keys, times_s, bounds };
     let first = steps.at(0.0)?;
     let mean = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).sum::<f64>() / first.len().max(1) as f64;
     let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
@@ -115,43 +106,19 @@ impl Mover for Steps {
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
         let file_s = self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.keys.speed * time_s;
         let at = between(&self.times_s, file_s).unwrap_or(Between { i: 0, j: 0, weight: 0.0 });
-        // An interval's first moment has the interval's layout, too.
-        let follows = at.i + 1 < self.times_s.len()
-            && self.times_s[at.i + 1] - self.times_s[at.i] <= LONGEST_INTERPOLATED_S
-            && file_s >= self.times_s[at.i];
-        let interval = self.of_steps(at.i, if follows { at.i + 1 } else { at.i })?;
-        let of = |i: usize| match i < interval.len() {
-            true => self.kept_to(particle(&interval.blob(i, at.weight), self.keys.exaggeration)),
-            false => self.nothing(),
+        // A span's first moment is the span's, too; what is before the first step is that step.
+        let is_before = file_s < self.times_s.first().copied().unwrap_or(file_s);
+        let ends = if is_before { (at.i, at.i) } else { self.spans.ends_from(at.i) };
+        let span = self.spans.get(ends)?;
+        let of = |i: usize| match span.blob(i, at.weight) {
+            Some(blob) => self.kept_to(particle(&blob, self.keys.exaggeration)),
+            None => self.nothing(),
         };
         Ok(Arc::new((0..self.keys.n_particles as usize).map(of).collect()))
     }
 }
 
 impl Steps {
-    fn of_steps(&self, i: usize, j: usize) -> Result<Arc<Interval>> {
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, found)) = kept.iter().find(|(of, _)| *of == (i, j)) {
-            return Ok(found.clone());
-        }
-        let read = Arc::new(self.read(i, j)?);
-        kept.truncate(MOST_KEPT - 1);
-        kept.insert(0, ((i, j), read.clone()));
-        Ok(read)
-    }
-
-    fn read(&self, i: usize, j: usize) -> Result<Interval> {
-        let first = self.file.step(i)?;
-        let second = if i == j { None } else { Some(self.file.step(j)?) };
-        let (a, b) = (moment(&first), second.as_ref().map(moment));
-        let n = self.keys.n_particles as usize;
-        Ok(match (&self.layout, b) {
-            (Some(layout), b) => Interval::laid_out(layout, a, b),
-            (None, Some(b)) => Interval::between(a, b, n, self.seed),
-            (None, None) => Interval::alone(a, n, self.seed),
-        })
-    }
-
     /// Within the bounds that the scene was told, with its mass.
     fn kept_to(&self, p: Particle) -> Particle {
         let sigma = p.sigma.min(self.bounds.sigma);
@@ -172,10 +139,6 @@ impl Steps {
     }
 }
 
-fn moment(step: &Step) -> Moment<'_> {
-    Moment { grid: &step.grid, extinction: &step.extinction }
-}
-
 #[cfg(test)]
 mod tests {
     use std::path::Path;
@@ -183,17 +146,18 @@ mod tests {
     use super::*;
     use crate::io::weather::wrf;
 
+    /// Of two layouts that fade into each other as of one: as much mass, within the bounds, and nobody jumps.
     #[test]
-    fn a_file_of_many_steps_is_laid_out_interval_by_interval() {
+    fn layouts_of_a_file_of_many_steps_fade_into_each_other() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
-        let keys = WeatherKeys { i_step: 0, n_particles: 2000, exaggeration: 2.0, speed: 60.0 };
+        let keys = WeatherKeys { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0 };
         let of = |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, most_together).unwrap();
         let (many, few) = (of(0), of(MOST_TOGETHER));
         let mass_of = |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
         // Steps of 120 s: at 0, 2 and 4 s.
         for t in [-1.0, 0.0, 0.7, 2.0, 3.1, 4.0, 9.0] {
             let (a, b) = (many.mover.at(t).unwrap(), few.mover.at(t).unwrap());
-            assert_eq!((a.len(), b.len()), (2000, 2000));
+            assert_eq!((a.len(), b.len()), (2001, 2001));
             assert!((mass_of(&a) / mass_of(&b) - 1.0).abs() < 1e-9, "{t}");
             let within = |p: &Particle| p.position.cmpge(many.low).all() && p.position.cmple(many.high).all();
             assert!(
@@ -202,11 +166,25 @@ mod tests {
                     && p.sigma * p.aspect <= many.sigma_y_max * 1.000001)
             );
         }
-        // Within an interval particles stay who they are; from one to the next they may not.
-        let [a, b, c] = [0.0, 1.9, 2.0].map(|t| many.mover.at(t).unwrap());
-        let apart = |a: &[Particle], b: &[Particle]| {
-            a.iter().zip(b).map(|(p, q)| p.position.distance(q.position)).fold(0.0, f64::max)
-        };
-        assert!(apart(&a, &b) < 200.0 && apart(&b, &c) > 1000.0, "{} {}", apart(&a, &b), apart(&b, &c));
+        // Who is somewhere else a moment later has no mass there, before or after.
+        for (t, is_all) in [(0.5, false), (2.0, false), (4.0, true)] {
+            let [a, b] = [t - 1e-6, t + 1e-6].map(|t| many.mover.at(t).unwrap());
+            let whole = mass_of(&a);
+            for (p, q) in a.iter().zip(b.iter()) {
+                let of = |p: &Particle| mass(p.kappa, p.sigma) * p.aspect;
+                let changed =
+                    if p.position.distance(q.position) > 1.0 { of(p).max(of(q)) } else { (of(p) - of(q)).abs() };
+                assert!(changed < 1e-4 * whole / 2001.0, "{t}: {p:?} {q:?}");
+            }
+            // Both halves are seen between steps, one at a step.
+            let n_seen = a.iter().filter(|p| p.kappa > 0.0).count();
+            assert!(n_seen > 500, "{t}: {n_seen}");
+            assert!(is_all || n_seen > 1000, "{t}: {n_seen}");
+        }
+        // The same forwards, backwards and at once.
+        let (c, d) = (of(0), of(0));
+        let [late, early] = [3.0, 1.0].map(|t| c.mover.at(t).unwrap());
+        assert!(d.mover.at(1.0).unwrap() == early && d.mover.at(3.0).unwrap() == late);
+        assert!(many.mover.at(3.0).unwrap() == late);
     }
 }

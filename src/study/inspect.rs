@@ -10,7 +10,7 @@ use crate::frame::plan::Pass;
 use crate::frame::stage::Stage;
 use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
 use crate::model::scene::{LightingMode, Scene};
-use crate::model::surface::Surface;
+use crate::model::terrain::Terrain;
 use crate::passes::generate::FOLDED;
 use crate::reference::generate::Generated;
 
@@ -142,9 +142,14 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     Ok(rows.collect())
 }
 
-/// The area means of each surface's facets, a row a surface; its index, region, centre, normal and whole area.
+/// The area means of the facets of each surface and ground, a row each; its index, region, centre, normal and whole area.
 pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
-    let mean = |(i, surface): (usize, &Surface)| {
+    let of_ground = |t: &Terrain| {
+        let (low, high) = t.bounds();
+        [0.5 * (low + high), t.facets().map(|f| f.area * f.normal).sum::<DVec3>().normalize_or(DVec3::Y)]
+    };
+    let surfaces = scene.surfaces.iter().map(|s| [s.center, s.normal()]);
+    let mean = |(i, place): (usize, [DVec3; 2])| {
         let own: Vec<&FacetRow> = rows.iter().filter(|r| r.region as usize == i).collect();
         let area: f64 = own.iter().map(|r| r.area).sum();
         let of = |value: fn(&FacetRow) -> f64| own.iter().map(|r| r.area * value(r)).sum::<f64>() / area;
@@ -156,9 +161,9 @@ pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
             rgb(|r| r.l1_r, |r| r.l1_g, |r| r.l1_b),
             rgb(|r| r.l2_r, |r| r.l2_g, |r| r.l2_b),
         ];
-        facet_row(i, i as u32, [surface.center, surface.normal()], area, lit)
+        facet_row(i, i as u32, place, area, lit)
     };
-    scene.surfaces.iter().enumerate().map(mean).collect()
+    surfaces.chain(scene.terrains.iter().map(of_ground)).enumerate().map(mean).collect()
 }
 
 /// What the last frame's light has that a reader should know: radiances that are negative or no numbers, and pairs that

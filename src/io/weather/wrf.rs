@@ -78,7 +78,8 @@ struct Fields {
     vapour: Option<Field>,
     condensates: Vec<(Field, Phase)>,
     factors: [Option<Field>; 2],
-    terrain: Option<Field>,
+    /// What is wrong with it is told to those who ask for it.
+    terrain: std::result::Result<Option<Field>, String>,
     latitude: Option<Field>,
     longitude: Option<Field>,
     /// WSM3 without QICE: cloud water is ice where it is cold.
@@ -256,7 +257,7 @@ impl Fields {
             vapour,
             condensates,
             factors,
-            terrain: optional("HGT", Extent::Columns, METRE)?,
+            terrain: optional("HGT", Extent::Columns, METRE),
             latitude: optional("XLAT", Extent::Columns, DEGREE)?,
             longitude: optional("XLONG", Extent::Columns, DEGREE)?,
             is_single_moment,
@@ -304,7 +305,7 @@ impl WeatherFile {
             within(&heights_m, HEIGHTS_M, "HGT", "m", self.shape, i_step)?;
             Ok((self.ground(i_step)?, heights_m))
         };
-        self.of_step(i_step, &|| self.fields.terrain.as_ref().map(read).transpose())
+        self.of_step(i_step, &|| self.fields.terrain.as_ref().map_err(Clone::clone)?.as_ref().map(read).transpose())
     }
 
     fn of_step<T>(&self, i_step: usize, read: &dyn Fn() -> std::result::Result<T, String>) -> Result<T> {

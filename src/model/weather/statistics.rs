@@ -20,6 +20,8 @@ pub struct CloudStatistics {
     pub mean_opacity: f64,
     /// Lowest bottom and highest top of such a cell, m above sea level.
     pub base_and_top_m: Option<(f64, f64)>,
+    /// Columns whose highest cell is such a cell: where there is more than one level, what is above may have some, too.
+    pub n_columns_to_the_top: usize,
     /// ∫ β dV over the domain, m².
     pub mass_m2: f64,
 }
@@ -44,6 +46,11 @@ pub fn of(grid: &Grid, extinction: &[f64]) -> CloudStatistics {
         greatest_depth: depths.iter().copied().fold(0.0, f64::max),
         mean_opacity: depths.iter().map(|depth| -(-depth).exp_m1()).sum::<f64>() / n as f64,
         base_and_top_m,
+        n_columns_to_the_top: if shape.nz > 1 {
+            (0..n).filter(|&k| extinction[shape.cell(shape.nz - 1, k)] > FAINT).count()
+        } else {
+            0
+        },
         mass_m2: depths.iter().enumerate().map(|(i, depth)| depth * grid.ground.area_m2(i)).sum(),
     }
 }

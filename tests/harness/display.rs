@@ -1,0 +1,82 @@
+//! A virtual display, and hands on its windows: Xvfb and xdotool, which `tools/bootstrap tests` installs. Missing ones fail.
+
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+pub struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+impl Display {
+    /// Of its own, on a number that is free.
+    pub fn open() -> Display {
+        let mut server = Command::new("Xvfb")
+            .args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("Xvfb: tools/bootstrap tests installs it");
+        let mut number = String::new();
+        let out = server.stdout.take().expect("its output");
+        BufReader::new(out).read_line(&mut number).expect("a display's number");
+        Display { server, name: format!(":{}", number.trim()) }
+    }
+
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// What xdotool answers.
+    pub fn xdotool(&self, args: &[&str]) -> Option<String> {
+        let output = Command::new("xdotool").args(args).env("DISPLAY", &self.name).output();
+        let output = output.expect("xdotool: tools/bootstrap tests installs it");
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    }
+
+    /// The window of a process, as soon as it has one.
+    pub fn window_of(&self, pid: u32) -> String {
+        let begin = Instant::now();
+        loop {
+            let found = self.xdotool(&["search", "--onlyvisible", "--pid", &pid.to_string()]);
+            if let Some(window) = found.and_then(|all| all.lines().next().map(str::to_owned)) {
+                return window;
+            }
+            assert!(begin.elapsed() < Duration::from_secs(60), "no window");
+            std::thread::sleep(Duration::from_millis(50));
+        }
+    }
+
+    /// Keys go to it from now on.
+    pub fn focus(&self, window: &str) {
+        self.xdotool(&["windowfocus", "--sync", window]).expect("the focus");
+    }
+
+    pub fn key(&self, name: &str) {
+        self.xdotool(&["key", "--delay", "30", name]).expect("a key");
+    }
+
+    pub fn resize(&self, window: &str, [width, height]: [u32; 2]) {
+        self.xdotool(&["windowsize", window, &width.to_string(), &height.to_string()]).expect("a size");
+    }
+
+    /// From a place in the window to another with a button held.
+    pub fn drag(&self, window: &str, button: u32, from: [u32; 2], to: [u32; 2]) {
+        let [x, y] = from.map(|v| v.to_string());
+        let [to_x, to_y] = to.map(|v| v.to_string());
+        let button = button.to_string();
+        self.xdotool(&["mousemove", "--window", window, &x, &y, "mousedown", &button]).expect("down");
+        self.xdotool(&["mousemove", "--window", window, &to_x, &to_y]).expect("moved");
+        self.xdotool(&["mouseup", &button]).expect("up");
+    }
+}

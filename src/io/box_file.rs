@@ -1,10 +1,12 @@
 //! Box files, P Table 1: the number of particles, the number of boxes, then a line a box of
 //! `particles, x extent, y extent, z extent, x, y, z, radius`.
 
+use std::io::Write;
 use std::path::Path;
 
 use glam::DVec3;
 
+use super::atomic::write_atomic;
 use super::magnitude::{LEAST_EXTENT, shortest, wrong_coordinate, wrong_size};
 use super::suggest::shown;
 use super::text_file::{DATA_LIMIT, line_column, read_text};
@@ -48,6 +50,33 @@ pub fn format(boxes: &[CloudBox]) -> String {
         text += &format!("{}, {}\n", b.n_particles, numbers.join(", "));
     }
     text
+}
+
+/// [`format`], in place of what was there only once it is whole. More than [`parse`] is ever given is an
+/// [`Error::Limit`], and nothing is written.
+pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
+    let text = format(boxes);
+    if text.len() as u64 > DATA_LIMIT {
+        let n_bytes = text.len();
+        return Err(Error::limit(format!("a box file has at most {DATA_LIMIT} bytes, and this one {n_bytes}")));
+    }
+    // Through a link, or the link itself would be replaced.
+    let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    write_atomic(&place, |file| file.write_all(text.as_bytes()))
+}
+
+/// The first field of a box that [`parse`] would refuse, and what it would expect.
+pub fn wrong(b: &CloudBox) -> Option<String> {
+    let numbers = [b.extent.to_array(), b.center.to_array()].concat();
+    let mut checked = FIELDS[1..].iter().zip(numbers.into_iter().chain([b.radius_max])).enumerate();
+    checked.find_map(|(i, (name, v))| {
+        let expected = match i {
+            0..3 => wrong_size(v, LEAST_EXTENT),
+            3..6 => wrong_coordinate(v),
+            _ => wrong_size(v, 0.0),
+        };
+        expected.map(|expected| format!("{name}: expected {expected}, found {}", shortest(v)))
+    })
 }
 
 struct Line<'a> {
@@ -230,6 +259,43 @@ mod tests {
         ] {
             assert_eq!(found, format!("b.dat:{expected}"));
         }
+    }
+
+    #[test]
+    fn wrong_is_what_the_reader_refuses() {
+        let good = CloudBox { n_particles: 1, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+        let numbers = [0.0, -0.0, 1e-31, 1e-30, 1e-300, 3.0, -3.0, 1e15, -1e15, 1.1e15, 1e300, f64::NAN, f64::INFINITY];
+        let mut n_wrong = 0;
+        for v in numbers {
+            for i in 0..7 {
+                let mut b = good;
+                match i {
+                    0..3 => b.extent[i] = v,
+                    3..6 => b.center[i - 3] = v,
+                    _ => b.radius_max = v,
+                }
+                let refused = parse(&format(&[b]), Path::new("b")).err().map(|e| e.to_string());
+                assert_eq!(wrong(&b).is_some(), refused.is_some(), "{b:?}");
+                let named = wrong(&b).is_none_or(|what| what.starts_with(&format!("{}: expected ", FIELDS[i + 1])));
+                assert!(named, "{b:?}");
+                n_wrong += usize::from(refused.is_some());
+            }
+        }
+        // 1e-31 and 1e-300 three times, −3 and −1e15 four times, and four numbers everywhere.
+        assert_eq!(n_wrong, 3 + 3 + 4 + 4 + 4 * 7);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_link_still_leads_to_the_file_after_a_save() {
+        let folder = tempfile::tempdir().unwrap();
+        let (file, link) = (folder.path().join("a.dat"), folder.path().join("link.dat"));
+        std::fs::write(&file, "0\n0\n").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        let b = CloudBox { n_particles: 4, extent: DVec3::ONE, center: DVec3::X, radius_max: 2.0 };
+        write(&link, &[b]).unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!((read(&file).unwrap(), std::fs::read_dir(folder.path()).unwrap().count()), (vec![b], 2));
     }
 
     #[test]

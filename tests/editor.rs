@@ -1,0 +1,263 @@
+//! The macrostructure editor without a window: P's two clouds made by hand, and laws over generated actions.
+
+#[path = "editor/actions.rs"]
+mod actions;
+#[path = "editor/rebuilt.rs"]
+mod rebuilt;
+
+use std::fmt::Debug;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::DVec3;
+use nimbus::io::box_file;
+use nimbus::model::boxes::CloudBox;
+use nimbus::viewer::editor::document::is_same;
+use nimbus::viewer::editor::mirror::{Outcome, Plane};
+use nimbus::viewer::editor::session::{Event, Request, Session, perform};
+use nimbus::viewer::editor::{Action, Axis, Document, DragAction, Edit, Editor, Select, Touched};
+use proptest::collection::vec;
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
+
+/// Of every one of `cases` values: the first that fails, made smaller, fails the test.
+fn check<S>(cases: u32, strategy: S, law: impl Fn(S::Value) -> Result<(), TestCaseError>)
+where
+    S: Strategy,
+    S::Value: Debug,
+{
+    let config = Config { cases, failure_persistence: None, max_shrink_iters: 2000, ..Config::default() };
+    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    match runner.run(&strategy, law) {
+        Ok(()) => {}
+        Err(TestError::Fail(why, what)) => panic!("{why}\nfor {what:#?}"),
+        Err(abort) => panic!("{abort}"),
+    }
+}
+
+/// What a refused action leaves is what was there.
+fn after(editor: &Editor, action: &Action) -> Editor {
+    editor.after(action).map_or_else(|_| editor.clone(), |(next, _)| next)
+}
+
+fn after_all(editor: &Editor, actions: &[Action]) -> Editor {
+    actions.iter().fold(editor.clone(), |editor, action| after(&editor, action))
+}
+
+/// What the file would have: it tells −0 from 0, and all else apart that bits do.
+fn text(boxes: &[CloudBox]) -> String {
+    box_file::format(boxes)
+}
+
+const END: Action = Action::Drag(DragAction::End);
+
+#[test]
+fn as_many_undos_as_steps_lead_to_the_first_document_and_redos_to_the_last() {
+    let n_steps = std::cell::Cell::new(0);
+    check(400, (actions::boxes(), vec(actions::action(), 1..60)), |(boxes, actions)| {
+        let first = Editor::new(boxes);
+        let last = after(&after_all(&first, &actions), &END);
+        let n = last.history().n_undo();
+        let undone = after_all(&last, &vec![Action::Undo; n]);
+        prop_assert!(undone.document().is_same(first.document()));
+        prop_assert_eq!((undone.history().n_undo(), undone.history().n_redo()), (0, n + last.history().n_redo()));
+        let redone = after_all(&undone, &vec![Action::Redo; n]);
+        prop_assert!(redone.document().is_same(last.document()));
+        prop_assert_eq!(redone.history().n_undo(), n);
+        n_steps.set(n_steps.get() + n);
+        Ok(())
+    });
+    // Of some 12 000 actions enough were taken for this to mean something.
+    assert!(n_steps.get() > 1500, "{}", n_steps.get());
+}
+
+#[test]
+fn no_step_stands_where_nothing_differs() {
+    check(300, (actions::boxes(), vec(actions::action(), 1..40)), |(boxes, actions)| {
+        let mut editor = after(&after_all(&Editor::new(boxes), &actions), &END);
+        while editor.history().n_undo() > 0 {
+            let before = after(&editor, &Action::Undo);
+            prop_assert!(!before.document().is_same(editor.document()), "an empty step");
+            editor = before;
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn no_actions_make_what_the_reader_refuses_and_touched_names_all_that_changed() {
+    let n_refused = std::cell::Cell::new(0);
+    check(400, (actions::boxes(), vec(actions::action(), 1..60)), |(boxes, actions)| {
+        let mut editor = Editor::new(boxes);
+        for action in &actions {
+            let Ok((next, touched)) = editor.after(action) else {
+                n_refused.set(n_refused.get() + 1);
+                continue;
+            };
+            let written = text(next.boxes());
+            let read = box_file::parse(&written, Path::new("b")).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            prop_assert_eq!(text(&read), written);
+            let selected = next.selection().boxes();
+            prop_assert!(selected.iter().all(|i| *i < next.boxes().len()));
+            check_touched(editor.document(), next.document(), &touched)?;
+            editor = next;
+        }
+        Ok(())
+    });
+    assert!(n_refused.get() > 1000, "{}", n_refused.get());
+}
+
+/// By the definition: a box that keeps its number, the seed and its bits keeps its particles, and no other does.
+fn check_touched(old: &Document, new: &Document, touched: &Touched) -> Result<(), TestCaseError> {
+    prop_assert_eq!((touched.n_boxes, touched.is_resized), (new.boxes.len(), old.boxes.len() != new.boxes.len()));
+    for (i, b) in new.boxes.iter().enumerate() {
+        let was = old.boxes.get(i).filter(|_| old.seed == new.seed);
+        let in_place = was.map(|was| CloudBox { center: b.center, ..*was });
+        let keeps_shape = in_place.is_some_and(|was| is_same(&was, b));
+        prop_assert_eq!(touched.generate.contains(&i), !keeps_shape);
+        prop_assert_eq!(touched.moved.contains(&i), keeps_shape && !was.is_some_and(|was| is_same(was, b)));
+    }
+    Ok(())
+}
+
+#[test]
+fn mirrored_twice_is_as_it_was() {
+    let axes = prop_oneof![Just(Axis::X), Just(Axis::Y), Just(Axis::Z)];
+    check(300, (actions::boxes(), axes, vec(any::<prop::sample::Index>(), 1..4)), |(boxes, axis, picked)| {
+        prop_assume!(!boxes.is_empty());
+        let picked = picked.iter().map(|index| index.index(boxes.len())).collect();
+        let start = after(&Editor::new(boxes), &actions::select(picked));
+        let twice = |plane| {
+            let mirror = Action::Edit(Edit::Mirror { axis, plane, outcome: Outcome::Move });
+            after_all(&start, &[mirror.clone(), mirror])
+        };
+        prop_assert!(twice(Plane::Zero).document().is_same(start.document()));
+        // M bounds the selection's coordinates, u = ε/2: faces are off by uM, their sum by 4uM, what is mirrored by 5uM,
+        // the second sum by 14uM, what comes back by 20uM, which is 10 εM.
+        let chosen = start.selection().boxes().iter().map(|i| start.boxes()[*i]);
+        let most = chosen.map(|b| b.center.abs() + 0.5 * b.extent).fold(DVec3::ZERO, DVec3::max);
+        let again = twice(Plane::Middle);
+        // Rounding may carry a box at the very bound beyond it: then the second is refused.
+        prop_assume!(most.max_element() < 0.9e15);
+        for (a, b) in again.boxes().iter().zip(start.boxes()) {
+            let off = (a.center - b.center).abs();
+            prop_assert!(off.cmple(10.0 * f64::EPSILON * most).all(), "{} {}", off, most);
+            let in_place = CloudBox { center: b.center, ..*a };
+            prop_assert!(is_same(&in_place, b));
+        }
+        Ok(())
+    });
+}
+
+#[test]
+fn a_mirror_image_lies_across_the_plane() {
+    check(200, actions::usual_boxes(), |boxes| {
+        prop_assume!(!boxes.is_empty());
+        let start = after(&Editor::new(boxes), &Action::Select(Select::All));
+        let mirror = Action::Edit(Edit::Mirror { axis: Axis::Y, plane: Plane::Zero, outcome: Outcome::Copy });
+        let copied = after(&start, &mirror);
+        let (n, old) = (start.boxes().len(), start.boxes());
+        prop_assert_eq!(&copied.boxes()[..n], old);
+        let images: Vec<CloudBox> =
+            old.iter().filter(|b| b.center.y != 0.0).map(|b| CloudBox { center: flipped(b.center), ..*b }).collect();
+        prop_assert_eq!(&copied.boxes()[n..], &images);
+        Ok(())
+    });
+}
+
+fn flipped(c: DVec3) -> DVec3 {
+    DVec3::new(c.x, -c.y, c.z)
+}
+
+#[test]
+fn duplicated_and_deleted_is_as_it_was() {
+    check(300, (actions::boxes(), vec(actions::action(), 0..10)), |(boxes, actions)| {
+        let start = after(&after_all(&Editor::new(boxes), &actions), &END);
+        let twice = after(&start, &Action::Edit(Edit::Duplicate));
+        prop_assert_eq!(twice.boxes().len(), start.boxes().len() + start.selection().boxes().len());
+        // Nothing selected is nothing duplicated, and nothing to delete.
+        let back = after(&twice, &Action::Edit(Edit::Delete));
+        prop_assert!(back.document().is_same(start.document()));
+        Ok(())
+    });
+}
+
+#[test]
+fn a_drag_is_one_step_or_none() {
+    check(300, (actions::usual_boxes(), actions::begin(), vec(actions::drag_to(), 1..50)), |(boxes, begin, moves)| {
+        let start = after(&Editor::new(boxes), &Action::Select(Select::All));
+        let held = after_all(&after(&start, &begin), &moves);
+        prop_assert_eq!(held.history().n_undo(), 0);
+        let ended = after(&held, &END);
+        let is_changed = !ended.document().is_same(start.document());
+        prop_assert_eq!(ended.history().n_undo(), usize::from(is_changed));
+        prop_assert!(after(&ended, &Action::Undo).document().is_same(start.document()));
+        // Where it ends says all: the way there says nothing.
+        let straight = after_all(&start, &[&[begin], &moves[moves.len() - 1..], &[END]].concat());
+        let last_taken = held.after(&moves[moves.len() - 1]).is_ok();
+        let says = |e: &Editor| text(e.boxes());
+        prop_assert!(!last_taken || says(&straight) == says(&ended) || says(&straight) == says(&start));
+        let cancelled = after(&held, &Action::Drag(DragAction::Cancel));
+        prop_assert!(cancelled.document().is_same(start.document()) && cancelled.history().n_undo() == 0);
+        Ok(())
+    });
+}
+
+#[test]
+fn what_is_saved_is_loaded_to_the_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("b.dat");
+    check(100, (actions::boxes(), vec(actions::action(), 0..30)), |(boxes, actions)| {
+        let document = after(&after_all(&Editor::new(boxes), &actions), &END).shared_document();
+        let saved = perform(&Request::Save { path: path.clone(), document: document.clone() });
+        prop_assert_eq!(saved, Some(Event::Saved { path: path.clone(), document: document.clone() }));
+        let Some(Event::Opened { boxes, .. }) = perform(&Request::Open(path.clone())) else {
+            return Err(TestCaseError::fail("not opened"));
+        };
+        prop_assert_eq!(boxes.len(), document.boxes.len());
+        prop_assert!(boxes.iter().zip(&document.boxes).all(|(a, b)| is_same(a, b)));
+        Ok(())
+    });
+    // Nothing else is left behind.
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+/// What is not touched by hand: a file whose numbers are written as P writes them.
+#[test]
+fn the_numbers_of_boxes_that_were_not_touched_keep_their_bits() {
+    let boxes = box_file::read(Path::new("scenes/cubes-554.dat")).unwrap();
+    let moved = Action::Edit(Edit::MoveBy(DVec3::new(0.1, 0.0, 0.0)));
+    let editor = after_all(&Editor::new(boxes.clone()), &[actions::select(vec![4]), moved]);
+    let read = box_file::parse(&text(editor.boxes()), Path::new("b")).unwrap();
+    let same: Vec<usize> = (0..17).filter(|i| is_same(&read[*i], &boxes[*i])).collect();
+    assert_eq!(same, (0..17).filter(|i| *i != 4).collect::<Vec<_>>());
+    assert_eq!(read[4], CloudBox { center: DVec3::new(-3.8 + 0.1, -0.499999, 0.0), ..boxes[4] });
+}
+
+#[test]
+fn dirty_is_what_differs_from_what_was_saved() {
+    let seen = std::cell::RefCell::new([0, 0]);
+    let steps = vec(prop_oneof![6 => actions::small_action().prop_map(Some), 1 => Just(None)], 1..60);
+    check(300, (actions::usual_boxes(), steps), |(boxes, steps)| {
+        let mut saved = text(&boxes);
+        let mut session = Session::opened(Path::new("b.dat"), boxes);
+        for step in steps {
+            let event = match step {
+                Some(action) => Event::Act(action),
+                None => {
+                    let document: Arc<Document> = session.editor().shared_document();
+                    saved = text(&document.boxes);
+                    Event::Saved { path: "b.dat".into(), document }
+                }
+            };
+            if let Ok(turn) = session.after(&event) {
+                session = turn.session;
+            }
+            let is_dirty = text(session.editor().boxes()) != saved;
+            prop_assert_eq!(session.is_dirty(), is_dirty);
+            seen.borrow_mut()[usize::from(is_dirty)] += 1;
+        }
+        Ok(())
+    });
+    assert!(seen.borrow().iter().all(|n| *n > 500), "{seen:?}");
+}

@@ -333,7 +333,7 @@ fn more_particles_than_can_be_numbered_are_refused() {
         load(&path, &[], None)
             .unwrap_err()
             .to_string()
-            .ends_with("8589934590 particles and 0 facets of surfaces: at most 4294967295 together")
+            .ends_with("8589934590 particles and 0 facets of surfaces and ground: at most 4294967295 together")
     );
 }
 

@@ -2,13 +2,15 @@
 
 #[path = "editor/actions.rs"]
 mod actions;
+#[path = "harness/generated.rs"]
+mod generated;
 #[path = "editor/rebuilt.rs"]
 mod rebuilt;
 
-use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
 
+use generated::check;
 use glam::DVec3;
 use nimbus::io::box_file;
 use nimbus::model::boxes::CloudBox;
@@ -18,22 +20,6 @@ use nimbus::viewer::editor::session::{Event, Request, Session, perform};
 use nimbus::viewer::editor::{Action, Axis, Document, DragAction, Edit, Editor, Select, Touched};
 use proptest::collection::vec;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
-
-/// Of every one of `cases` values: the first that fails, made smaller, fails the test.
-fn check<S>(cases: u32, strategy: S, law: impl Fn(S::Value) -> Result<(), TestCaseError>)
-where
-    S: Strategy,
-    S::Value: Debug,
-{
-    let config = Config { cases, failure_persistence: None, max_shrink_iters: 2000, ..Config::default() };
-    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    match runner.run(&strategy, law) {
-        Ok(()) => {}
-        Err(TestError::Fail(why, what)) => panic!("{why}\nfor {what:#?}"),
-        Err(abort) => panic!("{abort}"),
-    }
-}
 
 /// What a refused action leaves is what was there.
 fn after(editor: &Editor, action: &Action) -> Editor {

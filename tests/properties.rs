@@ -3,6 +3,8 @@
 
 #[path = "properties/drawn.rs"]
 mod drawn;
+#[path = "harness/generated.rs"]
+mod generated;
 #[path = "properties/laws.rs"]
 mod laws;
 #[path = "harness/readers.rs"]
@@ -10,9 +12,9 @@ mod readers;
 #[path = "properties/scenes.rs"]
 mod scenes;
 
-use std::fmt::Debug;
 use std::path::Path;
 
+use generated::check;
 use glam::DVec3;
 use nimbus::error::{Error, Place};
 use nimbus::io::box_file;
@@ -20,22 +22,6 @@ use nimbus::io::scene_file::{LoadedScene, parse_beside};
 use nimbus::model::boxes::CloudBox;
 use proptest::collection::vec;
 use proptest::prelude::*;
-use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
-
-/// Of every one of `cases` values: the first that fails, made smaller, fails the test.
-fn check<S>(cases: u32, strategy: S, law: impl Fn(S::Value) -> Result<(), TestCaseError>)
-where
-    S: Strategy,
-    S::Value: Debug,
-{
-    let config = Config { cases, failure_persistence: None, max_shrink_iters: 2000, ..Config::default() };
-    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
-    match runner.run(&strategy, law) {
-        Ok(()) => {}
-        Err(TestError::Fail(why, what)) => panic!("{why}\nfor {what:#?}"),
-        Err(abort) => panic!("{abort}"),
-    }
-}
 
 fn load(text: &str, overrides: &[String]) -> Result<LoadedScene, Error> {
     let files = |path: &Path, first: &str| match path.file_name().and_then(|name| name.to_str()) {

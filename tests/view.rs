@@ -22,20 +22,21 @@ fn view(display: &Display, dir: &std::path::Path, more: &[&str]) -> Child {
     command.current_dir(dir).env("DISPLAY", display.name()).spawn().expect("the program runs")
 }
 
-/// What it printed once it has ended, within a minute.
-fn ended(mut child: Child) -> (Value, String) {
+/// What it printed and what it said once it has ended, within a minute.
+fn ended(mut child: Child) -> (String, String) {
     let begin = Instant::now();
     while child.try_wait().expect("a child").is_none() {
         assert!(begin.elapsed() < Duration::from_secs(60), "the window does not close");
         std::thread::sleep(Duration::from_millis(20));
     }
     let output = child.wait_with_output().expect("its output");
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let [printed, said] = [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).into_owned());
     assert!(output.status.success(), "{said}");
-    (serde_json::from_slice(&output.stdout).unwrap_or(Value::Null), said)
+    (printed, said)
 }
 
-fn loops(found: &Value) -> Vec<(String, u64)> {
+fn loops(printed: &str) -> Vec<(String, u64)> {
+    let found: Value = serde_json::from_str(printed).expect("JSON");
     let of = |row: &Value| (row["loop"].as_str().expect("a name").to_owned(), row["n"].as_u64().expect("a number"));
     found["loops"].as_array().expect("loops").iter().map(of).collect()
 }
@@ -84,18 +85,7 @@ fn keys_and_mouse_and_sizes_are_heard() {
     let moved = dir.path().join("view-2.png");
     wait_for("another", || moved.is_file());
     display.key("Escape");
-    let output = {
-        let begin = Instant::now();
-        let mut child = child;
-        while child.try_wait().expect("a child").is_none() {
-            assert!(begin.elapsed() < Duration::from_secs(60), "the window does not close");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        child.wait_with_output().expect("its output")
-    };
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    let printed = String::from_utf8_lossy(&output.stdout).into_owned();
-    assert!(output.status.success(), "{said}");
+    let (printed, said) = ended(child);
     for words in ["threads.mode = \"serial\"", "draw.path = \"sprites\"", "skipping is off", "kept view-1.png"] {
         assert!(said.contains(words), "{words}: {said}");
     }

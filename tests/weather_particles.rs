@@ -196,7 +196,8 @@ fn a_layout_for_two_steps_serves_all_moments_between() {
 #[test]
 fn an_interval_goes_from_one_step_to_the_next() {
     let (a, b) = (step("supercell.nc", 0), step("supercell.nc", 1));
-    let interval = Interval::between(moment(&a), moment(&b), 20_000, 4);
+    let layout = Layout::new(&a.grid, &[&a.extinction, &b.extinction], 20_000, 4);
+    let interval = Interval::laid_out(&layout, moment(&a), Some(moment(&b)));
     let at = |weight: f64| (0..interval.len()).map(|i| interval.blob(i, weight)).collect::<Vec<_>>();
     let whole = |blobs: &[WeatherBlob]| blobs.iter().map(WeatherBlob::mass).sum::<f64>();
     let (first, last) = (mass(&a.grid, &a.extinction), mass(&b.grid, &b.extinction));
@@ -210,7 +211,8 @@ fn an_interval_goes_from_one_step_to_the_next() {
         // Only heights change, and those by what the air does in two minutes.
         assert!((ends.0[i].position - ends.1[i].position).length() < 500.0);
     }
-    let alone = Interval::alone(moment(&a), 20_000, 4);
+    let layout = Layout::new(&a.grid, &[&a.extinction], 20_000, 4);
+    let alone = Interval::laid_out(&layout, moment(&a), None);
     assert_eq!(alone.blob(7, 0.9), blobs_of(&a, 20_000, 4).1[7]);
     assert!(!alone.is_empty() && alone.len() == 20_000);
 }

@@ -9,7 +9,6 @@ use super::args::{PresentArg, ViewArgs};
 use super::{device_choice, load, output};
 use crate::error::Result;
 use crate::gpu::PresentMode;
-use crate::model::scene::Threading;
 use crate::viewer::screen::LoopTimes;
 use crate::viewer::wanted::help;
 use crate::viewer::window::{self, Options};
@@ -42,7 +41,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     table.extend(times.iter().map(|t| {
         let s = &t.frame_ms;
         let times = [s.p50, s.p95, s.p99, s.max].map(|ms| format!("{ms:.3}"));
-        [vec![name(t.threading).to_owned(), s.n.to_string()], times.to_vec()].concat()
+        [vec![t.threading.name().to_owned(), s.n.to_string()], times.to_vec()].concat()
     }));
     output::text(&output::table(&table))
 }
@@ -50,14 +49,7 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
 fn row(times: &LoopTimes) -> Value {
     let s = &times.frame_ms;
     json!({
-        "loop": name(times.threading), "n": s.n, "mean": s.mean, "min": s.min, "p50": s.p50, "p95": s.p95, "p99": s.p99,
+        "loop": times.threading.name(), "n": s.n, "mean": s.mean, "min": s.min, "p50": s.p50, "p95": s.p95, "p99": s.p99,
         "max": s.max,
     })
-}
-
-fn name(threading: Threading) -> &'static str {
-    match threading {
-        Threading::Serial => "serial",
-        Threading::Parallel => "parallel",
-    }
 }

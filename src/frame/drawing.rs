@@ -194,10 +194,10 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        self.record_solids(rec, solids, b, &packet.camera, s)?;
+        let is_drawn = self.record_solids(rec, solids, b, &packet.camera, s)?;
         match &mut self.shrunk {
-            Some(shrunk) => shrunk.record_solids(rec, solids, b, packet, s),
-            None => Ok(()),
+            Some(shrunk) if is_drawn => shrunk.record_solids(rec, solids, b, packet, s),
+            _ => Ok(()),
         }
     }
 
@@ -225,6 +225,7 @@ impl Drawing {
         }
     }
 
+    /// And whether there was anything to draw.
     pub fn record_solids(
         &mut self,
         rec: &mut Recorder<'_>,
@@ -232,8 +233,8 @@ impl Drawing {
         b: &Buffers,
         camera: &CameraRecord,
         s: &Settings,
-    ) -> Result<()> {
-        let (Some(scenery), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(()) };
+    ) -> Result<bool> {
+        let (Some(scenery), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(false) };
         scenery.record(rec, solids, b, &mut targets[self.i_picture], camera, s)
     }
 

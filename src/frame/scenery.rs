@@ -8,6 +8,7 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Compiler, Device, Image, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
+use crate::model::terrain::Terrain as Ground;
 use crate::passes::surfaces::Surfaces;
 use crate::passes::terrain::{Piece, Terrain};
 
@@ -36,7 +37,7 @@ impl Scenery {
         })
     }
 
-    /// What `solids` draws, into `color`: what comes first clears it.
+    /// What `solids` draws, into `color`, and whether that is anything: what comes first clears it.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,
@@ -45,12 +46,13 @@ impl Scenery {
         color: &mut Image,
         camera: &CameraRecord,
         s: &Settings,
-    ) -> Result<()> {
+    ) -> Result<bool> {
         let Scenery { surfaces, terrain, depth } = self;
         match (solids, &surfaces, &terrain) {
             (Pass::Surfaces, Some(surfaces), _) => {
                 let target = Target { color, depth: Some(depth) };
-                surfaces.record(rec, [&b.regions.buffer, &b.lit], target, camera, s.n_surfaces)
+                surfaces.record(rec, [&b.regions.buffer, &b.lit], target, camera, s.n_surfaces)?;
+                Ok(true)
             }
             (Pass::Terrain, before, Some((terrain, pieces))) => {
                 let mut start = if before.is_some() { Start::Load } else { Start::Clear };
@@ -65,15 +67,15 @@ impl Scenery {
                         *piece,
                     )?;
                 }
-                Ok(())
+                Ok(true)
             }
-            _ => Ok(()),
+            _ => Ok(false),
         }
     }
 }
 
 fn pieces(scene: &Scene) -> Vec<Piece> {
-    let of = |(terrain, i_region): (&crate::model::terrain::Terrain, u32)| Piece {
+    let of = |(terrain, i_region): (&Ground, u32)| Piece {
         i_region,
         i_first_ground: scene.n_surface_facets() as u32,
         n_cells: terrain.n_cells() as u32,

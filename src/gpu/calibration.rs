@@ -9,6 +9,7 @@ use std::time::Instant;
 use ash::{ext, khr, vk};
 
 use super::device::Device;
+use super::device::has_extension;
 use super::instance::Instance;
 use crate::error::{Error, Result};
 
@@ -86,9 +87,7 @@ pub(super) fn probe(instance: &Instance, physical: vk::PhysicalDevice) -> Option
     if !cfg!(target_os = "linux") {
         return None;
     }
-    // What cannot be listed is not there.
-    let found = unsafe { instance.raw.enumerate_device_extension_properties(physical) }.ok()?;
-    let name = NAMES.into_iter().find(|name| found.iter().any(|e| e.extension_name_as_c_str() == Ok(*name)))?;
+    let name = NAMES.into_iter().find(|name| has_extension(instance, physical, name))?;
     let domains = unsafe {
         if name == khr::calibrated_timestamps::NAME {
             khr::calibrated_timestamps::Instance::new(&instance.entry, &instance.raw)

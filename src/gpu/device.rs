@@ -347,7 +347,8 @@ fn unusable(
     needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
 }
 
-fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
+/// What cannot be listed is not there.
+pub(super) fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) };
     extensions.is_ok_and(|all| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
 }

@@ -43,7 +43,8 @@ impl PresentMode {
 pub struct Surface {
     raw: vk::SurfaceKHR,
     loader: khr::surface::Instance,
-    instance: Arc<Instance>,
+    /// Outlives it.
+    _instance: Arc<Instance>,
 }
 
 impl Surface {
@@ -62,7 +63,7 @@ impl Surface {
         let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
             .map_err(|e| Error::vulkan("creating the window's surface", e))?;
         let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
-        Ok((instance.clone(), Surface { raw, loader, instance }))
+        Ok((instance.clone(), Surface { raw, loader, _instance: instance }))
     }
 
     /// Whether `device` can show pictures here; an error that says so where it cannot.
@@ -107,7 +108,6 @@ impl Drop for Surface {
     fn drop(&mut self) {
         // SAFETY: its swapchains are gone: who has both drops them first. The instance is alive.
         unsafe { self.loader.destroy_surface(self.raw, None) };
-        let _ = &self.instance;
     }
 }
 

@@ -235,6 +235,10 @@ pub enum Threading {
 impl Threading {
     pub const NAMES: [(&'static str, Threading); 2] =
         [("serial", Threading::Serial), ("parallel", Threading::Parallel)];
+
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize].0
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

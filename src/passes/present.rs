@@ -2,7 +2,7 @@
 //!
 //! In: a picture's pixels as they lie in its target. Out: sRGB code values, 8 bits; black where there is no picture. Law: over the
 //! background, times the exposure, tone map, sRGB, ordered dither: what is written as PNG. Source: docs/model.md §11 "present".
-//! Error: 2e-5 of the greatest value, so that a code value is another where the exact one is that close to the next.
+//! Error: 8e-6 of the greatest value, so that a code value is another where the exact one is that close to the next.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;

@@ -14,13 +14,6 @@ use crate::measure::lows::Lows;
 use crate::measure::stats::{Summary, mean, median};
 use crate::model::scene::{Impostors, Simulate, Threading};
 
-pub fn name_of(threading: Threading) -> &'static str {
-    match threading {
-        Threading::Serial => "serial",
-        Threading::Parallel => "parallel",
-    }
-}
-
 impl FrameTimes {
     /// Sum of the passes; 0 where none had to run, `None` without timestamps.
     pub fn gpu_ms(&self) -> Option<f64> {
@@ -141,7 +134,7 @@ impl Outcome {
     pub fn block_order(&self) -> Vec<records::Block> {
         let of = |b: &super::bench::Block| records::Block {
             case: b.i_case,
-            threading: name_of(b.of.threading).to_owned(),
+            threading: b.of.threading.name().to_owned(),
             skip: b.of.skip,
         };
         self.blocks.iter().map(of).collect()
@@ -154,7 +147,7 @@ impl Outcome {
         let depths = timed.column(|t| Some(f64::from(t.queue_depth)));
         let against = unskipped.filter(|u| *u != of).map(|u| self.timed(i, u));
         Mode {
-            threading: name_of(of.threading).into(),
+            threading: of.threading.name().into(),
             skip: of.skip,
             simulate: if case.scene.threads.simulate == Simulate::Cpu { "cpu" } else { "gpu" }.into(),
             frames: timed.0.len(),
@@ -193,7 +186,7 @@ impl Outcome {
         let row = |s: &Sample| FrameRow {
             phase: cases[s.i_case].phase.clone().unwrap_or_default(),
             sweep: sweep_text(&cases[s.i_case].sweep),
-            threading: name_of(s.of.threading).into(),
+            threading: s.of.threading.name().into(),
             skip: s.of.skip,
             block: s.i_block as usize,
             frame: s.times.i_frame,

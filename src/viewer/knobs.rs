@@ -1,5 +1,6 @@
 //! What of a scene is turned while it runs, a key a knob: its values in a circle, and what the scene file would say.
 
+use crate::frame::choice::named;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{DrawPath, Gather, LightingMode, Scene, Simulate, Threading};
 
@@ -48,16 +49,16 @@ impl Knob {
     /// Its value in `scene`, as a scene file would have it.
     pub fn value(self, scene: &Scene) -> String {
         match self {
-            Knob::Threading => named(&Threading::NAMES, &scene.threads.mode),
-            Knob::Simulate => named(&Simulate::NAMES, &scene.threads.simulate),
-            Knob::Lighting => named(&LightingMode::NAMES, &scene.lighting.mode),
+            Knob::Threading => named(&Threading::NAMES, scene.threads.mode),
+            Knob::Simulate => named(&Simulate::NAMES, scene.threads.simulate),
+            Knob::Lighting => named(&LightingMode::NAMES, scene.lighting.mode),
             Knob::Bases => scene.lighting.bases.to_string(),
-            Knob::Gather => named(&Gather::NAMES, &scene.lighting.gather),
+            Knob::Gather => named(&Gather::NAMES, scene.lighting.gather),
             Knob::Theta => scene.lighting.theta.to_string(),
-            Knob::Path => named(&DrawPath::NAMES, &scene.draw.path),
+            Knob::Path => named(&DrawPath::NAMES, scene.draw.path),
             Knob::Resolution => match scene.draw.resolution {
                 Resolution::Auto => "\"auto\"".to_owned(),
-                resolution => (1.0 / f64::from(resolution.divisor())).to_string(),
+                resolution => resolution.name().to_owned(),
             },
         }
     }
@@ -89,11 +90,6 @@ impl Knob {
 fn next<T: Copy + PartialEq>(values: &[T], now: T) -> T {
     let after = values.iter().position(|v| *v == now).map_or(0, |i| i + 1);
     values[after % values.len()]
-}
-
-fn named<T: PartialEq>(names: &[(&str, T)], value: &T) -> String {
-    let name = names.iter().find(|(_, v)| v == value).map_or("", |(name, _)| name);
-    format!("\"{name}\"")
 }
 
 #[cfg(test)]

@@ -280,7 +280,7 @@ impl Showing {
 /// How long frames take, for the title.
 fn status(scene: &Scene, threading: Threading, ms: &[f64], last: &FrameTimes) -> String {
     let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
-    let name = Threading::NAMES.iter().find(|(_, t)| *t == threading).map_or("", |(name, _)| name);
+    let name = threading.name();
     let times =
         Summary::of(ms).map_or(String::new(), |s| format!(" | {:.1} ms p50, {:.1} p99 of {}", s.p50, s.p99, s.n));
     format!("{title} | {name}{times} | frame {} | {} particles | ? for keys", last.i_frame, last.n_shown())

@@ -112,7 +112,7 @@ impl Knob {
 }
 
 /// The name of a value, as a string of TOML.
-fn named<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
+pub fn named<T: PartialEq>(names: &[(&str, T)], value: T) -> String {
     let name = names.iter().find(|(_, of)| *of == value).map_or("", |(name, _)| name);
     format!("\"{name}\"")
 }

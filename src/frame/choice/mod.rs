@@ -3,6 +3,7 @@
 
 pub mod impostors;
 mod knobs;
+pub use knobs::named;
 mod rule;
 mod trial;
 

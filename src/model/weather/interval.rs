@@ -20,17 +20,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// A step that nothing is interpolated with.
-    pub fn alone(step: Moment, n: usize, seed: u32) -> Self {
-        Interval::laid_out(&Layout::new(step.grid, &[step.extinction], n, seed), step, None)
-    }
-
-    /// From a step to the next one, on a grid of the same shape.
-    pub fn between(a: Moment, b: Moment, n: usize, seed: u32) -> Self {
-        Interval::laid_out(&Layout::new(a.grid, &[a.extinction, b.extinction], n, seed), a, Some(b))
-    }
-
-    /// The same by a layout that stands for more moments than these.
+    /// From a step to the next one, on a grid of the same shape, or a step alone; `layout` stands for them, and maybe for more.
     pub fn laid_out(layout: &Layout, a: Moment, b: Option<Moment>) -> Self {
         Interval { from: layout.blobs(a.grid, a.extinction), to: b.map(|b| layout.blobs(b.grid, b.extinction)) }
     }

@@ -9,8 +9,8 @@ use std::time::Instant;
 use ash::{ext, khr, vk};
 
 use super::device::Device;
-use super::device::has_extension;
 use super::instance::Instance;
+use super::probe::has_extension;
 use crate::error::{Error, Result};
 
 /// Both clocks at one moment.

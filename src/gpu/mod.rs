@@ -9,10 +9,17 @@ pub mod draw;
 pub mod instance;
 pub mod kernel;
 pub mod memory;
+#[cfg(feature = "window")]
+pub mod overlay;
+#[cfg(feature = "window")]
+mod presenter;
+mod probe;
 pub mod recorder;
 pub mod recorder_draw;
 pub mod reflect;
 pub mod shader;
+#[cfg(feature = "window")]
+pub mod surface;
 #[cfg(feature = "window")]
 pub mod swapchain;
 pub mod timer;
@@ -23,9 +30,13 @@ pub use draw::{DrawPipeline, Meet};
 pub use instance::Instance;
 pub use kernel::{Field, Kernel};
 pub use memory::{Buffer, Image, Place};
+#[cfg(feature = "window")]
+pub use overlay::{Backdrop, Overlay, Widgets};
 pub use recorder::{Amount, Barriers, Commands, Pending, Recorder};
 pub use recorder_draw::{Instances, Start, Target};
 pub use shader::{Compiler, Sources};
 #[cfg(feature = "window")]
-pub use swapchain::{PresentMode, Shown, Surface, Swapchain};
+pub use surface::{PresentMode, Surface};
+#[cfg(feature = "window")]
+pub use swapchain::{Shown, Swapchain};
 pub use timer::ScopeTime;

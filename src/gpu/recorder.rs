@@ -149,7 +149,7 @@ impl Commands {
             .wait_semaphore_infos(&waits)
             .command_buffer_infos(&buffers)
             .signal_semaphore_infos(&signals)];
-        unsafe { self.shared.raw.queue_submit2(self.shared.queue, &info, vk::Fence::null()) }
+        unsafe { self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null()) }
             .map_err(|e| Error::vulkan(format!("vkQueueSubmit2 {}", self.name), e))?;
         self.submitted = value;
         Ok(self.pending())
@@ -325,6 +325,18 @@ impl Recorder<'_> {
         self.depend(&[(from.raw, true, false), (to.raw, false, true)]);
         let region = [vk::BufferCopy::default().size(from.bytes().min(to.bytes()))];
         unsafe { self.commands.shared.raw.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &region) };
+    }
+
+    /// Copies runs of bytes from one buffer to another: each by its beginning there and here, and its length.
+    pub fn copy_runs(&mut self, from: &Buffer, to: &Buffer, runs: &[[u64; 3]]) {
+        let regions = runs.iter().filter(|[_, _, n]| *n > 0);
+        let regions: Vec<_> =
+            regions.map(|[src, dst, n]| vk::BufferCopy::default().src_offset(*src).dst_offset(*dst).size(*n)).collect();
+        if regions.is_empty() {
+            return;
+        }
+        self.depend(&[(from.raw, true, false), (to.raw, false, true)]);
+        unsafe { self.commands.shared.raw.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &regions) };
     }
 
     pub(super) fn bind<P: Pod>(

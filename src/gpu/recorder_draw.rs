@@ -110,6 +110,24 @@ impl Recorder<'_> {
         };
     }
 
+    /// Has `draw` record draws of its own over what is in `image`; it is given the commands, and how much there is.
+    #[cfg(feature = "window")]
+    pub(super) fn draw_over(
+        &mut self,
+        image: &mut Image,
+        draw: impl FnOnce(vk::CommandBuffer, vk::Extent2D) -> Result<()>,
+    ) -> Result<()> {
+        self.transition(image, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
+        let on_color = [attachment(image, Start::Load)];
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: image.extent };
+        let info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&on_color);
+        let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
+        unsafe { raw.cmd_begin_rendering(commands, &info) };
+        let drawn = draw(commands, image.extent);
+        unsafe { raw.cmd_end_rendering(commands) };
+        drawn
+    }
+
     /// Hands `image`, of a swapchain, to the window.
     #[cfg(feature = "window")]
     pub(super) fn show(&self, image: &mut Image) {

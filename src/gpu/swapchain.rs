@@ -1,135 +1,32 @@
-//! Pictures in a window: the surface that a window system gives, and the images that go to and fro between it and nimbus.
+//! Pictures in a window: the images that go to and fro between it and nimbus.
 
 use std::sync::Arc;
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
 
 use ash::{khr, vk};
-use raw_window_handle::{RawDisplayHandle, RawWindowHandle};
 
 use super::device::{Device, Shared};
-use super::instance::Instance;
 use super::memory::{Image, TargetFormat};
+use super::presenter::{Chain, Drawn, ON_THEIR_WAY, Presenter, Told};
 use super::recorder::{Barriers, Commands, Recorder};
+use super::surface::{COLOR_SPACE, PresentMode, Surface};
 use crate::error::{Error, Result};
-
-/// When a picture that is ready is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PresentMode {
-    /// At the next refresh, one after the other: every device has it.
-    Fifo,
-    /// At the next refresh, the newest.
-    Mailbox,
-    /// At once.
-    Immediate,
-}
-
-impl PresentMode {
-    pub const NAMES: [(&'static str, PresentMode); 3] =
-        [("fifo", PresentMode::Fifo), ("mailbox", PresentMode::Mailbox), ("immediate", PresentMode::Immediate)];
-
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize].0
-    }
-
-    fn raw(self) -> vk::PresentModeKHR {
-        match self {
-            PresentMode::Fifo => vk::PresentModeKHR::FIFO,
-            PresentMode::Mailbox => vk::PresentModeKHR::MAILBOX,
-            PresentMode::Immediate => vk::PresentModeKHR::IMMEDIATE,
-        }
-    }
-}
-
-/// A window, as Vulkan knows it. The window must outlive it.
-pub struct Surface {
-    raw: vk::SurfaceKHR,
-    loader: khr::surface::Instance,
-    /// Outlives it.
-    _instance: Arc<Instance>,
-}
-
-impl Surface {
-    /// An instance that can show pictures on `display`, and the surface of a window there.
-    pub fn open(
-        validation: bool,
-        display: RawDisplayHandle,
-        window: RawWindowHandle,
-    ) -> Result<(Arc<Instance>, Surface)> {
-        let wanted = ash_window::enumerate_required_extensions(display)
-            .map_err(|e| Error::vulkan("window extensions", format!("no Vulkan for this window system: {e}")))?;
-        // SAFETY: the list is of static C strings.
-        let names: Vec<_> = wanted.iter().map(|name| unsafe { std::ffi::CStr::from_ptr(*name) }).collect();
-        let instance = Instance::with_extensions(validation, &names)?;
-        // SAFETY: both handles are those of a living window; whoever holds the surface keeps it.
-        let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
-            .map_err(|e| Error::vulkan("creating the window's surface", e))?;
-        let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
-        Ok((instance.clone(), Surface { raw, loader, _instance: instance }))
-    }
-
-    /// Whether `device` can show pictures here; an error that says so where it cannot.
-    pub fn check(&self, device: &Device) -> Result<()> {
-        let family = device.shared().queue_family;
-        let can = unsafe { self.loader.get_physical_device_surface_support(device.physical(), family, self.raw) };
-        match can {
-            Ok(true) if device.info().has_swapchain => Ok(()),
-            Ok(_) => Err(Error::vulkan("window", format!("{} cannot show pictures in it", device.info().name))),
-            Err(e) => Err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR", e)),
-        }
-    }
-
-    /// The modes that `device` has here, of those that nimbus knows.
-    pub fn modes(&self, device: &Device) -> Result<Vec<PresentMode>> {
-        let found = unsafe { self.loader.get_physical_device_surface_present_modes(device.physical(), self.raw) };
-        let found = found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfacePresentModesKHR", e))?;
-        Ok(PresentMode::NAMES.map(|(_, mode)| mode).into_iter().filter(|m| found.contains(&m.raw())).collect())
-    }
-
-    fn capabilities(&self, device: &Device) -> Result<vk::SurfaceCapabilitiesKHR> {
-        unsafe { self.loader.get_physical_device_surface_capabilities(device.physical(), self.raw) }
-            .map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", e))
-    }
-
-    /// What of its formats holds bytes as they are shown.
-    fn format(&self, device: &Device) -> Result<TargetFormat> {
-        let found = unsafe { self.loader.get_physical_device_surface_formats(device.physical(), self.raw) };
-        let found = found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfaceFormatsKHR", e))?;
-        let has = |format: &TargetFormat| {
-            let of = |f: &vk::SurfaceFormatKHR| f.format == format.raw() && f.color_space == COLOR_SPACE;
-            found.iter().any(of)
-        };
-        [TargetFormat::Rgba8, TargetFormat::Bgra8]
-            .into_iter()
-            .find(has)
-            .ok_or_else(|| Error::vulkan("window", "it takes neither R8G8B8A8_UNORM nor B8G8R8A8_UNORM in sRGB"))
-    }
-}
-
-impl Drop for Surface {
-    fn drop(&mut self) {
-        // SAFETY: its swapchains are gone: who has both drops them first. The instance is alive.
-        unsafe { self.loader.destroy_surface(self.raw, None) };
-    }
-}
-
-const COLOR_SPACE: vk::ColorSpaceKHR = vk::ColorSpaceKHR::SRGB_NONLINEAR;
 
 /// What became of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shown {
     Yes,
-    /// The window system had no image to draw into for [`PATIENCE_NS`]: nothing of the window is seen.
+    /// The window system had no image to draw into for [`PATIENCE`]: nothing of the window is seen.
     Late,
     /// The window is of another size by now, or nothing of it is seen: the swapchain is to be made anew.
     Outdated,
 }
 
 /// A window behind others may get no images at all; who waits for one could not be told to stop.
-const PATIENCE_NS: u64 = 250_000_000;
+const PATIENCE: Duration = Duration::from_millis(250);
 
-/// So many pictures may be on their way to the window.
-const ON_THEIR_WAY: usize = 2;
-
-/// The images of a window. Fields drop in order: commands wait for what is still under way.
+/// The images of a window.
 pub struct Swapchain {
     /// One for each picture on its way.
     commands: Vec<Commands>,
@@ -138,7 +35,8 @@ pub struct Swapchain {
     ready: Vec<vk::Semaphore>,
     /// By image: it may be shown.
     drawn: Vec<vk::Semaphore>,
-    i_next: usize,
+    /// Asks for images and shows them; none until all of the above is there.
+    presenter: Option<Presenter>,
     raw: vk::SwapchainKHR,
     loader: khr::swapchain::Device,
     format: TargetFormat,
@@ -177,9 +75,9 @@ impl Swapchain {
         let loader = khr::swapchain::Device::new(&shared.instance.raw, &shared.raw);
         let raw =
             unsafe { loader.create_swapchain(&info, None) }.map_err(|e| Error::vulkan("vkCreateSwapchainKHR", e))?;
-        let (commands, images) = (vec![], vec![]);
+        let (commands, images, ready, drawn) = (vec![], vec![], vec![], vec![]);
         let mut chain =
-            Swapchain { commands, images, ready: vec![], drawn: vec![], i_next: 0, raw, loader, format, mode, shared };
+            Swapchain { commands, images, ready, drawn, presenter: None, raw, loader, format, mode, shared };
         chain.fill(device, extent)?;
         Ok(Some(chain))
     }
@@ -195,6 +93,13 @@ impl Swapchain {
             self.commands.push(Commands::new(device, "window.show")?);
             self.ready.push(self.semaphore("window.ready")?);
         }
+        self.presenter = Some(Presenter::start(Chain {
+            raw: self.raw,
+            loader: self.loader.clone(),
+            ready: std::array::from_fn(|i| self.ready[i]),
+            drawn: self.drawn.clone(),
+            shared: self.shared.clone(),
+        })?);
         Ok(())
     }
 
@@ -218,45 +123,51 @@ impl Swapchain {
         self.images.first().map_or([0, 0], |image| image.size().into())
     }
 
-    /// Has `draw` fill an image, which is black before, and shows it.
+    /// Has `draw` fill an image, which is black before, and has it shown. What `draw` records is with the device when this
+    /// returns, ahead of whatever is submitted next.
     pub fn show(&mut self, draw: impl FnOnce(&mut Recorder<'_>, &mut Image) -> Result<()>) -> Result<Shown> {
-        let i = self.i_next;
-        // What was drawn with these commands before is done, and so their semaphore is free.
-        self.commands[i].wait()?;
-        let acquired =
-            unsafe { self.loader.acquire_next_image(self.raw, PATIENCE_NS, self.ready[i], vk::Fence::null()) };
-        let i_image = match acquired {
-            // A picture that does not quite fit is shown all the same: its semaphore is signalled.
-            Ok((i_image, _)) => i_image as usize,
-            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => return Ok(Shown::Late),
-            Err(vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_SURFACE_LOST_KHR) => return Ok(Shown::Outdated),
-            Err(e) => return Err(Error::vulkan("vkAcquireNextImageKHR", e)),
+        let Some(presenter) = &self.presenter else { return Ok(Shown::Outdated) };
+        let (i_image, i_slot) = match presenter.told.recv_timeout(PATIENCE) {
+            Ok(Told::Image { i_image, i_slot }) => (i_image, i_slot),
+            Ok(Told::Failed(error)) => return Err(error),
+            Err(RecvTimeoutError::Timeout) => return Ok(Shown::Late),
+            // It has told that before.
+            Ok(Told::Outdated) | Err(RecvTimeoutError::Disconnected) => return Ok(Shown::Outdated),
         };
-        self.i_next = (i + 1) % ON_THEIR_WAY;
-        let image = &mut self.images[i_image];
-        self.commands[i].record(Barriers::Placed, |rec| {
+        let (commands, image) = (&mut self.commands[i_slot], &mut self.images[i_image]);
+        commands.record(Barriers::Placed, |rec| {
             draw(rec, image)?;
             rec.show(image);
             Ok(())
         })?;
-        self.commands[i].submit_between(Some(self.ready[i]), Some(self.drawn[i_image]))?;
-        let (drawn, chains, images) = ([self.drawn[i_image]], [self.raw], [i_image as u32]);
-        let info = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
-        match unsafe { self.loader.queue_present(self.shared.queue, &info) } {
-            Ok(false) => Ok(Shown::Yes),
-            Ok(true) | Err(vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_SURFACE_LOST_KHR) => {
-                Ok(Shown::Outdated)
-            }
-            Err(e) => Err(Error::vulkan("vkQueuePresentKHR", e)),
+        let done = commands.submit_between(Some(self.ready[i_slot]), Some(self.drawn[i_image]))?;
+        presenter.show(Drawn { i_image, i_slot, done });
+        Ok(Shown::Yes)
+    }
+
+    /// Waits on the device for images that nobody drew into: a semaphore that is still to be signalled may not go.
+    fn take_back(&self, presenter: &Presenter) {
+        for told in presenter.told.try_iter() {
+            let Told::Image { i_slot, .. } = told else { continue };
+            let wait = [vk::SemaphoreSubmitInfo::default()
+                .semaphore(self.ready[i_slot])
+                .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+            let info = [vk::SubmitInfo2::default().wait_semaphore_infos(&wait)];
+            // A lost device signals nothing any more.
+            let _ = unsafe { self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null()) };
         }
     }
 }
 
 impl Drop for Swapchain {
     fn drop(&mut self) {
+        if let Some(mut presenter) = self.presenter.take() {
+            presenter.end();
+            self.take_back(&presenter);
+        }
         // SAFETY: all that was submitted or shown ends before what it uses; a lost device has ended it.
         unsafe {
-            let _ = self.shared.raw.queue_wait_idle(self.shared.queue);
+            let _ = self.shared.raw.queue_wait_idle(*self.shared.lock_queue());
             self.commands.clear();
             self.images.clear();
             for semaphore in self.ready.drain(..).chain(self.drawn.drain(..)) {
@@ -294,12 +205,5 @@ mod tests {
         capabilities.current_extent = of(u32::MAX, u32::MAX);
         assert_eq!(extent_of(&capabilities, [800, 6000]), of(800, 700));
         assert_eq!(extent_of(&capabilities, [0, 600]), of(1, 600));
-    }
-
-    #[test]
-    fn modes_have_their_names() {
-        for (name, mode) in PresentMode::NAMES {
-            assert_eq!(mode.name(), name);
-        }
     }
 }

@@ -1,29 +1,52 @@
 #version 460
 
-// A picture as a display shows it: over the background, tone-mapped, in sRGB, dithered (docs/model.md §11 "present").
+// A picture as a display shows it: over the background, tone-mapped, in sRGB, dithered; or two, compared (docs/model.md
+// §11 "present").
 
 // 0: bytes, 1: half floats, 2: floats.
 layout(constant_id = 0) const uint FORMAT = 1;
 
-layout(push_constant) uniform Push { vec3 background; float exposure; uvec2 size; ivec2 corner; uint tone_map; uint unused; } push;
-layout(std430, binding = 0) readonly buffer Picture { uint words[]; };
+layout(push_constant) uniform Push {
+    vec3 background;
+    float exposure;
+    uvec2 size;
+    ivec2 corner;
+    uint tone_map;
+    uint compare;
+    int split;
+    float gain;
+} push;
+layout(std430, binding = 0) readonly buffer PictureA { uint words_a[]; };
+layout(std430, binding = 1) readonly buffer PictureB { uint words_b[]; };
 
 layout(location = 0) out vec4 out_color;
 
 const uint NEUTRAL = 0;
+
+// What is compared, and how.
+const uint SPLIT = 1;
+const uint DIFFERENCE = 2;
+const uint SECOND = 3;
+// Rows of a dash of the line between, so that it shows on white and on black.
+const uint DASH = 4;
 const float START_COMPRESSION = 0.8;
 const float DESATURATION = 0.15;
 
+uint word(bool is_b, uint i) {
+    return is_b ? words_b[i] : words_a[i];
+}
+
 // Premultiplied linear RGBA.
-vec4 pixel_at(uvec2 p) {
+vec4 pixel_at(bool is_b, uvec2 p) {
     uint i = p.y * push.size.x + p.x;
     if (FORMAT == 0) {
-        return unpackUnorm4x8(words[i]);
+        return unpackUnorm4x8(word(is_b, i));
     }
     if (FORMAT == 1) {
-        return vec4(unpackHalf2x16(words[2 * i]), unpackHalf2x16(words[2 * i + 1]));
+        return vec4(unpackHalf2x16(word(is_b, 2 * i)), unpackHalf2x16(word(is_b, 2 * i + 1)));
     }
-    return uintBitsToFloat(uvec4(words[4 * i], words[4 * i + 1], words[4 * i + 2], words[4 * i + 3]));
+    uvec4 words = uvec4(word(is_b, 4 * i), word(is_b, 4 * i + 1), word(is_b, 4 * i + 2), word(is_b, 4 * i + 3));
+    return uintBitsToFloat(words);
 }
 
 // Khronos PBR Neutral.
@@ -37,6 +60,14 @@ vec3 neutral(vec3 color) {
     float gray = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
     // What is beyond f32's numbers is white.
     return peak > 3e38 ? vec3(1.0) : mix(color * (new_peak / peak), vec3(new_peak), gray);
+}
+
+// How far two pixels over the background are apart, times the gain; from differences, so that small ones keep their
+// digits. What is no number is 1: nobody is to take it for none.
+vec3 apart(vec4 a, vec4 b) {
+    vec4 d = a - b;
+    vec3 far = push.gain * (push.exposure * abs(d.rgb - d.a * push.background));
+    return mix(vec3(1.0), far, greaterThanEqual(far, vec3(0.0)));
 }
 
 // IEC 61966-2-1; NaN is black.
@@ -60,9 +91,19 @@ void main() {
     if (any(lessThan(at, ivec2(0))) || any(greaterThanEqual(at, ivec2(push.size)))) {
         return;
     }
-    vec4 pixel = pixel_at(uvec2(at));
-    vec3 linear = push.exposure * (pixel.rgb + (1.0 - pixel.a) * push.background);
-    vec3 shown = push.tone_map == NEUTRAL ? neutral(linear) : linear;
+    if (push.compare == SPLIT && at.x == push.split) {
+        out_color = vec4(vec3((uint(at.y) / DASH & 1u) == 0u ? 1.0 : 0.0), 1.0);
+        return;
+    }
+    bool shows_b = push.compare == SECOND || (push.compare == SPLIT && at.x > push.split);
+    vec4 pixel = pixel_at(shows_b, uvec2(at));
+    vec3 shown;
+    if (push.compare == DIFFERENCE) {
+        shown = apart(pixel, pixel_at(true, uvec2(at)));
+    } else {
+        vec3 linear = push.exposure * (pixel.rgb + (1.0 - pixel.a) * push.background);
+        shown = push.tone_map == NEUTRAL ? neutral(linear) : linear;
+    }
     vec3 code = floor(255.0 * vec3(encoded(shown.r), encoded(shown.g), encoded(shown.b)) + dither(uvec2(at)));
     out_color = vec4(min(code, 255.0) / 255.0, 1.0);
 }

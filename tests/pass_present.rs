@@ -1,4 +1,4 @@
-//! present: code values of whole windows against the f64 law, in every format of the film.
+//! present: code values of whole windows against the f64 law, in every format of the film, of one picture and of two.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -11,8 +11,8 @@ use harness::Gpu;
 use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, Place};
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
-use nimbus::passes::present::{Present, Shown};
-use nimbus::reference::present::code_values;
+use nimbus::passes::present::{Compare, Present, Shown};
+use nimbus::reference::present::{Compared, compared_values};
 
 const SIZE: [u32; 2] = [70, 50];
 /// The window is larger, and the picture not in its corner.
@@ -45,6 +45,50 @@ fn pixels() -> Vec<[f32; 4]> {
     (0..n).map(pixel).collect()
 }
 
+/// B: of a third of the pixels A's own, of a third nearly, the rest others; what is no number against other such, and
+/// against numbers.
+fn others() -> Vec<[f32; 4]> {
+    let mut random = Random(4);
+    let a = pixels();
+    let turned = |i: usize| a[(i + 1) % a.len()];
+    let other = |(i, pixel): (usize, &[f32; 4])| match i {
+        280..344 => {
+            if i % 2 == 0 {
+                *pixel
+            } else {
+                turned(i)
+            }
+        }
+        _ => match i % 3 {
+            0 => *pixel,
+            1 => pixel.map(|v| v * (1.0 + random.within(-1e-3, 1e-3))),
+            _ => turned(i * 7),
+        },
+    };
+    a.iter().enumerate().map(other).collect()
+}
+
+/// None, and all that two pictures can be compared by.
+const COMPARED: [(Option<Compare>, Option<Compared>); 8] = [
+    (None, None),
+    (Some(Compare::Second), Some(Compared::Second)),
+    (Some(Compare::Split { column: 31 }), Some(Compared::Split(31))),
+    // In the window's first column, and outside of the picture.
+    (Some(Compare::Split { column: 0 }), Some(Compared::Split(0))),
+    (Some(Compare::Split { column: -1 }), Some(Compared::Split(-1))),
+    (Some(Compare::Split { column: 70 }), Some(Compared::Split(70))),
+    (Some(Compare::Difference { gain: 1.0 }), Some(Compared::Difference(1.0))),
+    (Some(Compare::Difference { gain: 64.0 }), Some(Compared::Difference(64.0))),
+];
+const ALONE: (Option<Compare>, Option<Compared>) = COMPARED[0];
+
+/// What a difference may be off besides: 4 roundings of 2^-24 of what is added up, 5 more of either where bytes are read
+/// (2.5 ulp of a quotient), 2 of the gains; and 12.92 is the steepest of sRGB.
+fn off_by_differing(film: &Film, gain: f64, [a, b]: [DVec4; 2]) -> DVec3 {
+    let size = |p: DVec4| p.truncate().abs() + p.w.abs() * film.background;
+    255.0 * 12.92 * 11.0 * 2f64.powi(-24) * gain * film.exposure * (size(a) + size(b))
+}
+
 fn bytes_of(format: TargetFormat, pixels: &[[f32; 4]]) -> Vec<u8> {
     let all = pixels.iter().flatten();
     match format {
@@ -64,9 +108,15 @@ fn stored(format: TargetFormat, pixel: [f32; 4]) -> DVec4 {
 }
 
 /// Code values of the window.
-fn show(gpu: &mut Gpu, compiler: Option<&Compiler>, from: TargetFormat, film: &Film, into: TargetFormat) -> Vec<u8> {
+fn show(
+    gpu: &mut Gpu,
+    compiler: Option<&Compiler>,
+    (from, into): (TargetFormat, TargetFormat),
+    film: &Film,
+    compare: Option<Compare>,
+) -> Vec<u8> {
     let pass = Present::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), from, into).expect("present");
-    let picture = gpu.upload(&bytes_of(from, &pixels()));
+    let pictures = [pixels(), others()].map(|pixels| gpu.upload(&bytes_of(from, &pixels)));
     let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into).expect("a window");
     let n = 4 * window.n_pixels();
     let read = Buffer::new::<u8>(&gpu.device, "test.codes", n, Place::Readback).expect("room");
@@ -76,9 +126,12 @@ fn show(gpu: &mut Gpu, compiler: Option<&Compiler>, from: TargetFormat, film: &F
         size: SIZE,
         corner: CORNER,
         is_neutral: film.tone_map == ToneMap::Neutral,
+        compare,
     };
+    let [a, b] = &pictures;
+    let pictures = if compare.is_some() { [a, b] } else { [a, a] };
     gpu.run(|rec| {
-        pass.record(rec, &picture, &mut window, &shown)?;
+        pass.record(rec, pictures, &mut window, &shown)?;
         rec.copy_image(&mut window, &read);
         Ok(())
     });
@@ -86,21 +139,27 @@ fn show(gpu: &mut Gpu, compiler: Option<&Compiler>, from: TargetFormat, film: &F
 }
 
 /// The first pixel that is another than the law and rounding allow.
-fn first_wrong(film: &Film, from: TargetFormat, codes: &[u8]) -> Option<String> {
-    let pixels = pixels();
+fn first_wrong(film: &Film, from: TargetFormat, compared: Option<Compared>, codes: &[u8]) -> Option<String> {
+    let (a, b) = (pixels(), others());
     (0..WINDOW[1] as usize).flat_map(|y| (0..WINDOW[0] as usize).map(move |x| (x, y))).find_map(|(x, y)| {
         let code = &codes[4 * (y * WINDOW[0] as usize + x)..][..4];
         let (i, j) = (x as i64 - i64::from(CORNER[0]), y as i64 - i64::from(CORNER[1]));
         let is_inside = (0..i64::from(SIZE[0])).contains(&i) && (0..i64::from(SIZE[1])).contains(&j);
-        let truth = if is_inside {
+        let (truth, off) = if is_inside {
             let (i, j) = (i as usize, j as usize);
-            code_values(film, i, j, stored(from, pixels[j * SIZE[0] as usize + i]))
+            let both = [&a, &b].map(|pixels| stored(from, pixels[j * SIZE[0] as usize + i]));
+            let differing = match compared {
+                Some(Compared::Difference(gain)) => off_by_differing(film, gain, both),
+                _ => DVec3::ZERO,
+            };
+            (compared_values(film, compared, i, j, both), DVec3::splat(OFF) + differing)
         } else {
-            DVec3::ZERO
+            (DVec3::ZERO, DVec3::ZERO)
         };
         let is_right = |k: usize| {
             let within = |v: f64| v.floor().clamp(0.0, 255.0);
-            let off = if is_inside { OFF } else { 0.0 };
+            // Of what is no number nothing is rounded.
+            let off = if off[k].is_finite() { off[k] } else { 0.0 };
             (within(truth[k] - off)..=within(truth[k] + off)).contains(&f64::from(code[k]))
         };
         let is_right = (0..3).all(is_right) && code[3] == 255;
@@ -120,10 +179,14 @@ fn windows_show_what_files_have() {
     for (from, format) in FORMATS {
         for tone_map in [ToneMap::Neutral, ToneMap::Clip] {
             let film = film(format, tone_map);
-            let codes = show(&mut gpu, None, from, &film, TargetFormat::Rgba8);
-            assert_eq!(first_wrong(&film, from, &codes), None, "{format:?} {tone_map:?}");
+            let mut codes_of = |compare, into| show(&mut gpu, None, (from, into), &film, compare);
+            let codes = codes_of(None, TargetFormat::Rgba8);
+            for (compare, compared) in COMPARED {
+                let codes = codes_of(compare, TargetFormat::Rgba8);
+                assert_eq!(first_wrong(&film, from, compared, &codes), None, "{format:?} {tone_map:?} {compare:?}");
+            }
             // Windows that have blue first.
-            let mut swapped = show(&mut gpu, None, from, &film, TargetFormat::Bgra8);
+            let mut swapped = codes_of(None, TargetFormat::Bgra8);
             swapped.chunks_exact_mut(4).for_each(|p| p.swap(0, 2));
             assert!(swapped == codes);
             // Hardly a pixel is left to rounding: no code value is off by more than the bound's share of a step.
@@ -137,18 +200,51 @@ fn windows_show_what_files_have() {
 fn wrong_windows_are_noticed() {
     let mut gpu = Gpu::new();
     let film = film(FilmFormat::Rgba16f, ToneMap::Neutral);
-    for (from, to) in [
-        ("push.exposure * (", "("),
-        ("/ 2.4", "/ 2.2"),
-        ("+ dither(uvec2(at))", "+ 0.5"),
-        ("(1.0 - pixel.a) * push.background", "push.background"),
-        ("- push.corner", ""),
-        ("START_COMPRESSION = 0.8", "START_COMPRESSION = 0.9"),
-        ("peak > 3e38 ? vec3(1.0) : ", ""),
-        ("words[2 * i + 1]", "words[2 * i]"),
+    let (split, apart) = (COMPARED[2], COMPARED[7]);
+    for (from, to, (compare, compared)) in [
+        ("push.exposure * (pixel", "(pixel", ALONE),
+        ("/ 2.4", "/ 2.2", ALONE),
+        ("+ dither(uvec2(at))", "+ 0.5", ALONE),
+        ("(1.0 - pixel.a) * push.background", "push.background", ALONE),
+        ("- push.corner", "", ALONE),
+        ("START_COMPRESSION = 0.8", "START_COMPRESSION = 0.9", ALONE),
+        ("peak > 3e38 ? vec3(1.0) : ", "", ALONE),
+        ("word(is_b, 2 * i + 1)", "word(is_b, 2 * i)", ALONE),
+        ("push.compare == SECOND || (", "(", COMPARED[1]),
+        ("at.x > push.split", "at.x < push.split", split),
+        ("at.x == push.split", "false", split),
+        ("DASH = 4", "DASH = 2", split),
+        ("return is_b ?", "return !is_b ?", split),
+        ("pixel_at(true", "pixel_at(false", apart),
+        ("push.gain * (", "(", apart),
+        ("push.exposure * abs(", "abs(", apart),
+        ("* abs(", "* (", apart),
+        ("d.rgb - d.a * push.background", "d.rgb", apart),
+        ("mix(vec3(1.0), far, greaterThanEqual(far, vec3(0.0)))", "far", apart),
     ] {
         let wrong = Gpu::wrong_compiler("present.frag", from, to);
-        let codes = show(&mut gpu, Some(&wrong), TargetFormat::Rgba16f, &film, TargetFormat::Rgba8);
-        assert!(first_wrong(&film, TargetFormat::Rgba16f, &codes).is_some(), "{to} was not noticed");
+        let formats = (TargetFormat::Rgba16f, TargetFormat::Rgba8);
+        let codes = show(&mut gpu, Some(&wrong), formats, &film, compare);
+        assert!(first_wrong(&film, TargetFormat::Rgba16f, compared, &codes).is_some(), "{to} was not noticed");
     }
+}
+
+/// Where two pictures are the same nothing is off, whatever the gain: code value 0 and nothing else.
+#[test]
+fn the_same_picture_twice_is_black() {
+    let mut gpu = Gpu::new();
+    let film = film(FilmFormat::Rgba32f, ToneMap::Neutral);
+    let apart = Some(Compare::Difference { gain: 1e9 });
+    let codes = show(&mut gpu, None, (TargetFormat::Rgba32f, TargetFormat::Rgba8), &film, apart);
+    let (a, b) = (pixels(), others());
+    let mut n_same = 0;
+    for (k, (a, b)) in a.iter().zip(&b).enumerate().filter(|(_, (a, b))| a == b && a.iter().all(|v| v.is_finite())) {
+        let (x, y) = ((k as u32 % SIZE[0]) as i32 + CORNER[0], (k as u32 / SIZE[0]) as i32 + CORNER[1]);
+        if y >= 0 {
+            let code = &codes[4 * (y as usize * WINDOW[0] as usize + x as usize)..][..4];
+            assert_eq!(code, [0, 0, 0, 255], "{a:?} {b:?}");
+            n_same += 1;
+        }
+    }
+    assert!(n_same > pixels().len() / 4);
 }

@@ -1,8 +1,10 @@
 //! present: a finished picture as a display shows it, in a window's image.
 //!
-//! In: a picture's pixels as they lie in its target. Out: sRGB code values, 8 bits; black where there is no picture. Law: over the
-//! background, times the exposure, tone map, sRGB, ordered dither: what is written as PNG. Source: docs/model.md §11 "present".
-//! Error: 8e-6 of the greatest value, so that a code value is another where the exact one is that close to the next.
+//! In: a picture's pixels as they lie in its target, and a second one's that it may be compared with. Out: sRGB code
+//! values, 8 bits; black where there is no picture. Law: over the background, times the exposure, tone map, sRGB,
+//! ordered dither: what is written as PNG; or the two side by side, or how far they are apart. Source: docs/model.md
+//! §11 "present". Error: 8e-6 of the greatest value, so that a code value is another where the exact one is that close
+//! to the next; of a difference besides 11 roundings of what it is of.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
@@ -16,12 +18,25 @@ record! {
         size: [u32; 2],
         corner: [i32; 2],
         tone_map: u32,
-        unused: u32,
+        compare: u32,
+        split: i32,
+        gain: f32,
     }
 }
 
 pub struct Present {
     pipeline: DrawPipeline,
+}
+
+/// What is shown of two pictures, A and B.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Compare {
+    /// A left of this column of the picture, B right of it, a line in it. A column outside leaves one of them alone.
+    Split { column: i32 },
+    /// The difference of what is shown, before the tone map, times this; black where they are the same.
+    Difference { gain: f32 },
+    /// B alone.
+    Second,
 }
 
 /// Which picture is shown, and how.
@@ -36,6 +51,8 @@ pub struct Shown {
     pub corner: [i32; 2],
     /// Highlights are compressed, and not cut.
     pub is_neutral: bool,
+    /// None: A alone.
+    pub compare: Option<Compare>,
 }
 
 impl Present {
@@ -50,10 +67,24 @@ impl Present {
         Ok(Present { pipeline })
     }
 
-    /// Draws `picture` into all of `into`.
-    pub fn record(&self, rec: &mut Recorder<'_>, picture: &Buffer, into: &mut Image, shown: &Shown) -> Result<()> {
-        let Shown { background, exposure, size, corner, is_neutral } = *shown;
-        let push = Push { background, exposure, size, corner, tone_map: u32::from(!is_neutral), unused: 0 };
-        rec.draw(&self.pipeline, Target::color(into), Start::Clear, &[picture], &push, Instances::Known(1))
+    /// Draws `pictures`, A and B, into all of `into`. They have one format and one size; where nothing is compared, the
+    /// same twice.
+    pub fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        pictures: [&Buffer; 2],
+        into: &mut Image,
+        shown: &Shown,
+    ) -> Result<()> {
+        let Shown { background, exposure, size, corner, is_neutral, compare } = *shown;
+        let (compare, split, gain) = match compare {
+            None => (0, 0, 0.0),
+            Some(Compare::Split { column }) => (1, column, 0.0),
+            Some(Compare::Difference { gain }) => (2, 0, gain),
+            Some(Compare::Second) => (3, 0, 0.0),
+        };
+        let tone_map = u32::from(!is_neutral);
+        let push = Push { background, exposure, size, corner, tone_map, compare, split, gain };
+        rec.draw(&self.pipeline, Target::color(into), Start::Clear, &pictures, &push, Instances::Known(1))
     }
 }

@@ -11,7 +11,7 @@ layout(local_size_x = 64) in;
 // Particles an invocation makes; src/passes/generate.rs says why that many.
 const uint PER_INVOCATION = 16;
 
-layout(push_constant) uniform Push { uint n_particles; uint max_attempts; } push;
+layout(push_constant) uniform Push { uint i_first; uint n_particles; uint max_attempts; } push;
 layout(std430, binding = 0) readonly buffer Boxes { Box boxes[]; };
 layout(std430, binding = 1) readonly buffer GroupOf { uint i_group[]; };
 layout(std430, binding = 2) writeonly buffer Particles { Particle particles[]; };
@@ -82,8 +82,10 @@ void make(Box b, uint begin, uint end, uint hop) {
 
 void main() {
     uint n_chunk = gl_WorkGroupSize.x * PER_INVOCATION;
-    for (uint chunk = gl_WorkGroupID.x * n_chunk; chunk < push.n_particles; chunk += gl_NumWorkGroups.x * n_chunk) {
-        uint chunk_end = min(chunk + n_chunk, push.n_particles);
+    uint run_end = push.i_first + push.n_particles;
+    uint first = push.i_first + gl_WorkGroupID.x * n_chunk;
+    for (uint chunk = first; chunk < run_end; chunk += gl_NumWorkGroups.x * n_chunk) {
+        uint chunk_end = min(chunk + n_chunk, run_end);
         // Groups are runs of consecutive particles, so that a workgroup reads a box once and not for each of them.
         uint last = i_group[chunk_end - 1];
         for (uint g = i_group[chunk]; g <= last; ++g) {

@@ -310,7 +310,7 @@ fn the_number_of_invocations_does_not_matter() {
     let kernel = Kernel::new(&gpu.device, &gpu.compiler, "generate", Push::FIELDS, &[]).unwrap();
     let (list, i_group) = records(&boxes, &law);
     let (list, i_group) = (gpu.upload(&list), gpu.upload(&i_group));
-    let push = Push { n_particles: 615, max_attempts: MAX_ATTEMPTS };
+    let push = Push { i_first: 0, n_particles: 615, max_attempts: MAX_ATTEMPTS };
     for n_groups in [1, 2, 7, 40] {
         let (particles, status) = (gpu.buffer::<ParticleRecord>(615), gpu.buffer::<u32>(615));
         gpu.run(|rec| rec.dispatch_groups(&kernel, &[&list, &i_group, &particles, &status], &push, n_groups));

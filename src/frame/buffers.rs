@@ -207,7 +207,7 @@ fn ground_records(scene: &Scene) -> Vec<FacetRecord> {
 }
 
 /// A record a group, in order.
-fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
+pub(super) fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
     let mut records = Vec::with_capacity(groups.len());
     for cloud in &scene.clouds {
         match &cloud.source {
@@ -227,7 +227,7 @@ fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
 }
 
 /// A record a group, in order.
-fn textured_records(scene: &Scene, groups: &[Group]) -> Vec<TexturedRecord> {
+pub(super) fn textured_records(scene: &Scene, groups: &[Group]) -> Vec<TexturedRecord> {
     let of_group = |(g, i_box): (&Group, u32)| {
         let cloud = &scene.clouds[g.i_cloud];
         TexturedRecord::new(&cloud.texture, cloud.seed, i_box, g.i_first)

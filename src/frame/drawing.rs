@@ -287,6 +287,15 @@ impl Drawing {
         }
     }
 
+    /// The buffer that picture `i` lies in; none where it is an image.
+    pub fn picture(&self, path: DrawPath, i: usize) -> Option<&Buffer> {
+        match (&self.shrunk, path, &self.tiling) {
+            (Some(shrunk), ..) => Some(&shrunk.pictures[i]),
+            (_, DrawPath::Tiles, Some(tiling)) => Some(&tiling.pictures[i]),
+            _ => None,
+        }
+    }
+
     /// Copies the blobs that `path` has drawn into this picture.
     pub fn record_copy(&mut self, rec: &mut Recorder<'_>, path: DrawPath, to: &Buffer) {
         self.record_read(rec, path, self.i_picture, to);

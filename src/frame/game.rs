@@ -114,6 +114,12 @@ impl Game {
         Game { scene, ..self }
     }
 
+    /// Another scene, culled and seen as this one was.
+    pub(super) fn replay(&mut self, scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) {
+        let (culls, viewpoint) = (self.culls, self.viewpoint.take());
+        *self = Game { culls, viewpoint, ..Game::new(scene, rest) };
+    }
+
     /// Frame `i_frame`, from nothing but its number: any frame can be made alone, in any order.
     pub fn step(&mut self, i_frame: u32) -> Result<Packet> {
         self.step_at(i_frame, self.scene.time.at(i_frame))

@@ -20,6 +20,7 @@ pub mod plan;
 mod readback;
 pub mod relay;
 pub mod render;
+pub mod reshape;
 mod scenery;
 pub mod serial;
 mod settings;

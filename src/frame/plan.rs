@@ -159,6 +159,12 @@ impl Plan {
         self.changed
     }
 
+    /// In which nothing runs.
+    #[cfg(test)]
+    pub fn of_nothing() -> Plan {
+        Plan { decisions: [skip("nothing is there"); Pass::ALL.len()], view_only: false, changed: None }
+    }
+
     /// The same plan with another decision for `impostors`, which depends on more frames than the last.
     pub fn with_impostors(mut self, decision: Decision) -> Plan {
         self.decisions[Pass::Impostors as usize] = decision;
@@ -206,6 +212,8 @@ pub struct Traits {
     pub skip: bool,
     /// Without `skip`: but not what no frame of a run can change, the particles of boxes and the pool of textures.
     pub keeps_made: bool,
+    /// The particles of boxes and the pool of textures are there before the first frame.
+    pub made: bool,
 }
 
 impl Traits {
@@ -227,7 +235,7 @@ pub(super) fn pass(
 
 /// The plan for `next` after `last` (`None`: the first frame, nothing is there yet).
 pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
-    let is_made = last.is_some() && (traits.skip || traits.keeps_made);
+    let is_made = (last.is_some() || traits.made) && (traits.skip || traits.keeps_made);
     let last = last.filter(|_| traits.skip);
     let same = |f: &dyn Fn(&Packet, &Packet) -> bool| last.is_some_and(|l| f(l, next));
     let same_life = same(&|a, b| a.discs == b.discs && a.lived == b.lived);

@@ -45,6 +45,11 @@ impl Renderer {
         self.drawing.record_read(rec, self.traits.path, self.i_ended_picture, to);
     }
 
+    /// The buffer that holds it already, where one does: until the second frame from now begins.
+    pub fn picture(&self) -> Option<&Buffer> {
+        self.drawing.picture(self.traits.path, self.i_ended_picture)
+    }
+
     /// Format of that, and its bytes.
     pub fn picture_format(&self) -> (TargetFormat, u64) {
         (self.settings.format, self.settings.n_bytes())
@@ -68,6 +73,12 @@ impl Renderer {
         download(device, &mut self.host, &self.buffers.status, self.settings.n_particles)
     }
 
+    /// Every particle relative to its group, as it lies there. No frame may be in flight.
+    pub fn particles(&mut self, device: &Device) -> Result<Vec<ParticleRecord>> {
+        self.check_alone()?;
+        download(device, &mut self.host, &self.buffers.particles, self.settings.n_particles)
+    }
+
     /// What a pass that does nothing measures on the device, ns: median of several. None without timestamps.
     pub fn empty_scope_ns(&mut self) -> Result<Option<f64>> {
         const N_SCOPES: usize = 15;
@@ -78,7 +89,7 @@ impl Renderer {
     }
 
     /// Of frames in flight nobody knows which one's would be read.
-    fn check_alone(&self) -> Result<()> {
+    pub(super) fn check_alone(&self) -> Result<()> {
         if self.in_flight.is_empty() { Ok(()) } else { Err(Error::usage("frames are in flight")) }
     }
 

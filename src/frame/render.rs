@@ -43,7 +43,7 @@ pub struct Renderer {
     /// None where there are no discs.
     lives: Option<Lives>,
     place: PlacePass,
-    grid: Grid,
+    pub(super) grid: Grid,
     facets: Facets,
     grouping: Option<Grouping>,
     transmit: Transmit,
@@ -62,13 +62,13 @@ pub struct Renderer {
     pub(super) readback: Buffer,
     pub(super) settings: Settings,
     pub(super) traits: Traits,
-    last: Option<Packet>,
+    pub(super) last: Option<Packet>,
     /// Frames submitted so far.
     n_begun: u64,
     /// When the last one ended.
     last_end: Instant,
     /// A frame went wrong on its way.
-    failed: bool,
+    pub(super) failed: bool,
 }
 
 /// A frame that was submitted and has not been waited for.
@@ -161,6 +161,7 @@ impl Renderer {
                 path: DrawPath::Sprites,
                 skip,
                 keeps_made: false,
+                made: false,
             }
             .drawn_by(scene),
             last: None,
@@ -240,7 +241,7 @@ impl Renderer {
 
     /// Forgets the last frame: the next one does everything, as the first did.
     pub fn reset(&mut self) {
-        self.last = None;
+        (self.last, self.traits.made) = (None, false);
     }
 
     /// Whether the next frames leave out what they do not need.

@@ -79,6 +79,17 @@ impl Bed {
         &self.compiler
     }
 
+    /// What is made from now on is of these shaders; the compiler of those before.
+    pub fn set_sources(&mut self, sources: Sources) -> Result<Compiler> {
+        let compiler = Compiler::new(sources, Compiler::default_cache())?;
+        Ok(std::mem::replace(&mut self.compiler, compiler))
+    }
+
+    /// What is made from now on is compiled by this one.
+    pub fn set_compiler(&mut self, compiler: Compiler) {
+        self.compiler = compiler;
+    }
+
     /// All that `scene` needs. `skip`: leave out what a frame does not need.
     pub fn player(&self, scene: impl Into<Arc<Scene>>, skip: bool) -> Result<Player> {
         player(&self.device, &self.compiler, scene.into(), skip)

@@ -9,7 +9,7 @@ use crate::model::cloud::{Group, SQRT_TAU};
 use crate::model::film::FilmFormat;
 use crate::model::scene::{Impostors, LightingMode, Scene};
 use crate::passes::sort::{Counts, Sort, TILE};
-use crate::passes::tiles::{Division, Tiles, Variant, View, invocations};
+use crate::passes::tiles::{Division, THIN, Tiles, Variant, View, invocations};
 
 pub struct Tiling {
     tiles: Tiles,
@@ -109,6 +109,11 @@ fn variant(scene: &Scene, format: TargetFormat) -> Variant {
         most_pairs: None,
         most_tiles: None,
     }
+}
+
+/// Whether the tiles' shaders take all of the scene's blobs for thin.
+pub fn is_thin(scene: &Scene) -> bool {
+    tau_most(scene) <= THIN
 }
 
 /// What may be left out behind a pixel: half a step of the format below 1, where a target shows no less.

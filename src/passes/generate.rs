@@ -10,7 +10,7 @@ use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
 use crate::layout::record;
 
 record! {
-    pub struct Push { n_particles: u32, max_attempts: u32 }
+    pub struct Push { i_first: u32, n_particles: u32, max_attempts: u32 }
 }
 
 /// Set in a particle's status where it was folded back; the other bits count attempts.
@@ -38,14 +38,25 @@ impl Generate {
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
-        [boxes, i_group, particles, status]: [&Buffer; 4],
+        buffers: [&Buffer; 4],
         n_particles: u32,
+        max_attempts: u32,
+    ) -> Result<()> {
+        self.record_run(rec, buffers, [0, n_particles], max_attempts)
+    }
+
+    /// Makes `n_particles` from `i_first` on, and leaves all others as they are.
+    pub fn record_run(
+        &self,
+        rec: &mut Recorder<'_>,
+        [boxes, i_group, particles, status]: [&Buffer; 4],
+        [i_first, n_particles]: [u32; 2],
         max_attempts: u32,
     ) -> Result<()> {
         if max_attempts > MOST_ATTEMPTS {
             return Err(Error::limit(format!("generate: {max_attempts} attempts a particle, at most {MOST_ATTEMPTS}")));
         }
-        let push = Push { n_particles, max_attempts };
+        let push = Push { i_first, n_particles, max_attempts };
         let n_invocations = n_particles.div_ceil(PARTICLES_PER_INVOCATION);
         let n_groups = n_invocations.div_ceil(self.kernel.local_size_x());
         rec.dispatch_groups(&self.kernel, &[boxes, i_group, particles, status], &push, n_groups)

@@ -23,6 +23,7 @@ const TRAITS: Traits = Traits {
     shrunk: false,
     skip: true,
     keeps_made: false,
+    made: false,
 };
 const KEPT: Traits = Traits { two_reflections: true, tensors: Tensors::Kept, ..TRAITS };
 /// With every pass.
@@ -86,6 +87,12 @@ fn the_first_frame_runs_everything_and_a_still_one_nothing() {
     let (whole, kept) = (running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p), running(&moving, Some(&p), &p));
     assert!(whole.iter().filter(|pass| !kept.contains(pass)).eq(["generate", "texture"].iter()), "{kept:?}");
     assert_eq!(running(&moving, None, &p), running(&Traits { skip: false, ..ALL_TRAITS }, None, &p));
+    // What lies there from before the first frame is not made again, but where nothing is skipped.
+    let there = Traits { made: true, ..ALL_TRAITS };
+    let first = running(&there, None, &p);
+    assert_eq!(first.len(), all - 2);
+    assert!(!first.contains(&"generate") && !first.contains(&"texture"));
+    assert!(running(&Traits { skip: false, ..there }, None, &p).contains(&"generate"));
     // Without tensors it is all but `contract`.
     let without = Traits { tensors: Tensors::Needless, ..ALL_TRAITS };
     assert_eq!(running(&without, None, &p).len(), all - 1);

@@ -1,0 +1,66 @@
+use glam::DVec3;
+
+use super::*;
+use crate::model::boxes::{CloudBox, Form};
+use crate::model::cloud::{Facing, Particle};
+use crate::model::growth::Growth;
+use crate::model::gust::Gust;
+use crate::model::texture::Texture;
+
+fn cloud(source: CloudSource) -> Cloud {
+    Cloud {
+        source,
+        position: DVec3::ZERO,
+        wind: DVec3::ZERO,
+        gust: Gust::CALM,
+        growth: Growth::NONE,
+        texture: Texture::NONE,
+        i_material: 0,
+        facing: Facing::Outward,
+        seed: 1,
+    }
+}
+
+fn of_boxes(counts: &[u32]) -> Cloud {
+    let b = |n: &u32| CloudBox { n_particles: *n, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+    let boxes = counts.iter().map(b).collect();
+    cloud(CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 0.6 })
+}
+
+fn of_list(n: usize) -> Cloud {
+    let p = Particle { position: DVec3::ZERO, sigma: 1.0, aspect: 1.0, kappa: 1.0, color: DVec3::ONE };
+    cloud(CloudSource::Particles(vec![p; n]))
+}
+
+fn groups(clouds: &[Cloud]) -> Vec<Group> {
+    let mut groups: Vec<Group> = vec![];
+    for (i, cloud) in clouds.iter().enumerate() {
+        groups.extend(cloud.groups(i, groups.last().map_or(0, |g| g.i_first + g.n_particles)));
+    }
+    groups
+}
+
+fn kept_of(old: &[Cloud], new: &[Cloud], touched: &[usize]) -> Vec<[u32; 3]> {
+    let kept = kept((old, &groups(old)), (new, &groups(new)), touched);
+    kept.iter().map(|k| [k.there, k.here, k.n]).collect()
+}
+
+#[test]
+fn neighbours_are_one_run_and_empty_boxes_none() {
+    let groups = groups(&[of_boxes(&[3, 0, 4, 5, 2])]);
+    assert_eq!(runs(&groups, &[0, 1, 2, 4]), [[0, 7], [12, 2]]);
+    assert_eq!(runs(&groups, &[1, 3]), [[7, 5]]);
+    assert!(runs(&groups, &[1]).is_empty() && runs(&groups, &[]).is_empty());
+}
+
+#[test]
+fn particles_are_found_by_cloud_and_box() {
+    let old = [of_boxes(&[3, 4, 5]), of_list(7), of_boxes(&[2, 2])];
+    // One box more in the first cloud: all that follows is elsewhere.
+    let new = [of_boxes(&[3, 6, 5, 1]), of_list(7), of_boxes(&[2, 2])];
+    assert_eq!(kept_of(&old, &new, &[1, 3]), [[0, 0, 3], [7, 9, 5], [19, 22, 4]]);
+    // Fewer boxes; the last cloud's first one is touched.
+    let new = [of_boxes(&[3, 4]), of_list(7), of_boxes(&[2, 2])];
+    assert_eq!(kept_of(&old, &new, &[3]), [[0, 0, 7], [21, 16, 2]]);
+    assert!(kept_of(&old, &new, &[0, 1, 2, 3, 4]).is_empty());
+}

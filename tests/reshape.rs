@@ -1,0 +1,287 @@
+//! A player that goes on with other boxes, as an editor has it: what it holds and draws is what a fresh one holds and draws,
+//! and particles that nothing has changed are not generated.
+
+#[path = "harness/bounded.rs"]
+mod bounded;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use bounded::Random;
+use glam::DVec3;
+use nimbus::error::Error;
+use nimbus::frame::limits::n_cells_max;
+use nimbus::frame::plan::Pass;
+use nimbus::frame::reshape::Reshaped;
+use nimbus::frame::serial;
+use nimbus::frame::stage::{Bed, DeviceChoice, Player};
+use nimbus::io::scene_file;
+use nimbus::layout::particle::ParticleRecord;
+use nimbus::model::boxes::CloudBox;
+use nimbus::model::cloud::CloudSource;
+use nimbus::model::scene::Scene;
+use nimbus::viewer::editor::{Document, Touched};
+
+/// A scene of two clouds, of which the first is edited.
+fn scene(more: &str, of_cloud: &str) -> Scene {
+    let text = format!(
+        "[film]\nwidth = 40\nheight = 30\nformat = 'rgba32f'\n[camera]\nposition = [0, 0, 18]\ntarget = [0, 0, 0]\n\
+         [draw]\nparticles = 150\n{more}\n[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\n\
+         irradiance = [3, 3, 3]\n[[cloud]]\nfrom = 'boxes'\nfile = 'cubes-554.dat'\n{of_cloud}\n\
+         [[cloud]]\nfrom = 'boxes'\nfile = 'cubes-615.dat'\nposition = [0, 5, -3]\nseed = 4\n"
+    );
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/reshaped.toml");
+    scene_file::parse(text, &path, &[], None).expect("the scene loads").scene
+}
+
+fn document(scene: &Scene) -> Document {
+    let CloudSource::Boxes { boxes, .. } = &scene.clouds[0].source else { unreachable!("a cloud of boxes") };
+    Document { boxes: boxes.clone(), seed: scene.clouds[0].seed }
+}
+
+fn with(scene: &Scene, document: &Document) -> Arc<Scene> {
+    let mut scene = scene.clone();
+    let CloudSource::Boxes { boxes, .. } = &mut scene.clouds[0].source else { unreachable!("a cloud of boxes") };
+    *boxes = document.boxes.clone();
+    scene.clouds[0].seed = document.seed;
+    scene.into()
+}
+
+fn bed() -> Bed {
+    Bed::open(&DeviceChoice { validation: true, ..DeviceChoice::default() }).expect("a device")
+}
+
+/// What a player holds and draws, and whether its frame generated anything.
+#[derive(Debug, PartialEq)]
+struct Held {
+    particles: Vec<ParticleRecord>,
+    status: Vec<u32>,
+    picture: Vec<u8>,
+}
+
+fn held(bed: &Bed, player: &mut Player) -> (Held, bool) {
+    let mut generates = false;
+    serial::run(&mut player.game, &mut player.renderer, 0..1, &mut |times, _| {
+        generates = times.plan.runs(Pass::Generate);
+        Ok(true)
+    })
+    .expect("a frame");
+    let particles = player.renderer.particles(&bed.device).expect("particles");
+    let status = player.renderer.status(&bed.device).expect("statuses");
+    let picture = player.renderer.image_bytes().expect("pixels");
+    (Held { particles, status, picture }, generates)
+}
+
+fn fresh(bed: &Bed, scene: &Arc<Scene>) -> Held {
+    held(bed, &mut bed.player(scene.clone(), true).expect("a player")).0
+}
+
+/// Of every kind of edit one, in turn; whether it leaves every box's number of particles as it was.
+fn edit(document: &mut Document, kind: usize, random: &mut Random) -> bool {
+    let n = document.boxes.len();
+    let i = (random.word() % n as u64) as usize;
+    let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
+    let b = &mut document.boxes[i];
+    match kind {
+        0 => b.center += DVec3::new(within(-3.0, 3.0), within(-2.0, 2.0), within(-1.0, 1.0)),
+        1 => b.extent *= DVec3::new(within(0.3, 2.0), within(0.3, 2.0), within(0.3, 2.0)),
+        2 => b.radius_max *= within(0.5, 1.5),
+        3 => document.seed += 1,
+        // Far off: the density grid gets other proportions.
+        4 => b.center.x += 30.0,
+        5 => b.center.x -= 30.0,
+        6 => b.n_particles = (b.n_particles + 3) % 17,
+        7 => {
+            let added = CloudBox { center: DVec3::new(within(-5.0, 5.0), 1.0, 0.0), ..*b };
+            document.boxes.push(added);
+        }
+        _ => drop(document.boxes.remove(i)),
+    }
+    kind < 6
+}
+
+const N_KINDS: usize = 9;
+
+#[test]
+fn after_any_edits_all_is_as_of_a_fresh_player() {
+    let cases = [
+        ("[lighting]\nmode = 'first'\ngrid = 12", "texture = 'by-box'"),
+        ("path = 'sprites'\n[lighting]\nmode = 'two-reflection'\ngrid = 12\nfacets_per_cloud = 20", "gust = 0.3"),
+        ("[lighting]\nmode = 'none'\n[threads]\nsimulate = 'cpu'", "form = 'printed'"),
+    ];
+    let bed = bed();
+    for (i_case, (more, of_cloud)) in cases.into_iter().enumerate() {
+        let base = scene(more, of_cloud);
+        let mut document = document(&base);
+        let mut player = bed.player(base.clone(), true).expect("a player");
+        assert!(held(&bed, &mut player).1, "the first frame generates");
+        let mut random = Random(7 + i_case as u64);
+        for i_edit in 0..2 * N_KINDS {
+            let before = document.clone();
+            let is_same_size = edit(&mut document, i_edit % N_KINDS, &mut random);
+            let touched = Touched::between(&before, &document);
+            let scene = with(&base, &document);
+            let reshaped = player.reshape(&bed, scene.clone(), &touched.generate).expect("reshaped");
+            assert_eq!(reshaped == Reshaped::InPlace, is_same_size, "edit {i_edit} of case {i_case}");
+            // Several edits may come before a frame.
+            if i_edit % 3 == 1 {
+                continue;
+            }
+            let (held, generates) = held(&bed, &mut player);
+            assert!(!generates);
+            assert!(held == fresh(&bed, &scene), "edit {i_edit} of case {i_case}: {touched:?}");
+        }
+    }
+    bed.close().expect("nothing to complain of");
+}
+
+/// What is not named as touched is left as it lies, on both ways: so who names too little sees what was.
+#[test]
+fn only_what_is_touched_is_generated() {
+    let bed = bed();
+    let base = scene("[lighting]\nmode = 'none'", "");
+    let mut first = document(&base);
+    first.boxes.iter_mut().for_each(|b| b.n_particles = b.n_particles.max(4));
+    let base = Scene::clone(&with(&base, &first));
+    let mut changed = first.clone();
+    for i in [2, 5, 6] {
+        changed.boxes[i].extent *= 0.5;
+    }
+    let mut longer = changed.clone();
+    longer.boxes.push(changed.boxes[0]);
+    let n_before =
+        |document: &Document, i: usize| -> usize { document.boxes[..i].iter().map(|b| b.n_particles as usize).sum() };
+    let of = |held: &Held, document: &Document, i: usize| {
+        let begin = n_before(document, i);
+        held.particles[begin..begin + document.boxes[i].n_particles as usize].to_vec()
+    };
+    let old = fresh(&bed, &with(&base, &first));
+    for (document, touched, way) in
+        [(&changed, vec![5], Reshaped::InPlace), (&longer, vec![5, first.boxes.len()], Reshaped::Anew)]
+    {
+        let mut player = bed.player(base.clone(), true).expect("a player");
+        held(&bed, &mut player);
+        let scene = with(&base, document);
+        assert_eq!(player.reshape(&bed, scene.clone(), &touched).expect("reshaped"), way);
+        let (found, new) = (held(&bed, &mut player).0, fresh(&bed, &scene));
+        for i in 0..first.boxes.len() {
+            let [old, found, new] = [of(&old, &first, i), of(&found, document, i), of(&new, document, i)];
+            assert!(!old.is_empty());
+            assert_eq!(found == old, i != 5, "box {i}, {way:?}");
+            assert_eq!(found == new, ![2, 6].contains(&i), "box {i}, {way:?}");
+        }
+        assert!(found.picture != new.picture);
+        // With all of them named it is as it should be.
+        assert_eq!(player.reshape(&bed, scene, &[2, 6]).expect("reshaped"), Reshaped::InPlace);
+        assert!(held(&bed, &mut player).0 == new);
+        // And from a fresh start all is generated.
+        player.renderer.reset();
+        assert!(held(&bed, &mut player).1);
+    }
+    bed.close().expect("nothing to complain of");
+}
+
+#[test]
+fn nothing_but_boxes_may_differ_and_what_is_refused_changes_nothing() {
+    let bed = bed();
+    let base = scene("[lighting]\nmode = 'none'", "");
+    let mut player = bed.player(base.clone(), true).expect("a player");
+    let others: [&dyn Fn(&mut Scene); 6] = [
+        &|s| s.film.width += 1,
+        &|s| s.lighting.grid += 1,
+        &|s| s.clouds[0].position.x = 1.0,
+        &|s| s.clouds[1].i_material = 1,
+        &|s| s.lights.clear(),
+        &|s| s.clouds.truncate(1),
+    ];
+    for change in others {
+        let mut scene = base.clone();
+        change(&mut scene);
+        assert!(matches!(player.reshape(&bed, scene, &[]), Err(Error::Usage { .. })));
+    }
+    let n = base.groups().len();
+    for wrong in [&[n][..], &[3, 2]] {
+        assert!(player.reshape(&bed, base.clone(), wrong).is_err());
+    }
+    let mut huge = document(&base);
+    huge.boxes[0].n_particles = u32::MAX;
+    assert!(player.reshape(&bed, with(&base, &huge), &[0]).is_err());
+    assert!(held(&bed, &mut player).0 == fresh(&bed, &base.into()));
+    drop(player);
+    bed.close().expect("nothing to complain of");
+}
+
+/// Tiles compute thin blobs otherwise: what a radius turns thin, or no longer so, takes other pipelines.
+#[test]
+fn a_radius_that_makes_blobs_thin_makes_all_anew() {
+    let bed = bed();
+    let base = scene("[lighting]\nmode = 'none'", "");
+    let mut base = Scene { clouds: base.clouds[..1].to_vec(), ..base };
+    let CloudSource::Boxes { optical_depth, .. } = &mut base.clouds[0].source else { unreachable!("boxes") };
+    *optical_depth = 0.08;
+    // A greatest radius of 3 is 1.4 times the mean, one of 0.5 twice.
+    let mut wide = document(&base);
+    wide.boxes.iter_mut().for_each(|b| b.radius_max = 3.0);
+    base = Scene::clone(&with(&base, &wide));
+    let mut small = wide.clone();
+    small.boxes[3].radius_max = 0.5;
+    let mut player = bed.player(base.clone(), true).expect("a player");
+    held(&bed, &mut player);
+    for (document, way) in [(&small, Reshaped::Anew), (&small, Reshaped::InPlace), (&wide, Reshaped::Anew)] {
+        let scene = with(&base, document);
+        assert_eq!(player.reshape(&bed, scene.clone(), &[3]).expect("reshaped"), way);
+        assert!(held(&bed, &mut player).0 == fresh(&bed, &scene));
+    }
+    drop(player);
+    bed.close().expect("nothing to complain of");
+}
+
+/// A long cloud's grid has few cells across it; pulled together it needs more than there was room for.
+#[test]
+fn the_density_grid_gets_room_for_other_proportions() {
+    let bed = bed();
+    let base = scene("[lighting]\nmode = 'two-reflection'\ngrid = 16\nfacets_per_cloud = 30", "");
+    let round = document(&base);
+    let mut long = round.clone();
+    long.boxes[0].center.x += 80.0;
+    let [long, round] = [long, round].map(|document| with(&base, &document));
+    assert!(4 * n_cells_max(&long) < n_cells_max(&round));
+    let mut player = bed.player(long.clone(), true).expect("a player");
+    held(&bed, &mut player);
+    for scene in [&round, &long, &round] {
+        assert_eq!(player.reshape(&bed, scene.clone(), &[]).expect("reshaped"), Reshaped::InPlace);
+        assert!(held(&bed, &mut player).0 == fresh(&bed, scene));
+    }
+    drop(player);
+    bed.close().expect("nothing to complain of");
+}
+
+/// From nothing to a box and back: a picture without particles is all there is to see.
+#[test]
+fn a_cloud_may_begin_with_no_box_and_lose_its_last() {
+    let bed = bed();
+    for more in
+        ["[lighting]\nmode = 'two-reflection'\ngrid = 8", "path = 'sprites'\n[lighting]\nmode = 'first'\ngrid = 8"]
+    {
+        let base = scene(more, "");
+        let base = Scene { clouds: base.clouds[..1].to_vec(), ..base };
+        let [none, no_particles, one] = [vec![], vec![0], vec![40]].map(|counts| {
+            let like = document(&base).boxes[0];
+            let boxes = counts.into_iter().map(|n_particles| CloudBox { n_particles, ..like }).collect();
+            Document { boxes, seed: 3 }
+        });
+        let mut player = bed.player(with(&base, &none), true).expect("a player of nothing");
+        let empty = held(&bed, &mut player).0;
+        assert!(empty.particles.is_empty() && empty.picture.iter().all(|byte| *byte == 0));
+        for (document, touched) in
+            [(&no_particles, vec![0]), (&one, vec![0]), (&no_particles, vec![0]), (&one, vec![0]), (&none, vec![])]
+        {
+            let scene = with(&base, document);
+            player.reshape(&bed, scene.clone(), &touched).expect("reshaped");
+            let held = held(&bed, &mut player).0;
+            assert!(held == fresh(&bed, &scene));
+            assert_eq!(held.picture != empty.picture, document == &one);
+        }
+    }
+    bed.close().expect("nothing to complain of");
+}

@@ -16,7 +16,7 @@ pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
 #[cfg(feature = "window")]
-pub use view::{PresentArg, ViewArgs};
+pub use view::{EditArgs, PresentArg, ViewArgs};
 pub use weather::WeatherArgs;
 
 /// A Vulkan testbed for cloud particles: how much error does a millisecond buy?
@@ -111,6 +111,13 @@ pub enum Command {
     /// all of them are summed up. "i" prints the render command that draws what is seen.
     #[cfg(feature = "window")]
     View(ViewArgs),
+    /// Shape a cloud by hand: boxes that are filled with particles
+    ///
+    /// Boxes are added, moved, scaled, mirrored and numbered with the mouse, keys (listed by "?") and typed numbers with units; the
+    /// cloud that they make is drawn while they change, and only particles of a box that has changed are made anew. What is saved is
+    /// the box file that scenes name: `nimbus render` draws it as the editor does.
+    #[cfg(feature = "window")]
+    Edit(EditArgs),
     /// Say what is in a weather file, and what clouds there are in it
     ///
     /// Reads output of WRF as NetCDF of every kind (classic, 64-bit offset, CDF-5, NetCDF-4) and prints variables, steps with

@@ -8,6 +8,8 @@ mod bench_table;
 mod compare;
 mod compare_pictures;
 mod devices;
+#[cfg(feature = "window")]
+mod edit;
 mod inspect;
 mod ledger;
 mod output;
@@ -21,7 +23,7 @@ mod tradeoff_table;
 mod view;
 mod weather;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -67,6 +69,11 @@ pub fn main() -> ExitCode {
             GRACEFUL.store(true, Ordering::Relaxed);
             view::run(a, &STOP)
         }
+        #[cfg(feature = "window")]
+        Command::Edit(a) => {
+            GRACEFUL.store(true, Ordering::Relaxed);
+            edit::run(a, &STOP)
+        }
         Command::Weather(a) => weather::run(a),
     };
     match done {
@@ -93,18 +100,29 @@ fn interrupted() {
     unsafe { _exit(i32::from(Error::Interrupted.exit_code())) }
 }
 
-/// Loads a scene with all that was typed about it; prints what is allowed but hardly meant.
-fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
+/// What was typed about a scene's keys.
+fn overrides(args: &SceneArgs) -> Vec<String> {
     let mut overrides = args.set.clone();
     if let Some((width, height)) = args.size {
         overrides.push(format!("film.width={width}"));
         overrides.push(format!("film.height={height}"));
     }
-    let loaded = scene_file::load(path, &overrides, args.seed)?;
+    overrides
+}
+
+/// Loads a scene with all that was typed about it; prints what is allowed but hardly meant.
+fn load(path: &Path, args: &SceneArgs) -> Result<LoadedScene> {
+    load_and_name(path, args).map(|(loaded, _)| loaded)
+}
+
+/// The same, and the files that it was read from.
+fn load_and_name(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<PathBuf>)> {
+    let (loaded, files) = scene_file::load_and_name(path, &overrides(args), args.seed);
+    let loaded = loaded?;
     for warning in warnings_of(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
     }
-    Ok(loaded)
+    Ok((loaded, files))
 }
 
 /// What is allowed but hardly meant in a scene or one of its phases.

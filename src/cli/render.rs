@@ -45,7 +45,9 @@ pub fn run(args: &RenderArgs) -> Result<()> {
             eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }
-    let counts = (args.options.verbose || args.json).then(|| Counts::of(&mut stage)).transpose()?;
+    let counts = (args.options.verbose || args.json)
+        .then(|| Counts::of(&mut stage.renderer, &stage.device, &stage.scene))
+        .transpose()?;
     if let (Some(counts), true) = (&counts, args.options.verbose) {
         eprintln!("  {}", counts.text());
     }

@@ -6,15 +6,19 @@ use std::sync::atomic::AtomicBool;
 use serde_json::{Value, json};
 
 use super::args::{PresentArg, ViewArgs};
-use super::{device_choice, load, output};
+use super::{device_choice, load_and_name, output, overrides};
 use crate::error::Result;
 use crate::gpu::PresentMode;
+use crate::measure::stats::Summary;
+use crate::viewer::origin::Origin;
 use crate::viewer::screen::LoopTimes;
 use crate::viewer::wanted::help;
-use crate::viewer::window::{self, Options};
+use crate::viewer::window::{self, Ended, Options};
 
 pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
-    let loaded = load(&args.scene, &args.options)?;
+    let (loaded, files) = load_and_name(&args.scene, &args.options)?;
+    let first = Arc::new(loaded.scene);
+    let (typed, shaders) = ((overrides(&args.options), args.options.seed), args.options.shaders.as_deref());
     if !args.options.quiet {
         eprint!("{}", help());
     }
@@ -23,33 +27,40 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         PresentArg::Mailbox => PresentMode::Mailbox,
         PresentArg::Immediate => PresentMode::Immediate,
     };
-    let times = window::run(Options {
-        scene: Arc::new(loaded.scene),
-        scene_path: args.scene.clone(),
+    let Ended { loops, panels_ms } = window::run(Options {
+        origin: Origin::new((&args.scene, first), typed, files, shaders),
         choice: device_choice(&args.options),
         skip: !args.options.no_skip,
         mode,
         n_frames: args.frames,
         stop,
         quiet: args.options.quiet,
+        panels: !args.no_panels,
     })?;
     if args.json {
-        let rows: Vec<Value> = times.iter().map(row).collect();
-        return output::text(&format!("{:#}\n", json!({ "loops": rows })));
+        let rows: Vec<Value> = loops.iter().map(row).collect();
+        let panels = Summary::of(&panels_ms).map(|s| numbers(&s));
+        return output::text(&format!("{:#}\n", json!({ "loops": rows, "panels": panels })));
     }
-    let mut table = vec![["loop", "n", "p50 ms", "p95", "p99", "max"].map(str::to_owned).to_vec()];
-    table.extend(times.iter().map(|t| {
+    let mut table = vec![["loop", "panels", "n", "p50 ms", "p95", "p99", "max"].map(str::to_owned).to_vec()];
+    table.extend(loops.iter().map(|t| {
         let s = &t.frame_ms;
         let times = [s.p50, s.p95, s.p99, s.max].map(|ms| format!("{ms:.3}"));
-        [vec![t.threading.name().to_owned(), s.n.to_string()], times.to_vec()].concat()
+        let panels = if t.has_panels { "shown" } else { "hidden" };
+        [vec![t.threading.name().to_owned(), panels.to_owned(), s.n.to_string()], times.to_vec()].concat()
     }));
     output::text(&output::table(&table))
 }
 
 fn row(times: &LoopTimes) -> Value {
-    let s = &times.frame_ms;
-    json!({
-        "loop": times.threading.name(), "n": s.n, "mean": s.mean, "min": s.min, "p50": s.p50, "p95": s.p95, "p99": s.p99,
-        "max": s.max,
-    })
+    let mut row = json!({ "loop": times.threading.name(), "panels": times.has_panels });
+    if let (Value::Object(row), Value::Object(numbers)) = (&mut row, numbers(&times.frame_ms)) {
+        row.extend(numbers);
+    }
+    row
+}
+
+/// Milliseconds.
+fn numbers(s: &Summary) -> Value {
+    json!({ "n": s.n, "mean": s.mean, "min": s.min, "p50": s.p50, "p95": s.p95, "p99": s.p99, "max": s.max })
 }

@@ -5,6 +5,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Blob;
+use super::area::mean::each;
 use crate::model::camera::Pose;
 use crate::model::film::FilmFormat;
 
@@ -249,6 +250,57 @@ pub fn render_textured(
 /// Bands of rows that are drawn side by side; the result does not depend on it.
 const N_THREADS: u32 = 2;
 
+/// Blobs, their radiance, in which order they are drawn (far to near), and the factor on the τ of each.
+#[derive(Clone, Copy)]
+pub struct Layers<'a> {
+    pub blobs: &'a [Blob],
+    pub radiance: &'a [DVec3],
+    pub order: &'a [u32],
+    pub factor: Option<Factor<'a>>,
+}
+
+/// The values of [`render_textured`] at the pixels `at` alone ([column, row], one in each cell of `cell` by `cell`
+/// pixels, rows of cells from the top), over `behind`, one each. `on_row` hears how many rows of cells there are each
+/// time that one more is done.
+pub fn render_at(
+    view: &View,
+    (cell, at): (u32, &[[u32; 2]]),
+    behind: &[Behind],
+    layers: &Layers<'_>,
+    on_row: &(dyn Fn(usize) + Sync),
+) -> Vec<[f64; 4]> {
+    let met = |&j: &u32| Some((j as usize, Met::new(view, &layers.blobs[j as usize], &Rounding::NONE)?));
+    let met: Vec<(usize, Met)> = layers.order.iter().filter_map(met).collect();
+    let n_columns = view.width.div_ceil(cell) as usize;
+    let n_rows = at.len().div_ceil(n_columns.max(1));
+    let rows = each(n_rows, |i| {
+        let here = i * n_columns..((i + 1) * n_columns).min(at.len());
+        let mut pixels: Vec<Layered> = behind[here.clone()].iter().map(Layered::from).collect();
+        let (first, end) = (i as u32 * cell, (i as u32 + 1) * cell);
+        for (j, met) in met.iter().filter(|(_, met)| met.rows.0 < end && met.rows.1 > first) {
+            let (from, to) = (met.columns.0 / cell, met.columns.1.div_ceil(cell));
+            for (k, pixel) in pixels.iter_mut().enumerate().take(to as usize).skip(from as usize) {
+                let [column, row] = at[here.start + k];
+                let is_met =
+                    (met.columns.0..met.columns.1).contains(&column) && (met.rows.0..met.rows.1).contains(&row);
+                if is_met {
+                    let of_blob = |delta: DVec2| layers.factor.map_or(1.0, |f| f(*j, delta));
+                    met.lay(
+                        view,
+                        (&layers.blobs[*j], layers.radiance[*j]),
+                        &of_blob,
+                        ([column, row], pixel),
+                        &Rounding::NONE,
+                    );
+                }
+            }
+        }
+        on_row(n_rows);
+        pixels
+    });
+    rows.into_iter().flatten().map(|p| p.value).collect()
+}
+
 /// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference of slopes.
 fn draw(
     view: &View,
@@ -258,43 +310,76 @@ fn draw(
     (band, first_row): (&mut [Layered], u32),
     r: &Rounding,
 ) {
-    let c = blob.position - view.pose.position;
-    let depth = c.dot(view.pose.forward);
-    if !(depth >= view.near && blob.sigma > 0.0) {
-        return;
-    }
-    let most = view.cut(blob.deepest());
-    let reach = (2.0 * (most + r.slack(most)).max(0.0)).sqrt();
-    if reach <= 0.0 {
-        return;
-    }
-    let (above, off_size) = view.above_smallest(blob, c, r.depth);
-    if above < -off_size {
-        return;
-    }
-    let of_size = above.abs() < off_size;
+    let Some(met) = Met::new(view, blob, r) else { return };
     let n_rows = (band.len() / view.width as usize) as u32;
-    let [columns, rows] = view.rectangle(blob, c, reach);
-    for row in rows.0.max(first_row)..rows.1.min(first_row + n_rows) {
-        for column in columns.0..columns.1 {
+    for row in met.rows.0.max(first_row)..met.rows.1.min(first_row + n_rows) {
+        for column in met.columns.0..met.columns.1 {
             let pixel = &mut band[((row - first_row) * view.width + column) as usize];
-            let d = view.ray(column, row);
-            let line = blob.along(c, d);
-            let (cut, delta) = (view.cut(line.depth), view.slopes_of(d) - view.slopes_of(c));
-            let slack = r.slack(cut);
-            let alpha = alpha(factor(delta) * line.tau());
-            let (behind, behind_bound) = pixel.behind;
-            // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
-            // stands behind decides likewise.
-            let beyond = 0.5 * line.off.powi(2) - cut;
-            let (on_edge, at_behind) = (beyond.abs() <= slack, (depth - behind).abs() < behind_bound);
-            let is_in = beyond <= 0.0 && cut > 0.0;
-            if (!is_in && !on_edge) || (depth > behind && !at_behind) {
-                continue;
-            }
-            let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-            pixel.over(if is_in && depth <= behind && above >= 0.0 { alpha } else { 0.0 }, off, radiance, r);
+            met.lay(view, (blob, radiance), factor, ([column, row], pixel), r);
         }
+    }
+}
+
+/// A blob as a view meets it.
+struct Met {
+    /// Off the eye, and along the view.
+    c: DVec3,
+    depth: f64,
+    /// How far it is above the smallest size, and whether rounding decides that.
+    above: f64,
+    of_size: bool,
+    /// Outside of which it is not seen.
+    columns: (u32, u32),
+    rows: (u32, u32),
+}
+
+impl Met {
+    /// None where nothing of it is seen.
+    fn new(view: &View, blob: &Blob, r: &Rounding) -> Option<Met> {
+        let c = blob.position - view.pose.position;
+        let depth = c.dot(view.pose.forward);
+        if !(depth >= view.near && blob.sigma > 0.0) {
+            return None;
+        }
+        let most = view.cut(blob.deepest());
+        let reach = (2.0 * (most + r.slack(most)).max(0.0)).sqrt();
+        if reach <= 0.0 {
+            return None;
+        }
+        let (above, off_size) = view.above_smallest(blob, c, r.depth);
+        if above < -off_size {
+            return None;
+        }
+        let [columns, rows] = view.rectangle(blob, c, reach);
+        Some(Met { c, depth, above, of_size: above.abs() < off_size, columns, rows })
+    }
+
+    /// Lays the blob over a pixel.
+    fn lay(
+        &self,
+        view: &View,
+        (blob, radiance): (&Blob, DVec3),
+        factor: &dyn Fn(DVec2) -> f64,
+        ([column, row], pixel): ([u32; 2], &mut Layered),
+        r: &Rounding,
+    ) {
+        let Met { c, depth, above, of_size, .. } = *self;
+        let d = view.ray(column, row);
+        let line = blob.along(c, d);
+        let (cut, delta) = (view.cut(line.depth), view.slopes_of(d) - view.slopes_of(c));
+        let slack = r.slack(cut);
+        let alpha = alpha(factor(delta) * line.tau());
+        let (behind, behind_bound) = pixel.behind;
+        // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
+        // stands behind decides likewise.
+        let beyond = 0.5 * line.off.powi(2) - cut;
+        let (on_edge, at_behind) = (beyond.abs() <= slack, (depth - behind).abs() < behind_bound);
+        let is_in = beyond <= 0.0 && cut > 0.0;
+        if (!is_in && !on_edge) || (depth > behind && !at_behind) {
+            return;
+        }
+        let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+        pixel.over(if is_in && depth <= behind && above >= 0.0 { alpha } else { 0.0 }, off, radiance, r);
     }
 }
 

@@ -3,9 +3,10 @@
 
 use std::fmt;
 use std::str::FromStr;
+use std::sync::OnceLock;
 use std::time::Instant;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::model_light::{Lit, Met, ModelLight, reflections_of};
 use super::picture::{self, Drawing, Listener, Work};
@@ -18,7 +19,7 @@ use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode,
 use crate::model::sort_bits::SortBits;
 use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
-use crate::reference::sprites::{Behind, View};
+use crate::reference::sprites::{self, Behind, Factor, Layers, View};
 use crate::reference::surfaces;
 use crate::reference::volume::{Pixel, Volume};
 
@@ -81,6 +82,8 @@ pub struct Reference {
     pub accuracy: String,
     /// What computing it took.
     pub seconds: f64,
+    /// What of that grows with the number of pixels.
+    pub pixels_s: f64,
 }
 
 impl Against {
@@ -121,6 +124,13 @@ impl Against {
         let begin = Instant::now();
         self.check(scene, time_s)?;
         let scene = &Against::of_scene(scene);
+        let drawing_since = OnceLock::new();
+        let listener: Listener = &|work, n| {
+            if work == Work::Drawing {
+                drawing_since.get_or_init(Instant::now);
+            }
+            listener(work, n);
+        };
         let drawn = match self {
             Against::Thin | Against::Volume => {
                 let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
@@ -136,6 +146,7 @@ impl Against {
             own_error,
             accuracy: self.accuracy(scene),
             seconds: begin.elapsed().as_secs_f64(),
+            pixels_s: drawing_since.get().map_or(0.0, |since| since.elapsed().as_secs_f64()),
         })
     }
 
@@ -181,17 +192,35 @@ pub(super) fn of_scene_light(
     listener: Listener,
 ) -> Drawn {
     let of_light = root_mean_square(truth.second_error.iter().copied());
-    if drawing == Drawing::Thin {
-        let picture = picture::draw(scene, truth, Drawing::Thin, listener);
-        let errors = vec![of_light + ROUNDING * picture.brightest; pixels.at.len()];
-        return Drawn { rgba: pixels.pick(&picture.rgba), errors };
-    }
     let view = picture::view(scene, truth);
     let behind = pixels.pick(&picture::behind(scene, truth, &view));
     let radiance = truth.particle_radiance(scene);
+    if drawing == Drawing::Thin {
+        let brightest = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
+        let errors = vec![of_light + ROUNDING * brightest; pixels.at.len()];
+        return Drawn { rgba: thin(scene, truth, &view, (&behind, &radiance), pixels, listener), errors };
+    }
     let found = volume(&Volume::new(&view, &truth.blobs, &radiance), pixels, &behind, listener);
     let errors = found.iter().map(|p| p.error + of_light).collect();
     Drawn { rgba: found.into_iter().map(|p| p.color).collect(), errors }
+}
+
+/// Thin sprites of such radiance at `pixels`, over what is `behind` in each.
+fn thin(
+    scene: &Scene,
+    truth: &Truth,
+    view: &View,
+    (behind, radiance): (&[Behind], &[DVec3]),
+    pixels: &Pixels,
+    listener: Listener,
+) -> Vec<[f64; 4]> {
+    let (blobs, order) = picture::drawn(scene, truth);
+    let textured = picture::sheets(scene, truth, view);
+    let factor = |j: usize, delta: DVec2| textured.as_ref().map_or(1.0, |(pool, sheets)| sheets[j].factor(pool, delta));
+    let factor: Option<Factor> = if textured.is_some() { Some(&factor) } else { None };
+    let layers = Layers { blobs: &blobs, radiance, order: &order, factor };
+    let on_row = |n: usize| listener(Work::Drawing, n);
+    sprites::render_at(view, (pixels.cell, &pixels.at), behind, &layers, &on_row)
 }
 
 /// `scene` in the model's light, of `n` reflections where they are not the scene's. `by_facet`: surfaces are lit where the scene

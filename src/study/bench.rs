@@ -127,7 +127,7 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
             run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
             if is_last {
                 ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
-                ran.outcome.counts.insert(i_case, Counts::of(stage)?);
+                ran.outcome.counts.insert(i_case, Counts::of(&mut stage.renderer, &stage.device, &stage.scene)?);
                 // Of a block that was cut short the last frame is another one.
                 if plan.pictures && !stop.load(Ordering::Relaxed) {
                     ran.outcome.pictures.push(shown(i_case, case, &mut stage.renderer)?);

@@ -4,10 +4,11 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::Result;
-use crate::frame::stage::Stage;
+use crate::frame::render::Renderer;
+use crate::gpu::Device;
 use crate::layout::facet::LitRecord;
 use crate::model::film::FilmFormat;
-use crate::model::scene::LightingMode;
+use crate::model::scene::{LightingMode, Scene};
 use crate::passes::generate::FOLDED;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -33,16 +34,16 @@ pub struct Counts {
 const HALF_MAX: f32 = 65504.0;
 
 impl Counts {
-    /// Of the last frame of `stage`. No frame may be in flight.
-    pub fn of(stage: &mut Stage) -> Result<Counts> {
-        let rgba = stage.renderer.image()?;
-        let mut counts = Counts::of_picture(&rgba, stage.scene.film.format);
-        let status = stage.renderer.status(&stage.device)?;
+    /// Of the last frame that `renderer` drew of `scene`. No frame may be in flight.
+    pub fn of(renderer: &mut Renderer, device: &Device, scene: &Scene) -> Result<Counts> {
+        let rgba = renderer.image()?;
+        let mut counts = Counts::of_picture(&rgba, scene.film.format);
+        let status = renderer.status(device)?;
         // Of lists there are no attempts.
         counts.particles = status.iter().filter(|s| **s & !FOLDED != 0).count() as u64;
         counts.folded = status.iter().filter(|s| **s & FOLDED != 0).count() as u64;
-        if stage.scene.lighting.mode != LightingMode::None {
-            counts.add_light(&stage.renderer.facets(&stage.device)?.1);
+        if scene.lighting.mode != LightingMode::None {
+            counts.add_light(&renderer.facets(device)?.1);
         }
         Ok(counts)
     }

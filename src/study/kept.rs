@@ -35,6 +35,7 @@ struct Head {
     own_error: f64,
     accuracy: String,
     seconds: f64,
+    pixels_s: f64,
     n_pixels: usize,
     /// SHA-256 of the numbers, hex.
     content: String,
@@ -68,6 +69,11 @@ pub fn reference(
         let _ = write(&path, &hash, &reference);
     }
     Ok(Kept { reference, hash, from_cache: false })
+}
+
+/// Whether two scenes have one reference at one time.
+pub fn is_same(against: Against, a: &Scene, b: &Scene) -> bool {
+    counted(&Against::of_scene(a), against) == counted(&Against::of_scene(b), against)
 }
 
 fn hash_of(against: Against, scene: &Scene, time_s: f64, pixels: &Pixels) -> String {
@@ -123,18 +129,19 @@ fn read(path: &Path, hash: &str, n_pixels: usize) -> Option<Reference> {
     let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
     let values: Vec<f64> = numbers.chunks_exact(8).map(value).collect::<Option<_>>()?;
     let rgba: Vec<[f64; 4]> = values.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
-    let Head { own_error, accuracy, seconds, .. } = head;
-    (is_whole && rgba.len() == n_pixels).then_some(Reference { rgba, own_error, accuracy, seconds })
+    let Head { own_error, accuracy, seconds, pixels_s, .. } = head;
+    (is_whole && rgba.len() == n_pixels).then_some(Reference { rgba, own_error, accuracy, seconds, pixels_s })
 }
 
 fn write(path: &Path, hash: &str, reference: &Reference) -> Result<()> {
     let numbers: Vec<u8> = reference.rgba.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
-    let Reference { own_error, accuracy, seconds, .. } = reference;
+    let Reference { own_error, accuracy, seconds, pixels_s, .. } = reference;
     let head = Head {
         hash: hash.to_owned(),
         own_error: *own_error,
         accuracy: accuracy.clone(),
         seconds: *seconds,
+        pixels_s: *pixels_s,
         n_pixels: reference.rgba.len(),
         content: digest(&numbers),
     };
@@ -158,7 +165,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.f64");
         let rgba = vec![[0.1, -2.0, 1e-300, 1.0], [0.0, f64::MAX, 0.3, 0.4]];
-        let reference = Reference { rgba, own_error: 1e-7, accuracy: "rounding".into(), seconds: 2.5 };
+        let reference = Reference { rgba, own_error: 1e-7, accuracy: "rounding".into(), seconds: 2.5, pixels_s: 0.5 };
         write(&path, "abc", &reference).unwrap();
         assert_eq!(read(&path, "abc", 2), Some(reference));
         assert_eq!((read(&path, "abd", 2), read(&path, "abc", 3)), (None, None));

@@ -167,7 +167,7 @@ pub(super) fn ground_over(picture: &mut [Behind], scene: &Scene, origin: DVec3, 
 }
 
 /// The pool, and what every particle shows of it; nothing where the scene is plain.
-fn sheets(scene: &Scene, truth: &Truth, view: &View) -> Option<(Pool, Vec<Sheet>)> {
+pub(super) fn sheets(scene: &Scene, truth: &Truth, view: &View) -> Option<(Pool, Vec<Sheet>)> {
     if !scene.is_textured() {
         return None;
     }
@@ -191,7 +191,7 @@ fn sheets(scene: &Scene, truth: &Truth, view: &View) -> Option<(Pool, Vec<Sheet>
 
 /// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn are: far to near by exact
 /// view depth, ties by index.
-fn drawn(scene: &Scene, truth: &Truth) -> (Vec<Blob>, Vec<u32>) {
+pub(super) fn drawn(scene: &Scene, truth: &Truth) -> (Vec<Blob>, Vec<u32>) {
     let weights = weights(scene, truth);
     let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
     let blobs: Vec<Blob> = truth.blobs.iter().zip(&weights).map(weighed).collect();

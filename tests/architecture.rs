@@ -21,7 +21,7 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("frame", &["passes", "layout", "gpu", "model"]),
     ("measure", &[]),
     ("study", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
-    ("viewer", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
+    ("viewer", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"]),
     ("farm", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
     ("cli", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study", "viewer", "farm"]),
     ("main", &["cli"]),

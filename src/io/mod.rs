@@ -26,6 +26,7 @@ mod scene_lights;
 mod scene_phases;
 mod scene_sections;
 mod scene_surfaces;
+pub mod scene_view;
 mod scene_weather;
 mod suggest;
 pub mod text_file;

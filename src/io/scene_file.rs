@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use glam::DVec3;
 use serde_json::{Value as Json, json};
@@ -15,6 +16,7 @@ pub use super::scene_sections::MAX_SIDE;
 use super::suggest::shown;
 use super::toml_section::Section;
 use super::toml_tree::Document;
+use super::weather::wrf::WeatherFile;
 use super::{scene_air, scene_lights, scene_phases, scene_sections, scene_surfaces};
 use crate::error::{Error, Place, Result};
 use crate::model::scene::Scene;
@@ -70,6 +72,41 @@ const ROOT_KEYS: &[&str] = &[
 /// N + i, whatever the scene says.
 pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
     load_document(Document::read(path)?, path, overrides, seed, &OnDisk)
+}
+
+/// The same, and the files that it was read from, each once: the scene's own first, then those that it names, in their
+/// order, as far as it came. Also where it fails, so that somebody can wait until one of them is put right.
+pub fn load_and_name(path: &Path, overrides: &[String], seed: Option<u32>) -> (Result<LoadedScene>, Vec<PathBuf>) {
+    let named = Named { files: &OnDisk, paths: Mutex::new(vec![path.to_owned()]) };
+    let loaded = Document::read(path).and_then(|document| load_document(document, path, overrides, seed, &named));
+    (loaded, named.paths.into_inner().unwrap_or_else(PoisonError::into_inner))
+}
+
+/// Files that remember which of them were asked for.
+struct Named<'a> {
+    files: &'a dyn Files,
+    paths: Mutex<Vec<PathBuf>>,
+}
+
+impl Named<'_> {
+    fn name(&self, path: &Path) {
+        let mut paths = self.paths.lock().unwrap_or_else(PoisonError::into_inner);
+        if !paths.iter().any(|named| named == path) {
+            paths.push(path.to_owned());
+        }
+    }
+}
+
+impl Files for Named<'_> {
+    fn text(&self, path: &Path, first: &str) -> Result<String> {
+        self.name(path);
+        self.files.text(path, first)
+    }
+
+    fn weather(&self, path: &Path) -> Result<WeatherFile> {
+        self.name(path);
+        self.files.weather(path)
+    }
 }
 
 /// The same of a text; `path` is what errors call it, and files that it names lie beside that.
@@ -231,4 +268,41 @@ fn hash(resolved: &[String], digests: &[[u8; 32]]) -> String {
         hasher.update(digest);
     }
     format!("{:x}", hasher.finalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(paths: &[PathBuf]) -> Vec<String> {
+        paths.iter().map(|path| path.file_name().unwrap().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn files_are_named_in_order_and_once() {
+        let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+        let (loaded, paths) = load_and_name(&scenes.join("clusters-20.toml"), &[], None);
+        assert!(loaded == load(&scenes.join("clusters-20.toml"), &[], None));
+        assert_eq!(names(&paths), ["clusters-20.toml", "cubes-554.dat", "cubes-615.dat"]);
+        let (loaded, paths) = load_and_name(&scenes.join("supercell.toml"), &[], None);
+        assert!(loaded.is_ok());
+        assert_eq!(names(&paths), ["supercell.toml", "supercell.nc"]);
+    }
+
+    #[test]
+    fn what_fails_names_what_could_be_put_right() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("scene.toml");
+        let cloud = |file: &str| format!("[[cloud]]\nfrom = 'particles'\nfile = '{file}'\n");
+        std::fs::write(&path, cloud("a.csv") + &cloud("b.csv") + &cloud("c.csv")).unwrap();
+        std::fs::write(dir.path().join("a.csv"), "x,y,z,sigma,kappa\n0,0,0,1,1\n").unwrap();
+        let (loaded, paths) = load_and_name(&path, &[], None);
+        assert!(loaded.is_err());
+        assert_eq!(names(&paths), ["scene.toml", "a.csv", "b.csv"]);
+        // No TOML, no file at all.
+        std::fs::write(&path, "[").unwrap();
+        assert_eq!(names(&load_and_name(&path, &[], None).1), ["scene.toml"]);
+        let (missing, paths) = load_and_name(&dir.path().join("none.toml"), &[], None);
+        assert!(missing.is_err() && names(&paths) == ["none.toml"]);
+    }
 }

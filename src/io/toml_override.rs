@@ -44,7 +44,7 @@ fn parse_value(text: &str, origin: Origin) -> std::result::Result<Node, String> 
 }
 
 /// Names and file names. Anything with TOML's own punctuation was meant as TOML and is reported as such.
-fn is_word(text: &str) -> bool {
+pub(super) fn is_word(text: &str) -> bool {
     text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/' | '\\' | ' '))
 }
 

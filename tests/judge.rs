@@ -1,0 +1,235 @@
+//! Judging what is seen: right pictures are right, also those of the device, others are not; what is asked last is
+//! answered.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use glam::DVec3;
+use nimbus::frame::game::Game;
+use nimbus::frame::render::Renderer;
+use nimbus::frame::stage::{DeviceChoice, Stage};
+use nimbus::io::scene_file;
+use nimbus::model::least::Least;
+use nimbus::model::scene::{LightingMode, Scene, Threading};
+use nimbus::study::against::Against;
+use nimbus::study::picture::{Drawing, Work, picture};
+use nimbus::study::pixels::Pixels;
+use nimbus::viewer::judge::{Judge, Progress, Standing, View};
+
+/// hello.toml, plain, from aside.
+fn view(set: &[&str]) -> View {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
+    let set: Vec<String> = ["cloud.0.texture=none"].iter().chain(set).map(|s| (*s).to_owned()).collect();
+    let scene = Arc::new(scene_file::load(&path, &set, None).unwrap().scene);
+    let against = View::against(&scene);
+    let (position, target) = (DVec3::new(1.0, 0.7, 5.5), DVec3::new(0.1, 0.5, 0.0));
+    View { scene, position, target, time_s: 0.0, size: [64, 48], against }
+}
+
+/// As `Renderer::image` would give it, of an exact device.
+fn exact_picture(view: &View) -> Vec<f32> {
+    let drawing = if view.against == Against::Thin { Drawing::Thin } else { Drawing::Volume };
+    let rgba = picture(&Against::of_scene(&view.exact()), view.time_s, drawing, &|_, _| ()).unwrap().rgba;
+    rgba.iter().flatten().map(|v| *v as f32).collect()
+}
+
+fn settled(judge: &Judge) -> Standing {
+    let begin = Instant::now();
+    loop {
+        let standing = judge.standing();
+        if !standing.works {
+            return standing;
+        }
+        assert!(begin.elapsed() < Duration::from_secs(120), "{standing:?}");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+const LONG: Duration = Duration::from_secs(1000);
+
+#[test]
+fn right_pictures_are_right_and_others_are_not() {
+    let dir = tempfile::tempdir().unwrap();
+    for (set, against) in [(&[][..], Against::Volume), (&["cloud.0.texture=\"2\""][..], Against::Thin)] {
+        let view = view(set);
+        assert_eq!(view.against, against);
+        let judge = Judge::new(Some(dir.path().to_owned()), LONG).unwrap();
+        judge.ask(view.clone());
+        let Standing { known, failed, progress, .. } = settled(&judge);
+        assert_eq!((failed, progress), (None, None));
+        let known = known.unwrap();
+        assert!(known.pixels.at.len() == 64 * 48 && !known.from_cache, "there was time for all of them");
+        // Rounded to f32 once, of values up to about 1.
+        let mut rgba = exact_picture(&view);
+        let right = known.error(&rgba).unwrap();
+        assert!(right.rmse.value < 3e-8 && right.max < 1e-7, "{against}: {right:?}");
+        assert!(known.flip(&rgba).unwrap() < 1e-4);
+        // A block of 8 by 8 that is a tenth brighter in red: the square of one channel in four, of 1 pixel in 48.
+        for y in 20..28 {
+            (24..32).for_each(|x| rgba[4 * (64 * y + x)] += 0.1);
+        }
+        let wrong = known.error(&rgba).unwrap();
+        assert!((wrong.rmse.value - 0.1 * (1.0f64 / (48.0 * 4.0)).sqrt()).abs() < 1e-6, "{wrong:?}");
+        assert!((wrong.max - 0.1).abs() < 1e-6 && wrong.is_resolved);
+        assert!(known.flip(&rgba).unwrap() > 1e-3);
+        // No picture of this size, and no number.
+        assert_eq!((known.error(&rgba[4..]), known.flip(&rgba[4..])), (None, None));
+        rgba[0] = f32::NAN;
+        assert_eq!(known.error(&rgba), None);
+        // Somebody else who asks the same is told at once; where it is drawn otherwise it is the same.
+        drop(judge);
+        let judge = Judge::new(Some(dir.path().to_owned()), LONG).unwrap();
+        let mut turned = view.clone();
+        Arc::make_mut(&mut turned.scene).draw.cutoff = 2.0;
+        judge.ask(turned);
+        let again = settled(&judge).known.unwrap();
+        assert!(again.from_cache && again.reference == known.reference && again.pixels == known.pixels);
+    }
+}
+
+/// Without time for more: a few pixels, spread over the picture, which judge it nearly as well.
+#[test]
+fn a_short_time_is_kept_to_by_few_pixels() {
+    let judge = Judge::new(None, Duration::ZERO).unwrap();
+    let view = view(&["cloud.0.wind=[1, 0, 0]"]);
+    judge.ask(view.clone());
+    let known = settled(&judge).known.unwrap();
+    // 64 · 48/256 = 12: cells of 4.
+    assert_eq!((known.pixels.cell, known.pixels.at.len()), (4, 192));
+    let mut rgba = exact_picture(&view);
+    assert!(known.error(&rgba).unwrap().rmse.value < 3e-8 && known.flip(&rgba).is_none());
+    rgba.iter_mut().for_each(|v| *v += 0.01);
+    assert!((known.error(&rgba).unwrap().rmse.value - 0.01).abs() < 1e-6);
+}
+
+/// Thin sprites at some pixels are what the whole picture has there, to the bit.
+#[test]
+fn a_few_pixels_are_those_of_the_whole_picture() {
+    for set in [&["lighting.mode=first", "cloud.0.texture=\"2\""][..], &["lighting.mode=none"]] {
+        let view = View { size: [61, 47], against: Against::Thin, ..view(set) };
+        let scene = Against::of_scene(&view.exact());
+        let whole = picture(&scene, 0.0, Drawing::Thin, &|_, _| ()).unwrap().rgba;
+        for n in [1, 30, 200, usize::MAX] {
+            let pixels = Pixels::sample(61, 47, n);
+            let rows = AtomicUsize::new(0);
+            let listener = |work: Work, n: usize| {
+                if work == Work::Drawing {
+                    assert!(rows.fetch_add(1, Ordering::Relaxed) < n && n == pixels.n_rows() as usize);
+                }
+            };
+            let found = Against::Thin.reference(&scene, 0.0, &pixels, &listener).unwrap();
+            assert_eq!(found.rgba, pixels.pick(&whole), "{n}");
+            assert_eq!(rows.into_inner(), pixels.n_rows() as usize);
+        }
+        assert!(whole.iter().filter(|p| p[3] > 0.1).count() > 300);
+    }
+}
+
+#[test]
+fn what_is_asked_last_is_answered() {
+    let judge = Judge::new(None, LONG).unwrap();
+    let first = view(&[]);
+    for k in 0..20u32 {
+        judge.ask(View { time_s: f64::from(k), ..first.clone() });
+        // Of what was asked before nothing is said any more.
+        assert!(judge.standing().known.is_none_or(|known| known.view.time_s == f64::from(k)));
+        std::thread::sleep(Duration::from_millis(u64::from(k % 4)));
+    }
+    let last = settled(&judge).known.unwrap();
+    assert_eq!(last.view.time_s, 19.0);
+    // The same again, however its frames are run, is known still, and not computed again.
+    let mut same = last.view.clone();
+    Arc::make_mut(&mut same.scene).threads.mode = Threading::Serial;
+    Arc::make_mut(&mut same.scene).draw.threshold = Least::Of(0.1);
+    judge.ask(same);
+    assert!(!judge.standing().works && Arc::ptr_eq(&judge.standing().known.unwrap(), &last));
+    // Another light is another truth.
+    let mut other = last.view.clone();
+    Arc::make_mut(&mut other.scene).lighting.mode = LightingMode::None;
+    judge.ask(other);
+    assert!(judge.standing().known.is_none_or(|known| known.view.scene.lighting.mode == LightingMode::None));
+    judge.rest();
+    let rests = settled(&judge);
+    assert!(rests.known.is_none() && rests.failed.is_none());
+}
+
+/// A reference that would take long is told about, and dropped where nobody wants it.
+#[test]
+fn what_is_under_way_says_how_far_it_is_and_stops() {
+    let judge = Judge::new(None, LONG).unwrap();
+    // All of it, row by row.
+    judge.ask(View { size: [1024, 1024], ..view(&[]) });
+    let begin = Instant::now();
+    let counts = |judge: &Judge| judge.standing().progress.filter(|p| p.work == Work::Drawing && p.n_done > 1);
+    let mut seen = None;
+    while seen.is_none() {
+        seen = counts(&judge);
+        assert!(begin.elapsed() < Duration::from_secs(120));
+    }
+    let Progress { n_done, n, n_pixels, .. } = seen.unwrap();
+    assert!(n_done <= n && n > 1 && n_pixels >= 200, "{seen:?}");
+    // One more while it runs, and an end.
+    judge.ask(View { size: [1024, 1023], ..view(&[]) });
+    while counts(&judge).is_none() {
+        assert!(begin.elapsed() < Duration::from_secs(120));
+    }
+    let stopped = Instant::now();
+    drop(judge);
+    assert!(stopped.elapsed() < Duration::from_secs(20));
+}
+
+#[test]
+fn what_has_no_reference_says_why() {
+    let judge = Judge::new(None, LONG).unwrap();
+    judge.ask(View { against: Against::Volume, ..view(&["cloud.0.texture=\"1\""]) });
+    let Standing { known, failed, .. } = settled(&judge);
+    assert!(known.is_none() && failed.unwrap().contains("is textured"));
+    // And nothing is lost by that.
+    judge.ask(view(&[]));
+    assert!(settled(&judge).known.is_some());
+}
+/// The device's own picture, from where the eye was flown to and not where the scene's camera stands.
+#[test]
+fn the_devices_picture_is_judged_as_it_was_seen() {
+    // A hundred layers of f32, some roundings of 2^-24 each; and what light by a grid's directions and a basis of a few
+    // vectors is off.
+    const ROUNDED: f64 = 2e-5;
+    const LIT: f64 = 5e-3;
+    for (set, most) in [
+        (&["film.format=rgba32f", "lighting.mode=none"][..], ROUNDED),
+        (&["film.format=rgba32f", "lighting.mode=none", "cloud.0.texture=\"2\""], ROUNDED),
+        (&[], LIT),
+    ] {
+        let mut view = view(set);
+        view.against = Against::Thin;
+        let judge = Judge::new(None, LONG).unwrap();
+        judge.ask(view.clone());
+        // As the truth is drawn, of which nothing is left out; only the device's f32 and f16 are between them.
+        let exact = Against::of_scene(&view.exact());
+        let pose = exact.camera.pose(0.0).unwrap();
+        let size = view.size;
+        let scene_of_window = Scene { camera: view.scene.camera.clone(), ..exact };
+        let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
+        let mut stage = Stage::new(scene_of_window, &choice, true).expect("a stage");
+        let picture = |stage: &mut Stage, flown: bool| {
+            let game = Game::new(stage.scene.clone(), None);
+            stage.game = if flown { game.seen_from(Box::new(move || pose)) } else { game };
+            let mut rgba = vec![];
+            let mut on_frame = |_, renderer: &mut Renderer| {
+                rgba = renderer.image()?;
+                Ok(true)
+            };
+            stage.run(Threading::Serial, 0..1, &mut on_frame).expect("a frame");
+            assert_eq!(rgba.len(), 4 * (size[0] * size[1]) as usize);
+            rgba
+        };
+        let known = settled(&judge).known.unwrap();
+        let (right, elsewhere) = (picture(&mut stage, true), picture(&mut stage, false));
+        let [right, elsewhere] = [right, elsewhere].map(|rgba| known.error(&rgba).unwrap());
+        println!("{set:?}: {right:?}, from the scene's camera {elsewhere:?}");
+        assert!(right.rmse.value < most && elsewhere.rmse.value > 0.02, "{right:?} {elsewhere:?}");
+        stage.close().expect("nothing is said");
+    }
+}

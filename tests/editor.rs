@@ -2,6 +2,8 @@
 
 #[path = "editor/actions.rs"]
 mod actions;
+#[path = "editor/by_hand.rs"]
+mod by_hand;
 #[path = "harness/generated.rs"]
 mod generated;
 #[path = "editor/rebuilt.rs"]

@@ -2,6 +2,7 @@
 //! a box that accepts few is dear, and one whose particles run out of attempts has them folded back.
 
 use crate::model::boxes::{CloudBox, Form};
+use crate::passes::generate::FOLDED;
 use crate::reference::generate::{Acceptance, generate_particle};
 
 /// Particles that are counted at most. 64 attempts each take some hundredths of a second; the share of accepted attempts
@@ -23,6 +24,22 @@ pub fn counted(b: &CloudBox, i_box: u32, seed: u32, form: Form) -> Counted {
     // Depth and scale of the blobs say nothing about places.
     let particles: Vec<_> = (0..n_counted).map(|i| generate_particle(b, i_box, seed, form, 1.0, 1.0, i)).collect();
     Counted { acceptance: Acceptance::of(&particles), n_counted, n_particles: b.n_particles }
+}
+
+/// What the device counted of every box, from the statuses of their particles, in order (`Renderer::status`). Boxes whose
+/// particles have not been made, or are not among them, have no rate.
+pub fn of_statuses(boxes: &[CloudBox], statuses: &[u32]) -> Vec<Counted> {
+    let mut rest = statuses;
+    let of = |b: &CloudBox| {
+        let (own, others) = rest.split_at(rest.len().min(b.n_particles as usize));
+        rest = others;
+        let n_made = own.iter().filter(|status| **status & !FOLDED > 0).count() as u64;
+        let n_folded = own.iter().filter(|status| **status & FOLDED != 0).count() as u64;
+        let n_attempts = own.iter().map(|status| u64::from(status & !FOLDED)).sum();
+        let acceptance = Acceptance { n_attempts, n_accepted: n_made - n_folded, n_folded };
+        Counted { acceptance, n_counted: n_made as u32, n_particles: b.n_particles }
+    };
+    boxes.iter().map(of).collect()
 }
 
 impl Counted {
@@ -68,6 +85,26 @@ mod tests {
         let rate = counted.rate().unwrap();
         assert!((rate - expected).abs() < 5.0 * deviation, "{rate} {expected}");
         assert!(expected > 0.01 && expected < 0.9);
+    }
+
+    #[test]
+    fn the_devices_statuses_are_counted_box_by_box() {
+        let boxes = [3, 0, 2, 4].map(|n_particles| CloudBox { n_particles, ..unit_box() });
+        // The last box's particles have not been made.
+        let counted = of_statuses(&boxes, &[1, 64 | FOLDED, 5, 2, 2, 0, 0, 0, 0]);
+        let of = |n_attempts, n_accepted, n_folded| Acceptance { n_attempts, n_accepted, n_folded };
+        assert_eq!(
+            counted.iter().map(|c| c.acceptance).collect::<Vec<_>>(),
+            [of(70, 2, 1), of(0, 0, 0), of(4, 2, 0), of(0, 0, 0)]
+        );
+        assert_eq!(counted.iter().map(Counted::is_whole).collect::<Vec<_>>(), [true, true, true, false]);
+        assert_eq!((counted[0].rate(), counted[3].rate()), (Some(2.0 / 70.0), None));
+        assert_eq!(mean_rate(&counted), Some(4.0 / 74.0));
+        // As the reference counts them.
+        let b = CloudBox { n_particles: 50, ..unit_box() };
+        let word = |p: &crate::reference::generate::Generated| p.n_attempts | if p.folded { FOLDED } else { 0 };
+        let words: Vec<u32> = generate_box(&b, 2, 9, Form::Centred, 1.0, 1.0).iter().map(word).collect();
+        assert_eq!(of_statuses(&[b], &words), [super::counted(&b, 2, 9, Form::Centred)]);
     }
 
     #[test]

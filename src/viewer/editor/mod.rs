@@ -5,10 +5,12 @@
 //! [`document`], what is selected of it, the drag that is under way and the steps that can be undone. It takes an
 //! [`action`]; [`edits`], [`mirror`] and [`drag`] say what becomes of the boxes. A window draws what the state holds,
 //! asks [`viewport`] and [`handles`] what lies under the pointer, [`shortcuts`] what a key means and [`numbers`] what was
-//! typed, and computes anew what [`document::Touched`] names.
+//! typed, and computes anew what [`document::Touched`] names. [`desk`] does the asking: what pointer and keys do there
+//! becomes the session's events. [`scenery`] is the scene whose cloud is edited, [`sketch`] what is drawn over it.
 
 pub mod acceptance;
 pub mod action;
+pub mod desk;
 pub mod document;
 pub mod drag;
 pub mod edits;
@@ -18,9 +20,11 @@ pub mod mirror;
 pub mod numbers;
 pub mod ray;
 pub mod recent;
+pub mod scenery;
 pub mod selection;
 pub mod session;
 pub mod shortcuts;
+pub mod sketch;
 pub mod snap;
 pub mod state;
 pub mod viewport;

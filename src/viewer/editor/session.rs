@@ -102,6 +102,11 @@ impl Session {
         Session::of(Vec::new(), None)
     }
 
+    /// A new cloud that is to be saved as `path`.
+    pub fn begun(path: &Path) -> Session {
+        Session::of(Vec::new(), Some(path.to_owned()))
+    }
+
     /// Boxes as they were read from `path`.
     pub fn opened(path: &Path, boxes: Vec<CloudBox>) -> Session {
         Session::of(boxes, Some(path.to_owned()))
@@ -110,6 +115,13 @@ impl Session {
     fn of(boxes: Vec<CloudBox>, path: Option<PathBuf>) -> Session {
         let editor = Editor::new(boxes);
         Session { saved: editor.shared_document(), editor, path, waiting: Waiting::Nothing }
+    }
+
+    /// The same with a scene's seed, before anything is done to it.
+    pub fn seeded(self, seed: u32) -> Session {
+        let document = Document { seed, ..self.editor.document().clone() };
+        let editor = Editor::of(document, *self.editor.settings());
+        Session { saved: editor.shared_document(), editor, ..self }
     }
 
     pub fn editor(&self) -> &Editor {

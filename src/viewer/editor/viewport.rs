@@ -40,20 +40,38 @@ impl Viewport {
     }
 
     /// Right, up and forward of the eye.
-    fn seen(&self, place: DVec3) -> DVec3 {
+    pub(super) fn seen(&self, place: DVec3) -> DVec3 {
         let v = place - self.pose.position;
         DVec3::new(v.dot(self.pose.right), v.dot(self.pose.up), v.dot(self.pose.forward))
     }
 
     /// Where a place is seen; none of what lies behind the eye.
     pub fn project(&self, place: DVec3) -> Option<DVec2> {
-        let seen = self.seen(place);
+        self.pixel(self.seen(place))
+    }
+
+    /// Of (right, up, forward).
+    pub(super) fn pixel(&self, seen: DVec3) -> Option<DVec2> {
         if seen.z.is_nan() || seen.z <= 0.0 {
             return None;
         }
         let per_slope = 0.5 * self.size_px.y / (0.5 * self.fov_y_rad).tan();
         let pixel = 0.5 * self.size_px + DVec2::new(seen.x, -seen.y) * (per_slope / seen.z);
         pixel.is_finite().then_some(pixel)
+    }
+
+    /// What is seen between two pixels lies where all of these · (right, up, forward) are ≥ 0: a pyramid without end from
+    /// the eye.
+    pub(super) fn sides(&self, corner: DVec2, opposite: DVec2) -> [DVec3; 5] {
+        let (a, b) = (self.slopes(corner), self.slopes(opposite));
+        let (low, high) = (a.min(b), a.max(b));
+        [
+            DVec3::new(1.0, 0.0, -low.x),
+            DVec3::new(-1.0, 0.0, high.x),
+            DVec3::new(0.0, 1.0, -low.y),
+            DVec3::new(0.0, -1.0, high.y),
+            DVec3::Z,
+        ]
     }
 
     /// Scene units that a logical point spans at the depth of `place`.
@@ -78,16 +96,7 @@ pub fn pick(boxes: &[CloudBox], ray: &Ray) -> Option<Hit> {
 
 /// Every box of which a part is seen in the rectangle between two pixels, hidden or not.
 pub fn pick_rectangle(boxes: &[CloudBox], view: &Viewport, corner: DVec2, opposite: DVec2) -> Vec<usize> {
-    let (a, b) = (view.slopes(corner), view.slopes(opposite));
-    let (low, high) = (a.min(b), a.max(b));
-    // Inside where all are ≥ 0, of (right, up, forward): a pyramid without end from the eye.
-    let sides = [
-        DVec3::new(1.0, 0.0, -low.x),
-        DVec3::new(-1.0, 0.0, high.x),
-        DVec3::new(0.0, 1.0, -low.y),
-        DVec3::new(0.0, -1.0, high.y),
-        DVec3::Z,
-    ];
+    let sides = view.sides(corner, opposite);
     // From a place within both one can go on within the pyramid until the box ends, at a face: faces are all to be asked.
     let is_seen = |b: &CloudBox| {
         let corners = corners(b).map(|corner| view.seen(corner));
@@ -111,11 +120,12 @@ pub fn corners(b: &CloudBox) -> [DVec3; 8] {
 pub const EDGES: [[usize; 2]; 12] =
     [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
 
-/// Corners around each face.
-const FACES: [[usize; 4]; 6] = [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]];
+/// Corners around each face: those of the low and the high side along x, y and z.
+pub(super) const FACES: [[usize; 4]; 6] =
+    [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]];
 
 /// What of a convex polygon lies where `side` · v ≥ 0 (Sutherland–Hodgman).
-fn clipped(polygon: Vec<DVec3>, side: DVec3) -> Vec<DVec3> {
+pub(super) fn clipped(polygon: Vec<DVec3>, side: DVec3) -> Vec<DVec3> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (i, b) in polygon.iter().enumerate() {
         let a = polygon[(i + polygon.len() - 1) % polygon.len()];

@@ -135,3 +135,11 @@ fn files_are_opened_and_saved_whole() {
     assert!(matches!(perform(&nowhere), Some(Event::Failed(Error::Io { .. }))));
     assert_eq!(perform(&Request::Quit), None);
 }
+
+#[test]
+fn a_scenes_seed_is_no_change() {
+    let session = Session::opened(Path::new("a.dat"), vec![super::super::samples::unit_box()]).seeded(9);
+    assert_eq!((session.editor().document().seed, session.is_dirty()), (9, false));
+    assert_eq!((session.editor().history().n_undo(), session.editor().boxes().len()), (0, 1));
+    assert_eq!(session.path(), Some(Path::new("a.dat")));
+}

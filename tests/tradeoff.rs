@@ -89,7 +89,8 @@ fn plan(knobs: &[&str], design: Design, n_rounds: usize) -> StudyPlan {
 fn study(law: &mut Law, plan: &StudyPlan, found: &mut Found, stop: &AtomicBool) -> bool {
     let pixels = Pixels::all(SIDE, SIDE);
     let n = (SIDE * SIDE) as usize;
-    let reference = Reference { rgba: vec![[0.0; 4]; n], own_error: 1e-6, accuracy: String::new(), seconds: 0.0 };
+    let reference =
+        Reference { rgba: vec![[0.0; 4]; n], own_error: 1e-6, accuracy: String::new(), seconds: 0.0, pixels_s: 0.0 };
     let setup = Setup { plan, load: &loaded, reference: &reference, pixels: &pixels, stop };
     setup.run(law, found, &mut |_: Event<'_>| Ok(())).unwrap()
 }

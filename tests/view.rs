@@ -16,8 +16,11 @@ use serde_json::Value;
 /// `nimbus view` of a small scene on `display`, in `dir`.
 fn view(display: &Display, dir: &std::path::Path, more: &[&str]) -> Child {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let args =
-        [&["view", scene, "--size", "200x150", "--validation", "--json", "--present", "immediate"], more].concat();
+    let args = [
+        &["view", scene, "--size", "200x150", "--validation", "--json", "--present", "immediate", "--no-panels"],
+        more,
+    ]
+    .concat();
     let mut command: Command = nimbus(&args);
     command.current_dir(dir).env("DISPLAY", display.name()).spawn().expect("the program runs")
 }
@@ -106,8 +109,8 @@ fn wait_for(what: &str, is_there: impl Fn() -> bool) {
 #[test]
 fn without_a_display_it_says_what_is_missing_and_what_needs_none() {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let run = |display: Option<&str>| {
-        let mut command = nimbus(&["view", scene, "-q"]);
+    let run = |display: Option<&str>, args: &[&str]| {
+        let mut command = nimbus(args);
         command.env_remove("WAYLAND_DISPLAY").env_remove("DISPLAY");
         if let Some(display) = display {
             command.env("DISPLAY", display);
@@ -116,8 +119,114 @@ fn without_a_display_it_says_what_is_missing_and_what_needs_none() {
         assert_eq!(output.status.code(), Some(3));
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    let said = run(None);
-    assert!(said.contains("there is no display: DISPLAY is not set") && said.contains("nimbus render"), "{said}");
-    let said = run(Some(":6543"));
-    assert!(said.contains("the display :6543 cannot be opened") && said.contains("nimbus render"), "{said}");
+    for args in [["view", scene, "-q"], ["edit", "none.dat", "-q"]] {
+        let said = run(None, &args);
+        assert!(said.contains("there is no display: DISPLAY is not set") && said.contains("nimbus render"), "{said}");
+        let said = run(Some(":6543"), &args);
+        assert!(said.contains("the display :6543 cannot be opened") && said.contains("nimbus render"), "{said}");
+    }
+}
+
+/// What a child says goes to a file, which is read while it runs.
+fn view_telling(display: &Display, dir: &std::path::Path, args: &[&str]) -> (Child, impl Fn() -> String + use<>) {
+    let path = dir.join("said.txt");
+    let mut command: Command =
+        nimbus(&[&["view"], args, &["--validation", "--json", "--present", "immediate"]].concat());
+    command.current_dir(dir).env("DISPLAY", display.name()).env("NIMBUS_CACHE_DIR", dir.join("cache"));
+    command.stderr(std::fs::File::create(&path).expect("a file"));
+    let child = command.spawn().expect("the program runs");
+    (child, move || std::fs::read_to_string(&path).unwrap_or_default())
+}
+
+#[test]
+fn panels_compare_count_and_measure() {
+    let display = Display::open();
+    let dir = tempfile::tempdir().expect("a folder");
+    let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
+    let (child, said) = view_telling(&display, dir.path(), &[scene, "--size", "400x300"]);
+    let window = display.window_of(child.id());
+    display.focus(&window);
+    display.key("space");
+    display.key("n");
+    wait_for("counts", || said().contains("0 not finite"));
+    // B is what is set now, A goes without light: how far each is from the truth.
+    display.key("m");
+    display.key("l");
+    display.key("j");
+    wait_for("A's error", || said().contains("A: RMSE"));
+    wait_for("B's error", || said().contains("B: RMSE"));
+    for key in ["x", "x", "x", "m", "h", "h"] {
+        display.key(key);
+        std::thread::sleep(Duration::from_millis(250));
+    }
+    display.key("Escape");
+    let output = child.wait_with_output().expect("its output");
+    assert!(output.status.success(), "{}", said());
+    let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let rows = found["loops"].as_array().expect("loops");
+    assert!(rows.iter().any(|row| row["panels"] == true) && rows.iter().any(|row| row["panels"] == false), "{found}");
+    assert!(found["panels"]["p50"].as_f64().is_some_and(|ms| ms > 0.0), "{found}");
+    // The truth is that of what is set, and B has other light.
+    let text = said();
+    let error = |name: &str| {
+        let line = text.lines().rfind(|line| line.starts_with(&format!("{name}: RMSE "))).expect("an error");
+        line.split([' ', ',']).nth(2).expect("a number").parse::<f64>().expect("a number")
+    };
+    // A's is what sprites' cut-off leaves out: thin sprites of the reference have none.
+    assert!(error("A") < 0.02 && error("B") > 10.0 * error("A"), "{text}");
+}
+
+#[test]
+fn files_that_change_are_read_again_and_what_is_wrong_leaves_the_picture() {
+    let display = Display::open();
+    let dir = tempfile::tempdir().expect("a folder");
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let copy = |from: &str, to: &str| std::fs::copy(root.join(from), dir.path().join(to)).expect("a copy");
+    copy("scenes/hello.csv", "hello.csv");
+    copy("scenes/hello.toml", "scene.toml");
+    std::fs::create_dir(dir.path().join("shaders")).expect("a folder");
+    let shaders = dir.path().join("shaders");
+    for entry in std::fs::read_dir(root.join("shaders")).expect("shaders") {
+        let entry = entry.expect("a file");
+        if entry.file_type().expect("a type").is_file() {
+            std::fs::copy(entry.path(), shaders.join(entry.file_name())).expect("a copy");
+        }
+    }
+    let (child, said) =
+        view_telling(&display, dir.path(), &["scene.toml", "--size", "200x150", "--no-panels", "--shaders", "shaders"]);
+    let window = display.window_of(child.id());
+    display.focus(&window);
+    display.key("space");
+    display.key("Home");
+    let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).expect("written");
+    let scene = std::fs::read_to_string(dir.path().join("scene.toml")).expect("text");
+    write("scene.toml", &scene.replace("width = 320", "width = ]"));
+    wait_for("an error", || said().contains("scene.toml:"));
+    write("scene.toml", &scene.replace("[film]", "[film]\nexposure = 0.5"));
+    wait_for("the scene again", || said().contains("scene.toml has changed"));
+    let present = std::fs::read_to_string(shaders.join("present.frag")).expect("text");
+    write("shaders/present.frag", "no shader");
+    wait_for("a shader's error", || said().contains("back to what was"));
+    // It stands over the picture, and goes when all is well again.
+    let n_red = || {
+        let (.., rgb) = display.seen(&window);
+        rgb.chunks_exact(3).filter(|p| p[0] > 130 && p[1] < 70 && p[2] < 70).count()
+    };
+    wait_for("an alarm", || n_red() > 500);
+    write("shaders/present.frag", &present);
+    wait_for("no alarm", || n_red() == 0);
+    // What is saved as a scene is drawn as what is kept as a picture.
+    for (key, name) in [("F12", "view-1.png"), ("F10", "scene-view-1.toml")] {
+        display.key(key);
+        wait_for(name, || dir.path().join(name).is_file());
+    }
+    display.key("Escape");
+    let output = child.wait_with_output().expect("its output");
+    assert!(output.status.success(), "{}", said());
+    let drawn = dir.path().join("drawn.png");
+    let saved = dir.path().join("scene-view-1.toml");
+    let rendered = nimbus(&["render", &saved.to_string_lossy(), "-q", "-o", &drawn.to_string_lossy()]).output();
+    assert!(rendered.expect("rendered").status.success());
+    let kept = std::fs::read(dir.path().join("view-1.png")).expect("kept");
+    assert!(kept == std::fs::read(&drawn).expect("drawn"), "the same bytes");
 }

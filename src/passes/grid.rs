@@ -49,6 +49,18 @@ impl Grid {
         })
     }
 
+    /// Cells that there is room for.
+    pub fn room(&self) -> u64 {
+        self.room
+    }
+
+    /// Room for `n_cells` cells.
+    pub fn make_room(&mut self, device: &Device, n_cells: u64) -> Result<()> {
+        self.sums = Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, Place::Device)?;
+        self.room = n_cells;
+        Ok(())
+    }
+
     /// `placed`: PlacedRecord; `particles`: ParticleRecord; `density`: f32 by cell. `heaviest` is at least the greatest
     /// mass κ (2π)^{3/2} σ³ of any particle.
     pub fn record(

@@ -88,6 +88,7 @@ const MOST: u32 = 65_535;
 /// Most pairs that there is room for at once; the sort goes through its tiles of 1024 twice in one invocation, and
 /// llvmpipe's loops take 65 535 turns.
 const MOST_PAIRS: u64 = 1 << 24;
+pub const THIN: f64 = 0.125; // The optical depth of a thin scene's deepest blob, at most.
 
 /// How a scene is drawn, constant over a run.
 #[derive(Debug, Clone, Copy)]
@@ -227,7 +228,7 @@ impl Tiles {
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
             ("ONE_SUBGROUP", u32::from(!variant.portable && device.limits().is_one_subgroup(division.invocations))),
-            ("THIN", u32::from(variant.tau_most <= 0.125 && !variant.textured)),
+            ("THIN", u32::from(variant.tau_most <= THIN && !variant.textured)),
             ("TEXTURED", u32::from(variant.textured)),
             ("ELLIPSOIDS", u32::from(variant.ellipsoids)),
             ("THRESHOLD", threshold),

@@ -25,8 +25,18 @@ impl Playback {
         Playback { i_frame: 0, n_frames: n_frames.max(1), is_paused: false }
     }
 
+    /// The same of another number of frames.
+    pub fn among(self, n_frames: u32) -> Playback {
+        let n_frames = n_frames.max(1);
+        Playback { i_frame: self.i_frame % n_frames, n_frames, ..self }
+    }
+
     pub fn is_paused(&self) -> bool {
         self.is_paused
+    }
+
+    pub fn n_frames(&self) -> u32 {
+        self.n_frames
     }
 
     pub fn i_frame(&self) -> u32 {

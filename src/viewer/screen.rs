@@ -4,17 +4,22 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::wanted::{Keep, Wanted};
+use super::flight::Flight;
+use super::pane::{Pane, Showing};
+use super::second::{Cast, Poses, Second, compare_of};
+use super::seen::{OF_DRAWING, SharedSeen, lock as lock_seen};
+use super::wanted::{Keep, Other, Wanted};
+use super::widgets::SharedFace;
 use crate::error::{Error, Result};
+use crate::frame::game::Game;
 use crate::frame::render::Renderer;
-use crate::frame::stage::{Bed, DeviceChoice, Player};
+use crate::frame::stage::{DeviceChoice, Player};
 use crate::frame::{FrameTimes, parallel, serial};
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Instance, Place, PresentMode, Shown, Surface, Swapchain};
+use crate::gpu::{Compiler, Instance, PresentMode, Surface};
 use crate::measure::stats::Summary;
-use crate::model::film::{Film, ToneMap};
+use crate::model::film::Film;
 use crate::model::scene::{Scene, Threading};
-use crate::passes::present::{self, Present};
+use crate::study::counts::Counts;
 
 /// What hands want, and the thread that draws.
 pub type Shared = Arc<Mutex<Wanted>>;
@@ -37,6 +42,15 @@ pub enum Told {
         film: Film,
         rgba: Vec<f32>,
     },
+    /// A frame's pictures, A's and B's, as [`Wanted::reads`] asked for.
+    Read {
+        flight: Flight,
+        i_frame: u32,
+        film: Film,
+        pictures: [Option<Vec<f32>>; 2],
+    },
+    /// Something went wrong, which [`super::seen::Seen::wrong`] says.
+    Wrong,
     Ended,
 }
 
@@ -47,24 +61,34 @@ pub type Tell = Box<dyn Fn(Told) + Send>;
 #[derive(Debug, Clone, Copy)]
 pub struct LoopTimes {
     pub threading: Threading,
+    /// Panels were shown beside the picture.
+    pub has_panels: bool,
     pub frame_ms: Summary,
 }
 
+/// What the window and the thread that draws it have in common.
+pub struct Ties {
+    pub wanted: Shared,
+    pub seen: SharedSeen,
+    pub face: SharedFace,
+    pub tell: Tell,
+    /// Whoever sets it ends the thread.
+    pub stop: &'static AtomicBool,
+}
+
 pub struct Screen {
-    // Dropped in this order: what lies on the device before the device, that before the surface.
-    swapchain: Option<Swapchain>,
-    bed: Bed,
-    surface: Surface,
-    wanted: Shared,
-    tell: Tell,
-    stop: &'static AtomicBool,
-    modes: Vec<PresentMode>,
-    i_mode: usize,
+    pane: Pane,
+    choice: DeviceChoice,
+    n_shader_loads: u64,
+    /// What was wanted when something could not be drawn: version and shaders.
+    wrong_at: Option<(u64, u64)>,
+    ties: Ties,
     n_mode_turns: u32,
     /// Frames to show; all that come without.
     n_left: Option<u32>,
-    /// Frame times by loop, serial first, without those of frames after something was made anew.
-    times: [Vec<f64>; 2],
+    /// Frame times by loop, serial first, and by whether panels were shown, without those of frames after something was made
+    /// anew.
+    times: [[Vec<f64>; 2]; 2],
 }
 
 /// The frames after something was made are not counted among the times.
@@ -77,145 +101,239 @@ const UNSEEN: Duration = Duration::from_millis(50);
 impl Screen {
     /// On a window's `surface`; `mode` where there is such, else fifo.
     pub fn new(
-        (instance, surface): (Arc<Instance>, Surface),
+        surface: (Arc<Instance>, Surface),
         choice: &DeviceChoice,
         mode: PresentMode,
         n_frames: Option<u32>,
-        (wanted, tell, stop): (Shared, Tell, &'static AtomicBool),
+        ties: Ties,
     ) -> Result<Screen> {
-        let bed = Bed::of_instance(instance, choice, choice.sources()?)?;
-        surface.check(&bed.device)?;
-        let modes = surface.modes(&bed.device)?;
-        let i_mode = modes.iter().position(|m| *m == mode).unwrap_or_else(|| {
-            tell(Told::Said(format!("this window has no {}: {} in its place", mode.name(), PresentMode::Fifo.name())));
-            0
-        });
+        let pane = Pane::open(surface, choice, mode)?;
+        if pane.mode() != mode {
+            let (mode, found) = (mode.name(), pane.mode().name());
+            (ties.tell)(Told::Said(format!("this window has no {mode}: {found} in its place")));
+        }
+        lock_seen(&ties.seen).device = pane.bed.device.info().name.clone();
         Ok(Screen {
-            swapchain: None,
-            bed,
-            surface,
-            wanted,
-            tell,
-            stop,
-            modes,
-            i_mode,
+            pane,
+            choice: choice.clone(),
+            n_shader_loads: 0,
+            wrong_at: None,
+            ties,
             n_mode_turns: 0,
             n_left: n_frames,
-            times: [vec![], vec![]],
+            times: Default::default(),
         })
     }
 
     /// Draws until somebody wants no more; the times of each loop that ran.
     pub fn run(mut self) -> Result<Vec<LoopTimes>> {
-        let mut last_good: Option<Arc<Scene>> = None;
+        let mut good: Option<(Arc<Scene>, Option<Other>)> = None;
         while !self.is_over() {
-            if !self.make_swapchain()? {
+            if !self.remake()? {
                 std::thread::sleep(UNSEEN);
                 continue;
             }
-            let seen = lock(&self.wanted).clone();
-            let scene = self.scene_of(&seen);
-            match self.bed.player(scene, seen.skip) {
-                Ok(player) => {
-                    last_good = Some(seen.scene.clone());
-                    self.play(player, &seen)?;
-                }
-                // What does not fit turns back to what did.
-                Err(error @ Error::Limit { .. }) => match &last_good {
-                    Some(good) if *good != seen.scene => {
-                        (self.tell)(Told::Said(format!("{error}; back to what was")));
-                        lock(&self.wanted).scene = good.clone();
+            let seen = lock(&self.ties.wanted).clone();
+            let before = self.follow_shaders(&seen);
+            match self.make(&seen) {
+                Ok(Some(cast)) => {
+                    // What was wrong is right only where something else is wanted since.
+                    if self.wrong_at.is_some_and(|at| at != (seen.version, seen.n_shader_loads)) {
+                        self.wrong_at = None;
+                        lock_seen(&self.ties.seen).wrong[OF_DRAWING] = None;
                     }
-                    _ => return Err(error),
-                },
+                    good = Some((seen.scene.clone(), seen.other.clone()));
+                    self.play(cast, &seen)?;
+                }
+                Ok(None) => {}
+                // What does not fit, or does not compile, turns back to what did.
+                Err(error @ (Error::Limit { .. } | Error::Shader { .. })) => {
+                    self.turn_back(error, before.ok().flatten(), good.as_ref(), &seen)?;
+                }
                 Err(error) => return Err(error),
             }
         }
-        let Screen { swapchain, bed, surface, times, .. } = self;
-        drop(swapchain);
-        // The device goes before the surface, the instance after both.
-        let closed = bed.close();
-        drop(surface);
-        closed?;
-        let of =
-            |(threading, ms): (Threading, &Vec<f64>)| Summary::of(ms).map(|frame_ms| LoopTimes { threading, frame_ms });
-        Ok([Threading::Serial, Threading::Parallel].into_iter().zip(&times).filter_map(of).collect())
+        let Screen { pane, times, .. } = self;
+        pane.close()?;
+        let mut loops = vec![];
+        for (threading, by_panels) in [Threading::Serial, Threading::Parallel].into_iter().zip(&times) {
+            for (has_panels, ms) in [false, true].into_iter().zip(by_panels) {
+                loops.extend(Summary::of(ms).map(|frame_ms| LoopTimes { threading, has_panels, frame_ms }));
+            }
+        }
+        Ok(loops)
+    }
+
+    /// Takes the shaders as they are now, where they have changed: the compiler of those before; an error where they cannot be
+    /// read, which is shown, and those before stay.
+    fn follow_shaders(&mut self, seen: &Wanted) -> std::result::Result<Option<Compiler>, ()> {
+        if std::mem::replace(&mut self.n_shader_loads, seen.n_shader_loads) == seen.n_shader_loads {
+            return Ok(None);
+        }
+        let taken = self.choice.sources().and_then(|sources| self.pane.bed.set_sources(sources));
+        taken.map(Some).map_err(|error| self.show_wrong(&error, seen))
+    }
+
+    fn show_wrong(&mut self, error: &Error, seen: &Wanted) {
+        self.wrong_at = Some((seen.version, seen.n_shader_loads));
+        let text = format!("{}; back to what was", error.to_string().trim_end());
+        lock_seen(&self.ties.seen).wrong[OF_DRAWING] = Some(text.clone());
+        (self.ties.tell)(Told::Wrong);
+        (self.ties.tell)(Told::Said(text));
+    }
+
+    /// Back to the shaders of `before`, or to the scene that was good; the error where there is nothing to go back to.
+    fn turn_back(
+        &mut self,
+        error: Error,
+        before: Option<Compiler>,
+        good: Option<&(Arc<Scene>, Option<Other>)>,
+        seen: &Wanted,
+    ) -> Result<()> {
+        match (before, good) {
+            (Some(compiler), _) => self.pane.bed.set_compiler(compiler),
+            (None, Some((scene, other))) if *scene != seen.scene || other.is_none() && seen.other.is_some() => {
+                let mut wanted = lock(&self.ties.wanted);
+                (wanted.scene, wanted.other) = (scene.clone(), other.clone());
+            }
+            _ => return Err(error),
+        }
+        self.show_wrong(&error, seen);
+        Ok(())
+    }
+
+    /// All that draws what is wanted; none where nothing of the window is seen.
+    fn make(&mut self, seen: &Wanted) -> Result<Option<Cast>> {
+        let film_of = |scene: &Arc<Scene>| self.scene_of(scene);
+        let bed = &self.pane.bed;
+        let player = bed.player(film_of(&seen.scene), seen.skip)?;
+        let other = seen.other.as_ref().map(|other| bed.player(film_of(&other.scene), other.skip)).transpose()?;
+        let showing = self.pane.showing(&player.renderer, &player.scene.film)?;
+        Ok(showing.map(|showing| Cast { showing, player, other: other.map(Second::new) }))
     }
 
     fn is_over(&self) -> bool {
-        lock(&self.wanted).quits || self.stop.load(Ordering::Relaxed) || self.n_left == Some(0)
+        lock(&self.ties.wanted).quits || self.ties.stop.load(Ordering::Relaxed) || self.n_left == Some(0)
     }
 
-    /// `seen`'s scene with the window's film.
-    fn scene_of(&self, seen: &Wanted) -> Arc<Scene> {
-        let mut scene = seen.scene.clone();
-        if let Some([width, height]) = self.swapchain.as_ref().map(Swapchain::size) {
+    /// `scene` with the window's film.
+    fn scene_of(&self, scene: &Arc<Scene>) -> Arc<Scene> {
+        let mut scene = scene.clone();
+        if let Some([width, height]) = self.pane.size() {
             let film = scene.film;
             Arc::make_mut(&mut scene).film = Film { width, height, ..film };
         }
         scene
     }
 
-    /// Makes what pictures are shown by, where it is not as it is wanted; false where nothing of the window is seen.
-    fn make_swapchain(&mut self) -> Result<bool> {
+    /// Makes what pictures are shown by, as it is wanted; false where nothing of the window is seen.
+    fn remake(&mut self) -> Result<bool> {
         let (size, n_mode_turns) = {
-            let wanted = lock(&self.wanted);
+            let wanted = lock(&self.ties.wanted);
             (wanted.size, wanted.n_mode_turns)
         };
         let turns = n_mode_turns.wrapping_sub(std::mem::replace(&mut self.n_mode_turns, n_mode_turns)) as usize;
-        self.i_mode = (self.i_mode + turns) % self.modes.len().max(1);
-        let mode = self.modes.get(self.i_mode).copied().unwrap_or(PresentMode::Fifo);
+        self.pane.turn_mode(turns);
         if turns > 0 {
-            (self.tell)(Told::Said(format!("pictures are shown by {}", mode.name())));
+            (self.ties.tell)(Told::Said(format!("pictures are shown by {}", self.pane.mode().name())));
         }
-        // A surface has one at a time.
-        self.swapchain = None;
-        self.swapchain = Swapchain::new(&self.bed.device, &self.surface, size, mode)?;
-        Ok(self.swapchain.is_some())
+        lock_seen(&self.ties.seen).present = Some(self.pane.mode());
+        self.pane.remake(size)
     }
 
     /// Runs the loop that is wanted until something is wanted that takes another beginning.
-    fn play(&mut self, player: Player, seen: &Wanted) -> Result<()> {
+    fn play(&mut self, cast: Cast, seen: &Wanted) -> Result<()> {
+        let Cast { showing, player, mut other } = cast;
         let Player { mut renderer, game, scene, choices, impostor_choice } = player;
         let said = choices.iter().map(|c| c.text()).chain(impostor_choice.map(|c| c.text()));
-        said.for_each(|text| (self.tell)(Told::Said(text)));
-        let wanted = self.wanted.clone();
-        let mut game = game.seen_from(Box::new(move || lock(&wanted).flight.pose()));
-        let mut shown = Showing::new(&self.bed, self.swapchain.take(), &renderer, &scene)?;
-        let frames = Frames { wanted: self.wanted.clone(), last: Instant::now() };
+        said.for_each(|text| (self.ties.tell)(Told::Said(text)));
+        let (wanted, poses) = (self.ties.wanted.clone(), Poses::default());
+        let kept = poses.clone();
+        let mut game = game.seen_from(Box::new(move || kept.push(lock(&wanted).flight)));
+        let drawn = (&mut game, &mut renderer, &*scene);
+        let ended = self.run_loops(drawn, other.as_mut(), &showing, &poses, seen);
+        self.pane.finish();
+        lock_seen(&self.ties.seen).other_ms = None;
+        ended
+    }
+
+    fn run_loops(
+        &mut self,
+        (game, renderer, scene): (&mut Game, &mut Renderer, &Scene),
+        mut other: Option<&mut Second>,
+        showing: &Showing,
+        poses: &Poses,
+        seen: &Wanted,
+    ) -> Result<()> {
         let threading = scene.threads.mode;
         let mut n_warm_up = N_WARM_UP;
-        let mut last_status = (Instant::now(), self.times[threading as usize].len());
-        let mut on_frame = |times: FrameTimes, renderer: &mut Renderer| -> Result<bool> {
-            let is_shown = shown.show(renderer)?;
-            match n_warm_up {
-                0 => self.times[threading as usize].push(times.frame_ms),
-                _ => n_warm_up -= 1,
+        let mut status = Status { since: Instant::now(), frame_ms: vec![] };
+        loop {
+            poses.clear();
+            if std::mem::take(&mut lock(&self.ties.wanted).counts) {
+                self.count(game, renderer, scene)?;
+                poses.clear();
             }
-            self.n_left = self.n_left.map(|n| n - u32::from(n > 0));
-            if last_status.0.elapsed() >= STATUS {
-                let new = &self.times[threading as usize][last_status.1..];
-                let text = status(&scene, threading, new, &times);
-                last_status = (Instant::now(), self.times[threading as usize].len());
-                (self.tell)(Told::Status(text));
+            let frames = Frames { wanted: self.ties.wanted.clone(), last: Instant::now() };
+            let mut on_frame = |times: FrameTimes, renderer: &mut Renderer| -> Result<bool> {
+                let flight = poses.pop();
+                let now = lock(&self.ties.wanted).clone();
+                if let (Some(other), Some(flight)) = (&mut other, &flight) {
+                    let ms = other.step(times.i_frame, flight)?;
+                    lock_seen(&self.ties.seen).other_ms = Some(ms);
+                }
+                let second = other.as_mut().map(|other| &mut other.player.renderer);
+                let compare = second.as_ref().map(|_| compare_of(now.beside, scene.film.width));
+                let is_shown = self.pane.show(showing, [Some(&mut *renderer), second], compare, &self.ties.face)?;
+                match (n_warm_up, &other) {
+                    (0, None) => self.times[threading as usize][usize::from(now.panels)].push(times.frame_ms),
+                    // Two pictures are no scene's frame time.
+                    (0, Some(_)) => {}
+                    _ => n_warm_up -= 1,
+                }
+                if now.panels {
+                    lock_seen(&self.ties.seen).push(threading, &times, scene.n_particles());
+                }
+                self.n_left = self.n_left.map(|n| n - u32::from(n > 0));
+                if let Some(text) = status.after(scene, &times) {
+                    (self.ties.tell)(Told::Status(text));
+                }
+                if let Some(keep) = lock(&self.ties.wanted).keep.take() {
+                    let rgba = renderer.image()?;
+                    (self.ties.tell)(Told::Picture { keep, film: scene.film, rgba });
+                }
+                if let (true, Some(flight)) = (std::mem::take(&mut lock(&self.ties.wanted).reads), flight) {
+                    let second = other.as_mut().map(|other| other.player.renderer.image()).transpose()?;
+                    let pictures = [Some(renderer.image()?), second];
+                    (self.ties.tell)(Told::Read { flight, i_frame: times.i_frame, film: scene.film, pictures });
+                }
+                Ok(is_shown && goes_on(&now, seen) && !self.ties.stop.load(Ordering::Relaxed) && self.n_left != Some(0))
+            };
+            match threading {
+                Threading::Serial => serial::run(game, renderer, frames, &mut on_frame)?,
+                Threading::Parallel => parallel::run(game, renderer, frames, &mut on_frame)?,
             }
-            if let Some(keep) = lock(&self.wanted).keep.take() {
-                let rgba = renderer.image()?;
-                (self.tell)(Told::Picture { keep, film: scene.film, rgba });
+            if !lock(&self.ties.wanted).counts {
+                return Ok(());
             }
-            let now = lock(&self.wanted);
-            let goes_on = now.version == seen.version
-                && now.size == seen.size
-                && now.n_mode_turns == seen.n_mode_turns
-                && !now.quits;
-            drop(now);
-            Ok(is_shown && goes_on && !self.stop.load(Ordering::Relaxed) && self.n_left != Some(0))
-        };
-        match threading {
-            Threading::Serial => serial::run(&mut game, &mut renderer, frames, &mut on_frame),
-            Threading::Parallel => parallel::run(&mut game, &mut renderer, frames, &mut on_frame),
         }
     }
+
+    /// Draws a frame alone and counts what is odd of it.
+    fn count(&self, game: &mut Game, renderer: &mut Renderer, scene: &Scene) -> Result<()> {
+        let i_frame = lock(&self.ties.wanted).playback.i_frame();
+        renderer.step(game.step(i_frame)?)?;
+        let counts = Counts::of(renderer, &self.pane.bed.device, scene)?;
+        (self.ties.tell)(Told::Said(format!("frame {i_frame}: {}", counts.text())));
+        lock_seen(&self.ties.seen).counts = Some((i_frame, counts));
+        Ok(())
+    }
+}
+
+/// Whether the loop that began with `seen` can go on.
+fn goes_on(now: &Wanted, seen: &Wanted) -> bool {
+    let begun = |w: &Wanted| (w.version, w.n_shader_loads, w.size, w.n_mode_turns);
+    begun(now) == begun(seen) && !now.quits && !now.counts
 }
 
 /// Frames as somebody wants them, one after the other; keys that are held fly on at each.
@@ -239,49 +357,24 @@ impl Iterator for Frames {
     }
 }
 
-/// What takes a renderer's pictures to the window.
-struct Showing {
-    swapchain: Option<Swapchain>,
-    present: Option<Present>,
-    picture: Buffer,
-    shown: present::Shown,
-}
-
-impl Showing {
-    fn new(bed: &Bed, swapchain: Option<Swapchain>, renderer: &Renderer, scene: &Scene) -> Result<Showing> {
-        let (format, n_bytes): (TargetFormat, u64) = renderer.picture_format();
-        let Film { width, height, background, exposure, tone_map, .. } = scene.film;
-        let present = |chain: &Swapchain| Present::new(&bed.device, bed.compiler(), format, chain.format());
-        Ok(Showing {
-            present: swapchain.as_ref().map(present).transpose()?,
-            swapchain,
-            picture: Buffer::new::<u8>(&bed.device, "window.picture", n_bytes, Place::Device)?,
-            shown: present::Shown {
-                background: background.as_vec3().to_array(),
-                exposure: exposure as f32,
-                size: [width, height],
-                corner: [0, 0],
-                is_neutral: tone_map == ToneMap::Neutral,
-            },
-        })
-    }
-
-    /// Shows the picture of the frame that ended last; false where the window is another by now.
-    fn show(&mut self, renderer: &mut Renderer) -> Result<bool> {
-        let (Some(swapchain), Some(present)) = (&mut self.swapchain, &self.present) else { return Ok(false) };
-        let shown = swapchain.show(|rec, image| {
-            renderer.record_picture(rec, &self.picture);
-            present.record(rec, &self.picture, image, &self.shown)
-        })?;
-        Ok(shown != Shown::Outdated)
-    }
-}
-
 /// How long frames take, for the title.
-fn status(scene: &Scene, threading: Threading, ms: &[f64], last: &FrameTimes) -> String {
-    let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
-    let name = threading.name();
-    let times =
-        Summary::of(ms).map_or(String::new(), |s| format!(" | {:.1} ms p50, {:.1} p99 of {}", s.p50, s.p99, s.n));
-    format!("{title} | {name}{times} | frame {} | {} particles | ? for keys", last.i_frame, last.n_shown())
+struct Status {
+    since: Instant,
+    frame_ms: Vec<f64>,
+}
+
+impl Status {
+    /// With one more frame; the title where it is time for another.
+    fn after(&mut self, scene: &Scene, last: &FrameTimes) -> Option<String> {
+        self.frame_ms.push(last.frame_ms);
+        if self.since.elapsed() < STATUS {
+            return None;
+        }
+        self.since = Instant::now();
+        let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
+        let name = scene.threads.mode.name();
+        let summary = Summary::of(&std::mem::take(&mut self.frame_ms));
+        let times = summary.map_or(String::new(), |s| format!(" | {:.1} ms p50, {:.1} p99 of {}", s.p50, s.p99, s.n));
+        Some(format!("{title} | {name}{times} | frame {} | {} particles | ? for keys", last.i_frame, last.n_shown()))
+    }
 }

@@ -28,14 +28,46 @@ pub enum Command {
     /// Doublings of the speed.
     Speed(f64),
     Keep(Keep),
+    /// Shows panels, or hides them.
+    Panels,
+    /// What is odd of the next frame.
+    Count,
+    /// Keeps what is set as B, to be drawn beside what is set from then on; or forgets it.
+    Hold,
+    /// The next way to compare A with B.
+    Compare,
+    /// This way.
+    Beside(Beside),
+    /// Measures what is seen by its f64 reference, or does not.
+    Judge,
+    /// Writes a scene that draws what is seen.
+    SaveView,
     /// Prints the command that draws what is seen.
     CommandLine,
     Help,
     Quit,
 }
 
+/// What is shown of A and B.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Beside {
+    /// A left of this share of the picture, B right of it.
+    Split(f64),
+    /// How far they are apart, times this.
+    Difference(f64),
+    /// B alone.
+    Other,
+}
+
+/// What is drawn as B.
+#[derive(Debug, Clone)]
+pub struct Other {
+    pub scene: Arc<Scene>,
+    pub skip: bool,
+}
+
 /// A key by its name (of letters and signs themselves), what it means, and what that is called.
-pub const SHORTCUTS: [(&str, Command, &str); 21] = [
+pub const SHORTCUTS: [(&str, Command, &str); 27] = [
     ("t", Command::Turn(Knob::Threading), "game and render step one after the other, or side by side"),
     ("c", Command::Turn(Knob::Simulate), "particles moved by the device, or by the game thread"),
     ("l", Command::Turn(Knob::Lighting), "no light, one reflection, two"),
@@ -54,6 +86,12 @@ pub const SHORTCUTS: [(&str, Command, &str); 21] = [
     ("-", Command::Speed(-1.0), "fly half as fast"),
     ("f12", Command::Keep(Keep::Png), "keep the picture as PNG"),
     ("f11", Command::Keep(Keep::Exr), "keep the picture as EXR"),
+    ("h", Command::Panels, "show panels, or hide them"),
+    ("n", Command::Count, "count what is odd of a frame"),
+    ("m", Command::Hold, "keep these settings as B to compare with, or forget them"),
+    ("x", Command::Compare, "A and B split, their difference, B alone"),
+    ("j", Command::Judge, "measure what is seen by its f64 reference, while it stands still"),
+    ("f10", Command::SaveView, "save what is seen as a scene"),
     ("i", Command::CommandLine, "print the command that draws this"),
     ("?", Command::Help, "print these keys"),
     ("escape", Command::Quit, "close the window"),
@@ -86,6 +124,16 @@ pub struct Wanted {
     /// Of the window, in pixels.
     pub size: [u32; 2],
     pub keep: Option<Keep>,
+    pub panels: bool,
+    /// The next frame is to be counted.
+    pub counts: bool,
+    pub other: Option<Other>,
+    pub beside: Beside,
+    pub judges: bool,
+    /// The next frame's pictures are to be read back.
+    pub reads: bool,
+    /// Changes where shaders have: they are to be compiled anew.
+    pub n_shader_loads: u64,
     pub quits: bool,
     held: BTreeSet<&'static str>,
 }
@@ -97,8 +145,12 @@ pub enum Said {
     Text(String),
     /// The command line is asked for.
     CommandLine,
+    /// A scene file of what is seen is.
+    Scene,
 }
 
+/// A difference of a tenth of white becomes nearly white.
+const GAIN: f64 = 8.0;
 /// The eye turns by so much where the mouse goes across the window.
 const TURN: f64 = std::f64::consts::FRAC_PI_2;
 
@@ -117,9 +169,23 @@ impl Wanted {
             version: 0,
             n_mode_turns: 0,
             keep: None,
+            panels: false,
+            counts: false,
+            other: None,
+            beside: Beside::Split(0.5),
+            judges: false,
+            reads: false,
+            n_shader_loads: 0,
             quits: false,
             held: BTreeSet::new(),
         })
+    }
+
+    /// Goes on with a scene that was read anew, from where the eye is; B was another scene's.
+    pub fn reload(&mut self, scene: Arc<Scene>) {
+        self.playback = self.playback.among(scene.time.n_frames);
+        (self.scene, self.other) = (scene, None);
+        self.version += 1;
     }
 
     /// A key went down; names as in [`SHORTCUTS`].
@@ -162,6 +228,26 @@ impl Wanted {
             Command::Play(action) => self.playback = self.playback.after(action),
             Command::Speed(doublings) => self.flight = self.flight.after(Motion::Speed { doublings }),
             Command::Keep(keep) => self.keep = Some(keep),
+            Command::Panels => self.panels = !self.panels,
+            Command::Count => self.counts = true,
+            Command::Hold => {
+                let held = Other { scene: self.scene.clone(), skip: self.skip };
+                self.other = if self.other.is_none() { Some(held) } else { None };
+                self.version += 1;
+                let is_held = self.other.is_some();
+                let text = if is_held { "B is what is set now: what you turn is A" } else { "there is no B any more" };
+                return Said::Text(text.to_owned());
+            }
+            Command::Compare => {
+                self.beside = match self.beside {
+                    Beside::Split(_) => Beside::Difference(GAIN),
+                    Beside::Difference(_) => Beside::Other,
+                    Beside::Other => Beside::Split(0.5),
+                };
+            }
+            Command::Beside(beside) => self.beside = beside,
+            Command::Judge => self.judges = !self.judges,
+            Command::SaveView => return Said::Scene,
             Command::CommandLine => return Said::CommandLine,
             Command::Help => return Said::Text(help()),
             Command::Quit => self.quits = true,
@@ -198,21 +284,44 @@ impl Wanted {
         i_frame
     }
 
-    /// The command that draws what is seen, of the scene at `path`, from `first` as it was opened.
-    pub fn command_line(&self, path: &str, first: &Scene) -> String {
-        let set = |key: &str, value: &str| format!(" --set '{key}={value}'");
+    /// Keys of the scene and values, as `--set` has them, that make `first`, as it was opened, what is seen: what was turned, and
+    /// where the eye is. The size is that of [`Wanted::size`].
+    pub fn settings(&self, first: &Scene) -> Vec<(&'static str, String)> {
         let turned = Knob::ALL.iter().filter(|knob| knob.value(first) != knob.value(&self.scene));
-        let knobs: String = turned.map(|knob| set(knob.key(), &knob.value(&self.scene))).collect();
+        let mut settings: Vec<_> = turned.map(|knob| (knob.key(), knob.value(&self.scene))).collect();
         let place = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
         let (position, target) = (place(self.flight.position()), place(self.flight.target()));
-        let camera = match first.camera.keys.len() {
-            1 => set("camera.position", &position) + &set("camera.target", &target),
-            _ => set("camera.path", &format!("[{{ time_s = 0.0, position = {position}, target = {target} }}]")),
-        };
+        match first.camera.keys.len() {
+            1 => settings.extend([("camera.position", position), ("camera.target", target)]),
+            _ => {
+                let path = format!("[{{ time_s = 0.0, position = {position}, target = {target} }}]");
+                settings.push(("camera.path", path));
+            }
+        }
+        settings
+    }
+
+    /// Knobs that were turned since `first`, as `--set` has them.
+    pub fn turned(&self, first: &Scene) -> Vec<String> {
+        let turned = Knob::ALL.iter().filter(|knob| knob.value(first) != knob.value(&self.scene));
+        turned.map(|knob| format!("{}={}", knob.key(), knob.value(&self.scene))).collect()
+    }
+
+    /// The same with the size, as `io::scene_view::save` takes them.
+    pub fn overrides(&self, first: &Scene) -> Vec<String> {
+        let [width, height] = self.size;
+        let size = [("film.width", width.to_string()), ("film.height", height.to_string())];
+        size.into_iter().chain(self.settings(first)).map(|(key, value)| format!("{key}={value}")).collect()
+    }
+
+    /// The command that draws what is seen, of the scene at `path`, from `first` as it was opened.
+    pub fn command_line(&self, path: &str, first: &Scene) -> String {
+        let set = |(key, value): (&str, String)| format!(" --set '{key}={value}'");
+        let settings: String = self.settings(first).into_iter().map(set).collect();
         let no_skip = if self.skip { "" } else { " --no-skip" };
         let [width, height] = self.size;
         let i_frame = self.playback.i_frame();
-        format!("nimbus render {path} -o view.png --frame {i_frame} --size {width}x{height}{no_skip}{knobs}{camera}")
+        format!("nimbus render {path} -o view.png --frame {i_frame} --size {width}x{height}{no_skip}{settings}")
     }
 }
 

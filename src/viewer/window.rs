@@ -4,29 +4,32 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
 
 use glam::DVec2;
 use winit::application::ApplicationHandler;
 use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
-use winit::event_loop::{ActiveEventLoop, EventLoop, EventLoopProxy};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::keyboard::{Key, NamedKey};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::{Window, WindowId};
 
-use super::screen::{LoopTimes, Screen, Shared, Told, lock};
+use super::judging::Judging;
+use super::origin::Origin;
+use super::panels;
+use super::screen::{LoopTimes, Screen, Shared, Ties, Told, lock};
+use super::seen::{OF_FILES, SharedSeen, lock as lock_seen};
 use super::wanted::{Keep, Said, Wanted};
+use super::widgets::{Layer, SharedFace, lock as lock_face};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::gpu::{PresentMode, Surface};
 use crate::io::image;
-use crate::model::scene::Scene;
 
 /// What is shown, and how.
 pub struct Options {
-    pub scene: Arc<Scene>,
-    /// For the command line that draws what is seen.
-    pub scene_path: PathBuf,
+    pub origin: Origin,
     pub choice: DeviceChoice,
     pub skip: bool,
     pub mode: PresentMode,
@@ -35,20 +38,36 @@ pub struct Options {
     /// Whoever sets it closes the window.
     pub stop: &'static AtomicBool,
     pub quiet: bool,
+    /// Panels are shown at the start.
+    pub panels: bool,
+}
+
+/// What a window tells when it is closed.
+pub struct Ended {
+    pub loops: Vec<LoopTimes>,
+    /// What making the panels took the window's thread each time, ms.
+    pub panels_ms: Vec<f64>,
 }
 
 /// Opens a window and shows the scene until somebody closes it; the times of each loop that ran.
-pub fn run(options: Options) -> Result<Vec<LoopTimes>> {
-    let wanted = Wanted::new(options.scene.clone(), options.skip)
+pub fn run(options: Options) -> Result<Ended> {
+    let mut wanted = Wanted::new(options.origin.first.clone(), options.skip)
         .ok_or_else(|| Error::usage("the scene's camera looks nowhere at its first frame"))?;
-    let events = EventLoop::<Told>::with_user_event().build().map_err(|e| no_display(&e.to_string()))?;
+    wanted.panels = options.panels;
+    let events = EventLoop::<Told>::with_user_event()
+        .build()
+        .map_err(|e| no_display(&e.to_string(), "`nimbus render SCENE -o FILE.png` needs none"))?;
     let mut app = App {
         proxy: events.create_proxy(),
         wanted: Arc::new(Mutex::new(wanted)),
         options,
         thread: None,
         window: None,
+        layer: None,
+        seen: SharedSeen::default(),
+        face: SharedFace::default(),
         pointer: Pointer::default(),
+        judging: Judging::default(),
         n_kept: 0,
         failed: None,
     };
@@ -61,20 +80,23 @@ pub fn run(options: Options) -> Result<Vec<LoopTimes>> {
         return Err(error);
     }
     ran?;
-    drawn.unwrap_or_else(|| Ok(vec![]))
+    let loops = drawn.unwrap_or_else(|| Ok(vec![]))?;
+    let panels_ms = std::mem::take(&mut lock_face(&app.face).made_ms);
+    Ok(Ended { loops, panels_ms })
 }
 
 fn panicked() -> Error {
     Error::Fault { what: "the drawing thread panicked".to_owned() }
 }
 
-fn no_display(why: &str) -> Error {
+/// Why there is no window, and what does `without` one.
+pub fn no_display(why: &str, without: &str) -> Error {
     let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
     let what = match set("DISPLAY") {
         true => format!("the display {} cannot be opened", std::env::var("DISPLAY").unwrap_or_default()),
         false => "there is no display: DISPLAY is not set".to_owned(),
     };
-    Error::vulkan("opening a window", format!("{what} ({why}); `nimbus render SCENE -o FILE.png` needs none"))
+    Error::vulkan("opening a window", format!("{what} ({why}); {without}"))
 }
 
 /// Where the pointer was, and which buttons turn the eye.
@@ -91,7 +113,11 @@ struct App {
     proxy: EventLoopProxy<Told>,
     thread: Option<JoinHandle<Result<Vec<LoopTimes>>>>,
     window: Option<Window>,
+    layer: Option<Layer>,
+    seen: SharedSeen,
+    face: SharedFace,
     pointer: Pointer,
+    judging: Judging,
     /// Pictures kept so far.
     n_kept: u32,
     failed: Option<Error>,
@@ -116,11 +142,30 @@ impl ApplicationHandler<Told> for App {
                 let said = self.keep(keep, &film, &rgba).unwrap_or_else(|e| e.to_string());
                 self.say(&said);
             }
+            Told::Read { flight, i_frame, film, pictures } => {
+                let said = self.judging.take(flight, i_frame, &film, &pictures);
+                said.iter().for_each(|text| self.say(text));
+            }
+            Told::Wrong => self.layer.iter_mut().for_each(Layer::touch),
             Told::Ended => events.exit(),
         }
     }
 
+    fn about_to_wait(&mut self, events: &ActiveEventLoop) {
+        self.follow_files();
+        self.judging.follow(&self.wanted, &self.seen);
+        self.show_panels();
+        let due = self.layer.as_ref().filter(|_| self.has_widgets()).and_then(Layer::due);
+        let look = Instant::now() + STEADY;
+        events.set_control_flow(ControlFlow::WaitUntil(due.map_or(look, |due| due.min(look))));
+    }
+
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        if let (Some(layer), Some(window), true) = (&mut self.layer, &self.window, lock(&self.wanted).panels)
+            && layer.hears(window, &event)
+        {
+            return;
+        }
         let mut wanted = lock(&self.wanted);
         match event {
             // The thread hears it, ends and says so.
@@ -157,11 +202,15 @@ impl ApplicationHandler<Told> for App {
     }
 }
 
-const PIXELS_A_NOTCH: f64 = 40.0;
+/// So often panels show what is new: faster nobody reads.
+const STEADY: Duration = Duration::from_millis(100);
+/// Of a wheel that counts pixels.
+pub const PIXELS_A_NOTCH: f64 = 40.0;
 
 impl App {
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
-        let Options { scene, choice, mode, n_frames, stop, .. } = &self.options;
+        let Options { origin, choice, mode, n_frames, stop, .. } = &self.options;
+        let scene = &origin.first;
         let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
         let attributes = Window::default_attributes()
             .with_title(title)
@@ -175,7 +224,9 @@ impl App {
         let surface = Surface::open(choice.validation, display, handle)?;
         let proxy = self.proxy.clone();
         let tell = Box::new(move |told| drop(proxy.send_event(told)));
-        let screen = Screen::new(surface, choice, *mode, *n_frames, (self.wanted.clone(), tell, stop))?;
+        let (wanted, seen, face) = (self.wanted.clone(), self.seen.clone(), self.face.clone());
+        let screen = Screen::new(surface, choice, *mode, *n_frames, Ties { wanted, seen, face, tell, stop })?;
+        self.layer = Some(Layer::new(&window, self.face.clone(), (STEADY, false)));
         let proxy = self.proxy.clone();
         let draw = move || {
             let drawn = screen.run();
@@ -189,13 +240,82 @@ impl App {
         Ok(())
     }
 
+    /// Reads again what has changed on the disk; what is wrong with it is shown, and the last good picture stays.
+    fn follow_files(&mut self) {
+        let changed = self.options.origin.poll(Instant::now());
+        if changed.shaders {
+            lock(&self.wanted).n_shader_loads += 1;
+        }
+        if !changed.scene {
+            return;
+        }
+        let now = lock(&self.wanted).clone();
+        let read = self.options.origin.read(&now);
+        lock_seen(&self.seen).wrong[OF_FILES] = read.as_ref().err().map(|e| e.to_string());
+        self.say(&match &read {
+            Ok(_) => format!("{} has changed", self.options.origin.path.display()),
+            Err(error) => error.to_string(),
+        });
+        if let Ok(scene) = read {
+            lock(&self.wanted).reload(scene);
+        }
+        self.layer.iter_mut().for_each(Layer::touch);
+    }
+
+    /// Whether anything is to be drawn over the picture.
+    fn has_widgets(&self) -> bool {
+        lock(&self.wanted).panels || lock_seen(&self.seen).wrong.iter().any(Option::is_some)
+    }
+
+    fn show_panels(&mut self) {
+        let has_widgets = self.has_widgets();
+        let (Some(layer), Some(window)) = (&mut self.layer, &self.window) else { return };
+        if !has_widgets {
+            layer.hide();
+            return;
+        }
+        if !layer.is_due() {
+            return;
+        }
+        // Copies: nobody who draws waits for whoever makes panels.
+        let (wanted, seen) = (lock(&self.wanted).clone(), lock_seen(&self.seen).clone());
+        let mut commands = vec![];
+        layer.show(window, |ui| {
+            commands.clear();
+            let backdrop = wanted.panels.then(|| {
+                let (clicked, backdrop) = panels::show(ui, &wanted, &seen);
+                commands.extend(clicked);
+                backdrop
+            });
+            let wrong: Vec<&str> = seen.wrong.iter().flatten().map(String::as_str).collect();
+            if !wrong.is_empty() {
+                panels::alarm(ui, &wrong.join("\n"));
+            }
+            backdrop
+        });
+        if !commands.is_empty() {
+            layer.touch();
+        }
+        for command in commands {
+            let said = lock(&self.wanted).act(command);
+            self.answer(said);
+        }
+    }
+
     fn answer(&self, said: Said) {
         match said {
             Said::Nothing => {}
             Said::Text(text) => self.say(&text),
             Said::CommandLine => {
-                let path = self.options.scene_path.display().to_string();
-                println!("{}", lock(&self.wanted).command_line(&path, &self.options.scene));
+                let origin = &self.options.origin;
+                let line = lock(&self.wanted).command_line(&origin.path.display().to_string(), &origin.first);
+                println!("{line}");
+                self.layer.iter().for_each(|layer| layer.copy(&line));
+            }
+            Said::Scene => {
+                let wanted = lock(&self.wanted).clone();
+                let saved = self.options.origin.save(&wanted).map(|to| format!("saved {}", to.display()));
+                self.say(&saved.unwrap_or_else(|e| e.to_string()));
             }
         }
     }
@@ -241,6 +361,7 @@ fn name_of(key: &Key) -> Option<String> {
         Key::Named(NamedKey::Space) => Some("space".to_owned()),
         Key::Named(NamedKey::Home) => Some("home".to_owned()),
         Key::Named(NamedKey::Escape) => Some("escape".to_owned()),
+        Key::Named(NamedKey::F10) => Some("f10".to_owned()),
         Key::Named(NamedKey::F11) => Some("f11".to_owned()),
         Key::Named(NamedKey::F12) => Some("f12".to_owned()),
         _ => None,

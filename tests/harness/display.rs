@@ -60,10 +60,36 @@ impl Display {
     /// Keys go to it from now on.
     pub fn focus(&self, window: &str) {
         self.xdotool(&["windowfocus", "--sync", window]).expect("the focus");
+        // The window is still to hear of it.
+        std::thread::sleep(Duration::from_millis(500));
     }
 
     pub fn key(&self, name: &str) {
         self.xdotool(&["key", "--delay", "30", name]).expect("a key");
+    }
+
+    /// Characters, one after the other.
+    pub fn types(&self, text: &str) {
+        self.xdotool(&["type", "--delay", "30", "--", text]).expect("text");
+    }
+
+    pub fn title(&self, window: &str) -> String {
+        self.xdotool(&["getwindowname", window]).unwrap_or_default()
+    }
+
+    /// What is seen of a window: columns, rows, and a red, a green and a blue byte a pixel.
+    pub fn seen(&self, window: &str) -> (u32, u32, Vec<u8>) {
+        use x11rb::connection::Connection;
+        use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
+        let (connection, _) = x11rb::connect(Some(&self.name)).expect("the display");
+        let id: u32 = window.parse().expect("a window's number");
+        let shape = connection.get_geometry(id).expect("asked").reply().expect("a shape");
+        let (width, height) = (shape.width, shape.height);
+        let image = connection.get_image(ImageFormat::Z_PIXMAP, id, 0, 0, width, height, !0).expect("asked");
+        let data = image.reply().expect("what is seen").data;
+        assert_eq!(connection.setup().image_byte_order, x11rb::protocol::xproto::ImageOrder::LSB_FIRST);
+        let rgb = data.chunks_exact(4).flat_map(|p| [p[2], p[1], p[0]]).collect();
+        (u32::from(width), u32::from(height), rgb)
     }
 
     pub fn resize(&self, window: &str, [width, height]: [u32; 2]) {

@@ -1,6 +1,8 @@
 //! `nimbus view` under a virtual display: it opens, draws, hears keys and mouse, is resized, and closes; and says what is missing
 //! where it cannot.
 
+#![cfg(feature = "window")]
+
 #[path = "harness/display.rs"]
 mod display;
 #[path = "harness/program.rs"]
@@ -155,6 +157,11 @@ fn panels_compare_count_and_measure() {
     display.key("j");
     wait_for("A's error", || said().contains("A: RMSE"));
     wait_for("B's error", || said().contains("B: RMSE"));
+    // What is turned is measured anew.
+    let n_said = || said().lines().filter(|line| line.starts_with("A: RMSE")).count();
+    let before = n_said();
+    display.key("p");
+    wait_for("another measurement", || n_said() > before);
     for key in ["x", "x", "x", "m", "h", "h"] {
         display.key(key);
         std::thread::sleep(Duration::from_millis(250));

@@ -18,6 +18,11 @@ pub fn run(args: &EditArgs, stop: &'static AtomicBool) -> Result<()> {
         None if args.options.set.is_empty() => Scenery::plain()?,
         None => return Err(Error::usage("--set: expected --scene SCENE, whose keys it sets")),
     };
+    let session = match (&args.scene, args.options.seed) {
+        (Some(_), _) => session.seeded(scenery.document().seed),
+        (None, Some(seed)) => session.seeded(seed),
+        (None, None) => session,
+    };
     let (width, height) = args.options.size.unwrap_or(SIZE);
     let choice = device_choice(&args.options);
     edit_window::run(Options { session, scenery, choice, size: [width, height], stop })

@@ -12,18 +12,30 @@ use super::device::{Device, Shared};
 use super::memory::{Image, TargetFormat};
 use super::presenter::ON_THEIR_WAY;
 use super::recorder::Recorder;
+use super::swapchain::Swapchain;
 use crate::error::{Error, Result};
 
 /// What is drawn: egui's, tessellated.
 #[derive(Debug, Clone)]
 pub struct Widgets {
-    pub primitives: Vec<ClippedPrimitive>,
+    /// What lies within the backdrop: drawn once, and copied to every picture then.
+    pub within: Vec<ClippedPrimitive>,
+    /// What is drawn over all.
+    pub above: Vec<ClippedPrimitive>,
     pub pixels_per_point: f32,
-    /// What lies behind them, below which nothing of the picture is seen.
+    /// Below it nothing of the picture is seen.
     pub backdrop: Option<Backdrop>,
 }
 
-/// A rectangle of one colour. A clear: as a textured quad it costs a software device a millisecond.
+impl Widgets {
+    pub fn new(primitives: Vec<ClippedPrimitive>, pixels_per_point: f32, backdrop: Option<Backdrop>) -> Widgets {
+        let is_within = |p: &ClippedPrimitive| backdrop.is_some_and(|b| b.room.contains_rect(p.clip_rect));
+        let (within, above) = primitives.into_iter().partition(is_within);
+        Widgets { within, above, pixels_per_point, backdrop }
+    }
+}
+
+/// A rectangle of one colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backdrop {
     /// Points from the window's upper left corner.
@@ -55,8 +67,19 @@ pub struct Overlay {
     pool: vk::CommandPool,
     /// What the picture after the next change does not show any more.
     to_free: Vec<TextureId>,
+    /// None where the window's images cannot be copied to.
+    kept: Option<Kept>,
     shared: Arc<Shared>,
 }
+
+/// A picture of what lies within a backdrop: a copy costs a tenth of drawing it anew.
+struct Kept {
+    image: Image,
+    of: Option<Arc<Widgets>>,
+}
+
+/// Each picture draws twice at most, and as many may be on their way.
+const DRAWS: usize = 2 * ON_THEIR_WAY;
 
 fn failed(what: &'static str) -> impl Fn(egui_ash_renderer::RendererError) -> Error {
     move |e| Error::vulkan(format!("window.widgets: {what}"), e)
@@ -72,11 +95,11 @@ impl Overlay {
             stencil_attachment_format: None,
         });
         // The image holds code values, and so do blended widgets.
-        let options = Options { in_flight_frames: ON_THEIR_WAY, srgb_framebuffer: false, ..Options::default() };
+        let options = Options { in_flight_frames: DRAWS, srgb_framebuffer: false, ..Options::default() };
         let allocator = Arc::clone(&shared.allocator);
         let renderer = Renderer::with_gpu_allocator(allocator, shared.raw.clone(), mode, options);
         let renderer = Some(renderer.map_err(failed("making its renderer"))?);
-        let mut overlay = Overlay { renderer, pool: vk::CommandPool::null(), to_free: vec![], shared };
+        let mut overlay = Overlay { renderer, pool: vk::CommandPool::null(), to_free: vec![], kept: None, shared };
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(overlay.shared.queue_family);
         overlay.pool = unsafe { overlay.shared.raw.create_command_pool(&info, None) }
             .map_err(|e| Error::vulkan("vkCreateCommandPool window.widgets", e))?;
@@ -104,27 +127,55 @@ impl Overlay {
         Ok(())
     }
 
-    /// Draws over what is in `image`.
-    pub fn record(&mut self, rec: &mut Recorder<'_>, image: &mut Image, widgets: &Widgets) -> Result<()> {
-        let Some(renderer) = &mut self.renderer else { return Ok(()) };
-        let raw = &self.shared.raw;
-        rec.draw_over(image, |commands, extent| {
-            let Widgets { primitives, pixels_per_point, backdrop } = widgets;
-            if let Some(backdrop) = backdrop
-                && let Some(area) = backdrop.area(*pixels_per_point, extent)
-            {
-                let float32 = backdrop.color.to_array().map(|v| f32::from(v) / 255.0);
-                let clear = vk::ClearAttachment {
-                    aspect_mask: vk::ImageAspectFlags::COLOR,
-                    color_attachment: 0,
-                    clear_value: vk::ClearValue { color: vk::ClearColorValue { float32 } },
-                };
-                let rect = vk::ClearRect { rect: area, base_array_layer: 0, layer_count: 1 };
-                unsafe { raw.cmd_clear_attachments(commands, &[clear], &[rect]) };
-            }
-            renderer.cmd_draw(commands, extent, *pixels_per_point, primitives).map_err(failed("drawing"))
-        })
+    /// For images of another size from now on. None that it has drawn into may be on its way.
+    pub fn fit(&mut self, device: &Device, chain: &Swapchain) -> Result<()> {
+        self.kept = None;
+        if chain.takes_copies() {
+            let [width, height] = chain.size();
+            let image = Image::color_target(device, "window.widgets", width, height, chain.format())?;
+            self.kept = Some(Kept { image, of: None });
+        }
+        Ok(())
     }
+
+    /// Draws over what is in `image`.
+    pub fn record(&mut self, rec: &mut Recorder<'_>, image: &mut Image, widgets: &Arc<Widgets>) -> Result<()> {
+        let Overlay { renderer: Some(renderer), kept, shared, .. } = self else { return Ok(()) };
+        let scale = widgets.pixels_per_point;
+        let area = widgets.backdrop.and_then(|b| Some((b.area(scale, image.extent)?, b.color)));
+        let mut draw = |rec: &mut Recorder<'_>, image: &mut Image, clear, primitives: &[ClippedPrimitive]| {
+            rec.draw_over(image, |commands, extent| {
+                if let Some((area, color)) = clear {
+                    fill(shared, commands, area, color);
+                }
+                renderer.cmd_draw(commands, extent, scale, primitives).map_err(failed("drawing"))
+            })
+        };
+        match (kept, area) {
+            (Some(kept), Some((place, _))) => {
+                if !kept.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, widgets)) {
+                    draw(rec, &mut kept.image, area, &widgets.within)?;
+                    kept.of = Some(widgets.clone());
+                }
+                rec.copy_part(&mut kept.image, image, place);
+            }
+            _ if area.is_some() || !widgets.within.is_empty() => draw(rec, image, area, &widgets.within)?,
+            _ => {}
+        }
+        if widgets.above.is_empty() { Ok(()) } else { draw(rec, image, None, &widgets.above) }
+    }
+}
+
+/// Makes `area` of what is drawn into one colour.
+fn fill(shared: &Shared, commands: vk::CommandBuffer, area: vk::Rect2D, color: egui::Color32) {
+    let float32 = color.to_array().map(|v| f32::from(v) / 255.0);
+    let clear = vk::ClearAttachment {
+        aspect_mask: vk::ImageAspectFlags::COLOR,
+        color_attachment: 0,
+        clear_value: vk::ClearValue { color: vk::ClearColorValue { float32 } },
+    };
+    let rect = vk::ClearRect { rect: area, base_array_layer: 0, layer_count: 1 };
+    unsafe { shared.raw.cmd_clear_attachments(commands, &[clear], &[rect]) };
 }
 
 impl Drop for Overlay {

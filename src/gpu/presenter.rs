@@ -1,6 +1,6 @@
-//! The thread that shows. It asks the window system for images and gives them back to be seen; who draws waits for neither.
-//! A driver may keep whoever shows a picture until the device is done with all that it was handed, also with what came after
-//! the picture: software ones do. That costs this thread's time alone.
+//! The thread that shows. It asks the window system for images and gives them back to be seen. A driver may keep whoever shows
+//! a picture until the device is done with all that it was handed, also with what came after the picture: software ones do. Then
+//! the next submission waits for the queue, but neither the game step nor recording does.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -128,6 +128,23 @@ impl Recorder<'_> {
         drawn
     }
 
+    /// Copies `area` of an image to the same place of another in the same format.
+    #[cfg(feature = "window")]
+    pub(super) fn copy_part(&mut self, from: &mut Image, to: &mut Image, area: vk::Rect2D) {
+        self.transition(from, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
+        self.transition(to, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+        let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+        let at = vk::Offset3D { x: area.offset.x, y: area.offset.y, z: 0 };
+        let region = [vk::ImageCopy::default()
+            .src_subresource(layers)
+            .src_offset(at)
+            .dst_subresource(layers)
+            .dst_offset(at)
+            .extent(area.extent.into())];
+        let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
+        unsafe { raw.cmd_copy_image(commands, from.raw, from.layout, to.raw, to.layout, &region) };
+    }
+
     /// Hands `image`, of a swapchain, to the window.
     #[cfg(feature = "window")]
     pub(super) fn show(&self, image: &mut Image) {
@@ -151,6 +168,9 @@ impl Recorder<'_> {
             ),
             vk::ImageLayout::TRANSFER_SRC_OPTIMAL => {
                 (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_READ)
+            }
+            vk::ImageLayout::TRANSFER_DST_OPTIMAL => {
+                (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_WRITE)
             }
             _ => (vk::PipelineStageFlags2::NONE, vk::AccessFlags2::NONE),
         };

@@ -40,7 +40,7 @@ pub struct Swapchain {
     raw: vk::SwapchainKHR,
     loader: khr::swapchain::Device,
     format: TargetFormat,
-    mode: PresentMode,
+    takes_copies: bool,
     shared: Arc<Shared>,
 }
 
@@ -59,6 +59,10 @@ impl Swapchain {
             .into_iter()
             .find(|a| capabilities.supported_composite_alpha.contains(*a))
             .unwrap_or(vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED);
+        // All windows are drawn into, nearly all are copied to as well.
+        let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
+            | (vk::ImageUsageFlags::TRANSFER_DST & capabilities.supported_usage_flags);
+        let takes_copies = usage.contains(vk::ImageUsageFlags::TRANSFER_DST);
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(surface.raw)
             .min_image_count((capabilities.min_image_count + 1).min(most))
@@ -66,7 +70,7 @@ impl Swapchain {
             .image_color_space(COLOR_SPACE)
             .image_extent(extent)
             .image_array_layers(1)
-            .image_usage(vk::ImageUsageFlags::COLOR_ATTACHMENT)
+            .image_usage(usage)
             .pre_transform(capabilities.current_transform)
             .composite_alpha(alpha)
             .present_mode(mode.raw())
@@ -77,7 +81,7 @@ impl Swapchain {
             unsafe { loader.create_swapchain(&info, None) }.map_err(|e| Error::vulkan("vkCreateSwapchainKHR", e))?;
         let (commands, images, ready, drawn) = (vec![], vec![], vec![], vec![]);
         let mut chain =
-            Swapchain { commands, images, ready, drawn, presenter: None, raw, loader, format, mode, shared };
+            Swapchain { commands, images, ready, drawn, presenter: None, raw, loader, format, takes_copies, shared };
         chain.fill(device, extent)?;
         Ok(Some(chain))
     }
@@ -114,8 +118,9 @@ impl Swapchain {
         self.format
     }
 
-    pub fn mode(&self) -> PresentMode {
-        self.mode
+    /// Whether images may be copied to its own.
+    pub fn takes_copies(&self) -> bool {
+        self.takes_copies
     }
 
     /// Width and height in pixels.

@@ -85,6 +85,8 @@ pub type Tell = Box<dyn Fn(Told) + Send>;
 // What lies on the device goes before the pane.
 pub struct Easel {
     made: Option<Made>,
+    /// The window was told so.
+    is_wrong: bool,
     pane: Pane,
     scenery: Scenery,
     orders: Arc<Orders>,
@@ -113,7 +115,7 @@ impl Easel {
         (tell, stop): (Tell, &'static AtomicBool),
     ) -> Result<Easel> {
         let pane = Pane::open(surface, choice, PresentMode::Fifo)?;
-        Ok(Easel { made: None, pane, scenery, orders, face, tell, stop })
+        Ok(Easel { made: None, is_wrong: false, pane, scenery, orders, face, tell, stop })
     }
 
     /// Draws until somebody wants no more.
@@ -145,10 +147,12 @@ impl Easel {
                 }
             }
             match self.follow(&order) {
+                Ok(()) if std::mem::take(&mut self.is_wrong) => (self.tell)(Told::Wrong(None)),
                 Ok(()) => {}
                 // What does not fit is not drawn; what is edited stays.
                 Err(error @ (Error::Limit { .. } | Error::Usage { .. })) => {
-                    (self.tell)(Told::Wrong(Some(error.to_string())))
+                    self.is_wrong = true;
+                    (self.tell)(Told::Wrong(Some(error.to_string())));
                 }
                 Err(error) => return Err(error),
             }
@@ -175,7 +179,16 @@ impl Easel {
     fn follow(&mut self, order: &Order) -> Result<()> {
         let is_new = self.made.is_none();
         if is_new {
-            self.made = Some(self.make(order)?);
+            self.made = match self.make(order) {
+                // Panels say why over the background alone.
+                Err(error @ Error::Limit { .. }) => {
+                    let seed = order.document.seed;
+                    let document = Arc::new(Document { boxes: vec![], seed });
+                    self.made = Some(self.make(&Order { document, ..order.clone() })?);
+                    return Err(error);
+                }
+                made => Some(made?),
+            };
         }
         let scene = self.scene(order);
         let Some(made) = &mut self.made else { return Ok(()) };
@@ -201,7 +214,6 @@ impl Easel {
             let boxes = &order.document.boxes;
             let counted = of_statuses(boxes, self.scenery.statuses(boxes, &statuses));
             (self.tell)(Told::Counted(order.document.clone(), counted));
-            (self.tell)(Told::Wrong(None));
         }
         Ok(())
     }

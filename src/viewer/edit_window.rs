@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use glam::{DVec2, DVec3};
@@ -12,7 +11,6 @@ use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::keyboard::{Key as WinitKey, ModifiersState, NamedKey};
-use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::{Window, WindowId};
 
 use super::easel::{Easel, Order, Orders, Told};
@@ -24,11 +22,12 @@ use super::editor::scenery::Scenery;
 use super::editor::session::{Event, Request, Session, Wish, perform};
 use super::editor::shortcuts::{Chord, Key};
 use super::editor::state::View;
+use super::opening::{Thread, no_display, open};
 use super::widgets::{Layer, SharedFace};
-use super::window::{PIXELS_A_NOTCH, no_display};
+use super::window::PIXELS_A_NOTCH;
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
-use crate::gpu::Surface;
+use crate::io::box_file;
 use crate::model::camera::Pose;
 
 /// What is edited, and within what.
@@ -54,17 +53,14 @@ pub fn run(options: Options) -> Result<()> {
     let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
     app.orders.change(|order| order.quits = true);
     // The thread ends before the window that it draws into.
-    let drawn = app.thread.take().map(|thread| thread.join().unwrap_or_else(|_| Err(panicked())));
+    let drawn = app.thread.take().map(Thread::end);
     drop(app.window.take());
+    app.rescue();
     if let Some(error) = app.failed {
         return Err(error);
     }
     ran?;
     drawn.unwrap_or(Ok(()))
-}
-
-fn panicked() -> Error {
-    Error::Fault { what: "the drawing thread panicked".to_owned() }
 }
 
 struct App {
@@ -76,7 +72,7 @@ struct App {
     orders: Arc<Orders>,
     face: SharedFace,
     proxy: EventLoopProxy<Told>,
-    thread: Option<JoinHandle<Result<()>>>,
+    thread: Option<Thread<()>>,
     window: Option<Window>,
     layer: Option<Layer>,
     held: ModifiersState,
@@ -86,6 +82,8 @@ struct App {
     wrong: Option<String>,
     recent: Recent,
     failed: Option<Error>,
+    /// By somebody who was asked about what would be lost.
+    is_closed: bool,
 }
 
 /// So often panels are drawn, and Ctrl-C is looked for, while nobody touches anything.
@@ -127,31 +125,35 @@ impl App {
             wrong: None,
             recent: recent::default_place().map_or_else(Recent::default, |place| Recent::load(&place)),
             failed: None,
+            is_closed: false,
         })
     }
 
+    /// Where the window ends and nobody was asked, by a device that is lost or by Ctrl-C, what was not saved is kept beside the file.
+    fn rescue(&self) {
+        let session = self.desk.session();
+        if self.is_closed || !session.is_dirty() {
+            return;
+        }
+        let path = session.path().unwrap_or(Path::new("cloud.dat"));
+        let free = (1..).map(|n| path.with_extension(format!("unsaved-{n}.dat"))).find(|path| !path.exists());
+        let Some(free) = free else { return };
+        match box_file::write(&free, session.editor().boxes()) {
+            Ok(()) => eprintln!("what was not saved is in {}", free.display()),
+            Err(error) => eprintln!("what was not saved is lost: {error}"),
+        }
+    }
+
     fn open(&mut self, events: &ActiveEventLoop) -> Result<()> {
-        let fail = |e: String| Error::vulkan("opening a window", e);
-        let [width, height] = self.size;
-        let attributes = Window::default_attributes().with_inner_size(PhysicalSize::new(width, height));
-        let window = events.create_window(attributes).map_err(|e| fail(e.to_string()))?;
-        let display = window.display_handle().map_err(|e| fail(e.to_string()))?.as_raw();
-        let handle = window.window_handle().map_err(|e| fail(e.to_string()))?.as_raw();
-        let surface = Surface::open(self.choice.validation, display, handle)?;
+        let (window, surface) = open(events, "nimbus", self.size, self.choice.validation)?;
         let proxy = self.proxy.clone();
         let tell = Box::new(move |told| drop(proxy.send_event(told)));
         let shared = (self.orders.clone(), self.face.clone());
         let easel = Easel::new(surface, &self.choice, self.scenery.clone(), shared, (tell, self.stop))?;
         self.layer = Some(Layer::new(&window, self.face.clone(), (STEADY, true)));
         let proxy = self.proxy.clone();
-        let draw = move || {
-            let drawn = easel.run();
-            // Whether it went well is asked when the loop of events has ended.
-            drop(proxy.send_event(Told::Ended));
-            drawn
-        };
-        let thread = std::thread::Builder::new().name("draw".into()).spawn(draw);
-        self.thread = Some(thread.map_err(|e| fail(e.to_string()))?);
+        // Whether it went well is asked when the loop of events has ended.
+        self.thread = Some(Thread::start(move || easel.run(), move || drop(proxy.send_event(Told::Ended)))?);
         let PhysicalSize { width, height } = window.inner_size();
         let px_per_point = window.scale_factor();
         self.window = Some(window);
@@ -186,7 +188,10 @@ impl App {
             Request::ChooseToSave => self.choosing = Some(Choosing::new(true, self.desk.session().path())),
             // The panel asks it.
             Request::Ask(_) => {}
-            Request::Quit => self.orders.change(|order| order.quits = true),
+            Request::Quit => {
+                self.is_closed = true;
+                self.orders.change(|order| order.quits = true);
+            }
             Request::Open(_) | Request::Save { .. } => {
                 let event = perform(request)?;
                 if let Event::Opened { path, .. } | Event::Saved { path, .. } = &event {
@@ -249,7 +254,8 @@ impl App {
         let (typing, choosing) = (&mut self.typing, &mut self.choosing);
         let mut inputs = vec![];
         layer.show(window, |ui| {
-            inputs = edit_panels::show(ui, &shown, typing, choosing);
+            // egui may ask twice, and is clicked in but once.
+            inputs.extend(edit_panels::show(ui, &shown, typing, choosing));
             None
         });
         inputs.into_iter().for_each(|input| self.take(input));
@@ -319,6 +325,10 @@ impl ApplicationHandler<Told> for App {
             WindowEvent::MouseInput { state, button, .. } => {
                 let is_down = state == ElementState::Pressed;
                 if let (Some(which), true) = (button_of(button), !is_down || !is_heard) {
+                    // What was typed is for the boxes that were selected while it was.
+                    if is_down {
+                        self.typing.take().into_iter().for_each(|typed| self.take(typed));
+                    }
                     self.take(Input::Button { which, is_down, held: self.held() });
                 }
             }
@@ -355,8 +365,9 @@ fn key_of(key: &WinitKey) -> Option<Key> {
 /// A box file, or a new one in its place; the scene around it.
 pub fn session_of(path: Option<&Path>) -> Result<Session> {
     let Some(path) = path else { return Ok(Session::new()) };
-    if !path.exists() {
+    // What cannot be looked at is no new cloud: reading says why.
+    if path.symlink_metadata().is_err_and(|e| e.kind() == std::io::ErrorKind::NotFound) {
         return Ok(Session::begun(path));
     }
-    Ok(Session::opened(path, crate::io::box_file::read(path)?))
+    Ok(Session::opened(path, box_file::read(path)?))
 }

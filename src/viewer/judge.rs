@@ -175,8 +175,12 @@ impl Judge {
     /// on. To be asked where the eye stands still.
     pub fn ask(&self, view: View) {
         let mut desk = self.shared.lock();
-        let asked = desk.next.as_ref().or(desk.current.as_ref());
-        if asked.is_some_and(|asked| asked.is_as(&view)) {
+        let Desk { next, current, .. } = &mut *desk;
+        if let Some(asked) = next.as_mut().or(current.as_mut())
+            && asked.is_as(&view)
+        {
+            // The next time it is known at once.
+            asked.scene = view.scene;
             return;
         }
         desk.standing = Standing { works: true, ..Standing::default() };

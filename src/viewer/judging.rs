@@ -4,11 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::flight::Flight;
-use super::judge::{Judge, Known, View};
-use super::screen::{Shared, lock};
+use super::judge::{Judge, Known, Standing, View};
+use super::screen::{Read, Shared, lock};
 use super::seen::{Judged, SharedSeen, lock as lock_seen};
 use super::wanted::Wanted;
-use crate::model::film::Film;
 use crate::study::kept::default_folder;
 use crate::study::tradeoff::records::PictureError;
 
@@ -18,7 +17,7 @@ const BUDGET: Duration = Duration::from_secs(10);
 #[derive(Default)]
 pub struct Judging {
     /// None until somebody asks.
-    judge: Option<Judge>,
+    judge: Option<std::result::Result<Judge, String>>,
     /// Where things stood when it was last looked.
     last: Option<Moment>,
     /// By what the pictures were last measured, and at which version of what is set.
@@ -39,17 +38,22 @@ impl Judging {
     pub fn follow(&mut self, wanted: &Shared, seen: &SharedSeen) {
         let now = lock(wanted).clone();
         if !now.judges {
-            if let Some(judge) = &self.judge {
+            if let Some(Ok(judge)) = &self.judge {
                 judge.rest();
             }
             (self.last, self.measured, self.errors) = (None, None, [None, None]);
             lock_seen(seen).judged = None;
             return;
         }
-        if self.judge.is_none() {
-            self.judge = Judge::new(default_folder(), BUDGET).ok();
-        }
-        let Some(judge) = &self.judge else { return };
+        let judge =
+            match self.judge.get_or_insert_with(|| Judge::new(default_folder(), BUDGET).map_err(|e| e.to_string())) {
+                Ok(judge) => judge,
+                Err(why) => {
+                    let standing = Standing { failed: Some(why.clone()), ..Standing::default() };
+                    lock_seen(seen).judged = Some(Judged { standing, ..Judged::default() });
+                    return;
+                }
+            };
         let moment = Moment { flight: now.flight, i_frame: now.playback.i_frame(), size: now.size };
         let is_still = self.last.replace(moment) == Some(moment) && now.playback.is_paused();
         if !is_still {
@@ -71,17 +75,13 @@ impl Judging {
         lock_seen(seen).judged = Some(Judged { standing, errors: self.errors });
     }
 
-    /// A frame's pictures, seen from `flight`; what is to be said of them.
-    pub fn take(
-        &mut self,
-        flight: Flight,
-        i_frame: u32,
-        film: &Film,
-        pictures: &[Option<Vec<f32>>; 2],
-    ) -> Option<String> {
-        let moment = Moment { flight, i_frame, size: [film.width, film.height] };
-        let Some((known, _)) = self.measured.as_ref().filter(|_| self.last == Some(moment)) else {
-            // One of another moment: another is asked for.
+    /// A frame's pictures; what is to be said of them.
+    pub fn take(&mut self, read: &Read) -> Option<String> {
+        let Read { version, flight, i_frame, film, pictures } = read;
+        let moment = Moment { flight: *flight, i_frame: *i_frame, size: [film.width, film.height] };
+        let is_asked = |(_, asked): &&(Arc<Known>, u64)| self.last == Some(moment) && asked == version;
+        let Some((known, _)) = self.measured.as_ref().filter(is_asked) else {
+            // Those of another moment: others are asked for.
             self.measured = None;
             return None;
         };

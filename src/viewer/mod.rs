@@ -13,6 +13,8 @@ pub mod judge;
 #[cfg(feature = "window")]
 pub mod judging;
 pub mod knobs;
+#[cfg(feature = "window")]
+pub mod opening;
 pub mod origin;
 #[cfg(feature = "window")]
 pub mod pane;

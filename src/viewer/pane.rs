@@ -52,8 +52,13 @@ impl Pane {
         // A surface has one swapchain at a time.
         self.swapchain = None;
         self.swapchain = Swapchain::new(&self.bed.device, &self.surface, size, self.mode())?;
-        if let (Some(chain), None) = (&self.swapchain, &self.overlay) {
-            self.overlay = Some(Overlay::new(&self.bed.device, chain.format())?);
+        if let Some(chain) = &self.swapchain {
+            let mut overlay = match self.overlay.take() {
+                Some(overlay) => overlay,
+                None => Overlay::new(&self.bed.device, chain.format())?,
+            };
+            overlay.fit(&self.bed.device, chain)?;
+            self.overlay = Some(overlay);
         }
         Ok(self.swapchain.is_some())
     }

@@ -42,16 +42,21 @@ pub enum Told {
         film: Film,
         rgba: Vec<f32>,
     },
-    /// A frame's pictures, A's and B's, as [`Wanted::reads`] asked for.
-    Read {
-        flight: Flight,
-        i_frame: u32,
-        film: Film,
-        pictures: [Option<Vec<f32>>; 2],
-    },
+    Read(Read),
     /// Something went wrong, which [`super::seen::Seen::wrong`] says.
     Wrong,
     Ended,
+}
+
+/// A frame's pictures, A's and B's, as [`Wanted::reads`] asked for.
+#[derive(Debug)]
+pub struct Read {
+    /// Of what was wanted ([`Wanted::version`]).
+    pub version: u64,
+    pub flight: Flight,
+    pub i_frame: u32,
+    pub film: Film,
+    pub pictures: [Option<Vec<f32>>; 2],
 }
 
 /// What is told where nobody listens any more is lost.
@@ -129,11 +134,11 @@ impl Screen {
     pub fn run(mut self) -> Result<Vec<LoopTimes>> {
         let mut good: Option<(Arc<Scene>, Option<Other>)> = None;
         while !self.is_over() {
-            if !self.remake()? {
+            let seen = lock(&self.ties.wanted).clone();
+            if !self.remake(&seen)? {
                 std::thread::sleep(UNSEEN);
                 continue;
             }
-            let seen = lock(&self.ties.wanted).clone();
             let before = self.follow_shaders(&seen);
             match self.make(&seen) {
                 Ok(Some(cast)) => {
@@ -194,7 +199,10 @@ impl Screen {
             (Some(compiler), _) => self.pane.bed.set_compiler(compiler),
             (None, Some((scene, other))) if *scene != seen.scene || other.is_none() && seen.other.is_some() => {
                 let mut wanted = lock(&self.ties.wanted);
-                (wanted.scene, wanted.other) = (scene.clone(), other.clone());
+                // Somebody may have turned on meanwhile.
+                if wanted.version == seen.version {
+                    (wanted.scene, wanted.other) = (scene.clone(), other.clone());
+                }
             }
             _ => return Err(error),
         }
@@ -227,11 +235,8 @@ impl Screen {
     }
 
     /// Makes what pictures are shown by, as it is wanted; false where nothing of the window is seen.
-    fn remake(&mut self) -> Result<bool> {
-        let (size, n_mode_turns) = {
-            let wanted = lock(&self.ties.wanted);
-            (wanted.size, wanted.n_mode_turns)
-        };
+    fn remake(&mut self, seen: &Wanted) -> Result<bool> {
+        let (size, n_mode_turns) = (seen.size, seen.n_mode_turns);
         let turns = n_mode_turns.wrapping_sub(std::mem::replace(&mut self.n_mode_turns, n_mode_turns)) as usize;
         self.pane.turn_mode(turns);
         if turns > 0 {
@@ -298,14 +303,17 @@ impl Screen {
                 if let Some(text) = status.after(scene, &times) {
                     (self.ties.tell)(Told::Status(text));
                 }
-                if let Some(keep) = lock(&self.ties.wanted).keep.take() {
+                // Nothing is held while pictures are read back.
+                let (keep, reads) = lock(&self.ties.wanted).take_wishes(seen.version);
+                if let Some(keep) = keep {
                     let rgba = renderer.image()?;
                     (self.ties.tell)(Told::Picture { keep, film: scene.film, rgba });
                 }
-                if let (true, Some(flight)) = (std::mem::take(&mut lock(&self.ties.wanted).reads), flight) {
+                if let (true, Some(flight)) = (reads, flight) {
                     let second = other.as_mut().map(|other| other.player.renderer.image()).transpose()?;
-                    let pictures = [Some(renderer.image()?), second];
-                    (self.ties.tell)(Told::Read { flight, i_frame: times.i_frame, film: scene.film, pictures });
+                    let (film, pictures) = (scene.film, [Some(renderer.image()?), second]);
+                    let version = seen.version;
+                    (self.ties.tell)(Told::Read(Read { version, flight, i_frame: times.i_frame, film, pictures }));
                 }
                 Ok(is_shown && goes_on(&now, seen) && !self.ties.stop.load(Ordering::Relaxed) && self.n_left != Some(0))
             };

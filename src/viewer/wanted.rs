@@ -277,6 +277,15 @@ impl Wanted {
         }
     }
 
+    /// A picture to keep and whether pictures are to be read, of a frame of this version of what is wanted; neither is wished for
+    /// any more then.
+    pub fn take_wishes(&mut self, version: u64) -> (Option<Keep>, bool) {
+        if self.version != version {
+            return (None, false);
+        }
+        (self.keep.take(), std::mem::take(&mut self.reads))
+    }
+
     /// The frame to draw now.
     pub fn next_frame(&mut self) -> u32 {
         let (i_frame, after) = self.playback.next();

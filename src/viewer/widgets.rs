@@ -121,7 +121,7 @@ impl Layer {
         let delay = output.viewport_output.get(&ViewportId::ROOT).map(|v| v.repaint_delay);
         self.is_touched = delay.is_some_and(|delay| delay < self.steady);
         let mut face = lock(&self.face);
-        face.widgets = Some(Arc::new(Widgets { primitives, pixels_per_point, backdrop }));
+        face.widgets = Some(Arc::new(Widgets::new(primitives, pixels_per_point, backdrop)));
         face.changes.append(output.textures_delta);
         face.made_ms.push(begin.elapsed().as_secs_f64() * 1e3);
         self.last = Some(Instant::now());

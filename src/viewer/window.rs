@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use glam::DVec2;
@@ -12,10 +11,10 @@ use winit::dpi::{PhysicalPosition, PhysicalSize};
 use winit::event::{ElementState, KeyEvent, MouseButton, MouseScrollDelta, WindowEvent};
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy};
 use winit::keyboard::{Key, NamedKey};
-use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::{Window, WindowId};
 
 use super::judging::Judging;
+use super::opening::{Thread, no_display, open};
 use super::origin::Origin;
 use super::panels;
 use super::screen::{LoopTimes, Screen, Shared, Ties, Told, lock};
@@ -24,7 +23,7 @@ use super::wanted::{Keep, Said, Wanted};
 use super::widgets::{Layer, SharedFace, lock as lock_face};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
-use crate::gpu::{PresentMode, Surface};
+use crate::gpu::PresentMode;
 use crate::io::image;
 
 /// What is shown, and how.
@@ -74,7 +73,7 @@ pub fn run(options: Options) -> Result<Ended> {
     let ran = events.run_app(&mut app).map_err(|e| Error::vulkan("window", e));
     lock(&app.wanted).quits = true;
     // The thread ends before the window that it draws into.
-    let drawn = app.thread.take().map(|thread| thread.join().unwrap_or_else(|_| Err(panicked())));
+    let drawn = app.thread.take().map(Thread::end);
     drop(app.window.take());
     if let Some(error) = app.failed {
         return Err(error);
@@ -83,20 +82,6 @@ pub fn run(options: Options) -> Result<Ended> {
     let loops = drawn.unwrap_or_else(|| Ok(vec![]))?;
     let panels_ms = std::mem::take(&mut lock_face(&app.face).made_ms);
     Ok(Ended { loops, panels_ms })
-}
-
-fn panicked() -> Error {
-    Error::Fault { what: "the drawing thread panicked".to_owned() }
-}
-
-/// Why there is no window, and what does `without` one.
-pub fn no_display(why: &str, without: &str) -> Error {
-    let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
-    let what = match set("DISPLAY") {
-        true => format!("the display {} cannot be opened", std::env::var("DISPLAY").unwrap_or_default()),
-        false => "there is no display: DISPLAY is not set".to_owned(),
-    };
-    Error::vulkan("opening a window", format!("{what} ({why}); {without}"))
 }
 
 /// Where the pointer was, and which buttons turn the eye.
@@ -111,7 +96,7 @@ struct App {
     options: Options,
     wanted: Shared,
     proxy: EventLoopProxy<Told>,
-    thread: Option<JoinHandle<Result<Vec<LoopTimes>>>>,
+    thread: Option<Thread<Vec<LoopTimes>>>,
     window: Option<Window>,
     layer: Option<Layer>,
     seen: SharedSeen,
@@ -142,8 +127,8 @@ impl ApplicationHandler<Told> for App {
                 let said = self.keep(keep, &film, &rgba).unwrap_or_else(|e| e.to_string());
                 self.say(&said);
             }
-            Told::Read { flight, i_frame, film, pictures } => {
-                let said = self.judging.take(flight, i_frame, &film, &pictures);
+            Told::Read(read) => {
+                let said = self.judging.take(&read);
                 said.iter().for_each(|text| self.say(text));
             }
             Told::Wrong => self.layer.iter_mut().for_each(Layer::touch),
@@ -161,6 +146,16 @@ impl ApplicationHandler<Told> for App {
     }
 
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        // Whoever lets go is heard, wherever the pointer is.
+        if let WindowEvent::KeyboardInput { event, .. } = &event
+            && event.state == ElementState::Released
+            && let Some(name) = name_of(&event.logical_key)
+        {
+            lock(&self.wanted).release(&name);
+        }
+        if let WindowEvent::MouseInput { state: ElementState::Released, .. } = &event {
+            (self.pointer.looks, self.pointer.orbits) = (false, false);
+        }
         if let (Some(layer), Some(window), true) = (&mut self.layer, &self.window, lock(&self.wanted).panels)
             && layer.hears(window, &event)
         {
@@ -203,7 +198,7 @@ impl ApplicationHandler<Told> for App {
 }
 
 /// So often panels show what is new: faster nobody reads.
-const STEADY: Duration = Duration::from_millis(100);
+const STEADY: Duration = Duration::from_millis(250);
 /// Of a wheel that counts pixels.
 pub const PIXELS_A_NOTCH: f64 = 40.0;
 
@@ -212,30 +207,17 @@ impl App {
         let Options { origin, choice, mode, n_frames, stop, .. } = &self.options;
         let scene = &origin.first;
         let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
-        let attributes = Window::default_attributes()
-            .with_title(title)
-            .with_inner_size(PhysicalSize::new(scene.film.width, scene.film.height));
-        let fail = |e: String| Error::vulkan("opening a window", e);
-        let window = events.create_window(attributes).map_err(|e| fail(e.to_string()))?;
-        let display = window.display_handle().map_err(|e| fail(e.to_string()))?.as_raw();
-        let handle = window.window_handle().map_err(|e| fail(e.to_string()))?.as_raw();
+        let (window, surface) = open(events, title, [scene.film.width, scene.film.height], choice.validation)?;
         let PhysicalSize { width, height } = window.inner_size();
         lock(&self.wanted).size = [width, height];
-        let surface = Surface::open(choice.validation, display, handle)?;
         let proxy = self.proxy.clone();
         let tell = Box::new(move |told| drop(proxy.send_event(told)));
         let (wanted, seen, face) = (self.wanted.clone(), self.seen.clone(), self.face.clone());
         let screen = Screen::new(surface, choice, *mode, *n_frames, Ties { wanted, seen, face, tell, stop })?;
         self.layer = Some(Layer::new(&window, self.face.clone(), (STEADY, false)));
         let proxy = self.proxy.clone();
-        let draw = move || {
-            let drawn = screen.run();
-            // Whether it went well is asked when the loop of events has ended.
-            drop(proxy.send_event(Told::Ended));
-            drawn
-        };
-        let thread = std::thread::Builder::new().name("draw".into()).spawn(draw);
-        self.thread = Some(thread.map_err(|e| fail(e.to_string()))?);
+        // Whether it went well is asked when the loop of events has ended.
+        self.thread = Some(Thread::start(move || screen.run(), move || drop(proxy.send_event(Told::Ended)))?);
         self.window = Some(window);
         Ok(())
     }
@@ -281,7 +263,6 @@ impl App {
         let (wanted, seen) = (lock(&self.wanted).clone(), lock_seen(&self.seen).clone());
         let mut commands = vec![];
         layer.show(window, |ui| {
-            commands.clear();
             let backdrop = wanted.panels.then(|| {
                 let (clicked, backdrop) = panels::show(ui, &wanted, &seen);
                 commands.extend(clicked);

@@ -22,7 +22,8 @@ impl Display {
     /// Of its own, on a number that is free.
     pub fn open() -> Display {
         let mut server = Command::new("Xvfb")
-            .args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"])
+            // A server that loses its last client begins anew, and whoever comes at that moment is lost: xdotool comes and goes.
+            .args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()

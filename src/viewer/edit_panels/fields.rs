@@ -16,6 +16,14 @@ pub struct Typing {
     pub wants_focus: bool,
 }
 
+impl Typing {
+    /// What stands in the fields, as if each was left.
+    pub fn take(&mut self) -> Vec<Input> {
+        let texts = self.texts.drain().filter(|(_, text)| !text.trim().is_empty());
+        texts.map(|(field, text)| Input::Typed { field, text }).collect()
+    }
+}
+
 pub fn show(ui: &mut Ui, desk: &Desk, typing: &mut Typing, inputs: &mut Vec<Input>) {
     let editor = desk.editor();
     let active = editor.active_box().map(|(_, b)| b);

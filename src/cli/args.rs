@@ -108,7 +108,11 @@ pub enum Command {
     ///
     /// Keys and mouse are printed when it opens and by "?". The loops are those that bench times, one after the other or side
     /// by side, and "t" goes from one to the other; the window's title says how long their frames take, and when it is closed
-    /// all of them are summed up. "i" prints the render command that draws what is seen.
+    /// all of them are summed up. "i" prints and copies the render command that draws what is seen.
+    ///
+    /// Panels ("h") show times, passes, the plan and every setting. "m" keeps the settings as B, to compare with what is turned from then on;
+    /// "j" measures both by the f64 reference while the eye and the frame stand still; "F10" saves what is seen as a scene. The scene, the
+    /// files that it names and the shaders of --shaders are read again when they change.
     #[cfg(feature = "window")]
     View(ViewArgs),
     /// Shape a cloud by hand: boxes that are filled with particles

@@ -41,6 +41,10 @@ pub struct Swapchain {
     loader: khr::swapchain::Device,
     format: TargetFormat,
     takes_copies: bool,
+    /// An image that nothing was drawn into after all: its slot.
+    stray: Option<usize>,
+    /// The presenter has told how it ended.
+    is_over: bool,
     shared: Arc<Shared>,
 }
 
@@ -80,8 +84,20 @@ impl Swapchain {
         let raw =
             unsafe { loader.create_swapchain(&info, None) }.map_err(|e| Error::vulkan("vkCreateSwapchainKHR", e))?;
         let (commands, images, ready, drawn) = (vec![], vec![], vec![], vec![]);
-        let mut chain =
-            Swapchain { commands, images, ready, drawn, presenter: None, raw, loader, format, takes_copies, shared };
+        let mut chain = Swapchain {
+            commands,
+            images,
+            ready,
+            drawn,
+            presenter: None,
+            raw,
+            loader,
+            format,
+            takes_copies,
+            stray: None,
+            is_over: false,
+            shared,
+        };
         chain.fill(device, extent)?;
         Ok(Some(chain))
     }
@@ -134,11 +150,22 @@ impl Swapchain {
         let Some(presenter) = &self.presenter else { return Ok(Shown::Outdated) };
         let (i_image, i_slot) = match presenter.told.recv_timeout(PATIENCE) {
             Ok(Told::Image { i_image, i_slot }) => (i_image, i_slot),
-            Ok(Told::Failed(error)) => return Err(error),
+            Ok(Told::Failed(error)) => {
+                self.is_over = true;
+                return Err(error);
+            }
+            Ok(Told::Outdated) => {
+                self.is_over = true;
+                return Ok(Shown::Outdated);
+            }
             Err(RecvTimeoutError::Timeout) => return Ok(Shown::Late),
-            // It has told that before.
-            Ok(Told::Outdated) | Err(RecvTimeoutError::Disconnected) => return Ok(Shown::Outdated),
+            // It has told that before, unless it panicked.
+            Err(RecvTimeoutError::Disconnected) if self.is_over => return Ok(Shown::Outdated),
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(Error::Fault { what: "the show thread panicked".to_owned() });
+            }
         };
+        self.stray = Some(i_slot);
         let (commands, image) = (&mut self.commands[i_slot], &mut self.images[i_image]);
         commands.record(Barriers::Placed, |rec| {
             draw(rec, image)?;
@@ -146,14 +173,18 @@ impl Swapchain {
             Ok(())
         })?;
         let done = commands.submit_between(Some(self.ready[i_slot]), Some(self.drawn[i_image]))?;
+        self.stray = None;
         presenter.show(Drawn { i_image, i_slot, done });
         Ok(Shown::Yes)
     }
 
     /// Waits on the device for images that nobody drew into: a semaphore that is still to be signalled may not go.
     fn take_back(&self, presenter: &Presenter) {
-        for told in presenter.told.try_iter() {
-            let Told::Image { i_slot, .. } = told else { continue };
+        let told = presenter.told.try_iter().filter_map(|told| match told {
+            Told::Image { i_slot, .. } => Some(i_slot),
+            Told::Outdated | Told::Failed(_) => None,
+        });
+        for i_slot in told.chain(self.stray) {
             let wait = [vk::SemaphoreSubmitInfo::default()
                 .semaphore(self.ready[i_slot])
                 .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];

@@ -12,7 +12,7 @@ use super::editor::desk::{Desk, Input};
 use super::editor::selection::How;
 use super::editor::session::Event;
 use super::editor::shortcuts::{Command, SHORTCUTS};
-use super::editor::sketch::{Color, Pointing, Shape, sketch};
+use super::editor::sketch::{Color, Shape, sketch};
 use super::editor::state::{Scaling, View};
 use super::editor::{Action, Axis, Select, Setting};
 pub use dialogs::Choosing;
@@ -193,8 +193,7 @@ fn draw(ui: &Ui, desk: &Desk) {
     let color = |[r, g, b, a]: Color| Color32::from_rgba_unmultiplied(r, g, b, a);
     let stroke =
         |s: super::editor::sketch::Stroke| Stroke::new((s.width_px / view.px_per_point) as f32, color(s.color));
-    let pointing = Pointing { hovered: desk.hovered(), rectangle: desk.rectangle() };
-    for shape in sketch(desk.editor(), &view, pointing) {
+    for shape in sketch(desk.editor(), &view, desk.pointing()) {
         match shape {
             Shape::Polygon { corners, fill, stroke: around } => {
                 let corners = corners.into_iter().map(point).collect();

@@ -92,7 +92,7 @@ pub const SHORTCUTS: [(&str, Command, &str); 27] = [
     ("x", Command::Compare, "A and B split, their difference, B alone"),
     ("j", Command::Judge, "measure what is seen by its f64 reference, while it stands still"),
     ("f10", Command::SaveView, "save what is seen as a scene"),
-    ("i", Command::CommandLine, "print the command that draws this"),
+    ("i", Command::CommandLine, "print and copy the command that draws this"),
     ("?", Command::Help, "print these keys"),
     ("escape", Command::Quit, "close the window"),
 ];

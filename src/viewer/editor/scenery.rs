@@ -9,8 +9,7 @@ use glam::DVec3;
 use super::document::{Document, Touched};
 use crate::error::{Error, Result};
 use crate::io::{box_file, scene_file};
-use crate::model::boxes::{CloudBox, Form};
-use crate::model::camera::{CameraKey, Pose};
+use crate::model::boxes::CloudBox;
 use crate::model::cloud::{Cloud, CloudSource};
 use crate::model::scene::Scene;
 
@@ -69,25 +68,9 @@ impl Scenery {
         Arc::new(scene)
     }
 
-    /// The same as it is seen from somewhere, for who draws it alone.
-    pub fn scene_from(&self, document: &Document, pose: &Pose, target: DVec3) -> Arc<Scene> {
-        let mut scene = self.scene(document);
-        let key = CameraKey { time_s: 0.0, position: pose.position, target };
-        Arc::make_mut(&mut scene).camera.keys = vec![key];
-        scene
-    }
-
     /// Numbers of the scene's groups whose particles are to be generated, as `Player::reshape` asks for them.
     pub fn groups(&self, touched: &Touched) -> Vec<usize> {
         touched.generate.iter().map(|i| self.i_first_group + i).collect()
-    }
-
-    /// How the boxes are read.
-    pub fn form(&self) -> Form {
-        match self.cloud().source {
-            CloudSource::Boxes { form, .. } => form,
-            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => Form::Centred,
-        }
     }
 
     /// Statuses of the edited cloud's particles, of those of all, in order.
@@ -129,9 +112,6 @@ mod tests {
         let empty = scenery.scene(&document(0));
         assert_eq!((empty.n_particles(), empty.groups().len()), (0, 0));
         assert_ne!(empty.lighting.mode, LightingMode::None);
-        let seen = scenery.scene_from(&document(0), &empty.camera.pose(0.0).unwrap(), DVec3::X);
-        assert_eq!(seen.camera.keys.len(), 1);
-        assert_eq!(seen.camera.keys[0].target, DVec3::X);
     }
 
     #[test]
@@ -142,7 +122,7 @@ mod tests {
         let loaded = scene_file::parse_beside(text.to_owned(), Path::new("s.toml"), &[], Some(5), &files).unwrap();
         let scenery = Scenery::of(loaded.scene.clone()).unwrap();
         assert_eq!((scenery.document().boxes, scenery.document().seed), (document(2).boxes, 6));
-        assert_eq!((scenery.form(), scenery.origin()), (Form::Printed, DVec3::new(1.0, 2.0, 3.0)));
+        assert_eq!(scenery.origin(), DVec3::new(1.0, 2.0, 3.0));
         let (old, new) = (scenery.document(), Document { seed: 6, ..document(4) });
         let scene = scenery.scene(&new);
         assert_eq!(scene.clouds[1].n_groups(), 4);

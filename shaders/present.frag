@@ -16,8 +16,9 @@ layout(push_constant) uniform Push {
     int split;
     float gain;
 } push;
-layout(std430, binding = 0) readonly buffer PictureA { uint words_a[]; };
-layout(std430, binding = 1) readonly buffer PictureB { uint words_b[]; };
+// Four words at a time, as devices read them best.
+layout(binding = 0) uniform usamplerBuffer picture_a;
+layout(binding = 1) uniform usamplerBuffer picture_b;
 
 layout(location = 0) out vec4 out_color;
 
@@ -32,20 +33,18 @@ const uint DASH = 4;
 const float START_COMPRESSION = 0.8;
 const float DESATURATION = 0.15;
 
-uint word(bool is_b, uint i) {
-    return is_b ? words_b[i] : words_a[i];
-}
-
 // Premultiplied linear RGBA.
 vec4 pixel_at(bool is_b, uvec2 p) {
     uint i = p.y * push.size.x + p.x;
+    int at = int(FORMAT == 0 ? i >> 2 : FORMAT == 1 ? i >> 1 : i);
+    uvec4 words = is_b ? texelFetch(picture_b, at) : texelFetch(picture_a, at);
     if (FORMAT == 0) {
-        return unpackUnorm4x8(word(is_b, i));
+        return unpackUnorm4x8(words[i & 3u]);
     }
     if (FORMAT == 1) {
-        return vec4(unpackHalf2x16(word(is_b, 2 * i)), unpackHalf2x16(word(is_b, 2 * i + 1)));
+        uvec2 half_words = (i & 1u) == 0u ? words.xy : words.zw;
+        return vec4(unpackHalf2x16(half_words.x), unpackHalf2x16(half_words.y));
     }
-    uvec4 words = uvec4(word(is_b, 4 * i), word(is_b, 4 * i + 1), word(is_b, 4 * i + 2), word(is_b, 4 * i + 3));
     return uintBitsToFloat(words);
 }
 

@@ -137,7 +137,7 @@ const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
         sprites::Push::FIELDS,
         &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Textured")],
     ),
-    ("present.frag", present::Push::FIELDS, &[B(4), B(4)]),
+    ("present.frag", present::Push::FIELDS, &[T, T]),
     ("present.vert", &[], &[]),
     ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
     ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),

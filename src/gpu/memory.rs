@@ -29,6 +29,9 @@ pub enum Place {
 const TEXELS: [(BindingKind, vk::Format); 2] =
     [(BindingKind::Texels, vk::Format::R32G32B32A32_UINT), (BindingKind::Floats, vk::Format::R32_SFLOAT)];
 
+/// Of the largest texel.
+const TEXEL_BYTES: u64 = 16;
+
 pub struct Buffer {
     pub(super) raw: vk::Buffer,
     /// All of it, by kind of texel; null where it has more than the device reads.
@@ -49,7 +52,8 @@ impl Buffer {
             | vk::BufferUsageFlags::TRANSFER_SRC
             | vk::BufferUsageFlags::TRANSFER_DST
             | vk::BufferUsageFlags::INDIRECT_BUFFER;
-        let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
+        // Whole texels, so that the last words are read by them as well.
+        let info = vk::BufferCreateInfo::default().size(bytes.next_multiple_of(TEXEL_BYTES)).usage(usage);
         let raw = unsafe { shared.raw.create_buffer(&info, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateBuffer {name}"), e))?;
         shared.name(raw, name);
@@ -93,8 +97,8 @@ impl Buffer {
 
     fn make_views(&mut self, limits: &Limits) -> Result<()> {
         for (view, (kind, format)) in self.views.iter_mut().zip(TEXELS) {
-            let n = self.bytes / u64::from(kind.texel_bytes());
-            if n == 0 || n > limits.max_texels {
+            let n = self.bytes.div_ceil(u64::from(kind.texel_bytes()));
+            if n > limits.max_texels {
                 continue;
             }
             let info = vk::BufferViewCreateInfo::default().buffer(self.raw).format(format);

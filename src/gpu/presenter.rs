@@ -34,6 +34,8 @@ pub(super) struct Drawn {
     pub i_image: usize,
     pub i_slot: usize,
     pub done: Pending,
+    /// Dropped when the window system has it.
+    pub handed_over: SyncSender<()>,
 }
 
 /// What the thread works with. Whoever owns the swapchain and the semaphores ends it before them.
@@ -109,8 +111,10 @@ impl Chain {
                 false => drawn.recv_timeout(std::mem::take(&mut wait)),
             };
             match next {
-                Ok(Drawn { i_image, i_slot, done }) => {
-                    if !self.present(i_image)? {
+                Ok(Drawn { i_image, i_slot, done, handed_over }) => {
+                    let is_shown = self.present(i_image);
+                    drop(handed_over);
+                    if !is_shown? {
                         return Ok(End::Outdated);
                     }
                     idle.push_back((i_slot, Some(done)));

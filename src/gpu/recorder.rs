@@ -367,10 +367,8 @@ impl Recorder<'_> {
             views.push([buffer.texels(access.kind)?]);
         }
         let set = self.descriptor_set(interface.set_layout)?;
-        let infos: Vec<_> = buffers
-            .iter()
-            .map(|b| [vk::DescriptorBufferInfo { buffer: b.raw, offset: 0, range: vk::WHOLE_SIZE }])
-            .collect();
+        let infos: Vec<_> =
+            buffers.iter().map(|b| [vk::DescriptorBufferInfo { buffer: b.raw, offset: 0, range: b.bytes() }]).collect();
         let writes: Vec<_> = infos
             .iter()
             .zip(&views)

@@ -32,6 +32,8 @@ pub enum Start {
     ClearColor,
     /// What was drawn before.
     Load,
+    /// Anything: every pixel is drawn over.
+    Overwrite,
 }
 
 impl<'a> Target<'a> {
@@ -201,6 +203,7 @@ fn attachment(image: &Image, start: Start) -> vk::RenderingAttachmentInfo<'stati
     let load = match start {
         Start::Clear | Start::ClearColor => vk::AttachmentLoadOp::CLEAR,
         Start::Load => vk::AttachmentLoadOp::LOAD,
+        Start::Overwrite => vk::AttachmentLoadOp::DONT_CARE,
     };
     vk::RenderingAttachmentInfo::default()
         .image_view(image.view)

@@ -1,7 +1,7 @@
 //! Pictures in a window: the images that go to and fro between it and nimbus.
 
 use std::sync::Arc;
-use std::sync::mpsc::RecvTimeoutError;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
 use ash::{khr, vk};
@@ -9,7 +9,7 @@ use ash::{khr, vk};
 use super::device::{Device, Shared};
 use super::memory::{Image, TargetFormat};
 use super::presenter::{Chain, Drawn, ON_THEIR_WAY, Presenter, Told};
-use super::recorder::{Barriers, Commands, Recorder};
+use super::recorder::{Barriers, Commands, Pending, Recorder};
 use super::surface::{COLOR_SPACE, PresentMode, Surface};
 use crate::error::{Error, Result};
 
@@ -41,6 +41,8 @@ pub struct Swapchain {
     loader: khr::swapchain::Device,
     format: TargetFormat,
     takes_copies: bool,
+    /// The picture that was shown last: when it is drawn, and when the window system has it.
+    last: Option<(Pending, Receiver<()>)>,
     /// An image that nothing was drawn into after all: its slot.
     stray: Option<usize>,
     /// The presenter has told how it ended.
@@ -94,6 +96,7 @@ impl Swapchain {
             loader,
             format,
             takes_copies,
+            last: None,
             stray: None,
             is_over: false,
             shared,
@@ -144,7 +147,7 @@ impl Swapchain {
         self.images.first().map_or([0, 0], |image| image.size().into())
     }
 
-    /// Has `draw` fill an image, which is black before, and has it shown. What `draw` records is with the device when this
+    /// Has `draw` fill all of an image, and has it shown. What `draw` records is with the device when this
     /// returns, ahead of whatever is submitted next.
     pub fn show(&mut self, draw: impl FnOnce(&mut Recorder<'_>, &mut Image) -> Result<()>) -> Result<Shown> {
         let Some(presenter) = &self.presenter else { return Ok(Shown::Outdated) };
@@ -174,8 +177,19 @@ impl Swapchain {
         })?;
         let done = commands.submit_between(Some(self.ready[i_slot]), Some(self.drawn[i_image]))?;
         self.stray = None;
-        presenter.show(Drawn { i_image, i_slot, done });
+        let (handed_over, is_handed_over) = sync_channel(0);
+        self.last = Some((done.clone(), is_handed_over));
+        presenter.show(Drawn { i_image, i_slot, done, handed_over });
         Ok(Shown::Yes)
+    }
+
+    /// Returns when the last picture has been drawn and handed over to the window system.
+    pub fn wait(&self) -> Result<()> {
+        let Some((done, is_handed_over)) = &self.last else { return Ok(()) };
+        done.wait()?;
+        // Nothing is ever sent: the other end goes when it is, or with the thread that did not come to it.
+        let _ = is_handed_over.recv();
+        Ok(())
     }
 
     /// Waits on the device for images that nobody drew into: a semaphore that is still to be signalled may not go.

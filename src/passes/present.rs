@@ -85,6 +85,6 @@ impl Present {
         };
         let tone_map = u32::from(!is_neutral);
         let push = Push { background, exposure, size, corner, tone_map, compare, split, gain };
-        rec.draw(&self.pipeline, Target::color(into), Start::Clear, &pictures, &push, Instances::Known(1))
+        rec.draw(&self.pipeline, Target::color(into), Start::Overwrite, &pictures, &push, Instances::Known(1))
     }
 }

@@ -116,6 +116,11 @@ impl Pane {
         Ok(shown != Shown::Outdated)
     }
 
+    /// Returns when the last picture has been drawn and handed over to the window system.
+    pub fn wait(&self) -> Result<()> {
+        self.swapchain.as_ref().map_or(Ok(()), Swapchain::wait)
+    }
+
     /// Pictures that are on their way may use what is dropped next: they are done with after this.
     pub fn finish(&mut self) {
         self.swapchain = None;

@@ -96,8 +96,8 @@ pub struct Screen {
     times: [[Vec<f64>; 2]; 2],
 }
 
-/// The frames after something was made are not counted among the times.
-const N_WARM_UP: u32 = 3;
+/// The frames after something was made are not counted among the times: as many as a bench leaves out unless told otherwise.
+const N_WARM_UP: u32 = 10;
 /// So often the title says how long frames take.
 const STATUS: Duration = Duration::from_millis(500);
 /// And so long nothing is tried where nothing of the window is seen.
@@ -290,6 +290,10 @@ impl Screen {
                 let second = other.as_mut().map(|other| &mut other.player.renderer);
                 let compare = second.as_ref().map(|_| compare_of(now.beside, scene.film.width));
                 let is_shown = self.pane.show(showing, [Some(&mut *renderer), second], compare, &self.ties.face)?;
+                // One after the other: no game step runs beside it, or this loop would be a little parallel.
+                if threading == Threading::Serial {
+                    self.pane.wait()?;
+                }
                 match (n_warm_up, &other) {
                     (0, None) => self.times[threading as usize][usize::from(now.panels)].push(times.frame_ms),
                     // Two pictures are no scene's frame time.

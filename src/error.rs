@@ -24,6 +24,10 @@ pub enum Error {
     Check { what: String },
     /// A fault of nimbus itself: a thread that panicked.
     Fault { what: String },
+    /// What may be otherwise later or elsewhere: a shard of a farm is worth another try.
+    Transient { what: String },
+    /// Two results of the same work that differ.
+    Conflict { what: String },
     /// Ctrl-C; what was finished is kept.
     Interrupted,
 }
@@ -88,13 +92,16 @@ impl Error {
             | Error::Io { what, .. }
             | Error::Usage { what }
             | Error::Check { what }
-            | Error::Fault { what } => what.push_str(&format!(" (in {place})")),
+            | Error::Fault { what }
+            | Error::Transient { what }
+            | Error::Conflict { what } => what.push_str(&format!(" (in {place})")),
             Error::Interrupted => {}
         }
         self
     }
 
-    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 101 a fault of nimbus itself; 130 interrupted.
+    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 70 results that contradict each other; 75 worth
+    /// another try (as sysexits.h has the two); 101 a fault of nimbus itself; 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Check { .. } => 1,
@@ -104,6 +111,8 @@ impl Error {
             | Error::Io { .. }
             | Error::Usage { .. } => 2,
             Error::Vulkan { .. } => 3,
+            Error::Conflict { .. } => 70,
+            Error::Transient { .. } => 75,
             Error::Fault { .. } => 101,
             Error::Interrupted => 130,
         }
@@ -118,7 +127,11 @@ impl fmt::Display for Error {
             Error::Vulkan { call, what } => write!(f, "Vulkan: {call}: {what}"),
             Error::Limit { what } => write!(f, "limit: {what}"),
             Error::Io { path, what } => write!(f, "{}: {what}", path.display()),
-            Error::Usage { what } | Error::Check { what } | Error::Fault { what } => write!(f, "{what}"),
+            Error::Usage { what }
+            | Error::Check { what }
+            | Error::Fault { what }
+            | Error::Transient { what }
+            | Error::Conflict { what } => write!(f, "{what}"),
             Error::Interrupted => write!(f, "interrupted"),
         }
     }

@@ -10,6 +10,7 @@
 
 pub mod cli;
 pub mod error;
+pub mod farm;
 pub mod frame;
 pub mod gpu;
 pub mod io;

@@ -22,7 +22,7 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("measure", &[]),
     ("study", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
     ("viewer", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"]),
-    ("farm", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
+    ("farm", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"]),
     ("cli", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study", "viewer", "farm"]),
     ("main", &["cli"]),
 ];

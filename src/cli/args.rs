@@ -1,5 +1,6 @@
 //! The command line, as typed.
 
+mod farm;
 mod results;
 mod stress;
 mod study;
@@ -12,6 +13,9 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
+pub use farm::{
+    FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, LocalArgs, MergeArgs, PlanArgs, RunArgs, StatusArgs,
+};
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
@@ -25,7 +29,7 @@ pub use weather::WeatherArgs;
 #[command(after_help = "Start with:\n  nimbus render scenes/hello.toml -o hello.png\n  \
     nimbus bench scenes/threads.toml\n  nimbus compare before after\n  nimbus report before after -o report.html\n  \
     nimbus inspect scenes/cubes-554.toml\n  nimbus weather scenes/weather/katrina.nc\n  nimbus devices\n\n\
-    Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  101 a fault of nimbus itself; 130 interrupted.")]
+    Exit codes: 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver;\n  70, 75 of `nimbus farm`; 101 a fault of nimbus itself; 130 interrupted.")]
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
@@ -135,6 +139,14 @@ pub enum Command {
     /// P, PB, T, PH, PHB and the attributes DX and DY are needed; what else is missing is told. What is negative, NaN or a
     /// fill value among mixing ratios is counted and taken for none; elsewhere it is an error.
     Weather(WeatherArgs),
+    /// Spread frames over machines that share a folder, and put them together again
+    ///
+    /// `plan` cuts the work into shards, each with a key that follows from scene, shaders, build and range. `run` does one shard: it is
+    /// what an engine (Slurm, another one, or `local`, the pool of one machine) starts, as often and on as many nodes as it likes.
+    /// A result appears whole or not at all, is verified by its content before it counts, and frames that a killed run has finished
+    /// are gone on with. `status` says what is missing, `merge` puts all together, `gc` clears away what attempts have left.
+    #[command(subcommand_required = true)]
+    Farm(FarmArgs),
 }
 
 /// What every command with a scene takes.

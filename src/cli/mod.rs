@@ -10,6 +10,7 @@ mod compare_pictures;
 mod devices;
 #[cfg(feature = "window")]
 mod edit;
+mod farm;
 mod inspect;
 mod ledger;
 mod output;
@@ -75,6 +76,7 @@ pub fn main() -> ExitCode {
             edit::run(a, &STOP)
         }
         Command::Weather(a) => weather::run(a),
+        Command::Farm(a) => farm::run(a, &STOP, &GRACEFUL),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -43,6 +43,16 @@ impl Sources {
         self
     }
 
+    /// SHA-256 (hex) over all names and texts.
+    pub fn hash(&self) -> String {
+        let mut hasher = Sha256::new();
+        for (name, text) in &self.0 {
+            // Lengths tell where one ends.
+            hasher.update(format!("{name} {}\n{text}", text.len()));
+        }
+        format!("{:x}", hasher.finalize())
+    }
+
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }

@@ -83,6 +83,21 @@ pub fn png_bytes(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The bytes of the file that [`write`] makes.
+pub fn encoded(kind: ImageKind, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<Vec<u8>> {
+    match kind {
+        ImageKind::Png => png_bytes(width, height, &display_bytes(film, width, height, rgba)),
+        ImageKind::Exr => {
+            check_size(width, height, rgba);
+            let mut bytes = std::io::Cursor::new(Vec::new());
+            let encoder = OpenExrEncoder::new(&mut bytes);
+            let encoded = encoder.write_image(bytemuck::cast_slice(rgba), width, height, ExtendedColorType::Rgba32F);
+            encoded.map_err(|cause| Error::Fault { what: format!("a picture could not be encoded: {cause}") })?;
+            Ok(bytes.into_inner())
+        }
+    }
+}
+
 /// Writes what the extension asks for.
 pub fn write(path: &Path, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<()> {
     match ImageKind::of(path)? {

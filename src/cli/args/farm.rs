@@ -1,0 +1,192 @@
+//! What is typed after `nimbus farm`.
+
+use std::path::PathBuf;
+
+use clap::{Args as ClapArgs, Subcommand, ValueEnum};
+
+use super::parse_size;
+
+#[derive(Debug, ClapArgs)]
+pub struct FarmArgs {
+    #[command(subcommand)]
+    pub command: FarmCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum FarmCommand {
+    /// Cut the frames of an animation into shards
+    #[command(after_help = "An animation on this machine:\n  \
+        nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
+        nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames")]
+    Plan(PlanArgs),
+    /// Do one shard, unless it is done
+    ///
+    /// Exit codes: 0 done, by whomever; 75 it went wrong in a way that may pass (full disk, lost device, a signal): another try may go
+    /// well; 70 the result differs from one that is there; others as everywhere: another try is of no use.
+    Run(RunArgs),
+    /// Do all shards that are not done, here, some processes at a time
+    Local(LocalArgs),
+    /// Say what is done and what is not; reads and verifies every result
+    Status(StatusArgs),
+    /// Put all results together, as one machine would have made them
+    ///
+    /// Every result is verified before and every copy after. Where a shard is missing nothing is written, and it is named.
+    Merge(MergeArgs),
+    /// Remove what attempts have left behind
+    Gc(GcArgs),
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct PlanArgs {
+    /// Scene file; every node has to see it under the same path
+    pub scene: PathBuf,
+    /// Folder of the plan and of its results, which every node has to see
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Frames: FIRST..END (END is not drawn) or how many from 0 [default: the scene's]
+    #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
+    pub frames: Option<FrameSpan>,
+    /// Frames of a shard. A run opens the device and fills its buffers once a shard: few make it slow, many lose more when it is killed
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
+    pub shard_frames: u32,
+    /// What a frame is written as
+    #[arg(long, value_enum, default_value = "png")]
+    pub format: FormatArg,
+    /// Seed of the first cloud; the others count on from it
+    #[arg(long, value_name = "N", help_heading = "Scene")]
+    pub seed: Option<u32>,
+    /// Set any key of the scene, e.g. --set lighting.grid=128 (repeatable)
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Scene")]
+    pub set: Vec<String>,
+    /// Picture size in pixels
+    #[arg(long, value_name = "WxH", value_parser = parse_size, help_heading = "Scene")]
+    pub size: Option<(u32, u32)>,
+    /// Folder with shaders that replace those built in
+    #[arg(long, value_name = "DIR", help_heading = "Device")]
+    pub shaders: Option<PathBuf>,
+    /// Print the plan as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// No warnings
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// From `first`, `end` not counted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FrameSpan {
+    pub first: u32,
+    pub end: u32,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FormatArg {
+    /// 8-bit sRGB, tone-mapped, over the background
+    Png,
+    /// Linear premultiplied RGBA
+    Exr,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct RunArgs {
+    /// The plan's folder
+    #[arg(long, value_name = "DIR")]
+    pub plan: PathBuf,
+    /// Vulkan device, by index or part of its name (see `nimbus devices`)
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Run with the validation layers; any message fails the shard
+    #[arg(long)]
+    pub validation: bool,
+    /// Say nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+    /// Which shard, from 0
+    #[arg(long, value_name = "I")]
+    pub shard: usize,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct LocalArgs {
+    /// The plan's folder
+    #[arg(long, value_name = "DIR")]
+    pub plan: PathBuf,
+    /// Processes at a time. One fills a device; a software device fills all cores
+    #[arg(short, long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    pub jobs: u32,
+    /// So often a shard is tried that fails in a way that may pass
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    pub tries: u32,
+    /// Vulkan device, by index or part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct StatusArgs {
+    /// The plan's folder
+    #[arg(long, value_name = "DIR")]
+    pub plan: PathBuf,
+    /// Print only the indices that are not done, as Slurm's --array takes them: 0,3-5
+    #[arg(long, conflicts_with = "json")]
+    pub missing: bool,
+    /// Every shard as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct MergeArgs {
+    /// The plan's folder
+    #[arg(long, value_name = "DIR")]
+    pub plan: PathBuf,
+    /// Folder for the merged result
+    #[arg(short, long, value_name = "DIR")]
+    pub output: PathBuf,
+    /// Replace a folder that is there
+    #[arg(long)]
+    pub force: bool,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct GcArgs {
+    /// The plan's folder
+    #[arg(long, value_name = "DIR")]
+    pub plan: PathBuf,
+    /// Remove unfinished folders of shards that are not done, too, where nothing has happened for so many hours
+    #[arg(long, value_name = "HOURS", default_value_t = 24.0, value_parser = super::parse_positive)]
+    pub idle: f64,
+    /// Also what was put aside: broken results, and those that differ from the one that is there
+    #[arg(long)]
+    pub all: bool,
+    /// Only say what would be removed
+    #[arg(short = 'n', long)]
+    pub dry_run: bool,
+}
+
+fn parse_span(text: &str) -> Result<FrameSpan, String> {
+    let wrong = || format!("expected FIRST..END such as 0..240, or a number of frames, found \"{text}\"");
+    let number = |t: &str| t.parse::<u32>().map_err(|_| wrong());
+    let span = match text.split_once("..") {
+        Some((first, end)) => FrameSpan { first: number(first)?, end: number(end)? },
+        None => FrameSpan { first: 0, end: number(text)? },
+    };
+    if span.first < span.end { Ok(span) } else { Err(format!("{}: there is no frame in it", wrong())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans() {
+        assert_eq!(parse_span("3..10"), Ok(FrameSpan { first: 3, end: 10 }));
+        assert_eq!(parse_span("240"), Ok(FrameSpan { first: 0, end: 240 }));
+        for wrong in ["", "0", "5..5", "7..2", "a..3", "1..", "-1..3", "1..99999999999", "1...3"] {
+            assert!(parse_span(wrong).is_err(), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! `nimbus farm …`.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use super::args::{
+    FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, LocalArgs, MergeArgs, PlanArgs, RunArgs, StatusArgs,
+};
+use super::output;
+use crate::error::{Error, Result};
+use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
+use crate::farm::pool::Pool;
+use crate::farm::run::{How, Outcome};
+use crate::farm::status::{State, Status, status};
+use crate::farm::{gc, merge, run as shard_run};
+use crate::frame::stage::DeviceChoice;
+use crate::io::scene_file;
+
+/// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where `graceful` says that something is kept.
+pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+    graceful.store(matches!(args.command, FarmCommand::Run(_) | FarmCommand::Local(_)), Ordering::Relaxed);
+    match &args.command {
+        FarmCommand::Plan(a) => plan(a),
+        FarmCommand::Run(a) => shard(a, stop),
+        FarmCommand::Local(a) => local(a, stop),
+        FarmCommand::Status(a) => print_status(a),
+        FarmCommand::Merge(a) => merged(a),
+        FarmCommand::Gc(a) => clear(a),
+    }
+}
+
+fn plan(args: &PlanArgs) -> Result<()> {
+    let mut set = args.set.clone();
+    if let Some((width, height)) = args.size {
+        set.extend([format!("film.width={width}"), format!("film.height={height}")]);
+    }
+    let loaded = scene_file::load(&args.scene, &set, args.seed)?;
+    for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
+        eprintln!("warning: {warning}");
+    }
+    let of_scene = if loaded.phases.is_empty() {
+        loaded.scene.time.n_frames
+    } else {
+        loaded.phases.iter().map(|phase| phase.n_frames).fold(0, u32::saturating_add)
+    };
+    let FrameSpan { first, end } = args.frames.unwrap_or(FrameSpan { first: 0, end: of_scene });
+    let n = end - first;
+    let format = match args.format {
+        FormatArg::Png => PictureFormat::Png,
+        FormatArg::Exr => PictureFormat::Exr,
+    };
+    let whole = (0..n / args.shard_frames).map(|_| args.shard_frames);
+    let sizes: Vec<u32> = whole.chain((n % args.shard_frames > 0).then_some(n % args.shard_frames)).collect();
+    let plan = Plan::new(Wish {
+        scene: args.scene.clone(),
+        set,
+        seed: args.seed,
+        shaders: args.shaders.clone(),
+        work: Work::Frames { first, n, format },
+        sizes,
+    })?;
+    plan.write(&args.output)?;
+    if args.json {
+        return output::object(&plan);
+    }
+    let (n_shards, folder) = (plan.shards.len(), args.output.display());
+    output::text(&format!(
+        "{n} frames in {n_shards} shards\n\
+         all of them here:    nimbus farm local --plan {folder}\n\
+         one, by an engine:   nimbus farm run --plan {folder} --shard I     (I from 0 to {})\n",
+        n_shards - 1
+    ))
+}
+
+fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
+    let n_items = Plan::read(&args.plan)?.shard(args.shard)?.n;
+    let bar = output::progress(u64::from(n_items), "frames", args.quiet);
+    let choice = DeviceChoice { device: args.device.clone(), validation: args.validation, ..DeviceChoice::default() };
+    let how = How { choice: &choice, stop, on_item: &|| bar.inc(1) };
+    let outcome = shard_run::run(&args.plan, args.shard, &how);
+    bar.finish_and_clear();
+    let said = match outcome? {
+        Outcome::Skipped => "was done before".to_owned(),
+        Outcome::Beaten => "was done meanwhile, with the same result".to_owned(),
+        Outcome::Done { seconds, n_resumed: 0 } => format!("done in {seconds:.1} s"),
+        Outcome::Done { seconds, n_resumed } => {
+            format!("done in {seconds:.1} s; {n_resumed} of {n_items} frames were there from an attempt before")
+        }
+    };
+    if args.quiet { Ok(()) } else { output::text(&format!("shard {}: {said}\n", args.shard)) }
+}
+
+fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
+    let plan = Plan::read(&args.plan)?;
+    // What every shard would say is said once.
+    plan.scene_as_planned()?;
+    let found = status(&args.plan, &plan)?;
+    let open: Vec<usize> = found.shards.iter().filter(|s| s.state != State::Done).map(|s| s.index).collect();
+    let program = std::env::current_exe().map_err(|cause| Error::io(Path::new("nimbus"), cause))?;
+    let mut arguments: Vec<String> = ["farm", "run", "--quiet", "--plan"].map(str::to_owned).to_vec();
+    arguments.push(args.plan.display().to_string());
+    if let Some(device) = &args.device {
+        arguments.extend(["--device".to_owned(), device.clone()]);
+    }
+    arguments.push("--shard".to_owned());
+    let pool = Pool { program: &program, arguments, n_processes: args.jobs as usize, n_tries: args.tries as usize };
+    let bar = output::progress(open.len() as u64, "shards", args.quiet);
+    let ended = pool.run(&open, stop, &mut |_| bar.inc(1));
+    bar.finish_and_clear();
+    let failed: Vec<String> = ended?.iter().filter(|e| e.exit_code != Some(0)).map(|e| e.index.to_string()).collect();
+    let (n, n_open) = (plan.shards.len(), open.len());
+    if !failed.is_empty() {
+        let what = format!("{} of {n} shards are not done: {}", failed.len(), failed.join(", "));
+        return Err(Error::Check { what: format!("{what}; nimbus farm status --plan {}", args.plan.display()) });
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    output::text(&format!("{n} shards are done, {n_open} of them now\n"))
+}
+
+fn print_status(args: &StatusArgs) -> Result<()> {
+    let plan = Plan::read(&args.plan)?;
+    let found = status(&args.plan, &plan)?;
+    if args.json {
+        return output::object(&found);
+    }
+    if args.missing {
+        return output::text(&format!("{}\n", found.missing()));
+    }
+    output::text(&table(&plan, &found))
+}
+
+/// A row a shard that is not done or was hard to do, and a line for all.
+fn table(plan: &Plan, found: &Status) -> String {
+    let (n, n_done) = (found.shards.len(), found.n_done);
+    let seconds: f64 = found.shards.iter().filter_map(|s| s.seconds).sum();
+    let mut text = format!("{n_done} of {n} shards are done, in {seconds:.1} s of runs\n");
+    let is_told = |s: &&crate::farm::status::ShardStatus| {
+        s.state != State::Done || s.n_attempts > 1 || s.n_unfinished > 0 || s.n_differing > 0
+    };
+    for s in found.shards.iter().filter(is_told) {
+        let range = plan.shards[s.index].items();
+        let attempts = format!("{} attempt{}", s.n_attempts, if s.n_attempts == 1 { "" } else { "s" });
+        let mut notes = vec![attempts];
+        notes.extend((s.n_unfinished > 0).then(|| format!("{} unfinished", s.n_unfinished)));
+        notes.extend((s.n_differing > 0).then(|| format!("{} that differ", s.n_differing)));
+        notes.extend(s.what.clone());
+        let name = s.state.name();
+        text += &format!("{:>6}  {name:9}  frames {}..{}  {}\n", s.index, range.start, range.end, notes.join("; "));
+    }
+    if n_done < n {
+        text += &format!("to do: {}\n", found.missing());
+    }
+    text
+}
+
+fn merged(args: &MergeArgs) -> Result<()> {
+    let plan = Plan::read(&args.plan)?;
+    let spinner = output::spinner("merging", false);
+    let n = merge::merge(&args.plan, &plan, &args.output, args.force)?;
+    drop(spinner);
+    output::text(&format!("{n} frames in {}\n", args.output.display()))
+}
+
+fn clear(args: &GcArgs) -> Result<()> {
+    let plan = Plan::read(&args.plan)?;
+    let idle = Duration::from_secs_f64(args.idle.min(1e9) * 3600.0);
+    let removed = gc::gc(&args.plan, &plan, idle, args.all, args.dry_run)?;
+    let bytes: u64 = removed.iter().map(|r| r.bytes).sum();
+    let mut text: String = removed.iter().map(|r| format!("{}\n", r.path.display())).collect();
+    let verb = if args.dry_run { "would be removed" } else { "removed" };
+    text += &format!("{} folders, {:.1} MiB, {verb}\n", removed.len(), bytes as f64 / (1u64 << 20) as f64);
+    output::text(&text)
+}

@@ -1,0 +1,137 @@
+//! What was tried, where, and how it ended: a line an event, a file a node, so that no two machines write one file. Engines
+//! keep such a record as well, but a node that dies leaves none there.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::failing::of_io;
+use super::synced;
+use crate::error::Result;
+use crate::study::machine;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Attempt {
+    /// UTC, ISO 8601.
+    pub date: String,
+    pub index: usize,
+    pub key: String,
+    pub node: String,
+    pub pid: u32,
+    /// The engine's name for it, where one runs it.
+    pub job: Option<String>,
+    pub event: Event,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum Event {
+    Begun,
+    /// There was a verified result.
+    Skipped,
+    Done {
+        seconds: f64,
+        /// Files that an attempt before had finished.
+        n_resumed: usize,
+    },
+    /// Somebody else's result, with the same content, was there first.
+    Beaten {
+        seconds: f64,
+    },
+    Failed {
+        seconds: f64,
+        exit_code: u8,
+        what: String,
+    },
+    /// A result under the right name was not what it says: what was wrong with it, and where it was put.
+    PutAside {
+        what: String,
+        to: String,
+    },
+}
+
+/// Who writes.
+#[derive(Debug, Clone)]
+pub struct Log {
+    file: PathBuf,
+    pub node: String,
+    pub pid: u32,
+    job: Option<String>,
+}
+
+impl Log {
+    /// In a plan's folder, of this process.
+    pub fn open(folder: &Path) -> Result<Log> {
+        let folder = folder.join("attempts");
+        synced::make_folder(&folder)?;
+        let node = node();
+        let file = folder.join(format!("{node}.jsonl"));
+        Ok(Log { file, node, pid: std::process::id(), job: job() })
+    }
+
+    pub fn say(&self, index: usize, key: &str, event: Event) -> Result<()> {
+        let Log { node, pid, job, .. } = self.clone();
+        let attempt = Attempt { date: machine::utc_now(), index, key: key.to_owned(), node, pid, job, event };
+        let line = serde_json::to_string(&attempt).unwrap_or_default();
+        synced::append(&self.file, &line)
+    }
+}
+
+/// All attempts of a plan, in the order of their dates. A line that was cut off by whatever ended its writer is left out.
+pub fn read(folder: &Path) -> Result<Vec<Attempt>> {
+    let folder = folder.join("attempts");
+    let Ok(entries) = fs::read_dir(&folder) else { return Ok(Vec::new()) };
+    let mut all: Vec<Attempt> = Vec::new();
+    for entry in entries {
+        let path = entry.map_err(|cause| of_io(&folder, &cause))?.path();
+        let text = fs::read(&path).map_err(|cause| of_io(&path, &cause))?;
+        all.extend(String::from_utf8_lossy(&text).lines().filter_map(|line| serde_json::from_str(line).ok()));
+    }
+    all.sort_by(|a, b| a.date.cmp(&b.date));
+    Ok(all)
+}
+
+/// This machine, as its engine names it, or as it does itself; fit for a file's name.
+fn node() -> String {
+    let named = ["SLURMD_NODENAME", "HOSTNAME"].iter().find_map(|name| std::env::var(name).ok());
+    let name = named.or_else(|| fs::read_to_string("/proc/sys/kernel/hostname").ok()).unwrap_or_default();
+    let fit = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '-' };
+    let name: String = name.trim().chars().map(fit).collect();
+    if name.is_empty() { "node".to_owned() } else { name }
+}
+
+/// Slurm's name for what runs here; the restart tells a requeued job from the one before.
+fn job() -> Option<String> {
+    let of = |name| std::env::var(name).ok();
+    let id = match (of("SLURM_ARRAY_JOB_ID"), of("SLURM_ARRAY_TASK_ID")) {
+        (Some(job), Some(task)) => format!("{job}_{task}"),
+        _ => of("SLURM_JOB_ID")?,
+    };
+    Some(of("SLURM_RESTART_COUNT").map_or(id.clone(), |restart| format!("{id} restart {restart}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn events_are_read_back_and_a_cut_line_is_left_out() {
+        let dir = tempfile::tempdir().unwrap();
+        assert!(read(dir.path()).unwrap().is_empty());
+        let log = Log::open(dir.path()).unwrap();
+        let events = [
+            Event::Begun,
+            Event::Failed { seconds: 1.5, exit_code: 75, what: "a \"disk\"\nis full".into() },
+            Event::Done { seconds: 2.0, n_resumed: 3 },
+        ];
+        for event in &events {
+            log.say(4, "abc", event.clone()).unwrap();
+        }
+        let text = fs::read_to_string(&log.file).unwrap();
+        fs::write(&log.file, &text[..text.len() - 20]).unwrap();
+        let found = read(dir.path()).unwrap();
+        assert_eq!(found.iter().map(|a| a.event.clone()).collect::<Vec<_>>(), events[..2]);
+        assert!(found.iter().all(|a| a.index == 4 && a.key == "abc" && a.pid == std::process::id()));
+    }
+}

@@ -1,0 +1,64 @@
+//! The work of shards of frames: what `nimbus render` draws of each, to the byte.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use super::plan::{PictureFormat, Plan, Shard, Work};
+use super::store::Workplace;
+use crate::error::{Error, Result};
+use crate::frame::stage::{Bed, DeviceChoice, Player};
+use crate::io::image::{ImageKind, encoded};
+use crate::io::scene_file::LoadedScene;
+use crate::model::scene::Scene;
+use crate::study::machine::{Device, device_record};
+
+/// Draws the frames of `shard` that are not there yet, and tells of each; which device did.
+pub fn draw(
+    (plan, shard, loaded): (&Plan, &Shard, &LoadedScene),
+    choice: &DeviceChoice,
+    workplace: &mut Workplace,
+    stop: &AtomicBool,
+    on_frame: &dyn Fn(),
+) -> Result<Device> {
+    let Work::Frames { format, .. } = plan.work;
+    let kind = match format {
+        PictureFormat::Png => ImageKind::Png,
+        PictureFormat::Exr => ImageKind::Exr,
+    };
+    let bed = Bed::open(choice)?;
+    let device = device_record(bed.device.info());
+    let mut playing: Option<(Arc<Scene>, Player)> = None;
+    for i_frame in shard.items() {
+        let name = plan.output(i_frame);
+        if !workplace.has(&name) {
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
+            let (scene, player) = match playing.take() {
+                // Without phases it is one scene throughout.
+                Some((scene, player)) if loaded.phases.is_empty() || *scene == scene_at(loaded, i_frame) => {
+                    playing.insert((scene, player))
+                }
+                before => {
+                    // What the last phase had on the device makes room first.
+                    drop(before);
+                    let scene = Arc::new(scene_at(loaded, i_frame));
+                    playing.insert((scene.clone(), bed.player(scene, true)?))
+                }
+            };
+            let packet = player.game.step(i_frame)?;
+            player.renderer.step(packet)?;
+            let (rgba, film) = (player.renderer.image()?, scene.film);
+            workplace.add(&name, &encoded(kind, &film, film.width, film.height, &rgba)?)?;
+        }
+        on_frame();
+    }
+    drop(playing);
+    bed.close()?;
+    Ok(device)
+}
+
+/// As a frame has it. What "auto" takes may differ from one node to the next, and so would the pictures.
+fn scene_at(loaded: &LoadedScene, i_frame: u32) -> Scene {
+    loaded.clone().at_frame(i_frame).exact().into_owned()
+}

@@ -1,0 +1,368 @@
+//! `plan.json`: what there is to do, cut into shards, each with a key that names its result.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use sha2::{Digest, Sha256};
+
+use super::synced;
+use crate::error::{Error, Result};
+use crate::frame::stage::DeviceChoice;
+use crate::io::scene_file::{self, LoadedScene};
+use crate::io::text_file::{RECORD_LIMIT, read_result};
+use crate::model::scene::Impostors;
+use crate::study::machine;
+
+pub const SCHEMA_VERSION: u32 = 1;
+pub const PLAN_FILE: &str = "plan.json";
+/// Of a key's hex digits: 128 bits, so that no two of 10⁹ shards have the same by chance (10¹⁸/2¹²⁹ = 10⁻²¹).
+const KEY_DIGITS: usize = 32;
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    pub schema: u32,
+    pub nimbus: String,
+    pub revision: String,
+    /// Digest of the sources that were built. What another build makes is another result.
+    pub code: String,
+    /// UTC, ISO 8601.
+    pub date: String,
+    pub command: Vec<String>,
+    pub scene: SceneSource,
+    pub work: Work,
+    pub shards: Vec<Shard>,
+}
+
+/// What is drawn, and by which shaders.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSource {
+    /// Absolute: every node has to see it there.
+    pub file: PathBuf,
+    /// `key=value`, as `--set` has it.
+    pub set: Vec<String>,
+    pub seed: Option<u32>,
+    /// SHA-256 of the resolved scene and of the files that it names.
+    pub hash: String,
+    /// Folder of shaders in place of the built-in ones.
+    pub shaders: Option<PathBuf>,
+    /// SHA-256 of all shaders.
+    pub shaders_hash: String,
+}
+
+/// What is made of the scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Work {
+    /// Pictures of frames `first` … `first + n − 1`.
+    Frames { first: u32, n: u32, format: PictureFormat },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PictureFormat {
+    Png,
+    Exr,
+}
+
+impl PictureFormat {
+    pub fn extension(self) -> &'static str {
+        match self {
+            PictureFormat::Png => "png",
+            PictureFormat::Exr => "exr",
+        }
+    }
+}
+
+/// A part that is done at once, by one run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Shard {
+    pub index: usize,
+    /// Hash of all that its result follows from; names the result's folder.
+    pub key: String,
+    /// Its part of the work: frames from `first`.
+    pub first: u32,
+    pub n: u32,
+}
+
+impl Shard {
+    pub fn items(&self) -> std::ops::Range<u32> {
+        self.first..self.first + self.n
+    }
+}
+
+/// What a plan is made from.
+#[derive(Debug, Clone)]
+pub struct Wish {
+    pub scene: PathBuf,
+    pub set: Vec<String>,
+    pub seed: Option<u32>,
+    pub shaders: Option<PathBuf>,
+    pub work: Work,
+    /// Items of a shard, in the work's order: frames. Their sum is the work's.
+    pub sizes: Vec<u32>,
+}
+
+impl Plan {
+    /// Of what is wished for, by this build, as the files are now.
+    pub fn new(wish: Wish) -> Result<Plan> {
+        let absolute = |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
+        let Wish { scene, set, seed, shaders, work, sizes } = wish;
+        let mut source = SceneSource {
+            file: absolute(&scene)?,
+            set,
+            seed,
+            hash: String::new(),
+            shaders: shaders.as_deref().map(absolute).transpose()?,
+            shaders_hash: String::new(),
+        };
+        let loaded = source.load()?;
+        check(&loaded, &work)?;
+        source.hash = loaded.hash;
+        source.shaders_hash = source.hash_shaders()?;
+        let mut plan = Plan {
+            schema: SCHEMA_VERSION,
+            nimbus: env!("CARGO_PKG_VERSION").into(),
+            revision: machine::revision().into(),
+            code: env!("NIMBUS_CODE").into(),
+            date: machine::utc_now(),
+            command: std::env::args().collect(),
+            scene: source,
+            work,
+            shards: Vec::new(),
+        };
+        let Work::Frames { mut first, .. } = plan.work;
+        for (index, n) in sizes.into_iter().enumerate() {
+            let key = plan.key(first, n);
+            plan.shards.push(Shard { index, key, first, n });
+            first += n;
+        }
+        Ok(plan)
+    }
+
+    /// Of a shard's part: whatever changes the result changes it.
+    fn key(&self, first: u32, n: u32) -> String {
+        let SceneSource { hash, shaders_hash, .. } = &self.scene;
+        let Work::Frames { format, .. } = self.work;
+        let of = json!({
+            "schema": SCHEMA_VERSION, "scene": hash, "shaders": shaders_hash, "code": self.code,
+            "kind": "frames", "first": first, "n": n, "format": format.extension(),
+        });
+        let mut key = format!("{:x}", Sha256::digest(of.to_string()));
+        key.truncate(KEY_DIGITS);
+        key
+    }
+
+    /// Names of the files that `shard` makes, in their order.
+    pub fn outputs(&self, shard: &Shard) -> Vec<String> {
+        shard.items().map(|i| self.output(i)).collect()
+    }
+
+    /// Of one item. Names sort as the items do.
+    pub fn output(&self, i: u32) -> String {
+        let Work::Frames { format, .. } = self.work;
+        format!("frame-{i:08}.{}", format.extension())
+    }
+
+    pub fn shard(&self, index: usize) -> Result<&Shard> {
+        self.shards.get(index).ok_or_else(|| {
+            Error::usage(format!("shard {index}: this plan has {}, expected 0 to {}", self.shards.len(), self.last()))
+        })
+    }
+
+    fn last(&self) -> usize {
+        self.shards.len().saturating_sub(1)
+    }
+
+    /// The scene, if it is still what was planned and this is the build that planned it.
+    pub fn scene_as_planned(&self) -> Result<LoadedScene> {
+        let stale = |what: String| Err(Error::usage(format!("the plan of {} is stale: {what}; plan again", self.date)));
+        let code = env!("NIMBUS_CODE");
+        if self.code != code {
+            let (theirs, ours) = (&self.revision, machine::revision());
+            return stale(format!(
+                "it was made by another build of nimbus ({theirs}, code {}; this is {ours}, code {code})",
+                self.code
+            ));
+        }
+        let loaded = self.scene.load()?;
+        let file = self.scene.file.display();
+        if loaded.hash != self.scene.hash {
+            return stale(format!("{file} or a file that it names has changed since"));
+        }
+        if self.scene.hash_shaders()? != self.scene.shaders_hash {
+            return stale("the shaders have changed since".to_owned());
+        }
+        Ok(loaded)
+    }
+
+    /// Reads and checks `plan.json` in `folder`.
+    pub fn read(folder: &Path) -> Result<Plan> {
+        let path = folder.join(PLAN_FILE);
+        let text = read_result(&path, RECORD_LIMIT)?;
+        let wrong = |cause: &dyn std::fmt::Display| Error::io(&path, format!("not a plan of nimbus: {cause}"));
+        let value: serde_json::Value = serde_json::from_str(&text).map_err(|cause| wrong(&cause))?;
+        match value.get("schema").and_then(serde_json::Value::as_u64) {
+            Some(version) if version == u64::from(SCHEMA_VERSION) => {}
+            Some(version) => {
+                let what = format!("a plan of schema {version}; this nimbus reads {SCHEMA_VERSION}");
+                return Err(Error::io(&path, what));
+            }
+            None => return Err(wrong(&"it names no schema version")),
+        }
+        let plan: Plan = serde_json::from_value(value).map_err(|cause| wrong(&cause))?;
+        plan.check_shards().map_err(|what| wrong(&what))?;
+        Ok(plan)
+    }
+
+    /// That shards are what their keys say, and together the whole work.
+    fn check_shards(&self) -> std::result::Result<(), String> {
+        let Work::Frames { first, n, .. } = self.work;
+        let mut next = u64::from(first);
+        for (i, shard) in self.shards.iter().enumerate() {
+            if shard.index != i || u64::from(shard.first) != next || shard.n == 0 {
+                return Err(format!("shard {i} does not begin where the one before it ends"));
+            }
+            next += u64::from(shard.n);
+            if next > u64::from(u32::MAX) || shard.key != self.key(shard.first, shard.n) {
+                return Err(format!("shard {i} is not what its key says"));
+            }
+        }
+        let end = u64::from(first) + u64::from(n);
+        if next == end { Ok(()) } else { Err(format!("its shards end at frame {next}, its work at {end}")) }
+    }
+
+    /// Writes it into `folder`, which is made where it is not there; refuses to replace another plan's.
+    pub fn write(&self, folder: &Path) -> Result<()> {
+        let path = folder.join(PLAN_FILE);
+        if path.symlink_metadata().is_ok() {
+            return Err(Error::io(&path, "exists; a plan is not replaced: name another folder, or remove this one"));
+        }
+        synced::make_folder(folder)?;
+        let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(&path, cause))?;
+        synced::write(&path, format!("{text}\n").as_bytes())
+    }
+}
+
+/// Whether a plan of frames makes files of this name.
+pub fn is_output(name: &str) -> bool {
+    let number = name.strip_prefix("frame-").and_then(|rest| rest.strip_suffix(".png").or(rest.strip_suffix(".exr")));
+    number.is_some_and(|digits| digits.len() >= 8 && digits.bytes().all(|b| b.is_ascii_digit()))
+}
+
+impl SceneSource {
+    fn load(&self) -> Result<LoadedScene> {
+        scene_file::load(&self.file, &self.set, self.seed)
+    }
+
+    fn hash_shaders(&self) -> Result<String> {
+        let choice = DeviceChoice { shaders: self.shaders.clone(), ..DeviceChoice::default() };
+        choice.sources().map(|sources| sources.hash())
+    }
+}
+
+/// Refuses what cannot be cut: a frame has to follow from its number alone.
+fn check(loaded: &LoadedScene, work: &Work) -> Result<()> {
+    let Work::Frames { first, n, .. } = *work;
+    if n == 0 || first.checked_add(n).is_none() {
+        return Err(Error::usage(format!(
+            "--frames: expected at least one, up to {}, found {n} from {first}",
+            u32::MAX
+        )));
+    }
+    let phases = loaded.phases.iter().map(|phase| &phase.scene);
+    if std::iter::once(&loaded.scene).chain(phases).any(|scene| scene.draw.exact().impostors != Impostors::Off) {
+        let what = "a frame with impostors shows what earlier frames have drawn, and no shard has those";
+        return Err(Error::usage(format!("{what}: expected draw.impostors = \"off\" (--set draw.impostors=off)")));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wish(sizes: &[u32]) -> Wish {
+        let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
+        let work = Work::Frames { first: 3, n: sizes.iter().sum(), format: PictureFormat::Png };
+        Wish { scene, set: vec![], seed: None, shaders: None, work, sizes: sizes.to_vec() }
+    }
+
+    #[test]
+    fn keys_follow_from_all_that_a_result_follows_from() {
+        let plan = Plan::new(wish(&[4, 4])).unwrap();
+        let again = Plan::new(wish(&[4, 4])).unwrap();
+        assert_eq!(plan.shards, again.shards);
+        assert_eq!(plan.shards[1].items(), 7..11);
+        assert_eq!(plan.outputs(&plan.shards[0])[0], "frame-00000003.png");
+        let key = |plan: &Plan| plan.shards[0].key.clone();
+        let mut others = vec![key(&plan), plan.shards[1].key.clone()];
+        others.push(key(&Plan::new(wish(&[3, 5])).unwrap()));
+        others.push(key(&Plan::new(Wish { seed: Some(9), ..wish(&[4, 4]) }).unwrap()));
+        others.push(key(&Plan::new(Wish { set: vec!["film.width=64".into()], ..wish(&[4, 4]) }).unwrap()));
+        let exr = Work::Frames { first: 3, n: 8, format: PictureFormat::Exr };
+        others.push(key(&Plan::new(Wish { work: exr, ..wish(&[4, 4]) }).unwrap()));
+        let (mut built, mut shaded) = (plan.clone(), plan.clone());
+        built.code = "0123".into();
+        shaded.scene.shaders_hash = "4567".into();
+        others.extend([built.key(3, 4), shaded.key(3, 4)]);
+        let n = others.len();
+        others.sort();
+        others.dedup();
+        assert_eq!(others.len(), n);
+        assert!(others.iter().all(|key| key.len() == KEY_DIGITS));
+    }
+
+    #[test]
+    fn what_is_read_is_what_was_planned_and_what_was_changed_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("farm");
+        let plan = Plan::new(wish(&[4, 4, 2])).unwrap();
+        plan.write(&folder).unwrap();
+        assert_eq!(Plan::read(&folder).unwrap(), plan);
+        assert!(plan.write(&folder).unwrap_err().to_string().contains("is not replaced"));
+        let path = folder.join(PLAN_FILE);
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (from, to, expected) in [
+            ("\"schema\": 1", "\"schema\": 2", "schema 2"),
+            ("\"n\": 2", "\"n\": 3", "key"),
+            ("\"first\": 7", "\"first\": 8", "begin"),
+            ("\"n\": 10", "\"n\": 11", "end at frame 13"),
+            ("\"work\"", "\"wrok\"", "wrok"),
+            ("{", "", "not a plan"),
+        ] {
+            assert!(text.contains(from), "{from}");
+            std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+            let said = Plan::read(&folder).unwrap_err().to_string();
+            assert!(said.contains(expected), "{said}");
+        }
+    }
+
+    #[test]
+    fn another_build_and_a_changed_scene_are_stale() {
+        let dir = tempfile::tempdir().unwrap();
+        let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+        for name in ["hello.toml", "hello.csv"] {
+            std::fs::copy(scenes.join(name), dir.path().join(name)).unwrap();
+        }
+        let mut plan = Plan::new(Wish { scene: dir.path().join("hello.toml"), ..wish(&[1]) }).unwrap();
+        plan.scene_as_planned().unwrap();
+        let list = dir.path().join("hello.csv");
+        let text = std::fs::read_to_string(&list).unwrap();
+        let last = text.trim_end().rfind('\n').unwrap();
+        std::fs::write(&list, &text[..=last]).unwrap();
+        assert!(plan.scene_as_planned().unwrap_err().to_string().contains("has changed since"));
+        plan.code = "0".into();
+        assert!(plan.scene_as_planned().unwrap_err().to_string().contains("another build"));
+    }
+
+    #[test]
+    fn frames_that_need_others_are_refused() {
+        let set = vec!["draw.impostors=\"on\"".to_owned()];
+        let said = Plan::new(Wish { set, ..wish(&[1]) }).unwrap_err().to_string();
+        assert!(said.contains("draw.impostors"), "{said}");
+    }
+}

@@ -1,0 +1,117 @@
+//! One shard, from whatever is there of it to its verified result.
+
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+use super::attempts::{Event, Log};
+use super::failing::may_pass;
+use super::frames;
+use super::plan::{Plan, Shard};
+use super::store::{Manifest, Placed, SCHEMA_VERSION, Standing, Store};
+use crate::error::{Error, Result};
+use crate::frame::stage::DeviceChoice;
+use crate::study::machine;
+
+/// How a shard came to be there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Outcome {
+    /// It was there.
+    Skipped,
+    Done {
+        seconds: f64,
+        n_resumed: usize,
+    },
+    /// Another run put the same there while this one worked.
+    Beaten,
+}
+
+/// On which device, until when, and who is told of every item.
+pub struct How<'a> {
+    /// But for the shaders, which are the plan's.
+    pub choice: &'a DeviceChoice,
+    pub stop: &'a AtomicBool,
+    pub on_item: &'a dyn Fn(),
+}
+
+/// Does shard `index` of the plan in `folder`, unless it is done. Errors have the exit code that engines are told: 75 where another try
+/// may go well, 70 where the result contradicts one that is there.
+pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
+    let plan = Plan::read(folder)?;
+    let shard = plan.shard(index)?;
+    let log = Log::open(folder)?;
+    let store = Store::open(folder);
+    let begin = Instant::now();
+    let attempt = Attempt { plan: &plan, shard, store: &store, log: &log, how };
+    let ended = attempt.run(begin).or_else(|error| {
+        // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away what we worked in.
+        match store.standing(&plan, shard) {
+            Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
+            _ => Err(may_pass(error)),
+        }
+    });
+    let seconds = begin.elapsed().as_secs_f64();
+    let event = match &ended {
+        Ok(Outcome::Skipped) => Event::Skipped,
+        Ok(Outcome::Done { seconds, n_resumed }) => Event::Done { seconds: *seconds, n_resumed: *n_resumed },
+        Ok(Outcome::Beaten) => Event::Beaten { seconds },
+        Err(error) => Event::Failed { seconds, exit_code: error.exit_code(), what: error.to_string() },
+    };
+    // On a full disk nothing can be written down either, and why the shard failed says more.
+    let logged = log.say(index, &shard.key, event);
+    let outcome = ended?;
+    logged?;
+    Ok(outcome)
+}
+
+struct Attempt<'a> {
+    plan: &'a Plan,
+    shard: &'a Shard,
+    store: &'a Store,
+    log: &'a Log,
+    how: &'a How<'a>,
+}
+
+impl Attempt<'_> {
+    fn run(&self, begin: Instant) -> Result<Outcome> {
+        let Attempt { plan, shard, store, log, .. } = self;
+        // A stale plan is refused even where its results are there: they are not of what the files say now.
+        let loaded = plan.scene_as_planned()?;
+        let who = format!("{}.{}", log.node, log.pid);
+        match store.standing(plan, shard) {
+            Standing::Verified(_) => return Ok(Outcome::Skipped),
+            Standing::Missing => {}
+            Standing::Broken(what) => {
+                if let Some(to) = store.put_aside(&shard.key, &who)? {
+                    log.say(shard.index, &shard.key, Event::PutAside { what, to: to.display().to_string() })?;
+                }
+            }
+        }
+        let begun = machine::utc_now();
+        log.say(shard.index, &shard.key, Event::Begun)?;
+        let mut workplace = store.begin(plan, shard, &who)?;
+        let choice = DeviceChoice { shaders: plan.scene.shaders.clone(), ..self.how.choice.clone() };
+        let of = (*plan, *shard, &loaded);
+        let device = frames::draw(of, &choice, &mut workplace, self.how.stop, self.how.on_item)?;
+        let (seconds, n_resumed) = (begin.elapsed().as_secs_f64(), workplace.n_resumed);
+        let manifest = Manifest {
+            schema: SCHEMA_VERSION,
+            key: shard.key.clone(),
+            index: shard.index,
+            files: Vec::new(),
+            node: log.node.clone(),
+            pid: log.pid,
+            device,
+            cpu: machine::cpu(),
+            environment: machine::environment(),
+            begun,
+            seconds,
+            n_resumed,
+        };
+        workplace.finish(manifest, plan, shard)?;
+        match store.put(workplace, plan, shard, &who)? {
+            Placed::First => Ok(Outcome::Done { seconds, n_resumed }),
+            Placed::Same => Ok(Outcome::Beaten),
+        }
+    }
+}

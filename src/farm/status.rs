@@ -1,0 +1,149 @@
+//! What is done, what is not, and what was tried.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::attempts::{self, Attempt, Event};
+use super::plan::Plan;
+use super::store::{Other, Standing, Store};
+use crate::error::Result;
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Status {
+    pub shards: Vec<ShardStatus>,
+    /// Of `shards`, done.
+    pub n_done: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ShardStatus {
+    pub index: usize,
+    pub key: String,
+    pub state: State,
+    /// What is wrong with it, or how its last attempt failed.
+    pub what: Option<String>,
+    /// Of the run that did it.
+    pub seconds: Option<f64>,
+    pub node: Option<String>,
+    pub device: Option<String>,
+    /// Runs that began to work on it.
+    pub n_attempts: usize,
+    /// Folders of attempts that go on, or were ended.
+    pub n_unfinished: usize,
+    /// Whole results that contradict the one that is there.
+    pub n_differing: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum State {
+    /// Its result is whole.
+    Done,
+    /// Something lies under its name that is no result.
+    Broken,
+    /// The last attempt failed in a way that may pass.
+    Transient,
+    /// It failed for good.
+    Failed,
+    /// Somebody works on it, or did when it was ended.
+    Begun,
+    /// Nobody did.
+    Open,
+}
+
+impl State {
+    pub fn name(self) -> &'static str {
+        match self {
+            State::Done => "done",
+            State::Broken => "broken",
+            State::Transient => "transient",
+            State::Failed => "failed",
+            State::Begun => "begun",
+            State::Open => "open",
+        }
+    }
+}
+
+/// Of the plan in `folder`; reads every result.
+pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
+    let (store, attempts) = (Store::open(folder), attempts::read(folder)?);
+    let of = |shard| {
+        let standing = store.standing(plan, shard);
+        let of_shard: Vec<&Attempt> = attempts.iter().filter(|attempt| attempt.key == shard.key).collect();
+        let n_unfinished = store.others(&shard.key, Other::Unfinished).len();
+        let (state, what) = state(&standing, &of_shard);
+        let manifest = if let Standing::Verified(manifest) = standing { Some(manifest) } else { None };
+        ShardStatus {
+            index: shard.index,
+            key: shard.key.clone(),
+            state,
+            what,
+            seconds: manifest.as_ref().map(|m| m.seconds),
+            node: manifest.as_ref().map(|m| m.node.clone()),
+            device: manifest.map(|m| m.device.name.clone()),
+            n_attempts: of_shard.iter().filter(|attempt| attempt.event == Event::Begun).count(),
+            n_unfinished,
+            n_differing: store.others(&shard.key, Other::Differing).len(),
+        }
+    };
+    let shards: Vec<ShardStatus> = plan.shards.iter().map(of).collect();
+    let n_done = shards.iter().filter(|shard| shard.state == State::Done).count();
+    Ok(Status { shards, n_done })
+}
+
+fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) {
+    match (standing, attempts.last().map(|attempt| &attempt.event)) {
+        (Standing::Verified(_), _) => (State::Done, None),
+        (Standing::Broken(what), _) => (State::Broken, Some(what.clone())),
+        (_, Some(Event::Failed { exit_code, what, .. })) => {
+            let state = if *exit_code == 75 { State::Transient } else { State::Failed };
+            (state, Some(what.clone()))
+        }
+        (_, Some(_)) => (State::Begun, None),
+        (_, None) => (State::Open, None),
+    }
+}
+
+impl Status {
+    /// Indices that are not done, as Slurm's `--array` takes them: "0,3-5".
+    pub fn missing(&self) -> String {
+        let indices = self.shards.iter().filter(|s| s.state != State::Done).map(|s| s.index);
+        let mut runs: Vec<[usize; 2]> = Vec::new();
+        for i in indices {
+            match runs.last_mut() {
+                Some([_, last]) if *last + 1 == i => *last = i,
+                _ => runs.push([i, i]),
+            }
+        }
+        let text = |[first, last]: &[usize; 2]| {
+            if first == last { first.to_string() } else { format!("{first}-{last}") }
+        };
+        runs.iter().map(text).collect::<Vec<_>>().join(",")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_named_as_engines_take_it() {
+        let shard = |index, state| ShardStatus {
+            index,
+            key: String::new(),
+            state,
+            what: None,
+            seconds: None,
+            node: None,
+            device: None,
+            n_attempts: 0,
+            n_unfinished: 0,
+            n_differing: 0,
+        };
+        let states = [State::Open, State::Done, State::Failed, State::Broken, State::Begun, State::Done, State::Open];
+        let shards: Vec<ShardStatus> = states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();
+        assert_eq!(Status { shards, n_done: 2 }.missing(), "0,2-4,6");
+        assert_eq!(Status { shards: vec![shard(0, State::Done)], n_done: 1 }.missing(), "");
+    }
+}

@@ -1,0 +1,325 @@
+//! What is done: `shards/KEY`, a folder with a shard's files and `shard.json`, which says what is in them. A folder appears
+//! under its key at once and whole, by a rename; until then it is `KEY.tmp.NODE.PID`, where whoever tries next finds the files
+//! that were finished.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::failing::of_io;
+use super::plan::{Plan, Shard};
+use super::synced;
+use crate::error::{Error, Result};
+use crate::study::machine::{Cpu, Device};
+
+pub const MANIFEST_FILE: &str = "shard.json";
+/// In a folder that is not finished: a [`FileRecord`] a line, of each file that is.
+const DONE_FILE: &str = "done.jsonl";
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// `shard.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    pub schema: u32,
+    pub key: String,
+    pub index: usize,
+    /// In the order of the plan.
+    pub files: Vec<FileRecord>,
+    pub node: String,
+    pub pid: u32,
+    pub device: Device,
+    pub cpu: Cpu,
+    pub environment: BTreeMap<String, String>,
+    /// UTC, ISO 8601, of the attempt that finished it.
+    pub begun: String,
+    /// That attempt's, from its beginning to its last file.
+    pub seconds: f64,
+    /// Files that attempts before it had finished.
+    pub n_resumed: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileRecord {
+    pub name: String,
+    pub bytes: u64,
+    /// Hex.
+    pub sha256: String,
+}
+
+impl FileRecord {
+    fn of(name: &str, bytes: &[u8]) -> FileRecord {
+        FileRecord { name: name.to_owned(), bytes: bytes.len() as u64, sha256: format!("{:x}", Sha256::digest(bytes)) }
+    }
+
+    /// What is wrong with the file of this name in `folder`.
+    pub fn check(&self, folder: &Path) -> std::result::Result<(), String> {
+        let FileRecord { name, bytes, sha256 } = self;
+        // The length first: what was cut off need not be read.
+        let about = fs::symlink_metadata(folder.join(name)).map_err(|cause| format!("{name}: {cause}"))?;
+        if !about.is_file() || about.len() != *bytes {
+            return Err(format!("{name} has {} bytes, {MANIFEST_FILE} says {bytes}", about.len()));
+        }
+        let content = fs::read(folder.join(name)).map_err(|cause| format!("{name}: {cause}"))?;
+        if FileRecord::of(name, &content) != *self {
+            return Err(format!(
+                "{name} is not what {MANIFEST_FILE} says: its SHA-256 begins otherwise than {}",
+                &sha256[..8.min(sha256.len())]
+            ));
+        }
+        Ok(())
+    }
+}
+
+/// What lies under a shard's key.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Standing {
+    Missing,
+    /// Every file is there, and is what was written.
+    Verified(Box<Manifest>),
+    /// What is wrong with it.
+    Broken(String),
+}
+
+/// How a result found its place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Placed {
+    First,
+    /// The same was there already.
+    Same,
+}
+
+#[derive(Debug, Clone)]
+pub struct Store {
+    folder: PathBuf,
+}
+
+impl Store {
+    /// Of the plan in `folder`.
+    pub fn open(folder: &Path) -> Store {
+        Store { folder: folder.join("shards") }
+    }
+
+    pub fn place(&self, key: &str) -> PathBuf {
+        self.folder.join(key)
+    }
+
+    /// Reads every byte of it.
+    pub fn standing(&self, plan: &Plan, shard: &Shard) -> Standing {
+        let place = self.place(&shard.key);
+        match fs::symlink_metadata(&place) {
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Standing::Missing,
+            Err(cause) => return Standing::Broken(cause.to_string()),
+            Ok(_) => {}
+        }
+        verify(&place, plan, shard).map_or_else(Standing::Broken, |manifest| Standing::Verified(Box::new(manifest)))
+    }
+
+    /// Unfinished folders of a key, and those that were put aside.
+    pub fn others(&self, key: &str, kind: Other) -> Vec<PathBuf> {
+        let begin = format!("{key}.{}.", kind.name());
+        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
+        let mut found: Vec<PathBuf> =
+            entries.filter(|e| e.file_name().to_string_lossy().starts_with(&begin)).map(|e| e.path()).collect();
+        found.sort();
+        found
+    }
+
+    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone.
+    pub fn put_aside(&self, key: &str, who: &str) -> Result<Option<PathBuf>> {
+        let place = self.place(key);
+        let to = self.free(key, Other::Bad, who);
+        match fs::rename(&place, &to) {
+            Ok(()) => Ok(Some(to)),
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(None),
+            Err(cause) => Err(of_io(&place, &cause)),
+        }
+    }
+
+    /// A name that nobody has.
+    fn free(&self, key: &str, kind: Other, who: &str) -> PathBuf {
+        let base = format!("{key}.{}.{who}", kind.name());
+        let numbered = (1..).map(|k| self.folder.join(format!("{base}.{k}")));
+        let mut names = std::iter::once(self.folder.join(&base)).chain(numbered);
+        names.find(|path| path.symlink_metadata().is_err()).unwrap_or_else(|| self.folder.join(base))
+    }
+
+    /// A folder to work in, with what attempts before finished of `shard`.
+    pub fn begin(&self, plan: &Plan, shard: &Shard, who: &str) -> Result<Workplace> {
+        synced::make_folder(&self.folder)?;
+        let path = self.free(&shard.key, Other::Unfinished, who);
+        fs::create_dir(&path).map_err(|cause| of_io(&path, &cause))?;
+        let mut workplace = Workplace { path, files: BTreeMap::new(), n_resumed: 0 };
+        let outputs = plan.outputs(shard);
+        for other in self.others(&shard.key, Other::Unfinished) {
+            workplace.adopt(&other, &outputs)?;
+        }
+        workplace.n_resumed = workplace.files.len();
+        Ok(workplace)
+    }
+
+    /// Moves a finished folder under its key. What is there already stays, if it is whole: the same is as good, and another is
+    /// a contradiction (exit code 70), which is kept beside it.
+    pub fn put(&self, workplace: Workplace, plan: &Plan, shard: &Shard, who: &str) -> Result<Placed> {
+        // Whoever puts something broken aside makes room for one more try; a few of them may meet.
+        const TRIES: usize = 16;
+        let place = self.place(&shard.key);
+        for _ in 0..TRIES {
+            match fs::rename(&workplace.path, &place) {
+                Ok(()) => {
+                    synced::folder(&self.folder)?;
+                    return Ok(Placed::First);
+                }
+                Err(cause) if is_taken(&cause) => {}
+                Err(cause) => return Err(of_io(&place, &cause)),
+            }
+            match self.standing(plan, shard) {
+                Standing::Missing => {}
+                Standing::Broken(_) => {
+                    self.put_aside(&shard.key, who)?;
+                }
+                Standing::Verified(theirs) if theirs.files == workplace.records(plan, shard) => {
+                    let _ = fs::remove_dir_all(&workplace.path);
+                    return Ok(Placed::Same);
+                }
+                Standing::Verified(theirs) => return Err(self.contradiction(workplace, &theirs, plan, shard, who)),
+            }
+        }
+        Err(Error::Transient { what: format!("{}: others keep putting results there", place.display()) })
+    }
+
+    fn contradiction(&self, ours: Workplace, theirs: &Manifest, plan: &Plan, shard: &Shard, who: &str) -> Error {
+        let kept = self.free(&shard.key, Other::Differing, who);
+        let kept = if fs::rename(&ours.path, &kept).is_ok() { kept } else { ours.path.clone() };
+        let ours = ours.records(plan, shard);
+        let differing: Vec<&str> =
+            ours.iter().zip(&theirs.files).filter(|(a, b)| a != b).map(|(a, _)| a.name.as_str()).collect();
+        Error::Conflict {
+            what: format!(
+                "shard {}: {} made another result before (on {}, process {}): {} of {} files differ, {} the first; what was made \
+                 here is kept in {}. Two devices or drivers in one farm do that: `nimbus farm status --json` names them",
+                shard.index,
+                theirs.node,
+                theirs.device.name,
+                theirs.pid,
+                differing.len(),
+                ours.len(),
+                differing.first().unwrap_or(&"none"),
+                kept.display()
+            ),
+        }
+    }
+}
+
+/// Folders beside the results.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Other {
+    /// An attempt's that goes on, or was ended.
+    Unfinished,
+    /// Under the right name, with the wrong content.
+    Bad,
+    /// Whole, and not what somebody else made.
+    Differing,
+}
+
+impl Other {
+    pub const ALL: [Other; 3] = [Other::Unfinished, Other::Bad, Other::Differing];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Other::Unfinished => "tmp",
+            Other::Bad => "bad",
+            Other::Differing => "differs",
+        }
+    }
+}
+
+/// EEXIST, ENOTEMPTY, and ENOTDIR where something else lies there.
+fn is_taken(cause: &io::Error) -> bool {
+    use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotADirectory};
+    matches!(cause.kind(), AlreadyExists | DirectoryNotEmpty | NotADirectory)
+}
+
+/// That `folder` is a whole result of `shard`; else what is wrong.
+fn verify(folder: &Path, plan: &Plan, shard: &Shard) -> std::result::Result<Manifest, String> {
+    let text = fs::read(folder.join(MANIFEST_FILE)).map_err(|cause| format!("{MANIFEST_FILE}: {cause}"))?;
+    let manifest: Manifest = serde_json::from_slice(&text).map_err(|cause| format!("{MANIFEST_FILE}: {cause}"))?;
+    if manifest.schema != SCHEMA_VERSION {
+        return Err(format!("{MANIFEST_FILE} is of schema {}, expected {SCHEMA_VERSION}", manifest.schema));
+    }
+    if (&manifest.key, manifest.index) != (&shard.key, shard.index) {
+        return Err(format!("{MANIFEST_FILE} is of shard {}, key {}", manifest.index, manifest.key));
+    }
+    if !manifest.files.iter().map(|file| &file.name).eq(&plan.outputs(shard)) {
+        return Err(format!("{MANIFEST_FILE} names other files than the plan"));
+    }
+    manifest.files.iter().try_for_each(|file| file.check(folder))?;
+    Ok(manifest)
+}
+
+/// Where an attempt works.
+#[derive(Debug)]
+pub struct Workplace {
+    path: PathBuf,
+    /// What is finished, by name.
+    files: BTreeMap<String, FileRecord>,
+    pub n_resumed: usize,
+}
+
+impl Workplace {
+    pub fn has(&self, name: &str) -> bool {
+        self.files.contains_key(name)
+    }
+
+    /// Writes a file, for good: who goes on after us takes it over.
+    pub fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        synced::write(&self.path.join(name), bytes)?;
+        self.record(FileRecord::of(name, bytes))
+    }
+
+    fn record(&mut self, record: FileRecord) -> Result<()> {
+        let line = serde_json::to_string(&record).map_err(|cause| Error::io(&self.path, cause))?;
+        synced::append(&self.path.join(DONE_FILE), &line)?;
+        self.files.insert(record.name.clone(), record);
+        Ok(())
+    }
+
+    /// Takes over what another attempt finished: it may go on itself, what it has finished it does not change.
+    fn adopt(&mut self, other: &Path, outputs: &[String]) -> Result<()> {
+        // None, or one that is moved away meanwhile.
+        let Ok(text) = fs::read(other.join(DONE_FILE)) else { return Ok(()) };
+        for line in String::from_utf8_lossy(&text).lines() {
+            let Ok(record) = serde_json::from_str::<FileRecord>(line) else { continue };
+            if !outputs.contains(&record.name) || self.has(&record.name) || record.check(other).is_err() {
+                continue;
+            }
+            let (from, to) = (other.join(&record.name), self.path.join(&record.name));
+            // Nobody writes into a finished file, so that one file may be in both; a copy where that cannot be.
+            if fs::hard_link(&from, &to).is_ok() || fs::copy(&from, &to).is_ok() && record.check(&self.path).is_ok() {
+                self.record(record)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn records(&self, plan: &Plan, shard: &Shard) -> Vec<FileRecord> {
+        plan.outputs(shard).iter().filter_map(|name| self.files.get(name).cloned()).collect()
+    }
+
+    /// Writes `shard.json`: all files are there.
+    pub fn finish(&self, manifest: Manifest, plan: &Plan, shard: &Shard) -> Result<()> {
+        let manifest = Manifest { files: self.records(plan, shard), ..manifest };
+        let path = self.path.join(MANIFEST_FILE);
+        let text = serde_json::to_string_pretty(&manifest).map_err(|cause| Error::io(&path, cause))?;
+        synced::write(&path, format!("{text}\n").as_bytes())?;
+        let done = self.path.join(DONE_FILE);
+        // Not there where a shard has no files.
+        let _ = fs::remove_file(&done);
+        synced::folder(&self.path)
+    }
+}

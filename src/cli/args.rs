@@ -14,7 +14,8 @@ use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
 pub use farm::{
-    FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, LocalArgs, MergeArgs, PlanArgs, RunArgs, StatusArgs,
+    EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, JobArgs, LocalArgs, MergeArgs, PlanArgs,
+    RunArgs, StatusArgs, SubmitArg, SubmitArgs,
 };
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use stress::StressArgs;

@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::args::{
     FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, LocalArgs, MergeArgs, PlanArgs, RunArgs, StatusArgs,
 };
-use super::output;
+use super::{farm_jobs, output};
 use crate::error::{Error, Result};
 use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
 use crate::farm::pool::Pool;
@@ -27,6 +27,8 @@ pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<
         FarmCommand::Status(a) => print_status(a),
         FarmCommand::Merge(a) => merged(a),
         FarmCommand::Gc(a) => clear(a),
+        FarmCommand::Emit(a) => farm_jobs::emit(a),
+        FarmCommand::Submit(a) => farm_jobs::submit(a),
     }
 }
 
@@ -96,7 +98,7 @@ fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
     // What every shard would say is said once.
     plan.scene_as_planned()?;
     let found = status(&args.plan, &plan)?;
-    let open: Vec<usize> = found.shards.iter().filter(|s| s.state != State::Done).map(|s| s.index).collect();
+    let open = found.open();
     let program = std::env::current_exe().map_err(|cause| Error::io(Path::new("nimbus"), cause))?;
     let mut arguments: Vec<String> = ["farm", "run", "--quiet", "--plan"].map(str::to_owned).to_vec();
     arguments.push(args.plan.display().to_string());
@@ -146,6 +148,7 @@ fn table(plan: &Plan, found: &Status) -> String {
         let mut notes = vec![attempts];
         notes.extend((s.n_unfinished > 0).then(|| format!("{} unfinished", s.n_unfinished)));
         notes.extend((s.n_differing > 0).then(|| format!("{} that differ", s.n_differing)));
+        notes.extend(s.engine.clone());
         notes.extend(s.what.clone());
         let name = s.state.name();
         text += &format!("{:>6}  {name:9}  frames {}..{}  {}\n", s.index, range.start, range.end, notes.join("; "));

@@ -11,6 +11,7 @@ mod devices;
 #[cfg(feature = "window")]
 mod edit;
 mod farm;
+mod farm_jobs;
 mod inspect;
 mod ledger;
 mod output;

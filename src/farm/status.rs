@@ -5,7 +5,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::attempts::{self, Attempt, Event};
-use super::plan::Plan;
+use super::plan::{Plan, Shard};
+use super::slurm;
 use super::store::{Other, Standing, Store};
 use crate::error::Result;
 
@@ -33,6 +34,8 @@ pub struct ShardStatus {
     pub n_unfinished: usize,
     /// Whole results that contradict the one that is there.
     pub n_differing: usize,
+    /// What the engine that it was submitted to does with it now.
+    pub engine: Option<String>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -68,7 +71,8 @@ impl State {
 /// Of the plan in `folder`; reads every result.
 pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     let (store, attempts) = (Store::open(folder), attempts::read(folder)?);
-    let of = |shard| {
+    let mut engine = slurm::states(&slurm::submitted(folder));
+    let of = |shard: &Shard| {
         let standing = store.standing(plan, shard);
         let of_shard: Vec<&Attempt> = attempts.iter().filter(|attempt| attempt.key == shard.key).collect();
         let n_unfinished = store.others(&shard.key, Other::Unfinished).len();
@@ -85,6 +89,7 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
             n_attempts: of_shard.iter().filter(|attempt| attempt.event == Event::Begun).count(),
             n_unfinished,
             n_differing: store.others(&shard.key, Other::Differing).len(),
+            engine: engine.remove(&shard.index),
         }
     };
     let shards: Vec<ShardStatus> = plan.shards.iter().map(of).collect();
@@ -108,19 +113,23 @@ fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) 
 impl Status {
     /// Indices that are not done, as Slurm's `--array` takes them: "0,3-5".
     pub fn missing(&self) -> String {
-        let indices = self.shards.iter().filter(|s| s.state != State::Done).map(|s| s.index);
-        let mut runs: Vec<[usize; 2]> = Vec::new();
-        for i in indices {
-            match runs.last_mut() {
-                Some([_, last]) if *last + 1 == i => *last = i,
-                _ => runs.push([i, i]),
-            }
-        }
-        let text = |[first, last]: &[usize; 2]| {
-            if first == last { first.to_string() } else { format!("{first}-{last}") }
-        };
-        runs.iter().map(text).collect::<Vec<_>>().join(",")
+        ranges(&self.open())
     }
+
+    /// The same as numbers.
+    pub fn open(&self) -> Vec<usize> {
+        self.shards.iter().filter(|s| s.state != State::Done).map(|s| s.index).collect()
+    }
+}
+
+/// Ascending numbers as engines take them: "0,3-5".
+pub fn ranges(indices: &[usize]) -> String {
+    let runs = indices.chunk_by(|a, b| a + 1 == *b).map(|run| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        [one] => one.to_string(),
+        [] => String::new(),
+    });
+    runs.collect::<Vec<_>>().join(",")
 }
 
 #[cfg(test)]
@@ -140,6 +149,7 @@ mod tests {
             n_attempts: 0,
             n_unfinished: 0,
             n_differing: 0,
+            engine: None,
         };
         let states = [State::Open, State::Done, State::Failed, State::Broken, State::Begun, State::Done, State::Open];
         let shards: Vec<ShardStatus> = states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();

@@ -34,6 +34,10 @@ pub enum FarmCommand {
     Merge(MergeArgs),
     /// Remove what attempts have left behind
     Gc(GcArgs),
+    /// Write job files for an engine: a task for every shard that is not done, and the merge after them
+    Emit(EmitArgs),
+    /// Hand all shards that are not done to an engine, and the merge after them; prints its ids, and `status` follows them
+    Submit(SubmitArgs),
 }
 
 #[derive(Debug, ClapArgs)]
@@ -165,6 +169,61 @@ pub struct GcArgs {
     /// Only say what would be removed
     #[arg(short = 'n', long)]
     pub dry_run: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EngineArg {
+    /// shard.sh, an array's task, and merge.sh
+    Slurm,
+    /// shard.sh and submit.sh
+    Hyperqueue,
+    /// template.json, a job template of Open Job Description
+    Openjd,
+    /// local.sh: the pool of one machine, then the merge
+    Local,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SubmitArg {
+    Slurm,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct JobArgs {
+    /// The plan's folder
+    #[arg(long, value_name = "DIR")]
+    pub plan: PathBuf,
+    /// Folder for the merged result [default: "merged" in the plan's folder]
+    #[arg(short, long, value_name = "DIR")]
+    pub output: Option<PathBuf>,
+    /// So often a shard is tried that fails in a way that may pass
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
+    pub tries: u32,
+    /// An option for sbatch, e.g. --sbatch=--gres=gpu:1 (repeatable)
+    #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
+    pub sbatch: Vec<String>,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct EmitArgs {
+    #[arg(value_enum)]
+    pub engine: EngineArg,
+    /// Folder for the files [default: the engine's name in the plan's folder]
+    #[arg(long, value_name = "DIR")]
+    pub files: Option<PathBuf>,
+    #[command(flatten)]
+    pub job: JobArgs,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct SubmitArgs {
+    #[arg(value_enum)]
+    pub engine: SubmitArg,
+    /// Print the ids as JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub job: JobArgs,
 }
 
 fn parse_span(text: &str) -> Result<FrameSpan, String> {

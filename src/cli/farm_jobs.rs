@@ -1,0 +1,95 @@
+//! `nimbus farm emit` and `submit`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::args::{EmitArgs, EngineArg, JobArgs, SubmitArg, SubmitArgs};
+use super::output;
+use crate::error::{Error, Result};
+use crate::farm::emit::{Job, JobFile};
+use crate::farm::plan::Plan;
+use crate::farm::slurm;
+use crate::farm::status::{ranges, status};
+use crate::farm::synced;
+
+pub fn emit(args: &EmitArgs) -> Result<()> {
+    let (name, hint) = match args.engine {
+        EngineArg::Slurm => {
+            ("slurm", "J=$(sbatch --parsable --array=INDICES shard.sh); sbatch --dependency=afterok:$J merge.sh")
+        }
+        EngineArg::Hyperqueue => ("hyperqueue", "bash submit.sh"),
+        EngineArg::Openjd => ("openjd", "openjd run template.json, or any engine that takes such"),
+        EngineArg::Local => ("local", "bash local.sh"),
+    };
+    let files = args.files.clone().unwrap_or_else(|| args.job.plan.join(name));
+    let (written, indices) = write(&args.job, &files, args.engine)?;
+    let hint = hint.replace("INDICES", &ranges(&indices));
+    output::text(&format!("{} in {}: {hint}\n", written.join(", "), files.display()))
+}
+
+pub fn submit(args: &SubmitArgs) -> Result<()> {
+    let SubmitArg::Slurm = args.engine;
+    let plan = absolute(&args.job.plan)?;
+    let files = plan.join("slurm");
+    // What every shard would say is said once.
+    Plan::read(&plan)?.scene_as_planned()?;
+    let (_, indices) = write(&args.job, &files, EngineArg::Slurm)?;
+    if indices.is_empty() {
+        return output::text("all shards are done, nothing was submitted\n");
+    }
+    let submitted = slurm::submit(&plan, &files, &indices)?;
+    if args.json {
+        return output::object(&submitted);
+    }
+    let mut text = String::new();
+    for array in &submitted.arrays {
+        text += &format!("job {}: shards {}\n", array.job, array.shards);
+    }
+    let folder = args.job.plan.display();
+    text +=
+        &format!("job {}: the merge, after them\nfollow them: nimbus farm status --plan {folder}\n", submitted.merge);
+    output::text(&text)
+}
+
+/// Writes the engine's files for what is not done: their names, and what that is.
+fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<(Vec<&'static str>, Vec<usize>)> {
+    let folder = absolute(&args.plan)?;
+    let plan = Plan::read(&folder)?;
+    let indices = status(&folder, &plan)?.open();
+    let program = std::env::current_exe().map_err(|cause| Error::io(Path::new("nimbus"), cause))?;
+    let merged = args.output.as_deref().map_or_else(|| Ok(folder.join("merged")), absolute)?;
+    let job = Job {
+        program: &program,
+        plan: &folder,
+        merged: &merged,
+        indices: &indices,
+        n_tries: args.tries,
+        options: &args.sbatch,
+    };
+    let made: Vec<JobFile> = match engine {
+        EngineArg::Slurm => job.slurm(),
+        EngineArg::Hyperqueue => job.hyperqueue(),
+        EngineArg::Openjd => job.openjd(),
+        EngineArg::Local => job.local(),
+    };
+    synced::make_folder(files)?;
+    // Slurm makes none for its logs, and a job without one fails without a word.
+    synced::make_folder(&folder.join("logs"))?;
+    for (name, text, is_run) in &made {
+        let path = files.join(name);
+        synced::write(&path, text.as_bytes())?;
+        if *is_run {
+            make_runnable(&path)?;
+        }
+    }
+    Ok((made.iter().map(|(name, ..)| *name).collect(), indices))
+}
+
+fn make_runnable(path: &Path) -> Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).map_err(|cause| Error::io(path, cause))
+}
+
+fn absolute(path: &Path) -> Result<PathBuf> {
+    std::path::absolute(path).map_err(|cause| Error::io(path, cause))
+}

@@ -66,8 +66,8 @@ struct Cuts {
 
 impl Cuts {
     fn new(item_s: &[f64], setup_s: f64, shortest_s: f64, longest_s: f64) -> Cuts {
-        // max takes the number where one is none.
-        let counted = |seconds: f64| seconds.max(0.0).min(LONGEST_ITEM_S);
+        // What is not a number is not above 0.
+        let counted = |seconds: f64| if seconds > 0.0 { seconds.min(LONGEST_ITEM_S) } else { 0.0 };
         let mut before_s = vec![0.0];
         let mut sum = 0.0;
         for seconds in item_s {

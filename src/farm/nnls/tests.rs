@@ -93,6 +93,33 @@ fn a_column_goes_out_again_by_hand() {
 }
 
 #[test]
+fn what_a_column_adds_is_seen_down_to_rounding() {
+    // The second column's gradient is 1e-10 of b's length; rounding makes 1e-14 at most.
+    let x = solve(&[vec![1.0, 0.0], vec![0.0, 1.0]], &[1.0, 1e-10]).unwrap();
+    assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] / 1e-10 - 1.0).abs() < 1e-9, "{x:?}");
+}
+
+#[test]
+fn the_distance_falls_with_every_column_that_enters() {
+    for (columns, b) in problems(6, 2000) {
+        let scaled: Vec<Scaled> = columns.iter().map(|column| Scaled::of(column)).collect();
+        let problem = Problem::new(&scaled, Scaled::of(&b).unit);
+        let unit: Vec<Vec<f64>> = scaled.iter().map(|column| column.unit.clone()).collect();
+        let distance = |x: &[f64]| length(&residual(&unit, &problem.b, x));
+        let (mut x, mut set) = (vec![0.0; columns.len()], 0);
+        // Far more than rounding, so that the fall is, too.
+        let enters = |x: &[f64], set: usize| {
+            let gradient = problem.gradient(x);
+            (0..columns.len()).find(|j| set >> j & 1 == 0 && gradient[*j] > 1e-4)
+        };
+        while let Some((next, next_set)) = enters(&x, set).and_then(|j| problem.enter(&x, set, j)) {
+            assert!(distance(&next) < distance(&x), "{} after {}", distance(&next), distance(&x));
+            (x, set) = (next, next_set);
+        }
+    }
+}
+
+#[test]
 fn everything_that_points_away_is_zero() {
     assert_eq!(solve(&[vec![1.0, 0.0], vec![1.0, 1.0]], &[-1.0, 0.0]), Ok(vec![0.0, 0.0]));
     assert_eq!(solve(&[vec![1.0, 2.0]], &[0.0, 0.0]), Ok(vec![0.0]));

@@ -66,11 +66,17 @@ fn a_long_item_is_alone() {
 
 #[test]
 fn no_shard_is_short_where_another_cut_avoids_it() {
-    // As long as can be from the left would be 4 + 4, 4 + 4, 4 | 1, the last one short; two and three are not.
+    // 4 + 4 is as long as can be, and leaves 1; all together are 9.
     assert_eq!(split(&[4.0, 4.0, 1.0], 0.0, 5.0, 9.0, 1), vec![0..3]);
+    // 4 + 4 + 4 would be too long. 4 + 4 and 4 + 1 do.
     assert_eq!(split(&[4.0, 4.0, 4.0, 1.0], 0.0, 5.0, 9.0, 1), vec![0..2, 2..4]);
-    // An even share would be 7: but 6 | 1 + 7, and not 6 + 1 | 7, reaches 7 where 8 is the longest … neither does.
     assert_eq!(split(&[6.0, 1.0, 7.0], 0.0, 7.0, 8.0, 1), vec![0..2, 2..3]);
+}
+
+#[test]
+fn there_are_no_more_shards_than_needed_where_an_even_cut_would_make_one() {
+    // 27 s in three are 9 each. 8.5 is nearer to it than 8.5 + 1.5, but then 1.5 + 9.5 are too long.
+    assert_eq!(split(&[8.5, 1.5, 9.5, 7.5], 0.0, 0.0, 10.0, 1), [0..2, 2..3, 3..4]);
 }
 
 #[test]

@@ -4,24 +4,23 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use super::args::{
-    FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, LocalArgs, MergeArgs, PlanArgs, RunArgs, StatusArgs,
-};
-use super::{farm_jobs, output};
+use super::args::{FarmArgs, FarmCommand, GcArgs, LocalArgs, MergeArgs, RunArgs, StatusArgs};
+use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
-use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
+use crate::farm::cost::Compared;
+use crate::farm::plan::Plan;
 use crate::farm::pool::Pool;
 use crate::farm::run::{How, Outcome};
 use crate::farm::status::{State, Status, status};
 use crate::farm::{gc, merge, run as shard_run};
 use crate::frame::stage::DeviceChoice;
-use crate::io::scene_file;
 
 /// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where `graceful` says that something is kept.
 pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
     graceful.store(matches!(args.command, FarmCommand::Run(_) | FarmCommand::Local(_)), Ordering::Relaxed);
     match &args.command {
-        FarmCommand::Plan(a) => plan(a),
+        FarmCommand::Plan(a) => farm_plan::plan(a),
+        FarmCommand::Calibrate(a) => farm_plan::calibrated(a, stop),
         FarmCommand::Run(a) => shard(a, stop),
         FarmCommand::Local(a) => local(a, stop),
         FarmCommand::Status(a) => print_status(a),
@@ -30,49 +29,6 @@ pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<
         FarmCommand::Emit(a) => farm_jobs::emit(a),
         FarmCommand::Submit(a) => farm_jobs::submit(a),
     }
-}
-
-fn plan(args: &PlanArgs) -> Result<()> {
-    let mut set = args.set.clone();
-    if let Some((width, height)) = args.size {
-        set.extend([format!("film.width={width}"), format!("film.height={height}")]);
-    }
-    let loaded = scene_file::load(&args.scene, &set, args.seed)?;
-    for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
-        eprintln!("warning: {warning}");
-    }
-    let of_scene = if loaded.phases.is_empty() {
-        loaded.scene.time.n_frames
-    } else {
-        loaded.phases.iter().map(|phase| phase.n_frames).fold(0, u32::saturating_add)
-    };
-    let FrameSpan { first, end } = args.frames.unwrap_or(FrameSpan { first: 0, end: of_scene });
-    let n = end - first;
-    let format = match args.format {
-        FormatArg::Png => PictureFormat::Png,
-        FormatArg::Exr => PictureFormat::Exr,
-    };
-    let whole = (0..n / args.shard_frames).map(|_| args.shard_frames);
-    let sizes: Vec<u32> = whole.chain((n % args.shard_frames > 0).then_some(n % args.shard_frames)).collect();
-    let plan = Plan::new(Wish {
-        scene: args.scene.clone(),
-        set,
-        seed: args.seed,
-        shaders: args.shaders.clone(),
-        work: Work::Frames { first, n, format },
-        sizes,
-    })?;
-    plan.write(&args.output)?;
-    if args.json {
-        return output::object(&plan);
-    }
-    let (n_shards, folder) = (plan.shards.len(), args.output.display());
-    output::text(&format!(
-        "{n} frames in {n_shards} shards\n\
-         all of them here:    nimbus farm local --plan {folder}\n\
-         one, by an engine:   nimbus farm run --plan {folder} --shard I     (I from 0 to {})\n",
-        n_shards - 1
-    ))
 }
 
 fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
@@ -142,6 +98,12 @@ fn table(plan: &Plan, found: &Status) -> String {
     let is_told = |s: &&crate::farm::status::ShardStatus| {
         s.state != State::Done || s.n_attempts > 1 || s.n_unfinished > 0 || s.n_differing > 0
     };
+    if let Some(Compared { n, median, p90, largest, .. }) = found.predicted {
+        let [median, p90, largest] = [median, p90, largest].map(|share| 100.0 * share);
+        text += &format!(
+            "predicted against taken, {n} shards: off by {median:.0} % (median), {p90:.0} % (p90), {largest:.0} % at most\n"
+        );
+    }
     for s in found.shards.iter().filter(is_told) {
         let range = plan.shards[s.index].items();
         let attempts = format!("{} attempt{}", s.n_attempts, if s.n_attempts == 1 { "" } else { "s" });

@@ -12,6 +12,7 @@ mod devices;
 mod edit;
 mod farm;
 mod farm_jobs;
+mod farm_plan;
 mod inspect;
 mod ledger;
 mod output;

@@ -86,6 +86,9 @@ pub struct Shard {
     /// Its part of the work: frames from `first`.
     pub first: u32,
     pub n: u32,
+    /// What it will take, where the plan was made with a cost model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_s: Option<f64>,
 }
 
 impl Shard {
@@ -104,13 +107,15 @@ pub struct Wish {
     pub work: Work,
     /// Items of a shard, in the work's order: frames. Their sum is the work's.
     pub sizes: Vec<u32>,
+    /// What each of those will take, s.
+    pub predicted_s: Option<Vec<f64>>,
 }
 
 impl Plan {
     /// Of what is wished for, by this build, as the files are now.
     pub fn new(wish: Wish) -> Result<Plan> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
-        let Wish { scene, set, seed, shaders, work, sizes } = wish;
+        let Wish { scene, set, seed, shaders, work, sizes, predicted_s } = wish;
         let mut source = SceneSource {
             file: absolute(&scene)?,
             set,
@@ -137,7 +142,8 @@ impl Plan {
         let Work::Frames { mut first, .. } = plan.work;
         for (index, n) in sizes.into_iter().enumerate() {
             let key = plan.key(first, n);
-            plan.shards.push(Shard { index, key, first, n });
+            let predicted_s = predicted_s.as_ref().and_then(|all| all.get(index).copied());
+            plan.shards.push(Shard { index, key, first, n, predicted_s });
             first += n;
         }
         Ok(plan)
@@ -288,7 +294,7 @@ mod tests {
     fn wish(sizes: &[u32]) -> Wish {
         let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
         let work = Work::Frames { first: 3, n: sizes.iter().sum(), format: PictureFormat::Png };
-        Wish { scene, set: vec![], seed: None, shaders: None, work, sizes: sizes.to_vec() }
+        Wish { scene, set: vec![], seed: None, shaders: None, work, sizes: sizes.to_vec(), predicted_s: None }
     }
 
     #[test]

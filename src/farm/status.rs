@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::attempts::{self, Attempt, Event};
+use super::cost::Compared;
 use super::plan::{Plan, Shard};
 use super::slurm;
 use super::store::{Other, Standing, Store};
@@ -15,6 +16,8 @@ pub struct Status {
     pub shards: Vec<ShardStatus>,
     /// Of `shards`, done.
     pub n_done: usize,
+    /// How far what was predicted is off from what it took, of shards that one run did from beginning to end.
+    pub predicted: Option<Compared>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,6 +29,8 @@ pub struct ShardStatus {
     pub what: Option<String>,
     /// Of the run that did it.
     pub seconds: Option<f64>,
+    /// What the plan said.
+    pub predicted_s: Option<f64>,
     pub node: Option<String>,
     pub device: Option<String>,
     /// Runs that began to work on it.
@@ -72,11 +77,17 @@ impl State {
 pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     let (store, attempts) = (Store::open(folder), attempts::read(folder)?);
     let mut engine = slurm::states(&slurm::submitted(folder));
+    let mut pairs = Vec::new();
     let of = |shard: &Shard| {
         let standing = store.standing(plan, shard);
         let of_shard: Vec<&Attempt> = attempts.iter().filter(|attempt| attempt.key == shard.key).collect();
         let n_unfinished = store.others(&shard.key, Other::Unfinished).len();
         let (state, what) = state(&standing, &of_shard);
+        if let (Standing::Verified(manifest), Some(predicted_s)) = (&standing, shard.predicted_s)
+            && manifest.n_resumed == 0
+        {
+            pairs.push((predicted_s, manifest.seconds));
+        }
         let manifest = if let Standing::Verified(manifest) = standing { Some(manifest) } else { None };
         ShardStatus {
             index: shard.index,
@@ -84,6 +95,7 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
             state,
             what,
             seconds: manifest.as_ref().map(|m| m.seconds),
+            predicted_s: shard.predicted_s,
             node: manifest.as_ref().map(|m| m.node.clone()),
             device: manifest.map(|m| m.device.name.clone()),
             n_attempts: of_shard.iter().filter(|attempt| attempt.event == Event::Begun).count(),
@@ -94,7 +106,7 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     };
     let shards: Vec<ShardStatus> = plan.shards.iter().map(of).collect();
     let n_done = shards.iter().filter(|shard| shard.state == State::Done).count();
-    Ok(Status { shards, n_done })
+    Ok(Status { shards, n_done, predicted: Compared::of(&pairs) })
 }
 
 fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) {
@@ -144,6 +156,7 @@ mod tests {
             state,
             what: None,
             seconds: None,
+            predicted_s: None,
             node: None,
             device: None,
             n_attempts: 0,
@@ -153,7 +166,7 @@ mod tests {
         };
         let states = [State::Open, State::Done, State::Failed, State::Broken, State::Begun, State::Done, State::Open];
         let shards: Vec<ShardStatus> = states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();
-        assert_eq!(Status { shards, n_done: 2 }.missing(), "0,2-4,6");
-        assert_eq!(Status { shards: vec![shard(0, State::Done)], n_done: 1 }.missing(), "");
+        assert_eq!(Status { shards, n_done: 2, predicted: None }.missing(), "0,2-4,6");
+        assert_eq!(Status { shards: vec![shard(0, State::Done)], n_done: 1, predicted: None }.missing(), "");
     }
 }

@@ -19,6 +19,12 @@ pub enum FarmCommand {
         nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
         nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames")]
     Plan(PlanArgs),
+    /// Time a few frames of scenes here and fit the cost model that plans are made with
+    ///
+    /// t = setup + a · particles · steps + b · pixels + c · facet pairs, by non-negative least squares of relative errors over runs of one
+    /// frame and of several at three sizes, each timed as a shard is. It is for this class of devices; scenes like those to come make
+    /// it good. What it is off by for runs that it has not seen is said (each left out in turn).
+    Calibrate(CalibrateArgs),
     /// Do one shard, unless it is done
     ///
     /// Exit codes: 0 done, by whomever; 75 it went wrong in a way that may pass (full disk, lost device, a signal): another try may go
@@ -50,9 +56,28 @@ pub struct PlanArgs {
     /// Frames: FIRST..END (END is not drawn) or how many from 0 [default: the scene's]
     #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
     pub frames: Option<FrameSpan>,
-    /// Frames of a shard. A run opens the device and fills its buffers once a shard: few make it slow, many lose more when it is killed
-    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..))]
-    pub shard_frames: u32,
+    /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few make it slow,
+    /// many lose more when it is killed
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shard_frames: Option<u32>,
+    /// What `nimbus farm calibrate` wrote: shards are cut to take 1 to 10 minutes, and what all of them will take and cost is said
+    #[arg(long, value_name = "FILE", help_heading = "Cost")]
+    pub model: Option<PathBuf>,
+    /// Nodes that are to share the work
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Cost")]
+    pub nodes: u32,
+    /// A shard's least and greatest length, seconds
+    #[arg(long, value_name = "LEAST,MOST", num_args = 2, value_delimiter = ',', default_values_t = [60.0, 600.0], help_heading = "Cost")]
+    pub shard_seconds: Vec<f64>,
+    /// What a node costs in every piece of time that it is paid for by, in any money
+    #[arg(long, value_name = "PRICE", requires = "model", help_heading = "Cost")]
+    pub rate: Option<f64>,
+    /// That piece, seconds: each is paid for whole
+    #[arg(long, value_name = "S", default_value_t = 3600.0, help_heading = "Cost")]
+    pub quantum: f64,
+    /// The share of attempts that fail and are repeated, from 0 to below 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.02, help_heading = "Cost")]
+    pub retries: f64,
     /// What a frame is written as
     #[arg(long, value_enum, default_value = "png")]
     pub format: FormatArg,
@@ -89,6 +114,34 @@ pub enum FormatArg {
     Png,
     /// Linear premultiplied RGBA
     Exr,
+}
+
+#[derive(Debug, ClapArgs)]
+pub struct CalibrateArgs {
+    /// Scene files
+    #[arg(required = true, value_name = "SCENE")]
+    pub scenes: Vec<PathBuf>,
+    /// File for the model
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+    /// Replace an existing file
+    #[arg(long)]
+    pub force: bool,
+    /// Frames of the longer runs
+    #[arg(long, value_name = "N", default_value_t = 12, value_parser = clap::value_parser!(u32).range(2..))]
+    pub frames: u32,
+    /// Set any key of the scenes (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Vec<String>,
+    /// Vulkan device, by index or part of its name
+    #[arg(long, value_name = "INDEX|NAME")]
+    pub device: Option<String>,
+    /// Print what was written
+    #[arg(long)]
+    pub json: bool,
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 #[derive(Debug, ClapArgs)]

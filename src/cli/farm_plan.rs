@@ -1,0 +1,175 @@
+//! `nimbus farm plan` and `calibrate`: what there is to do, and what it will take.
+
+use std::sync::atomic::AtomicBool;
+
+use super::args::{CalibrateArgs, FormatArg, FrameSpan, PlanArgs};
+use super::output;
+use crate::error::{Error, Result};
+use crate::farm::calibrate::{Calibration, calibrate, n_runs, work_of_frames};
+use crate::farm::pack::{Packing, Rate, pack, price, split};
+use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
+use crate::farm::run::How;
+use crate::frame::stage::DeviceChoice;
+use crate::io::atomic;
+use crate::io::scene_file::{self, LoadedScene};
+
+/// Frames of a shard where nothing is known of what they take.
+const USUAL_FRAMES: u32 = 16;
+
+pub fn plan(args: &PlanArgs) -> Result<()> {
+    let mut set = args.set.clone();
+    if let Some((width, height)) = args.size {
+        set.extend([format!("film.width={width}"), format!("film.height={height}")]);
+    }
+    let loaded = scene_file::load(&args.scene, &set, args.seed)?;
+    for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
+        eprintln!("warning: {warning}");
+    }
+    let FrameSpan { first, end } = args.frames.unwrap_or_else(|| whole(&loaded));
+    let n = end - first;
+    let format = match args.format {
+        FormatArg::Png => PictureFormat::Png,
+        FormatArg::Exr => PictureFormat::Exr,
+    };
+    let model = args.model.as_deref().map(Calibration::read).transpose()?;
+    let cut = match &model {
+        Some(model) => by_model(args, model, &loaded, first..end)?,
+        None => Cut { sizes: even(n, args.shard_frames.unwrap_or(USUAL_FRAMES)), predicted_s: None },
+    };
+    // What is to be said of the price is known to be right before anything is written.
+    let packing = cut.predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
+    let estimate = packing.map(|packing| estimate(args, &packing)).transpose()?;
+    let plan = Plan::new(Wish {
+        scene: args.scene.clone(),
+        set,
+        seed: args.seed,
+        shaders: args.shaders.clone(),
+        work: Work::Frames { first, n, format },
+        sizes: cut.sizes,
+        predicted_s: cut.predicted_s,
+    })?;
+    plan.write(&args.output)?;
+    if args.json {
+        return output::object(&plan);
+    }
+    let (n_shards, folder) = (plan.shards.len(), args.output.display());
+    output::text(&format!(
+        "{n} frames in {n_shards} shards\n{}\
+         all of them here:      nimbus farm local --plan {folder}\n\
+         by Slurm:              nimbus farm submit slurm --plan {folder}\n\
+         one, by any engine:    nimbus farm run --plan {folder} --shard I     (I from 0 to {})\n",
+        estimate.unwrap_or_default(),
+        n_shards - 1
+    ))
+}
+
+/// All frames of a scene, or of its phases.
+fn whole(loaded: &LoadedScene) -> FrameSpan {
+    let of_phases = loaded.phases.iter().map(|phase| phase.n_frames).fold(0, u32::saturating_add);
+    FrameSpan { first: 0, end: if loaded.phases.is_empty() { loaded.scene.time.n_frames } else { of_phases } }
+}
+
+struct Cut {
+    sizes: Vec<u32>,
+    predicted_s: Option<Vec<f64>>,
+}
+
+fn even(n: u32, each: u32) -> Vec<u32> {
+    let rest = n % each;
+    (0..n / each).map(|_| each).chain((rest > 0).then_some(rest)).collect()
+}
+
+fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, frames: std::ops::Range<u32>) -> Result<Cut> {
+    let seconds = |setups: f64, work: &_| {
+        let file = args.model.as_deref().unwrap_or(std::path::Path::new(""));
+        model.fit.model.seconds(setups, work).map_err(|what| Error::io(file, what))
+    };
+    let works = work_of_frames(loaded, frames.clone());
+    let item_s = works.iter().map(|work| seconds(0.0, work)).collect::<Result<Vec<f64>>>()?;
+    let setup_s = seconds(1.0, &Default::default())?;
+    let [least, most] = args.shard_seconds[..] else {
+        return Err(Error::usage("--shard-seconds: expected two numbers such as 60,600"));
+    };
+    if !(least >= 0.0 && most >= least && most.is_finite()) {
+        return Err(Error::usage(format!("--shard-seconds {least},{most}: expected 0 <= least <= most")));
+    }
+    let sizes: Vec<u32> = match args.shard_frames {
+        Some(each) => even(frames.end - frames.start, each),
+        None => split(&item_s, setup_s, least, most, args.nodes as usize).iter().map(|r| r.len() as u32).collect(),
+    };
+    let mut rest = &item_s[..];
+    let predicted = sizes.iter().map(|n| {
+        let (part, after) = rest.split_at(*n as usize);
+        rest = after;
+        setup_s + part.iter().sum::<f64>()
+    });
+    let predicted_s = Some(predicted.collect());
+    Ok(Cut { sizes, predicted_s })
+}
+
+/// What all of it takes and costs, in words.
+fn estimate(args: &PlanArgs, packing: &Packing) -> Result<String> {
+    let all_s: f64 = packing.node_seconds.iter().sum();
+    let mut text = format!(
+        "predicted: {} of runs; on {} nodes done after {}, {:.0} % of their time idle\n",
+        duration(all_s),
+        args.nodes,
+        duration(packing.makespan_s),
+        100.0 * packing.idle_share
+    );
+    if let Some(price_per_quantum) = args.rate {
+        let rate = Rate { quantum_s: args.quantum, price_per_quantum, retry_share: args.retries };
+        let price = price(packing, &rate).map_err(Error::usage)?;
+        text += &format!(
+            "price: {:.2} for {} pieces of {} s, and {:.2} for retries to be expected: {:.2}\n",
+            price.without_retries, price.quanta, args.quantum, price.retries, price.total
+        );
+    }
+    Ok(text)
+}
+
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{s:.1} s"),
+        s if s < 7200.0 => format!("{:.1} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
+pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
+    atomic::check_place(&args.output)?;
+    super::refuse_existing(&args.output, args.force)?;
+    let choice = DeviceChoice { device: args.device.clone(), ..DeviceChoice::default() };
+    let n_frames = n_runs(args.scenes.len()) as u64 * u64::from(args.frames + 1) / 2;
+    let bar = output::progress(n_frames, "frames", args.quiet);
+    let how = How { choice: &choice, stop, on_item: &|| bar.inc(1) };
+    let found = calibrate(&args.scenes, &args.set, args.frames, &how);
+    bar.finish_and_clear();
+    let found = found?;
+    found.write(&args.output)?;
+    if args.json {
+        return output::object(&found);
+    }
+    let (fit, percent) = (&found.fit, |share: f64| format!("{:.0} %", 100.0 * share));
+    let mut text = format!("{} ({}), {} runs\n", found.device.name, found.cpu.model, fit.n);
+    let model = fit.model;
+    for (name, each_s) in [
+        ("set-up", model.setup_s),
+        ("a particle and frame", model.particle_step_s),
+        ("a pixel and frame", model.pixel_sample_s),
+        ("a pair of facets and frame", model.facet_pair_s),
+    ] {
+        let each = each_s.map_or("not measured".to_owned(), |s| format!("{s:.3e} s"));
+        text += &format!("{name:>28}: {each}\n");
+    }
+    let left_out = fit.left_out_median.map_or(String::new(), |e| format!("; of runs left out in turn {}", percent(e)));
+    text += &format!(
+        "off by {} (median), {} at most{left_out}\n",
+        percent(fit.median_relative_error),
+        percent(fit.largest_relative_error)
+    );
+    for what in &fit.not_told_apart {
+        text += &format!("not told apart from the others: {what}\n");
+    }
+    output::text(&text)
+}

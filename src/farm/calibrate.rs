@@ -1,0 +1,169 @@
+//! What work takes on a class of devices: runs of a few frames at several sizes, timed from one end to the other as a shard is, and
+//! the cost model that is fitted to them.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::cost::{Fit, Timed, Work as Counted, fit};
+use super::plan::{self, PictureFormat, Plan, Wish};
+use super::run::{self, How};
+use super::store::{Standing, Store};
+use super::synced;
+use crate::error::{Error, Result};
+use crate::io::scene_file::{self, LoadedScene};
+use crate::io::text_file::{RECORD_LIMIT, read_result};
+use crate::model::scene::{LightingMode, Scene};
+use crate::study::machine::{self, Cpu, Device};
+
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// A calibration's file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Calibration {
+    pub schema: u32,
+    pub nimbus: String,
+    pub revision: String,
+    /// UTC, ISO 8601.
+    pub date: String,
+    /// The class: what this device and processor take is taken for all of it.
+    pub device: Device,
+    pub cpu: Cpu,
+    pub environment: BTreeMap<String, String>,
+    pub fit: Fit,
+    pub rows: Vec<Row>,
+}
+
+/// One run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Row {
+    pub scene: PathBuf,
+    pub width: u32,
+    pub height: u32,
+    pub frames: u32,
+    pub timed: Timed,
+}
+
+/// Sizes of the pictures, by the scene's own along each side: what grows with the pixels and what does not come apart.
+const SIZES: [f64; 3] = [0.5, 0.75, 1.0];
+
+/// What `frames` of a scene make work of, each.
+pub fn work_of(scene: &Scene) -> Counted {
+    let film = scene.film;
+    let n_facets = scene.n_facets() as f64;
+    let is_second = scene.lighting.mode == LightingMode::TwoReflection;
+    Counted {
+        particle_steps: scene.n_particles() as f64,
+        pixel_samples: f64::from(film.width) * f64::from(film.height),
+        facet_pairs: if is_second { n_facets * n_facets } else { 0.0 },
+    }
+}
+
+/// Frame by frame, of `frames`.
+pub fn work_of_frames(loaded: &LoadedScene, frames: std::ops::Range<u32>) -> Vec<Counted> {
+    if loaded.phases.is_empty() {
+        return vec![work_of(&loaded.scene); frames.len()];
+    }
+    frames.map(|i| work_of(&loaded.clone().at_frame(i))).collect()
+}
+
+/// How many runs [`calibrate`] makes of so many scenes.
+pub fn n_runs(n_scenes: usize) -> usize {
+    // One that is not counted: the first compiles shaders for all that follow.
+    1 + 2 * SIZES.len() * n_scenes
+}
+
+/// Runs every scene with one frame and with `frames`, at every size, and fits the model.
+pub fn calibrate(scenes: &[PathBuf], set: &[String], frames: u32, how: &How<'_>) -> Result<Calibration> {
+    let mut rows = Vec::new();
+    let mut device = None;
+    for scene in scenes {
+        let film = scene_file::load(scene, set, None)?.scene.film;
+        for share in SIZES {
+            let side = |n: u32| ((f64::from(n) * share).round() as u32).max(1);
+            let size = [side(film.width), side(film.height)];
+            for n in [1, frames] {
+                if rows.is_empty() && device.is_none() {
+                    device = Some(timed(scene, set, size, n, how)?.1);
+                }
+                rows.push(timed(scene, set, size, n, how)?.0);
+            }
+        }
+    }
+    let Some(device) = device else { return Err(Error::usage("no scene to calibrate by")) };
+    let all: Vec<Timed> = rows.iter().map(|row| row.timed).collect();
+    Ok(Calibration {
+        schema: SCHEMA_VERSION,
+        nimbus: env!("CARGO_PKG_VERSION").into(),
+        revision: machine::revision().into(),
+        date: machine::utc_now(),
+        device,
+        cpu: machine::cpu(),
+        environment: machine::environment(),
+        fit: fit(&all).map_err(Error::usage)?,
+        rows,
+    })
+}
+
+/// A shard of `n` frames, as any farm's, in a folder that goes with it.
+fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &How<'_>) -> Result<(Row, Device)> {
+    let folder = Folder::new()?;
+    let mut set = set.to_vec();
+    set.extend([format!("film.width={width}"), format!("film.height={height}")]);
+    let work = plan::Work::Frames { first: 0, n, format: PictureFormat::Png };
+    let wish =
+        Wish { scene: scene.to_owned(), set, seed: None, shaders: None, work, sizes: vec![n], predicted_s: None };
+    let plan = Plan::new(wish)?;
+    plan.write(&folder.0)?;
+    let loaded = plan.scene_as_planned()?;
+    let begin = Instant::now();
+    run::run(&folder.0, 0, how)?;
+    let seconds = begin.elapsed().as_secs_f64();
+    let work = work_of_frames(&loaded, 0..n).into_iter().fold(Counted::default(), |sum, of| sum + of);
+    let device = match Store::open(&folder.0).standing(&plan, &plan.shards[0]) {
+        Standing::Verified(manifest) => manifest.device,
+        other => return Err(Error::Fault { what: format!("a shard that was just done is not there: {other:?}") }),
+    };
+    let timed = Timed { setups: 1.0, work, seconds };
+    Ok((Row { scene: scene.to_owned(), width, height, frames: n, timed }, device))
+}
+
+/// A folder that is gone when it is dropped.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Result<Folder> {
+        let path = std::env::temp_dir().join(format!("nimbus-calibrate-{}", std::process::id()));
+        synced::make_folder(&path)?;
+        Ok(Folder(path))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What stays is in the system's folder for such.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+impl Calibration {
+    pub fn write(&self, path: &Path) -> Result<()> {
+        let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(path, cause))?;
+        synced::write(path, format!("{text}\n").as_bytes())
+    }
+
+    pub fn read(path: &Path) -> Result<Calibration> {
+        let wrong = |cause: &dyn std::fmt::Display| Error::io(path, format!("not a calibration of nimbus: {cause}"));
+        let read: Calibration =
+            serde_json::from_str(&read_result(path, RECORD_LIMIT)?).map_err(|cause| wrong(&cause))?;
+        if read.schema != SCHEMA_VERSION {
+            return Err(wrong(&format!("it is of schema {}, expected {SCHEMA_VERSION}", read.schema)));
+        }
+        read.fit.model.check().map_err(|what| wrong(&what))?;
+        Ok(read)
+    }
+}

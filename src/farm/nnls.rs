@@ -10,7 +10,7 @@ pub const MAX_COLUMNS: usize = 8;
 
 /// The constant c of Householder's QR with m rows and k columns: its solution is the exact one of a problem whose
 /// columns and b are changed by c m k ε/2 of their lengths (Higham 2002, theorem 20.3, who leaves c open as "a small
-/// integer"; his count of operations gives less than 4 for the inner products, the update and the reflector).
+/// integer"). 4 is a choice; the conditions of a minimum hold within it over thousands of random problems.
 const HOUSEHOLDER_CONSTANT: f64 = 4.0;
 
 /// x ≥ 0, one for every column, with ‖Σ xⱼ columnⱼ − b‖ least; its unit is b's over the column's. Where columns depend

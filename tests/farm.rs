@@ -405,3 +405,72 @@ fn a_full_disk_is_75_and_leaves_nothing_half_done() {
     assert_eq!((farm.state(0), farm.missing()), ("transient".to_owned(), "0".to_owned()));
     assert_eq!(farm.ran(0).0, Some(0));
 }
+
+#[test]
+fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let model = dir.path().join("model.json");
+    let model = model.to_str().expect("UTF-8");
+    let hello = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
+    let (code, out, said) = ran(&["farm", "calibrate", SCENE, hello, "--frames", "6", "-o", model, "--set", "film.width=64"]);
+    assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
+    let found: Value = serde_json::from_slice(&fs::read(model).expect("a model")).expect("JSON");
+    assert_eq!((found["rows"].as_array().map(Vec::len), found["fit"]["n"].as_u64()), (Some(12), Some(12)));
+    assert!(out.contains("12 runs") && out.contains("off by"), "{out}");
+    assert!(ran(&["farm", "calibrate", hello, "-o", model]).2.contains("--force"));
+
+    // Shards of so little that all are one, and as many as frames where no more than a frame fits.
+    let by = ["--frames", "8", "--size", SIZE, "--model", model];
+    let sizes = |plan: &Value| -> Vec<u64> {
+        plan["shards"].as_array().expect("shards").iter().filter_map(|s| s["n"].as_u64()).collect()
+    };
+    assert_eq!(sizes(&Farm::of(SCENE, &by).plan()), [8]);
+    let farm = Farm::of(SCENE, &[&by[..], &["--shard-seconds", "0,1e-9"]].concat());
+    assert_eq!(sizes(&farm.plan()), [1; 8]);
+    let seconds = |i: usize| farm.plan()["shards"][i]["predicted_s"].as_f64().expect("seconds");
+    let fitted = &found["fit"]["model"];
+    let term = |name: &str| fitted[name].as_f64().unwrap_or(0.0);
+    let n_particles = term("particle_step_s") * particles_of(&dir);
+    let expected = term("setup_s") + n_particles + 48.0 * 36.0 * term("pixel_sample_s");
+    assert!((seconds(3) - expected).abs() <= 1e-12 * expected, "{} {expected}", seconds(3));
+    let price = ["--nodes", "2", "--rate", "3", "--quantum", "1e-3", "--retries", "0"];
+    let again = dir.path().join("again");
+    let again = again.to_str().expect("UTF-8");
+    let (_, out, _) = ran(&[&["farm", "plan", SCENE, "-o", again], &by[..], &price].concat());
+    // One shard: one of two nodes works, and is paid for by the millisecond.
+    let whole = term("setup_s") + 8.0 * (expected - term("setup_s"));
+    let cost = 3.0 * (whole / 1e-3).ceil();
+    assert!(out.contains("50 % of their time idle") && out.contains(&format!("price: {cost:.2} for ")), "{cost} {out}");
+
+    assert_eq!(ran(&["farm", "local", "--plan", farm.path()]).0, Some(0));
+    let status = farm.status();
+    let off: Vec<f64> = (0..8)
+        .map(|i| (seconds(i), status["shards"][i]["seconds"].as_f64().expect("seconds")))
+        .map(|(predicted, taken)| (predicted - taken).abs() / taken)
+        .collect();
+    let largest = off.iter().copied().fold(0.0, f64::max);
+    assert_eq!((status["predicted"]["n"].as_u64(), status["predicted"]["largest"].as_f64()), (Some(8), Some(largest)));
+
+    // What no calibration is, and what it does not know.
+    for (from, to, expected) in [("\"schema\": 1", "\"schema\": 9", "schema 9"), ("\"fit\"", "\"fat\"", "fat"), ("{", "", "calibration")] {
+        let text = fs::read_to_string(model).expect("a model").replacen(from, to, 1);
+        let other = dir.path().join("other.json");
+        fs::write(&other, text).expect("room");
+        let other = other.to_str().expect("UTF-8");
+        let (code, _, said) = ran(&["farm", "plan", SCENE, "-o", again, "--model", other]);
+        assert!(code == Some(2) && said.contains(expected), "{said}");
+    }
+    let both = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/rectangles.toml");
+    let unmeasured = dir.path().join("unmeasured");
+    let (code, _, said) = ran(&["farm", "plan", both, "-o", unmeasured.to_str().expect("UTF-8"), "--model", model, "-q"]);
+    assert!(code == Some(2) && said.contains("facet pairs was not measured") && !unmeasured.exists(), "{said}");
+}
+
+/// Of the fly-by, as `bench` counts them.
+fn particles_of(dir: &TempDir) -> f64 {
+    let out = dir.path().join("counted.png");
+    let args = ["render", SCENE, "--size", SIZE, "-o", out.to_str().expect("UTF-8"), "-v"];
+    let (_, _, said) = ran(&args);
+    let line = said.lines().find(|line| line.contains(" particles in ")).expect("a count");
+    line.split_whitespace().next().and_then(|n| n.parse().ok()).expect("a number")
+}

@@ -87,12 +87,7 @@ fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, frames: 
     let works = work_of_frames(loaded, frames.clone());
     let item_s = works.iter().map(|work| seconds(0.0, work)).collect::<Result<Vec<f64>>>()?;
     let setup_s = seconds(1.0, &Default::default())?;
-    let [least, most] = args.shard_seconds[..] else {
-        return Err(Error::usage("--shard-seconds: expected two numbers such as 60,600"));
-    };
-    if !(least >= 0.0 && most >= least && most.is_finite()) {
-        return Err(Error::usage(format!("--shard-seconds {least},{most}: expected 0 <= least <= most")));
-    }
+    let (least, most) = args.shard_seconds;
     let sizes: Vec<u32> = match args.shard_frames {
         Some(each) => even(frames.end - frames.start, each),
         None => split(&item_s, setup_s, least, most, args.nodes as usize).iter().map(|r| r.len() as u32).collect(),

@@ -67,8 +67,8 @@ pub struct PlanArgs {
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Cost")]
     pub nodes: u32,
     /// A shard's least and greatest length, seconds
-    #[arg(long, value_name = "LEAST,MOST", num_args = 2, value_delimiter = ',', default_values_t = [60.0, 600.0], help_heading = "Cost")]
-    pub shard_seconds: Vec<f64>,
+    #[arg(long, value_name = "LEAST,MOST", default_value = "60,600", value_parser = parse_lengths, help_heading = "Cost")]
+    pub shard_seconds: (f64, f64),
     /// What a node costs in every piece of time that it is paid for by, in any money
     #[arg(long, value_name = "PRICE", requires = "model", help_heading = "Cost")]
     pub rate: Option<f64>,
@@ -289,6 +289,14 @@ fn parse_span(text: &str) -> Result<FrameSpan, String> {
     if span.first < span.end { Ok(span) } else { Err(format!("{}: there is no frame in it", wrong())) }
 }
 
+fn parse_lengths(text: &str) -> Result<(f64, f64), String> {
+    let wrong = || format!("expected LEAST,MOST such as 60,600, seconds from 0 and in this order, found \"{text}\"");
+    let (least, most) = text.split_once(',').ok_or_else(wrong)?;
+    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(wrong);
+    let (least, most) = (number(least)?, number(most)?);
+    if least <= most && most > 0.0 { Ok((least, most)) } else { Err(wrong()) }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -299,6 +307,14 @@ mod tests {
         assert_eq!(parse_span("240"), Ok(FrameSpan { first: 0, end: 240 }));
         for wrong in ["", "0", "5..5", "7..2", "a..3", "1..", "-1..3", "1..99999999999", "1...3"] {
             assert!(parse_span(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn lengths() {
+        assert_eq!(parse_lengths("60,600"), Ok((60.0, 600.0)));
+        for wrong in ["", "60", "600,60", "-1,5", "0,0", "a,b", "1,inf", "nan,3"] {
+            assert!(parse_lengths(wrong).is_err(), "{wrong}");
         }
     }
 }

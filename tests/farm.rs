@@ -412,7 +412,8 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let model = dir.path().join("model.json");
     let model = model.to_str().expect("UTF-8");
     let hello = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let (code, out, said) = ran(&["farm", "calibrate", SCENE, hello, "--frames", "6", "-o", model, "--set", "film.width=64"]);
+    let (code, out, said) =
+        ran(&["farm", "calibrate", SCENE, hello, "--frames", "6", "-o", model, "--set", "lighting.mode=first"]);
     assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
     let found: Value = serde_json::from_slice(&fs::read(model).expect("a model")).expect("JSON");
     assert_eq!((found["rows"].as_array().map(Vec::len), found["fit"]["n"].as_u64()), (Some(12), Some(12)));
@@ -452,7 +453,9 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     assert_eq!((status["predicted"]["n"].as_u64(), status["predicted"]["largest"].as_f64()), (Some(8), Some(largest)));
 
     // What no calibration is, and what it does not know.
-    for (from, to, expected) in [("\"schema\": 1", "\"schema\": 9", "schema 9"), ("\"fit\"", "\"fat\"", "fat"), ("{", "", "calibration")] {
+    for (from, to, expected) in
+        [("\"schema\": 1", "\"schema\": 9", "schema 9"), ("\"fit\"", "\"fat\"", "fat"), ("{", "", "calibration")]
+    {
         let text = fs::read_to_string(model).expect("a model").replacen(from, to, 1);
         let other = dir.path().join("other.json");
         fs::write(&other, text).expect("room");
@@ -462,7 +465,8 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     }
     let both = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/rectangles.toml");
     let unmeasured = dir.path().join("unmeasured");
-    let (code, _, said) = ran(&["farm", "plan", both, "-o", unmeasured.to_str().expect("UTF-8"), "--model", model, "-q"]);
+    let (code, _, said) =
+        ran(&["farm", "plan", both, "-o", unmeasured.to_str().expect("UTF-8"), "--model", model, "-q"]);
     assert!(code == Some(2) && said.contains("facet pairs was not measured") && !unmeasured.exists(), "{said}");
 }
 

@@ -160,7 +160,7 @@ fn alone(frames: &str, size: &str) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn an_animation_of_240_frames_on_four_nodes() {
+fn on_slurm_240_frames_are_what_one_machine_draws() {
     let cluster = Cluster::up();
     let farm = Farm::planned(&["--frames", "240", "--shard-frames", "10", "--size", "64x48"]);
     let (_, merge) = farm.submit(&cluster);
@@ -181,7 +181,7 @@ fn an_animation_of_240_frames_on_four_nodes() {
 
 /// A node without power, one without network, whose task goes on while its copy runs elsewhere, and a controller that dies.
 #[test]
-fn nodes_are_killed_and_cut_off_and_the_controller_is_restarted() {
+fn on_slurm_nodes_are_killed_and_cut_off_and_the_controller_is_restarted() {
     let cluster = Cluster::up();
     let size = "400x300";
     let farm = Farm::planned(&["--frames", "96", "--shard-frames", "24", "--size", size]);
@@ -213,7 +213,7 @@ fn nodes_are_killed_and_cut_off_and_the_controller_is_restarted() {
 }
 
 #[test]
-fn what_may_pass_is_queued_again_and_what_stays_ends_the_merge() {
+fn on_slurm_what_may_pass_is_queued_again_and_what_stays_ends_the_merge() {
     let cluster = Cluster::up();
     let farm = Farm::planned(&["--frames", "4", "--shard-frames", "2", "--size", "48x36"]);
     let folder = farm.folder();

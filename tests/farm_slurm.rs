@@ -191,6 +191,10 @@ fn on_slurm_nodes_are_killed_and_cut_off_and_the_controller_is_restarted() {
     wait_for(&farm, "work on every node", || all.iter().all(|node| farm.at_work().iter().any(|at| at == node)));
     let engine = farm.status(&cluster)["shards"][0]["engine"].as_str().map(str::to_owned);
     assert!(engine.as_ref().is_some_and(|e| e.starts_with("RUNNING on n") && e.contains(&array)), "{engine:?}");
+    // What is queued is not queued again.
+    let folder = farm.folder();
+    let output = cluster.nimbus(&["farm", "submit", "slurm", "--plan", folder.to_str().expect("UTF-8")]);
+    assert!(output.status.code() == Some(2) && text(&output).contains("are with Slurm already"), "{}", text(&output));
     cluster.told(&["node-kill"], &["n2"]);
     cluster.told(&["node-cut"], &["n3"]);
     // The controller writes down what it has every few seconds: one that dies before has never heard of the job.

@@ -32,7 +32,16 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     let plan = absolute(&args.job.plan)?;
     let files = plan.join("slurm");
     // What every shard would say is said once.
-    Plan::read(&plan)?.scene_as_planned()?;
+    let planned = Plan::read(&plan)?;
+    planned.scene_as_planned()?;
+    let engine = status(&plan, &planned)?.shards.into_iter().filter_map(|s| s.engine.map(|what| (s.index, what)));
+    let (queued, what): (Vec<usize>, Vec<String>) = engine.unzip();
+    if let Some(what) = what.first() {
+        let shards = ranges(&queued);
+        return Err(Error::usage(format!(
+            "shards {shards} are with Slurm already ({what}, …): wait for them, or scancel them"
+        )));
+    }
     let (_, indices) = write(&args.job, &files, EngineArg::Slurm)?;
     if indices.is_empty() {
         return output::text("all shards are done, nothing was submitted\n");

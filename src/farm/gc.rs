@@ -20,13 +20,16 @@ pub struct Removed {
 /// put aside. With `dry` it only says so.
 pub fn gc(folder: &Path, plan: &Plan, idle: Duration, all: bool, dry: bool) -> Result<Vec<Removed>> {
     let store = Store::open(folder);
-    let mut removed = Vec::new();
+    let (others, mut removed) = (store.others(), Vec::new());
     for shard in &plan.shards {
-        let unfinished = store.others(&shard.key, Other::Unfinished);
+        let unfinished = others.of(&shard.key, Other::Unfinished);
         let is_done = !unfinished.is_empty() && matches!(store.standing(plan, shard), Standing::Verified(_));
-        let mut paths: Vec<PathBuf> = unfinished.into_iter().filter(|path| is_done || is_idle(path, idle)).collect();
+        let mut paths: Vec<PathBuf> =
+            unfinished.iter().filter(|path| is_done || is_idle(path, idle)).cloned().collect();
         if all {
-            paths.extend([Other::Bad, Other::Differing].iter().flat_map(|kind| store.others(&shard.key, *kind)));
+            paths.extend(
+                [Other::Bad, Other::Differing].iter().flat_map(|kind| others.of(&shard.key, *kind).iter().cloned()),
+            );
         }
         for path in paths {
             let bytes = bytes_of(&path);

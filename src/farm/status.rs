@@ -1,5 +1,6 @@
 //! What is done, what is not, and what was tried.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
@@ -76,13 +77,16 @@ impl State {
 /// Of the plan in `folder`; reads every result.
 pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     let (store, attempts) = (Store::open(folder), attempts::read(folder)?);
+    let others = store.others();
     let mut engine = slurm::states(&slurm::submitted(folder));
+    let mut by_key: BTreeMap<&str, Vec<&Attempt>> = BTreeMap::new();
+    attempts.iter().for_each(|attempt| by_key.entry(&attempt.key).or_default().push(attempt));
     let mut pairs = Vec::new();
     let of = |shard: &Shard| {
         let standing = store.standing(plan, shard);
-        let of_shard: Vec<&Attempt> = attempts.iter().filter(|attempt| attempt.key == shard.key).collect();
-        let n_unfinished = store.others(&shard.key, Other::Unfinished).len();
-        let (state, what) = state(&standing, &of_shard);
+        let of_shard = by_key.get(shard.key.as_str()).map_or(&[][..], Vec::as_slice);
+        let n_unfinished = others.of(&shard.key, Other::Unfinished).len();
+        let (state, what) = state(&standing, of_shard);
         if let (Standing::Verified(manifest), Some(predicted_s)) = (&standing, shard.predicted_s)
             && manifest.n_resumed == 0
         {
@@ -100,7 +104,7 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
             device: manifest.map(|m| m.device.name.clone()),
             n_attempts: of_shard.iter().filter(|attempt| attempt.event == Event::Begun).count(),
             n_unfinished,
-            n_differing: store.others(&shard.key, Other::Differing).len(),
+            n_differing: others.of(&shard.key, Other::Differing).len(),
             engine: engine.remove(&shard.index),
         }
     };

@@ -120,14 +120,19 @@ impl Store {
         verify(&place, plan, shard).map_or_else(Standing::Broken, |manifest| Standing::Verified(Box::new(manifest)))
     }
 
-    /// Unfinished folders of a key, and those that were put aside.
-    pub fn others(&self, key: &str, kind: Other) -> Vec<PathBuf> {
-        let begin = format!("{key}.{}.", kind.name());
-        let entries = fs::read_dir(&self.folder).into_iter().flatten().flatten();
-        let mut found: Vec<PathBuf> =
-            entries.filter(|e| e.file_name().to_string_lossy().starts_with(&begin)).map(|e| e.path()).collect();
-        found.sort();
-        found
+    /// Unfinished folders, and those that were put aside, by key: read at once, since a listing takes as long as there are results.
+    pub fn others(&self) -> Others {
+        let mut others = Others::default();
+        for entry in fs::read_dir(&self.folder).into_iter().flatten().flatten() {
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let mut words = name.split('.');
+            let (Some(key), Some(word)) = (words.next(), words.next()) else { continue };
+            if let Some(kind) = Other::ALL.into_iter().find(|kind| kind.name() == word) {
+                others.0.entry((key.to_owned(), kind)).or_default().push(entry.path());
+            }
+        }
+        others.0.values_mut().for_each(|paths| paths.sort());
+        others
     }
 
     /// Puts what lies under a key aside, to be looked at; where to, unless it was gone.
@@ -156,8 +161,8 @@ impl Store {
         fs::create_dir(&path).map_err(|cause| of_io(&path, &cause))?;
         let mut workplace = Workplace { path, files: BTreeMap::new(), n_resumed: 0 };
         let outputs = plan.outputs(shard);
-        for other in self.others(&shard.key, Other::Unfinished) {
-            workplace.adopt(&other, &outputs)?;
+        for other in self.others().of(&shard.key, Other::Unfinished) {
+            workplace.adopt(other, &outputs)?;
         }
         workplace.n_resumed = workplace.files.len();
         Ok(workplace)
@@ -216,8 +221,18 @@ impl Store {
     }
 }
 
+/// What lies beside the results.
+#[derive(Debug, Clone, Default)]
+pub struct Others(BTreeMap<(String, Other), Vec<PathBuf>>);
+
+impl Others {
+    pub fn of(&self, key: &str, kind: Other) -> &[PathBuf] {
+        self.0.get(&(key.to_owned(), kind)).map_or(&[], Vec::as_slice)
+    }
+}
+
 /// Folders beside the results.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Other {
     /// An attempt's that goes on, or was ended.
     Unfinished,

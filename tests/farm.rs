@@ -305,6 +305,11 @@ fn what_lies_under_the_right_name_with_wrong_content_is_made_anew() {
         let frames = |all: &[(String, Vec<u8>)]| all[..3].to_vec();
         assert!(frames(&content(&farm.place(0))) == frames(&good), "{n}");
     }
+    // What cannot be printed in part.
+    let hash = format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(&whole));
+    let manifest = fs::read_to_string(at("shard.json")).expect("it").replace(&hash, "aéééééé");
+    fs::write(at("shard.json"), manifest).expect("room");
+    assert!(farm.state(0) == "broken" && farm.ran(0).0 == Some(0) && farm.state(0) == "done");
     // A file in the folder's place, and a result of another shard.
     fs::remove_dir_all(farm.place(0)).expect("it was there");
     fs::write(farm.place(0), b"no folder").expect("room");
@@ -320,6 +325,16 @@ fn unfinished_files_of_a_killed_run_count_only_where_they_are_whole() {
     wait_for_frames(&farm, 0, 3);
     kill(&mut child);
     let left = farm.beside(0, "tmp").remove(0);
+    // Another device's are not gone on with.
+    let device = fs::read_to_string(left.join("device.json")).expect("a device");
+    let elsewhere = left.with_file_name(left.file_name().expect("a name").to_string_lossy().replace("n1", "n9"));
+    fs::create_dir(&elsewhere).expect("room");
+    fs::write(elsewhere.join("device.json"), device.replace("llvmpipe", "another").replace("driver", "Driver"))
+        .expect("room");
+    fs::write(elsewhere.join(frame(39)), b"another's").expect("room");
+    let hash = format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(b"another's"));
+    let record = format!("{{\"name\":\"{}\",\"bytes\":9,\"sha256\":\"{hash}\"}}\n", frame(39));
+    fs::write(elsewhere.join("done.jsonl"), record).expect("room");
     // A power cut: one file without its end, one full of zeros, and half a line of the list.
     let bytes = fs::read(left.join(frame(0))).expect("a frame");
     fs::write(left.join(frame(0)), &bytes[..bytes.len() / 2]).expect("room");
@@ -382,6 +397,11 @@ fn a_stale_plan_is_refused() {
     assert!(code == Some(2) && said.contains("key"), "{said}");
     fs::write(&path, plan).expect("room");
     assert_eq!(farm.ran(0).0, Some(0));
+    // Also where it is done.
+    fs::write(&scene, fs::read_to_string(&scene).expect("a scene").replace("[film]", "[film]\nexposure = 0.5"))
+        .expect("room");
+    let (code, _, said) = farm.ran(0);
+    assert!(code == Some(2) && said.contains("stale"), "{said}");
 }
 
 /// A file system of 1 MiB. Mounting asks for root, or a user namespace: CI and most machines have one of them.

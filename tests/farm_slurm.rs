@@ -73,7 +73,7 @@ impl Farm {
     }
 
     fn folder(&self) -> PathBuf {
-        self.dir.path().join("farm")
+        self.dir.path().join("a farm")
     }
 
     fn merged(&self) -> PathBuf {
@@ -177,6 +177,41 @@ fn on_slurm_240_frames_are_what_one_machine_draws() {
     let folder = farm.folder();
     let output = cluster.nimbus(&["farm", "submit", "slurm", "--plan", folder.to_str().expect("UTF-8")]);
     assert!(text(&output).contains("nothing was submitted"), "{}", text(&output));
+}
+
+#[test]
+fn on_slurm_a_study_of_60_configurations_is_the_one_of_one_machine() {
+    let cluster = Cluster::up();
+    let dir = tempfile::tempdir().expect("a folder");
+    let hello = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
+    let knobs = ["draw.cutoff=2,2.5,3.5,4,5", "lighting.grid=16,24,40,48", "draw.sort_bits=16,32,\"auto\""];
+    let mut study = vec!["--grid", "--against", "thin", "--pixels", "64", "--rounds", "1", "--frames", "1"];
+    knobs.iter().for_each(|knob| study.extend(["--knob", *knob]));
+    let folder = dir.path().join("a farm");
+    let plan = ["farm", "plan", hello, "-o", folder.to_str().expect("UTF-8"), "--size", "48x36", "--error", "--"];
+    let output = nimbus(&[&plan[..], &study].concat());
+    assert!(output.status.success() && text(&output).starts_with("60 configurations in 8 shards"), "{}", text(&output));
+    let farm = Farm { dir };
+    let (_, merge) = farm.submit(&cluster);
+    wait_for(&farm, "the merge", || cluster.state(&merge) == "COMPLETED");
+    let alone = farm.dir.path().join("alone");
+    let error = ["error", hello, "--size", "48x36", "-q", "--out", alone.to_str().expect("UTF-8")];
+    let output = nimbus(&[&error[..], &study].concat());
+    assert!(output.status.success(), "{}", text(&output));
+    let read = |folder: &Path| -> Value {
+        serde_json::from_slice(&fs::read(folder.join("study.json")).expect("a study")).expect("JSON")
+    };
+    let of = |study: &Value| -> Vec<[Value; 4]> {
+        // The scene as it stands, which is the first, has turns in every part.
+        let all = study["configurations"].as_array().expect("configurations").iter().skip(1);
+        let mut all: Vec<_> = all.map(|c| ["name", "hash", "error", "n_turns"].map(|key| c[key].clone())).collect();
+        all.sort_by_key(|c| c[0].to_string());
+        all
+    };
+    let (ours, theirs) = (read(&farm.merged()), read(&alone));
+    assert!(of(&ours).len() > 40 && of(&ours) == of(&theirs), "{:?}\n{:?}", of(&ours), of(&theirs));
+    let keys = |value: &Value| value.as_object().expect("an object").keys().cloned().collect::<Vec<_>>();
+    assert_eq!((keys(&ours), keys(&ours["configurations"][7])), (keys(&theirs), keys(&theirs["configurations"][7])));
 }
 
 /// A node without power, one without network, whose task goes on while its copy runs elsewhere, and a controller that dies.

@@ -83,7 +83,7 @@ fn loaded(settings: &[Setting]) -> Result<Loaded> {
 
 fn plan(knobs: &[&str], design: Design, n_rounds: usize) -> StudyPlan {
     let axes = knobs.iter().map(|text| Axis::parse(text).unwrap()).collect();
-    StudyPlan { axes, design, metric: Metric::Rmse, time: Time::Gpu, n_rounds }
+    StudyPlan { axes, design, metric: Metric::Rmse, time: Time::Gpu, n_rounds, part: None }
 }
 
 fn study(law: &mut Law, plan: &StudyPlan, found: &mut Found, stop: &AtomicBool) -> bool {

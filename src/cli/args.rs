@@ -14,8 +14,8 @@ use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
 pub use farm::{
-    CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, FrameSpan, GcArgs, JobArgs, LocalArgs,
-    MergeArgs, PlanArgs, RunArgs, StatusArgs, SubmitArg, SubmitArgs,
+    CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs, LocalArgs, MergeArgs,
+    PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,
 };
 pub use results::{CompareArgs, ReportArgs, SamenessArg};
 pub use stress::StressArgs;

@@ -9,7 +9,7 @@ use super::{farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
 use crate::farm::cost::Compared;
 use crate::farm::plan::Plan;
-use crate::farm::pool::Pool;
+use crate::farm::pool::{Ended, Pool};
 use crate::farm::run::{How, Outcome};
 use crate::farm::status::{State, Status, status};
 use crate::farm::{gc, merge, run as shard_run};
@@ -32,8 +32,9 @@ pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<
 }
 
 fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
-    let n_items = Plan::read(&args.plan)?.shard(args.shard)?.n;
-    let bar = output::progress(u64::from(n_items), "frames", args.quiet);
+    let plan = Plan::read(&args.plan)?;
+    let n_items = plan.shard(args.shard)?.n;
+    let bar = output::progress(u64::from(n_items), plan.work.noun(), args.quiet);
     let choice = DeviceChoice { device: args.device.clone(), validation: args.validation, ..DeviceChoice::default() };
     let how = How { choice: &choice, stop, on_item: &|| bar.inc(1) };
     let outcome = shard_run::run(&args.plan, args.shard, &how);
@@ -43,7 +44,10 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
         Outcome::Beaten => "was done meanwhile, with the same result".to_owned(),
         Outcome::Done { seconds, n_resumed: 0 } => format!("done in {seconds:.1} s"),
         Outcome::Done { seconds, n_resumed } => {
-            format!("done in {seconds:.1} s; {n_resumed} of {n_items} frames were there from an attempt before")
+            format!(
+                "done in {seconds:.1} s; {n_resumed} of {n_items} {} were there from an attempt before",
+                plan.work.noun()
+            )
         }
     };
     if args.quiet { Ok(()) } else { output::text(&format!("shard {}: {said}\n", args.shard)) }
@@ -62,20 +66,37 @@ fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
         arguments.extend(["--device".to_owned(), device.clone()]);
     }
     arguments.push("--shard".to_owned());
-    let pool = Pool { program: &program, arguments, n_processes: args.jobs as usize, n_tries: args.tries as usize };
+    // Times are the device's own where one process uses it.
+    let exclusive = args.jobs == 1;
+    let pool =
+        Pool { program: &program, arguments, n_processes: args.jobs as usize, n_tries: args.tries as usize, exclusive };
     let bar = output::progress(open.len() as u64, "shards", args.quiet);
     let ended = pool.run(&open, stop, &mut |_| bar.inc(1));
     bar.finish_and_clear();
-    let failed: Vec<String> = ended?.iter().filter(|e| e.exit_code != Some(0)).map(|e| e.index.to_string()).collect();
     let (n, n_open) = (plan.shards.len(), open.len());
-    if !failed.is_empty() {
-        let what = format!("{} of {n} shards are not done: {}", failed.len(), failed.join(", "));
-        return Err(Error::Check { what: format!("{what}; nimbus farm status --plan {}", args.plan.display()) });
-    }
+    failed(&ended?, n, &args.plan)?;
     if args.quiet {
         return Ok(());
     }
     output::text(&format!("{n} shards are done, {n_open} of them now\n"))
+}
+
+/// An error where shards are not done, with the exit code that says most: 70 before those that stay, those before 75.
+fn failed(ended: &[Ended], n: usize, plan: &Path) -> Result<()> {
+    let failed: Vec<&Ended> = ended.iter().filter(|e| e.exit_code != Some(0)).collect();
+    if failed.is_empty() {
+        return Ok(());
+    }
+    let code = |e: &Ended| e.exit_code.map_or("killed".to_owned(), |code| format!("exit code {code}"));
+    let list: Vec<String> = failed.iter().map(|e| format!("{} ({})", e.index, code(e))).collect();
+    let (n_failed, list, plan) = (failed.len(), list.join(", "), plan.display());
+    let what = format!("{n_failed} of {n} shards went wrong: {list}; nimbus farm status --plan {plan}");
+    let may_pass = |e: &&Ended| matches!(e.exit_code, None | Some(75));
+    Err(match () {
+        () if failed.iter().any(|e| e.exit_code == Some(70)) => Error::Conflict { what },
+        () if failed.iter().all(may_pass) => Error::Transient { what },
+        () => Error::Check { what },
+    })
 }
 
 fn print_status(args: &StatusArgs) -> Result<()> {
@@ -93,7 +114,7 @@ fn print_status(args: &StatusArgs) -> Result<()> {
 /// A row a shard that is not done or was hard to do, and a line for all.
 fn table(plan: &Plan, found: &Status) -> String {
     let (n, n_done) = (found.shards.len(), found.n_done);
-    let seconds: f64 = found.shards.iter().filter_map(|s| s.seconds).sum();
+    let seconds: f64 = found.shards.iter().filter_map(|s| s.seconds).fold(0.0, |sum, s| sum + s);
     let mut text = format!("{n_done} of {n} shards are done, in {seconds:.1} s of runs\n");
     let is_told = |s: &&crate::farm::status::ShardStatus| {
         s.state != State::Done || s.n_attempts > 1 || s.n_unfinished > 0 || s.n_differing > 0
@@ -113,7 +134,8 @@ fn table(plan: &Plan, found: &Status) -> String {
         notes.extend(s.engine.clone());
         notes.extend(s.what.clone());
         let name = s.state.name();
-        text += &format!("{:>6}  {name:9}  frames {}..{}  {}\n", s.index, range.start, range.end, notes.join("; "));
+        let (noun, notes) = (plan.work.noun(), notes.join("; "));
+        text += &format!("{:>6}  {name:9}  {noun} {}..{}  {notes}\n", s.index, range.start, range.end);
     }
     if n_done < n {
         text += &format!("to do: {}\n", found.missing());
@@ -124,9 +146,9 @@ fn table(plan: &Plan, found: &Status) -> String {
 fn merged(args: &MergeArgs) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
     let spinner = output::spinner("merging", false);
-    let n = merge::merge(&args.plan, &plan, &args.output, args.force)?;
+    let n = merge::merge(&args.plan, &plan, &args.output, args.force, args.mixed)?;
     drop(spinner);
-    output::text(&format!("{n} frames in {}\n", args.output.display()))
+    output::text(&format!("{n} {} in {}\n", plan.work.noun(), args.output.display()))
 }
 
 fn clear(args: &GcArgs) -> Result<()> {

@@ -14,15 +14,19 @@ use crate::farm::synced;
 
 pub fn emit(args: &EmitArgs) -> Result<()> {
     let (name, hint) = match args.engine {
-        EngineArg::Slurm => {
-            ("slurm", "J=$(sbatch --parsable --array=INDICES shard.sh); sbatch --dependency=afterok:$J merge.sh")
-        }
+        EngineArg::Slurm => (
+            "slurm",
+            "J=$(sbatch --parsable --array=INDICES shard.sh); sbatch --dependency=afterok:$J --kill-on-invalid-dep=yes merge.sh",
+        ),
         EngineArg::Hyperqueue => ("hyperqueue", "bash submit.sh"),
         EngineArg::Openjd => ("openjd", "openjd run template.json, or any engine that takes such"),
         EngineArg::Local => ("local", "bash local.sh"),
     };
     let files = args.files.clone().unwrap_or_else(|| args.job.plan.join(name));
     let (written, indices) = write(&args.job, &files, args.engine)?;
+    if indices.is_empty() {
+        return output::text("all shards are done, nothing was written: nimbus farm merge\n");
+    }
     let hint = hint.replace("INDICES", &ranges(&indices));
     output::text(&format!("{} in {}: {hint}\n", written.join(", "), files.display()))
 }
@@ -34,8 +38,12 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     // What every shard would say is said once.
     let planned = Plan::read(&plan)?;
     planned.scene_as_planned()?;
-    let engine = status(&plan, &planned)?.shards.into_iter().filter_map(|s| s.engine.map(|what| (s.index, what)));
-    let (queued, what): (Vec<usize>, Vec<String>) = engine.unzip();
+    let Some(engine) = slurm::states(&slurm::submitted(&plan)) else {
+        return Err(Error::Transient {
+            what: "squeue does not say what is queued already; nothing was submitted".into(),
+        });
+    };
+    let (queued, what): (Vec<usize>, Vec<String>) = engine.into_iter().unzip();
     if let Some(what) = what.first() {
         let shards = ranges(&queued);
         return Err(Error::usage(format!(
@@ -74,7 +82,11 @@ fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<(Vec<&'stati
         indices: &indices,
         n_tries: args.tries,
         options: &args.sbatch,
+        exclusive: !plan.is_exact(),
     };
+    if indices.is_empty() {
+        return Ok((Vec::new(), indices));
+    }
     let made: Vec<JobFile> = match engine {
         EngineArg::Slurm => job.slurm(),
         EngineArg::Hyperqueue => job.hyperqueue(),

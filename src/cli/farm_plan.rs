@@ -2,8 +2,11 @@
 
 use std::sync::atomic::AtomicBool;
 
-use super::args::{CalibrateArgs, FormatArg, FrameSpan, PlanArgs};
+use clap::Parser;
+
+use super::args::{Args, CalibrateArgs, Command, ErrorArgs, FormatArg, PlanArgs, Span};
 use super::output;
+use super::tradeoff;
 use crate::error::{Error, Result};
 use crate::farm::calibrate::{Calibration, calibrate, n_runs, work_of_frames};
 use crate::farm::pack::{Packing, Rate, pack, price, split};
@@ -25,36 +28,28 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
     }
-    let FrameSpan { first, end } = args.frames.unwrap_or_else(|| whole(&loaded));
-    let n = end - first;
-    let format = match args.format {
-        FormatArg::Png => PictureFormat::Png,
-        FormatArg::Exr => PictureFormat::Exr,
-    };
-    let model = args.model.as_deref().map(Calibration::read).transpose()?;
-    let cut = match &model {
-        Some(model) => by_model(args, model, &loaded, first..end)?,
-        None => Cut { sizes: even(n, args.shard_frames.unwrap_or(USUAL_FRAMES)), predicted_s: None },
-    };
+    let Cut { work, sizes, predicted_s } = if args.error { study(args, &set)? } else { frames(args, &loaded)? };
     // What is to be said of the price is known to be right before anything is written.
-    let packing = cut.predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
+    let packing = predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
     let estimate = packing.map(|packing| estimate(args, &packing)).transpose()?;
     let plan = Plan::new(Wish {
         scene: args.scene.clone(),
         set,
         seed: args.seed,
         shaders: args.shaders.clone(),
-        work: Work::Frames { first, n, format },
-        sizes: cut.sizes,
-        predicted_s: cut.predicted_s,
+        work,
+        sizes,
+        predicted_s,
     })?;
     plan.write(&args.output)?;
     if args.json {
         return output::object(&plan);
     }
     let (n_shards, folder) = (plan.shards.len(), args.output.display());
+    let items = plan.work.items();
+    let (n, noun) = (items.end - items.start, plan.work.noun());
     output::text(&format!(
-        "{n} frames in {n_shards} shards\n{}\
+        "{n} {noun} in {n_shards} shards\n{}\
          all of them here:      nimbus farm local --plan {folder}\n\
          by Slurm:              nimbus farm submit slurm --plan {folder}\n\
          one, by any engine:    nimbus farm run --plan {folder} --shard I     (I from 0 to {})\n",
@@ -64,14 +59,58 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
 }
 
 /// All frames of a scene, or of its phases.
-fn whole(loaded: &LoadedScene) -> FrameSpan {
+fn whole(loaded: &LoadedScene) -> Span {
     let of_phases = loaded.phases.iter().map(|phase| phase.n_frames).fold(0, u32::saturating_add);
-    FrameSpan { first: 0, end: if loaded.phases.is_empty() { loaded.scene.time.n_frames } else { of_phases } }
+    Span { first: 0, end: if loaded.phases.is_empty() { loaded.scene.time.n_frames } else { of_phases } }
 }
 
 struct Cut {
+    work: Work,
     sizes: Vec<u32>,
     predicted_s: Option<Vec<f64>>,
+}
+
+fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
+    let Span { first, end } = args.frames.unwrap_or_else(|| whole(loaded));
+    let n = end - first;
+    let format = match args.format {
+        FormatArg::Png => PictureFormat::Png,
+        FormatArg::Exr => PictureFormat::Exr,
+    };
+    let work = Work::Frames { first, n, format };
+    match args.model.as_deref().map(Calibration::read).transpose()? {
+        Some(model) => by_model(args, &model, loaded, work),
+        None => Ok(Cut { work, sizes: even(n, args.shard_frames.unwrap_or(USUAL_FRAMES)), predicted_s: None }),
+    }
+}
+
+/// The configurations that `nimbus error` would measure, told the same.
+fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
+    let parsed = |more: &[String]| {
+        let begin = ["nimbus".into(), "error".into(), args.scene.display().to_string()];
+        match Args::try_parse_from(begin.iter().chain(more).chain(&args.study)) {
+            Ok(Args { command: Command::Error(of), .. }) => Ok(of),
+            Ok(_) => Err(Error::usage("expected arguments of nimbus error after \"--\"")),
+            Err(cause) => {
+                Err(Error::usage(format!("after \"--\": {}", cause.to_string().trim_start_matches("error: "))))
+            }
+        }
+    };
+    let ErrorArgs { out, resume, force, plot, json, csv, part, budget_ms, budget_error, options, .. } = parsed(&[])?;
+    let is_results = out.is_some() || resume || force || plot || json || csv || part.is_some();
+    let is_budget = !budget_ms.is_empty() || !budget_error.is_empty();
+    let is_scene = !options.set.is_empty() || options.seed.is_some() || options.size.is_some();
+    let is_device = options.device.is_some() || options.shaders.is_some() || options.validation || options.poison;
+    if is_results || is_budget || is_scene || is_device {
+        return Err(Error::usage(
+            "after \"--\": expected no --out, --resume, --force, --plot, --json, --csv, --part, --budget-…, --device or --validation; --set, --seed, \
+             --size and --shaders stand before it",
+        ));
+    }
+    let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));
+    let configurations = tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
+    let sizes = even(configurations.len() as u32, args.shard_configurations);
+    Ok(Cut { work: Work::Error { arguments: args.study.clone(), configurations }, sizes, predicted_s: None })
 }
 
 fn even(n: u32, each: u32) -> Vec<u32> {
@@ -79,7 +118,9 @@ fn even(n: u32, each: u32) -> Vec<u32> {
     (0..n / each).map(|_| each).chain((rest > 0).then_some(rest)).collect()
 }
 
-fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, frames: std::ops::Range<u32>) -> Result<Cut> {
+fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, work: Work) -> Result<Cut> {
+    let items = work.items();
+    let frames = items.start as u32..items.end as u32;
     let seconds = |setups: f64, work: &_| {
         let file = args.model.as_deref().unwrap_or(std::path::Path::new(""));
         model.fit.model.seconds(setups, work).map_err(|what| Error::io(file, what))
@@ -99,7 +140,7 @@ fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, frames: 
         setup_s + part.iter().sum::<f64>()
     });
     let predicted_s = Some(predicted.collect());
-    Ok(Cut { sizes, predicted_s })
+    Ok(Cut { work, sizes, predicted_s })
 }
 
 /// What all of it takes and costs, in words.

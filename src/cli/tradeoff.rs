@@ -59,7 +59,8 @@ pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &A
     let pixels = Pixels::sample(film.width, film.height, args.pixels);
     let kept = reference(args, scene, time_s, &pixels)?;
     let design = if args.grid { Design::Grid } else { Design::Alone };
-    let plan = StudyPlan { axes, design, metric, time, n_rounds: args.rounds as usize };
+    let part = args.part.map(|part| part.first as usize..part.end as usize);
+    let plan = StudyPlan { axes, design, metric, time, n_rounds: args.rounds as usize, part };
     let made = Provenance::now(SCHEMA_VERSION, &args.scene, &base, bed.device.info(), clocks);
     let reference = ReferenceRecord::of(&kept, args.against, &pixels, args.frame, time_s);
     let mut study = begun(args, made, reference, &plan);
@@ -129,6 +130,18 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     }
     let chart = plot::tradeoff::chart(study);
     output::text(&format!("\n{}", chart.text(output::columns(), chart.rows(), output::colored(color))?))
+}
+
+/// Names of the configurations that a study is asked for, without the scene as it stands; in the order that `--part` counts by.
+pub(super) fn configurations(args: &ErrorArgs) -> Result<Vec<String>> {
+    let options = plain(args)?;
+    let scene = load(&args.scene, &options)?.at_frame(args.frame);
+    super::check_time(&scene, scene.time.at(args.frame))?;
+    let axes = axes(args, &scene)?;
+    check_values(args, &options, &axes, &scene.film)?;
+    args.against.check(&scene, scene.time.at(args.frame))?;
+    let design = if args.grid { Design::Grid } else { Design::Alone };
+    Ok(settings(&axes, design).iter().map(|settings| name_of(settings)).collect())
 }
 
 /// The options, with every cloud plain where that is asked for.

@@ -93,9 +93,11 @@ pub fn read(folder: &Path) -> Result<Vec<Attempt>> {
 }
 
 /// This machine, as its engine names it, or as it does itself; fit for a file's name.
-fn node() -> String {
-    let named = ["SLURMD_NODENAME", "HOSTNAME"].iter().find_map(|name| std::env::var(name).ok());
-    let name = named.or_else(|| fs::read_to_string("/proc/sys/kernel/hostname").ok()).unwrap_or_default();
+pub(super) fn node() -> String {
+    let of = |name| std::env::var(name).ok();
+    let kernel = || fs::read_to_string("/proc/sys/kernel/hostname").ok();
+    // A shell hands its HOSTNAME on to where it is wrong.
+    let name = of("SLURMD_NODENAME").or_else(kernel).or_else(|| of("HOSTNAME")).unwrap_or_default();
     let fit = |c: char| if c.is_ascii_alphanumeric() || c == '-' || c == '_' { c } else { '-' };
     let name: String = name.trim().chars().map(fit).collect();
     if name.is_empty() { "node".to_owned() } else { name }

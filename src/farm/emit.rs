@@ -7,6 +7,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::status::ranges;
+use super::study::EXCLUSIVE;
 
 /// What the files name.
 #[derive(Debug, Clone)]
@@ -22,6 +23,8 @@ pub struct Job<'a> {
     pub n_tries: u32,
     /// `#SBATCH` lines, as given.
     pub options: &'a [String],
+    /// Times are taken: a node is one shard's alone.
+    pub exclusive: bool,
 }
 
 /// A file: name, content, whether it is run.
@@ -34,6 +37,10 @@ impl Job<'_> {
     /// both are as good.
     pub fn slurm(&self) -> Vec<JobFile> {
         let options: String = self.options.iter().map(|option| format!("#SBATCH {option}\n")).collect();
+        let (alone, say_so) = match self.exclusive {
+            true => ("#SBATCH --exclusive\n", format!("export {EXCLUSIVE}=1\n")),
+            false => ("", String::new()),
+        };
         let logs = self.plan.join("logs");
         let again = self.n_tries - 1;
         let shard = format!(
@@ -43,8 +50,12 @@ impl Job<'_> {
              #SBATCH --requeue\n\
              #SBATCH --open-mode=append\n\
              #SBATCH --output={log}\n\
+             {alone}\
              {options}\
              set -u\n\
+             # Slurm takes the node back: nimbus is told as well, keeps what it has and ends with 75.\n\
+             trap : TERM\n\
+             {say_so}\
              shard=$((${{1:-0}} + SLURM_ARRAY_TASK_ID))\n\
              {run}\n\
              code=$?\n\
@@ -54,7 +65,7 @@ impl Job<'_> {
              fi\n\
              exit \"$code\"\n",
             plan = self.plan.display(),
-            log = logs.join("%A_%a.log").display(),
+            log = log_name(&logs, "%A_%a.log"),
             run = self.run("\"$shard\""),
         );
         let merge = format!(
@@ -66,7 +77,7 @@ impl Job<'_> {
              #SBATCH --output={log}\n\
              {options}\
              exec {merge}\n",
-            log = logs.join("merge-%j.log").display(),
+            log = log_name(&logs, "merge-%j.log"),
             merge = self.merge(),
         );
         vec![("shard.sh", shard, true), ("merge.sh", merge, true)]
@@ -149,6 +160,11 @@ impl Job<'_> {
     }
 }
 
+/// As sbatch takes it: a word, in which `%` begins what it fills in.
+fn log_name(logs: &Path, name: &str) -> String {
+    format!("\"{}/{name}\"", logs.display().to_string().replace('%', "%%"))
+}
+
 /// As a shell takes it for one word.
 pub fn quoted(path: &Path) -> String {
     format!("'{}'", path.display().to_string().replace('\'', r"'\''"))
@@ -188,14 +204,21 @@ mod tests {
         let (program, plan, merged) = (program(folder), folder.join("a plan"), folder.join("m"));
         let options = ["--gres=gpu:1".to_owned()];
         let indices = [0, 2, 3, 4, 9];
-        let job =
-            Job { program: &program, plan: &plan, merged: &merged, indices: &indices, n_tries: 3, options: &options };
+        let job = Job {
+            program: &program,
+            plan: &plan,
+            merged: &merged,
+            indices: &indices,
+            n_tries: 3,
+            options: &options,
+            exclusive: false,
+        };
         let run = |i: u32| format!("farm run --plan {} --shard {i}\n", plan.display());
         let merge = format!("farm merge --plan {} -o {} --force\n", plan.display(), merged.display());
         let clear = || std::fs::remove_file(folder.join("log")).unwrap_or(());
 
         let [(_, shard, _), (_, merging, _)] = job.slurm().try_into().unwrap();
-        assert!(shard.contains("#SBATCH --gres=gpu:1\n") && shard.contains("a plan/logs/%A_%a.log\n"));
+        assert!(shard.contains("#SBATCH --gres=gpu:1\n") && shard.contains("a plan/logs/%A_%a.log\"\n"));
         // scontrol is asked once for what may pass, and not where it was tried often enough.
         std::fs::write(
             folder.join("scontrol"),

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::plan::{PictureFormat, Plan, Shard, Work};
-use super::store::Workplace;
+use super::plan::{PictureFormat, Plan, Shard, Work, output};
+use super::store::{Store, Workplace};
 use crate::error::{Error, Result};
 use crate::frame::stage::{Bed, DeviceChoice, Player};
 use crate::io::image::{ImageKind, encoded};
@@ -14,22 +14,23 @@ use crate::study::machine::{Device, device_record};
 
 /// Draws the frames of `shard` that are not there yet, and tells of each; which device did.
 pub fn draw(
-    (plan, shard, loaded): (&Plan, &Shard, &LoadedScene),
+    (store, plan, shard, loaded): (&Store, &Plan, &Shard, &LoadedScene),
     choice: &DeviceChoice,
     workplace: &mut Workplace,
     stop: &AtomicBool,
     on_frame: &dyn Fn(),
 ) -> Result<Device> {
-    let Work::Frames { format, .. } = plan.work;
+    let Work::Frames { format, .. } = plan.work else { return Err(Error::usage("a plan of something else")) };
     let kind = match format {
         PictureFormat::Png => ImageKind::Png,
         PictureFormat::Exr => ImageKind::Exr,
     };
     let bed = Bed::open(choice)?;
     let device = device_record(bed.device.info());
+    store.resume(workplace, plan, shard, &device)?;
     let mut playing: Option<(Arc<Scene>, Player)> = None;
     for i_frame in shard.items() {
-        let name = plan.output(i_frame);
+        let name = output(i_frame, format);
         if !workplace.has(&name) {
             if stop.load(Ordering::Relaxed) {
                 return Err(Error::Interrupted);
@@ -54,7 +55,8 @@ pub fn draw(
         on_frame();
     }
     drop(playing);
-    bed.close()?;
+    // What the validation layers say comes here: pictures that it is about are drawn anew.
+    bed.close().inspect_err(|_| workplace.disown())?;
     Ok(device)
 }
 

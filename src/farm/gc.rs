@@ -1,6 +1,7 @@
 //! Clears away what attempts left.
 
 use std::fs;
+use std::io::ErrorKind::{DirectoryNotEmpty, NotFound};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -37,7 +38,12 @@ pub fn gc(folder: &Path, plan: &Plan, idle: Duration, all: bool, dry: bool) -> R
                 // What was put aside need not have been a folder.
                 let is_folder = fs::symlink_metadata(&path).is_ok_and(|about| about.is_dir());
                 let gone = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
-                gone.map_err(|cause| of_io(&path, &cause))?;
+                match gone {
+                    Ok(()) => {}
+                    // A run has cleared it away, or still works in it: the next time.
+                    Err(cause) if [NotFound, DirectoryNotEmpty].contains(&cause.kind()) => continue,
+                    Err(cause) => return Err(of_io(&path, &cause)),
+                }
             }
             removed.push(Removed { path, bytes });
         }

@@ -1,30 +1,55 @@
 //! All shards' results in one folder, as one machine would have made them. Everything is verified before, and every copy after.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::failing::of_io;
-use super::plan::{Plan, is_output};
-use super::status::Status;
-use super::store::{FileRecord, Standing, Store};
+use super::plan::{Plan, Work, is_output};
+use super::status::{Status, ranges};
+use super::store::{FileRecord, Manifest, Standing, Store};
+use super::study;
 use super::synced;
 use crate::error::{Error, Result};
 use crate::io::folder::replace_files;
 
-/// Puts the frames of the plan in `folder` into `out`, which appears whole; their number. Refuses where a shard is not done. With
+/// Puts the results of the plan in `folder` into `out`, frames all at once; how many. Refuses where a shard is not done. With
 /// `force` frames of an earlier merge are replaced, and go.
-pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool) -> Result<usize> {
+pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -> Result<usize> {
     if !force && out.symlink_metadata().is_ok() {
         return Err(Error::io(out, "exists; --force replaces it"));
     }
     let store = Store::open(folder);
     let parts = verified(folder, plan, &store)?;
+    if let Work::Error { .. } = plan.work {
+        return study::merge(&parts, out, force);
+    }
+    check_devices(&parts, mixed)?;
+    let parts: Vec<_> = parts.into_iter().map(|(place, manifest)| (place, manifest.files)).collect();
     let names: Vec<&str> = parts.iter().flat_map(|(_, files)| files).map(|file| file.name.as_str()).collect();
     let earlier = earlier(out);
     let gone = earlier.iter().map(String::as_str).filter(|name| !names.contains(name));
     let files: Vec<&str> = gone.chain(names.iter().copied()).collect();
     replace_files(out, &files, |staged| copy_all(&parts, staged))?;
     Ok(names.len())
+}
+
+/// Refuses frames of several devices or drivers, unless they are meant to be `mixed`: they differ in their last bits.
+fn check_devices(parts: &[(PathBuf, Manifest)], mixed: bool) -> Result<()> {
+    let mut by_device: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (_, Manifest { device, index, .. }) in parts {
+        by_device
+            .entry(format!("{} ({}, Vulkan {})", device.name, device.driver, device.api))
+            .or_default()
+            .push(*index);
+    }
+    if mixed || by_device.len() < 2 {
+        return Ok(());
+    }
+    let list: String =
+        by_device.iter().map(|(name, indices)| format!("\n  {name}: shards {}", ranges(indices))).collect();
+    let what = "frames of several devices are no single machine's";
+    Err(Error::Check { what: format!("{what}, --mixed merges them all the same:{list}") })
 }
 
 /// Frames that lie in `out`.
@@ -34,12 +59,14 @@ fn earlier(out: &Path) -> Vec<String> {
     names.filter(|name| is_output(name)).collect()
 }
 
-/// Every shard's folder and files, in the plan's order.
-fn verified(folder: &Path, plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Vec<FileRecord>)>> {
+/// Every shard's folder and what is in it, in the plan's order.
+fn verified(folder: &Path, plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Manifest)>> {
     let mut parts = Vec::new();
     for shard in &plan.shards {
-        if let Standing::Verified(manifest) = store.standing(plan, shard) {
-            parts.push((store.place(&shard.key), manifest.files));
+        match store.standing(plan, shard) {
+            Standing::Verified(manifest) => parts.push((store.place(&shard.key), *manifest)),
+            Standing::Unreadable(error) => return Err(error),
+            Standing::Missing | Standing::Broken(_) => {}
         }
     }
     if parts.len() == plan.shards.len() {
@@ -59,7 +86,7 @@ fn copy_all(parts: &[(PathBuf, Vec<FileRecord>)], to: &Path) -> Result<()> {
         for file in files {
             let (source, copy) = (from.join(&file.name), to.join(&file.name));
             fs::copy(&source, &copy).map_err(|cause| of_io(&copy, &cause))?;
-            file.check(to).map_err(|what| Error::Transient { what: format!("{}: {what}", to.display()) })?;
+            file.check(to).map_err(|wrong| wrong.error(to))?;
             synced::folder(&copy)?;
         }
     }

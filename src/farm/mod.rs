@@ -3,7 +3,7 @@
 //!
 //! A [`plan`] says what there is to do, in shards; a [`store`] holds what is done, each result [`verified`](store::Store::standing)
 //! by its content; [`run`] does one shard, [`merge`] puts all together, [`status`] and [`gc`] say and clear away. [`frames`]
-//! is the work itself; [`emit`] and [`slurm`] hand it to engines.
+//! and [`study`] are the work itself; [`emit`] and [`slurm`] hand it to engines.
 //!
 //! What that takes is predicted by [`cost`], fitted with [`nnls`]; [`split`] cuts items into shards of such a length, and
 //! [`pack`] says who does which of them, when all is done, and at what price.
@@ -25,4 +25,5 @@ pub mod slurm;
 pub mod split;
 pub mod status;
 pub mod store;
+pub mod study;
 pub mod synced;

@@ -1,12 +1,13 @@
 //! `plan.json`: what there is to do, cut into shards, each with a key that names its result.
 
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use super::synced;
+use super::{study, synced};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
@@ -58,6 +59,26 @@ pub struct SceneSource {
 pub enum Work {
     /// Pictures of frames `first` … `first + n − 1`.
     Frames { first: u32, n: u32, format: PictureFormat },
+    /// An error study's configurations, and what `nimbus error` is told of it.
+    Error { arguments: Vec<String>, configurations: Vec<String> },
+}
+
+impl Work {
+    /// Its items: frames, or configurations from 0.
+    pub fn items(&self) -> Range<u64> {
+        match self {
+            Work::Frames { first, n, .. } => u64::from(*first)..u64::from(*first) + u64::from(*n),
+            Work::Error { configurations, .. } => 0..configurations.len() as u64,
+        }
+    }
+
+    /// What an item is called.
+    pub fn noun(&self) -> &'static str {
+        match self {
+            Work::Frames { .. } => "frames",
+            Work::Error { .. } => "configurations",
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -92,7 +113,7 @@ pub struct Shard {
 }
 
 impl Shard {
-    pub fn items(&self) -> std::ops::Range<u32> {
+    pub fn items(&self) -> Range<u32> {
         self.first..self.first + self.n
     }
 }
@@ -139,7 +160,7 @@ impl Plan {
             work,
             shards: Vec::new(),
         };
-        let Work::Frames { mut first, .. } = plan.work;
+        let mut first = plan.work.items().start as u32;
         for (index, n) in sizes.into_iter().enumerate() {
             let key = plan.key(first, n);
             let predicted_s = predicted_s.as_ref().and_then(|all| all.get(index).copied());
@@ -152,25 +173,40 @@ impl Plan {
     /// Of a shard's part: whatever changes the result changes it.
     fn key(&self, first: u32, n: u32) -> String {
         let SceneSource { hash, shaders_hash, .. } = &self.scene;
-        let Work::Frames { format, .. } = self.work;
+        let work = match &self.work {
+            Work::Frames { format, .. } => json!({"kind": "frames", "format": format.extension()}),
+            // What the items are called says what they are.
+            work @ Work::Error { .. } => json!(work),
+        };
         let of = json!({
-            "schema": SCHEMA_VERSION, "scene": hash, "shaders": shaders_hash, "code": self.code,
-            "kind": "frames", "first": first, "n": n, "format": format.extension(),
+            "schema": SCHEMA_VERSION, "scene": hash, "shaders": shaders_hash, "code": self.code, "work": work,
+            "first": first, "n": n,
         });
         let mut key = format!("{:x}", Sha256::digest(of.to_string()));
         key.truncate(KEY_DIGITS);
         key
     }
 
-    /// Names of the files that `shard` makes, in their order.
+    /// Names of the files that `shard` makes, sorted; pictures of a study come on top.
     pub fn outputs(&self, shard: &Shard) -> Vec<String> {
-        shard.items().map(|i| self.output(i)).collect()
+        match &self.work {
+            Work::Frames { format, .. } => shard.items().map(|i| output(i, *format)).collect(),
+            Work::Error { .. } => study::FILES.map(str::to_owned).to_vec(),
+        }
     }
 
-    /// Of one item. Names sort as the items do.
-    pub fn output(&self, i: u32) -> String {
-        let Work::Frames { format, .. } = self.work;
-        format!("frame-{i:08}.{}", format.extension())
+    /// Whether a result of `shard` has these files.
+    pub fn are_outputs(&self, shard: &Shard, names: &[&str]) -> bool {
+        let outputs = self.outputs(shard);
+        match self.work {
+            Work::Frames { .. } => outputs.iter().eq(names),
+            Work::Error { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
+        }
+    }
+
+    /// Whether two results of a shard are the same: pictures are, times are not.
+    pub fn is_exact(&self) -> bool {
+        matches!(self.work, Work::Frames { .. })
     }
 
     pub fn shard(&self, index: usize) -> Result<&Shard> {
@@ -226,8 +262,7 @@ impl Plan {
 
     /// That shards are what their keys say, and together the whole work.
     fn check_shards(&self) -> std::result::Result<(), String> {
-        let Work::Frames { first, n, .. } = self.work;
-        let mut next = u64::from(first);
+        let Range { start: mut next, end } = self.work.items();
         for (i, shard) in self.shards.iter().enumerate() {
             if shard.index != i || u64::from(shard.first) != next || shard.n == 0 {
                 return Err(format!("shard {i} does not begin where the one before it ends"));
@@ -237,20 +272,31 @@ impl Plan {
                 return Err(format!("shard {i} is not what its key says"));
             }
         }
-        let end = u64::from(first) + u64::from(n);
-        if next == end { Ok(()) } else { Err(format!("its shards end at frame {next}, its work at {end}")) }
+        if next == end { Ok(()) } else { Err(format!("its shards end at {next}, its work at {end}")) }
     }
 
     /// Writes it into `folder`, which is made where it is not there; refuses to replace another plan's.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let path = folder.join(PLAN_FILE);
+        let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(&path, cause))?;
+        if text.len() as u64 >= RECORD_LIMIT {
+            let n = self.shards.len();
+            return Err(Error::limit(format!(
+                "a plan of {n} shards is too large to be read again: expected fewer, longer ones"
+            )));
+        }
+        let exists = "exists; a plan is not replaced: name another folder, or remove this one";
         if path.symlink_metadata().is_ok() {
-            return Err(Error::io(&path, "exists; a plan is not replaced: name another folder, or remove this one"));
+            return Err(Error::io(&path, exists));
         }
         synced::make_folder(folder)?;
-        let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(&path, cause))?;
-        synced::write(&path, format!("{text}\n").as_bytes())
+        synced::write_new(&path, format!("{text}\n").as_bytes())
     }
+}
+
+/// A frame's file. Names sort as the frames do.
+pub fn output(i: u32, format: PictureFormat) -> String {
+    format!("frame-{i:08}.{}", format.extension())
 }
 
 /// Whether a plan of frames makes files of this name.
@@ -272,7 +318,7 @@ impl SceneSource {
 
 /// Refuses what cannot be cut: a frame has to follow from its number alone.
 fn check(loaded: &LoadedScene, work: &Work) -> Result<()> {
-    let Work::Frames { first, n, .. } = *work;
+    let Work::Frames { first, n, .. } = *work else { return Ok(()) };
     if n == 0 || first.checked_add(n).is_none() {
         return Err(Error::usage(format!(
             "--frames: expected at least one, up to {}, found {n} from {first}",
@@ -336,7 +382,7 @@ mod tests {
             ("\"schema\": 1", "\"schema\": 2", "schema 2"),
             ("\"n\": 2", "\"n\": 3", "key"),
             ("\"first\": 7", "\"first\": 8", "begin"),
-            ("\"n\": 10", "\"n\": 11", "end at frame 13"),
+            ("\"n\": 10", "\"n\": 11", "end at 13"),
             ("\"work\"", "\"wrok\"", "wrok"),
             ("{", "", "not a plan"),
         ] {

@@ -5,8 +5,9 @@ use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use super::study::EXCLUSIVE;
 use crate::error::{Error, Result};
 
 /// What there is to run.
@@ -19,6 +20,8 @@ pub struct Pool<'a> {
     pub n_processes: usize,
     /// A shard that fails in a way that may pass is tried so often.
     pub n_tries: usize,
+    /// Nobody else uses the device, as far as is known here.
+    pub exclusive: bool,
 }
 
 /// How a shard's last try ended.
@@ -30,54 +33,91 @@ pub struct Ended {
     pub n_tries: usize,
 }
 
+/// A shard that is to be run.
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    index: usize,
+    /// So often it was.
+    n_tries: usize,
+    from: Instant,
+}
+
+/// Before another try, times those before: what may pass takes a while.
+const PAUSE: Duration = Duration::from_secs(1);
 /// How often children are looked at: short beside a shard, which takes a second at least.
 const LOOK: Duration = Duration::from_millis(5);
 
 impl Pool<'_> {
-    /// Runs `indices`; `on_end` is told of each. On `stop` no more begin, and those that run are asked to end: they keep
-    /// what they have.
+    /// Runs `indices`; `on_end` is told of each. On `stop`, and on an error, no more begin, and those that run are asked to end: they
+    /// keep what they have.
     pub fn run(&self, indices: &[usize], stop: &AtomicBool, on_end: &mut dyn FnMut(&Ended)) -> Result<Vec<Ended>> {
-        let mut waiting: VecDeque<(usize, usize)> = indices.iter().map(|i| (*i, 0)).collect();
-        let mut running: Vec<(usize, usize, Child)> = Vec::new();
+        let now = Instant::now();
+        let mut waiting: VecDeque<Waiting> =
+            indices.iter().map(|i| Waiting { index: *i, n_tries: 0, from: now }).collect();
+        let mut running: Vec<(Waiting, Child)> = Vec::new();
         let mut all = Vec::new();
-        let mut is_stopped = false;
-        while !waiting.is_empty() || !running.is_empty() {
-            if stop.load(Ordering::Relaxed) && !is_stopped {
-                is_stopped = true;
-                waiting.clear();
-                running.iter().for_each(|(.., child)| ask_to_end(child));
+        let ended = loop {
+            if waiting.is_empty() && running.is_empty() {
+                break Ok(());
             }
-            while running.len() < self.n_processes
-                && let Some((index, n_tries)) = waiting.pop_front()
-            {
-                running.push((index, n_tries + 1, self.start(index)?));
+            if stop.load(Ordering::Relaxed) {
+                break Err(Error::Interrupted);
             }
-            let mut still = Vec::new();
-            for (index, n_tries, mut child) in running {
-                let failed = |cause| Error::io(self.program, cause);
-                let Some(status) = child.try_wait().map_err(failed)? else {
-                    still.push((index, n_tries, child));
-                    continue;
-                };
-                // One that was killed is worth another try as well.
-                let may_pass = matches!(status.code(), None | Some(75));
-                if may_pass && n_tries < self.n_tries && !is_stopped {
-                    waiting.push_back((index, n_tries));
-                    continue;
-                }
-                let ended = Ended { index, exit_code: status.code(), n_tries };
-                on_end(&ended);
-                all.push(ended);
+            if let Err(error) = self.step(&mut waiting, &mut running, &mut all, on_end) {
+                break Err(error);
             }
-            running = still;
             std::thread::sleep(LOOK);
+        };
+        running.iter().for_each(|(_, child)| ask_to_end(child));
+        for (_, child) in &mut running {
+            // It was asked to.
+            let _ = child.wait();
         }
-        if is_stopped { Err(Error::Interrupted) } else { Ok(all) }
+        ended.map(|()| all)
+    }
+
+    /// Starts what there is room for, and looks at what runs.
+    fn step(
+        &self,
+        waiting: &mut VecDeque<Waiting>,
+        running: &mut Vec<(Waiting, Child)>,
+        all: &mut Vec<Ended>,
+        on_end: &mut dyn FnMut(&Ended),
+    ) -> Result<()> {
+        while running.len() < self.n_processes
+            && let Some(i) = waiting.iter().position(|shard| shard.from <= Instant::now())
+            && let Some(next) = waiting.remove(i)
+        {
+            let child = self.start(next.index)?;
+            running.push((Waiting { n_tries: next.n_tries + 1, ..next }, child));
+        }
+        let mut i = 0;
+        while let Some((shard, child)) = running.get_mut(i) {
+            let Some(status) = child.try_wait().map_err(|cause| Error::io(self.program, cause))? else {
+                i += 1;
+                continue;
+            };
+            let Waiting { index, n_tries, .. } = *shard;
+            running.swap_remove(i);
+            // One that was killed is worth another try as well.
+            if matches!(status.code(), None | Some(75)) && n_tries < self.n_tries {
+                let from = Instant::now() + PAUSE * n_tries as u32;
+                waiting.push_back(Waiting { index, n_tries, from });
+                continue;
+            }
+            let ended = Ended { index, exit_code: status.code(), n_tries };
+            on_end(&ended);
+            all.push(ended);
+        }
+        Ok(())
     }
 
     fn start(&self, index: usize) -> Result<Child> {
         let mut command = Command::new(self.program);
         command.args(&self.arguments).arg(index.to_string()).stdin(Stdio::null()).stdout(Stdio::null());
+        if self.exclusive {
+            command.env(EXCLUSIVE, "1");
+        }
         // A terminal's Ctrl-C would reach them twice, and twice means at once.
         command.process_group(0);
         command.spawn().map_err(|cause| Error::io(self.program, cause))
@@ -85,7 +125,7 @@ impl Pool<'_> {
 }
 
 /// As Ctrl-C does.
-fn ask_to_end(child: &Child) {
+pub(super) fn ask_to_end(child: &Child) {
     // One that has ended meanwhile is waited for all the same.
     let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
 }

@@ -7,10 +7,12 @@ use std::time::Instant;
 use super::attempts::{Event, Log};
 use super::failing::may_pass;
 use super::frames;
-use super::plan::{Plan, Shard};
+use super::plan::{Plan, Shard, Work};
 use super::store::{Manifest, Placed, SCHEMA_VERSION, Standing, Store};
+use super::study;
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
+use crate::io::scene_file::LoadedScene;
 use crate::study::machine;
 
 /// How a shard came to be there.
@@ -42,13 +44,13 @@ pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
     let log = Log::open(folder)?;
     let store = Store::open(folder);
     let begin = Instant::now();
-    let attempt = Attempt { plan: &plan, shard, store: &store, log: &log, how };
-    let ended = attempt.run(begin).or_else(|error| {
+    // A stale plan is refused even where its results are there: they are not of what the files say now.
+    let loaded = plan.scene_as_planned()?;
+    let attempt = Attempt { plan: &plan, loaded: &loaded, shard, store: &store, log: &log, how };
+    let ended = attempt.run(begin).or_else(|error| match store.standing(&plan, shard) {
         // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away what we worked in.
-        match store.standing(&plan, shard) {
-            Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
-            _ => Err(may_pass(error)),
-        }
+        Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
+        _ => Err(may_pass(error)),
     });
     let seconds = begin.elapsed().as_secs_f64();
     let event = match &ended {
@@ -57,15 +59,14 @@ pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
         Ok(Outcome::Beaten) => Event::Beaten { seconds },
         Err(error) => Event::Failed { seconds, exit_code: error.exit_code(), what: error.to_string() },
     };
-    // On a full disk nothing can be written down either, and why the shard failed says more.
-    let logged = log.say(index, &shard.key, event);
-    let outcome = ended?;
-    logged?;
-    Ok(outcome)
+    // On a full disk nothing can be written down either, and a result counts without a line about it.
+    let _ = log.say(index, &shard.key, event);
+    ended
 }
 
 struct Attempt<'a> {
     plan: &'a Plan,
+    loaded: &'a LoadedScene,
     shard: &'a Shard,
     store: &'a Store,
     log: &'a Log,
@@ -74,25 +75,32 @@ struct Attempt<'a> {
 
 impl Attempt<'_> {
     fn run(&self, begin: Instant) -> Result<Outcome> {
-        let Attempt { plan, shard, store, log, .. } = self;
-        // A stale plan is refused even where its results are there: they are not of what the files say now.
-        let loaded = plan.scene_as_planned()?;
+        let Attempt { plan, loaded, shard, store, log, .. } = self;
         let who = format!("{}.{}", log.node, log.pid);
         match store.standing(plan, shard) {
             Standing::Verified(_) => return Ok(Outcome::Skipped),
             Standing::Missing => {}
+            Standing::Unreadable(error) => return Err(error),
             Standing::Broken(what) => {
-                if let Some(to) = store.put_aside(&shard.key, &who)? {
-                    log.say(shard.index, &shard.key, Event::PutAside { what, to: to.display().to_string() })?;
+                if let Some(to) = store.put_aside(plan, shard, &who)? {
+                    let event = Event::PutAside { what, to: to.display().to_string() };
+                    let _ = log.say(shard.index, &shard.key, event);
                 }
             }
         }
         let begun = machine::utc_now();
-        log.say(shard.index, &shard.key, Event::Begun)?;
-        let mut workplace = store.begin(plan, shard, &who)?;
+        // The log tells people; without it work goes on.
+        let _ = log.say(shard.index, &shard.key, Event::Begun);
+        let mut workplace = store.begin(shard, &who)?;
         let choice = DeviceChoice { shaders: plan.scene.shaders.clone(), ..self.how.choice.clone() };
-        let of = (*plan, *shard, &loaded);
-        let device = frames::draw(of, &choice, &mut workplace, self.how.stop, self.how.on_item)?;
+        let stop = self.how.stop;
+        let device = match &plan.work {
+            Work::Frames { .. } => {
+                let of = (*store, *plan, *shard, *loaded);
+                frames::draw(of, &choice, &mut workplace, stop, self.how.on_item)?
+            }
+            Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)?,
+        };
         let (seconds, n_resumed) = (begin.elapsed().as_secs_f64(), workplace.n_resumed);
         let manifest = Manifest {
             schema: SCHEMA_VERSION,
@@ -107,8 +115,9 @@ impl Attempt<'_> {
             begun,
             seconds,
             n_resumed,
+            exclusive: std::env::var_os(study::EXCLUSIVE).is_some_and(|value| value == "1"),
         };
-        workplace.finish(manifest, plan, shard)?;
+        workplace.finish(manifest)?;
         match store.put(workplace, plan, shard, &who)? {
             Placed::First => Ok(Outcome::Done { seconds, n_resumed }),
             Placed::Same => Ok(Outcome::Beaten),

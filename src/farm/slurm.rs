@@ -55,7 +55,11 @@ pub fn submit(folder: &Path, scripts: &Path, indices: &[usize]) -> Result<Submit
     let merge = sbatch(&[&after, "--kill-on-invalid-dep=yes", &merge]).map_err(|error| cancelled(&arrays, error))?;
     let submitted = Submitted { date: machine::utc_now(), arrays, merge };
     let line = serde_json::to_string(&submitted).map_err(|cause| Error::io(folder, cause))?;
-    synced::append(&folder.join(FILE), &line)?;
+    if let Err(error) = synced::append(&folder.join(FILE), &line) {
+        // Jobs that nobody knows of would run all the same.
+        let _ = Command::new("scancel").arg(&submitted.merge).status();
+        return Err(cancelled(&submitted.arrays, error));
+    }
     Ok(submitted)
 }
 
@@ -99,18 +103,18 @@ pub fn submitted(folder: &Path) -> Vec<Submitted> {
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
 }
 
-/// What Slurm does with shards now, such as "RUNNING on n2 (17_3)"; nothing of those it does not know any more, and nothing at all where
-/// it does not answer.
-pub fn states(submitted: &[Submitted]) -> BTreeMap<usize, String> {
+/// What Slurm does with shards now, such as "RUNNING on n2 (17_3)"; nothing of those it does not know any more. None where it does not
+/// answer.
+pub fn states(submitted: &[Submitted]) -> Option<BTreeMap<usize, String>> {
     let arrays: Vec<&Array> = submitted.iter().flat_map(|s| &s.arrays).collect();
     if arrays.is_empty() {
-        return BTreeMap::new();
+        return Some(BTreeMap::new());
     }
-    let ids: Vec<&str> = arrays.iter().map(|array| array.job.as_str()).collect();
     // %F array's id, %K task, %T state, %N node.
-    let output = Command::new("squeue").args(["-h", "-r", "-o", "%F %K %T %N", "-j", &ids.join(",")]).output();
-    let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
-    states_in(&arrays, &text)
+    // All of them: of an id that Slurm has forgotten it says an error.
+    let output = Command::new("squeue").args(["-h", "-r", "-o", "%F %K %T %N", "-n", "nimbus-farm"]).output().ok()?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    output.status.success().then(|| states_in(&arrays, &text))
 }
 
 fn states_in(arrays: &[&Array], queue: &str) -> BTreeMap<usize, String> {

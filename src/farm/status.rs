@@ -51,6 +51,8 @@ pub enum State {
     Done,
     /// Something lies under its name that is no result.
     Broken,
+    /// What lies there could not be read.
+    Unreadable,
     /// The last attempt failed in a way that may pass.
     Transient,
     /// It failed for good.
@@ -66,6 +68,7 @@ impl State {
         match self {
             State::Done => "done",
             State::Broken => "broken",
+            State::Unreadable => "unreadable",
             State::Transient => "transient",
             State::Failed => "failed",
             State::Begun => "begun",
@@ -78,7 +81,7 @@ impl State {
 pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     let (store, attempts) = (Store::open(folder), attempts::read(folder)?);
     let others = store.others();
-    let mut engine = slurm::states(&slurm::submitted(folder));
+    let mut engine = slurm::states(&slurm::submitted(folder)).unwrap_or_default();
     let mut by_key: BTreeMap<&str, Vec<&Attempt>> = BTreeMap::new();
     attempts.iter().for_each(|attempt| by_key.entry(&attempt.key).or_default().push(attempt));
     let mut pairs = Vec::new();
@@ -117,6 +120,7 @@ fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) 
     match (standing, attempts.last().map(|attempt| &attempt.event)) {
         (Standing::Verified(_), _) => (State::Done, None),
         (Standing::Broken(what), _) => (State::Broken, Some(what.clone())),
+        (Standing::Unreadable(error), _) => (State::Unreadable, Some(error.to_string())),
         (_, Some(Event::Failed { exit_code, what, .. })) => {
             let state = if *exit_code == 75 { State::Transient } else { State::Failed };
             (state, Some(what.clone()))

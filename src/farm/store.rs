@@ -19,6 +19,8 @@ use crate::study::machine::{Cpu, Device};
 pub const MANIFEST_FILE: &str = "shard.json";
 /// In a folder that is not finished: a [`FileRecord`] a line, of each file that is.
 const DONE_FILE: &str = "done.jsonl";
+/// And the device that made them.
+const DEVICE_FILE: &str = "device.json";
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// `shard.json`.
@@ -41,6 +43,8 @@ pub struct Manifest {
     pub seconds: f64,
     /// Files that attempts before it had finished.
     pub n_resumed: usize,
+    /// The node is said to have been this run's alone, so that its times are nobody else's as well.
+    pub exclusive: bool,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -58,21 +62,49 @@ impl FileRecord {
     }
 
     /// What is wrong with the file of this name in `folder`.
-    pub fn check(&self, folder: &Path) -> std::result::Result<(), String> {
+    pub fn check(&self, folder: &Path) -> std::result::Result<(), Wrong> {
         let FileRecord { name, bytes, sha256 } = self;
+        let path = folder.join(name);
         // The length first: what was cut off need not be read.
-        let about = fs::symlink_metadata(folder.join(name)).map_err(|cause| format!("{name}: {cause}"))?;
+        let about = fs::symlink_metadata(&path).map_err(|cause| Wrong::of(&path, &cause))?;
         if !about.is_file() || about.len() != *bytes {
-            return Err(format!("{name} has {} bytes, {MANIFEST_FILE} says {bytes}", about.len()));
+            let what = format!("{name} has {} bytes, {MANIFEST_FILE} says {bytes}", about.len());
+            return Err(Wrong::Broken(what));
         }
-        let content = fs::read(folder.join(name)).map_err(|cause| format!("{name}: {cause}"))?;
+        let content = fs::read(&path).map_err(|cause| Wrong::of(&path, &cause))?;
         if FileRecord::of(name, &content) != *self {
-            return Err(format!(
-                "{name} is not what {MANIFEST_FILE} says: its SHA-256 begins otherwise than {}",
-                &sha256[..8.min(sha256.len())]
-            ));
+            let begin: String = sha256.chars().take(8).collect();
+            let what = format!("{name} is not what {MANIFEST_FILE} says: its SHA-256 does not begin with {begin}");
+            return Err(Wrong::Broken(what));
         }
         Ok(())
+    }
+}
+
+/// Why something is no result.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Wrong {
+    /// It was read, and is not what it says; or a part of it is not there.
+    Broken(String),
+    /// It may be one: it could not be read.
+    Unreadable(Error),
+}
+
+impl Wrong {
+    fn of(path: &Path, cause: &io::Error) -> Wrong {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        match cause.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Wrong::Broken(format!("{name}: {cause}")),
+            _ => Wrong::Unreadable(of_io(path, cause)),
+        }
+    }
+
+    /// As the error of whoever needs it.
+    pub fn error(self, folder: &Path) -> Error {
+        match self {
+            Wrong::Broken(what) => Error::Transient { what: format!("{}: {what}", folder.display()) },
+            Wrong::Unreadable(error) => error,
+        }
     }
 }
 
@@ -84,6 +116,8 @@ pub enum Standing {
     Verified(Box<Manifest>),
     /// What is wrong with it.
     Broken(String),
+    /// Nobody knows: it could not be read.
+    Unreadable(Error),
 }
 
 /// How a result found its place.
@@ -114,10 +148,14 @@ impl Store {
         let place = self.place(&shard.key);
         match fs::symlink_metadata(&place) {
             Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Standing::Missing,
-            Err(cause) => return Standing::Broken(cause.to_string()),
+            Err(cause) => return Standing::Unreadable(of_io(&place, &cause)),
             Ok(_) => {}
         }
-        verify(&place, plan, shard).map_or_else(Standing::Broken, |manifest| Standing::Verified(Box::new(manifest)))
+        match verify(&place, plan, shard) {
+            Ok(manifest) => Standing::Verified(Box::new(manifest)),
+            Err(Wrong::Broken(what)) => Standing::Broken(what),
+            Err(Wrong::Unreadable(error)) => Standing::Unreadable(error),
+        }
     }
 
     /// Unfinished folders, and those that were put aside, by key: read at once, since a listing takes as long as there are results.
@@ -135,15 +173,19 @@ impl Store {
         others
     }
 
-    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone.
-    pub fn put_aside(&self, key: &str, who: &str) -> Result<Option<PathBuf>> {
-        let place = self.place(key);
-        let to = self.free(key, Other::Bad, who);
+    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone, or whole: somebody may have mended it since it was
+    /// looked at.
+    pub fn put_aside(&self, plan: &Plan, shard: &Shard, who: &str) -> Result<Option<PathBuf>> {
+        let key = &shard.key;
+        let (place, to) = (self.place(key), self.free(key, Other::Bad, who));
         match fs::rename(&place, &to) {
-            Ok(()) => Ok(Some(to)),
-            Err(cause) if cause.kind() == io::ErrorKind::NotFound => Ok(None),
-            Err(cause) => Err(of_io(&place, &cause)),
+            Ok(()) => {}
+            Err(cause) if cause.kind() == io::ErrorKind::NotFound => return Ok(None),
+            Err(cause) => return Err(of_io(&place, &cause)),
         }
+        // Taken meanwhile by somebody else's, it stays aside.
+        let is_back = verify(&to, plan, shard).is_ok() && fs::rename(&to, &place).is_ok();
+        Ok((!is_back).then_some(to))
     }
 
     /// A name that nobody has.
@@ -154,18 +196,31 @@ impl Store {
         names.find(|path| path.symlink_metadata().is_err()).unwrap_or_else(|| self.folder.join(base))
     }
 
-    /// A folder to work in, with what attempts before finished of `shard`.
-    pub fn begin(&self, plan: &Plan, shard: &Shard, who: &str) -> Result<Workplace> {
+    /// A folder to work in.
+    pub fn begin(&self, shard: &Shard, who: &str) -> Result<Workplace> {
         synced::make_folder(&self.folder)?;
-        let path = self.free(&shard.key, Other::Unfinished, who);
-        fs::create_dir(&path).map_err(|cause| of_io(&path, &cause))?;
-        let mut workplace = Workplace { path, files: BTreeMap::new(), n_resumed: 0 };
+        loop {
+            let path = self.free(&shard.key, Other::Unfinished, who);
+            match fs::create_dir(&path) {
+                Ok(()) => return Ok(Workplace { path, files: BTreeMap::new(), n_resumed: 0 }),
+                // Somebody of the same name, in another container.
+                Err(cause) if cause.kind() == io::ErrorKind::AlreadyExists => {}
+                Err(cause) => return Err(of_io(&path, &cause)),
+            }
+        }
+    }
+
+    /// Takes over what attempts at `shard` before have finished on a device like `device`: another one's pictures differ.
+    pub fn resume(&self, workplace: &mut Workplace, plan: &Plan, shard: &Shard, device: &Device) -> Result<()> {
         let outputs = plan.outputs(shard);
+        let mark = serde_json::to_string(device).map_err(|cause| Error::io(&workplace.path, cause))?;
         for other in self.others().of(&shard.key, Other::Unfinished) {
-            workplace.adopt(other, &outputs)?;
+            if fs::read_to_string(other.join(DEVICE_FILE)).is_ok_and(|of| of == mark) {
+                workplace.adopt(other, &outputs)?;
+            }
         }
         workplace.n_resumed = workplace.files.len();
-        Ok(workplace)
+        synced::write(&workplace.path.join(DEVICE_FILE), mark.as_bytes())
     }
 
     /// Moves a finished folder under its key. What is there already stays, if it is whole: the same is as good, and another is
@@ -177,6 +232,8 @@ impl Store {
         for _ in 0..TRIES {
             match fs::rename(&workplace.path, &place) {
                 Ok(()) => {
+                    // They are no part of a result, and do no harm.
+                    let _ = [DONE_FILE, DEVICE_FILE].map(|name| fs::remove_file(place.join(name)));
                     synced::folder(&self.folder)?;
                     return Ok(Placed::First);
                 }
@@ -185,23 +242,24 @@ impl Store {
             }
             match self.standing(plan, shard) {
                 Standing::Missing => {}
+                Standing::Unreadable(error) => return Err(error),
                 Standing::Broken(_) => {
-                    self.put_aside(&shard.key, who)?;
+                    self.put_aside(plan, shard, who)?;
                 }
-                Standing::Verified(theirs) if theirs.files == workplace.records(plan, shard) => {
+                Standing::Verified(theirs) if !plan.is_exact() || theirs.files == workplace.records() => {
                     let _ = fs::remove_dir_all(&workplace.path);
                     return Ok(Placed::Same);
                 }
-                Standing::Verified(theirs) => return Err(self.contradiction(workplace, &theirs, plan, shard, who)),
+                Standing::Verified(theirs) => return Err(self.contradiction(workplace, &theirs, shard, who)),
             }
         }
         Err(Error::Transient { what: format!("{}: others keep putting results there", place.display()) })
     }
 
-    fn contradiction(&self, ours: Workplace, theirs: &Manifest, plan: &Plan, shard: &Shard, who: &str) -> Error {
+    fn contradiction(&self, ours: Workplace, theirs: &Manifest, shard: &Shard, who: &str) -> Error {
         let kept = self.free(&shard.key, Other::Differing, who);
         let kept = if fs::rename(&ours.path, &kept).is_ok() { kept } else { ours.path.clone() };
-        let ours = ours.records(plan, shard);
+        let ours = ours.records();
         let differing: Vec<&str> =
             ours.iter().zip(&theirs.files).filter(|(a, b)| a != b).map(|(a, _)| a.name.as_str()).collect();
         Error::Conflict {
@@ -261,17 +319,21 @@ fn is_taken(cause: &io::Error) -> bool {
 }
 
 /// That `folder` is a whole result of `shard`; else what is wrong.
-fn verify(folder: &Path, plan: &Plan, shard: &Shard) -> std::result::Result<Manifest, String> {
-    let text = fs::read(folder.join(MANIFEST_FILE)).map_err(|cause| format!("{MANIFEST_FILE}: {cause}"))?;
-    let manifest: Manifest = serde_json::from_slice(&text).map_err(|cause| format!("{MANIFEST_FILE}: {cause}"))?;
+fn verify(folder: &Path, plan: &Plan, shard: &Shard) -> std::result::Result<Manifest, Wrong> {
+    let path = folder.join(MANIFEST_FILE);
+    let broken = |what: String| Err(Wrong::Broken(what));
+    let text = fs::read(&path).map_err(|cause| Wrong::of(&path, &cause))?;
+    let read = serde_json::from_slice(&text);
+    let manifest: Manifest = read.map_err(|cause| Wrong::Broken(format!("{MANIFEST_FILE}: {cause}")))?;
     if manifest.schema != SCHEMA_VERSION {
-        return Err(format!("{MANIFEST_FILE} is of schema {}, expected {SCHEMA_VERSION}", manifest.schema));
+        return broken(format!("{MANIFEST_FILE} is of schema {}, expected {SCHEMA_VERSION}", manifest.schema));
     }
     if (&manifest.key, manifest.index) != (&shard.key, shard.index) {
-        return Err(format!("{MANIFEST_FILE} is of shard {}, key {}", manifest.index, manifest.key));
+        return broken(format!("{MANIFEST_FILE} is of shard {}, key {}", manifest.index, manifest.key));
     }
-    if !manifest.files.iter().map(|file| &file.name).eq(&plan.outputs(shard)) {
-        return Err(format!("{MANIFEST_FILE} names other files than the plan"));
+    let names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
+    if !plan.are_outputs(shard, &names) {
+        return broken(format!("{MANIFEST_FILE} names other files than the plan"));
     }
     manifest.files.iter().try_for_each(|file| file.check(folder))?;
     Ok(manifest)
@@ -297,6 +359,11 @@ impl Workplace {
         self.record(FileRecord::of(name, bytes))
     }
 
+    /// What is in it is not to be gone on with.
+    pub fn disown(&self) {
+        let _ = fs::remove_file(self.path.join(DONE_FILE));
+    }
+
     fn record(&mut self, record: FileRecord) -> Result<()> {
         let line = serde_json::to_string(&record).map_err(|cause| Error::io(&self.path, cause))?;
         synced::append(&self.path.join(DONE_FILE), &line)?;
@@ -315,26 +382,42 @@ impl Workplace {
             }
             let (from, to) = (other.join(&record.name), self.path.join(&record.name));
             // Nobody writes into a finished file, so that one file may be in both; a copy where that cannot be.
-            if fs::hard_link(&from, &to).is_ok() || fs::copy(&from, &to).is_ok() && record.check(&self.path).is_ok() {
+            let copy =
+                || fs::copy(&from, &to).is_ok() && record.check(&self.path).is_ok() && synced::folder(&to).is_ok();
+            if fs::hard_link(&from, &to).is_ok() || copy() {
                 self.record(record)?;
             }
         }
         Ok(())
     }
 
-    fn records(&self, plan: &Plan, shard: &Shard) -> Vec<FileRecord> {
-        plan.outputs(shard).iter().filter_map(|name| self.files.get(name).cloned()).collect()
+    /// By name, which is the order of the plan.
+    fn records(&self) -> Vec<FileRecord> {
+        self.files.values().cloned().collect()
+    }
+
+    /// Where something else is made that [`take`](Workplace::take) takes over.
+    pub fn folder(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Takes over all files of a folder in it.
+    pub fn take(&mut self, folder: &Path) -> Result<()> {
+        let failed = |cause: io::Error| of_io(folder, &cause);
+        for entry in fs::read_dir(folder).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            self.add(&name, &fs::read(entry.path()).map_err(failed)?)?;
+        }
+        fs::remove_dir_all(folder).map_err(failed)
     }
 
     /// Writes `shard.json`: all files are there.
-    pub fn finish(&self, manifest: Manifest, plan: &Plan, shard: &Shard) -> Result<()> {
-        let manifest = Manifest { files: self.records(plan, shard), ..manifest };
+    pub fn finish(&self, manifest: Manifest) -> Result<()> {
+        let manifest = Manifest { files: self.records(), ..manifest };
         let path = self.path.join(MANIFEST_FILE);
         let text = serde_json::to_string_pretty(&manifest).map_err(|cause| Error::io(&path, cause))?;
         synced::write(&path, format!("{text}\n").as_bytes())?;
-        let done = self.path.join(DONE_FILE);
-        // Not there where a shard has no files.
-        let _ = fs::remove_file(&done);
         synced::folder(&self.path)
     }
 }

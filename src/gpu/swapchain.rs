@@ -187,8 +187,9 @@ impl Swapchain {
     pub fn wait(&self) -> Result<()> {
         let Some((done, is_handed_over)) = &self.last else { return Ok(()) };
         done.wait()?;
-        // Nothing is ever sent: the other end goes when it is, or with the thread that did not come to it.
-        let _ = is_handed_over.recv();
+        // Nothing is ever sent: the other end goes when it is, or with the thread that did not come to it. A window system that keeps the
+        // thread is not waited for longer than for an image.
+        let _ = is_handed_over.recv_timeout(PATIENCE);
         Ok(())
     }
 

@@ -14,10 +14,13 @@ pub struct FarmArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum FarmCommand {
-    /// Cut the frames of an animation into shards
+    /// Cut the frames of an animation, or the configurations of an error study, into shards
     #[command(after_help = "An animation on this machine:\n  \
         nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
-        nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames")]
+        nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames\n\n\
+        A study of 60 configurations, as `nimbus error` makes it:\n  \
+        nimbus farm plan scenes/study-cloud.toml -o farm --error -- --grid --knob draw.cutoff=2,2.5,3,3.5,4 \\\n      \
+        --knob lighting.grid=16,24,32,48 --knob lighting.step=1,0.75,0.5")]
     Plan(PlanArgs),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
@@ -55,7 +58,13 @@ pub struct PlanArgs {
     pub output: PathBuf,
     /// Frames: FIRST..END (END is not drawn) or how many from 0 [default: the scene's]
     #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
-    pub frames: Option<FrameSpan>,
+    pub frames: Option<Span>,
+    /// The configurations of an error study in place of frames; what follows "--" is what `nimbus error` takes
+    #[arg(long, conflicts_with_all = ["frames", "shard_frames", "format", "model"])]
+    pub error: bool,
+    /// Configurations of a shard. Each shard times the scene as it stands as well
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
+    pub shard_configurations: u32,
     /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few make it slow,
     /// many lose more when it is killed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -99,11 +108,14 @@ pub struct PlanArgs {
     /// No warnings
     #[arg(short, long)]
     pub quiet: bool,
+    /// Arguments of `nimbus error`, without scene, results and device
+    #[arg(last = true, requires = "error", value_name = "ARGUMENTS")]
+    pub study: Vec<String>,
 }
 
-/// From `first`, `end` not counted.
+/// Frames or configurations from `first`, `end` not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameSpan {
+pub struct Span {
     pub first: u32,
     pub end: u32,
 }
@@ -203,9 +215,12 @@ pub struct MergeArgs {
     /// Folder for the merged result
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
-    /// Replace a folder that is there
+    /// Replace results in a folder that is there; what else lies in it stays
     #[arg(long)]
     pub force: bool,
+    /// Merge frames that several devices or drivers drew, too
+    #[arg(long)]
+    pub mixed: bool,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -279,14 +294,14 @@ pub struct SubmitArgs {
     pub job: JobArgs,
 }
 
-fn parse_span(text: &str) -> Result<FrameSpan, String> {
-    let wrong = || format!("expected FIRST..END such as 0..240, or a number of frames, found \"{text}\"");
+pub(super) fn parse_span(text: &str) -> Result<Span, String> {
+    let wrong = || format!("expected FIRST..END such as 0..240, or how many, found \"{text}\"");
     let number = |t: &str| t.parse::<u32>().map_err(|_| wrong());
     let span = match text.split_once("..") {
-        Some((first, end)) => FrameSpan { first: number(first)?, end: number(end)? },
-        None => FrameSpan { first: 0, end: number(text)? },
+        Some((first, end)) => Span { first: number(first)?, end: number(end)? },
+        None => Span { first: 0, end: number(text)? },
     };
-    if span.first < span.end { Ok(span) } else { Err(format!("{}: there is no frame in it", wrong())) }
+    if span.first < span.end { Ok(span) } else { Err(format!("{}: there is nothing in it", wrong())) }
 }
 
 fn parse_lengths(text: &str) -> Result<(f64, f64), String> {
@@ -303,8 +318,8 @@ mod tests {
 
     #[test]
     fn spans() {
-        assert_eq!(parse_span("3..10"), Ok(FrameSpan { first: 3, end: 10 }));
-        assert_eq!(parse_span("240"), Ok(FrameSpan { first: 0, end: 240 }));
+        assert_eq!(parse_span("3..10"), Ok(Span { first: 3, end: 10 }));
+        assert_eq!(parse_span("240"), Ok(Span { first: 0, end: 240 }));
         for wrong in ["", "0", "5..5", "7..2", "a..3", "1..", "-1..3", "1..99999999999", "1...3"] {
             assert!(parse_span(wrong).is_err(), "{wrong}");
         }

@@ -9,6 +9,7 @@ pub mod errors;
 pub mod files;
 pub mod front;
 pub mod knobs;
+pub mod parts;
 pub mod players;
 pub mod records;
 pub mod run;

@@ -1,5 +1,6 @@
 //! A study from its knobs to its front: configurations are drawn, compared, timed in turn, put together, and placed.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -40,6 +41,8 @@ pub struct StudyPlan {
     pub metric: Metric,
     pub time: Time,
     pub n_rounds: usize,
+    /// Only these of the configurations, and none put together of them.
+    pub part: Option<Range<usize>>,
 }
 
 /// What of a study is there so far.
@@ -91,10 +94,14 @@ impl Setup<'_> {
             }
             subject.add(&scene);
         }
-        let wanted = settings(&self.plan.axes, self.plan.design);
+        let mut wanted = settings(&self.plan.axes, self.plan.design);
+        if let Some(Range { start, end }) = self.plan.part {
+            let end = end.min(wanted.len());
+            wanted = wanted.drain(start.min(end)..end).collect();
+        }
         self.add(subject, found, std::iter::once(Vec::new()).chain(wanted))?;
         let mut is_whole = self.measure(subject, found, on)?;
-        if is_whole && self.plan.design == Design::Alone {
+        if is_whole && self.plan.design == Design::Alone && self.plan.part.is_none() {
             let more = together(&found.configurations, self.plan.metric);
             if self.add(subject, found, more.into_iter())? > 0 {
                 is_whole = self.measure(subject, found, on)?;
@@ -206,14 +213,21 @@ impl Setup<'_> {
     }
 
     fn sum_up(&self, found: &mut Found) {
-        let Found { configurations, turns, .. } = found;
+        found.sum_up(self.plan.time, self.plan.metric);
+    }
+}
+
+impl Found {
+    /// What the turns say of every configuration, and where each lies.
+    pub fn sum_up(&mut self, time: Time, metric: Metric) {
+        let Found { configurations, turns, .. } = self;
         for (i, c) in configurations.iter_mut().enumerate() {
             let [gpu, frame] = [Time::Gpu, Time::Frame].map(|time| timed(turns, i, time));
             c.gpu_ms = gpu.map(|t| t.ms);
             c.frame_ms = frame.map(|t| t.ms);
-            c.by_base = if self.plan.time == Time::Gpu { gpu } else { frame }.map(|t| t.by_base);
+            c.by_base = if time == Time::Gpu { gpu } else { frame }.map(|t| t.by_base);
             c.n_turns = n_turns(turns, i);
         }
-        place(configurations, self.plan.metric);
+        place(configurations, metric);
     }
 }

@@ -53,8 +53,11 @@ fn read(folder: &Path) -> Value {
     serde_json::from_slice(&fs::read(folder.join("study.json")).expect("a study")).expect("JSON")
 }
 
+/// Values, picture, error map.
+type Exact = (Vec<Value>, Vec<u8>, Vec<u8>);
+
 /// What of every configuration follows from it alone, by its name; and its picture. The scene as it stands has turns in every part.
-fn exact(folder: &Path) -> BTreeMap<String, (Vec<Value>, Vec<u8>, Vec<u8>)> {
+fn exact(folder: &Path) -> BTreeMap<String, Exact> {
     let of = |c: &Value| {
         let keys = ["settings", "hash", "error", "failure", "n_turns"];
         let is_base = c["name"] == "as it stands";

@@ -385,6 +385,9 @@ fn a_stale_plan_is_refused() {
     fs::write(&scene, text.replace("[film]", "[film]\nexposure = 0.5")).expect("room");
     let (code, _, said) = farm.ran(0);
     assert!(code == Some(2) && said.contains("stale") && said.contains("has changed since"), "{said}");
+    // Whoever asks later is told why.
+    assert_eq!(farm.state(0), "failed");
+    assert!(farm.status()["shards"][0]["what"].as_str().is_some_and(|what| what.contains("has changed since")));
     let (code, _, said) = ran(&["farm", "local", "--plan", farm.path()]);
     assert!(code == Some(2) && said.contains("stale"), "{said}");
     fs::write(&scene, text).expect("room");

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::failing::of_io;
 use super::plan::{Plan, Work, is_output};
-use super::status::{Status, ranges};
+use super::status::ranges;
 use super::store::{FileRecord, Manifest, Standing, Store};
 use super::study;
 use super::synced;
@@ -20,7 +20,7 @@ pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -
         return Err(Error::io(out, "exists; --force replaces it"));
     }
     let store = Store::open(folder);
-    let parts = verified(folder, plan, &store)?;
+    let parts = verified(plan, &store)?;
     if let Work::Error { .. } = plan.work {
         return study::merge(&parts, out, force);
     }
@@ -60,25 +60,25 @@ fn earlier(out: &Path) -> Vec<String> {
 }
 
 /// Every shard's folder and what is in it, in the plan's order.
-fn verified(folder: &Path, plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Manifest)>> {
-    let mut parts = Vec::new();
+fn verified(plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Manifest)>> {
+    let (mut parts, mut missing, mut broken) = (Vec::new(), Vec::new(), String::new());
     for shard in &plan.shards {
         match store.standing(plan, shard) {
-            Standing::Verified(manifest) => parts.push((store.place(&shard.key), *manifest)),
+            Standing::Verified(manifest) => {
+                parts.push((store.place(&shard.key), *manifest));
+                continue;
+            }
             Standing::Unreadable(error) => return Err(error),
+            Standing::Broken(what) if broken.is_empty() => broken = format!(" (shard {}: {what})", shard.index),
             Standing::Missing | Standing::Broken(_) => {}
         }
+        missing.push(shard.index);
     }
-    if parts.len() == plan.shards.len() {
+    if missing.is_empty() {
         return Ok(parts);
     }
-    let status: Status = super::status::status(folder, plan)?;
-    let (n_done, n) = (status.n_done, plan.shards.len());
-    let broken = status.shards.iter().find(|s| s.state == super::status::State::Broken);
-    let broken = broken.map_or(String::new(), |s| format!(" (shard {}: {})", s.index, s.what.as_deref().unwrap_or("")));
-    Err(Error::Check {
-        what: format!("{n_done} of {n} shards are done, nothing was merged; to do: {}{broken}", status.missing()),
-    })
+    let (n_done, n, to_do) = (parts.len(), plan.shards.len(), ranges(&missing));
+    Err(Error::Check { what: format!("{n_done} of {n} shards are done, nothing was merged; to do: {to_do}{broken}") })
 }
 
 fn copy_all(parts: &[(PathBuf, Vec<FileRecord>)], to: &Path) -> Result<()> {

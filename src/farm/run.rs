@@ -45,12 +45,13 @@ pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
     let store = Store::open(folder);
     let begin = Instant::now();
     // A stale plan is refused even where its results are there: they are not of what the files say now.
-    let loaded = plan.scene_as_planned()?;
-    let attempt = Attempt { plan: &plan, loaded: &loaded, shard, store: &store, log: &log, how };
-    let ended = attempt.run(begin).or_else(|error| match store.standing(&plan, shard) {
-        // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away what we worked in.
-        Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
-        _ => Err(may_pass(error)),
+    let ended = plan.scene_as_planned().and_then(|loaded| {
+        let attempt = Attempt { plan: &plan, loaded: &loaded, shard, store: &store, log: &log, how };
+        attempt.run(begin).or_else(|error| match store.standing(&plan, shard) {
+            // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away what we worked in.
+            Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
+            _ => Err(may_pass(error)),
+        })
     });
     let seconds = begin.elapsed().as_secs_f64();
     let event = match &ended {

@@ -126,7 +126,7 @@ fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3])
         let e = scenery.second(&at, toward, &Accuracy::relative(1e-4));
         assert!(e.error.is_finite() && e.irradiance_error.is_finite(), "{e:?}");
         let by_paths = |at: &Receiver, seed| {
-            let l = scenery.reflections(at, toward, 2, Chance { n_paths, seed })[1];
+            let l = scenery.reflections(at, toward, 2, Chance { n_paths, seed, i_sample: 0 })[1];
             [l.radiance.x, l.error.x]
         };
         let what = format!("room {seed} ({kind:?}), surface {s}, facet {i}");

@@ -53,7 +53,17 @@ impl Scene {
     fn new(width: u32, height: u32) -> Scene {
         let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         let fov_y_rad = 2.0 * 0.5f64.atan();
-        let view = View { width, height, pose, fov_y_rad, near: 0.5, cutoff: 3.0, threshold: 0.0, smallest: 0.0 };
+        let view = View {
+            width,
+            height,
+            pose,
+            fov_y_rad,
+            near: 0.5,
+            cutoff: 3.0,
+            threshold: 0.0,
+            smallest: 0.0,
+            shift: glam::DVec2::ZERO,
+        };
         let group = DrawnRecord { shift: 0, end: u32::MAX, kappa_scale: 1.0, last_weight: 1.0 };
         Scene {
             placed: vec![],

@@ -1,6 +1,6 @@
 //! The f64 reference on hand-worked and published numbers. Rooms small enough are tested in their own file.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use half::f16;
 use nimbus::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, mean_radius};
 use nimbus::model::camera::Pose;
@@ -247,7 +247,17 @@ fn f32_evaluations_stay_within_their_bound() {
 
 fn view(width: u32, height: u32) -> View {
     let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
-    View { width, height, pose, fov_y_rad: FRAC_PI_2, near: 0.1, cutoff: 3.0, threshold: 0.0, smallest: 0.0 }
+    View {
+        width,
+        height,
+        pose,
+        fov_y_rad: FRAC_PI_2,
+        near: 0.1,
+        cutoff: 3.0,
+        threshold: 0.0,
+        smallest: 0.0,
+        shift: DVec2::ZERO,
+    }
 }
 
 /// Blobs before the camera, far to near, and a radiance each.

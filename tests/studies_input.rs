@@ -54,7 +54,7 @@ fn what_cannot_be_studied_is_refused_before_anything_is_done() {
         ),
         (
             &["error", "scene.toml", "--against=reflections=2", "--set", "lighting.mode=\"none\""],
-            "--against reflections=2: nothing reflects where lighting.mode is \"none\"; expected thin, volume or model",
+            "reflections=2: nothing reflects where lighting.mode is \"none\"; expected thin, volume or model",
         ),
         (
             &["error", "scene.toml", "--set", textured],

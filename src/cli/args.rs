@@ -13,6 +13,8 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
+use crate::study::against::Against;
+use crate::study::samples::MOST_SAMPLES;
 pub use farm::{
     CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs, LocalArgs, MergeArgs,
     PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,
@@ -46,7 +48,9 @@ pub enum Command {
     /// With --reference the frame is drawn in f64 on the processor, without a Vulkan device: particles, lighting and
     /// picture from the mathematics (docs/model.md §9) and from no shader. "thin" composes the sprites that nimbus draws,
     /// sorted by exact depth: what differs from it is arithmetic. "volume" integrates light through the overlapping blobs
-    /// themselves, every pixel to about a millionth of the brightest: what differs from it is what sprites leave out.
+    /// themselves, every pixel to about a millionth of the brightest: what differs from it is what sprites leave out. "model"
+    /// lights them by the model itself, and surfaces pixel by pixel; "reflections=K" with as many reflections as K says.
+    /// --samples takes the mean over each pixel's area, and more random paths, in place of what its centre shows.
     Render(RenderArgs),
     /// Time a scene, one thread against two
     Bench(BenchArgs),
@@ -205,10 +209,14 @@ pub struct RenderArgs {
     /// Time in seconds, in place of a frame number
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub time: Option<f64>,
-    /// Draw the f64 reference in place of the device's picture: the same sprites, or the volume they stand for
-    #[arg(long, value_enum, value_name = "WHICH")]
+    /// Draw the f64 reference in place of the device's picture: thin (the same sprites), volume (what they stand for), model, or
+    /// reflections=K
+    #[arg(long, value_name = "WHICH")]
     #[arg(conflicts_with_all = ["device", "shaders", "validation", "no_skip"])]
-    pub reference: Option<ReferenceArg>,
+    pub reference: Option<Against>,
+    /// Samples of every pixel of a reference: the first through its centre, the others spread over it
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "reference", value_parser = parse_samples)]
+    pub samples: u32,
     /// Replace an existing file
     #[arg(long)]
     pub force: bool,
@@ -217,14 +225,6 @@ pub struct RenderArgs {
     pub json: bool,
     #[command(flatten)]
     pub options: SceneArgs,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ReferenceArg {
-    /// Sorted thin sprites, as nimbus draws them
-    Thin,
-    /// The integral over the overlapping blobs
-    Volume,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -360,6 +360,11 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let (w, h) = text.split_once(['x', 'X', '×']).ok_or_else(wrong)?;
     let parse = |t: &str| t.parse::<u32>().ok().filter(|n| (1..=MAX_SIDE).contains(n)).ok_or_else(wrong);
     Ok((parse(w)?, parse(h)?))
+}
+
+fn parse_samples(text: &str) -> Result<u32, String> {
+    let n = text.parse().ok().filter(|n| (1..=MOST_SAMPLES).contains(n));
+    n.ok_or_else(|| format!("expected a number of samples from 1 to {MOST_SAMPLES}, found \"{text}\""))
 }
 
 fn parse_positive(text: &str) -> Result<f64, String> {

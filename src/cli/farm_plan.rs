@@ -39,6 +39,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         shaders: args.shaders.clone(),
         work,
         sizes,
+        counted: Vec::new(),
         predicted_s,
     })?;
     plan.write(&args.output)?;

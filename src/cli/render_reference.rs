@@ -1,10 +1,11 @@
-//! `nimbus render SCENE --reference thin|volume -o FILE`: the frame in f64, without a device.
+//! `nimbus render SCENE --reference WHICH -o FILE`: the frame in f64, without a device.
 
+use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 
-use serde_json::json;
+use serde_json::{Value, json};
 
-use super::args::{ReferenceArg, RenderArgs};
+use super::args::RenderArgs;
 use super::output::{self, LateProgress, Spinner};
 use super::render::{image_hash, not_finite};
 use super::say_sizes;
@@ -12,47 +13,108 @@ use crate::error::Result;
 use crate::io::{atomic, image};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
+use crate::study::against::Against;
 use crate::study::picture::{Drawing, Picture, Work, picture};
+use crate::study::pixels::Pixels;
+use crate::study::samples::{self, Subject};
 
-pub fn run(args: &RenderArgs, reference: ReferenceArg, scene: &Scene, time_s: f64) -> Result<()> {
+/// The picture of `reference`, of so many samples as were asked for.
+pub fn run(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) -> Result<()> {
     // What may take minutes is not begun where it could not be kept.
     atomic::check_place(&args.output)?;
-    let quiet = args.options.quiet;
     if args.options.verbose {
         say_sizes(scene, None);
     }
-    let Picture { rgba, error, brightest, n_particles, cut } = draw(scene, time_s, reference, quiet)?;
-    let rgba: Vec<f32> = rgba.iter().flatten().map(|v| *v as f32).collect();
-    let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
-    if n_bad > 0 && !quiet {
-        // The file has f32, whatever the film's format.
-        eprintln!("warning: {}", not_finite(n_bad, rgba.len(), FilmFormat::Rgba32f));
+    match reference {
+        Against::Thin if args.samples == 1 => centered(args, reference, Drawing::Thin, scene, time_s),
+        Against::Volume if args.samples == 1 => centered(args, reference, Drawing::Volume, scene, time_s),
+        _ => sampled(args, reference, scene, time_s),
     }
-    let film = scene.film;
+}
+
+/// Of one sample, and what of the drawing there is to be said.
+fn centered(args: &RenderArgs, reference: Against, drawing: Drawing, scene: &Scene, time_s: f64) -> Result<()> {
+    let shown = Progress::new(args.options.quiet);
+    let Picture { rgba, error, brightest, n_particles, cut } =
+        picture(scene, time_s, drawing, &|work, n| shown.hear(work, n))?;
+    drop(shown);
     if let Some(error) = error.filter(|_| args.options.verbose) {
         eprintln!("error of the integral: at most about {error:.1e}; the brightest particle has {brightest:.3e}");
     }
-    let share = (reference == ReferenceArg::Thin).then(|| cut.share());
+    let share = (drawing == Drawing::Thin).then(|| cut.share());
     if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_some()) {
         let n = cut.n_layers;
         eprintln!(
             "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most {share:.1e} of the radiances"
         );
     }
+    let more = json!({
+        "particles": n_particles, "error": error, "brightest": brightest,
+        "layers_cut": share.map(|_| cut.n_layers), "cut_changes": share,
+    });
+    write((args, reference), scene, time_s, &rgba, more)
+}
+
+/// Of any number of samples, in the order and with the sums that parts of it have.
+fn sampled(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) -> Result<()> {
+    let (film, never) = (scene.film, AtomicBool::new(false));
+    let pixels = Pixels::all(film.width, film.height);
+    let shown = Progress::new(args.options.quiet);
+    let subject = Subject { of: reference, scene, time_s };
+    let sums = samples::sums(&subject, &pixels, 0..args.samples, &never, &|work, n| shown.hear(work, n))?;
+    drop(shown);
+    let mean = sums.mean();
+    let accuracy = reference.accuracy_of(scene, args.samples);
+    if args.options.verbose {
+        eprintln!("off by about {:.1e} (root mean square of the pixels' estimates; {accuracy})", mean.own_error);
+    }
+    let more = json!({ "samples": args.samples, "own_error": mean.own_error, "accuracy": accuracy });
+    write((args, reference), scene, time_s, &mean.rgba, more)
+}
+
+fn write(
+    (args, reference): (&RenderArgs, Against),
+    scene: &Scene,
+    time_s: f64,
+    rgba: &[[f64; 4]],
+    more: Value,
+) -> Result<()> {
+    let rgba = samples::shown(rgba);
+    let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
+    if n_bad > 0 && !args.options.quiet {
+        // The file has f32, whatever the film's format.
+        eprintln!("warning: {}", not_finite(n_bad, rgba.len(), FilmFormat::Rgba32f));
+    }
+    let film = scene.film;
     image::write(&args.output, &film, film.width, film.height, &rgba)?;
     if !args.json {
         return Ok(());
     }
-    output::text(&format!(
-        "{:#}\n",
-        json!({
-            "file": args.output.display().to_string(), "width": film.width, "height": film.height,
-            "image_hash": image_hash(&rgba), "reference": name(reference),
-            "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad,
-            "particles": n_particles, "error": error, "brightest": brightest,
-            "layers_cut": share.map(|_| cut.n_layers), "cut_changes": share,
-        })
-    ))
+    let mut said = json!({
+        "file": args.output.display().to_string(), "width": film.width, "height": film.height,
+        "image_hash": image_hash(&rgba), "reference": reference.to_string(),
+        "frame": args.time.is_none().then_some(args.frame), "time_s": time_s, "not_finite": n_bad,
+    });
+    if let (Value::Object(said), Value::Object(more)) = (&mut said, more) {
+        said.extend(more);
+    }
+    output::text(&format!("{said:#}\n"))
+}
+
+/// A bar or a spinner for what takes longer than a second; heard from any thread.
+struct Progress {
+    shown: Mutex<Shown>,
+    quiet: bool,
+}
+
+impl Progress {
+    fn new(quiet: bool) -> Progress {
+        Progress { shown: Mutex::new(Shown::spinner(quiet)), quiet }
+    }
+
+    fn hear(&self, work: Work, n: usize) {
+        self.shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, self.quiet);
+    }
 }
 
 /// What a person sees of the work.
@@ -80,6 +142,7 @@ impl Shown {
             let what = match work {
                 Work::Lighting => "lighting",
                 Work::Drawing => "drawing",
+                Work::Sampling => "samples",
             };
             // The line is cleared before another is drawn on it.
             *self = Shown::Nothing;
@@ -93,25 +156,5 @@ impl Shown {
                 *self = Shown::spinner(quiet);
             }
         }
-    }
-}
-
-/// The picture, with a bar or a spinner for what takes longer than a second.
-fn draw(scene: &Scene, time_s: f64, reference: ReferenceArg, quiet: bool) -> Result<Picture> {
-    let shown = Mutex::new(Shown::spinner(quiet));
-    let on_part = |work: Work, n: usize| {
-        shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
-    };
-    let drawing = match reference {
-        ReferenceArg::Thin => Drawing::Thin,
-        ReferenceArg::Volume => Drawing::Volume,
-    };
-    picture(scene, time_s, drawing, &on_part)
-}
-
-fn name(reference: ReferenceArg) -> &'static str {
-    match reference {
-        ReferenceArg::Thin => "thin",
-        ReferenceArg::Volume => "volume",
     }
 }

@@ -115,8 +115,9 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
     let mut set = set.to_vec();
     set.extend([format!("film.width={width}"), format!("film.height={height}")]);
     let work = plan::Work::Frames { first: 0, n, format: PictureFormat::Png };
+    let (scene_file, sizes) = (scene.to_owned(), vec![n]);
     let wish =
-        Wish { scene: scene.to_owned(), set, seed: None, shaders: None, work, sizes: vec![n], predicted_s: None };
+        Wish { scene: scene_file, set, seed: None, shaders: None, work, sizes, counted: vec![], predicted_s: None };
     let plan = Plan::new(wish)?;
     plan.write(&folder.0)?;
     let loaded = plan.scene_as_planned()?;

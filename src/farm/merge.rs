@@ -8,8 +8,8 @@ use super::failing::of_io;
 use super::plan::{Plan, Work, is_output};
 use super::status::ranges;
 use super::store::{FileRecord, Manifest, Standing, Store};
-use super::study;
 use super::synced;
+use super::{reference, study};
 use crate::error::{Error, Result};
 use crate::io::folder::replace_files;
 
@@ -25,6 +25,9 @@ pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -
         return study::merge(&parts, out, force);
     }
     check_devices(&parts, mixed)?;
+    if let Work::Reference(cut) = &plan.work {
+        return reference::merge(plan, cut, &parts, out);
+    }
     let parts: Vec<_> = parts.into_iter().map(|(place, manifest)| (place, manifest.files)).collect();
     let names: Vec<&str> = parts.iter().flat_map(|(_, files)| files).map(|file| file.name.as_str()).collect();
     let earlier = earlier(out);
@@ -48,7 +51,7 @@ fn check_devices(parts: &[(PathBuf, Manifest)], mixed: bool) -> Result<()> {
     }
     let list: String =
         by_device.iter().map(|(name, indices)| format!("\n  {name}: shards {}", ranges(indices))).collect();
-    let what = "frames of several devices are no single machine's";
+    let what = "pictures of several devices are no single machine's";
     Err(Error::Check { what: format!("{what}, --mixed merges them all the same:{list}") })
 }
 

@@ -2,8 +2,8 @@
 //! what makes it safe to start them twice, to kill them or to cut them off is here.
 //!
 //! A [`plan`] says what there is to do, in shards; a [`store`] holds what is done, each result [`verified`](store::Store::standing)
-//! by its content; [`run`] does one shard, [`merge`] puts all together, [`status`] and [`gc`] say and clear away. [`frames`]
-//! and [`study`] are the work itself; [`emit`] and [`slurm`] hand it to engines.
+//! by its content; [`run`] does one shard, [`merge`] puts all together, [`status`] and [`gc`] say and clear away. [`frames`],
+//! [`study`] and [`reference`] are the work itself; [`emit`] and [`slurm`] hand it to engines.
 //!
 //! What that takes is predicted by [`cost`], fitted with [`nnls`]; [`split`] cuts items into shards of such a length, and
 //! [`pack`] says who does which of them, when all is done, and at what price.
@@ -20,6 +20,7 @@ pub mod nnls;
 pub mod pack;
 pub mod plan;
 pub mod pool;
+pub mod reference;
 pub mod run;
 pub mod slurm;
 pub mod split;

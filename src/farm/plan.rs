@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use super::{study, synced};
+use super::{cost, reference, study, synced};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
@@ -61,6 +61,8 @@ pub enum Work {
     Frames { first: u32, n: u32, format: PictureFormat },
     /// An error study's configurations, and what `nimbus error` is told of it.
     Error { arguments: Vec<String>, configurations: Vec<String> },
+    /// A picture in f64, in tiles and ranges of samples.
+    Reference(reference::Cut),
 }
 
 impl Work {
@@ -69,6 +71,7 @@ impl Work {
         match self {
             Work::Frames { first, n, .. } => u64::from(*first)..u64::from(*first) + u64::from(*n),
             Work::Error { configurations, .. } => 0..configurations.len() as u64,
+            Work::Reference(cut) => 0..cut.n_pieces(),
         }
     }
 
@@ -77,6 +80,7 @@ impl Work {
         match self {
             Work::Frames { .. } => "frames",
             Work::Error { .. } => "configurations",
+            Work::Reference(_) => "pieces",
         }
     }
 }
@@ -107,6 +111,9 @@ pub struct Shard {
     /// Its part of the work: frames from `first`.
     pub first: u32,
     pub n: u32,
+    /// What takes time in it, where that is known before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counted: Option<cost::Work>,
     /// What it will take, where the plan was made with a cost model.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predicted_s: Option<f64>,
@@ -128,6 +135,8 @@ pub struct Wish {
     pub work: Work,
     /// Items of a shard, in the work's order: frames. Their sum is the work's.
     pub sizes: Vec<u32>,
+    /// What takes time in each of those; nothing where it is not known.
+    pub counted: Vec<cost::Work>,
     /// What each of those will take, s.
     pub predicted_s: Option<Vec<f64>>,
 }
@@ -136,7 +145,7 @@ impl Plan {
     /// Of what is wished for, by this build, as the files are now.
     pub fn new(wish: Wish) -> Result<Plan> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
-        let Wish { scene, set, seed, shaders, work, sizes, predicted_s } = wish;
+        let Wish { scene, set, seed, shaders, work, sizes, counted, predicted_s } = wish;
         let mut source = SceneSource {
             file: absolute(&scene)?,
             set,
@@ -164,7 +173,8 @@ impl Plan {
         for (index, n) in sizes.into_iter().enumerate() {
             let key = plan.key(first, n);
             let predicted_s = predicted_s.as_ref().and_then(|all| all.get(index).copied());
-            plan.shards.push(Shard { index, key, first, n, predicted_s });
+            let counted = counted.get(index).copied();
+            plan.shards.push(Shard { index, key, first, n, counted, predicted_s });
             first += n;
         }
         Ok(plan)
@@ -176,7 +186,7 @@ impl Plan {
         let work = match &self.work {
             Work::Frames { format, .. } => json!({"kind": "frames", "format": format.extension()}),
             // What the items are called says what they are.
-            work @ Work::Error { .. } => json!(work),
+            work @ (Work::Error { .. } | Work::Reference(_)) => json!(work),
         };
         let of = json!({
             "schema": SCHEMA_VERSION, "scene": hash, "shaders": shaders_hash, "code": self.code, "work": work,
@@ -192,6 +202,7 @@ impl Plan {
         match &self.work {
             Work::Frames { format, .. } => shard.items().map(|i| output(i, *format)).collect(),
             Work::Error { .. } => study::FILES.map(str::to_owned).to_vec(),
+            Work::Reference(_) => vec![reference::SUMS_FILE.to_owned()],
         }
     }
 
@@ -199,14 +210,14 @@ impl Plan {
     pub fn are_outputs(&self, shard: &Shard, names: &[&str]) -> bool {
         let outputs = self.outputs(shard);
         match self.work {
-            Work::Frames { .. } => outputs.iter().eq(names),
+            Work::Frames { .. } | Work::Reference(_) => outputs.iter().eq(names),
             Work::Error { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
         }
     }
 
     /// Whether two results of a shard are the same: pictures are, times are not.
     pub fn is_exact(&self) -> bool {
-        matches!(self.work, Work::Frames { .. })
+        matches!(self.work, Work::Frames { .. } | Work::Reference(_))
     }
 
     pub fn shard(&self, index: usize) -> Result<&Shard> {
@@ -262,6 +273,9 @@ impl Plan {
 
     /// That shards are what their keys say, and together the whole work.
     fn check_shards(&self) -> std::result::Result<(), String> {
+        if let Work::Reference(cut) = &self.work {
+            cut.check()?;
+        }
         let Range { start: mut next, end } = self.work.items();
         for (i, shard) in self.shards.iter().enumerate() {
             if shard.index != i || u64::from(shard.first) != next || shard.n == 0 {
@@ -318,7 +332,11 @@ impl SceneSource {
 
 /// Refuses what cannot be cut: a frame has to follow from its number alone.
 fn check(loaded: &LoadedScene, work: &Work) -> Result<()> {
-    let Work::Frames { first, n, .. } = *work else { return Ok(()) };
+    let (first, n) = match work {
+        Work::Frames { first, n, .. } => (*first, *n),
+        Work::Error { .. } => return Ok(()),
+        Work::Reference(cut) => return reference::check(cut, loaded),
+    };
     if n == 0 || first.checked_add(n).is_none() {
         return Err(Error::usage(format!(
             "--frames: expected at least one, up to {}, found {n} from {first}",
@@ -340,7 +358,16 @@ mod tests {
     fn wish(sizes: &[u32]) -> Wish {
         let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
         let work = Work::Frames { first: 3, n: sizes.iter().sum(), format: PictureFormat::Png };
-        Wish { scene, set: vec![], seed: None, shaders: None, work, sizes: sizes.to_vec(), predicted_s: None }
+        Wish {
+            scene,
+            set: vec![],
+            seed: None,
+            shaders: None,
+            work,
+            sizes: sizes.to_vec(),
+            counted: vec![],
+            predicted_s: None,
+        }
     }
 
     #[test]

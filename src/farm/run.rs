@@ -9,7 +9,7 @@ use super::failing::may_pass;
 use super::frames;
 use super::plan::{Plan, Shard, Work};
 use super::store::{Manifest, Placed, SCHEMA_VERSION, Standing, Store};
-use super::study;
+use super::{reference, study};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
@@ -100,6 +100,7 @@ impl Attempt<'_> {
                 let of = (*store, *plan, *shard, *loaded);
                 frames::draw(of, &choice, &mut workplace, stop, self.how.on_item)?
             }
+            Work::Reference(cut) => reference::draw((cut, *shard, *loaded), &mut workplace, stop, self.how.on_item)?,
             Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)?,
         };
         let (seconds, n_resumed) = (begin.elapsed().as_secs_f64(), workplace.n_resumed);

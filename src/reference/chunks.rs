@@ -53,6 +53,7 @@ mod tests {
         cutoff: 3.0,
         threshold: 0.0,
         smallest: 0.0,
+        shift: glam::DVec2::ZERO,
     };
 
     fn layer(z: f64, tau: f64) -> Blob {

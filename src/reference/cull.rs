@@ -81,6 +81,7 @@ mod tests {
         cutoff: 3.0,
         threshold: 0.0,
         smallest: 0.0,
+        shift: glam::DVec2::ZERO,
     };
 
     fn of(x: f64, y: f64, z: f64, sigma: f64) -> Fate {

@@ -24,6 +24,8 @@ pub struct View {
     pub threshold: f64,
     /// Blobs whose σ is narrower than so many pixels are left out; 0: none.
     pub smallest: f64,
+    /// Where in a pixel its ray goes through: off its centre, to the right and down, pixels within ±½.
+    pub shift: DVec2,
 }
 
 /// How a GPU may depart from the mathematics while drawing.
@@ -109,11 +111,11 @@ impl View {
         (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())
     }
 
-    /// Direction through the centre of pixel (column `i`, row `j` from the top); its view depth is 1.
+    /// Direction through pixel (column `i`, row `j` from the top), at its centre but for `shift`; its view depth is 1.
     pub fn ray(&self, i: u32, j: u32) -> DVec3 {
         let (slope_x, slope_y) = self.half_slopes();
-        let x = 2.0 * (f64::from(i) + 0.5) / f64::from(self.width) - 1.0;
-        let y = 1.0 - 2.0 * (f64::from(j) + 0.5) / f64::from(self.height);
+        let x = 2.0 * (f64::from(i) + 0.5 + self.shift.x) / f64::from(self.width) - 1.0;
+        let y = 1.0 - 2.0 * (f64::from(j) + 0.5 + self.shift.y) / f64::from(self.height);
         self.pose.forward + x * slope_x * self.pose.right + y * slope_y * self.pose.up
     }
 
@@ -134,7 +136,8 @@ impl View {
         let [x, y] = [self.pose.right, self.pose.up].map(|side| blob.slopes(c, [side, self.pose.forward], reach));
         let pixels = |(low, high): (f64, f64), slope: f64, n: u32| {
             let at = |s: f64| 0.5 * (s / slope + 1.0) * f64::from(n);
-            // One pixel to either side for the rounding of the tangents; `as` saturates, and min keeps it inside.
+            // One pixel to either side, of which a shift takes up to half, for the rounding of the tangents; `as` saturates, and min
+            // keeps it inside.
             let from = ((at(low) - 1.0).floor() as u32).min(n);
             (from, ((at(high) + 1.0).ceil() as u32).clamp(from, n))
         };
@@ -259,26 +262,40 @@ pub struct Layers<'a> {
     pub factor: Option<Factor<'a>>,
 }
 
-/// The values of [`render_textured`] at the pixels `at` alone ([column, row], one in each cell of `cell` by `cell`
-/// pixels, rows of cells from the top), over `behind`, one each. `on_row` hears how many rows of cells there are each
-/// time that one more is done.
+/// Pixels one in each cell of a part of a picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Raster<'a> {
+    /// [column, row] of the part's first pixel.
+    pub first: [u32; 2],
+    /// Cells in a row of them.
+    pub n_columns: u32,
+    /// Pixels along a side of a cell.
+    pub cell: u32,
+    /// [column, row] of the picture, rows of cells from the top.
+    pub at: &'a [[u32; 2]],
+}
+
+/// The values of [`render_textured`] at the pixels of `raster` alone, over `behind`, one each. `on_row` hears how many rows of
+/// cells there are each time that one more is done.
 pub fn render_at(
     view: &View,
-    (cell, at): (u32, &[[u32; 2]]),
+    raster: &Raster<'_>,
     behind: &[Behind],
     layers: &Layers<'_>,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<[f64; 4]> {
     let met = |&j: &u32| Some((j as usize, Met::new(view, &layers.blobs[j as usize], &Rounding::NONE)?));
     let met: Vec<(usize, Met)> = layers.order.iter().filter_map(met).collect();
-    let n_columns = view.width.div_ceil(cell) as usize;
+    let Raster { first: [left, top], cell, at, .. } = *raster;
+    let n_columns = raster.n_columns as usize;
     let n_rows = at.len().div_ceil(n_columns.max(1));
     let rows = each(n_rows, |i| {
         let here = i * n_columns..((i + 1) * n_columns).min(at.len());
         let mut pixels: Vec<Layered> = behind[here.clone()].iter().map(Layered::from).collect();
-        let (first, end) = (i as u32 * cell, (i as u32 + 1) * cell);
+        let (first, end) = (top + i as u32 * cell, top + (i as u32 + 1) * cell);
         for (j, met) in met.iter().filter(|(_, met)| met.rows.0 < end && met.rows.1 > first) {
-            let (from, to) = (met.columns.0 / cell, met.columns.1.div_ceil(cell));
+            let [from, to] = [met.columns.0, met.columns.1].map(|column| column.saturating_sub(left));
+            let (from, to) = (from / cell, to.div_ceil(cell));
             for (k, pixel) in pixels.iter_mut().enumerate().take(to as usize).skip(from as usize) {
                 let [column, row] = at[here.start + k];
                 let is_met =
@@ -299,6 +316,35 @@ pub fn render_at(
         pixels
     });
     rows.into_iter().flatten().map(|p| p.value).collect()
+}
+
+/// In how many blobs' rectangles each pixel lies, out to `reach` σ: about how many layers it has.
+pub fn n_layers(view: &View, blobs: &[Blob], reach: f64) -> Vec<u32> {
+    let (width, height) = (view.width as usize, view.height as usize);
+    // Differences along rows and columns, with a place beyond either end.
+    let mut steps = vec![0i64; (width + 1) * (height + 1)];
+    for blob in blobs {
+        let c = blob.position - view.pose.position;
+        if c.dot(view.pose.forward) < view.near {
+            continue;
+        }
+        let [(left, right), (top, bottom)] = view.rectangle(blob, c, reach);
+        for (row, sign) in [(top, 1), (bottom, -1)] {
+            steps[row as usize * (width + 1) + left as usize] += sign;
+            steps[row as usize * (width + 1) + right as usize] -= sign;
+        }
+    }
+    let mut above = vec![0i64; width];
+    let mut counts = Vec::with_capacity(width * height);
+    for row in steps.chunks_exact(width + 1).take(height) {
+        let mut sum = 0;
+        for (above, step) in above.iter_mut().zip(row) {
+            sum += step;
+            *above += sum;
+            counts.push(u32::try_from(*above).unwrap_or(0));
+        }
+    }
+    counts
 }
 
 /// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference of slopes.
@@ -403,7 +449,27 @@ mod tests {
         cutoff: 3.0,
         threshold: 0.0,
         smallest: 0.0,
+        shift: DVec2::ZERO,
     };
+
+    #[test]
+    fn layers_are_counted_where_blobs_lie() {
+        // 9 by 7 pixels; a blob in the middle, one to the lower right, one behind the eye.
+        let view = View { width: 9, height: 7, ..VIEW };
+        let at = |x: f64, y: f64, z: f64| Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma: 0.05, kappa: 1.0 };
+        let blobs = [at(0.0, 0.0, 4.0), at(0.9, -0.9, 4.0), at(0.0, 0.0, -4.0)];
+        let counts = n_layers(&view, &blobs, 3.0);
+        let rectangle = |b: &Blob| view.rectangle(b, b.position, 3.0);
+        for (k, n) in counts.iter().enumerate() {
+            let (i, j) = (k as u32 % 9, k as u32 / 9);
+            let lies = |b: &&Blob| {
+                let [(left, right), (top, bottom)] = rectangle(b);
+                (left..right).contains(&i) && (top..bottom).contains(&j)
+            };
+            assert_eq!(*n as usize, blobs[..2].iter().filter(lies).count(), "{i} {j}");
+        }
+        assert!(counts[3 * 9 + 4] >= 1 && counts[0] == 0 && counts.contains(&2));
+    }
 
     #[test]
     fn what_stands_behind_shows_through_and_hides() {

@@ -60,8 +60,18 @@ pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
 
 /// Picture of `surfaces`; `facets`: the radiance of all their facets, surface after surface.
 pub fn render(view: &View, surfaces: &[Surface], facets: &[DVec3]) -> Vec<Behind> {
-    let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
-    rows.map(|(i, j)| pixel(view, surfaces, facets, view.ray(i, j))).collect()
+    let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| [i, j]));
+    render_at(view, surfaces, facets, rows)
+}
+
+/// The same at some pixels, [column, row].
+pub fn render_at(
+    view: &View,
+    surfaces: &[Surface],
+    facets: &[DVec3],
+    at: impl Iterator<Item = [u32; 2]>,
+) -> Vec<Behind> {
+    at.map(|[i, j]| pixel(view, surfaces, facets, view.ray(i, j))).collect()
 }
 
 /// Which surface is seen along `ray`, and where: the nearest hit, and of equally near ones the last.
@@ -93,6 +103,7 @@ mod tests {
         cutoff: 3.0,
         threshold: 0.0,
         smallest: 0.0,
+        shift: glam::DVec2::ZERO,
     };
 
     /// At depth `z`, facing the eye: u right, v up, 2 wide and high.

@@ -112,7 +112,7 @@ impl Half {
             }
             let half = DVec2::new(view.pixel() * 0.5 * f64::from(size[0]), view.pixel() * 0.5 * f64::from(size[1]));
             let slope = DVec2::new(from_eye.dot(view.pose.right), -from_eye.dot(view.pose.up)) / z;
-            let at = (slope + half) / view.pixel();
+            let at = (slope + half) / view.pixel() - view.shift;
             (low, high) = (low.min(at), high.max(at));
         }
         let range = |low: f64, high: f64, n: u32| {
@@ -164,6 +164,7 @@ mod tests {
             cutoff: 3.0,
             threshold: 0.0,
             smallest: 0.0,
+            shift: DVec2::ZERO,
         }
     }
 

@@ -68,14 +68,15 @@ mod tests {
     use super::*;
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
-    use glam::DVec3;
+    use glam::{DVec2, DVec3};
 
     #[test]
     fn what_lies_between_the_threshold_and_the_cutoff_is_counted() {
         let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         // Three pixels at slopes −1, 0 and 1.
         let (fov_y_rad, smallest) = (2.0 * 0.5f64.atan(), 0.0);
-        let view = View { width: 3, height: 1, pose, fov_y_rad, near: 0.5, cutoff: 3.0, threshold: 0.1, smallest };
+        let (shift, threshold) = (DVec2::ZERO, 0.1);
+        let view = View { width: 3, height: 1, pose, fov_y_rad, near: 0.5, cutoff: 3.0, threshold, smallest, shift };
         // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.
         let blob = |tau: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * 2.0, sigma: 1.0, kappa: tau / SQRT_TAU };
         let of = |blobs: &[Blob], depth: f64| cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None);

@@ -138,8 +138,17 @@ mod tests {
     #[test]
     fn near_to_far_is_the_picture_of_far_to_near() {
         let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
-        let view =
-            View { width: 3, height: 2, pose, fov_y_rad: 1.0, near: 0.5, cutoff: 3.0, threshold: 0.0, smallest: 0.0 };
+        let view = View {
+            width: 3,
+            height: 2,
+            pose,
+            fov_y_rad: 1.0,
+            near: 0.5,
+            cutoff: 3.0,
+            threshold: 0.0,
+            smallest: 0.0,
+            shift: glam::DVec2::ZERO,
+        };
         let at = |x: f64, z: f64, tau: f64| Blob {
             aspect: 1.0,
             position: DVec3::new(x, 0.1, -z),

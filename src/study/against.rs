@@ -8,7 +8,8 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 
-use super::model_light::{Lit, Met, ModelLight, reflections_of};
+use super::model_light::{Doubt, reflections_of, root_mean_square};
+use super::model_picture::of_model;
 use super::picture::{self, Drawing, Listener, Work};
 use super::pixels::Pixels;
 use super::truth::Truth;
@@ -17,10 +18,8 @@ use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
-use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
-use crate::reference::sprites::{self, Behind, Factor, Layers, View};
-use crate::reference::surfaces;
+use crate::reference::sprites::{self, Behind, Factor, Layers, Raster, View};
 use crate::reference::volume::{Pixel, Volume};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,7 +112,7 @@ impl Against {
         picture::check(scene, time_s, drawing)?;
         if matches!(self, Against::Reflections(_)) && scene.lighting.mode == LightingMode::None {
             return Err(Error::usage(format!(
-                "--against {self}: nothing reflects where lighting.mode is \"none\"; expected thin, volume or model"
+                "{self}: nothing reflects where lighting.mode is \"none\"; expected thin, volume or model"
             )));
         }
         Ok(())
@@ -135,7 +134,7 @@ impl Against {
             Against::Thin | Against::Volume => {
                 let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
                 let drawing = if self == Against::Thin { Drawing::Thin } else { Drawing::Volume };
-                of_scene_light(scene, &truth, drawing, pixels, listener)
+                of_scene_light(scene, &truth, drawing, pixels, Sample::CENTER, listener)
             }
             Against::Model => of_model(scene, time_s, None, false, pixels, listener)?,
             Against::Reflections(k) => of_model(scene, time_s, Some(k), false, pixels, listener)?,
@@ -144,13 +143,14 @@ impl Against {
         Ok(Reference {
             rgba: drawn.rgba,
             own_error,
-            accuracy: self.accuracy(scene),
+            accuracy: self.accuracy_of(scene, 1),
             seconds: begin.elapsed().as_secs_f64(),
             pixels_s: drawing_since.get().map_or(0.0, |since| since.elapsed().as_secs_f64()),
         })
     }
 
-    fn accuracy(self, scene: &Scene) -> String {
+    /// What the estimate of its own error is, in words.
+    pub fn accuracy_of(self, scene: &Scene, n_samples: u32) -> String {
         let mut of = vec![match self {
             Against::Thin => "sprites composed in f64: rounding",
             _ => "the volume's quadrature: its error estimate",
@@ -162,22 +162,36 @@ impl Against {
         if k >= 3 {
             of.push("random paths: one standard error");
         }
+        let mean = format!("mean of {n_samples} samples: one standard error, were they random");
+        of.extend((n_samples > 1).then_some(mean.as_str()));
         of.join("; ")
     }
 }
 
-/// A picture at the pixels of a sample.
+/// A picture at some pixels.
 pub(super) struct Drawn {
     pub rgba: Vec<[f64; 4]>,
     /// Estimates of what each may be off.
-    errors: Vec<f64>,
+    pub doubts: Vec<Doubt>,
 }
 
 impl Drawn {
     /// Their root mean square.
     pub fn own_error(&self) -> f64 {
-        root_mean_square(self.errors.iter().copied())
+        root_mean_square(self.doubts.iter().map(|doubt| doubt.sum()))
     }
+}
+
+/// One of several pictures whose mean is meant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Sample {
+    pub i: u32,
+    /// Where in a pixel rays go through, off its centre.
+    pub shift: DVec2,
+}
+
+impl Sample {
+    pub const CENTER: Sample = Sample { i: 0, shift: DVec2::ZERO };
 }
 
 /// Rounding of what is composed in f64, of the greatest value: some thousand layers.
@@ -189,20 +203,22 @@ pub(super) fn of_scene_light(
     truth: &Truth,
     drawing: Drawing,
     pixels: &Pixels,
+    sample: Sample,
     listener: Listener,
 ) -> Drawn {
     let of_light = root_mean_square(truth.second_error.iter().copied());
-    let view = picture::view(scene, truth);
-    let behind = pixels.pick(&picture::behind(scene, truth, &view));
+    let view = View { shift: sample.shift, ..picture::view(scene, truth) };
+    let behind = picture::behind_at(scene, truth, &view, pixels);
+    let of_quadrature = |quadrature: f64| Doubt { quadrature, chance: 0.0 };
     let radiance = truth.particle_radiance(scene);
     if drawing == Drawing::Thin {
         let brightest = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
-        let errors = vec![of_light + ROUNDING * brightest; pixels.at.len()];
-        return Drawn { rgba: thin(scene, truth, &view, (&behind, &radiance), pixels, listener), errors };
+        let doubts = vec![of_quadrature(of_light + ROUNDING * brightest); pixels.at.len()];
+        return Drawn { rgba: thin(scene, truth, &view, (&behind, &radiance), pixels, listener), doubts };
     }
     let found = volume(&Volume::new(&view, &truth.blobs, &radiance), pixels, &behind, listener);
-    let errors = found.iter().map(|p| p.error + of_light).collect();
-    Drawn { rgba: found.into_iter().map(|p| p.color).collect(), errors }
+    let doubts = found.iter().map(|p| of_quadrature(p.error + of_light)).collect();
+    Drawn { rgba: found.into_iter().map(|p| p.color).collect(), doubts }
 }
 
 /// Thin sprites of such radiance at `pixels`, over what is `behind` in each.
@@ -220,112 +236,13 @@ fn thin(
     let factor: Option<Factor> = if textured.is_some() { Some(&factor) } else { None };
     let layers = Layers { blobs: &blobs, radiance, order: &order, factor };
     let on_row = |n: usize| listener(Work::Drawing, n);
-    sprites::render_at(view, (pixels.cell, &pixels.at), behind, &layers, &on_row)
-}
-
-/// `scene` in the model's light, of `n` reflections where they are not the scene's. `by_facet`: surfaces are lit where the scene
-/// has facets, and between them as it is drawn; else at every pixel.
-pub(super) fn of_model(
-    scene: &Scene,
-    time_s: f64,
-    n: Option<u32>,
-    by_facet: bool,
-    pixels: &Pixels,
-    listener: Listener,
-) -> Result<Drawn> {
-    if scene.lighting.mode == LightingMode::None {
-        let truth = Truth::unlit(scene, time_s)?;
-        return Ok(of_scene_light(scene, &truth, Drawing::Volume, pixels, listener));
-    }
-    let truth = Truth::unlit(scene, time_s)?;
-    let view = picture::view(scene, &truth);
-    let met = Met::of(scene, &truth);
-    let light = ModelLight::new(scene, &met, &truth, n);
-    let facets: Vec<(usize, DVec3)> = match by_facet {
-        true => met
-            .surfaces
-            .iter()
-            .enumerate()
-            .flat_map(|(i, s)| (0..s.n_facets() as u32).map(move |k| (i, s.facet_center(k))))
-            .collect(),
-        false => Vec::new(),
-    };
-    let n_lit_pixels = if by_facet { 0 } else { pixels.at.len() };
-    let n_parts = met.n_discs() + facets.len() + n_lit_pixels;
-    let discs = each(met.n_discs(), |i| {
-        let lit = light.of_disc(i);
-        listener(Work::Lighting, n_parts);
-        lit
-    });
-    let lit_facets = each(facets.len(), |k| {
-        let lit = light.of_surface(facets[k].0, facets[k].1, met.n_discs() + k);
-        listener(Work::Lighting, n_parts);
-        lit
-    });
-    let behind = match by_facet {
-        true => between(&view, &met.surfaces, &lit_facets, pixels),
-        false => each(pixels.at.len(), |k| {
-            let seen = seen(&view, &met.surfaces, &light, pixels.at[k], met.n_discs() + k);
-            listener(Work::Lighting, n_parts);
-            seen
-        }),
-    };
-    let (ground, discs) = discs.split_at(met.n_ground());
-    let behind = over(behind, scene, &truth, &view, ground, pixels);
-    let radiance: Vec<DVec3> = discs.iter().map(|lit| lit.radiance).collect();
-    let of_discs = root_mean_square(discs.iter().map(|lit| lit.error));
-    let places: Vec<Behind> = behind.iter().map(|(b, _)| *b).collect();
-    let found = volume(&Volume::new(&view, &truth.blobs, &radiance), pixels, &places, listener);
-    // Of a surface or ground all may show, of particles as much as they hold back.
-    let error = |(p, (behind, e)): (&Pixel, &(Behind, f64))| {
-        let through = if behind.color[3] > 0.0 { 1.0 } else { 0.0 };
-        p.error + e * through + of_discs * p.color[3]
-    };
-    let errors = found.iter().zip(&behind).map(error).collect();
-    Ok(Drawn { rgba: found.into_iter().map(|p| p.color).collect(), errors })
-}
-
-/// The surfaces in the pixels as they are drawn from the light of their facets.
-fn between(view: &View, placed: &[Surface], facets: &[Lit], pixels: &Pixels) -> Vec<(Behind, f64)> {
-    let radiance: Vec<DVec3> = facets.iter().map(|lit| lit.radiance).collect();
-    let error = root_mean_square(facets.iter().map(|lit| lit.error));
-    pixels.pick(&surfaces::render(view, placed, &radiance)).into_iter().map(|behind| (behind, error)).collect()
-}
-
-/// `behind`, and over it what is nearer of the ground, as it is drawn from the light of its points.
-fn over(
-    behind: Vec<(Behind, f64)>,
-    scene: &Scene,
-    truth: &Truth,
-    view: &View,
-    ground: &[Lit],
-    pixels: &Pixels,
-) -> Vec<(Behind, f64)> {
-    if ground.is_empty() {
-        return behind;
-    }
-    let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
-    let error = root_mean_square(ground.iter().map(|lit| lit.error));
-    let mut picture = vec![Behind::NOTHING; view.width as usize * view.height as usize];
-    picture::ground_over(&mut picture, scene, truth.setting.light_origin, view, &radiance);
-    let nearer =
-        |(other, seen): ((Behind, f64), Behind)| if seen.depth < other.0.depth { (seen, error) } else { other };
-    behind.into_iter().zip(pixels.pick(&picture)).map(nearer).collect()
-}
-
-/// The surface in a pixel, and what its radiance may be off; black from behind.
-fn seen(view: &View, placed: &[Surface], light: &ModelLight<'_>, [i, j]: [u32; 2], number: usize) -> (Behind, f64) {
-    let ray = view.ray(i, j);
-    let Some((i_surface, hit)) = surfaces::seen(view, placed, ray) else { return (Behind::NOTHING, 0.0) };
-    let lit = match hit.is_front {
-        true => light.of_surface(i_surface, view.pose.position + hit.depth * ray, number),
-        false => Lit { radiance: DVec3::ZERO, error: 0.0 },
-    };
-    (Behind { color: lit.radiance.extend(1.0).to_array(), depth: hit.depth, ..Behind::NOTHING }, lit.error)
+    let Pixels { tile, cell, ref at, .. } = *pixels;
+    let raster = Raster { first: [tile.left, tile.top], n_columns: pixels.n_columns(), cell, at };
+    sprites::render_at(view, &raster, behind, &layers, &on_row)
 }
 
 /// The volume at `pixels`, whose surfaces are `behind`.
-fn volume(volume: &Volume<'_>, pixels: &Pixels, behind: &[Behind], listener: Listener) -> Vec<Pixel> {
+pub(super) fn volume(volume: &Volume<'_>, pixels: &Pixels, behind: &[Behind], listener: Listener) -> Vec<Pixel> {
     // Pixels of a row share what they look through.
     let mut order: Vec<usize> = (0..pixels.at.len()).collect();
     order.sort_by_key(|&k| pixels.at[k][1]);
@@ -339,11 +256,6 @@ fn volume(volume: &Volume<'_>, pixels: &Pixels, behind: &[Behind], listener: Lis
     let mut found: Vec<(usize, Pixel)> = order.iter().copied().zip(of_rows.into_iter().flatten()).collect();
     found.sort_by_key(|(k, _)| *k);
     found.into_iter().map(|(_, pixel)| pixel).collect()
-}
-
-fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
-    let (n, sum) = values.fold((0u64, 0.0), |(n, sum), v| (n + 1, sum + v * v));
-    if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
 #[cfg(test)]

@@ -79,7 +79,7 @@ pub fn is_same(against: Against, a: &Scene, b: &Scene) -> bool {
 fn hash_of(against: Against, scene: &Scene, time_s: f64, pixels: &Pixels) -> String {
     let mut hasher = Sha256::new();
     let counted = counted(&Against::of_scene(scene), against);
-    let pixels = (pixels.width, pixels.height, pixels.cell);
+    let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
     hasher.update(format!("{}\n{against}\n{:x}\n{pixels:?}\n", env!("NIMBUS_REFERENCE_CODE"), time_s.to_bits()));
     // Shortest digits that read back as the same numbers: two scenes that differ differ here.
     hasher.update(format!("{counted:?}"));

@@ -1,6 +1,8 @@
 //! Light by the model itself, at any point and without what nimbus makes it cheap by: transmittance in closed form, normals
 //! from the blobs' own density, a facet a particle, areas integrated, the BRDF itself, and as many reflections as asked for.
 
+use std::ops::{Add, Mul};
+
 use glam::DVec3;
 
 use super::truth::{Truth, ground};
@@ -29,7 +31,52 @@ pub struct Met {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lit {
     pub radiance: DVec3,
-    pub error: f64,
+    pub doubt: Doubt,
+}
+
+/// What a value may be off, by where that comes from: estimates.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Doubt {
+    /// Of integrals. It is there however often they are done.
+    pub quadrature: f64,
+    /// One standard error of random paths. It falls where several samples are averaged.
+    pub chance: f64,
+}
+
+impl Doubt {
+    pub fn sum(self) -> f64 {
+        self.quadrature + self.chance
+    }
+
+    /// Root mean square of each.
+    pub fn mean(all: impl Iterator<Item = Doubt> + Clone) -> Doubt {
+        Doubt {
+            quadrature: root_mean_square(all.clone().map(|doubt| doubt.quadrature)),
+            chance: root_mean_square(all.map(|doubt| doubt.chance)),
+        }
+    }
+}
+
+impl Add for Doubt {
+    type Output = Doubt;
+
+    fn add(self, other: Doubt) -> Doubt {
+        Doubt { quadrature: self.quadrature + other.quadrature, chance: self.chance + other.chance }
+    }
+}
+
+impl Mul<f64> for Doubt {
+    type Output = Doubt;
+
+    fn mul(self, share: f64) -> Doubt {
+        Doubt { quadrature: share * self.quadrature, chance: share * self.chance }
+    }
+}
+
+/// 0 of nothing.
+pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values.fold((0u64, 0.0), |(n, sum), v| (n + 1, sum + v * v));
+    if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
 /// How exactly the second reflection is integrated: of a light that is a tenth of all a tenth of a thousandth is left, far below
@@ -99,55 +146,58 @@ impl<'a> ModelLight<'a> {
         ModelLight { scenery, eye: met.eye, n_reflections: n_reflections.unwrap_or(reflections_of(scene)) }
     }
 
-    /// Of disc `i`.
-    pub fn of_disc(&self, i: usize) -> Lit {
-        self.of(&self.scenery.on_disc(i), i)
+    /// Whether it has random paths in it, and so differs from sample to sample.
+    pub fn is_random(&self) -> bool {
+        self.n_reflections >= 3
+    }
+
+    /// Of disc `i`, in one of several samples.
+    pub fn of_disc(&self, i: usize, i_sample: u32) -> Lit {
+        self.of(&self.scenery.on_disc(i), [i as u32, i_sample])
     }
 
     /// At a point of a surface's front; `i` tells its random numbers from others'.
-    pub fn of_surface(&self, i_surface: usize, position: DVec3, i: usize) -> Lit {
-        self.of(&self.scenery.on_surface(i_surface, position), i)
+    pub fn of_surface(&self, i_surface: usize, position: DVec3, i: usize, i_sample: u32) -> Lit {
+        self.of(&self.scenery.on_surface(i_surface, position), [i as u32, i_sample])
     }
 
-    fn of(&self, at: &Receiver, i: usize) -> Lit {
+    fn of(&self, at: &Receiver, number: [u32; 2]) -> Lit {
         let toward = (self.eye - at.position).normalize_or(at.normal);
-        let mut lit = Lit { radiance: self.scenery.first(at, toward), error: 0.0 };
+        let mut lit = Lit { radiance: self.scenery.first(at, toward), doubt: Doubt::default() };
         if self.n_reflections >= 2 {
             let second = self.scenery.second(at, toward, &Accuracy::relative(SECOND_ACCURACY));
             lit.radiance += second.radiance;
-            lit.error += second.error;
+            lit.doubt.quadrature += second.error;
         }
-        if self.n_reflections >= 3 {
-            let further = self.further(at, toward, i, PATHS_ACCURACY * lit.radiance.abs().max_element());
-            lit.radiance += further.radiance;
-            lit.error += further.error;
+        if self.is_random() {
+            let (radiance, error) = self.further(at, toward, number, PATHS_ACCURACY * lit.radiance.abs().max_element());
+            lit.radiance += radiance;
+            lit.doubt.chance += error;
         }
         lit
     }
 
-    /// What comes after the second reflection, by random paths, to about `accuracy`. A first batch says how many are needed and
+    /// What comes after the second reflection, by random paths, to about `accuracy`, and its standard error. A first batch says how many are needed and
     /// counts for nothing else: who stops where chance has looked best so far is off to that side.
-    fn further(&self, at: &Receiver, toward: DVec3, i: usize, accuracy: f64) -> Lit {
+    fn further(&self, at: &Receiver, toward: DVec3, [i, i_sample]: [u32; 2], accuracy: f64) -> (DVec3, f64) {
         let k = self.n_reflections as usize;
         let batch = |i_batch: u32| {
-            let seed = (i as u32).wrapping_mul(N_BATCHES + 1).wrapping_add(i_batch);
-            let all = self.scenery.reflections(at, toward, k, Chance { n_paths: N_PATHS, seed });
+            let seed = i.wrapping_mul(N_BATCHES + 1).wrapping_add(i_batch);
+            let all = self.scenery.reflections(at, toward, k, Chance { n_paths: N_PATHS, seed, i_sample });
             let radiance = all[2..k].iter().map(|r| r.radiance).sum::<DVec3>();
             // Of the same paths: errors of one reflection and the next may add up.
-            Lit { radiance, error: all[2..k].iter().map(|r| r.error.max_element()).sum() }
+            (radiance, all[2..k].iter().map(|r| r.error.max_element()).sum::<f64>())
         };
-        let pilot = batch(0);
-        let n = match pilot.error > 0.0 && accuracy > 0.0 {
-            true => {
-                (pilot.error / accuracy).powi(2).ceil().clamp(f64::from(LEAST_BATCHES), f64::from(N_BATCHES)) as u32
-            }
+        let (_, pilot) = batch(0);
+        let n = match pilot > 0.0 && accuracy > 0.0 {
+            true => (pilot / accuracy).powi(2).ceil().clamp(f64::from(LEAST_BATCHES), f64::from(N_BATCHES)) as u32,
             // It met no light, or the same everywhere.
             false => N_BATCHES,
         };
-        let (sum, squares) = (1..=n).map(batch).fold((DVec3::ZERO, 0.0), |(sum, squares), found| {
-            (sum + found.radiance, squares + found.error * found.error)
-        });
-        Lit { radiance: sum / f64::from(n), error: squares.sqrt() / f64::from(n) }
+        let (sum, squares) = (1..=n)
+            .map(batch)
+            .fold((DVec3::ZERO, 0.0), |(sum, squares), found| (sum + found.0, squares + found.1 * found.1));
+        (sum / f64::from(n), squares.sqrt() / f64::from(n))
     }
 }
 

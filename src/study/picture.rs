@@ -3,6 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
+use super::pixels::Pixels;
 use super::truth::Truth;
 use crate::error::{Error, Result};
 use crate::model::cloud::Group;
@@ -33,6 +34,8 @@ pub enum Work {
     Lighting,
     /// The volume, row by row.
     Drawing,
+    /// Whole samples, of several.
+    Sampling,
 }
 
 /// Hears how much of a piece of work there is each time that one more of it is done, from any thread.
@@ -132,11 +135,35 @@ pub(super) fn view(scene: &Scene, truth: &Truth) -> View {
         cutoff: scene.draw.cutoff,
         threshold: scene.draw.threshold.bound(),
         smallest: scene.draw.smallest.bound(),
+        shift: DVec2::ZERO,
     }
 }
 
-/// Surfaces and ground, a pixel each; where nothing is lit they show their materials' K_d, as particles show their colours.
+/// [`behind`] at some pixels.
+pub(super) fn behind_at(scene: &Scene, truth: &Truth, view: &View, pixels: &Pixels) -> Vec<Behind> {
+    let (placed, facets) = facets(scene, truth);
+    if !scene.terrains.is_empty() {
+        return pixels.pick(&behind_from(scene, truth, view, &placed, &facets));
+    }
+    surfaces::render_at(view, &placed, &facets, pixels.at.iter().copied())
+}
+
+/// Surfaces and ground, a pixel each.
 pub(super) fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
+    let (placed, facets) = facets(scene, truth);
+    behind_from(scene, truth, view, &placed, &facets)
+}
+
+fn behind_from(scene: &Scene, truth: &Truth, view: &View, placed: &[Surface], facets: &[DVec3]) -> Vec<Behind> {
+    let (of_surfaces, of_terrains) = facets.split_at(scene.n_surface_facets() as usize);
+    let mut picture = surfaces::render(view, placed, of_surfaces);
+    ground_over(&mut picture, scene, truth.setting.light_origin, view, of_terrains);
+    picture
+}
+
+/// The surfaces relative to the lighting origin, and the radiance of their facets and of the ground's points; where nothing is
+/// lit they show their materials' K_d, as particles show their colours.
+fn facets(scene: &Scene, truth: &Truth) -> (Vec<Surface>, Vec<DVec3>) {
     let origin = truth.setting.light_origin;
     let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
     let placed: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
@@ -149,10 +176,7 @@ pub(super) fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
         }
         _ => (0..scene.n_solid_facets() as usize).map(|i| truth.facet_radiance(i)).collect(),
     };
-    let (of_surfaces, of_terrains) = facets.split_at(scene.n_surface_facets() as usize);
-    let mut picture = surfaces::render(view, &placed, of_surfaces);
-    ground_over(&mut picture, scene, origin, view, of_terrains);
-    picture
+    (placed, facets)
 }
 
 /// Lays over `picture` what is nearer of the scene's ground; `radiance` by the points of all of it.

@@ -5,11 +5,23 @@ use crate::model::philox::{philox4x32_10, uniform};
 /// Second word of the key, so that pixels share no numbers with particles and paths.
 const KEY: u32 = 0x7069_7873;
 
-/// Pixels of a picture, cell by cell, rows of cells from the top.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Pixels {
+/// A rectangle of pixels of a picture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Tile {
+    pub left: u32,
+    pub top: u32,
     pub width: u32,
     pub height: u32,
+}
+
+/// Pixels of a picture, or of a tile of it, cell by cell, rows of cells from the top.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Pixels {
+    /// Of the picture.
+    pub width: u32,
+    pub height: u32,
+    /// What of it they lie in.
+    pub tile: Tile,
     /// Pixels along a side of a cell.
     pub cell: u32,
     /// [column, row], one a cell.
@@ -32,7 +44,14 @@ impl Pixels {
             [within(i, width, words[0]), within(j, height, words[1])]
         };
         let at = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| place(i, j)).collect();
-        Pixels { width, height, cell, at }
+        Pixels { width, height, tile: Tile { left: 0, top: 0, width, height }, cell, at }
+    }
+
+    /// All pixels of `tile`, which lies within the picture.
+    pub fn tile(width: u32, height: u32, tile: Tile) -> Pixels {
+        let Tile { left, top, width: columns, height: rows } = tile;
+        let at = (top..top + rows).flat_map(|j| (left..left + columns).map(move |i| [i, j])).collect();
+        Pixels { width, height, tile, cell: 1, at }
     }
 
     pub fn all(width: u32, height: u32) -> Pixels {
@@ -40,11 +59,11 @@ impl Pixels {
     }
 
     pub fn n_columns(&self) -> u32 {
-        self.width.div_ceil(self.cell)
+        self.tile.width.div_ceil(self.cell)
     }
 
     pub fn n_rows(&self) -> u32 {
-        self.height.div_ceil(self.cell)
+        self.tile.height.div_ceil(self.cell)
     }
 
     /// Place of a pixel in a picture's rows.
@@ -52,12 +71,17 @@ impl Pixels {
         j as usize * self.width as usize + i as usize
     }
 
+    /// Number of pixel `k` where each is to be told from all others: in a whole picture and in its tiles the same.
+    pub fn number(&self, k: usize) -> usize {
+        if self.cell == 1 { self.index(self.at[k]) } else { k }
+    }
+
     /// Their values of a whole picture, row 0 at the top.
     pub fn pick<T: Copy>(&self, whole: &[T]) -> Vec<T> {
         self.at.iter().map(|&at| whole[self.index(at)]).collect()
     }
 
-    /// A whole picture that shows in every cell its pixel's value.
+    /// A whole picture that shows in every cell its pixel's value; of pixels of all of it.
     pub fn spread<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let columns = self.n_columns();
         let of = |i: u32, j: u32| values[((j / self.cell) * columns + i / self.cell) as usize];
@@ -89,7 +113,12 @@ mod tests {
     fn all_of_them_in_order() {
         let pixels = Pixels::all(5, 3);
         let whole: Vec<u32> = (0..15).collect();
-        assert_eq!((pixels.pick(&whole), pixels.spread(&whole)), (whole.clone(), whole));
+        assert_eq!((pixels.pick(&whole), pixels.spread(&whole)), (whole.clone(), whole.clone()));
+        let tile = Tile { left: 3, top: 1, width: 2, height: 2 };
+        let of_tile = Pixels::tile(5, 3, tile);
+        assert_eq!(of_tile.pick(&whole), [8, 9, 13, 14]);
+        assert_eq!((0..4).map(|k| of_tile.number(k)).collect::<Vec<_>>(), [8, 9, 13, 14]);
+        assert_eq!((of_tile.n_columns(), of_tile.n_rows()), (2, 2));
         let pixels = Pixels::sample(4, 4, 4);
         assert_eq!(pixels.spread(&[1, 2, 3, 4])[..6], [1, 1, 2, 2, 1, 1]);
     }

@@ -93,6 +93,7 @@ impl Picture {
             cutoff: 3.0,
             threshold: 0.0,
             smallest: 0.0,
+            shift: DVec2::ZERO,
         };
         Picture {
             camera,

@@ -31,6 +31,8 @@ pub struct Reflected {
 pub struct Chance {
     pub n_paths: u32,
     pub seed: u32,
+    /// Of several samples which one: they share no numbers.
+    pub i_sample: u32,
 }
 
 /// Sums of one job: of every reflection beyond the first, and of all of them together (last).
@@ -48,7 +50,7 @@ impl Scenery<'_> {
             let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); n_more + 1];
             for i_path in paths {
                 let mut all = DVec3::ZERO;
-                let found = self.path(at, toward, n_more, [chance.seed, i_path]);
+                let found = self.path(at, toward, n_more, (chance, i_path));
                 for (sum, l) in sums.iter_mut().zip(found) {
                     *sum = (sum.0 + l, sum.1 + l * l);
                     all += l;
@@ -72,11 +74,12 @@ impl Scenery<'_> {
     }
 
     /// What one path finds at its vertices: the second reflection, the third, …
-    fn path(&self, at: &Receiver, toward: DVec3, n_more: usize, [seed, i_path]: [u32; 2]) -> Vec<DVec3> {
+    fn path(&self, at: &Receiver, toward: DVec3, n_more: usize, (chance, i_path): (Chance, u32)) -> Vec<DVec3> {
         let (mut at, mut toward, mut weight) = (*at, toward, DVec3::ONE);
         let mut found = vec![DVec3::ZERO; n_more];
         for (i, l) in found.iter_mut().enumerate() {
-            let draw = |turn: u32| philox4x32_10([seed, KEY], [i_path, i as u32, turn, 0]).map(uniform);
+            let draw =
+                |turn: u32| philox4x32_10([chance.seed, KEY], [i_path, i as u32, turn, chance.i_sample]).map(uniform);
             let Some((next, direction, w)) = self.step(&at, toward, draw(0), draw(1)) else { break };
             weight *= w;
             *l = weight * self.first(&next, -direction);

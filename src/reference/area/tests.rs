@@ -114,7 +114,7 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
     }
     // Paths drawn by the cosine carry the albedo itself: no chance is left.
     let receiver = s.on_surface(2, faces[2].center + 0.3 * faces[2].u);
-    let found = s.reflections(&receiver, receiver.normal, 5, Chance { n_paths: 2000, seed: 1 });
+    let found = s.reflections(&receiver, receiver.normal, 5, Chance { n_paths: 2000, seed: 1, i_sample: 0 });
     for (k, l) in found[..5].iter().enumerate() {
         assert!((l.radiance.x - 0.7f64.powi(k as i32 + 1)).abs() < 1e-12, "{k} {l:?}");
     }
@@ -132,7 +132,7 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
         let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
         assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
         // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
-        let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 2000, seed: 1 });
+        let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 2000, seed: 1, i_sample: 0 });
         for (l, truth) in found.iter().zip([0.5, 0.35, 0.85]) {
             assert!((l.radiance.x - truth).abs() < 1e-12, "{depth} {l:?}");
         }
@@ -264,7 +264,7 @@ fn quadrature_and_paths_agree_in_random_scenes() {
         for receiver in receivers {
             let toward = (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
             let e = s.second(&receiver, toward, &Accuracy::relative(1e-4));
-            let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 20_000, seed })[1];
+            let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 20_000, seed, i_sample: 0 })[1];
             for c in 0..3 {
                 // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the sample's variance.
                 let (off, sigma) = ((e.radiance[c] - found.radiance[c]).abs(), found.error[c].hypot(e.error) + 5e-5);

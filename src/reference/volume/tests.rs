@@ -18,6 +18,7 @@ fn view(n: u32) -> View {
         cutoff: 9.0,
         threshold: 0.0,
         smallest: 0.0,
+        shift: glam::DVec2::ZERO,
     }
 }
 

@@ -13,8 +13,9 @@ use crate::frame::stage::Bed;
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
 use crate::model::scene::{LightingMode, Scene};
-use crate::study::against::{Against, Drawn, of_model, of_scene_light};
+use crate::study::against::{Against, Drawn, Sample, of_scene_light};
 use crate::study::model_light::reflections_of;
+use crate::study::model_picture::of_model;
 use crate::study::picture::{Drawing, Listener, Work};
 use crate::study::pixels::Pixels;
 use crate::study::provenance::{Figure, Provenance};
@@ -128,7 +129,9 @@ impl Setup<'_> {
             // As it is, it is exact: what it should be is told by the rows below.
             by_device.second_error = Vec::new();
         }
-        let draw = |truth: &Truth, drawing: Drawing| Shown::of(of_scene_light(scene, truth, drawing, pixels, listener));
+        let draw = |truth: &Truth, drawing: Drawing| {
+            Shown::of(of_scene_light(scene, truth, drawing, pixels, Sample::CENTER, listener))
+        };
         chain.add("drawing", words("f32", "f64"), false, draw(&by_device, Drawing::Thin));
         if self.is_stopped() {
             return Ok(());
@@ -152,7 +155,8 @@ impl Setup<'_> {
         listener: Listener,
     ) -> Result<()> {
         let (time_s, pixels) = (self.frames.time_s, self.pixels);
-        let draw = |truth: &Truth| Shown::of(of_scene_light(scene, truth, Drawing::Volume, pixels, listener));
+        let draw =
+            |truth: &Truth| Shown::of(of_scene_light(scene, truth, Drawing::Volume, pixels, Sample::CENTER, listener));
         let first = Truth { second: by_device.second.clone(), second_error: Vec::new(), ..truth.clone() };
         // The reference of surfaces' light knows no density grid.
         let on_both = scene.n_particles() > 0 && !scene.surfaces.is_empty();

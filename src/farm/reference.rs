@@ -1,0 +1,274 @@
+//! The work of shards of a reference picture: sums over a range of samples in a tile, and all of them as the picture that
+//! `nimbus render --reference` makes, to the byte.
+
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::cost::Work as Counted;
+use super::failing::of_io;
+use super::plan::{PictureFormat, Plan, Shard};
+use super::store::{Manifest, Workplace};
+use super::synced;
+use crate::error::{Error, Result};
+use crate::io::folder::replace_files;
+use crate::io::image::{ImageKind, encoded};
+use crate::io::scene_file::LoadedScene;
+use crate::model::scene::{LightingMode, Scene};
+use crate::study::against::Against;
+use crate::study::layers::Layers;
+use crate::study::machine::{self, Device};
+use crate::study::model_light::reflections_of;
+use crate::study::pixels::{Pixels, Tile};
+use crate::study::samples::{self, MOST_SAMPLES, Pairs, Subject, Sums};
+
+/// A shard's file: [`Sums::bytes`] of its pixels.
+pub const SUMS_FILE: &str = "sums.f64";
+/// What the picture is of, and how far it may be off.
+pub const ABOUT_FILE: &str = "reference.json";
+
+/// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k / n_ranges, tiles row by row.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Cut {
+    /// As [`Against`] is written.
+    pub of: String,
+    pub frame: u32,
+    /// Of the picture, pixels.
+    pub width: u32,
+    pub height: u32,
+    /// Of a tile that no edge cuts.
+    pub tile: [u32; 2],
+    pub n_samples: u32,
+    /// Samples of a range: a power of two, so that the sums are those of the whole ([`Pairs`]).
+    pub range: u32,
+    pub format: PictureFormat,
+}
+
+impl Cut {
+    /// What is wrong with it.
+    pub fn check(&self) -> std::result::Result<(), String> {
+        self.of.parse::<Against>()?;
+        let Cut { width, height, tile, n_samples, range, .. } = self;
+        if [*width, *height, tile[0], tile[1]].contains(&0) {
+            return Err("a picture or a tile without pixels".into());
+        }
+        if !(1..=MOST_SAMPLES).contains(n_samples) {
+            return Err(format!("{n_samples} samples, expected 1 to {MOST_SAMPLES}"));
+        }
+        if !range.is_power_of_two() {
+            return Err(format!("ranges of {range} samples, expected a power of two"));
+        }
+        if self.n_pieces() > u64::from(u32::MAX) {
+            return Err(format!("{} pieces, expected fewer, larger ones", self.n_pieces()));
+        }
+        Ok(())
+    }
+
+    fn n_columns(&self) -> u32 {
+        self.width.div_ceil(self.tile[0])
+    }
+
+    fn n_ranges(&self) -> u32 {
+        self.n_samples.div_ceil(self.range)
+    }
+
+    pub fn n_pieces(&self) -> u64 {
+        let n_tiles = u64::from(self.n_columns()) * u64::from(self.height.div_ceil(self.tile[1]));
+        n_tiles * u64::from(self.n_ranges())
+    }
+
+    /// Its part of the picture, and which samples.
+    pub fn piece(&self, k: u32) -> (Tile, Range<u32>) {
+        let (i_tile, i_range) = (k / self.n_ranges(), k % self.n_ranges());
+        let (left, top) = (i_tile % self.n_columns() * self.tile[0], i_tile / self.n_columns() * self.tile[1]);
+        let (width, height) = (self.tile[0].min(self.width - left), self.tile[1].min(self.height - top));
+        let first = i_range * self.range;
+        (Tile { left, top, width, height }, first..self.n_samples.min(first.saturating_add(self.range)))
+    }
+
+    /// The picture's file.
+    pub fn file(&self) -> String {
+        format!("reference.{}", self.format.extension())
+    }
+
+    fn pixels(&self, tile: Tile) -> Pixels {
+        Pixels::tile(self.width, self.height, tile)
+    }
+
+    fn against(&self) -> Result<Against> {
+        self.of.parse().map_err(Error::usage)
+    }
+
+    /// What each piece makes work of.
+    pub fn work(&self, loaded: &LoadedScene) -> Result<Vec<Counted>> {
+        let scene = loaded.clone().at_frame(self.frame);
+        let of = self.against()?;
+        let layers = Layers::of(&scene, scene.time.at(self.frame))?;
+        let n_particles = scene.n_particles() as f64;
+        let by_model = matches!(of, Against::Model | Against::Reflections(_));
+        let n_facets = if by_model { n_particles } else { scene.n_facets() as f64 };
+        let n_reflections = if let Against::Reflections(k) = of { k } else { reflections_of(&scene) };
+        let of_piece = |k: u32| {
+            let (tile, samples) = self.piece(k);
+            let (n, n_lit) = (samples.len() as f64, if n_reflections >= 3 { samples.len() as f64 } else { 1.0 });
+            let (n_layers, n_solid) = (layers.n_within(tile), layers.n_solid_within(tile));
+            let receivers = n_lit * n_facets + if by_model { n * n_solid } else { 0.0 };
+            Counted {
+                particle_steps: n_particles,
+                pixel_samples: n * n_layers,
+                facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_facets },
+            }
+        };
+        Ok((0..self.n_pieces() as u32).map(of_piece).collect())
+    }
+}
+
+/// Refuses what the reference does not know, or does not fit the scene.
+pub fn check(cut: &Cut, loaded: &LoadedScene) -> Result<()> {
+    cut.check().map_err(Error::usage)?;
+    let scene = scene_of(cut, loaded);
+    if (cut.width, cut.height) != (scene.film.width, scene.film.height) {
+        return Err(Error::usage("the picture is not as large as its scene's film"));
+    }
+    cut.against()?.check(&scene, scene.time.at(cut.frame))
+}
+
+fn scene_of(cut: &Cut, loaded: &LoadedScene) -> Scene {
+    loaded.clone().at_frame(cut.frame)
+}
+
+/// Does the piece of `shard`; the device is the processor, whose last digits another kind's mathematics may not share.
+pub fn draw(
+    (cut, shard, loaded): (&Cut, &Shard, &LoadedScene),
+    workplace: &mut Workplace,
+    stop: &AtomicBool,
+    on_piece: &dyn Fn(),
+) -> Result<Device> {
+    let scene = scene_of(cut, loaded);
+    let subject = Subject { of: cut.against()?, scene: &scene, time_s: scene.time.at(cut.frame) };
+    let mut bytes = Vec::new();
+    for k in shard.items() {
+        let (tile, samples) = cut.piece(k);
+        let sums = samples::sums(&subject, &cut.pixels(tile), samples, stop, &|_, _| ())?;
+        bytes.extend(sums.bytes());
+        on_piece();
+    }
+    workplace.add(SUMS_FILE, &bytes)?;
+    Ok(processor())
+}
+
+/// The processor as the device that it is here.
+fn processor() -> Device {
+    Device {
+        name: machine::cpu().model,
+        driver: "f64 on the processor".into(),
+        api: "none".into(),
+        kind: "cpu".into(),
+        uuid: String::new(),
+    }
+}
+
+/// All pieces as the picture, in `out`; how many files.
+pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) -> Result<usize> {
+    let loaded = plan.scene_as_planned()?;
+    let sums = put_together(plan, cut, parts)?;
+    let mean = sums.mean();
+    let (scene, kind) = (scene_of(cut, &loaded), ImageKind::of(Path::new(&cut.file()))?);
+    let rgba = samples::shown(&mean.rgba);
+    let picture = encoded(kind, &scene.film, cut.width, cut.height, &rgba)?;
+    let about = json!({
+        "schema": 1, "reference": cut.of, "frame": cut.frame, "time_s": scene.time.at(cut.frame),
+        "width": cut.width, "height": cut.height, "samples": cut.n_samples, "own_error": mean.own_error,
+        "accuracy": cut.against()?.accuracy_of(&scene, cut.n_samples), "file": cut.file(),
+        "scene_file": plan.scene.file.display().to_string(), "scene_hash": plan.scene.hash, "set": plan.scene.set,
+        "seed": plan.scene.seed, "nimbus": plan.nimbus, "revision": plan.revision, "code": plan.code,
+        "seconds": parts.iter().map(|(_, manifest)| manifest.seconds).sum::<f64>(),
+    });
+    let other = ["reference.png", "reference.exr"].into_iter().find(|name| *name != cut.file());
+    let gone = other.filter(|name| out.join(name).exists());
+    let files: Vec<String> = gone.map(str::to_owned).into_iter().chain([cut.file(), ABOUT_FILE.to_owned()]).collect();
+    replace_files(out, &files.iter().map(String::as_str).collect::<Vec<_>>(), |staged| {
+        synced::write(&staged.join(cut.file()), &picture)?;
+        synced::write(&staged.join(ABOUT_FILE), format!("{about:#}\n").as_bytes())
+    })?;
+    Ok(2)
+}
+
+/// The sums of the whole picture: tiles by copy, ranges of samples by their tree, in the order of their shards.
+fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result<Sums> {
+    let whole = Pixels::all(cut.width, cut.height);
+    let mut values = vec![0.0; samples::N_VALUES * whole.at.len()];
+    let mut pairs = Pairs::default();
+    for (shard, (folder, _)) in plan.shards.iter().zip(parts) {
+        let path = folder.join(SUMS_FILE);
+        let bytes = fs::read(&path).map_err(|cause| of_io(&path, &cause))?;
+        let mut rest = &bytes[..];
+        for k in shard.items() {
+            let (tile, samples) = cut.piece(k);
+            let pixels = cut.pixels(tile);
+            let n_bytes = 8 * samples::N_VALUES * pixels.at.len();
+            let (here, after) = rest.split_at(n_bytes.min(rest.len()));
+            rest = after;
+            let is_last = samples.end == cut.n_samples;
+            let sums = Sums::from_bytes(here, pixels.at.len(), samples.len() as u32);
+            pairs.push(sums.ok_or_else(|| Error::io(&path, "has other numbers than its piece has pixels"))?);
+            if !is_last {
+                continue;
+            }
+            let Some(of_tile) = std::mem::take(&mut pairs).finish() else { continue };
+            for (at, found) in pixels.at.iter().zip(of_tile.values.chunks_exact(samples::N_VALUES)) {
+                values[samples::N_VALUES * whole.index(*at)..][..samples::N_VALUES].copy_from_slice(found);
+            }
+        }
+        if !rest.is_empty() {
+            return Err(Error::io(&path, "has other numbers than its piece has pixels"));
+        }
+    }
+    Ok(Sums { n_samples: cut.n_samples, values })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_cover_every_sample_of_every_pixel_once() {
+        let cut = Cut {
+            of: "thin".into(),
+            frame: 0,
+            width: 10,
+            height: 7,
+            tile: [4, 3],
+            n_samples: 11,
+            range: 4,
+            format: PictureFormat::Exr,
+        };
+        cut.check().unwrap();
+        // 3 by 3 tiles, 3 ranges each.
+        assert_eq!(cut.n_pieces(), 27);
+        let mut counts = vec![0; 10 * 7 * 11];
+        for k in 0..27 {
+            let (tile, samples) = cut.piece(k);
+            for [i, j] in cut.pixels(tile).at {
+                samples.clone().for_each(|s| counts[((j * 10 + i) * 11 + s) as usize] += 1);
+            }
+        }
+        assert!(counts.iter().all(|n| *n == 1));
+        assert_eq!(cut.piece(26), (Tile { left: 8, top: 6, width: 2, height: 1 }, 8..11));
+        let wrong = |change: &dyn Fn(&mut Cut)| {
+            let mut cut = cut.clone();
+            change(&mut cut);
+            cut.check().unwrap_err()
+        };
+        assert!(wrong(&|c| c.range = 3).contains("power of two"));
+        assert!(wrong(&|c| c.range = 0).contains("power of two"));
+        assert!(wrong(&|c| c.tile = [0, 3]).contains("without pixels"));
+        assert!(wrong(&|c| c.n_samples = 0).contains("expected 1 to"));
+        assert!(wrong(&|c| c.of = "thick".into()).contains("expected thin"));
+    }
+}

@@ -1,0 +1,51 @@
+//! How much there is to compose in the parts of a picture: what of it takes time before any of it is drawn.
+
+use super::picture;
+use super::pixels::Tile;
+use super::truth::Truth;
+use crate::error::Result;
+use crate::model::scene::Scene;
+use crate::model::surface::Surface;
+use crate::reference::sprites;
+use crate::reference::surfaces;
+
+/// By pixel.
+pub struct Layers {
+    width: u32,
+    /// Blobs that lie over it.
+    n: Vec<u32>,
+    /// Whether a surface is seen in it.
+    solid: Vec<bool>,
+}
+
+impl Layers {
+    /// Of a scene at one time.
+    pub fn of(scene: &Scene, time_s: f64) -> Result<Layers> {
+        /// Where a blob has lost all but a thousandth: farther out it seldom matters.
+        const REACH: f64 = 4.0;
+        let truth = Truth::unlit(scene, time_s)?;
+        let view = picture::view(scene, &truth);
+        let origin = truth.setting.light_origin;
+        let placed: Vec<Surface> = scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect();
+        let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();
+        let all = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
+        let solid = all.map(|(i, j)| !placed.is_empty() && sees(i, j)).collect();
+        Ok(Layers { width: view.width, n: sprites::n_layers(&view, &truth.blobs, REACH), solid })
+    }
+
+    fn rows<'a, T>(&self, values: &'a [T], tile: Tile) -> impl Iterator<Item = &'a [T]> {
+        let width = self.width as usize;
+        let (left, n) = (tile.left as usize, tile.width as usize);
+        (tile.top..tile.top + tile.height).map(move |j| &values[j as usize * width + left..][..n])
+    }
+
+    /// Layers over the pixels of `tile`, and one a pixel for what is behind them.
+    pub fn n_within(&self, tile: Tile) -> f64 {
+        self.rows(&self.n, tile).flatten().map(|n| 1.0 + f64::from(*n)).sum()
+    }
+
+    /// Pixels of `tile` that see a surface.
+    pub fn n_solid_within(&self, tile: Tile) -> f64 {
+        self.rows(&self.solid, tile).flatten().filter(|solid| **solid).count() as f64
+    }
+}

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use super::{study, synced};
+use super::{bench, study, synced};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
@@ -61,14 +61,17 @@ pub enum Work {
     Frames { first: u32, n: u32, format: PictureFormat },
     /// An error study's configurations, and what `nimbus error` is told of it.
     Error { arguments: Vec<String>, configurations: Vec<String> },
+    /// A sweep's cases, and what `nimbus bench` is told of it.
+    Bench { arguments: Vec<String>, cases: Vec<String> },
 }
 
 impl Work {
-    /// Its items: frames, or configurations from 0.
+    /// Its items: frames, or configurations or cases from 0.
     pub fn items(&self) -> Range<u64> {
         match self {
             Work::Frames { first, n, .. } => u64::from(*first)..u64::from(*first) + u64::from(*n),
             Work::Error { configurations, .. } => 0..configurations.len() as u64,
+            Work::Bench { cases, .. } => 0..cases.len() as u64,
         }
     }
 
@@ -77,6 +80,7 @@ impl Work {
         match self {
             Work::Frames { .. } => "frames",
             Work::Error { .. } => "configurations",
+            Work::Bench { .. } => "cases",
         }
     }
 }
@@ -176,7 +180,7 @@ impl Plan {
         let work = match &self.work {
             Work::Frames { format, .. } => json!({"kind": "frames", "format": format.extension()}),
             // What the items are called says what they are.
-            work @ Work::Error { .. } => json!(work),
+            work @ (Work::Error { .. } | Work::Bench { .. }) => json!(work),
         };
         let of = json!({
             "schema": SCHEMA_VERSION, "scene": hash, "shaders": shaders_hash, "code": self.code, "work": work,
@@ -192,6 +196,7 @@ impl Plan {
         match &self.work {
             Work::Frames { format, .. } => shard.items().map(|i| output(i, *format)).collect(),
             Work::Error { .. } => study::FILES.map(str::to_owned).to_vec(),
+            Work::Bench { .. } => bench::files(shard),
         }
     }
 
@@ -200,7 +205,7 @@ impl Plan {
         let outputs = self.outputs(shard);
         match self.work {
             Work::Frames { .. } => outputs.iter().eq(names),
-            Work::Error { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
+            Work::Error { .. } | Work::Bench { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
         }
     }
 

@@ -257,6 +257,9 @@ pub struct BenchArgs {
     /// Blocks of each loop, in the order A B B A …; with an even number a steady drift cancels
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..))]
     pub repeat: u32,
+    /// Only these of the cases, counted from 0, after the first of all. What the nodes of a farm run (one scene)
+    #[arg(long, value_name = "FIRST..END", value_parser = farm::parse_span, requires = "out", hide_short_help = true)]
+    pub part: Option<Span>,
     /// Folder for run.json, frames.csv and the last frame of every case as a PNG (with several scenes: a folder each in it)
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::ColorChoice;
 
-use super::args::{BenchArgs, ThreadingArg};
+use super::args::{BenchArgs, Span, ThreadingArg};
 use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
 use crate::frame::limits;
@@ -16,6 +16,7 @@ use crate::io::atomic;
 use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Ran};
+use crate::study::bench_parts::numbers;
 use crate::study::beside::Beside;
 use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points, sweep_text};
 use crate::study::machine;
@@ -35,6 +36,9 @@ pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Optio
         if args.scenes.len() > 1 {
             return Err(Error::usage(format!("--trace takes one scene, found {}", args.scenes.len())));
         }
+    }
+    if args.part.is_some() && args.scenes.len() > 1 {
+        return Err(Error::usage(format!("--part takes one scene, found {}", args.scenes.len())));
     }
     // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no folder
     // is made for results that will not come.
@@ -98,7 +102,8 @@ fn prepare(args: &BenchArgs, path: &Path, options: &super::SceneArgs) -> Result<
     let loaded = load(path, options)?;
     let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());
     if axes.is_empty() {
-        return Ok(Prepared { cases: cases(loaded, &[], modes, args.frames, flags), scene_hash, resolved });
+        let cases = of_part(args, cases(loaded, &[], modes, args.frames, flags))?;
+        return Ok(Prepared { cases, scene_hash, resolved });
     }
     let (mut all, mut said) = (Vec::new(), BTreeSet::from_iter(warnings_of(&loaded)));
     for point in points(&axes) {
@@ -116,7 +121,26 @@ fn prepare(args: &BenchArgs, path: &Path, options: &super::SceneArgs) -> Result<
         }
         all.extend(cases(at, &point, modes, args.frames, flags));
     }
-    Ok(Prepared { cases: all, scene_hash, resolved })
+    Ok(Prepared { cases: of_part(args, all)?, scene_hash, resolved })
+}
+
+/// Those of `--part`, after the first of all; all of them without.
+fn of_part(args: &BenchArgs, cases: Vec<Case>) -> Result<Vec<Case>> {
+    let Some(Span { first, end }) = args.part else { return Ok(cases) };
+    let (n, range) = (cases.len(), first as usize..end as usize);
+    if range.end > n {
+        return Err(Error::usage(format!("--part {first}..{end}: expected a part of cases 0..{n}")));
+    }
+    Ok(numbers(&range).into_iter().map(|i| cases[i].clone()).collect())
+}
+
+/// Names of the cases that a bench is asked for, in the order that `--part` counts by.
+pub(super) fn case_names(args: &BenchArgs) -> Result<Vec<String>> {
+    let [scene] = &args.scenes[..] else {
+        return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));
+    };
+    let quiet = super::SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
+    Ok(prepare(args, scene, &quiet)?.cases.iter().map(Case::name).collect())
 }
 
 /// The sweep's keys, each once.
@@ -211,12 +235,13 @@ fn bench_one(
         block_order: outcome.block_order(),
         cases: outcome.cases(&cases, &plan),
         chosen: outcome.chosen.clone(),
+        parts: Vec::new(),
         interrupted: outcome.interrupted || failure.is_some(),
     };
     let rows = if out.is_some() || args.plot { outcome.rows(&cases) } else { vec![] };
     if let Some(dir) = out {
         let charts = if args.plot { bench_plot::files(&run, &rows)? } else { vec![] };
-        let beside = Beside { pictures: outcome.pictures.clone(), charts };
+        let beside = Beside { pictures: outcome.pictures.clone(), charts, ..Beside::default() };
         records::write_results_with(dir, &run, &pass_names(), &rows, &beside)?;
     }
     if !args.json {

@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::args::{FarmArgs, FarmCommand, GcArgs, LocalArgs, MergeArgs, RunArgs, StatusArgs};
-use super::{farm_jobs, farm_plan, output};
+use super::{farm_bench, farm_jobs, farm_plan, output};
 use crate::error::{Error, Result};
 use crate::farm::cost::Compared;
-use crate::farm::plan::Plan;
+use crate::farm::plan::{Plan, Work};
 use crate::farm::pool::{Ended, Pool};
 use crate::farm::run::{How, Outcome};
 use crate::farm::status::{State, Status, status};
@@ -148,7 +148,8 @@ fn merged(args: &MergeArgs) -> Result<()> {
     let spinner = output::spinner("merging", false);
     let n = merge::merge(&args.plan, &plan, &args.output, args.force, args.mixed)?;
     drop(spinner);
-    output::text(&format!("{n} {} in {}\n", plan.work.noun(), args.output.display()))
+    let more = if let Work::Bench { .. } = plan.work { farm_bench::spread(&args.output)? } else { String::new() };
+    output::text(&format!("{n} {} in {}\n{more}", plan.work.noun(), args.output.display()))
 }
 
 fn clear(args: &GcArgs) -> Result<()> {

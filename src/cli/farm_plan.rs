@@ -5,6 +5,7 @@ use std::sync::atomic::AtomicBool;
 use clap::Parser;
 
 use super::args::{Args, CalibrateArgs, Command, ErrorArgs, FormatArg, PlanArgs, Span};
+use super::farm_bench;
 use super::output;
 use super::tradeoff;
 use crate::error::{Error, Result};
@@ -28,7 +29,11 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
     }
-    let Cut { work, sizes, predicted_s } = if args.error { study(args, &set)? } else { frames(args, &loaded)? };
+    let Cut { work, sizes, predicted_s } = match () {
+        () if args.error => study(args, &set)?,
+        () if args.bench => bench(args, &set)?,
+        () => frames(args, &loaded)?,
+    };
     // What is to be said of the price is known to be right before anything is written.
     let packing = predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
     let estimate = packing.map(|packing| estimate(args, &packing)).transpose()?;
@@ -89,7 +94,7 @@ fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
 fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
     let parsed = |more: &[String]| {
         let begin = ["nimbus".into(), "error".into(), args.scene.display().to_string()];
-        match Args::try_parse_from(begin.iter().chain(more).chain(&args.study)) {
+        match Args::try_parse_from(begin.iter().chain(more).chain(&args.told)) {
             Ok(Args { command: Command::Error(of), .. }) => Ok(of),
             Ok(_) => Err(Error::usage("expected arguments of nimbus error after \"--\"")),
             Err(cause) => {
@@ -111,7 +116,14 @@ fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
     let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));
     let configurations = tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
     let sizes = even(configurations.len() as u32, args.shard_configurations);
-    Ok(Cut { work: Work::Error { arguments: args.study.clone(), configurations }, sizes, predicted_s: None })
+    Ok(Cut { work: Work::Error { arguments: args.told.clone(), configurations }, sizes, predicted_s: None })
+}
+
+/// The cases that `nimbus bench` would time, told the same.
+fn bench(args: &PlanArgs, set: &[String]) -> Result<Cut> {
+    let work = farm_bench::work(args, set)?;
+    let sizes = even(work.items().end as u32, args.shard_cases);
+    Ok(Cut { work, sizes, predicted_s: None })
 }
 
 fn even(n: u32, each: u32) -> Vec<u32> {

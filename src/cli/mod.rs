@@ -11,6 +11,7 @@ mod devices;
 #[cfg(feature = "window")]
 mod edit;
 mod farm;
+mod farm_bench;
 mod farm_jobs;
 mod farm_plan;
 mod inspect;

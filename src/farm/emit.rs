@@ -6,8 +6,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::child::EXCLUSIVE;
 use super::status::ranges;
-use super::study::EXCLUSIVE;
 
 /// What the files name.
 #[derive(Debug, Clone)]

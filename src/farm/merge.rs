@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::bench;
 use super::failing::of_io;
 use super::plan::{Plan, Work, is_output};
 use super::status::ranges;
@@ -23,6 +24,9 @@ pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -
     let parts = verified(plan, &store)?;
     if let Work::Error { .. } = plan.work {
         return study::merge(&parts, out, force);
+    }
+    if let Work::Bench { cases, .. } = &plan.work {
+        return bench::merge(plan, cases, &parts, out, force);
     }
     check_devices(&parts, mixed)?;
     if let Work::Reference(cut) = &plan.work {

@@ -3,13 +3,15 @@
 //!
 //! A [`plan`] says what there is to do, in shards; a [`store`] holds what is done, each result [`verified`](store::Store::standing)
 //! by its content; [`run`] does one shard, [`merge`] puts all together, [`status`] and [`gc`] say and clear away. [`frames`],
-//! [`study`] and [`reference`] are the work itself; [`emit`] and [`slurm`] hand it to engines.
+//! [`study`], [`bench`] and [`reference`] are the work itself; [`emit`] and [`slurm`] hand it to engines.
 //!
 //! What that takes is predicted by [`cost`], fitted with [`nnls`]; [`split`] cuts items into shards of such a length, and
 //! [`pack`] says who does which of them, when all is done, and at what price.
 
 pub mod attempts;
+pub mod bench;
 pub mod calibrate;
+pub mod child;
 pub mod cost;
 pub mod emit;
 pub mod failing;

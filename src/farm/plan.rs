@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 use sha2::{Digest, Sha256};
 
-use super::{cost, reference, study, synced};
+use super::{bench, cost, reference, study, synced};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
@@ -61,16 +61,19 @@ pub enum Work {
     Frames { first: u32, n: u32, format: PictureFormat },
     /// An error study's configurations, and what `nimbus error` is told of it.
     Error { arguments: Vec<String>, configurations: Vec<String> },
+    /// A sweep's cases, and what `nimbus bench` is told of it.
+    Bench { arguments: Vec<String>, cases: Vec<String> },
     /// A picture in f64, in tiles and ranges of samples.
     Reference(reference::Cut),
 }
 
 impl Work {
-    /// Its items: frames, or configurations from 0.
+    /// Its items: frames, or configurations or cases from 0.
     pub fn items(&self) -> Range<u64> {
         match self {
             Work::Frames { first, n, .. } => u64::from(*first)..u64::from(*first) + u64::from(*n),
             Work::Error { configurations, .. } => 0..configurations.len() as u64,
+            Work::Bench { cases, .. } => 0..cases.len() as u64,
             Work::Reference(cut) => 0..cut.n_pieces(),
         }
     }
@@ -80,6 +83,7 @@ impl Work {
         match self {
             Work::Frames { .. } => "frames",
             Work::Error { .. } => "configurations",
+            Work::Bench { .. } => "cases",
             Work::Reference(_) => "pieces",
         }
     }
@@ -186,7 +190,7 @@ impl Plan {
         let work = match &self.work {
             Work::Frames { format, .. } => json!({"kind": "frames", "format": format.extension()}),
             // What the items are called says what they are.
-            work @ (Work::Error { .. } | Work::Reference(_)) => json!(work),
+            work @ (Work::Error { .. } | Work::Bench { .. } | Work::Reference(_)) => json!(work),
         };
         let of = json!({
             "schema": SCHEMA_VERSION, "scene": hash, "shaders": shaders_hash, "code": self.code, "work": work,
@@ -202,6 +206,7 @@ impl Plan {
         match &self.work {
             Work::Frames { format, .. } => shard.items().map(|i| output(i, *format)).collect(),
             Work::Error { .. } => study::FILES.map(str::to_owned).to_vec(),
+            Work::Bench { .. } => bench::files(shard),
             Work::Reference(_) => vec![reference::SUMS_FILE.to_owned()],
         }
     }
@@ -211,7 +216,7 @@ impl Plan {
         let outputs = self.outputs(shard);
         match self.work {
             Work::Frames { .. } | Work::Reference(_) => outputs.iter().eq(names),
-            Work::Error { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
+            Work::Error { .. } | Work::Bench { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
         }
     }
 
@@ -334,7 +339,7 @@ impl SceneSource {
 fn check(loaded: &LoadedScene, work: &Work) -> Result<()> {
     let (first, n) = match work {
         Work::Frames { first, n, .. } => (*first, *n),
-        Work::Error { .. } => return Ok(()),
+        Work::Error { .. } | Work::Bench { .. } => return Ok(()),
         Work::Reference(cut) => return reference::check(cut, loaded),
     };
     if n == 0 || first.checked_add(n).is_none() {

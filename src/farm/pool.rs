@@ -7,7 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use super::study::EXCLUSIVE;
+use super::child::EXCLUSIVE;
 use crate::error::{Error, Result};
 
 /// What there is to run.

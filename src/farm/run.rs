@@ -9,7 +9,7 @@ use super::failing::may_pass;
 use super::frames;
 use super::plan::{Plan, Shard, Work};
 use super::store::{Manifest, Placed, SCHEMA_VERSION, Standing, Store};
-use super::{reference, study};
+use super::{bench, child, reference, study};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
@@ -102,6 +102,7 @@ impl Attempt<'_> {
             }
             Work::Reference(cut) => reference::draw((cut, *shard, *loaded), &mut workplace, stop, self.how.on_item)?,
             Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)?,
+            Work::Bench { arguments, .. } => bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)?,
         };
         let (seconds, n_resumed) = (begin.elapsed().as_secs_f64(), workplace.n_resumed);
         let manifest = Manifest {
@@ -117,7 +118,7 @@ impl Attempt<'_> {
             begun,
             seconds,
             n_resumed,
-            exclusive: std::env::var_os(study::EXCLUSIVE).is_some_and(|value| value == "1"),
+            exclusive: std::env::var_os(child::EXCLUSIVE).is_some_and(|value| value == "1"),
         };
         workplace.finish(manifest)?;
         match store.put(workplace, plan, shard, &who)? {

@@ -2,10 +2,10 @@
 
 use std::fs;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::bench::Shown;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::image::write_bytes;
 
@@ -17,6 +17,8 @@ pub struct Beside {
     pub pictures: Vec<Shown>,
     /// File names and SVG documents.
     pub charts: Vec<(String, String)>,
+    /// File names, and the finished pictures that are copied to them.
+    pub copies: Vec<(String, PathBuf)>,
 }
 
 /// The last frame of a case.
@@ -32,12 +34,17 @@ pub fn frames_chart(i: usize, n: usize) -> String {
 impl Beside {
     pub fn names(&self) -> Vec<String> {
         let pictures = self.pictures.iter().map(|p| picture_file(p.i_case));
-        pictures.chain(self.charts.iter().map(|(name, _)| name.clone())).collect()
+        let charts = self.charts.iter().map(|(name, _)| name.clone());
+        pictures.chain(charts).chain(self.copies.iter().map(|(name, _)| name.clone())).collect()
     }
 
     pub fn write(&self, folder: &Path) -> Result<()> {
         for Shown { i_case, width, height, rgb } in &self.pictures {
             write_bytes(&folder.join(picture_file(*i_case)), *width, *height, rgb)?;
+        }
+        for (name, from) in &self.copies {
+            let bytes = fs::read(from).map_err(|cause| Error::io(from, cause))?;
+            write_atomic(&folder.join(name), |file| file.write_all(&bytes))?;
         }
         for (name, text) in &self.charts {
             write_atomic(&folder.join(name), |file| file.write_all(text.as_bytes()))?;

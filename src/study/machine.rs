@@ -31,6 +31,19 @@ pub struct Cpu {
     pub logical_cores: usize,
 }
 
+impl Device {
+    /// All that tells it from another one, in words.
+    pub fn identity(&self) -> String {
+        format!("{} ({}, Vulkan {}, {})", self.name, self.driver, self.api, self.uuid)
+    }
+}
+
+impl Cpu {
+    pub fn identity(&self) -> String {
+        format!("{}, {} cores", self.model, self.logical_cores)
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Clocks {
     pub resolution_ns: f64,

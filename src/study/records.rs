@@ -10,6 +10,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::bench_parts::PartRecord;
 use super::beside::{self, Beside};
 use super::cases::sweep_text;
 use super::counts::Counts;
@@ -53,6 +54,9 @@ pub struct Run {
     /// What each case's "auto" came to, and by what: times and errors at its first frame.
     #[serde(default)]
     pub chosen: Vec<String>,
+    /// What the nodes of a farm timed, part by part; empty where one process ran all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<PartRecord>,
     /// Ctrl-C, or an error, came before the end; what is here was finished.
     pub interrupted: bool,
 }
@@ -232,7 +236,7 @@ pub struct FrameRow {
     pub image_hash: Option<String>,
 }
 
-const FRAME_COLUMNS: [&str; 19] = [
+pub(super) const FRAME_COLUMNS: [&str; 19] = [
     "i_row",
     "phase",
     "sweep",

@@ -74,6 +74,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
             counts: None,
         }],
         chosen: Vec::new(),
+        parts: Vec::new(),
         interrupted: false,
     }
 }

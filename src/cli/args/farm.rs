@@ -14,13 +14,16 @@ pub struct FarmArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum FarmCommand {
-    /// Cut the frames of an animation, or the configurations of an error study, into shards
+    /// Cut the frames of an animation, the configurations of an error study, or the cases of a sweep into shards
     #[command(after_help = "An animation on this machine:\n  \
         nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
         nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames\n\n\
         A study of 60 configurations, as `nimbus error` makes it:\n  \
         nimbus farm plan scenes/study-cloud.toml -o farm --error -- --grid --knob draw.cutoff=2,2.5,3,3.5,4 \\\n      \
-        --knob lighting.grid=16,24,32,48 --knob lighting.step=1,0.75,0.5")]
+        --knob lighting.grid=16,24,32,48 --knob lighting.step=1,0.75,0.5\n\n\
+        A sweep of 12 cases, as `nimbus bench` times it:\n  \
+        nimbus farm plan scenes/cubes-554.toml -o farm --bench --shard-cases 4 -- --repeat 4 \\\n      \
+        --sweep draw.particles=500,5000,50000 --sweep size=400x300,800x600,1024x768,1600x1200")]
     Plan(PlanArgs),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
@@ -60,11 +63,17 @@ pub struct PlanArgs {
     #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
     pub frames: Option<Span>,
     /// The configurations of an error study in place of frames; what follows "--" is what `nimbus error` takes
-    #[arg(long, conflicts_with_all = ["frames", "shard_frames", "format", "model"])]
+    #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format", "model"])]
     pub error: bool,
+    /// The cases of a sweep in place of frames; what follows "--" is what `nimbus bench` takes
+    #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format", "model"])]
+    pub bench: bool,
     /// Configurations of a shard. Each shard times the scene as it stands as well
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_configurations: u32,
+    /// Cases of a shard. Each shard times the first case of all as well
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
+    pub shard_cases: u32,
     /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few make it slow,
     /// many lose more when it is killed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -108,12 +117,12 @@ pub struct PlanArgs {
     /// No warnings
     #[arg(short, long)]
     pub quiet: bool,
-    /// Arguments of `nimbus error`, without scene, results and device
-    #[arg(last = true, requires = "error", value_name = "ARGUMENTS")]
-    pub study: Vec<String>,
+    /// Arguments of `nimbus error` or `nimbus bench`, without scene, results and device
+    #[arg(last = true, requires = "told-more", value_name = "ARGUMENTS")]
+    pub told: Vec<String>,
 }
 
-/// Frames or configurations from `first`, `end` not counted.
+/// Frames, configurations or cases from `first`, `end` not counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Span {
     pub first: u32,

@@ -30,18 +30,13 @@ pub fn differences(parts: &[Part]) -> Vec<String> {
     for part in &parts[1..] {
         let (a, b) = (&first.study, &part.study);
         let (made, other) = (&a.made, &b.made);
-        let device = |study: &Study| {
-            let d = &study.made.device;
-            format!("{} ({}, Vulkan {}, {})", d.name, d.driver, d.api, d.uuid)
-        };
-        let cpu = |study: &Study| format!("{}, {} cores", study.made.cpu.model, study.made.cpu.logical_cores);
         let reference = |study: &Study| study.reference.hash.chars().take(12).collect::<String>();
         let bases = [a, b].map(|study| study.configurations.first().and_then(|c| c.error.map(|e| e.rmse.value)));
         let said = [
             ("build", made.code.clone(), other.code.clone()),
             ("scene", made.scene_hash.clone(), other.scene_hash.clone()),
-            ("device", device(a), device(b)),
-            ("processor", cpu(a), cpu(b)),
+            ("device", made.device.identity(), other.device.identity()),
+            ("processor", made.cpu.identity(), other.cpu.identity()),
             ("environment", format!("{:?}", made.environment), format!("{:?}", other.environment)),
             ("reference", reference(a), reference(b)),
             ("time that decides", a.time.clone(), b.time.clone()),

@@ -7,8 +7,11 @@ use std::sync::atomic::AtomicBool;
 use clap::ColorChoice;
 
 use super::args::{BenchArgs, Span, ThreadingArg};
+use super::farm_cut::Amounts;
 use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
+use crate::farm::calibrate::work_of;
+use crate::farm::cost::Work as Counted;
 use crate::frame::limits;
 use crate::frame::stage::Stage;
 use crate::gpu::ClockFit;
@@ -134,13 +137,21 @@ fn of_part(args: &BenchArgs, cases: Vec<Case>) -> Result<Vec<Case>> {
     Ok(numbers(&range).into_iter().map(|i| cases[i].clone()).collect())
 }
 
-/// Names of the cases that a bench is asked for, in the order that `--part` counts by.
-pub(super) fn case_names(args: &BenchArgs) -> Result<Vec<String>> {
+/// Names of the cases that a bench is asked for, in the order that `--part` counts by; and what each makes work of, the first being
+/// timed in every part.
+pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
     let [scene] = &args.scenes[..] else {
         return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));
     };
     let quiet = super::SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
-    Ok(prepare(args, scene, &quiet)?.cases.iter().map(Case::name).collect())
+    let cases = prepare(args, scene, &quiet)?.cases;
+    let frames =
+        |case: &Case| case.loops.len() as f64 * f64::from(case.n_frames + args.warmup) * f64::from(args.repeat);
+    let counted: Vec<Counted> = cases.iter().map(|case| work_of(&case.scene) * frames(case)).collect();
+    let of_shard = counted.first().copied().unwrap_or_default();
+    // It is an item of the first part as well, and only once in it.
+    let items = std::iter::once(Counted::default()).chain(counted.into_iter().skip(1)).collect();
+    Ok((cases.iter().map(Case::name).collect(), Amounts { items, of_shard }))
 }
 
 /// The sweep's keys, each once.

@@ -7,13 +7,14 @@ use clap::Parser;
 
 use super::args::{Args, BenchArgs, Command, PlanArgs};
 use super::bench;
+use super::farm_cut::Amounts;
 use crate::error::{Error, Result};
 use crate::farm::plan::Work;
 use crate::study::bench_parts::base_spread;
 use crate::study::records::read_run;
 
 /// The cases that `nimbus bench` would time, told the same; `set` is the plan's.
-pub(super) fn work(args: &PlanArgs, set: &[String]) -> Result<Work> {
+pub(super) fn work(args: &PlanArgs, set: &[String]) -> Result<(Work, Amounts)> {
     let BenchArgs { scenes, trace, plot, force, json, part, options, .. } = parsed(args, &[])?;
     let is_out = args.told.iter().any(|word| word == "--out" || word.starts_with("--out="));
     let is_results = is_out || trace.is_some() || plot || force || json || part.is_some() || scenes.len() > 1;
@@ -26,8 +27,8 @@ pub(super) fn work(args: &PlanArgs, set: &[String]) -> Result<Work> {
         ));
     }
     let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));
-    let cases = bench::case_names(&parsed(args, &of_scene.collect::<Vec<_>>())?)?;
-    Ok(Work::Bench { arguments: args.told.clone(), cases })
+    let (cases, amounts) = bench::case_names(&parsed(args, &of_scene.collect::<Vec<_>>())?)?;
+    Ok((Work::Bench { arguments: args.told.clone(), cases }, amounts))
 }
 
 /// What stands after "--", with `more` before it.

@@ -5,12 +5,12 @@ use std::sync::atomic::AtomicBool;
 use clap::Parser;
 
 use super::args::{Args, CalibrateArgs, Command, ErrorArgs, FormatArg, PlanArgs, Span};
-use super::farm_bench;
-use super::output;
-use super::tradeoff;
+use super::farm_cut::{Amounts, Cut, cut};
+use super::{farm_bench, farm_reference, output, tradeoff};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::{Calibration, calibrate, n_runs, work_of_frames};
-use crate::farm::pack::{Packing, Rate, pack, price, split};
+use crate::farm::calibrate::{calibrate, n_runs, of_farms, work_of_frames};
+use crate::farm::cost::Work as Counted;
+use crate::farm::pack::{Packing, Rate, pack, price};
 use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
 use crate::farm::run::How;
 use crate::frame::stage::DeviceChoice;
@@ -19,6 +19,8 @@ use crate::io::scene_file::{self, LoadedScene};
 
 /// Frames of a shard where nothing is known of what they take.
 const USUAL_FRAMES: u32 = 16;
+/// Configurations, or cases.
+const USUAL_CONFIGURATIONS: u32 = 8;
 
 pub fn plan(args: &PlanArgs) -> Result<()> {
     let mut set = args.set.clone();
@@ -29,10 +31,11 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
     }
-    let Cut { work, sizes, predicted_s } = match () {
-        () if args.error => study(args, &set)?,
-        () if args.bench => bench(args, &set)?,
-        () => frames(args, &loaded)?,
+    let Cut { work, sizes, counted, predicted_s } = match args.reference {
+        Some(of) => farm_reference::cut(args, of, &loaded)?,
+        None if args.error => study(args, &set)?,
+        None if args.bench => bench(args, &set)?,
+        None => frames(args, &loaded)?,
     };
     // What is to be said of the price is known to be right before anything is written.
     let packing = predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
@@ -44,7 +47,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         shaders: args.shaders.clone(),
         work,
         sizes,
-        counted: Vec::new(),
+        counted,
         predicted_s,
     })?;
     plan.write(&args.output)?;
@@ -70,24 +73,16 @@ fn whole(loaded: &LoadedScene) -> Span {
     Span { first: 0, end: if loaded.phases.is_empty() { loaded.scene.time.n_frames } else { of_phases } }
 }
 
-struct Cut {
-    work: Work,
-    sizes: Vec<u32>,
-    predicted_s: Option<Vec<f64>>,
-}
-
 fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
     let Span { first, end } = args.frames.unwrap_or_else(|| whole(loaded));
     let n = end - first;
     let format = match args.format {
-        FormatArg::Png => PictureFormat::Png,
-        FormatArg::Exr => PictureFormat::Exr,
+        Some(FormatArg::Exr) => PictureFormat::Exr,
+        Some(FormatArg::Png) | None => PictureFormat::Png,
     };
     let work = Work::Frames { first, n, format };
-    match args.model.as_deref().map(Calibration::read).transpose()? {
-        Some(model) => by_model(args, &model, loaded, work),
-        None => Ok(Cut { work, sizes: even(n, args.shard_frames.unwrap_or(USUAL_FRAMES)), predicted_s: None }),
-    }
+    let amounts = Amounts { items: work_of_frames(loaded, first..end), of_shard: Counted::default() };
+    cut(args, work, &amounts, (args.shard_frames, USUAL_FRAMES))
 }
 
 /// The configurations that `nimbus error` would measure, told the same.
@@ -114,46 +109,15 @@ fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
         ));
     }
     let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));
-    let configurations = tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
-    let sizes = even(configurations.len() as u32, args.shard_configurations);
-    Ok(Cut { work: Work::Error { arguments: args.told.clone(), configurations }, sizes, predicted_s: None })
+    let (configurations, amounts) = tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
+    let work = Work::Error { arguments: args.told.clone(), configurations };
+    cut(args, work, &amounts, (args.shard_configurations, USUAL_CONFIGURATIONS))
 }
 
 /// The cases that `nimbus bench` would time, told the same.
 fn bench(args: &PlanArgs, set: &[String]) -> Result<Cut> {
-    let work = farm_bench::work(args, set)?;
-    let sizes = even(work.items().end as u32, args.shard_cases);
-    Ok(Cut { work, sizes, predicted_s: None })
-}
-
-fn even(n: u32, each: u32) -> Vec<u32> {
-    let rest = n % each;
-    (0..n / each).map(|_| each).chain((rest > 0).then_some(rest)).collect()
-}
-
-fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, work: Work) -> Result<Cut> {
-    let items = work.items();
-    let frames = items.start as u32..items.end as u32;
-    let seconds = |setups: f64, work: &_| {
-        let file = args.model.as_deref().unwrap_or(std::path::Path::new(""));
-        model.fit.model.seconds(setups, work).map_err(|what| Error::io(file, what))
-    };
-    let works = work_of_frames(loaded, frames.clone());
-    let item_s = works.iter().map(|work| seconds(0.0, work)).collect::<Result<Vec<f64>>>()?;
-    let setup_s = seconds(1.0, &Default::default())?;
-    let (least, most) = args.shard_seconds;
-    let sizes: Vec<u32> = match args.shard_frames {
-        Some(each) => even(frames.end - frames.start, each),
-        None => split(&item_s, setup_s, least, most, args.nodes as usize).iter().map(|r| r.len() as u32).collect(),
-    };
-    let mut rest = &item_s[..];
-    let predicted = sizes.iter().map(|n| {
-        let (part, after) = rest.split_at(*n as usize);
-        rest = after;
-        setup_s + part.iter().sum::<f64>()
-    });
-    let predicted_s = Some(predicted.collect());
-    Ok(Cut { work, sizes, predicted_s })
+    let (work, amounts) = farm_bench::work(args, set)?;
+    cut(args, work, &amounts, (args.shard_cases, USUAL_CONFIGURATIONS))
 }
 
 /// What all of it takes and costs, in words.
@@ -185,6 +149,10 @@ fn duration(seconds: f64) -> String {
     }
 }
 
+fn runs(n: usize) -> String {
+    if n == 1 { "1 run".to_owned() } else { format!("{n} runs") }
+}
+
 pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
     atomic::check_place(&args.output)?;
     super::refuse_existing(&args.output, args.force)?;
@@ -192,7 +160,10 @@ pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
     let n_frames = n_runs(args.scenes.len()) as u64 * u64::from(args.frames + 1) / 2;
     let bar = output::progress(n_frames, "frames", args.quiet);
     let how = How { choice: &choice, stop, on_item: &|| bar.inc(1) };
-    let found = calibrate(&args.scenes, &args.set, args.frames, &how);
+    let found = match &args.farm[..] {
+        [] => calibrate(&args.scenes, &args.set, args.frames, &how),
+        farms => of_farms(farms),
+    };
     bar.finish_and_clear();
     let found = found?;
     found.write(&args.output)?;
@@ -200,13 +171,13 @@ pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
         return output::object(&found);
     }
     let (fit, percent) = (&found.fit, |share: f64| format!("{:.0} %", 100.0 * share));
-    let mut text = format!("{} ({}), {} runs\n", found.device.name, found.cpu.model, fit.n);
+    let mut text = format!("{} of {}, {} ({})\n", runs(fit.n), found.of, found.device.name, found.cpu.model);
     let model = fit.model;
     for (name, each_s) in [
         ("set-up", model.setup_s),
-        ("a particle and frame", model.particle_step_s),
-        ("a pixel and frame", model.pixel_sample_s),
-        ("a pair of facets and frame", model.facet_pair_s),
+        ("a particle and step", model.particle_step_s),
+        ("a pixel and sample", model.pixel_sample_s),
+        ("a pair of facets", model.facet_pair_s),
     ] {
         let each = each_s.map_or("not measured".to_owned(), |s| format!("{s:.3e} s"));
         text += &format!("{name:>28}: {each}\n");

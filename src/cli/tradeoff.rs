@@ -9,9 +9,11 @@ use clap::ColorChoice;
 use indicatif::ProgressBar;
 
 use super::args::{ErrorArgs, MetricArg, TimeArg};
+use super::farm_cut::Amounts;
 use super::render_reference::Shown;
 use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
+use crate::farm::calibrate::work_of;
 use crate::frame::limits;
 use crate::frame::stage::Bed;
 use crate::io::image;
@@ -30,10 +32,10 @@ use crate::study::tradeoff::design::{Design, name_of, settings};
 use crate::study::tradeoff::files;
 use crate::study::tradeoff::front::{Metric, best_within_error, best_within_ms};
 use crate::study::tradeoff::knobs::default_axes;
-use crate::study::tradeoff::players::{Frames, Players};
+use crate::study::tradeoff::players::{Frames, Players, frames_of_turns};
 use crate::study::tradeoff::records::{Configuration, SCHEMA_VERSION, Study};
 use crate::study::tradeoff::run::{Event, Found, Loaded, Setup, StudyPlan};
-use crate::study::tradeoff::turns::Time;
+use crate::study::tradeoff::turns::{BETWEEN, Time};
 
 /// `graceful`: set once there is something to keep on Ctrl-C.
 pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
@@ -132,8 +134,9 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     output::text(&format!("\n{}", chart.text(output::columns(), chart.rows(), output::colored(color))?))
 }
 
-/// Names of the configurations that a study is asked for, without the scene as it stands; in the order that `--part` counts by.
-pub(super) fn configurations(args: &ErrorArgs) -> Result<Vec<String>> {
+/// Names of the configurations that a study is asked for, without the scene as it stands, in the order that `--part` counts by; and
+/// what each makes work of, the scene as it stands being timed beside them.
+pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)> {
     let options = plain(args)?;
     let scene = load(&args.scene, &options)?.at_frame(args.frame);
     super::check_time(&scene, scene.time.at(args.frame))?;
@@ -141,7 +144,15 @@ pub(super) fn configurations(args: &ErrorArgs) -> Result<Vec<String>> {
     check_values(args, &options, &axes, &scene.film)?;
     args.against.check(&scene, scene.time.at(args.frame))?;
     let design = if args.grid { Design::Grid } else { Design::Alone };
-    Ok(settings(&axes, design).iter().map(|settings| name_of(settings)).collect())
+    let all = settings(&axes, design);
+    let frames = f64::from(frames_of_turns(args.rounds, args.frames));
+    let turns_beside = f64::from(frames_of_turns(args.rounds, args.frames)) / BETWEEN as f64;
+    let base = work_of(&scene);
+    let of_one = |settings: &Vec<Setting>| {
+        load_with(args, &options, settings).map(|of| work_of(&of.scene) * frames + base * turns_beside)
+    };
+    let amounts = Amounts { items: all.iter().map(of_one).collect::<Result<_>>()?, of_shard: base * frames };
+    Ok((all.iter().map(|settings| name_of(settings)).collect(), amounts))
 }
 
 /// The options, with every cloud plain where that is asked for.

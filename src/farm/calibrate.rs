@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::cost::{Fit, Timed, Work as Counted, fit};
 use super::plan::{self, PictureFormat, Plan, Wish};
 use super::run::{self, How};
-use super::store::{Standing, Store};
+use super::store::{Manifest, Standing, Store};
 use super::synced;
 use crate::error::{Error, Result};
 use crate::io::scene_file::{self, LoadedScene};
@@ -33,6 +33,8 @@ pub struct Calibration {
     pub device: Device,
     pub cpu: Cpu,
     pub environment: BTreeMap<String, String>,
+    /// [`plan::Work::kind`] of what was timed: other work takes other times.
+    pub of: String,
     pub fit: Fit,
     pub rows: Vec<Row>,
 }
@@ -41,10 +43,8 @@ pub struct Calibration {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    pub scene: PathBuf,
-    pub width: u32,
-    pub height: u32,
-    pub frames: u32,
+    /// Its scene, and what of it was done.
+    pub what: String,
     pub timed: Timed,
 }
 
@@ -95,6 +95,54 @@ pub fn calibrate(scenes: &[PathBuf], set: &[String], frames: u32, how: &How<'_>)
         }
     }
     let Some(device) = device else { return Err(Error::usage("no scene to calibrate by")) };
+    let of = plan::Work::Frames { first: 0, n: 1, format: PictureFormat::Png }.kind();
+    fitted(of, rows, (device, machine::cpu(), machine::environment()))
+}
+
+/// Fits the model to farms that are done: to every shard of which it is known what takes time in it, and that one run did from
+/// its beginning to its end.
+pub fn of_farms(folders: &[PathBuf]) -> Result<Calibration> {
+    let (mut rows, mut class): (_, Option<(String, Device, Cpu, _)>) = (Vec::new(), None);
+    for folder in folders {
+        let plan = Plan::read(folder)?;
+        let (store, scene) = (Store::open(folder), plan.scene.file.display());
+        for shard in &plan.shards {
+            let (Some(work), Standing::Verified(manifest)) = (shard.counted, store.standing(&plan, shard)) else {
+                continue;
+            };
+            let Manifest { device, cpu, environment, seconds, n_resumed, .. } = *manifest;
+            let of = plan.work.kind();
+            let (kind, first, processor, _) =
+                class.get_or_insert_with(|| (of.clone(), device.clone(), cpu.clone(), environment));
+            let is_one = (&*kind, &first.name, &first.driver, &processor.model);
+            if is_one != (&of, &device.name, &device.driver, &cpu.model) {
+                return Err(Error::usage(format!(
+                    "{}: shard {} is {of} on {} with {}; expected what the others are, {kind} on {} with {}",
+                    folder.display(),
+                    shard.index,
+                    device.name,
+                    cpu.model,
+                    first.name,
+                    processor.model
+                )));
+            }
+            if n_resumed == 0 {
+                let what = format!("{scene}, {} {:?}", plan.work.noun(), shard.items());
+                rows.push(Row { what, timed: Timed { setups: 1.0, work, seconds } });
+            }
+        }
+    }
+    let Some((of, device, cpu, environment)) = class else {
+        return Err(Error::usage("no shard of these farms is done of which it is known what takes time in it"));
+    };
+    fitted(of, rows, (device, cpu, environment))
+}
+
+fn fitted(
+    of: String,
+    rows: Vec<Row>,
+    (device, cpu, environment): (Device, Cpu, BTreeMap<String, String>),
+) -> Result<Calibration> {
     let all: Vec<Timed> = rows.iter().map(|row| row.timed).collect();
     Ok(Calibration {
         schema: SCHEMA_VERSION,
@@ -102,8 +150,9 @@ pub fn calibrate(scenes: &[PathBuf], set: &[String], frames: u32, how: &How<'_>)
         revision: machine::revision().into(),
         date: machine::utc_now(),
         device,
-        cpu: machine::cpu(),
-        environment: machine::environment(),
+        cpu,
+        environment,
+        of,
         fit: fit(&all).map_err(Error::usage)?,
         rows,
     })
@@ -130,7 +179,8 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
         other => return Err(Error::Fault { what: format!("a shard that was just done is not there: {other:?}") }),
     };
     let timed = Timed { setups: 1.0, work, seconds };
-    Ok((Row { scene: scene.to_owned(), width, height, frames: n, timed }, device))
+    let what = format!("{}, {width}x{height}, {n} frames", scene.display());
+    Ok((Row { what, timed }, device))
 }
 
 /// A folder that is gone when it is dropped.

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
 use super::parse_size;
+use crate::study::against::Against;
+use crate::study::samples::MOST_SAMPLES;
 
 #[derive(Debug, ClapArgs)]
 pub struct FarmArgs {
@@ -63,17 +65,32 @@ pub struct PlanArgs {
     #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
     pub frames: Option<Span>,
     /// The configurations of an error study in place of frames; what follows "--" is what `nimbus error` takes
-    #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format", "model"])]
+    #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format"])]
     pub error: bool,
     /// The cases of a sweep in place of frames; what follows "--" is what `nimbus bench` takes
-    #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format", "model"])]
+    #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format"])]
     pub bench: bool,
-    /// Configurations of a shard. Each shard times the scene as it stands as well
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
-    pub shard_configurations: u32,
-    /// Cases of a shard. Each shard times the first case of all as well
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..))]
-    pub shard_cases: u32,
+    /// A picture in f64 in place of frames, as `nimbus render --reference` draws it: thin, volume, model or reflections=K
+    #[arg(long, value_name = "WHICH", conflicts_with_all = ["frames", "shard_frames", "error", "bench"])]
+    pub reference: Option<Against>,
+    /// The reference's frame
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "reference")]
+    pub frame: u32,
+    /// The reference's samples of every pixel
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "reference", value_parser = super::parse_samples)]
+    pub samples: u32,
+    /// Size of its tiles, pixels [default: 256x256, or by --model]
+    #[arg(long, value_name = "WxH", requires = "reference", value_parser = parse_size)]
+    pub tile: Option<(u32, u32)>,
+    /// Samples of a shard, a power of two: then all shards' sums are the bits of one machine's [default: 16, or by --model]
+    #[arg(long, value_name = "N", requires = "reference", value_parser = parse_power)]
+    pub shard_samples: Option<u32>,
+    /// Configurations of a shard [default: 8, or by --model]. Each shard times the scene as it stands as well
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shard_configurations: Option<u32>,
+    /// Cases of a shard [default: 8, or by --model]. Each shard times the first case of all as well
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub shard_cases: Option<u32>,
     /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few make it slow,
     /// many lose more when it is killed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -96,9 +113,9 @@ pub struct PlanArgs {
     /// The share of attempts that fail and are repeated, from 0 to below 1
     #[arg(long, value_name = "SHARE", default_value_t = 0.02, help_heading = "Cost")]
     pub retries: f64,
-    /// What a frame is written as
-    #[arg(long, value_enum, default_value = "png")]
-    pub format: FormatArg,
+    /// What pictures are written as [default: png of frames, exr of a reference]
+    #[arg(long, value_enum)]
+    pub format: Option<FormatArg>,
     /// Seed of the first cloud; the others count on from it
     #[arg(long, value_name = "N", help_heading = "Scene")]
     pub seed: Option<u32>,
@@ -139,9 +156,12 @@ pub enum FormatArg {
 
 #[derive(Debug, ClapArgs)]
 pub struct CalibrateArgs {
-    /// Scene files
-    #[arg(required = true, value_name = "SCENE")]
+    /// Scene files whose frames are timed
+    #[arg(required_unless_present = "farm", conflicts_with = "farm", value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
+    /// Fit to the shards of a farm that is done (repeatable): the way to a model of studies, benches and references
+    #[arg(long, value_name = "DIR")]
+    pub farm: Vec<PathBuf>,
     /// File for the model
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
@@ -311,6 +331,11 @@ pub(super) fn parse_span(text: &str) -> Result<Span, String> {
         None => Span { first: 0, end: number(text)? },
     };
     if span.first < span.end { Ok(span) } else { Err(format!("{}: there is nothing in it", wrong())) }
+}
+
+fn parse_power(text: &str) -> Result<u32, String> {
+    let n = text.parse().ok().filter(|n: &u32| n.is_power_of_two() && *n <= MOST_SAMPLES);
+    n.ok_or_else(|| format!("expected a power of two such as 16, up to {MOST_SAMPLES}, found \"{text}\""))
 }
 
 fn parse_lengths(text: &str) -> Result<(f64, f64), String> {

@@ -29,6 +29,11 @@ const N_WARM_NEW: u32 = 3;
 /// Share of the device's memory that what is kept may take.
 const MEMORY_SHARE: f64 = 0.25;
 
+/// Frames that a configuration is drawn in: its picture, and its turns with what leads up to them.
+pub fn frames_of_turns(n_rounds: u32, n_frames: u32) -> u32 {
+    1 + N_WARM_NEW - N_WARM + n_rounds * (N_WARM + n_frames)
+}
+
 pub struct Players<'a> {
     bed: &'a Bed,
     scenes: Vec<Arc<Scene>>,

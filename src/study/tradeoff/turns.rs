@@ -7,7 +7,7 @@ use crate::measure::stats::median;
 use crate::study::provenance::Figure;
 
 /// Configurations between two turns of the scene as it stands, which is number 0.
-const BETWEEN: usize = 4;
+pub const BETWEEN: usize = 4;
 
 /// A few frames of one configuration, one after the other.
 #[derive(Debug, Clone, PartialEq)]

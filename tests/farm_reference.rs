@@ -155,25 +155,37 @@ fn what_cannot_be_planned_is_said() {
 #[test]
 fn a_model_of_finished_shards_cuts_the_next_plan() {
     let dir = tempfile::tempdir().expect("a folder");
-    let room =
-        ["scenes/study-light.toml", "--reference", "model", "--samples", "2", "--tile", "12x9", "--shard-samples", "2"];
-    let folder = plan(&dir, "small", &room, &["--size", "24x18"]);
-    let model = path(&dir, "model.json");
-    let (code, said) = bad(&["farm", "calibrate", "--farm", &folder, "-o", &model]);
-    assert!(code == Some(2) && said.contains("no shard of these farms is done"), "{said}");
-    good(&["farm", "local", "-q", "--plan", &folder]);
+    let of = |samples| ["--reference", "model", "--samples", samples, "--shard-samples", "4"];
+    let room = "scenes/study-light.toml";
     let hello = ["scenes/hello.toml", "--size", "16x12", "--set", PLAIN];
-    let other = plan(&dir, "other", &hello, &["--reference", "model", "--samples", "2", "--shard-samples", "1"]);
-    good(&["farm", "local", "-q", "--plan", &other]);
-    let said = good(&["farm", "calibrate", "--farm", &folder, "--farm", &other, "-o", &model]);
-    assert!(said.contains("6 runs of reference model"), "{said}");
-    // Larger, in pieces of at most half a second and of at least a fifth.
-    let lengths = ["--model", &model, "--shard-seconds", "0.2,0.5", "--nodes", "2"];
-    let large = ["scenes/study-light.toml", "--reference", "model", "--samples", "4", "--size", "80x60"];
-    let folder = plan(&dir, "large", &large, &lengths);
-    let seconds: Vec<f64> = shards(&folder).iter().map(|s| s["predicted_s"].as_f64().expect("seconds")).collect();
-    println!("{seconds:?}");
-    assert!(seconds.len() > 2 && seconds.iter().all(|s| *s > 0.0 && *s <= 0.5), "{seconds:?}");
+    // Of so different sizes that no noise hides what a pixel takes.
+    let farms = [
+        plan(&dir, "small", &[room, "--size", "6x4", "--tile", "3x4"], &of("1")),
+        plan(&dir, "large", &[room, "--size", "20x15"], &of("4")),
+        plan(&dir, "other", &hello, &of("1")),
+    ];
+    let model = path(&dir, "model.json");
+    let (code, said) = bad(&["farm", "calibrate", "--farm", &farms[0], "-o", &model]);
+    assert!(code == Some(2) && said.contains("no shard of these farms is done"), "{said}");
+    farms.iter().for_each(|farm| drop(good(&["farm", "local", "-q", "--plan", farm])));
+    let told = farms.iter().flat_map(|farm| ["--farm", farm]);
+    let said = good(&["farm", "calibrate", "-o", &model].into_iter().chain(told).collect::<Vec<_>>());
+    assert!(said.contains("4 runs of reference model"), "{said}");
+    // Cut to a third of what it takes beyond a set-up.
+    let predicted = |name: &str, lengths: &str| -> Vec<f64> {
+        let scene = [room, "--reference", "model", "--samples", "8", "--size", "40x30"];
+        let folder = plan(&dir, name, &scene, &["--model", &model, "--shard-seconds", lengths, "--nodes", "1"]);
+        shards(&folder).iter().map(|s| s["predicted_s"].as_f64().expect("seconds")).collect()
+    };
+    let whole = predicted("whole", "5000,9000");
+    let text = fs::read_to_string(&model).expect("a model");
+    let read: Value = serde_json::from_str(&text).expect("JSON");
+    let setup = read["fit"]["model"]["setup_s"].as_f64().expect("seconds");
+    assert!(whole.len() == 1 && whole[0] > setup, "{whole:?} {setup}");
+    let most = setup + (whole[0] - setup) / 3.0;
+    let cut = predicted("cut", &format!("0,{most}"));
+    println!("{setup} {whole:?} {cut:?}");
+    assert!((3..=8).contains(&cut.len()) && cut.iter().all(|s| *s <= most), "{setup} {whole:?} {cut:?}");
     // Of another kind of work the model says nothing.
     let (code, said) = bad(&[&["farm", "plan", "-o", &path(&dir, "frames"), "--model", &model], &hello[..]].concat());
     assert!(code == Some(2) && said.contains("calibrated by reference model; expected one of frames"), "{said}");

@@ -42,25 +42,30 @@ fn in_parts(subject: &Subject<'_>, n: u32, [columns, rows]: [u32; 2]) -> Sums {
 
 #[test]
 fn tiles_and_ranges_are_the_whole_to_the_bit() {
-    let size = ["film.width=23", "film.height=17"];
+    let size = ["film.width=11", "film.height=8"];
     let plain = "cloud.0.texture=\"none\"";
     for (what, of_which, scene, more) in [
         ("sprites with textures", "thin", "scenes/cubes-554.toml", &[][..]),
         ("the volume", "volume", "scenes/cubes-554.toml", &[plain][..]),
-        ("facets on a floor", "thin", "scenes/study-light.toml", &[]),
+        ("facets of a room", "thin", "scenes/study-light.toml", &["lighting.mode=\"first\""]),
         ("every pixel of a floor lit", "model", "scenes/study-light.toml", &[]),
         ("random paths", "reflections=3", "scenes/study-light.toml", &["film.width=7", "film.height=5"]),
-        ("random paths to particles", "reflections=3", "scenes/hello.toml", &[plain, "film.width=7", "film.height=5"]),
+        (
+            "random paths to particles",
+            "reflections=3",
+            "scenes/cubes-554.toml",
+            &[plain, "draw.particles=12", "film.width=4", "film.height=3"],
+        ),
         ("what nothing lights", "model", "scenes/hello.toml", &[plain, "lighting.mode=\"none\""]),
-        ("hills", "thin", "scenes/katrina.toml", &["lighting.mode=\"none\"", "draw.particles=300"]),
+        ("hills", "thin", "scenes/katrina.toml", &["lighting.mode=\"none\"", "cloud.0.particles=300"]),
     ] {
         let scene = loaded(scene, &[&size[..], more].concat());
         let subject = Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
         let pixels = Pixels::all(scene.film.width, scene.film.height);
-        let whole = of(&subject, &pixels, 0..5);
+        let whole = of(&subject, &pixels, 0..3);
         assert!(whole.values.iter().all(|v| v.is_finite()) && whole.values.iter().any(|v| *v > 0.0), "{what}");
-        for size in [[5, 4], [23, 1], [1, 17]] {
-            assert!(in_parts(&subject, 5, size) == whole, "{what}: tiles of {size:?}");
+        for size in [[4, 5], [11, 7]] {
+            assert!(in_parts(&subject, 3, size) == whole, "{what}: tiles of {size:?}");
         }
         // Samples differ from each other: ranges that were mistaken for others would show.
         let [a, b] = [0..1, 1..2].map(|range| of(&subject, &pixels, range));
@@ -128,14 +133,14 @@ fn differ(a: &Mean, b: &Mean) -> f64 {
 
 #[test]
 fn more_samples_are_nearer_and_say_so() {
-    let size = ["film.width=12", "film.height=9"];
+    let size = ["film.width=8", "film.height=6"];
     let scene = loaded("scenes/study-light.toml", &size);
     let subject = Subject { of: Against::Reflections(3), scene: &scene, time_s: 0.0 };
-    let pixels = Pixels::all(12, 9);
+    let pixels = Pixels::all(8, 6);
     // Others than those that are judged.
-    let truth = of(&subject, &pixels, 1000..1128).mean();
+    let truth = of(&subject, &pixels, 1000..1064).mean();
     let mut before = f64::INFINITY;
-    for n in [4u32, 16, 64] {
+    for n in [2u32, 8, 32] {
         let mean = of(&subject, &pixels, 0..n).mean();
         let (off, said) = (differ(&mean, &truth), mean.own_error);
         println!("{n} samples: off by {off:.2e}, said {said:.2e}");

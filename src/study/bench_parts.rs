@@ -38,6 +38,13 @@ pub struct BaseTime {
     pub p50_ms: Option<f64>,
 }
 
+impl BaseTime {
+    /// The loop in words.
+    pub fn name(&self) -> String {
+        loop_name(&self.threading, self.skip)
+    }
+}
+
 /// A part as it was read.
 #[derive(Debug, Clone)]
 pub struct Part {
@@ -240,7 +247,7 @@ pub fn base_spread(parts: &[PartRecord]) -> Vec<(String, f64)> {
         let is_same = |other: &&BaseTime| (&other.threading, other.skip) == (&base.threading, base.skip);
         let all = parts.iter().filter_map(|part| part.base.iter().find(is_same)?.p50_ms).filter(|ms| *ms > 0.0);
         let (least, greatest, n) = all.fold((f64::INFINITY, 0.0_f64, 0), |(l, g, n), ms| (l.min(ms), g.max(ms), n + 1));
-        (n > 1).then(|| (loop_name(&base.threading, base.skip), greatest / least))
+        (n > 1).then(|| (base.name(), greatest / least))
     };
     first.base.iter().filter_map(of).collect()
 }

@@ -4,7 +4,8 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
 
 use nimbus::study::bench_parts::base_spread;
 use nimbus::study::recorded::read_results;
@@ -279,19 +280,49 @@ fn what_a_farm_decides_itself_is_refused_among_a_sweep_s_arguments() {
 }
 
 #[test]
-fn a_part_that_fails_for_good_is_not_tried_again() {
+fn a_part_that_fails_for_good_is_said_to_and_a_job_has_its_node_alone() {
     let dir = tempfile::tempdir().expect("a folder");
     let farm = planned(&dir, "6");
-    // No such device: what a node without one says.
     let run = ["farm", "run", "--plan", text(&farm), "--shard", "0", "--device", "no such device"];
     let (code, _, said) = ran(&run);
-    assert!(code == Some(75) && said.contains("no such device"), "{code:?} {said}");
+    assert!(code == Some(2) && said.contains("nimbus bench ended with exit code 2"), "{code:?} {said}");
+    assert!(said.contains("no such device"), "{said}");
     let (_, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
-    assert!(out.contains("transient") && out.contains("cases 0..6") && out.contains("to do: 0"), "{out}");
+    assert!(out.contains("failed") && out.contains("cases 0..6") && out.contains("to do: 0"), "{out}");
     let (code, out, said) = ran(&["farm", "gc", "--plan", text(&farm), "--idle", "0.000001"]);
-    assert!(code == Some(0) && out.contains("removed"), "{out}{said}");
+    assert!(code == Some(0) && out.contains("1 folders") && out.contains("removed"), "{out}{said}");
     let (code, out, said) = ran(&["farm", "emit", "slurm", "--plan", text(&farm)]);
     assert_eq!(code, Some(0), "{out}{said}");
     let script = fs::read_to_string(farm.join("slurm/shard.sh")).expect("a script");
     assert!(script.contains("--exclusive") && script.contains("NIMBUS_EXCLUSIVE=1"), "{script}");
+}
+
+#[test]
+fn a_part_that_is_ended_is_worth_another_try_and_leaves_no_result() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let farm = dir.path().join("farm");
+    // Minutes, unless it is ended.
+    let plan = ["farm", "plan", SCENE, "-o", text(&farm), "--bench", "--", "--repeat", "10000"];
+    assert_eq!(ran(&plan).0, Some(0));
+    let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
+    command.args(["farm", "run", "--quiet", "--plan", text(&farm), "--shard", "0"]);
+    let mut child = command.stderr(Stdio::piped()).spawn().expect("the program runs");
+    let shards = farm.join("shards");
+    // Its folder is made once the device is open.
+    let is_timing = || {
+        let entries = fs::read_dir(&shards).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path().join("part")).any(|part| part.exists())
+    };
+    let begin = Instant::now();
+    while !is_timing() && begin.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(child.try_wait().expect("a child").is_none(), "it is at work");
+    let ended = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+    assert!(ended.success());
+    assert_eq!(child.wait().expect("it ends").code(), Some(75));
+    let (_, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
+    assert!(out.contains("transient") && out.contains("1 unfinished") && out.contains("0 of 1 shards"), "{out}");
+    let (code, _, said) = ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&dir.path().join("merged"))]);
+    assert!(code == Some(1) && said.contains("to do: 0"), "{said}");
 }

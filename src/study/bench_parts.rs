@@ -1,4 +1,5 @@
-//! Parts of one bench, each with its first case, timed one by one and maybe on several nodes: as the bench that they are parts of.
+//! Parts of one bench, each with its first case, timed one by one and maybe on several nodes: as the bench that they
+//! are parts of.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -118,8 +119,8 @@ fn is_of_its_block(row: &FrameRow, run: &Run) -> bool {
     })
 }
 
-/// What differs between parts that has to be the same: times of two devices, drivers or builds are no bench's. That shaders and
-/// arguments are the same is known by whoever had the parts made.
+/// What differs between parts that has to be the same: times of two devices, drivers or builds are no bench's. That
+/// shaders and arguments are the same is known by whoever had the parts made.
 pub fn differences(parts: &[Part]) -> Vec<String> {
     let Some(first) = parts.first() else { return vec!["there is no part".to_owned()] };
     let mut all = BTreeSet::new();
@@ -185,8 +186,8 @@ fn loop_name(threading: &str, skip: bool) -> String {
     if skip { threading.to_owned() } else { format!("{threading} no-skip") }
 }
 
-/// All of them as one bench, with all cases in order and the first as the first part timed it; blocks follow each other part by part.
-/// `parts` do not differ; none of no part.
+/// All of them as one bench, with all cases in order and the first as the first part timed it; blocks follow each other
+/// part by part. `parts` do not differ; none of no part.
 pub fn join(parts: &[Part]) -> Option<Joined> {
     let first = parts.first()?;
     let n_cases: usize = parts.iter().map(|part| part.range.len()).sum();
@@ -239,8 +240,8 @@ fn chosen(run: &Run, n_cases: usize) -> Vec<(usize, String)> {
     run.chosen.iter().map(of).collect()
 }
 
-/// By how much the nodes differ: the greatest median frame time of the first case by the least over all parts, loop by loop. None
-/// of a loop that fewer than two parts have times of.
+/// By how much the nodes differ: the greatest median frame time of the first case by the least over all parts, loop by
+/// loop. None of a loop that fewer than two parts have times of.
 pub fn base_spread(parts: &[PartRecord]) -> Vec<(String, f64)> {
     let Some(first) = parts.first() else { return Vec::new() };
     let of = |base: &BaseTime| {

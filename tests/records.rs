@@ -8,6 +8,7 @@ use std::path::Path;
 
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
+use nimbus::study::bench_parts::{BaseTime, PartRecord};
 use nimbus::study::counts::Counts;
 use nimbus::study::machine::{Cpu, cpu, environment, revision, utc_now};
 use nimbus::study::overlap::{Overlap, SerialFrame};
@@ -79,6 +80,15 @@ fn sample() -> Run {
         counts: Some(Counts { values: 8, ..Counts::default() }),
         ..blank.cases[0].clone()
     };
+    let base = BaseTime { threading: "serial".to_owned(), skip: true, p50_ms: Some(1.5) };
+    let part = PartRecord {
+        first: 0,
+        end: 1,
+        node: "node".to_owned(),
+        date: utc_now(),
+        clocks: blank.clocks,
+        base: vec![base],
+    };
     Run {
         nimbus: env!("CARGO_PKG_VERSION").to_owned(),
         revision: revision().to_owned(),
@@ -86,6 +96,7 @@ fn sample() -> Run {
         cpu: cpu(),
         cases: vec![case],
         chosen: vec!["draw.path = \"auto\" took \"tiles\"".to_owned()],
+        parts: vec![part],
         ..blank
     }
 }
@@ -122,12 +133,20 @@ fn a_full_and_a_bare_run_satisfy_the_schema() {
             ..sample().cases[0].clone()
         }],
         block_order: Vec::new(),
+        parts: Vec::new(),
         interrupted: true,
         environment: environment(),
         cpu: Cpu { model: "unknown".to_owned(), logical_cores: 1 },
         ..sample()
     };
     assert_eq!(complaints(&serde_json::to_value(bare).unwrap()), [""; 0]);
+}
+
+#[test]
+fn a_run_of_one_process_says_nothing_of_parts() {
+    let value = serde_json::to_value(Run { parts: Vec::new(), ..sample() }).unwrap();
+    assert!(value.get("parts").is_none());
+    assert!(serde_json::from_value::<Run>(value).unwrap().parts.is_empty());
 }
 
 #[test]
@@ -146,6 +165,9 @@ fn the_schema_refuses_what_is_wrong() {
         ("/cases/0/modes/0/frame_lows/p99_fps", json!(0)),
         ("/cases/0/modes/0/passes/0/share", json!(1.5)),
         ("/scene_hash", json!("ab")),
+        ("/parts/0/node", Value::Null),
+        ("/parts/0/base/0/p50_ms", json!(-1)),
+        ("/parts", json!([])),
     ] {
         let mut bad = good.clone();
         *bad.pointer_mut(pointer).unwrap() = wrong;
@@ -189,8 +211,8 @@ fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
     // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping, counts; twice a
-    // mode, seven summaries, lows, two passes, a reason.
-    assert_eq!(n_compared, 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
+    // mode, seven summaries, lows, two passes, a reason. A part, its clocks and its time.
+    assert_eq!(n_compared, 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
 #[test]

@@ -32,6 +32,9 @@ const N_CLOCK_READINGS: usize = 8;
 
 /// `zones`: where what the threads do is collected; `color`: of charts.
 pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Option<&Zones>) -> Result<()> {
+    if args.part.is_some() && args.scenes.len() > 1 {
+        return Err(Error::usage(format!("--part takes one scene, found {}", args.scenes.len())));
+    }
     let outs = out_dirs(args)?;
     if let Some(file) = &args.trace {
         super::refuse_existing(file, args.force)?;
@@ -39,9 +42,6 @@ pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Optio
         if args.scenes.len() > 1 {
             return Err(Error::usage(format!("--trace takes one scene, found {}", args.scenes.len())));
         }
-    }
-    if args.part.is_some() && args.scenes.len() > 1 {
-        return Err(Error::usage(format!("--part takes one scene, found {}", args.scenes.len())));
     }
     // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no folder
     // is made for results that will not come.

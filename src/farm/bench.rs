@@ -39,8 +39,8 @@ pub fn measure(
     Ok(run.device)
 }
 
-/// All parts, in the order of their shards, as one bench in `out`, whose cases are called `names`; how many. Refuses, with a list of
-/// the differences, where times cannot be compared.
+/// All parts, in the order of their shards, as one bench in `out`, whose cases are called `names`; how many. Refuses,
+/// with a list of the differences, where times cannot be compared.
 pub fn merge(plan: &Plan, names: &[String], parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<usize> {
     let read = |((folder, manifest), shard): (&(PathBuf, Manifest), &Shard)| {
         let name = format!("shard {} on {}", manifest.index, manifest.node);

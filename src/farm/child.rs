@@ -1,4 +1,5 @@
-//! Shards that are measured: a command of nimbus with `--part`, in a process of its own, and who may put such parts together.
+//! Shards that are measured: a command of nimbus with `--part`, in a process of its own, and who may put such parts
+//! together.
 
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -18,7 +19,8 @@ pub const EXCLUSIVE: &str = "NIMBUS_EXCLUSIVE";
 /// How often a child is looked at.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Runs `nimbus NAME` with `arguments` for the part of `shard`, results in the folder `out`. On `stop` it is asked to end.
+/// Runs `nimbus NAME` with `arguments` for the part of `shard`, results in the folder `out`. On `stop` it is asked to
+/// end.
 pub fn run(
     name: &str,
     (plan, shard, arguments): (&Plan, &Shard, &[String]),

@@ -1,4 +1,5 @@
-//! Parts of one bench, each with its first case, timed one by one and maybe on several nodes: as the bench that they are parts of.
+//! Parts of one bench, each with its first case, timed one by one and maybe on several nodes: as the bench that they
+//! are parts of.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -36,6 +37,13 @@ pub struct BaseTime {
     pub skip: bool,
     /// Median frame time, ms; null where nothing finite was measured.
     pub p50_ms: Option<f64>,
+}
+
+impl BaseTime {
+    /// The loop in words.
+    pub fn name(&self) -> String {
+        loop_name(&self.threading, self.skip)
+    }
 }
 
 /// A part as it was read.
@@ -111,8 +119,8 @@ fn is_of_its_block(row: &FrameRow, run: &Run) -> bool {
     })
 }
 
-/// What differs between parts that has to be the same: times of two devices, drivers or builds are no bench's. That shaders and
-/// arguments are the same is known by whoever had the parts made.
+/// What differs between parts that has to be the same: times of two devices, drivers or builds are no bench's. That
+/// shaders and arguments are the same is known by whoever had the parts made.
 pub fn differences(parts: &[Part]) -> Vec<String> {
     let Some(first) = parts.first() else { return vec!["there is no part".to_owned()] };
     let mut all = BTreeSet::new();
@@ -178,8 +186,8 @@ fn loop_name(threading: &str, skip: bool) -> String {
     if skip { threading.to_owned() } else { format!("{threading} no-skip") }
 }
 
-/// All of them as one bench, with all cases in order and the first as the first part timed it; blocks follow each other part by part.
-/// `parts` do not differ; none of no part.
+/// All of them as one bench, with all cases in order and the first as the first part timed it; blocks follow each other
+/// part by part. `parts` do not differ; none of no part.
 pub fn join(parts: &[Part]) -> Option<Joined> {
     let first = parts.first()?;
     let n_cases: usize = parts.iter().map(|part| part.range.len()).sum();
@@ -232,15 +240,15 @@ fn chosen(run: &Run, n_cases: usize) -> Vec<(usize, String)> {
     run.chosen.iter().map(of).collect()
 }
 
-/// By how much the nodes differ: the greatest median frame time of the first case by the least over all parts, loop by loop. None
-/// of a loop that fewer than two parts have times of.
+/// By how much the nodes differ: the greatest median frame time of the first case by the least over all parts, loop by
+/// loop. None of a loop that fewer than two parts have times of.
 pub fn base_spread(parts: &[PartRecord]) -> Vec<(String, f64)> {
     let Some(first) = parts.first() else { return Vec::new() };
     let of = |base: &BaseTime| {
         let is_same = |other: &&BaseTime| (&other.threading, other.skip) == (&base.threading, base.skip);
         let all = parts.iter().filter_map(|part| part.base.iter().find(is_same)?.p50_ms).filter(|ms| *ms > 0.0);
         let (least, greatest, n) = all.fold((f64::INFINITY, 0.0_f64, 0), |(l, g, n), ms| (l.min(ms), g.max(ms), n + 1));
-        (n > 1).then(|| (loop_name(&base.threading, base.skip), greatest / least))
+        (n > 1).then(|| (base.name(), greatest / least))
     };
     first.base.iter().filter_map(of).collect()
 }

@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 
 type Told<T> = std::result::Result<T, String>;
 
-/// Names of the passes and all rows, warm-up included, of the text of a `frames.csv`; `path` is for messages, which name the line.
+/// Names of the passes and all rows, warm-up included, of the text of a `frames.csv`; `path` is for messages, which
+/// name the line.
 pub fn read_rows(text: &str, path: &Path) -> Result<(Vec<String>, Vec<FrameRow>)> {
     let failed = |cause: csv::Error| Error::io(path, cause);
     let mut reader = csv::Reader::from_reader(text.as_bytes());

@@ -9,6 +9,7 @@ use super::pictures::Png;
 use super::provenance::{self, Made};
 use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
+use crate::study::bench_parts::PartRecord;
 use crate::study::beside::picture_file;
 use crate::study::plot::number::{number, with_interval};
 use crate::study::plot::{frames, passes};
@@ -46,6 +47,7 @@ pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
             h3 { "What \"auto\" came to" }
             ul { @for chosen in &run.chosen { li { (chosen) } } }
         }
+        @if !run.parts.is_empty() { h3 { "Parts" } (parts(run)) }
         @if !shown.is_empty() { h3 { "Pictures" } div class="gallery" { @for figure in &shown { (figure) } } }
         h3 { "Frames" }
         (loops(run))
@@ -90,6 +92,22 @@ fn loops(run: &Run) -> Markup {
     ];
     let caption = "Every loop: medians with their 95 % intervals; \"1 % low\" is the mean of the slowest 1 %";
     table(caption, &header, &rows)
+}
+
+/// Which node timed what, and how long the first case took there.
+fn parts(run: &Run) -> Markup {
+    let row = |part: &PartRecord| -> Vec<Cell> {
+        let times = part.base.iter().map(|base| ms(base.p50_ms));
+        [text(&format!("{}..{}", part.first, part.end)), text(&part.node), text(&part.date)]
+            .into_iter()
+            .chain(times)
+            .collect()
+    };
+    let loops: Vec<String> =
+        run.parts.iter().take(1).flat_map(|part| part.base.iter().map(|base| format!("{}, ms", base.name()))).collect();
+    let header: Vec<&str> = ["cases", "node", "begun"].into_iter().chain(loops.iter().map(String::as_str)).collect();
+    let rows: Vec<Vec<Cell>> = run.parts.iter().map(row).collect();
+    table("Who timed what, and the median frame time of the first case there: how far nodes differ", &header, &rows)
 }
 
 /// The cases, and what overlap and skipping gained in each.

@@ -45,10 +45,7 @@ pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -
 fn check_devices(parts: &[(PathBuf, Manifest)], mixed: bool) -> Result<()> {
     let mut by_device: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (_, Manifest { device, index, .. }) in parts {
-        by_device
-            .entry(format!("{} ({}, Vulkan {})", device.name, device.driver, device.api))
-            .or_default()
-            .push(*index);
+        by_device.entry(device.class()).or_default().push(*index);
     }
     if mixed || by_device.len() < 2 {
         return Ok(());

@@ -213,7 +213,7 @@ impl Store {
     /// Takes over what attempts at `shard` before have finished on a device like `device`: another one's pictures differ.
     pub fn resume(&self, workplace: &mut Workplace, plan: &Plan, shard: &Shard, device: &Device) -> Result<()> {
         let outputs = plan.outputs(shard);
-        let mark = serde_json::to_string(device).map_err(|cause| Error::io(&workplace.path, cause))?;
+        let mark = serde_json::to_string(&device.class()).map_err(|cause| Error::io(&workplace.path, cause))?;
         for other in self.others().of(&shard.key, Other::Unfinished) {
             if fs::read_to_string(other.join(DEVICE_FILE)).is_ok_and(|of| of == mark) {
                 workplace.adopt(other, &outputs)?;

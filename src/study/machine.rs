@@ -32,14 +32,14 @@ pub struct Cpu {
 }
 
 impl Device {
-    /// All that tells it from another one, in words.
-    pub fn identity(&self) -> String {
-        format!("{} ({}, Vulkan {}, {})", self.name, self.driver, self.api, self.uuid)
+    /// Its kind: two cards of one kind, whose UUIDs differ, draw the same and take the same time.
+    pub fn class(&self) -> String {
+        format!("{} ({}, Vulkan {})", self.name, self.driver, self.api)
     }
 }
 
 impl Cpu {
-    pub fn identity(&self) -> String {
+    pub fn class(&self) -> String {
         format!("{}, {} cores", self.model, self.logical_cores)
     }
 }

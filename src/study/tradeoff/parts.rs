@@ -35,8 +35,8 @@ pub fn differences(parts: &[Part]) -> Vec<String> {
         let said = [
             ("build", made.code.clone(), other.code.clone()),
             ("scene", made.scene_hash.clone(), other.scene_hash.clone()),
-            ("device", made.device.identity(), other.device.identity()),
-            ("processor", made.cpu.identity(), other.cpu.identity()),
+            ("device", made.device.class(), other.device.class()),
+            ("processor", made.cpu.class(), other.cpu.class()),
             ("environment", format!("{:?}", made.environment), format!("{:?}", other.environment)),
             ("reference", reference(a), reference(b)),
             ("time that decides", a.time.clone(), b.time.clone()),

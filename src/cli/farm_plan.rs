@@ -18,6 +18,11 @@ use crate::io::scene_file::{self, LoadedScene};
 
 /// Frames of a shard where nothing is known of what they take.
 const USUAL_FRAMES: u32 = 16;
+const USUAL_CONFIGURATIONS: u32 = 8;
+const USUAL_NODES: u32 = 4;
+const USUAL_SECONDS: (f64, f64) = (60.0, 600.0);
+const USUAL_QUANTUM_S: f64 = 3600.0;
+const USUAL_RETRIES: f64 = 0.02;
 
 pub fn plan(args: &PlanArgs) -> Result<()> {
     let mut set = args.set.clone();
@@ -30,7 +35,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     }
     let Cut { work, sizes, predicted_s } = if args.error { study(args, &set)? } else { frames(args, &loaded)? };
     // What is to be said of the price is known to be right before anything is written.
-    let packing = predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
+    let packing = predicted_s.as_deref().map(|seconds| pack(seconds, n_nodes(args) as usize));
     let estimate = packing.map(|packing| estimate(args, &packing)).transpose()?;
     let plan = Plan::new(Wish {
         scene: args.scene.clone(),
@@ -109,7 +114,7 @@ fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
     }
     let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));
     let configurations = tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
-    let sizes = even(configurations.len() as u32, args.shard_configurations);
+    let sizes = even(configurations.len() as u32, args.shard_configurations.unwrap_or(USUAL_CONFIGURATIONS));
     Ok(Cut { work: Work::Error { arguments: args.study.clone(), configurations }, sizes, predicted_s: None })
 }
 
@@ -128,10 +133,10 @@ fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, work: Wo
     let works = work_of_frames(loaded, frames.clone());
     let item_s = works.iter().map(|work| seconds(0.0, work)).collect::<Result<Vec<f64>>>()?;
     let setup_s = seconds(1.0, &Default::default())?;
-    let (least, most) = args.shard_seconds;
+    let (least, most) = args.shard_seconds.unwrap_or(USUAL_SECONDS);
     let sizes: Vec<u32> = match args.shard_frames {
         Some(each) => even(frames.end - frames.start, each),
-        None => split(&item_s, setup_s, least, most, args.nodes as usize).iter().map(|r| r.len() as u32).collect(),
+        None => split(&item_s, setup_s, least, most, n_nodes(args) as usize).iter().map(|r| r.len() as u32).collect(),
     };
     let mut rest = &item_s[..];
     let predicted = sizes.iter().map(|n| {
@@ -143,22 +148,27 @@ fn by_model(args: &PlanArgs, model: &Calibration, loaded: &LoadedScene, work: Wo
     Ok(Cut { work, sizes, predicted_s })
 }
 
+fn n_nodes(args: &PlanArgs) -> u32 {
+    args.nodes.unwrap_or(USUAL_NODES)
+}
+
 /// What all of it takes and costs, in words.
 fn estimate(args: &PlanArgs, packing: &Packing) -> Result<String> {
     let all_s: f64 = packing.node_seconds.iter().sum();
     let mut text = format!(
         "predicted: {} of runs; on {} nodes done after {}, {:.0} % of their time idle\n",
         duration(all_s),
-        args.nodes,
+        n_nodes(args),
         duration(packing.makespan_s),
         100.0 * packing.idle_share
     );
     if let Some(price_per_quantum) = args.rate {
-        let rate = Rate { quantum_s: args.quantum, price_per_quantum, retry_share: args.retries };
+        let quantum_s = args.quantum.unwrap_or(USUAL_QUANTUM_S);
+        let rate = Rate { quantum_s, price_per_quantum, retry_share: args.retries.unwrap_or(USUAL_RETRIES) };
         let price = price(packing, &rate).map_err(Error::usage)?;
         text += &format!(
             "price: {:.2} for {} pieces of {} s, and {:.2} for retries to be expected: {:.2}\n",
-            price.without_retries, price.quanta, args.quantum, price.retries, price.total
+            price.without_retries, price.quanta, quantum_s, price.retries, price.total
         );
     }
     Ok(text)

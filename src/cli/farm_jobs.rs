@@ -17,7 +17,7 @@ pub fn emit(args: &EmitArgs) -> Result<()> {
         EngineArg::Slurm => (
             "slurm",
             "J=$(sbatch --parsable --array=INDICES shard.sh); \
-             sbatch --dependency=afterok:$J --kill-on-invalid-dep=yes merge.sh",
+             sbatch --dependency=afterany:$J merge.sh",
         ),
         EngineArg::Hyperqueue => ("hyperqueue", "bash submit.sh"),
         EngineArg::Openjd => ("openjd", "openjd run template.json, or any engine that takes such"),

@@ -86,7 +86,7 @@ impl Job<'_> {
         let may_pass = format!("[ \"$code\" -eq 75 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt {} ]", self.n_tries - 1);
         format!(
             "#!/bin/bash\n\
-             # Submit: sbatch --dependency=afterok:ARRAY --kill-on-invalid-dep=yes merge.sh\n\
+             # Submit: sbatch --dependency=afterany:ARRAY merge.sh\n\
              {head}\
              {options}\
              set -u\n\

@@ -84,8 +84,10 @@ fn queue(submitted: &mut Submitted, scripts: &Path, tasks: &[String], mark: &str
         array.job = Some(sbatch(SHARDS, &array.mark, &[&indices, &shard, &offset])?);
     }
     let ids: Vec<&str> = submitted.arrays.iter().filter_map(|array| array.job.as_deref()).collect();
-    let after = format!("--dependency=afterok:{}", ids.join(":"));
-    let merge = sbatch(MERGE, &format!("{mark}-merge"), &[&after, "--kill-on-invalid-dep=yes", &merge])?;
+    // Not afterok: for that an array has failed whose task ran out of time, also where the task went on and ended well.
+    // The merge itself looks whether all is there.
+    let after = format!("--dependency=afterany:{}", ids.join(":"));
+    let merge = sbatch(MERGE, &format!("{mark}-merge"), &[&after, &merge])?;
     submitted.merge = Some(merge);
     Ok(())
 }

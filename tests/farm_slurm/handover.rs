@@ -60,7 +60,7 @@ fn on_slurm_what_is_taken_back_goes_on_later_and_what_is_cancelled_does_not() {
     let (array, merge) = farm.submit(&cluster);
     wait_for(&farm, "work", || farm.at_work().len() == 1);
     cluster.told(&["run"], &["scancel", &array]);
-    wait_for(&farm, "the end", || cluster.state(&array) == "CANCELLED" && cluster.state(&merge) == "CANCELLED");
+    wait_for(&farm, "the end", || cluster.state(&array) == "CANCELLED" && cluster.state(&merge) == "FAILED");
     assert!(matches!(&failed_and_resumed(&farm).0[..], [n] if *n > 0), "{:?}", farm.attempts());
     // A job that is queued again is seen at once, though it waits.
     std::thread::sleep(Duration::from_secs(3));

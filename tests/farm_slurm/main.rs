@@ -304,7 +304,7 @@ fn on_slurm_what_may_pass_is_queued_again_and_what_stays_ends_the_merge() {
     fs::write(&scene, text_of.replace("fov_y_deg = 55.0", "fov_y_deg = 50.0")).expect("room");
     let ids: Value = serde_json::from_slice(&submitted.stdout).expect("JSON");
     let [array, merge] = [&ids["arrays"][0]["job"], &ids["merge"]].map(|id| id.as_str().expect("an id").to_owned());
-    wait_for(&farm, "the end", || cluster.state(&array) == "FAILED" && cluster.state(&merge) == "CANCELLED");
+    wait_for(&farm, "the end", || cluster.state(&array) == "FAILED" && cluster.state(&merge) == "FAILED");
     assert!(!Path::new(other).join("merged").exists());
     let output = nimbus(&["farm", "status", "--plan", other]);
     assert!(text(&output).contains("0 of 1 shards are done"), "{}", text(&output));

@@ -12,16 +12,17 @@ use crate::farm::plan::{Plan, Work};
 use crate::farm::pool::{Ended, Pool};
 use crate::farm::run::{How, Outcome};
 use crate::farm::status::{State, Status, status};
-use crate::farm::{gc, merge, run as shard_run};
+use crate::farm::{attempts, gc, merge, run as shard_run};
 use crate::frame::stage::DeviceChoice;
 
-/// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where `graceful` says that something is kept.
+/// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where `graceful` says that
+/// something is kept.
 pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
     graceful.store(matches!(args.command, FarmCommand::Run(_) | FarmCommand::Local(_)), Ordering::Relaxed);
     match &args.command {
         FarmCommand::Plan(a) => farm_plan::plan(a),
         FarmCommand::Calibrate(a) => farm_plan::calibrated(a, stop),
-        FarmCommand::Run(a) => shard(a, stop),
+        FarmCommand::Run(a) => shard(a, stop).map_err(|error| given_up(a, error)),
         FarmCommand::Local(a) => local(a, stop),
         FarmCommand::Status(a) => print_status(a),
         FarmCommand::Merge(a) => merged(a),
@@ -51,6 +52,17 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
         }
     };
     if args.quiet { Ok(()) } else { output::text(&format!("shard {}: {said}\n", args.shard)) }
+}
+
+/// What may pass and did not, so often, stays.
+fn given_up(args: &RunArgs, error: Error) -> Error {
+    let (Error::Transient { what }, Some(n_tries)) = (&error, args.tries) else { return error };
+    match attempts::n_fruitless(&args.plan, args.shard) {
+        n if n >= n_tries as usize => {
+            Error::Check { what: format!("{what}; nothing was finished {n} times in a row: this task ends here") }
+        }
+        _ => error,
+    }
 }
 
 fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
@@ -101,12 +113,13 @@ fn failed(ended: &[Ended], n: usize, plan: &Path) -> Result<()> {
 
 fn print_status(args: &StatusArgs) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
-    let found = status(&args.plan, &plan)?;
-    if args.json {
-        return output::object(&found);
-    }
+    let mut found = status(&args.plan, &plan)?;
     if args.missing {
         return output::text(&format!("{}\n", found.missing()));
+    }
+    found.ask_engine(&args.plan);
+    if args.json {
+        return output::object(&found);
     }
     output::text(&table(&plan, &found))
 }
@@ -122,7 +135,8 @@ fn table(plan: &Plan, found: &Status) -> String {
     if let Some(Compared { n, median, p90, largest, .. }) = found.predicted {
         let [median, p90, largest] = [median, p90, largest].map(|share| 100.0 * share);
         text += &format!(
-            "predicted against taken, {n} shards: off by {median:.0} % (median), {p90:.0} % (p90), {largest:.0} % at most\n"
+            "predicted against taken, {n} shards: off by {median:.0} % (median), {p90:.0} % (p90), {largest:.0} % at \
+             most\n"
         );
     }
     for s in found.shards.iter().filter(is_told) {
@@ -136,6 +150,9 @@ fn table(plan: &Plan, found: &Status) -> String {
         let name = s.state.name();
         let (noun, notes) = (plan.work.noun(), notes.join("; "));
         text += &format!("{:>6}  {name:9}  {noun} {}..{}  {notes}\n", s.index, range.start, range.end);
+    }
+    if let Some(why) = &found.engine_silent {
+        text += &format!("what Slurm does with them is not known: {why}\n");
     }
     if n_done < n {
         text += &format!("to do: {}\n", found.missing());

@@ -58,8 +58,8 @@ pub(super) fn cut(args: &PlanArgs, work: Work, amounts: &Amounts, (each, usual):
             model.check(&work)?;
             let item_s = amounts.items.iter().map(|item| model.seconds(0.0, item)).collect::<Result<Vec<f64>>>()?;
             let setup_s = model.seconds(1.0, &amounts.of_shard)?;
-            let (least, most) = args.shard_seconds;
-            split(&item_s, setup_s, least, most, args.nodes as usize).iter().map(|r| r.len() as u32).collect()
+            let (least, most) = args.lengths();
+            split(&item_s, setup_s, least, most, args.n_nodes()).iter().map(|r| r.len() as u32).collect()
         }
         (_, each) => even(n, each.unwrap_or(usual)),
     };

@@ -16,7 +16,8 @@ pub fn emit(args: &EmitArgs) -> Result<()> {
     let (name, hint) = match args.engine {
         EngineArg::Slurm => (
             "slurm",
-            "J=$(sbatch --parsable --array=INDICES shard.sh); sbatch --dependency=afterok:$J --kill-on-invalid-dep=yes merge.sh",
+            "J=$(sbatch --parsable --array=INDICES shard.sh); \
+             sbatch --dependency=afterany:$J merge.sh",
         ),
         EngineArg::Hyperqueue => ("hyperqueue", "bash submit.sh"),
         EngineArg::Openjd => ("openjd", "openjd run template.json, or any engine that takes such"),
@@ -38,11 +39,12 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     // What every shard would say is said once.
     let planned = Plan::read(&plan)?;
     planned.scene_as_planned()?;
-    let Some(engine) = slurm::states(&slurm::submitted(&plan)) else {
-        return Err(Error::Transient {
-            what: "squeue does not say what is queued already; nothing was submitted".into(),
-        });
-    };
+    if let Some(option) = args.job.sbatch.iter().chain(&args.job.sbatch_merge).find(|option| names_job(option)) {
+        return Err(Error::usage(format!("--sbatch={option}: by names and comments `submit` tells its jobs apart")));
+    }
+    let engine = slurm::states(&slurm::submitted(&plan)).map_err(|why| Error::Transient {
+        what: format!("what is queued already is not known, nothing was submitted: {}", why.what),
+    })?;
     let (queued, what): (Vec<usize>, Vec<String>) = engine.into_iter().unzip();
     if let Some(what) = what.first() {
         let shards = ranges(&queued);
@@ -60,12 +62,16 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     }
     let mut text = String::new();
     for array in &submitted.arrays {
-        text += &format!("job {}: shards {}\n", array.job, array.shards);
+        text += &format!("job {}: shards {}\n", array.job.as_deref().unwrap_or_default(), array.shards);
     }
     let folder = args.job.plan.display();
-    text +=
-        &format!("job {}: the merge, after them\nfollow them: nimbus farm status --plan {folder}\n", submitted.merge);
+    let merge = submitted.merge.as_deref().unwrap_or_default();
+    text += &format!("job {merge}: the merge, after them\nfollow them: nimbus farm status --plan {folder}\n");
     output::text(&text)
+}
+
+fn names_job(option: &str) -> bool {
+    ["--comment", "--job-name", "-J"].iter().any(|name| option.trim_start().starts_with(name))
 }
 
 /// Writes the engine's files for what is not done: their names, and what that is.
@@ -82,6 +88,7 @@ fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<(Vec<&'stati
         indices: &indices,
         n_tries: args.tries,
         options: &args.sbatch,
+        merge_options: &args.sbatch_merge,
         exclusive: !plan.is_exact(),
     };
     if indices.is_empty() {

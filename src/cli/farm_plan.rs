@@ -21,6 +21,8 @@ use crate::io::scene_file::{self, LoadedScene};
 const USUAL_FRAMES: u32 = 16;
 /// Configurations, or cases.
 const USUAL_CONFIGURATIONS: u32 = 8;
+const USUAL_QUANTUM_S: f64 = 3600.0;
+const USUAL_RETRIES: f64 = 0.02;
 
 pub fn plan(args: &PlanArgs) -> Result<()> {
     let mut set = args.set.clone();
@@ -38,7 +40,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         None => frames(args, &loaded)?,
     };
     // What is to be said of the price is known to be right before anything is written.
-    let packing = predicted_s.as_deref().map(|seconds| pack(seconds, args.nodes as usize));
+    let packing = predicted_s.as_deref().map(|seconds| pack(seconds, args.n_nodes()));
     let estimate = packing.map(|packing| estimate(args, &packing)).transpose()?;
     let plan = Plan::new(Wish {
         scene: args.scene.clone(),
@@ -126,16 +128,17 @@ fn estimate(args: &PlanArgs, packing: &Packing) -> Result<String> {
     let mut text = format!(
         "predicted: {} of runs; on {} nodes done after {}, {:.0} % of their time idle\n",
         duration(all_s),
-        args.nodes,
+        args.n_nodes(),
         duration(packing.makespan_s),
         100.0 * packing.idle_share
     );
     if let Some(price_per_quantum) = args.rate {
-        let rate = Rate { quantum_s: args.quantum, price_per_quantum, retry_share: args.retries };
+        let quantum_s = args.quantum.unwrap_or(USUAL_QUANTUM_S);
+        let rate = Rate { quantum_s, price_per_quantum, retry_share: args.retries.unwrap_or(USUAL_RETRIES) };
         let price = price(packing, &rate).map_err(Error::usage)?;
         text += &format!(
             "price: {:.2} for {} pieces of {} s, and {:.2} for retries to be expected: {:.2}\n",
-            price.without_retries, price.quanta, args.quantum, price.retries, price.total
+            price.without_retries, price.quanta, quantum_s, price.retries, price.total
         );
     }
     Ok(text)

@@ -40,13 +40,13 @@ pub(super) fn cut(args: &PlanArgs, of: Against, loaded: &LoadedScene) -> Result<
     let Some(model) = model else { return planned(cut, loaded, None) };
     // Halved until the longest piece is short enough, and there is one for every node; ranges first, as they cost no more
     // than a set-up, and what of the light all samples share.
-    let (least, most) = args.shard_seconds;
+    let (least, most) = args.lengths();
     model.check(&Work::Reference(cut.clone()))?;
     loop {
         let counted = cut.work(loaded)?;
         let seconds = counted.iter().map(|piece| model.seconds(1.0, piece)).collect::<Result<Vec<f64>>>()?;
         let longest = seconds.iter().copied().fold(0.0, f64::max);
-        let is_short = longest <= most && (longest < 2.0 * least || seconds.len() >= args.nodes as usize);
+        let is_short = longest <= most && (longest < 2.0 * least || seconds.len() >= args.n_nodes());
         let halves = halves(args, &cut);
         let Some(next) = halves.filter(|_| !is_short) else { return planned(cut, loaded, Some(seconds)) };
         cut = next;

@@ -31,7 +31,9 @@ mod weather;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use clap::Parser;
 
@@ -92,11 +94,21 @@ pub fn main() -> ExitCode {
     }
 }
 
+/// Signals so close together are one: an engine tells a job script and all that it runs, and the script tells them, too.
+const ONE_SIGNAL: Duration = Duration::from_secs(1);
+
 /// What Ctrl-C does; runs on a thread of its own.
 fn interrupted() {
-    if GRACEFUL.load(Ordering::Relaxed) && !STOP.swap(true, Ordering::Relaxed) {
-        eprintln!("interrupted: finishes this frame and keeps what is done; once more ends at once");
-        return;
+    static FIRST: OnceLock<Instant> = OnceLock::new();
+    if GRACEFUL.load(Ordering::Relaxed) {
+        if !STOP.swap(true, Ordering::Relaxed) {
+            FIRST.get_or_init(Instant::now);
+            eprintln!("interrupted: finishes this frame and keeps what is done; once more ends at once");
+            return;
+        }
+        if FIRST.get().is_some_and(|first| first.elapsed() < ONE_SIGNAL) {
+            return;
+        }
     }
     atomic::abandon();
     // std::process::exit would run the exit handlers of a driver that other threads are still inside of.

@@ -1,5 +1,5 @@
-//! What was tried, where, and how it ended: a line an event, a file a node, so that no two machines write one file. Engines
-//! keep such a record as well, but a node that dies leaves none there.
+//! What was tried, where, and how it ended: a line an event, a file a node, so that no two machines write one file.
+//! Engines keep such a record as well, but a node that dies leaves none there.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -42,6 +42,9 @@ pub enum Event {
     Failed {
         seconds: f64,
         exit_code: u8,
+        /// Files that it had finished, for those after it.
+        #[serde(default)]
+        n_new: usize,
         what: String,
     },
     /// A result under the right name was not what it says: what was wrong with it, and where it was put.
@@ -78,7 +81,8 @@ impl Log {
     }
 }
 
-/// All attempts of a plan, in the order of their dates. A line that was cut off by whatever ended its writer is left out.
+/// All attempts of a plan, in the order of their dates. A line that was cut off by whatever ended its writer is left
+/// out.
 pub fn read(folder: &Path) -> Result<Vec<Attempt>> {
     let folder = folder.join("attempts");
     let Ok(entries) = fs::read_dir(&folder) else { return Ok(Vec::new()) };
@@ -91,6 +95,33 @@ pub fn read(folder: &Path) -> Result<Vec<Attempt>> {
     all.sort_by(|a, b| a.date.cmp(&b.date));
     Ok(all)
 }
+
+/// How often the task of the engine that this process is has just failed at shard `index` in a row, in ways that may
+/// pass and without finishing anything. What finished something ends the row, so that whoever ends by this count ends.
+/// Where this failure could not be written down those before may not have been either: then it is how often the engine
+/// began the task, with all that died.
+pub fn n_fruitless(folder: &Path, index: usize) -> usize {
+    // What cannot be read counts as not written.
+    let all = read(folder).unwrap_or_default();
+    let n_restarts = std::env::var("SLURM_RESTART_COUNT").ok().and_then(|n| n.parse::<usize>().ok()).unwrap_or(0);
+    fruitless(&all, index, job().as_deref(), &node(), std::process::id()).unwrap_or(n_restarts + 1)
+}
+
+/// None where the failure of this process is not there.
+fn fruitless(all: &[Attempt], index: usize, job: Option<&str>, node: &str, pid: u32) -> Option<usize> {
+    let task = |job: Option<&str>| job.map(|job| job.split(RESTART).next().unwrap_or(job).to_owned());
+    let ours = all.iter().rev().filter(|a| a.index == index && task(a.job.as_deref()) == task(job));
+    let failed: Vec<(&Attempt, usize)> = ours
+        .filter_map(|a| match &a.event {
+            Event::Failed { exit_code: 75, n_new, .. } => Some((a, *n_new)),
+            _ => None,
+        })
+        .collect();
+    let is_ours = |a: &Attempt| a.job.as_deref() == job && a.node == node && a.pid == pid;
+    failed.iter().any(|(a, _)| is_ours(a)).then(|| failed.iter().take_while(|(_, n_new)| *n_new == 0).count())
+}
+
+const RESTART: &str = " restart ";
 
 /// This machine, as its engine names it, or as it does itself; fit for a file's name.
 pub(super) fn node() -> String {
@@ -110,7 +141,7 @@ fn job() -> Option<String> {
         (Some(job), Some(task)) => format!("{job}_{task}"),
         _ => of("SLURM_JOB_ID")?,
     };
-    Some(of("SLURM_RESTART_COUNT").map_or(id.clone(), |restart| format!("{id} restart {restart}")))
+    Some(of("SLURM_RESTART_COUNT").map_or(id.clone(), |restart| format!("{id}{RESTART}{restart}")))
 }
 
 #[cfg(test)]
@@ -124,7 +155,7 @@ mod tests {
         let log = Log::open(dir.path()).unwrap();
         let events = [
             Event::Begun,
-            Event::Failed { seconds: 1.5, exit_code: 75, what: "a \"disk\"\nis full".into() },
+            Event::Failed { seconds: 1.5, exit_code: 75, n_new: 0, what: "a \"disk\"\nis full".into() },
             Event::Done { seconds: 2.0, n_resumed: 3 },
         ];
         for event in &events {
@@ -135,5 +166,38 @@ mod tests {
         let found = read(dir.path()).unwrap();
         assert_eq!(found.iter().map(|a| a.event.clone()).collect::<Vec<_>>(), events[..2]);
         assert!(found.iter().all(|a| a.index == 4 && a.key == "abc" && a.pid == std::process::id()));
+    }
+
+    #[test]
+    fn a_task_s_own_failures_in_a_row_are_counted() {
+        let of = |job: &str, pid, event| Attempt {
+            date: String::new(),
+            index: 4,
+            key: "abc".into(),
+            node: "n1".into(),
+            pid,
+            job: Some(job.into()),
+            event,
+        };
+        let failed = |exit_code, n_new| Event::Failed { seconds: 1.0, exit_code, n_new, what: String::new() };
+        let mut all = vec![
+            of("17_4", 1, failed(75, 0)),
+            // It got somewhere, and what follows is counted anew; a node that died says nothing.
+            of("17_4 restart 1", 2, failed(75, 3)),
+            of("17_4 restart 2", 3, Event::Begun),
+            of("17_4 restart 3", 4, failed(75, 0)),
+            // Another task, an earlier submission's, and another shard.
+            of("17_40", 5, failed(75, 0)),
+            of("9_4", 6, failed(75, 0)),
+            Attempt { index: 5, ..of("17_4", 7, failed(75, 0)) },
+            of("17_4 restart 4", 8, Event::Begun),
+            of("17_4 restart 4", 8, failed(75, 0)),
+        ];
+        let count = |all: &[Attempt], pid| fruitless(all, 4, Some("17_4 restart 4"), "n1", pid);
+        assert_eq!(count(&all, 8), Some(2));
+        // The disk was full.
+        assert_eq!(count(&all, 9), None);
+        all.push(of("17_4 restart 4", 8, failed(75, 1)));
+        assert_eq!(count(&all, 8), Some(0));
     }
 }

@@ -1,5 +1,5 @@
-//! What work takes on a class of devices: runs of a few frames at several sizes, timed from one end to the other as a shard is, and
-//! the cost model that is fitted to them.
+//! What work takes on a class of devices: runs of a few frames at several sizes, timed from one end to the other as a
+//! shard is, and the cost model that is fitted to them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,6 +8,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use super::cost::{Fit, Timed, Work as Counted, fit};
+use super::failing::of_io;
 use super::plan::{self, PictureFormat, Plan, Wish};
 use super::run::{self, How};
 use super::store::{Manifest, Standing, Store};
@@ -183,14 +184,25 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
     Ok((Row { what, timed }, device))
 }
 
-/// A folder that is gone when it is dropped.
+/// So many names are tried for a folder that nobody else has.
+const N_NAMES: u32 = 1000;
+
+/// A new folder that is gone when it is dropped.
 struct Folder(PathBuf);
 
 impl Folder {
     fn new() -> Result<Folder> {
-        let path = std::env::temp_dir().join(format!("nimbus-calibrate-{}", std::process::id()));
-        synced::make_folder(&path)?;
-        Ok(Folder(path))
+        let (base, pid) = (std::env::temp_dir(), std::process::id());
+        for k in 0..N_NAMES {
+            let path = base.join(format!("nimbus-calibrate-{pid}-{k}"));
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(Folder(path)),
+                // Somebody's of the same number: in another container, or before the machine was started again.
+                Err(cause) if cause.kind() == std::io::ErrorKind::AlreadyExists => {}
+                Err(cause) => return Err(of_io(&path, &cause)),
+            }
+        }
+        Err(Error::io(&base, format!("{N_NAMES} folders nimbus-calibrate-{pid}-… are there already")))
     }
 }
 
@@ -216,5 +228,19 @@ impl Calibration {
         }
         read.fit.model.check().map_err(|what| wrong(&what))?;
         Ok(read)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_are_one_s_own_and_go() {
+        let [a, b] = [Folder::new().unwrap(), Folder::new().unwrap()];
+        let paths = [a.0.clone(), b.0.clone()];
+        assert!(paths[0] != paths[1] && paths.iter().all(|path| path.is_dir()));
+        drop((a, b));
+        assert!(!paths.iter().any(|path| path.exists()));
     }
 }

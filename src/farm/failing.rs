@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::error::Error;
 
-/// What may be otherwise later or on another node: a full disk, a file server that is away, a device that was lost or is not
-/// there, Ctrl-C or an engine's signal. Everything else is as it is.
+/// What may be otherwise later or on another node: a full disk, a file server that is away, a device that was lost or
+/// is not there, Ctrl-C or an engine's signal. Everything else is as it is.
 pub fn may_pass(error: Error) -> Error {
     match error {
         Error::Vulkan { .. } | Error::Interrupted => Error::Transient { what: error.to_string() },

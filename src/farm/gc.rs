@@ -17,8 +17,8 @@ pub struct Removed {
     pub bytes: u64,
 }
 
-/// Removes unfinished folders: of shards that are done, and those in which nothing has happened for `idle`. With `all` also what was
-/// put aside. With `dry` it only says so.
+/// Removes unfinished folders: of shards that are done, and those in which nothing has happened for `idle`. With `all`
+/// also what was put aside. With `dry` it only says so.
 pub fn gc(folder: &Path, plan: &Plan, idle: Duration, all: bool, dry: bool) -> Result<Vec<Removed>> {
     let store = Store::open(folder);
     let (others, mut removed) = (store.others(), Vec::new());

@@ -48,8 +48,8 @@ const PAUSE: Duration = Duration::from_secs(1);
 const LOOK: Duration = Duration::from_millis(5);
 
 impl Pool<'_> {
-    /// Runs `indices`; `on_end` is told of each. On `stop`, and on an error, no more begin, and those that run are asked to end: they
-    /// keep what they have.
+    /// Runs `indices`; `on_end` is told of each. On `stop`, and on an error, no more begin, and those that run are
+    /// asked to end: they keep what they have.
     pub fn run(&self, indices: &[usize], stop: &AtomicBool, on_end: &mut dyn FnMut(&Ended)) -> Result<Vec<Ended>> {
         let now = Instant::now();
         let mut waiting: VecDeque<Waiting> =

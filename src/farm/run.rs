@@ -1,5 +1,6 @@
 //! One shard, from whatever is there of it to its verified result.
 
+use std::cell::Cell;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -43,10 +44,10 @@ pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
     let shard = plan.shard(index)?;
     let log = Log::open(folder)?;
     let store = Store::open(folder);
-    let begin = Instant::now();
+    let (begin, n_new) = (Instant::now(), Cell::new(0));
     // A stale plan is refused even where its results are there: they are not of what the files say now.
     let ended = plan.scene_as_planned().and_then(|loaded| {
-        let attempt = Attempt { plan: &plan, loaded: &loaded, shard, store: &store, log: &log, how };
+        let attempt = Attempt { plan: &plan, loaded: &loaded, shard, store: &store, log: &log, how, n_new: &n_new };
         attempt.run(begin).or_else(|error| match store.standing(&plan, shard) {
             // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away what we worked in.
             Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
@@ -58,7 +59,10 @@ pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
         Ok(Outcome::Skipped) => Event::Skipped,
         Ok(Outcome::Done { seconds, n_resumed }) => Event::Done { seconds: *seconds, n_resumed: *n_resumed },
         Ok(Outcome::Beaten) => Event::Beaten { seconds },
-        Err(error) => Event::Failed { seconds, exit_code: error.exit_code(), what: error.to_string() },
+        Err(error) => {
+            let (exit_code, what) = (error.exit_code(), error.to_string());
+            Event::Failed { seconds, exit_code, n_new: n_new.get(), what }
+        }
     };
     // On a full disk nothing can be written down either, and a result counts without a line about it.
     let _ = log.say(index, &shard.key, event);
@@ -72,6 +76,8 @@ struct Attempt<'a> {
     store: &'a Store,
     log: &'a Log,
     how: &'a How<'a>,
+    /// Is told how many files it finished, also where it fails.
+    n_new: &'a Cell<usize>,
 }
 
 impl Attempt<'_> {
@@ -95,15 +101,17 @@ impl Attempt<'_> {
         let mut workplace = store.begin(shard, &who)?;
         let choice = DeviceChoice { shaders: plan.scene.shaders.clone(), ..self.how.choice.clone() };
         let stop = self.how.stop;
-        let device = match &plan.work {
+        let made = match &plan.work {
             Work::Frames { .. } => {
                 let of = (*store, *plan, *shard, *loaded);
-                frames::draw(of, &choice, &mut workplace, stop, self.how.on_item)?
+                frames::draw(of, &choice, &mut workplace, stop, self.how.on_item)
             }
-            Work::Reference(cut) => reference::draw((cut, *shard, *loaded), &mut workplace, stop, self.how.on_item)?,
-            Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)?,
-            Work::Bench { arguments, .. } => bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)?,
+            Work::Reference(cut) => reference::draw((cut, *shard, *loaded), &mut workplace, stop, self.how.on_item),
+            Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop),
+            Work::Bench { arguments, .. } => bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop),
         };
+        self.n_new.set(workplace.n_new());
+        let device = made?;
         let (seconds, n_resumed) = (begin.elapsed().as_secs_f64(), workplace.n_resumed);
         let manifest = Manifest {
             schema: SCHEMA_VERSION,

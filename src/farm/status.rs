@@ -19,6 +19,8 @@ pub struct Status {
     pub n_done: usize,
     /// How far what was predicted is off from what it took, of shards that one run did from beginning to end.
     pub predicted: Option<Compared>,
+    /// Why the engine that shards were submitted to does not say what it does with them.
+    pub engine_silent: Option<String>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,11 +79,10 @@ impl State {
     }
 }
 
-/// Of the plan in `folder`; reads every result.
+/// Of the plan in `folder`; reads every result, and asks no engine.
 pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     let (store, attempts) = (Store::open(folder), attempts::read(folder)?);
     let others = store.others();
-    let mut engine = slurm::states(&slurm::submitted(folder)).unwrap_or_default();
     let mut by_key: BTreeMap<&str, Vec<&Attempt>> = BTreeMap::new();
     attempts.iter().for_each(|attempt| by_key.entry(&attempt.key).or_default().push(attempt));
     let mut pairs = Vec::new();
@@ -108,12 +109,12 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
             n_attempts: of_shard.iter().filter(|attempt| attempt.event == Event::Begun).count(),
             n_unfinished,
             n_differing: others.of(&shard.key, Other::Differing).len(),
-            engine: engine.remove(&shard.index),
+            engine: None,
         }
     };
     let shards: Vec<ShardStatus> = plan.shards.iter().map(of).collect();
     let n_done = shards.iter().filter(|shard| shard.state == State::Done).count();
-    Ok(Status { shards, n_done, predicted: Compared::of(&pairs) })
+    Ok(Status { shards, n_done, predicted: Compared::of(&pairs), engine_silent: None })
 }
 
 fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) {
@@ -131,6 +132,14 @@ fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) 
 }
 
 impl Status {
+    /// Asks the engine that the plan in `folder` was submitted to, which takes some seconds where it does not answer.
+    pub fn ask_engine(&mut self, folder: &Path) {
+        match slurm::states(&slurm::submitted(folder)) {
+            Ok(mut states) => self.shards.iter_mut().for_each(|shard| shard.engine = states.remove(&shard.index)),
+            Err(why) => self.engine_silent = Some(why.what),
+        }
+    }
+
     /// Indices that are not done, as Slurm's `--array` takes them: "0,3-5".
     pub fn missing(&self) -> String {
         ranges(&self.open())
@@ -174,7 +183,8 @@ mod tests {
         };
         let states = [State::Open, State::Done, State::Failed, State::Broken, State::Begun, State::Done, State::Open];
         let shards: Vec<ShardStatus> = states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();
-        assert_eq!(Status { shards, n_done: 2, predicted: None }.missing(), "0,2-4,6");
-        assert_eq!(Status { shards: vec![shard(0, State::Done)], n_done: 1, predicted: None }.missing(), "");
+        let status = |shards| Status { shards, n_done: 0, predicted: None, engine_silent: None };
+        assert_eq!(status(shards).missing(), "0,2-4,6");
+        assert_eq!(status(vec![shard(0, State::Done)]).missing(), "");
     }
 }

@@ -1,6 +1,6 @@
-//! What is done: `shards/KEY`, a folder with a shard's files and `shard.json`, which says what is in them. A folder appears
-//! under its key at once and whole, by a rename; until then it is `KEY.tmp.NODE.PID`, where whoever tries next finds the files
-//! that were finished.
+//! What is done: `shards/KEY`, a folder with a shard's files and `shard.json`, which says what is in them. A folder
+//! appears under its key at once and whole, by a rename; until then it is `KEY.tmp.NODE.PID`, where whoever tries next
+//! finds the files that were finished.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -158,7 +158,8 @@ impl Store {
         }
     }
 
-    /// Unfinished folders, and those that were put aside, by key: read at once, since a listing takes as long as there are results.
+    /// Unfinished folders, and those that were put aside, by key: read at once, since a listing takes as long as there
+    /// are results.
     pub fn others(&self) -> Others {
         let mut others = Others::default();
         for entry in fs::read_dir(&self.folder).into_iter().flatten().flatten() {
@@ -173,8 +174,8 @@ impl Store {
         others
     }
 
-    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone, or whole: somebody may have mended it since it was
-    /// looked at.
+    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone, or whole: somebody may have
+    /// mended it since it was looked at.
     pub fn put_aside(&self, plan: &Plan, shard: &Shard, who: &str) -> Result<Option<PathBuf>> {
         let key = &shard.key;
         let (place, to) = (self.place(key), self.free(key, Other::Bad, who));
@@ -210,21 +211,24 @@ impl Store {
         }
     }
 
-    /// Takes over what attempts at `shard` before have finished on a device like `device`: another one's pictures differ.
+    /// Takes over what attempts at `shard` before have finished on a device like `device`: another one's pictures
+    /// differ.
     pub fn resume(&self, workplace: &mut Workplace, plan: &Plan, shard: &Shard, device: &Device) -> Result<()> {
         let outputs = plan.outputs(shard);
         let mark = serde_json::to_string(&device.class()).map_err(|cause| Error::io(&workplace.path, cause))?;
         for other in self.others().of(&shard.key, Other::Unfinished) {
             if fs::read_to_string(other.join(DEVICE_FILE)).is_ok_and(|of| of == mark) {
-                workplace.adopt(other, &outputs)?;
+                let adopted = workplace.adopt(other, &outputs);
+                // Also where it fails: what was taken over is not what this attempt made.
+                workplace.n_resumed = workplace.files.len();
+                adopted?;
             }
         }
-        workplace.n_resumed = workplace.files.len();
         synced::write(&workplace.path.join(DEVICE_FILE), mark.as_bytes())
     }
 
-    /// Moves a finished folder under its key. What is there already stays, if it is whole: the same is as good, and another is
-    /// a contradiction (exit code 70), which is kept beside it.
+    /// Moves a finished folder under its key. What is there already stays, if it is whole: the same is as good, and
+    /// another is a contradiction (exit code 70), which is kept beside it.
     pub fn put(&self, workplace: Workplace, plan: &Plan, shard: &Shard, who: &str) -> Result<Placed> {
         // Whoever puts something broken aside makes room for one more try; a few of them may meet.
         const TRIES: usize = 16;
@@ -264,8 +268,9 @@ impl Store {
             ours.iter().zip(&theirs.files).filter(|(a, b)| a != b).map(|(a, _)| a.name.as_str()).collect();
         Error::Conflict {
             what: format!(
-                "shard {}: {} made another result before (on {}, process {}): {} of {} files differ, {} the first; what was made \
-                 here is kept in {}. Two devices or drivers in one farm do that: `nimbus farm status --json` names them",
+                "shard {}: {} made another result before (on {}, process {}): {} of {} files differ, {} the first; \
+                 what was made here is kept in {}. Two devices or drivers in one farm do that: \
+                 `nimbus farm status --json` names them",
                 shard.index,
                 theirs.node,
                 theirs.device.name,
@@ -351,6 +356,11 @@ pub struct Workplace {
 impl Workplace {
     pub fn has(&self, name: &str) -> bool {
         self.files.contains_key(name)
+    }
+
+    /// Files that this attempt finished itself.
+    pub fn n_new(&self) -> usize {
+        self.files.len() - self.n_resumed
     }
 
     /// Writes a file, for good: who goes on after us takes it over.

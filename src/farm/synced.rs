@@ -1,5 +1,5 @@
-//! Files that outlast a power cut: written under a name that nobody else has, brought to the disk, renamed, and the new name brought to
-//! the disk.
+//! Files that outlast a power cut: written under a name that nobody else has, brought to the disk, renamed, and the new
+//! name brought to the disk.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;

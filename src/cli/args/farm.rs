@@ -29,28 +29,32 @@ pub enum FarmCommand {
     Plan(PlanArgs),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
-    /// t = setup + a · particles · steps + b · pixels + c · facet pairs, by non-negative least squares of relative errors over runs of one
-    /// frame and of several at three sizes, each timed as a shard is. It is for this class of devices; scenes like those to come make
-    /// it good. What it is off by for runs that it has not seen is said (each left out in turn).
+    /// t = setup + a · particles · steps + b · pixels + c · facet pairs, by non-negative least squares of relative
+    /// errors over runs of one frame and of several at three sizes, each timed as a shard is. It is for this class of
+    /// devices; scenes like those to come make it good. What it is off by for runs that it has not seen is said (each
+    /// left out in turn).
     Calibrate(CalibrateArgs),
     /// Do one shard, unless it is done
     ///
-    /// Exit codes: 0 done, by whomever; 75 it went wrong in a way that may pass (full disk, lost device, a signal): another try may go
-    /// well; 70 the result differs from one that is there; others as everywhere: another try is of no use.
+    /// Exit codes: 0 done, by whomever; 75 it went wrong in a way that may pass (full disk, lost device, a signal):
+    /// another try may go well; 70 the result differs from one that is there; others as everywhere: another try is of
+    /// no use.
     Run(RunArgs),
     /// Do all shards that are not done, here, some processes at a time
     Local(LocalArgs),
-    /// Say what is done and what is not; reads and verifies every result
+    /// Say what is done and what is not; reads and verifies every result, and asks the engine for 10 s at most
     Status(StatusArgs),
     /// Put all results together, as one machine would have made them
     ///
-    /// Every result is verified before and every copy after. Where a shard is missing nothing is written, and it is named.
+    /// Every result is verified before and every copy after. Where a shard is missing nothing is written, and it is
+    /// named.
     Merge(MergeArgs),
     /// Remove what attempts have left behind
     Gc(GcArgs),
     /// Write job files for an engine: a task for every shard that is not done, and the merge after them
     Emit(EmitArgs),
-    /// Hand all shards that are not done to an engine, and the merge after them; prints its ids, and `status` follows them
+    /// Hand all shards that are not done to an engine, and the merge after them; prints its ids, and `status` follows
+    /// them
     Submit(SubmitArgs),
 }
 
@@ -85,34 +89,48 @@ pub struct PlanArgs {
     /// Samples of a shard, a power of two: then all shards' sums are the bits of one machine's [default: 16, or by --model]
     #[arg(long, value_name = "N", requires = "reference", value_parser = parse_power)]
     pub shard_samples: Option<u32>,
-    /// Configurations of a shard [default: 8, or by --model]. Each shard times the scene as it stands as well
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Configurations of a shard, with --error [default: 8, or by --model]. Each shard times the scene as it stands as well
+    #[arg(long, value_name = "N", requires = "error", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_configurations: Option<u32>,
-    /// Cases of a shard [default: 8, or by --model]. Each shard times the first case of all as well
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    /// Cases of a shard, with --bench [default: 8, or by --model]. Each shard times the first case of all as well
+    #[arg(long, value_name = "N", requires = "bench", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_cases: Option<u32>,
     /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few make it slow,
     /// many lose more when it is killed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_frames: Option<u32>,
-    /// What `nimbus farm calibrate` wrote: shards are cut to take 1 to 10 minutes, and what all of them will take and cost is said
+    /// What `nimbus farm calibrate` wrote: shards are cut to take 1 to 10 minutes, and what all of them will take and
+    /// cost is said
     #[arg(long, value_name = "FILE", help_heading = "Cost")]
     pub model: Option<PathBuf>,
-    /// Nodes that are to share the work
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..), help_heading = "Cost")]
-    pub nodes: u32,
-    /// A shard's least and greatest length, seconds
-    #[arg(long, value_name = "LEAST,MOST", default_value = "60,600", value_parser = parse_lengths, help_heading = "Cost")]
-    pub shard_seconds: (f64, f64),
+    /// Nodes that are to share the work, by --model [default: 4]
+    #[arg(
+        long,
+        value_name = "N",
+        requires = "model",
+        value_parser = clap::value_parser!(u32).range(1..),
+        help_heading = "Cost"
+    )]
+    pub nodes: Option<u32>,
+    /// A shard's least and greatest length, seconds, by --model [default: 60,600]
+    #[arg(
+        long,
+        value_name = "LEAST,MOST",
+        requires = "model",
+        conflicts_with_all = ["shard_frames", "shard_configurations", "shard_cases"],
+        value_parser = parse_lengths,
+        help_heading = "Cost"
+    )]
+    pub shard_seconds: Option<(f64, f64)>,
     /// What a node costs in every piece of time that it is paid for by, in any money
     #[arg(long, value_name = "PRICE", requires = "model", help_heading = "Cost")]
     pub rate: Option<f64>,
-    /// That piece, seconds: each is paid for whole
-    #[arg(long, value_name = "S", default_value_t = 3600.0, help_heading = "Cost")]
-    pub quantum: f64,
-    /// The share of attempts that fail and are repeated, from 0 to below 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.02, help_heading = "Cost")]
-    pub retries: f64,
+    /// That piece, seconds: each is paid for whole [default: 3600]
+    #[arg(long, value_name = "S", requires = "rate", help_heading = "Cost")]
+    pub quantum: Option<f64>,
+    /// The share of attempts that fail and are repeated, from 0 to below 1 [default: 0.02]
+    #[arg(long, value_name = "SHARE", requires = "rate", help_heading = "Cost")]
+    pub retries: Option<f64>,
     /// What pictures are written as [default: png of frames, exr of a reference]
     #[arg(long, value_enum)]
     pub format: Option<FormatArg>,
@@ -137,6 +155,17 @@ pub struct PlanArgs {
     /// Arguments of `nimbus error` or `nimbus bench`, without scene, results and device
     #[arg(last = true, requires = "told-more", value_name = "ARGUMENTS")]
     pub told: Vec<String>,
+}
+
+impl PlanArgs {
+    pub fn n_nodes(&self) -> usize {
+        self.nodes.map_or(4, |n| n as usize)
+    }
+
+    /// A shard's least and greatest length, s.
+    pub fn lengths(&self) -> (f64, f64) {
+        self.shard_seconds.unwrap_or((60.0, 600.0))
+    }
 }
 
 /// Frames, configurations or cases from `first`, `end` not counted.
@@ -199,6 +228,10 @@ pub struct RunArgs {
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
+    /// In a task of Slurm: where it has failed so often in a row without finishing anything, it ends with 1 in place of
+    /// 75
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub tries: Option<u32>,
     /// Which shard, from 0
     #[arg(long, value_name = "I")]
     pub shard: usize,
@@ -290,15 +323,21 @@ pub struct JobArgs {
     /// The plan's folder
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
-    /// Folder for the merged result [default: "merged" in the plan's folder]
+    /// Folder for the merged result [default: "merged" in the plan's folder]. What an earlier merge left there is
+    /// replaced (jobs merge with --force)
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// So often a shard is tried that fails in a way that may pass
+    /// So often a shard, or the merge, is tried that fails in a way that may pass. With Slurm a shard's failures count
+    /// in a row, and one that finished frames ends the row; nodes that die do not count, but for the merge
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub tries: u32,
-    /// An option for sbatch, e.g. --sbatch=--gres=gpu:1 (repeatable)
+    /// An option for sbatch of the shards, e.g. --sbatch=--gres=gpu:1 (repeatable). The merge has those that say where
+    /// and for whom (--account, --partition, --qos, --reservation), too
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     pub sbatch: Vec<String>,
+    /// An option for sbatch of the merge, after those (repeatable)
+    #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
+    pub sbatch_merge: Vec<String>,
 }
 
 #[derive(Debug, ClapArgs)]
@@ -356,6 +395,32 @@ mod tests {
         assert_eq!(parse_span("240"), Ok(Span { first: 0, end: 240 }));
         for wrong in ["", "0", "5..5", "7..2", "a..3", "1..", "-1..3", "1..99999999999", "1...3"] {
             assert!(parse_span(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_would_be_of_no_effect_is_refused() {
+        use clap::Parser;
+        let plan = |more: &str| {
+            let line = format!("nimbus farm plan a.toml -o b {more}");
+            crate::cli::args::Args::try_parse_from(line.split_whitespace()).map_err(|cause| cause.to_string())
+        };
+        for (wrong, missing) in [
+            ("--nodes 3", "--model"),
+            ("--shard-seconds 1,2", "--model"),
+            ("--model m --quantum 60", "--rate"),
+            ("--model m --retries 0.1", "--rate"),
+            ("--rate 2", "--model"),
+            ("--shard-configurations 3", "--error"),
+            ("--model m --shard-seconds 1,2 --shard-frames 3", "--shard-frames"),
+        ] {
+            let said = plan(wrong).unwrap_err();
+            assert!(said.contains(missing), "{wrong}: {said}");
+        }
+        for right in
+            ["", "--model m --nodes 3 --shard-seconds 1,2 --rate 2 --quantum 60 --retries 0.1", "--error -- --grid"]
+        {
+            assert!(plan(right).is_ok(), "{right}");
         }
     }
 

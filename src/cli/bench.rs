@@ -10,7 +10,7 @@ use super::args::{BenchArgs, Span, ThreadingArg};
 use super::farm_cut::Amounts;
 use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::work_of;
+use crate::farm::calibrate::{textures_of, work_of};
 use crate::farm::cost::Work as Counted;
 use crate::frame::limits;
 use crate::frame::stage::Stage;
@@ -147,7 +147,13 @@ pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
     let cases = prepare(args, scene, &quiet)?.cases;
     let frames =
         |case: &Case| case.loops.len() as f64 * f64::from(case.n_frames + args.warmup) * f64::from(args.repeat);
-    let counted: Vec<Counted> = cases.iter().map(|case| work_of(&case.scene) * frames(case)).collect();
+    // Of several cases each block begins anew.
+    let n_begun = |case: &Case| f64::from(args.repeat) * case.loops.len() as f64;
+    let counted = |case: &Case| {
+        let frame = work_of(&case.scene, case.scene.time.at(case.i_first))?;
+        Ok(frame * frames(case) + textures_of(&case.scene) * n_begun(case))
+    };
+    let counted = cases.iter().map(counted).collect::<Result<Vec<Counted>>>()?;
     let of_shard = counted.first().copied().unwrap_or_default();
     // It is an item of the first part as well, and only once in it.
     let items = std::iter::once(Counted::default()).chain(counted.into_iter().skip(1)).collect();

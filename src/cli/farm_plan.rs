@@ -8,8 +8,7 @@ use super::args::{Args, CalibrateArgs, Command, ErrorArgs, FormatArg, PlanArgs, 
 use super::farm_cut::{Amounts, Cut, cut};
 use super::{farm_bench, farm_reference, output, tradeoff};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::{calibrate, n_runs, of_farms, work_of_frames};
-use crate::farm::cost::Work as Counted;
+use crate::farm::calibrate::{calibrate, n_runs, of_farms, textures_of, work_of_frames};
 use crate::farm::pack::{Packing, Rate, pack, price};
 use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
 use crate::farm::run::How;
@@ -83,7 +82,7 @@ fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
         Some(FormatArg::Png) | None => PictureFormat::Png,
     };
     let work = Work::Frames { first, n, format };
-    let amounts = Amounts { items: work_of_frames(loaded, first..end), of_shard: Counted::default() };
+    let amounts = Amounts { items: work_of_frames(loaded, first..end)?, of_shard: textures_of(&loaded.scene) };
     cut(args, work, &amounts, (args.shard_frames, USUAL_FRAMES))
 }
 
@@ -178,9 +177,11 @@ pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
     let model = fit.model;
     for (name, each_s) in [
         ("set-up", model.setup_s),
+        ("a step", model.step_s),
         ("a particle and step", model.particle_step_s),
         ("a pixel and sample", model.pixel_sample_s),
         ("a pair of facets", model.facet_pair_s),
+        ("making textures", model.texture_s),
     ] {
         let each = each_s.map_or("not measured".to_owned(), |s| format!("{s:.3e} s"));
         text += &format!("{name:>28}: {each}\n");

@@ -13,7 +13,7 @@ use super::farm_cut::Amounts;
 use super::render_reference::Shown;
 use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::work_of;
+use crate::farm::calibrate::{textures_of, work_of};
 use crate::frame::limits;
 use crate::frame::stage::Bed;
 use crate::io::image;
@@ -146,12 +146,16 @@ pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)>
     let design = if args.grid { Design::Grid } else { Design::Alone };
     let all = settings(&axes, design);
     let frames = f64::from(frames_of_turns(args.rounds, args.frames));
-    let turns_beside = f64::from(frames_of_turns(args.rounds, args.frames)) / BETWEEN as f64;
-    let base = work_of(&scene);
+    let time_s = scene.time.at(args.frame);
+    // A turn begins anew, textures and all, as the picture did.
+    let n_begun = f64::from(args.rounds + 1);
+    let of_scene = |scene: &Scene| Ok(work_of(scene, time_s)? * frames + textures_of(scene) * n_begun);
+    let base = of_scene(&scene)?;
     let of_one = |settings: &Vec<Setting>| {
-        load_with(args, &options, settings).map(|of| work_of(&of.scene) * frames + base * turns_beside)
+        let of = load_with(args, &options, settings)?;
+        Ok(of_scene(&of.scene)? + base * (1.0 / BETWEEN as f64))
     };
-    let amounts = Amounts { items: all.iter().map(of_one).collect::<Result<_>>()?, of_shard: base * frames };
+    let amounts = Amounts { items: all.iter().map(of_one).collect::<Result<_>>()?, of_shard: base };
     Ok((all.iter().map(|settings| name_of(settings)).collect(), amounts))
 }
 

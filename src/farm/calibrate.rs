@@ -2,6 +2,7 @@
 //! shard is, and the cost model that is fitted to them.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -17,6 +18,7 @@ use crate::error::{Error, Result};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::io::text_file::{RECORD_LIMIT, read_result};
 use crate::model::scene::{LightingMode, Scene};
+use crate::study::layers::Layers;
 use crate::study::machine::{self, Cpu, Device};
 
 pub const SCHEMA_VERSION: u32 = 1;
@@ -52,24 +54,36 @@ pub struct Row {
 /// Sizes of the pictures, by the scene's own along each side: what grows with the pixels and what does not come apart.
 const SIZES: [f64; 3] = [0.5, 0.75, 1.0];
 
-/// What `frames` of a scene make work of, each.
-pub fn work_of(scene: &Scene) -> Counted {
-    let film = scene.film;
+/// What a frame of a scene at that time makes work of.
+pub fn work_of(scene: &Scene, time_s: f64) -> Result<Counted> {
     let n_facets = scene.n_facets() as f64;
     let is_second = scene.lighting.mode == LightingMode::TwoReflection;
-    Counted {
+    Ok(Counted {
+        steps: 1.0,
         particle_steps: scene.n_particles() as f64,
-        pixel_samples: f64::from(film.width) * f64::from(film.height),
+        pixel_samples: Layers::of(scene, time_s, scene.draw.cutoff)?.n_whole(),
         facet_pairs: if is_second { n_facets * n_facets } else { 0.0 },
-    }
+        textures: 0.0,
+    })
 }
 
-/// Frame by frame, of `frames`.
-pub fn work_of_frames(loaded: &LoadedScene, frames: std::ops::Range<u32>) -> Vec<Counted> {
-    if loaded.phases.is_empty() {
-        return vec![work_of(&loaded.scene); frames.len()];
-    }
-    frames.map(|i| work_of(&loaded.clone().at_frame(i))).collect()
+/// What making a scene's textures once is.
+pub fn textures_of(scene: &Scene) -> Counted {
+    Counted { textures: if scene.is_textured() { 1.0 } else { 0.0 }, ..Counted::default() }
+}
+
+/// Frame by frame, of `frames`: at some of them, each of which stands for its neighbours.
+pub fn work_of_frames(loaded: &LoadedScene, frames: Range<u32>) -> Result<Vec<Counted>> {
+    const N_LOOKED_AT: u32 = 16;
+    let n_alike = (frames.end - frames.start).div_ceil(N_LOOKED_AT).max(1);
+    let of = |first: u32| {
+        let n = n_alike.min(frames.end - first);
+        let middle = first + n / 2;
+        let scene = loaded.clone().at_frame(middle);
+        Ok(vec![work_of(&scene, scene.time.at(middle))?; n as usize])
+    };
+    let parts = frames.clone().step_by(n_alike as usize).map(of).collect::<Result<Vec<_>>>()?;
+    Ok(parts.concat())
 }
 
 /// How many runs [`calibrate`] makes of so many scenes.
@@ -174,7 +188,7 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
     let begin = Instant::now();
     run::run(&folder.0, 0, how)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let work = work_of_frames(&loaded, 0..n).into_iter().fold(Counted::default(), |sum, of| sum + of);
+    let work = work_of_frames(&loaded, 0..n)?.into_iter().fold(textures_of(&loaded.scene), |sum, of| sum + of);
     let device = match Store::open(&folder.0).standing(&plan, &plan.shards[0]) {
         Standing::Verified(manifest) => manifest.device,
         other => return Err(Error::Fault { what: format!("a shard that was just done is not there: {other:?}") }),

@@ -1,4 +1,4 @@
-//! How long work takes: t = setup + a · particles · steps + b · pixels · samples + c · facet pairs (docs/model.md §17),
+//! How long work takes: t = setup + d · steps + a · particles · steps + b · pixels · samples + c · facet pairs + e · textures (docs/model.md §17),
 //! fitted to what a class of devices took, and how far off that is.
 
 use std::ops::{Add, Mul};
@@ -12,12 +12,18 @@ use crate::measure::stats::{median, percentile};
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Work {
+    /// Frames or samples: what each takes whatever is in it.
+    #[serde(default)]
+    pub steps: f64,
     /// Particles times the steps (frames, mostly) that each is moved, sorted and drawn in.
     pub particle_steps: f64,
-    /// Pixels times the samples taken in each.
+    /// Pixels times the samples taken in each: one for what lies behind, and one for every layer over it.
     pub pixel_samples: f64,
     /// Pairs of facets between which light is exchanged.
     pub facet_pairs: f64,
+    /// How often the textures of a scene are made: with each device that begins with it, each time that it begins anew.
+    #[serde(default)]
+    pub textures: f64,
 }
 
 impl Add for Work {
@@ -25,9 +31,11 @@ impl Add for Work {
 
     fn add(self, other: Work) -> Work {
         Work {
+            steps: self.steps + other.steps,
             particle_steps: self.particle_steps + other.particle_steps,
             pixel_samples: self.pixel_samples + other.pixel_samples,
             facet_pairs: self.facet_pairs + other.facet_pairs,
+            textures: self.textures + other.textures,
         }
     }
 }
@@ -37,9 +45,11 @@ impl Mul<f64> for Work {
 
     fn mul(self, times: f64) -> Work {
         Work {
+            steps: self.steps * times,
             particle_steps: self.particle_steps * times,
             pixel_samples: self.pixel_samples * times,
             facet_pairs: self.facet_pairs * times,
+            textures: self.textures * times,
         }
     }
 }
@@ -55,11 +65,11 @@ pub struct Timed {
     pub seconds: f64,
 }
 
-/// The four terms in the order of [`terms`], as messages name them.
-const TERMS: [&str; 4] = ["setups", "particle steps", "pixel samples", "facet pairs"];
+/// The terms in the order of [`terms`], as messages name them.
+const TERMS: [&str; 6] = ["setups", "steps", "particle steps", "pixel samples", "facet pairs", "textures"];
 
 fn terms(setups: f64, work: &Work) -> [f64; TERMS.len()] {
-    [setups, work.particle_steps, work.pixel_samples, work.facet_pairs]
+    [setups, work.steps, work.particle_steps, work.pixel_samples, work.facet_pairs, work.textures]
 }
 
 /// Seconds that one of each takes on one class of devices. None where no run of the calibration had any: nothing is
@@ -70,11 +80,15 @@ pub struct CostModel {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub setup_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub particle_step_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel_sample_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub facet_pair_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub texture_s: Option<f64>,
 }
 
 impl CostModel {
@@ -112,12 +126,12 @@ impl CostModel {
     }
 
     fn each_s(&self) -> [Option<f64>; TERMS.len()] {
-        [self.setup_s, self.particle_step_s, self.pixel_sample_s, self.facet_pair_s]
+        [self.setup_s, self.step_s, self.particle_step_s, self.pixel_sample_s, self.facet_pair_s, self.texture_s]
     }
 
     fn of(each_s: [Option<f64>; TERMS.len()]) -> Self {
-        let [setup_s, particle_step_s, pixel_sample_s, facet_pair_s] = each_s;
-        CostModel { setup_s, particle_step_s, pixel_sample_s, facet_pair_s }
+        let [setup_s, step_s, particle_step_s, pixel_sample_s, facet_pair_s, texture_s] = each_s;
+        CostModel { setup_s, step_s, particle_step_s, pixel_sample_s, facet_pair_s, texture_s }
     }
 }
 

@@ -108,7 +108,10 @@ impl Cut {
     pub fn work(&self, loaded: &LoadedScene) -> Result<Vec<Counted>> {
         let scene = loaded.clone().at_frame(self.frame);
         let of = self.against()?;
-        let layers = Layers::of(&scene, scene.time.at(self.frame))?;
+        // Where a blob has lost all but a thousandth of its depth; integrals end nowhere, and little is left there.
+        const REACH: f64 = 4.0;
+        let reach = if of == Against::Thin { scene.draw.cutoff } else { REACH };
+        let layers = Layers::of(&scene, scene.time.at(self.frame), reach)?;
         let n_particles = scene.n_particles() as f64;
         let by_model = matches!(of, Against::Model | Against::Reflections(_));
         let n_facets = if by_model { n_particles } else { scene.n_facets() as f64 };
@@ -119,9 +122,12 @@ impl Cut {
             let (n_layers, n_solid) = (layers.n_within(tile), layers.n_solid_within(tile));
             let receivers = n_lit * n_facets + if by_model { n * n_solid } else { 0.0 };
             Counted {
+                steps: n,
                 particle_steps: n_particles,
                 pixel_samples: n * n_layers,
                 facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_facets },
+                // The processor makes them once, a part of the set-up.
+                textures: 0.0,
             }
         };
         Ok((0..self.n_pieces() as u32).map(of_piece).collect())

@@ -19,10 +19,8 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Of a scene at one time.
-    pub fn of(scene: &Scene, time_s: f64) -> Result<Layers> {
-        /// Where a blob has lost all but a thousandth: farther out it seldom matters.
-        const REACH: f64 = 4.0;
+    /// Of a scene at one time, whose blobs end at `reach` σ.
+    pub fn of(scene: &Scene, time_s: f64, reach: f64) -> Result<Layers> {
         let truth = Truth::unlit(scene, time_s)?;
         let view = picture::view(scene, &truth);
         let origin = truth.setting.light_origin;
@@ -30,13 +28,18 @@ impl Layers {
         let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();
         let all = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
         let solid = all.map(|(i, j)| !placed.is_empty() && sees(i, j)).collect();
-        Ok(Layers { width: view.width, n: sprites::n_layers(&view, &truth.blobs, REACH), solid })
+        Ok(Layers { width: view.width, n: sprites::n_layers(&view, &truth.blobs, reach), solid })
     }
 
     fn rows<'a, T>(&self, values: &'a [T], tile: Tile) -> impl Iterator<Item = &'a [T]> {
         let width = self.width as usize;
         let (left, n) = (tile.left as usize, tile.width as usize);
         (tile.top..tile.top + tile.height).map(move |j| &values[j as usize * width + left..][..n])
+    }
+
+    /// Layers over all pixels, and one a pixel for what is behind them.
+    pub fn n_whole(&self) -> f64 {
+        self.n.iter().map(|n| 1.0 + f64::from(*n)).sum()
     }
 
     /// Layers over the pixels of `tile`, and one a pixel for what is behind them.

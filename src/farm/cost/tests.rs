@@ -3,13 +3,15 @@ use crate::measure::random::{SplitMix64, normal};
 
 const TRUTH: CostModel = CostModel {
     setup_s: Some(2.0),
+    step_s: Some(0.01),
     particle_step_s: Some(1e-7),
     pixel_sample_s: Some(4e-9),
     facet_pair_s: Some(3e-10),
+    texture_s: Some(0.05),
 };
 
 fn work(particle_steps: f64, pixel_samples: f64, facet_pairs: f64) -> Work {
-    Work { particle_steps, pixel_samples, facet_pairs }
+    Work { steps: 0.0, particle_steps, pixel_samples, facet_pairs, textures: 0.0 }
 }
 
 /// What TRUTH says of some work, times `noise`.
@@ -21,9 +23,11 @@ fn timed(work: Work, noise: f64) -> Timed {
 fn runs(seed: u64, n: usize, sd: f64) -> Vec<Timed> {
     let random = &mut SplitMix64(seed);
     let mut amounts = |middle: f64| normal(random, n).iter().map(|z| middle * z.exp()).collect::<Vec<f64>>();
-    let (particles, pixels, pairs) = (amounts(1e8), amounts(2e9), amounts(3e10));
+    let (steps, particles, pixels, pairs) = (amounts(300.0), amounts(1e8), amounts(2e9), amounts(3e10));
+    let textures = amounts(40.0);
     let noise: Vec<f64> = normal(random, n).iter().map(|z| (sd * z).exp()).collect();
-    (0..n).map(|i| timed(work(particles[i], pixels[i], pairs[i]), noise[i])).collect()
+    let of = |i: usize| Work { steps: steps[i], textures: textures[i], ..work(particles[i], pixels[i], pairs[i]) };
+    (0..n).map(|i| timed(of(i), noise[i])).collect()
 }
 
 #[test]
@@ -33,9 +37,9 @@ fn work_adds_up_and_is_multiplied() {
 
 #[test]
 fn seconds_by_hand() {
-    // 3 · 2 + 1e8 · 1e-7 + 1e9 · 4e-9 + 1e10 · 3e-10 = 6 + 10 + 4 + 3.
-    let seconds = TRUTH.seconds(3.0, &work(1e8, 1e9, 1e10)).unwrap();
-    assert!((seconds - 23.0).abs() < 1e-13, "{seconds}");
+    // 3 · 2 + 1e8 · 1e-7 + 1e9 · 4e-9 + 1e10 · 3e-10 = 6 + 10 + 4 + 3, and 200 · 0.01 + 20 · 0.05 = 3.
+    let seconds = TRUTH.seconds(3.0, &Work { steps: 200.0, textures: 20.0, ..work(1e8, 1e9, 1e10) }).unwrap();
+    assert!((seconds - 26.0).abs() < 1e-13, "{seconds}");
 }
 
 #[test]

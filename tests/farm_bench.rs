@@ -1,5 +1,5 @@
-//! A sweep in shards: what is merged is the bench that one process makes but for its times, and times that cannot be compared are not
-//! merged.
+//! A sweep in shards: what is merged is the bench that one process makes but for its times, and times that cannot be
+//! compared are not merged.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -164,7 +164,8 @@ fn readers(dir: &TempDir, merged: &Path, alone: &Path) {
     assert_eq!(validator.iter_errors(&value).map(|e| e.to_string()).collect::<Vec<_>>(), [""; 0]);
 }
 
-/// Changes `file` of the shard in `place`, and its record with it, as if its node had written it so; and says that the node was its own.
+/// Changes `file` of the shard in `place`, and its record with it, as if its node had written it so; and says that the
+/// node was its own.
 fn change(place: &Path, file: &str, from: &str, to: &str) {
     let before = fs::read_to_string(place.join(file)).expect("a file");
     assert!(before.contains(from), "{from}");

@@ -1,4 +1,5 @@
-//! A reference picture in tiles and ranges of samples: what is merged is the picture that one machine makes, to the byte.
+//! A reference picture in tiles and ranges of samples: what is merged is the picture that one machine makes, to the
+//! byte.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -38,7 +39,7 @@ fn shards(folder: &str) -> Vec<Value> {
 
 fn sums_of(folder: &str, i: usize) -> PathBuf {
     let key = shards(folder)[i]["key"].as_str().expect("a key").to_owned();
-    Path::new(folder).join("shards").join(key).join("sums.f64")
+    Path::new(folder).join("shards").join(key).join(format!("sums-{i:08}.f64"))
 }
 
 #[test]
@@ -110,7 +111,7 @@ fn what_is_not_all_there_or_is_something_else_is_no_picture() {
         fs::write(&sums, content).expect("a file");
         let (code, said) = merge(what);
         assert_eq!(code, Some(1), "{what}: {said}");
-        assert!(said.contains("to do: 2") && said.contains("shard 2: sums.f64"), "{what}: {said}");
+        assert!(said.contains("to do: 2") && said.contains("shard 2: sums-00000002.f64"), "{what}: {said}");
         assert!(!Path::new(&path(&dir, what)).exists());
         // It is made anew, the same.
         good(&["farm", "run", "-q", "--plan", &folder, "--shard", "2"]);

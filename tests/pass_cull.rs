@@ -1,4 +1,5 @@
-//! cull: what is kept against the f64 reference, over whole buffers: who, in which order, under which keys, and how many.
+//! cull: what is kept against the f64 reference, over whole buffers: who, in which order, under which keys, and how
+//! many.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -145,7 +146,8 @@ impl Scene {
     }
 
     fn fates(&self) -> Vec<Fate> {
-        // ln of a product of four, each rounded, by Vulkan's 3 ulp or 2^-21; what is kept beside the silhouette, and its rounding.
+        // ln of a product of four, each rounded, by Vulkan's 3 ulp or 2^-21; what is kept beside the silhouette, and
+        // its rounding.
         let slack = Slack { depth: DEPTH, log: 2f64.powi(-20), growth: 1.01e-4, pixels: 1.01 / 16.0 };
         let of = |i: usize| {
             let drawn = (i as u32) < self.drawn[self.i_group[i] as usize].end;

@@ -210,8 +210,8 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
     compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
-    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping, counts; twice a
-    // mode, seven summaries, lows, two passes, a reason. A part, its clocks and its time.
+    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping, counts;
+    // twice a mode, seven summaries, lows, two passes, a reason. A part, its clocks and its time.
     assert_eq!(n_compared, 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 

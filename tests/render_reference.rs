@@ -28,8 +28,8 @@ const CUBES: [&str; 3] = ["scenes/cubes-554.toml", "--size", "100x75"];
 
 const FLAT: [&str; 3] = ["tests/data/flat.toml", "--size", "100x75"];
 
-/// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one way. A pixel on a sprite's
-/// edge may be drawn or not: e^{−4.5} of its α.
+/// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one way. A pixel on a
+/// sprite's edge may be drawn or not: e^{−4.5} of its α.
 const RMSE_OF_F32: f64 = 1e-5;
 const MAX_OF_F32: f64 = 0.012;
 

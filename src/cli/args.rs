@@ -144,7 +144,7 @@ pub enum Command {
     /// P, PB, T, PH, PHB and the attributes DX and DY are needed; what else is missing is told. What is negative, NaN or a
     /// fill value among mixing ratios is counted and taken for none; elsewhere it is an error.
     Weather(WeatherArgs),
-    /// Spread frames, studies or sweeps over machines that share a folder, and put them together again
+    /// Spread frames, studies, sweeps or reference pictures over machines that share a folder
     ///
     /// `plan` cuts the work into shards, each with a key that follows from scene, shaders, build and range. `run` does one shard: it is
     /// what an engine (Slurm, another one, or `local`, the pool of one machine) starts, as often and on as many nodes as it likes.

@@ -43,8 +43,8 @@ pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Optio
             return Err(Error::usage(format!("--trace takes one scene, found {}", args.scenes.len())));
         }
     }
-    // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no folder
-    // is made for results that will not come.
+    // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no
+    // folder is made for results that will not come.
     let quiet = super::SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     for scene in &args.scenes {
         prepare(args, scene, &quiet)?;
@@ -137,8 +137,8 @@ fn of_part(args: &BenchArgs, cases: Vec<Case>) -> Result<Vec<Case>> {
     Ok(numbers(&range).into_iter().map(|i| cases[i].clone()).collect())
 }
 
-/// Names of the cases that a bench is asked for, in the order that `--part` counts by; and what each makes work of, the first being
-/// timed in every part.
+/// Names of the cases that a bench is asked for, in the order that `--part` counts by; and what each makes work of, the
+/// first being timed in every part.
 pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
     let [scene] = &args.scenes[..] else {
         return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));

@@ -1,12 +1,14 @@
 //! `nimbus farm plan --reference`: how a picture is cut into tiles and ranges of samples.
 
 use super::args::{FormatArg, PlanArgs};
-use super::farm_cut::{Cut, Model};
-use crate::error::{Error, Result};
+use super::farm_cut::{self, Amounts, Cut, Model};
+use crate::error::Result;
+use crate::farm::cost::Work as Counted;
 use crate::farm::plan::{PictureFormat, Work};
 use crate::farm::reference;
 use crate::io::scene_file::LoadedScene;
 use crate::study::against::Against;
+use crate::study::layers::Layers;
 
 /// Pixels along a side of a tile, and samples of a range, where nothing is known of what they take.
 const USUAL_TILE: u32 = 256;
@@ -37,40 +39,68 @@ pub(super) fn cut(args: &PlanArgs, of: Against, loaded: &LoadedScene) -> Result<
         format,
     };
     reference::check(&cut, loaded)?;
-    let Some(model) = model else { return planned(cut, loaded, None) };
-    // Halved until the longest piece is short enough, and there is one for every node; ranges first, as they cost no more
-    // than a set-up, and what of the light all samples share.
-    let (least, most) = args.lengths();
-    model.check(&Work::Reference(cut.clone()))?;
-    loop {
-        let counted = cut.work(loaded)?;
-        let seconds = counted.iter().map(|piece| model.seconds(1.0, piece)).collect::<Result<Vec<f64>>>()?;
-        let longest = seconds.iter().copied().fold(0.0, f64::max);
-        let is_short = longest <= most && (longest < 2.0 * least || seconds.len() >= args.n_nodes());
-        let halves = halves(args, &cut);
-        let Some(next) = halves.filter(|_| !is_short) else { return planned(cut, loaded, Some(seconds)) };
-        cut = next;
+    let layers = cut.layers(loaded)?;
+    if let Some(model) = &model {
+        model.check(&Work::Reference(cut.clone()))?;
+        cut = shortened(args, cut, |cut| longest(cut, loaded, &layers, model))?;
     }
+    let amounts = Amounts { items: cut.work(loaded, &layers)?, of_shard: Counted::default() };
+    // Without a model every piece is a shard; with one neighbours go together as far as they are short.
+    farm_cut::cut(args, Work::Reference(cut), &amounts, (None, 1))
 }
 
-/// The same with pieces half as large; none where they are as small as they may be.
-fn halves(args: &PlanArgs, cut: &reference::Cut) -> Option<reference::Cut> {
+/// The longest piece, s, and how many there are.
+fn longest(cut: &reference::Cut, loaded: &LoadedScene, layers: &Layers, model: &Model<'_>) -> Result<(f64, usize)> {
+    let work = cut.work(loaded, layers)?;
+    let seconds = work.iter().map(|piece| model.seconds(1.0, piece)).collect::<Result<Vec<f64>>>()?;
+    Ok((seconds.iter().copied().fold(0.0, f64::max), seconds.len()))
+}
+
+/// Halved until the longest piece is short enough and there is one for every node, as far as that makes it shorter;
+/// ranges first, as they cost no more than a set-up and what of the light all samples share.
+fn shortened(
+    args: &PlanArgs,
+    mut cut: reference::Cut,
+    longest: impl Fn(&reference::Cut) -> Result<(f64, usize)>,
+) -> Result<reference::Cut> {
+    /// What does not make a piece this much shorter only adds the light that every piece pays anew.
+    const WORTH: f64 = 0.8;
+    let (least, most) = args.lengths();
+    let (mut now, mut n) = longest(&cut)?;
+    while now > most || (now >= 2.0 * least && n < args.n_nodes()) {
+        let mut next = None;
+        for half in halves(args, &cut) {
+            let (then, n) = longest(&half)?;
+            if then < WORTH * now {
+                next = Some((half, then, n));
+                break;
+            }
+        }
+        let Some(found) = next else { break };
+        (cut, now, n) = found;
+    }
+    if now > most {
+        eprintln!(
+            "note: the longest piece takes {now:.0} s, more than {most:.0}: light that every piece computes anew"
+        );
+    }
+    Ok(cut)
+}
+
+/// The same with pieces half as large, in ranges or in tiles, as far as they may be.
+fn halves(args: &PlanArgs, cut: &reference::Cut) -> Vec<reference::Cut> {
     /// Smaller ones spend more on what all tiles share.
     const LEAST_TILE: u32 = 16;
-    let mut half = cut.clone();
     let longer = if cut.tile[0] >= cut.tile[1] { 0 } else { 1 };
-    match () {
-        () if args.shard_samples.is_none() && cut.range > 1 => half.range /= 2,
-        () if args.tile.is_none() && cut.tile[longer] >= 2 * LEAST_TILE => {
-            half.tile[longer] = cut.tile[longer].div_ceil(2);
-        }
-        () => return None,
+    let mut found = Vec::new();
+    if args.shard_samples.is_none() && cut.range > 1 {
+        found.push(reference::Cut { range: cut.range / 2, ..cut.clone() });
     }
-    half.check().ok().map(|()| half)
-}
-
-fn planned(cut: reference::Cut, loaded: &LoadedScene, predicted_s: Option<Vec<f64>>) -> Result<Cut> {
-    let counted = cut.work(loaded)?;
-    let n = u32::try_from(counted.len()).map_err(|_| Error::usage("more pieces than a plan can have"))?;
-    Ok(Cut { work: Work::Reference(cut), sizes: vec![1; n as usize], counted, predicted_s })
+    if args.tile.is_none() && cut.tile[longer] >= 2 * LEAST_TILE {
+        let mut tile = cut.tile;
+        tile[longer] = tile[longer].div_ceil(2);
+        found.push(reference::Cut { tile, ..cut.clone() });
+    }
+    found.retain(|half| half.check().is_ok());
+    found
 }

@@ -94,7 +94,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Signals so close together are one: an engine tells a job script and all that it runs, and the script tells them, too.
+/// Signals so close together are one: an engine tells a job script and all that it runs, and the script tells them,
+/// too.
 const ONE_SIGNAL: Duration = Duration::from_secs(1);
 
 /// What Ctrl-C does; runs on a thread of its own.

@@ -1,7 +1,6 @@
 //! `nimbus render SCENE -o FILE`.
 
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 
 use super::args::RenderArgs;
 use super::{check_time, device_choice, load, output, refuse_existing, render_reference, say_notes, say_sizes};
@@ -9,7 +8,7 @@ use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
 use crate::frame::stage::Stage;
-use crate::io::image::{self, ImageKind};
+use crate::io::image::{self, ImageKind, image_hash};
 use crate::model::film::FilmFormat;
 use crate::study::counts::Counts;
 use crate::study::machine::device_record;
@@ -93,15 +92,6 @@ fn pass_ms(rendered: &Rendered, pass: Pass) -> Option<f64> {
     rendered.passes.iter().find(|p| p.name == pass.name()).map(|p| p.ms())
 }
 
-/// SHA-256 (hex) over the pixels as little-endian f32, whatever the machine's own order.
-pub(super) fn image_hash(rgba: &[f32]) -> String {
-    let mut hasher = Sha256::new();
-    for part in rgba.chunks(4096) {
-        hasher.update(part.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
-    }
-    format!("{:x}", hasher.finalize())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,12 +102,5 @@ mod tests {
         assert_eq!(not_finite(3, 8, FilmFormat::Rgba32f), plain);
         let half = not_finite(3, 8, FilmFormat::Rgba16f);
         assert_eq!(half, format!("{plain}; film.format = \"rgba32f\" holds more than 65504"));
-    }
-
-    #[test]
-    fn the_hash_is_over_the_values_in_little_endian_order() {
-        let rgba: Vec<f32> = (0..5000).map(|i| i as f32 * 0.37).collect();
-        let bytes: Vec<u8> = rgba.iter().flat_map(|v| v.to_le_bytes()).collect();
-        assert_eq!(image_hash(&rgba), format!("{:x}", Sha256::digest(&bytes)));
     }
 }

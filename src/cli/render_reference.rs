@@ -7,10 +7,11 @@ use serde_json::{Value, json};
 
 use super::args::RenderArgs;
 use super::output::{self, LateProgress, Spinner};
-use super::render::{image_hash, not_finite};
+use super::render::not_finite;
 use super::say_sizes;
 use crate::error::Result;
-use crate::io::{atomic, image};
+use crate::io::atomic;
+use crate::io::image::{self, image_hash};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
 use crate::study::against::Against;

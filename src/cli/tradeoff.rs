@@ -134,8 +134,8 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     output::text(&format!("\n{}", chart.text(output::columns(), chart.rows(), output::colored(color))?))
 }
 
-/// Names of the configurations that a study is asked for, without the scene as it stands, in the order that `--part` counts by; and
-/// what each makes work of, the scene as it stands being timed beside them.
+/// Names of the configurations that a study is asked for, without the scene as it stands, in the order that `--part`
+/// counts by; and what each makes work of, the scene as it stands being timed beside them.
 pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)> {
     let options = plain(args)?;
     let scene = load(&args.scene, &options)?.at_frame(args.frame);

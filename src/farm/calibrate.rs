@@ -114,10 +114,27 @@ pub fn calibrate(scenes: &[PathBuf], set: &[String], frames: u32, how: &How<'_>)
     fitted(of, rows, (device, machine::cpu(), machine::environment()))
 }
 
-/// Fits the model to farms that are done: to every shard of which it is known what takes time in it, and that one run did from
-/// its beginning to its end.
+/// What of shards has to be the same where their times are one model's.
+#[derive(Debug, Clone)]
+struct Class {
+    of: String,
+    code: String,
+    device: Device,
+    cpu: Cpu,
+    environment: BTreeMap<String, String>,
+}
+
+impl Class {
+    fn words(&self) -> String {
+        let Class { of, code, device, cpu, environment } = self;
+        format!("{of}, build {code}, {}, {}, environment {environment:?}", device.class(), cpu.class())
+    }
+}
+
+/// Fits the model to farms that are done: to every shard of which it is known what takes time in it, and that one run
+/// did from its beginning to its end.
 pub fn of_farms(folders: &[PathBuf]) -> Result<Calibration> {
-    let (mut rows, mut class): (_, Option<(String, Device, Cpu, _)>) = (Vec::new(), None);
+    let (mut rows, mut class): (_, Option<Class>) = (Vec::new(), None);
     for folder in folders {
         let plan = Plan::read(folder)?;
         let (store, scene) = (Store::open(folder), plan.scene.file.display());
@@ -126,19 +143,15 @@ pub fn of_farms(folders: &[PathBuf]) -> Result<Calibration> {
                 continue;
             };
             let Manifest { device, cpu, environment, seconds, n_resumed, .. } = *manifest;
-            let of = plan.work.kind();
-            let (kind, first, processor, _) =
-                class.get_or_insert_with(|| (of.clone(), device.clone(), cpu.clone(), environment));
-            let is_one = (&*kind, &first.name, &first.driver, &processor.model);
-            if is_one != (&of, &device.name, &device.driver, &cpu.model) {
+            let here = Class { of: plan.work.kind(), code: plan.code.clone(), device, cpu, environment };
+            let class = class.get_or_insert_with(|| here.clone());
+            if class.words() != here.words() {
                 return Err(Error::usage(format!(
-                    "{}: shard {} is {of} on {} with {}; expected what the others are, {kind} on {} with {}",
+                    "{}: shard {} was done by {}; expected what did the first, {}",
                     folder.display(),
                     shard.index,
-                    device.name,
-                    cpu.model,
-                    first.name,
-                    processor.model
+                    here.words(),
+                    class.words()
                 )));
             }
             if n_resumed == 0 {
@@ -147,7 +160,7 @@ pub fn of_farms(folders: &[PathBuf]) -> Result<Calibration> {
             }
         }
     }
-    let Some((of, device, cpu, environment)) = class else {
+    let Some(Class { of, device, cpu, environment, .. }) = class else {
         return Err(Error::usage("no shard of these farms is done of which it is known what takes time in it"));
     };
     fitted(of, rows, (device, cpu, environment))

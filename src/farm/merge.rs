@@ -1,4 +1,5 @@
-//! All shards' results in one folder, as one machine would have made them. Everything is verified before, and every copy after.
+//! All shards' results in one folder, as one machine would have made them. Everything is verified before, and every
+//! copy after.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,8 +15,8 @@ use super::{reference, study};
 use crate::error::{Error, Result};
 use crate::io::folder::replace_files;
 
-/// Puts the results of the plan in `folder` into `out`, frames all at once; how many. Refuses where a shard is not done. With
-/// `force` frames of an earlier merge are replaced, and go.
+/// Puts the results of the plan in `folder` into `out`, frames all at once; how many. Refuses where a shard is not
+/// done. With `force` frames of an earlier merge are replaced, and go.
 pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -> Result<usize> {
     if !force && out.symlink_metadata().is_ok() {
         return Err(Error::io(out, "exists; --force replaces it"));

@@ -217,7 +217,7 @@ impl Plan {
             Work::Frames { format, .. } => shard.items().map(|i| output(i, *format)).collect(),
             Work::Error { .. } => study::FILES.map(str::to_owned).to_vec(),
             Work::Bench { .. } => bench::files(shard),
-            Work::Reference(_) => vec![reference::SUMS_FILE.to_owned()],
+            Work::Reference(_) => shard.items().map(reference::Cut::sums_file).collect(),
         }
     }
 

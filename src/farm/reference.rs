@@ -1,6 +1,7 @@
-//! The work of shards of a reference picture: sums over a range of samples in a tile, and all of them as the picture that
-//! `nimbus render --reference` makes, to the byte.
+//! The work of shards of a reference picture: sums over a range of samples in a tile, and all of them as the picture
+//! that `nimbus render --reference` makes, to the byte.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,11 +13,11 @@ use serde_json::json;
 use super::cost::Work as Counted;
 use super::failing::of_io;
 use super::plan::{PictureFormat, Plan, Shard};
-use super::store::{Manifest, Workplace};
+use super::store::{Manifest, Store, Workplace};
 use super::synced;
 use crate::error::{Error, Result};
 use crate::io::folder::replace_files;
-use crate::io::image::{ImageKind, encoded};
+use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::study::against::Against;
@@ -26,12 +27,13 @@ use crate::study::model_light::reflections_of;
 use crate::study::pixels::{Pixels, Tile};
 use crate::study::samples::{self, MOST_SAMPLES, Pairs, Subject, Sums};
 
-/// A shard's file: [`Sums::bytes`] of its pixels.
-pub const SUMS_FILE: &str = "sums.f64";
+/// Most pieces of a picture: a plan of as many shards is about as large as one can be.
+const MOST_PIECES: u64 = 40_000;
 /// What the picture is of, and how far it may be off.
 pub const ABOUT_FILE: &str = "reference.json";
 
-/// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k / n_ranges, tiles row by row.
+/// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k / n_ranges, tiles row by
+/// row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
@@ -63,8 +65,9 @@ impl Cut {
         if !range.is_power_of_two() {
             return Err(format!("ranges of {range} samples, expected a power of two"));
         }
-        if self.n_pieces() > u64::from(u32::MAX) {
-            return Err(format!("{} pieces, expected fewer, larger ones", self.n_pieces()));
+        if self.n_pieces() > MOST_PIECES {
+            let n = self.n_pieces();
+            return Err(format!("{n} pieces, expected up to {MOST_PIECES}: larger tiles, or more samples in each"));
         }
         Ok(())
     }
@@ -91,6 +94,11 @@ impl Cut {
         (Tile { left, top, width, height }, first..self.n_samples.min(first.saturating_add(self.range)))
     }
 
+    /// The file of piece `k`: [`Sums::bytes`] of its pixels. Names sort as the pieces do.
+    pub fn sums_file(k: u32) -> String {
+        format!("sums-{k:08}.f64")
+    }
+
     /// The picture's file.
     pub fn file(&self) -> String {
         format!("reference.{}", self.format.extension())
@@ -104,28 +112,39 @@ impl Cut {
         self.of.parse().map_err(Error::usage)
     }
 
-    /// What each piece makes work of.
-    pub fn work(&self, loaded: &LoadedScene) -> Result<Vec<Counted>> {
+    /// How many layers its pixels have.
+    pub fn layers(&self, loaded: &LoadedScene) -> Result<Layers> {
         let scene = loaded.clone().at_frame(self.frame);
-        let of = self.against()?;
         // Where a blob has lost all but a thousandth of its depth; integrals end nowhere, and little is left there.
         const REACH: f64 = 4.0;
-        let reach = if of == Against::Thin { scene.draw.cutoff } else { REACH };
-        let layers = Layers::of(&scene, scene.time.at(self.frame), reach)?;
+        let reach = if self.against()? == Against::Thin { scene.draw.cutoff } else { REACH };
+        Layers::of(&scene, scene.time.at(self.frame), reach)
+    }
+
+    /// What each piece makes work of.
+    pub fn work(&self, loaded: &LoadedScene, layers: &Layers) -> Result<Vec<Counted>> {
+        let scene = loaded.clone().at_frame(self.frame);
+        let of = self.against()?;
         let n_particles = scene.n_particles() as f64;
         let by_model = matches!(of, Against::Model | Against::Reflections(_));
         let n_facets = if by_model { n_particles } else { scene.n_facets() as f64 };
+        // Light comes from particles' facets, and from surfaces' areas.
+        let n_emitters = n_facets + scene.surfaces.len() as f64;
         let n_reflections = if let Against::Reflections(k) = of { k } else { reflections_of(&scene) };
+        let tile = |i: u32| self.piece(i * self.n_ranges()).0;
+        let n_tiles = self.n_pieces() as u32 / self.n_ranges();
+        let of_tiles: Vec<[f64; 2]> =
+            (0..n_tiles).map(|i| [layers.n_within(tile(i)), layers.n_solid_within(tile(i))]).collect();
         let of_piece = |k: u32| {
-            let (tile, samples) = self.piece(k);
+            let (_, samples) = self.piece(k);
             let (n, n_lit) = (samples.len() as f64, if n_reflections >= 3 { samples.len() as f64 } else { 1.0 });
-            let (n_layers, n_solid) = (layers.n_within(tile), layers.n_solid_within(tile));
+            let [n_layers, n_solid] = of_tiles[(k / self.n_ranges()) as usize];
             let receivers = n_lit * n_facets + if by_model { n * n_solid } else { 0.0 };
             Counted {
                 steps: n,
                 particle_steps: n_particles,
                 pixel_samples: n * n_layers,
-                facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_facets },
+                facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_emitters },
                 // The processor makes them once, a part of the set-up.
                 textures: 0.0,
             }
@@ -148,24 +167,29 @@ fn scene_of(cut: &Cut, loaded: &LoadedScene) -> Scene {
     loaded.clone().at_frame(cut.frame)
 }
 
-/// Does the piece of `shard`; the device is the processor, whose last digits another kind's mathematics may not share.
+/// Does the pieces of `shard` that are not there yet; the device is the processor, whose last digits another kind's
+/// mathematics may not share.
 pub fn draw(
-    (cut, shard, loaded): (&Cut, &Shard, &LoadedScene),
+    (store, plan, shard, loaded): (&Store, &Plan, &Shard, &LoadedScene),
+    cut: &Cut,
     workplace: &mut Workplace,
     stop: &AtomicBool,
     on_piece: &dyn Fn(),
 ) -> Result<Device> {
     let scene = scene_of(cut, loaded);
     let subject = Subject { of: cut.against()?, scene: &scene, time_s: scene.time.at(cut.frame) };
-    let mut bytes = Vec::new();
+    let device = processor();
+    store.resume(workplace, plan, shard, &device)?;
     for k in shard.items() {
-        let (tile, samples) = cut.piece(k);
-        let sums = samples::sums(&subject, &cut.pixels(tile), samples, stop, &|_, _| ())?;
-        bytes.extend(sums.bytes());
+        let name = Cut::sums_file(k);
+        if !workplace.has(&name) {
+            let (tile, samples) = cut.piece(k);
+            let sums = samples::sums(&subject, &cut.pixels(tile), samples, stop, &|_, _| ())?;
+            workplace.add(&name, &sums.bytes())?;
+        }
         on_piece();
     }
-    workplace.add(SUMS_FILE, &bytes)?;
-    Ok(processor())
+    Ok(device)
 }
 
 /// The processor as the device that it is here.
@@ -173,13 +197,13 @@ fn processor() -> Device {
     Device {
         name: machine::cpu().model,
         driver: "f64 on the processor".into(),
-        api: "none".into(),
+        api: "not used".into(),
         kind: "cpu".into(),
         uuid: String::new(),
     }
 }
 
-/// All pieces as the picture, in `out`; how many files.
+/// All pieces as the picture, in `out`; how many pieces.
 pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) -> Result<usize> {
     let loaded = plan.scene_as_planned()?;
     let sums = put_together(plan, cut, parts)?;
@@ -187,12 +211,16 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
     let (scene, kind) = (scene_of(cut, &loaded), ImageKind::of(Path::new(&cut.file()))?);
     let rgba = samples::shown(&mean.rgba);
     let picture = encoded(kind, &scene.film, cut.width, cut.height, &rgba)?;
+    let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
+    let nodes: BTreeSet<&str> = parts.iter().map(|(_, manifest)| manifest.node.as_str()).collect();
+    let processors: BTreeSet<&str> = parts.iter().map(|(_, manifest)| manifest.cpu.model.as_str()).collect();
     let about = json!({
         "schema": 1, "reference": cut.of, "frame": cut.frame, "time_s": scene.time.at(cut.frame),
         "width": cut.width, "height": cut.height, "samples": cut.n_samples, "own_error": mean.own_error,
         "accuracy": cut.against()?.accuracy_of(&scene, cut.n_samples), "file": cut.file(),
         "scene_file": plan.scene.file.display().to_string(), "scene_hash": plan.scene.hash, "set": plan.scene.set,
         "seed": plan.scene.seed, "nimbus": plan.nimbus, "revision": plan.revision, "code": plan.code,
+        "image_hash": image_hash(&rgba), "not_finite": n_bad, "nodes": nodes, "processors": processors,
         "seconds": parts.iter().map(|(_, manifest)| manifest.seconds).sum::<f64>(),
     });
     let other = ["reference.png", "reference.exr"].into_iter().find(|name| *name != cut.file());
@@ -202,7 +230,7 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
         synced::write(&staged.join(cut.file()), &picture)?;
         synced::write(&staged.join(ABOUT_FILE), format!("{about:#}\n").as_bytes())
     })?;
-    Ok(2)
+    Ok(cut.n_pieces() as usize)
 }
 
 /// The sums of the whole picture: tiles by copy, ranges of samples by their tree, in the order of their shards.
@@ -211,17 +239,13 @@ fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result
     let mut values = vec![0.0; samples::N_VALUES * whole.at.len()];
     let mut pairs = Pairs::default();
     for (shard, (folder, _)) in plan.shards.iter().zip(parts) {
-        let path = folder.join(SUMS_FILE);
-        let bytes = fs::read(&path).map_err(|cause| of_io(&path, &cause))?;
-        let mut rest = &bytes[..];
         for k in shard.items() {
+            let path = folder.join(Cut::sums_file(k));
+            let bytes = fs::read(&path).map_err(|cause| of_io(&path, &cause))?;
             let (tile, samples) = cut.piece(k);
             let pixels = cut.pixels(tile);
-            let n_bytes = 8 * samples::N_VALUES * pixels.at.len();
-            let (here, after) = rest.split_at(n_bytes.min(rest.len()));
-            rest = after;
             let is_last = samples.end == cut.n_samples;
-            let sums = Sums::from_bytes(here, pixels.at.len(), samples.len() as u32);
+            let sums = Sums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32);
             pairs.push(sums.ok_or_else(|| Error::io(&path, "has other numbers than its piece has pixels"))?);
             if !is_last {
                 continue;
@@ -230,9 +254,6 @@ fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result
             for (at, found) in pixels.at.iter().zip(of_tile.values.chunks_exact(samples::N_VALUES)) {
                 values[samples::N_VALUES * whole.index(*at)..][..samples::N_VALUES].copy_from_slice(found);
             }
-        }
-        if !rest.is_empty() {
-            return Err(Error::io(&path, "has other numbers than its piece has pixels"));
         }
     }
     Ok(Sums { n_samples: cut.n_samples, values })

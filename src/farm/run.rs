@@ -37,8 +37,8 @@ pub struct How<'a> {
     pub on_item: &'a dyn Fn(),
 }
 
-/// Does shard `index` of the plan in `folder`, unless it is done. Errors have the exit code that engines are told: 75 where another try
-/// may go well, 70 where the result contradicts one that is there.
+/// Does shard `index` of the plan in `folder`, unless it is done. Errors have the exit code that engines are told: 75
+/// where another try may go well, 70 where the result contradicts one that is there.
 pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
     let plan = Plan::read(folder)?;
     let shard = plan.shard(index)?;
@@ -106,7 +106,10 @@ impl Attempt<'_> {
                 let of = (*store, *plan, *shard, *loaded);
                 frames::draw(of, &choice, &mut workplace, stop, self.how.on_item)
             }
-            Work::Reference(cut) => reference::draw((cut, *shard, *loaded), &mut workplace, stop, self.how.on_item),
+            Work::Reference(cut) => {
+                let of = (*store, *plan, *shard, *loaded);
+                reference::draw(of, cut, &mut workplace, stop, self.how.on_item)
+            }
             Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop),
             Work::Bench { arguments, .. } => bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop),
         };

@@ -35,8 +35,8 @@ pub fn measure(
     Ok(study.made.device)
 }
 
-/// All parts, in the order of their shards, as one study in `out`; the number of its configurations. Refuses, with a list of the
-/// differences, where times cannot be compared.
+/// All parts, in the order of their shards, as one study in `out`; the number of its configurations. Refuses, with a
+/// list of the differences, where times cannot be compared.
 pub fn merge(parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<usize> {
     let read = |(folder, manifest): &(PathBuf, Manifest)| {
         let (study, found) = files::read_found(folder)?;

@@ -7,6 +7,7 @@ use glam::DVec3;
 use image::codecs::openexr::OpenExrEncoder;
 use image::codecs::png::PngEncoder;
 use image::{ColorType, DynamicImage, ExtendedColorType, ImageEncoder, ImageFormat};
+use sha2::{Digest, Sha256};
 
 use super::atomic::write_atomic;
 use crate::error::{Error, Result};
@@ -32,7 +33,8 @@ impl ImageKind {
     }
 }
 
-/// A picture as its file has it, row 0 the top: an EXR's numbers; a PNG's code values (of 8 or 16 bits) by the greatest.
+/// A picture as its file has it, row 0 the top: an EXR's numbers; a PNG's code values (of 8 or 16 bits) by the
+/// greatest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
     pub kind: ImageKind,
@@ -135,6 +137,15 @@ pub fn display_bytes(film: &Film, width: u32, height: u32, rgba: &[f32]) -> Vec<
 
 fn check_size(width: u32, height: u32, rgba: &[f32]) {
     assert_eq!(rgba.len() as u64, 4 * u64::from(width) * u64::from(height), "four floats a pixel");
+}
+
+/// SHA-256 (hex) over the pixels as little-endian f32, whatever the machine's own order.
+pub fn image_hash(rgba: &[f32]) -> String {
+    let mut hasher = Sha256::new();
+    for part in rgba.chunks(4096) {
+        hasher.update(part.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>());
+    }
+    format!("{:x}", hasher.finalize())
 }
 
 #[cfg(test)]
@@ -244,5 +255,12 @@ mod tests {
             let error = write(Path::new(name), &film(1, 1), 1, 1, &[0.0; 4]).unwrap_err();
             assert_eq!(error, Error::usage(format!("{name}: expected a file name that ends in .png or .exr")));
         }
+    }
+
+    #[test]
+    fn the_hash_is_over_the_values_in_little_endian_order() {
+        let rgba: Vec<f32> = (0..5000).map(|i| i as f32 * 0.37).collect();
+        let bytes: Vec<u8> = rgba.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(image_hash(&rgba), format!("{:x}", Sha256::digest(&bytes)));
     }
 }

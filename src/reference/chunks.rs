@@ -1,6 +1,6 @@
-//! chunks, model.md §11 "chunks": thin blobs composed near to far by blending under what is there, in f64, and a bound on what a
-//! device may differ that blends in f32 and shows the result in the film's format.
-//! In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of which it is the same picture.
+//! chunks, model.md §11 "chunks": thin blobs composed near to far by blending under what is there, in f64, and a bound
+//! on what a device may differ that blends in f32 and shows the result in the film's format. In: blobs and eye relative
+//! to O, an order far to near. Out: as `sprites`, of which it is the same picture.
 
 use glam::DVec3;
 
@@ -82,8 +82,8 @@ mod tests {
         assert!(value.iter().zip(other[0]).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 
-    /// The recurrence in f32, rounded correctly at each step, lies within the bound, and a factor of ten below what would
-    /// be wide.
+    /// The recurrence in f32, rounded correctly at each step, lies within the bound, and a factor of ten below what
+    /// would be wide.
     #[test]
     fn f32_stays_within_the_bound() {
         let n = 4000;

@@ -42,7 +42,8 @@ pub fn fate(view: &View, blob: &Blob, slack: &Slack) -> Fate {
     }
 }
 
-/// Whether `blob` can show where every decision is moved by `slack` toward "yes". A comparison with what is no number is "no".
+/// Whether `blob` can show where every decision is moved by `slack` toward "yes". A comparison with what is no number
+/// is "no".
 fn shows(view: &View, blob: &Blob, slack: &Slack) -> bool {
     let c = blob.position - view.pose.position;
     let (depth, off) = (c.dot(view.pose.forward), slack.depth * c.length());

@@ -14,6 +14,7 @@ pub mod first;
 pub mod generate;
 pub mod grid;
 pub mod impostors;
+pub mod layers;
 pub mod live;
 pub mod morton;
 pub mod occlude;

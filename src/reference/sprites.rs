@@ -39,8 +39,8 @@ pub struct Rounding {
     pub step: f64,
     /// Relative error of each α.
     pub alpha: f64,
-    /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there (so a relative error of b).
-    /// Nearer to the cut a sprite may end or not.
+    /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there (so a relative error
+    /// of b). Nearer to the cut a sprite may end or not.
     pub edge: f64,
     /// What a view depth may be off, as a share of the distance, where it decides on a size.
     pub depth: f64,
@@ -97,15 +97,16 @@ impl View {
         (tan * f64::from(self.width) / f64::from(self.height), tan)
     }
 
-    /// b²/2σ² where a sprite ends whose centre has the optical depth `tau` (model.md §11 "threshold"); where it is not above 0
-    /// nothing is drawn.
+    /// b²/2σ² where a sprite ends whose centre has the optical depth `tau` (model.md §11 "threshold"); where it is not
+    /// above 0 nothing is drawn.
     pub fn cut(&self, tau: f64) -> f64 {
         // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves out.
         (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
     }
 
-    /// How much wider than the smallest one, over the eye's offset `c` from it, a blob's σ is: where that is below 0 nothing of it
-    /// is drawn (model.md §11 "cull"). And how far a GPU's answer may lie from it, `depth` as in [`Rounding`].
+    /// How much wider than the smallest one, over the eye's offset `c` from it, a blob's σ is: where that is below 0
+    /// nothing of it is drawn (model.md §11 "cull"). And how far a GPU's answer may lie from it, `depth` as in
+    /// [`Rounding`].
     pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
         let width = self.smallest * self.pixel();
         (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())
@@ -129,15 +130,15 @@ impl View {
         2.0 * self.half_slopes().1 / f64::from(self.height)
     }
 
-    /// Columns and rows (from, to; to excluded) outside which no ray meets `blob`, `c` off the eye, out to `reach` σ. May be too
-    /// large, never too small.
+    /// Columns and rows (from, to; to excluded) outside which no ray meets `blob`, `c` off the eye, out to `reach` σ.
+    /// May be too large, never too small.
     pub(super) fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let (slope_x, slope_y) = self.half_slopes();
         let [x, y] = [self.pose.right, self.pose.up].map(|side| blob.slopes(c, [side, self.pose.forward], reach));
         let pixels = |(low, high): (f64, f64), slope: f64, n: u32| {
             let at = |s: f64| 0.5 * (s / slope + 1.0) * f64::from(n);
-            // One pixel to either side, of which a shift takes up to half, for the rounding of the tangents; `as` saturates, and min
-            // keeps it inside.
+            // One pixel to either side, of which a shift takes up to half, for the rounding of the tangents; `as`
+            // saturates, and min keeps it inside.
             let from = ((at(low) - 1.0).floor() as u32).min(n);
             (from, ((at(high) + 1.0).ceil() as u32).clamp(from, n))
         };
@@ -179,9 +180,9 @@ impl Layered {
     }
 }
 
-/// The same of a target of equal steps, which cuts source and result to [0, 1]; value and bound. It may blend in its own
-/// few bits (Vulkan, "Blending": no less precise than the target): source, factor, product and sum are then each rounded to
-/// a step, half a step off where rounding is correct.
+/// The same of a target of equal steps, which cuts source and result to [0, 1]; value and bound. It may blend in its
+/// own few bits (Vulkan, "Blending": no less precise than the target): source, factor, product and sum are then each
+/// rounded to a step, half a step off where rounding is correct.
 fn over_steps([value, bound]: [f64; 2], source: f64, alpha: f64, off: f64, r: &Rounding) -> [f64; 2] {
     // No difference of source and target as in floats: a source that is cut does not follow α.
     let inherited = (1.0 - alpha) * bound + off * (source.abs() + value.abs() + bound);
@@ -275,8 +276,8 @@ pub struct Raster<'a> {
     pub at: &'a [[u32; 2]],
 }
 
-/// The values of [`render_textured`] at the pixels of `raster` alone, over `behind`, one each. `on_row` hears how many rows of
-/// cells there are each time that one more is done.
+/// The values of [`render_textured`] at the pixels of `raster` alone, over `behind`, one each. `on_row` hears how many
+/// rows of cells there are each time that one more is done.
 pub fn render_at(
     view: &View,
     raster: &Raster<'_>,
@@ -316,35 +317,6 @@ pub fn render_at(
         pixels
     });
     rows.into_iter().flatten().map(|p| p.value).collect()
-}
-
-/// In how many blobs' rectangles each pixel lies, out to `reach` σ: about how many layers it has.
-pub fn n_layers(view: &View, blobs: &[Blob], reach: f64) -> Vec<u32> {
-    let (width, height) = (view.width as usize, view.height as usize);
-    // Differences along rows and columns, with a place beyond either end.
-    let mut steps = vec![0i64; (width + 1) * (height + 1)];
-    for blob in blobs {
-        let c = blob.position - view.pose.position;
-        if c.dot(view.pose.forward) < view.near {
-            continue;
-        }
-        let [(left, right), (top, bottom)] = view.rectangle(blob, c, reach);
-        for (row, sign) in [(top, 1), (bottom, -1)] {
-            steps[row as usize * (width + 1) + left as usize] += sign;
-            steps[row as usize * (width + 1) + right as usize] -= sign;
-        }
-    }
-    let mut above = vec![0i64; width];
-    let mut counts = Vec::with_capacity(width * height);
-    for row in steps.chunks_exact(width + 1).take(height) {
-        let mut sum = 0;
-        for (above, step) in above.iter_mut().zip(row) {
-            sum += step;
-            *above += sum;
-            counts.push(u32::try_from(*above).unwrap_or(0));
-        }
-    }
-    counts
 }
 
 /// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference of slopes.
@@ -451,25 +423,6 @@ mod tests {
         smallest: 0.0,
         shift: DVec2::ZERO,
     };
-
-    #[test]
-    fn layers_are_counted_where_blobs_lie() {
-        // 9 by 7 pixels; a blob in the middle, one to the lower right, one behind the eye.
-        let view = View { width: 9, height: 7, ..VIEW };
-        let at = |x: f64, y: f64, z: f64| Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma: 0.05, kappa: 1.0 };
-        let blobs = [at(0.0, 0.0, 4.0), at(0.9, -0.9, 4.0), at(0.0, 0.0, -4.0)];
-        let counts = n_layers(&view, &blobs, 3.0);
-        let rectangle = |b: &Blob| view.rectangle(b, b.position, 3.0);
-        for (k, n) in counts.iter().enumerate() {
-            let (i, j) = (k as u32 % 9, k as u32 / 9);
-            let lies = |b: &&Blob| {
-                let [(left, right), (top, bottom)] = rectangle(b);
-                (left..right).contains(&i) && (top..bottom).contains(&j)
-            };
-            assert_eq!(*n as usize, blobs[..2].iter().filter(lies).count(), "{i} {j}");
-        }
-        assert!(counts[3 * 9 + 4] >= 1 && counts[0] == 0 && counts.contains(&2));
-    }
 
     #[test]
     fn what_stands_behind_shows_through_and_hides() {

@@ -1,5 +1,6 @@
-//! Ground, model.md §16: its facets, and its picture: opaque triangles between its points, the nearest in every pixel, in f64.
-//! In: points and eye relative to O, radiance of every point (W m⁻² sr⁻¹, RGB). Out: colour and view depth where it is seen.
+//! Ground, model.md §16: its facets, and its picture: opaque triangles between its points, the nearest in every pixel,
+//! in f64. In: points and eye relative to O, radiance of every point (W m⁻² sr⁻¹, RGB). Out: colour and view depth
+//! where it is seen.
 
 use glam::{DVec2, DVec3};
 
@@ -81,8 +82,8 @@ impl Half {
         self.hit(view, ray).map(|hit| self.shown(&hit))
     }
 
-    /// What is seen in a pixel that a rasteriser counts among its own though the ray may pass by it: where the ray meets its
-    /// plane, no farther out than it reaches.
+    /// What is seen in a pixel that a rasteriser counts among its own though the ray may pass by it: where the ray
+    /// meets its plane, no farther out than it reaches.
     pub fn given(&self, view: &View, ray: DVec3) -> Option<Hit> {
         let hit = self.meet(view.pose.position, ray)?;
         let depths = self.points().map(|p| (p - view.pose.position).dot(view.pose.forward).max(view.near));
@@ -123,16 +124,21 @@ impl Half {
     }
 }
 
-/// Lays over `picture`, a pixel each, what is nearer of `terrain`, whose points are where its origin puts them; `radiance` by
-/// its points.
-pub fn render_over(picture: &mut [Behind], view: &View, terrain: &Terrain, radiance: &[DVec3]) {
+/// Columns and rows of a picture: (first, end) of each.
+pub type Window = [(u32, u32); 2];
+
+/// Lays over `picture`, the pixels of `window` row by row, what is nearer of `terrain`, whose points are where its
+/// origin puts them; `radiance` by its points.
+pub fn render_over((picture, window): (&mut [Behind], Window), view: &View, terrain: &Terrain, radiance: &[DVec3]) {
+    let [(first_column, end_column), (first_row, end_row)] = window;
     /// Rounding of a corner's place in pixels must not leave a pixel out; the hit decides.
     const MARGIN: f64 = 1e-6;
     for half in Half::of(terrain, radiance) {
         let [(left, right), (top, bottom)] = half.pixels(view, MARGIN);
-        for j in top..bottom {
-            for i in left..right {
-                let pixel = &mut picture[(j * view.width + i) as usize];
+        for j in top.max(first_row)..bottom.min(end_row) {
+            for i in left.max(first_column)..right.min(end_column) {
+                let place = (j - first_row) * (end_column - first_column) + i - first_column;
+                let pixel = &mut picture[place as usize];
                 if let Some(seen) = half.seen(view, view.ray(i, j)).filter(|seen| seen.depth <= pixel.depth) {
                     *pixel = seen;
                 }
@@ -176,7 +182,7 @@ mod tests {
 
     fn picture(view: &View, terrain: &Terrain, radiance: &[DVec3]) -> Vec<Behind> {
         let mut picture = vec![Behind::NOTHING; 9];
-        render_over(&mut picture, view, terrain, radiance);
+        render_over((&mut picture, [(0, view.width), (0, view.height)]), view, terrain, radiance);
         picture
     }
 
@@ -197,8 +203,8 @@ mod tests {
 
     #[test]
     fn a_hill_is_nearer_and_hides() {
-        // The middle raised by 1: the middle ray meets it at depth 1; that through (2/3, 0) meets the triangle of height
-        // 1 − x/2 at z with 2 − z = 1 − z/3: z = 3/2.
+        // The middle raised by 1: the middle ray meets it at depth 1; that through (2/3, 0) meets the triangle of
+        // height 1 − x/2 at z with 2 − z = 1 − z/3: z = 3/2.
         let mut heights = [0.0; 9];
         heights[4] = 1.0;
         let hill = terrain(heights);
@@ -211,7 +217,7 @@ mod tests {
         // What was nearer stays, what was farther goes.
         let before = |depth: f64| Behind { color: [9.0; 4], depth, ..Behind::NOTHING };
         let mut over = vec![before(1.25); 9];
-        render_over(&mut over, &from_above(), &hill, &radiance);
+        render_over((&mut over, [(0, 3), (0, 3)]), &from_above(), &hill, &radiance);
         assert!(over[4].depth < 1.25 && over[5].color == [9.0; 4]);
     }
 

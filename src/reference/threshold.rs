@@ -14,7 +14,8 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// A pixel's channel changes by at most this share of the greatest difference between two radiances that it can meet.
+    /// A pixel's channel changes by at most this share of the greatest difference between two radiances that it can
+    /// meet.
     pub fn share(&self) -> f64 {
         -libm::expm1(-self.tau)
     }

@@ -1,5 +1,5 @@
-//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in that order may differ.
-//! In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of which it is the same picture.
+//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in that order may
+//! differ. In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of which it is the same picture.
 
 use glam::DVec3;
 

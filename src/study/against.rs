@@ -1,5 +1,5 @@
-//! What pictures are measured by: `--against thin|volume|model|reflections=K`. Each takes away what the one before it still
-//! shares with the device's picture.
+//! What pictures are measured by: `--against thin|volume|model|reflections=K`. Each takes away what the one before it
+//! still shares with the device's picture.
 
 use std::fmt;
 use std::str::FromStr;
@@ -24,12 +24,13 @@ use crate::reference::volume::{Pixel, Volume};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Against {
-    /// Light as the scene has it computed, but in f64 and with areas integrated; sorted thin sprites, all of them and uncut.
+    /// Light as the scene has it computed, but in f64 and with areas integrated; sorted thin sprites, all of them and
+    /// uncut.
     Thin,
     /// The same light; the integral over the overlapping blobs.
     Volume,
-    /// Light by the model itself ([`super::model_light`]); the integral over the overlapping blobs, and surfaces lit pixel by
-    /// pixel.
+    /// Light by the model itself ([`super::model_light`]); the integral over the overlapping blobs, and surfaces lit
+    /// pixel by pixel.
     Model,
     /// The model with this many reflections in place of the scene's.
     Reflections(u32),

@@ -1,5 +1,5 @@
-//! References kept between runs, by the hash of all that they are computed from: the code, the scene as far as it counts,
-//! time, pixels, and what is asked for.
+//! References kept between runs, by the hash of all that they are computed from: the code, the scene as far as it
+//! counts, time, pixels, and what is asked for.
 
 use std::fs;
 use std::io::Write;

@@ -6,8 +6,7 @@ use super::truth::Truth;
 use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
-use crate::reference::sprites;
-use crate::reference::surfaces;
+use crate::reference::{layers, surfaces};
 
 /// By pixel.
 pub struct Layers {
@@ -28,7 +27,7 @@ impl Layers {
         let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();
         let all = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
         let solid = all.map(|(i, j)| !placed.is_empty() && sees(i, j)).collect();
-        Ok(Layers { width: view.width, n: sprites::n_layers(&view, &truth.blobs, reach), solid })
+        Ok(Layers { width: view.width, n: layers::n_layers(&view, &truth.blobs, reach), solid })
     }
 
     fn rows<'a, T>(&self, values: &'a [T], tile: Tile) -> impl Iterator<Item = &'a [T]> {

@@ -1,5 +1,6 @@
-//! Light by the model itself, at any point and without what nimbus makes it cheap by: transmittance in closed form, normals
-//! from the blobs' own density, a facet a particle, areas integrated, the BRDF itself, and as many reflections as asked for.
+//! Light by the model itself, at any point and without what nimbus makes it cheap by: transmittance in closed form,
+//! normals from the blobs' own density, a facet a particle, areas integrated, the BRDF itself, and as many reflections
+//! as asked for.
 
 use std::ops::{Add, Mul};
 
@@ -79,8 +80,8 @@ pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
-/// How exactly the second reflection is integrated: of a light that is a tenth of all a tenth of a thousandth is left, far below
-/// what pictures are off by.
+/// How exactly the second reflection is integrated: of a light that is a tenth of all a tenth of a thousandth is left,
+/// far below what pictures are off by.
 const SECOND_ACCURACY: f64 = 1e-3;
 /// Random paths of a receiver, for what comes after the second reflection: so many at once,
 const N_PATHS: u32 = 128;
@@ -177,8 +178,9 @@ impl<'a> ModelLight<'a> {
         lit
     }
 
-    /// What comes after the second reflection, by random paths, to about `accuracy`, and its standard error. A first batch says how many are needed and
-    /// counts for nothing else: who stops where chance has looked best so far is off to that side.
+    /// What comes after the second reflection, by random paths, to about `accuracy`, and its standard error. A first
+    /// batch says how many are needed and counts for nothing else: who stops where chance has looked best so far is off
+    /// to that side.
     fn further(&self, at: &Receiver, toward: DVec3, [i, i_sample]: [u32; 2], accuracy: f64) -> (DVec3, f64) {
         let k = self.n_reflections as usize;
         let batch = |i_batch: u32| {

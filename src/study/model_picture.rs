@@ -15,8 +15,8 @@ use crate::reference::sprites::{Behind, View};
 use crate::reference::surfaces;
 use crate::reference::volume::{Pixel, Volume};
 
-/// One picture of `scene`, through the centres of `pixels`. `n`: reflections, where they are not the scene's. `by_facet`:
-/// surfaces are lit where the scene has facets, and between them as it is drawn; else at every pixel.
+/// One picture of `scene`, through the centres of `pixels`. `n`: reflections, where they are not the scene's.
+/// `by_facet`: surfaces are lit where the scene has facets, and between them as it is drawn; else at every pixel.
 pub(super) fn of_model(
     scene: &Scene,
     time_s: f64,
@@ -131,11 +131,11 @@ impl Model<'_> {
         }
         let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
         let doubt = Doubt::mean(ground.iter().map(|lit| lit.doubt));
-        let mut picture = vec![Behind::NOTHING; view.width as usize * view.height as usize];
-        picture::ground_over(&mut picture, self.scene, self.truth.setting.light_origin, view, &radiance);
+        let mut picture = vec![Behind::NOTHING; pixels.tile.n_pixels()];
+        picture::ground_over((&mut picture, pixels.tile), self.scene, self.truth.setting.light_origin, view, &radiance);
         let nearer =
             |(other, seen): ((Behind, Doubt), Behind)| if seen.depth < other.0.depth { (seen, doubt) } else { other };
-        behind.into_iter().zip(pixels.pick(&picture)).map(nearer).collect()
+        behind.into_iter().zip(pixels.pick_tile(&picture)).map(nearer).collect()
     }
 }
 

@@ -1,9 +1,9 @@
-//! A whole frame's picture in f64, from the scene alone: by the thin sprites that nimbus draws, or by the volume that they
-//! stand for.
+//! A whole frame's picture in f64, from the scene alone: by the thin sprites that nimbus draws, or by the volume that
+//! they stand for.
 
 use glam::{DVec2, DVec3};
 
-use super::pixels::Pixels;
+use super::pixels::{Pixels, Tile};
 use super::truth::Truth;
 use crate::error::{Error, Result};
 use crate::model::cloud::Group;
@@ -142,27 +142,33 @@ pub(super) fn view(scene: &Scene, truth: &Truth) -> View {
 /// [`behind`] at some pixels.
 pub(super) fn behind_at(scene: &Scene, truth: &Truth, view: &View, pixels: &Pixels) -> Vec<Behind> {
     let (placed, facets) = facets(scene, truth);
-    if !scene.terrains.is_empty() {
-        return pixels.pick(&behind_from(scene, truth, view, &placed, &facets));
+    if scene.terrains.is_empty() {
+        return surfaces::render_at(view, &placed, &facets, pixels.at.iter().copied());
     }
-    surfaces::render_at(view, &placed, &facets, pixels.at.iter().copied())
+    pixels.pick_tile(&behind_from(scene, truth, view, pixels.tile, (&placed, &facets)))
 }
 
 /// Surfaces and ground, a pixel each.
 pub(super) fn behind(scene: &Scene, truth: &Truth, view: &View) -> Vec<Behind> {
     let (placed, facets) = facets(scene, truth);
-    behind_from(scene, truth, view, &placed, &facets)
+    behind_from(scene, truth, view, Tile::whole(view.width, view.height), (&placed, &facets))
 }
 
-fn behind_from(scene: &Scene, truth: &Truth, view: &View, placed: &[Surface], facets: &[DVec3]) -> Vec<Behind> {
+fn behind_from(
+    scene: &Scene,
+    truth: &Truth,
+    view: &View,
+    tile: Tile,
+    (placed, facets): (&[Surface], &[DVec3]),
+) -> Vec<Behind> {
     let (of_surfaces, of_terrains) = facets.split_at(scene.n_surface_facets() as usize);
-    let mut picture = surfaces::render(view, placed, of_surfaces);
-    ground_over(&mut picture, scene, truth.setting.light_origin, view, of_terrains);
+    let mut picture = surfaces::render_at(view, placed, of_surfaces, tile.pixels());
+    ground_over((&mut picture, tile), scene, truth.setting.light_origin, view, of_terrains);
     picture
 }
 
-/// The surfaces relative to the lighting origin, and the radiance of their facets and of the ground's points; where nothing is
-/// lit they show their materials' K_d, as particles show their colours.
+/// The surfaces relative to the lighting origin, and the radiance of their facets and of the ground's points; where
+/// nothing is lit they show their materials' K_d, as particles show their colours.
 fn facets(scene: &Scene, truth: &Truth) -> (Vec<Surface>, Vec<DVec3>) {
     let origin = truth.setting.light_origin;
     let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
@@ -180,12 +186,19 @@ fn facets(scene: &Scene, truth: &Truth) -> (Vec<Surface>, Vec<DVec3>) {
 }
 
 /// Lays over `picture` what is nearer of the scene's ground; `radiance` by the points of all of it.
-pub(super) fn ground_over(picture: &mut [Behind], scene: &Scene, origin: DVec3, view: &View, radiance: &[DVec3]) {
+pub(super) fn ground_over(
+    (picture, tile): (&mut [Behind], Tile),
+    scene: &Scene,
+    origin: DVec3,
+    view: &View,
+    radiance: &[DVec3],
+) {
+    let window = [(tile.left, tile.left + tile.width), (tile.top, tile.top + tile.height)];
     let mut rest = radiance;
     for terrain in &scene.terrains {
         let (of, others) = rest.split_at(terrain.n_facets() as usize);
         let placed = Terrain { origin: terrain.origin - origin, ..terrain.clone() };
-        terrain::render_over(picture, view, &placed, of);
+        terrain::render_over((&mut *picture, window), view, &placed, of);
         rest = others;
     }
 }
@@ -213,8 +226,8 @@ pub(super) fn sheets(scene: &Scene, truth: &Truth, view: &View) -> Option<(Pool,
     Some((Pool::new(scene.draw.texture_seed).rounded(), sheets))
 }
 
-/// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn are: far to near by exact
-/// view depth, ties by index.
+/// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn are: far to near by
+/// exact view depth, ties by index.
 pub(super) fn drawn(scene: &Scene, truth: &Truth) -> (Vec<Blob>, Vec<u32>) {
     let weights = weights(scene, truth);
     let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };

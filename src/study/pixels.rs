@@ -14,6 +14,22 @@ pub struct Tile {
     pub height: u32,
 }
 
+impl Tile {
+    pub fn whole(width: u32, height: u32) -> Tile {
+        Tile { left: 0, top: 0, width, height }
+    }
+
+    pub fn n_pixels(self) -> usize {
+        self.width as usize * self.height as usize
+    }
+
+    /// [column, row] of the picture, row by row.
+    pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
+        let Tile { left, top, width, height } = self;
+        (top..top + height).flat_map(move |j| (left..left + width).map(move |i| [i, j]))
+    }
+}
+
 /// Pixels of a picture, or of a tile of it, cell by cell, rows of cells from the top.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pixels {
@@ -44,14 +60,12 @@ impl Pixels {
             [within(i, width, words[0]), within(j, height, words[1])]
         };
         let at = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| place(i, j)).collect();
-        Pixels { width, height, tile: Tile { left: 0, top: 0, width, height }, cell, at }
+        Pixels { width, height, tile: Tile::whole(width, height), cell, at }
     }
 
     /// All pixels of `tile`, which lies within the picture.
     pub fn tile(width: u32, height: u32, tile: Tile) -> Pixels {
-        let Tile { left, top, width: columns, height: rows } = tile;
-        let at = (top..top + rows).flat_map(|j| (left..left + columns).map(move |i| [i, j])).collect();
-        Pixels { width, height, tile, cell: 1, at }
+        Pixels { width, height, tile, cell: 1, at: tile.pixels().collect() }
     }
 
     pub fn all(width: u32, height: u32) -> Pixels {
@@ -79,6 +93,13 @@ impl Pixels {
     /// Their values of a whole picture, row 0 at the top.
     pub fn pick<T: Copy>(&self, whole: &[T]) -> Vec<T> {
         self.at.iter().map(|&at| whole[self.index(at)]).collect()
+    }
+
+    /// The same of all pixels of their tile.
+    pub fn pick_tile<T: Copy>(&self, of_tile: &[T]) -> Vec<T> {
+        let Tile { left, top, width, .. } = self.tile;
+        let place = |[i, j]: [u32; 2]| (j - top) as usize * width as usize + (i - left) as usize;
+        self.at.iter().map(|&at| of_tile[place(at)]).collect()
     }
 
     /// A whole picture that shows in every cell its pixel's value; of pixels of all of it.
@@ -117,6 +138,8 @@ mod tests {
         let tile = Tile { left: 3, top: 1, width: 2, height: 2 };
         let of_tile = Pixels::tile(5, 3, tile);
         assert_eq!(of_tile.pick(&whole), [8, 9, 13, 14]);
+        assert_eq!(of_tile.pick_tile(&[5, 6, 7, 8]), [5, 6, 7, 8]);
+        assert_eq!(pixels.pick_tile(&whole), whole);
         assert_eq!((0..4).map(|k| of_tile.number(k)).collect::<Vec<_>>(), [8, 9, 13, 14]);
         assert_eq!((of_tile.n_columns(), of_tile.n_rows()), (2, 2));
         let pixels = Pixels::sample(4, 4, 4);

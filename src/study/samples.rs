@@ -1,5 +1,5 @@
-//! A reference picture as the mean of samples, each through another place of every pixel and by other random paths; and the
-//! sums that parts of it are put together from, tile by tile and range by range, to the same bits as the whole.
+//! A reference picture as the mean of samples, each through another place of every pixel and by other random paths; and
+//! the sums that parts of it are put together from, tile by tile and range by range, to the same bits as the whole.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,8 +18,8 @@ use crate::model::scene::{LightingMode, Scene};
 /// Most samples of a picture: their numbers' last digits still tell places in a pixel apart.
 pub const MOST_SAMPLES: u32 = 1 << 20;
 
-/// Values of a pixel in [`Sums`]: premultiplied linear R, G, B, A; the sum of their squares; what quadrature leaves; and
-/// the square of the random paths' standard error.
+/// Values of a pixel in [`Sums`]: premultiplied linear R, G, B, A; the sum of their squares; what quadrature leaves;
+/// and the square of the random paths' standard error.
 pub const N_VALUES: usize = 7;
 
 /// Sums over samples, [`N_VALUES`] a pixel.
@@ -46,8 +46,8 @@ pub struct Mean {
     pub own_error: f64,
 }
 
-/// Where in a pixel sample `i` lies, off its centre: the first in it, the others spread evenly (Roberts' R2, the powers of the
-/// plastic number's inverse), whatever number of them is taken.
+/// Where in a pixel sample `i` lies, off its centre: the first in it, the others spread evenly (Roberts' R2, the powers
+/// of the plastic number's inverse), whatever number of them is taken.
 pub fn shift(i: u32) -> DVec2 {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2);
     (0.5 + f64::from(i) * STEP).fract() - 0.5
@@ -69,12 +69,13 @@ pub fn sums(
     let mut pairs = Pairs::default();
     let mut each = |draw: &mut dyn FnMut(Sample) -> Drawn| {
         for i in samples.clone() {
+            // Before, not after: what is finished counts.
+            if stop.load(Ordering::Relaxed) {
+                return Err(Error::Interrupted);
+            }
             pairs.push(of_drawn(&draw(Sample { i, shift: shift(i) })));
             if n > 1 {
                 listener(Work::Sampling, n);
-            }
-            if stop.load(Ordering::Relaxed) {
-                return Err(Error::Interrupted);
             }
         }
         Ok(())
@@ -138,8 +139,8 @@ impl Sums {
         let rgba = |v: &[f64]| [v[0] / n, v[1] / n, v[2] / n, v[3] / n];
         let error = |v: &[f64]| {
             let of_mean: f64 = rgba(v).iter().map(|c| c * c).sum();
-            // Of all channels together: no channel's alone is greater. Samples are spread more evenly than by chance, and
-            // so the mean is nearer than this.
+            // Of all channels together: no channel's alone is greater. Samples are spread more evenly than by chance,
+            // and so the mean is nearer than this.
             let spread = ((v[4] / n - of_mean).max(0.0) / (n - 1.0).max(1.0)).sqrt();
             v[5] / n + spread.max(v[6].sqrt() / n)
         };
@@ -161,9 +162,10 @@ impl Sums {
     }
 }
 
-/// Sums of neighbouring ranges of samples, added as one fixed tree of pairs: (0 + 1) + (2 + 3) and so on. Ranges whose length
-/// is a power of two, and that begin at a multiple of it, are nodes of that tree; so a whole put together from them in order
-/// has the bits of a whole that was never cut. What rounding adds grows with the tree's height, not with the samples.
+/// Sums of neighbouring ranges of samples, added as one fixed tree of pairs: (0 + 1) + (2 + 3) and so on. Ranges whose
+/// length is a power of two, and that begin at a multiple of it, are nodes of that tree; so a whole put together from
+/// them in order has the bits of a whole that was never cut. What rounding adds grows with the tree's height, not with
+/// the samples.
 #[derive(Debug, Default)]
 pub struct Pairs {
     /// Each shorter than the one before it.

@@ -1,4 +1,5 @@
-//! A picture of sprites, over rectangles or not, its inputs in f32 for the GPU and in f64 for the reference, and the bound between the two.
+//! A picture of sprites, over rectangles or not, its inputs in f32 for the GPU and in f64 for the reference, and the
+//! bound between the two.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -23,7 +24,8 @@ use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
 
-/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term, three products and two sums.
+/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term, three products and
+/// two sums.
 pub const DEPTH: f64 = 16.0 * U;
 
 /// What one_minus_exp promises.
@@ -220,8 +222,8 @@ impl Picture {
         found.into_iter().map(|all| all.into_iter().map(|one| rounding.stored(one)).collect()).collect()
     }
 
-    /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any bound where it is not the
-    /// only candidate.
+    /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any bound where it is not
+    /// the only candidate.
     pub fn widened(&self, candidates: &Candidates) -> Behind {
         let truth = candidates[0];
         if candidates.len() > 1 {

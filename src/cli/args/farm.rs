@@ -16,7 +16,8 @@ pub struct FarmArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum FarmCommand {
-    /// Cut the frames of an animation, the configurations of an error study, or the cases of a sweep into shards
+    /// Cut the frames of an animation, the configurations of an error study, the cases of a sweep, or a reference
+    /// picture into shards
     #[command(after_help = "An animation on this machine:\n  \
         nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
         nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames\n\n\
@@ -25,14 +26,16 @@ pub enum FarmCommand {
         --knob lighting.grid=16,24,32,48 --knob lighting.step=1,0.75,0.5\n\n\
         A sweep of 12 cases, as `nimbus bench` times it:\n  \
         nimbus farm plan scenes/cubes-554.toml -o farm --bench --shard-cases 4 -- --repeat 4 \\\n      \
-        --sweep draw.particles=500,5000,50000 --sweep size=400x300,800x600,1024x768,1600x1200")]
+        --sweep draw.particles=500,5000,50000 --sweep size=400x300,800x600,1024x768,1600x1200\n\n\
+        A picture in f64 of 64 samples a pixel, as `nimbus render --reference` draws it:\n  \
+        nimbus farm plan scenes/study-light.toml -o farm --reference model --samples 64 --tile 80x60")]
     Plan(PlanArgs),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
-    /// t = setup + a · particles · steps + b · pixels + c · facet pairs, by non-negative least squares of relative
-    /// errors over runs of one frame and of several at three sizes, each timed as a shard is. It is for this class of
-    /// devices; scenes like those to come make it good. What it is off by for runs that it has not seen is said (each
-    /// left out in turn).
+    /// t = setup + d · steps + a · particles · steps + b · layers of pixels + c · facet pairs + e · textures, by
+    /// non-negative least squares of relative errors over runs of one frame and of several at three sizes, each timed
+    /// as a shard is. It is for this class of devices; scenes like those to come make it good. What it is off by for
+    /// runs that it has not seen is said (each left out in turn).
     Calibrate(CalibrateArgs),
     /// Do one shard, unless it is done
     ///
@@ -74,7 +77,8 @@ pub struct PlanArgs {
     /// The cases of a sweep in place of frames; what follows "--" is what `nimbus bench` takes
     #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format"])]
     pub bench: bool,
-    /// A picture in f64 in place of frames, as `nimbus render --reference` draws it: thin, volume, model or reflections=K
+    /// A picture in f64 in place of frames, as `nimbus render --reference` draws it: thin, volume, model or
+    /// reflections=K
     #[arg(long, value_name = "WHICH", conflicts_with_all = ["frames", "shard_frames", "error", "bench"])]
     pub reference: Option<Against>,
     /// The reference's frame
@@ -86,17 +90,19 @@ pub struct PlanArgs {
     /// Size of its tiles, pixels [default: 256x256, or by --model]
     #[arg(long, value_name = "WxH", requires = "reference", value_parser = parse_size)]
     pub tile: Option<(u32, u32)>,
-    /// Samples of a shard, a power of two: then all shards' sums are the bits of one machine's [default: 16, or by --model]
+    /// Samples of a shard, a power of two: then all shards' sums are the bits of one machine's [default: 16, or by
+    /// --model]
     #[arg(long, value_name = "N", requires = "reference", value_parser = parse_power)]
     pub shard_samples: Option<u32>,
-    /// Configurations of a shard, with --error [default: 8, or by --model]. Each shard times the scene as it stands as well
+    /// Configurations of a shard, with --error [default: 8, or by --model]. Each shard times the scene as it stands as
+    /// well
     #[arg(long, value_name = "N", requires = "error", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_configurations: Option<u32>,
     /// Cases of a shard, with --bench [default: 8, or by --model]. Each shard times the first case of all as well
     #[arg(long, value_name = "N", requires = "bench", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_cases: Option<u32>,
-    /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few make it slow,
-    /// many lose more when it is killed
+    /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few
+    /// make it slow, many lose more when it is killed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_frames: Option<u32>,
     /// What `nimbus farm calibrate` wrote: shards are cut to take 1 to 10 minutes, and what all of them will take and
@@ -189,7 +195,7 @@ pub struct CalibrateArgs {
     #[arg(required_unless_present = "farm", conflicts_with = "farm", value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
     /// Fit to the shards of a farm that is done (repeatable): the way to a model of studies, benches and references
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["frames", "set", "device"])]
     pub farm: Vec<PathBuf>,
     /// File for the model
     #[arg(short, long, value_name = "FILE")]
@@ -280,7 +286,7 @@ pub struct MergeArgs {
     /// Replace results in a folder that is there; what else lies in it stays
     #[arg(long)]
     pub force: bool,
-    /// Merge frames that several devices or drivers drew, too
+    /// Merge pictures that several devices, drivers or processors drew, too
     #[arg(long)]
     pub mixed: bool,
 }

@@ -1,6 +1,6 @@
 //! Any number of reflections by random paths: an estimate with a standard error, and of the second reflection one that
-//! shares no quadrature with `Scenery::second`. Each path starts at the receiver, goes where its BRDF sends it (or to one
-//! of the discs) and collects L1 at every vertex; V is tested point by point.
+//! shares no quadrature with `Scenery::second`. Each path starts at the receiver, goes where its BRDF sends it (or to
+//! one of the discs) and collects L1 at every vertex; V is tested point by point.
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -20,9 +20,9 @@ const PATHS_A_JOB: u32 = 1024;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflected {
     pub radiance: DVec3,
-    /// One standard error of the mean, every channel; 0 for the first reflection, which needs no chance. It is of the same
-    /// paths: too small where few of them met the light, 0 where none did. Below a tenth of the radiance, which takes a
-    /// hundred paths that meet it, differences from the truth are normal numbers of it (`tests/area.rs`).
+    /// One standard error of the mean, every channel; 0 for the first reflection, which needs no chance. It is of the
+    /// same paths: too small where few of them met the light, 0 where none did. Below a tenth of the radiance, which
+    /// takes a hundred paths that meet it, differences from the truth are normal numbers of it (`tests/area.rs`).
     pub error: DVec3,
 }
 
@@ -114,8 +114,8 @@ impl Scenery<'_> {
         Some((self.on_surface(i, position), direction, w))
     }
 
-    /// The same to one of the discs, drawn by how much light each would bring if all shone alike and nothing lay between; the
-    /// choice fell on discs with probability `chosen`.
+    /// The same to one of the discs, drawn by how much light each would bring if all shone alike and nothing lay
+    /// between; the choice fell on discs with probability `chosen`.
     fn step_to_disc(&self, at: &Receiver, toward: DVec3, u: f64, chosen: f64) -> Option<(Receiver, DVec3, DVec3)> {
         let pairs: Vec<f64> =
             (0..self.discs.len()).map(|i| if at.i_disc == Some(i) { 0.0 } else { self.pair(i, at) }).collect();
@@ -142,8 +142,8 @@ fn nearest(rects: &[Rect], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
     rects.iter().enumerate().filter_map(met).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Share of directions drawn from the lobe: none for an eye behind. It sees no lobe, and its half vectors about the normal
-/// lead before the surface also where `density`, whose half vectors turn toward the eye, knows nothing of them.
+/// Share of directions drawn from the lobe: none for an eye behind. It sees no lobe, and its half vectors about the
+/// normal lead before the surface also where `density`, whose half vectors turn toward the eye, knows nothing of them.
 fn lobe_share(brdf: &Brdf, normal: DVec3, toward: DVec3) -> f64 {
     let (d, s) = (brdf.kd.max_element(), brdf.ks.max_element());
     if s > 0.0 && normal.dot(toward) > 0.0 { s / (d + s) } else { 0.0 }

@@ -64,8 +64,8 @@ fn one_blob_is_one_minus_e_to_the_minus_tau() {
 
 #[test]
 fn an_eye_inside_sees_what_lies_before_it() {
-    // From the centre on half of it; from 1 σ behind the centre the share below +1 σ, 0.8413447460685429. The near plane is
-    // at 1e-3: less by 1e-3/0.4 of a σ, of the density there.
+    // From the centre on half of it; from 1 σ behind the centre the share below +1 σ, 0.8413447460685429. The near
+    // plane is at 1e-3: less by 1e-3/0.4 of a σ, of the density there.
     let near = |x: f64| 1e-3 / 0.4 * (-0.5 * x * x).exp() / SQRT_TAU;
     for (z, share) in [(0.0, 0.5), (0.4, 0.841_344_746_068_542_9), (-0.4, 1.0 - 0.841_344_746_068_542_9)] {
         let tau = 2.0 * (share - near(z / 0.4));
@@ -173,8 +173,8 @@ fn overlapping_blobs_are_what_small_steps_make_of_them() {
 
 #[test]
 fn dense_blobs_around_the_eye_are_resolved() {
-    // τ = 10⁶ on either side: light comes from the first hundred-thousandth of σ, and what it is made of is what is at the
-    // near plane: κ g of the red one over that of both.
+    // τ = 10⁶ on either side: light comes from the first hundred-thousandth of σ, and what it is made of is what is at
+    // the near plane: κ g of the red one over that of both.
     let (red, blue) = (blob(0.3, 0.4, 1e6), blob(-0.2, 0.4, 2e6));
     let density = |b: &Blob| b.kappa * (-0.5 * ((b.position.z + 1e-3) / b.sigma).powi(2)).exp();
     let share = density(&red) / (density(&red) + density(&blue));

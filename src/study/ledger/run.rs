@@ -1,5 +1,5 @@
-//! The pictures of a ledger, from the one that is drawn down to the whole model, each compared with the next; and the times of
-//! those that the device draws, in turn.
+//! The pictures of a ledger, from the one that is drawn down to the whole model, each compared with the next; and the
+//! times of those that the device draws, in turn.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -108,7 +108,8 @@ impl Setup<'_> {
         self.pixels.pick(&whole)
     }
 
-    /// The pictures in f64, below the one that player `i` drew of `scene`, which nothing but what follows makes inexact.
+    /// The pictures in f64, below the one that player `i` drew of `scene`, which nothing but what follows makes
+    /// inexact.
     fn references(
         &self,
         players: &mut Players<'_>,
@@ -232,8 +233,8 @@ impl Setup<'_> {
         };
         let rows: Vec<Row> = chain.between.iter().zip(&errors).enumerate().map(row).collect();
         let (total, _) = compare(first, last)?;
-        // A root mean square is a norm: of differences that follow each other the sum's is at most the sum of theirs, but for
-        // the rounding of both.
+        // A root mean square is a norm: of differences that follow each other the sum's is at most the sum of theirs,
+        // but for the rounding of both.
         let holds = total.value <= sum * (1.0 + 1e-9) + 1e-15;
         let interrupted = self.is_stopped();
         let quadrature = errors.iter().map(|(error, _)| error.value.powi(2)).sum::<f64>().sqrt();

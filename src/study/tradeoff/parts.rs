@@ -53,8 +53,9 @@ pub fn differences(parts: &[Part]) -> Vec<String> {
     all.into_iter().collect()
 }
 
-/// All of them as one study, whose configurations are in the parts' order, and what its pictures are called. `parts` do not differ, and
-/// there is one. Turns stay in the rounds of their parts, each beside those of the scene as it stands that it was taken with.
+/// All of them as one study, whose configurations are in the parts' order, and what its pictures are called. `parts` do
+/// not differ, and there is one. Turns stay in the rounds of their parts, each beside those of the scene as it stands
+/// that it was taken with.
 pub fn join(parts: &[Part]) -> Option<(Study, Found, Vec<Moved>)> {
     let first = parts.first()?;
     let (mut configurations, mut turns): (Vec<Configuration>, Vec<Turn>) = (Vec::new(), Vec::new());
@@ -63,7 +64,8 @@ pub fn join(parts: &[Part]) -> Option<(Study, Found, Vec<Moved>)> {
         let mut places = Vec::new();
         for (i, c) in part.found.configurations.iter().enumerate() {
             let known = configurations.iter().any(|other| other.hash == c.hash);
-            // Two settings that come to the same scene are one configuration. The scene as it stands is every part's first.
+            // Two settings that come to the same scene are one configuration. The scene as it stands is every part's
+            // first.
             places.push(if i == 0 && i_part > 0 { Some(0) } else { (!known).then_some(configurations.len()) });
             if known {
                 continue;

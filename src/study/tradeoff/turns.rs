@@ -1,6 +1,6 @@
-//! Times in turn: rounds in which every configuration has a turn of a few frames, and the scene as it stands one every few
-//! others, so that each is compared with what the scene took just before and just after it. Whatever a shared machine does over
-//! minutes falls on both alike.
+//! Times in turn: rounds in which every configuration has a turn of a few frames, and the scene as it stands one every
+//! few others, so that each is compared with what the scene took just before and just after it. Whatever a shared
+//! machine does over minutes falls on both alike.
 
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
@@ -123,7 +123,8 @@ mod tests {
 
     #[test]
     fn a_drift_falls_on_both() {
-        // A machine that gets slower from turn to turn by 3 %, and one configuration that takes 0.8 of the scene's time.
+        // A machine that gets slower from turn to turn by 3 %, and one configuration that takes 0.8 of the scene's
+        // time.
         let mut turns = Vec::new();
         for i_round in 0..10 {
             for i in order(&[1, 2], i_round) {

@@ -454,8 +454,19 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let seconds = |i: usize| farm.plan()["shards"][i]["predicted_s"].as_f64().expect("seconds");
     let fitted = &found["fit"]["model"];
     let term = |name: &str| fitted[name].as_f64().unwrap_or(0.0);
-    let n_particles = term("particle_step_s") * particles_of(&dir);
-    let expected = term("setup_s") + n_particles + 48.0 * 36.0 * term("pixel_sample_s");
+    let counted = &farm.plan()["shards"][3]["counted"];
+    let amount = |name: &str| counted[name].as_f64().expect("a number");
+    assert_eq!((amount("steps"), amount("particle_steps")), (1.0, particles_of(&dir)));
+    // One a pixel for what lies behind, and some layers over it.
+    assert!(amount("pixel_samples") > 48.0 * 36.0, "{counted}");
+    let of_each = [
+        ("step_s", "steps"),
+        ("particle_step_s", "particle_steps"),
+        ("pixel_sample_s", "pixel_samples"),
+        ("facet_pair_s", "facet_pairs"),
+        ("texture_s", "textures"),
+    ];
+    let expected = term("setup_s") + of_each.iter().map(|(each, of)| term(each) * amount(of)).sum::<f64>();
     assert!((seconds(3) - expected).abs() <= 1e-12 * expected, "{} {expected}", seconds(3));
     let price = ["--nodes", "2", "--rate", "3", "--quantum", "1e-3", "--retries", "0"];
     let again = dir.path().join("again");

@@ -161,9 +161,9 @@ fn a_model_of_finished_shards_cuts_the_next_plan() {
     let hello = ["scenes/hello.toml", "--size", "16x12", "--set", PLAIN];
     // Of so different sizes that no noise hides what a pixel takes.
     let farms = [
-        plan(&dir, "small", &[room, "--size", "6x4", "--tile", "3x4"], &of("1")),
+        plan(&dir, "small", &[room, "--size", "6x4", "--tile", "2x4"], &of("1")),
         plan(&dir, "large", &[room, "--size", "20x15"], &of("4")),
-        plan(&dir, "other", &hello, &of("1")),
+        plan(&dir, "other", &[&hello[..], &["--tile", "8x12"]].concat(), &of("1")),
     ];
     let model = path(&dir, "model.json");
     let (code, said) = bad(&["farm", "calibrate", "--farm", &farms[0], "-o", &model]);
@@ -171,7 +171,7 @@ fn a_model_of_finished_shards_cuts_the_next_plan() {
     farms.iter().for_each(|farm| drop(good(&["farm", "local", "-q", "--plan", farm])));
     let told = farms.iter().flat_map(|farm| ["--farm", farm]);
     let said = good(&["farm", "calibrate", "-o", &model].into_iter().chain(told).collect::<Vec<_>>());
-    assert!(said.contains("4 runs of reference model"), "{said}");
+    assert!(said.contains("6 runs of reference model"), "{said}");
     // Cut to a third of what it takes beyond a set-up.
     let predicted = |name: &str, lengths: &str| -> Vec<f64> {
         let scene = [room, "--reference", "model", "--samples", "8", "--size", "40x30"];

@@ -429,6 +429,23 @@ fn a_full_disk_is_75_and_leaves_nothing_half_done() {
     assert_eq!(farm.ran(0).0, Some(0));
 }
 
+/// What a model says of a frame of so many particles, 48 by 36 pixels.
+fn by_hand(fitted: &Value, counted: &Value, n_particles: f64) -> f64 {
+    let term = |name: &str| fitted[name].as_f64().unwrap_or(0.0);
+    let amount = |name: &str| counted[name].as_f64().expect("a number");
+    assert_eq!((amount("steps"), amount("particle_steps")), (1.0, n_particles));
+    // One a pixel for what lies behind, and some layers over it.
+    assert!(amount("pixel_samples") > 48.0 * 36.0, "{counted}");
+    let of_each = [
+        ("step_s", "steps"),
+        ("particle_step_s", "particle_steps"),
+        ("pixel_sample_s", "pixel_samples"),
+        ("facet_pair_s", "facet_pairs"),
+        ("texture_s", "textures"),
+    ];
+    term("setup_s") + of_each.iter().map(|(each, of)| term(each) * amount(of)).sum::<f64>()
+}
+
 #[test]
 fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let dir = tempfile::tempdir().expect("a folder");
@@ -452,21 +469,7 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let farm = Farm::of(SCENE, &[&by[..], &["--shard-seconds", "0,1e-9"]].concat());
     assert_eq!(sizes(&farm.plan()), [1; 8]);
     let seconds = |i: usize| farm.plan()["shards"][i]["predicted_s"].as_f64().expect("seconds");
-    let fitted = &found["fit"]["model"];
-    let term = |name: &str| fitted[name].as_f64().unwrap_or(0.0);
-    let counted = &farm.plan()["shards"][3]["counted"];
-    let amount = |name: &str| counted[name].as_f64().expect("a number");
-    assert_eq!((amount("steps"), amount("particle_steps")), (1.0, particles_of(&dir)));
-    // One a pixel for what lies behind, and some layers over it.
-    assert!(amount("pixel_samples") > 48.0 * 36.0, "{counted}");
-    let of_each = [
-        ("step_s", "steps"),
-        ("particle_step_s", "particle_steps"),
-        ("pixel_sample_s", "pixel_samples"),
-        ("facet_pair_s", "facet_pairs"),
-        ("texture_s", "textures"),
-    ];
-    let expected = term("setup_s") + of_each.iter().map(|(each, of)| term(each) * amount(of)).sum::<f64>();
+    let expected = by_hand(&found["fit"]["model"], &farm.plan()["shards"][3]["counted"], particles_of(&dir));
     assert!((seconds(3) - expected).abs() <= 1e-12 * expected, "{} {expected}", seconds(3));
     let price = ["--nodes", "2", "--rate", "3", "--quantum", "1e-3", "--retries", "0"];
     let again = dir.path().join("again");

@@ -476,7 +476,8 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let again = again.to_str().expect("UTF-8");
     let (_, out, _) = ran(&[&["farm", "plan", SCENE, "-o", again], &by[..], &price].concat());
     // One shard: one of two nodes works, and is paid for by the millisecond.
-    let whole = term("setup_s") + 8.0 * (expected - term("setup_s"));
+    let setup = found["fit"]["model"]["setup_s"].as_f64().unwrap_or(0.0);
+    let whole = setup + 8.0 * (expected - setup);
     let cost = 3.0 * (whole / 1e-3).ceil();
     assert!(out.contains("50 % of their time idle") && out.contains(&format!("price: {cost:.2} for ")), "{cost} {out}");
 

@@ -469,7 +469,8 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let farm = Farm::of(SCENE, &[&by[..], &["--shard-seconds", "0,1e-9"]].concat());
     assert_eq!(sizes(&farm.plan()), [1; 8]);
     let seconds = |i: usize| farm.plan()["shards"][i]["predicted_s"].as_f64().expect("seconds");
-    let expected = by_hand(&found["fit"]["model"], &farm.plan()["shards"][3]["counted"], particles_of(&dir));
+    let n_particles = particles_of(&dir);
+    let expected = by_hand(&found["fit"]["model"], &farm.plan()["shards"][3]["counted"], n_particles);
     assert!((seconds(3) - expected).abs() <= 1e-12 * expected, "{} {expected}", seconds(3));
     let price = ["--nodes", "2", "--rate", "3", "--quantum", "1e-3", "--retries", "0"];
     let again = dir.path().join("again");
@@ -479,7 +480,7 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let planned: Value =
         serde_json::from_slice(&fs::read(Path::new(again).join("plan.json")).expect("a plan")).expect("JSON");
     let whole = &planned["shards"][0];
-    let all = by_hand(&found["fit"]["model"], &whole["counted"], particles_of(&dir) * 8.0);
+    let all = by_hand(&found["fit"]["model"], &whole["counted"], 8.0 * n_particles);
     let whole = whole["predicted_s"].as_f64().expect("seconds");
     assert!((whole - all).abs() <= 1e-12 * all && whole > expected, "{whole} {all}");
     let cost = 3.0 * (whole / 1e-3).ceil();

@@ -139,6 +139,10 @@ fn table(plan: &Plan, found: &Status) -> String {
              most\n"
         );
     }
+    if let (1.., Some(class)) = (found.n_other_class, &plan.predicted_for) {
+        let (n, device, cpu) = (found.n_other_class, &class.device, &class.cpu);
+        text += &format!("of {n} shards nothing was predicted: the model is of {device}, {cpu}\n");
+    }
     for s in found.shards.iter().filter(is_told) {
         let range = plan.shards[s.index].items();
         let attempts = format!("{} attempt{}", s.n_attempts, if s.n_attempts == 1 { "" } else { "s" });

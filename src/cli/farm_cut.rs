@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::farm::calibrate::Calibration;
 use crate::farm::cost::Work as Counted;
 use crate::farm::pack::split;
-use crate::farm::plan::Work;
+use crate::farm::plan::{Class, Work};
 
 /// Work, and its shards in order: their items, what takes time in each, and how long that is.
 pub(super) struct Cut {
@@ -15,6 +15,7 @@ pub(super) struct Cut {
     pub sizes: Vec<u32>,
     pub counted: Vec<Counted>,
     pub predicted_s: Option<Vec<f64>>,
+    pub predicted_for: Option<Class>,
 }
 
 /// What takes time in work, item by item, and in every shard besides.
@@ -77,7 +78,8 @@ pub(super) fn cut(args: &PlanArgs, work: Work, amounts: &Amounts, (each, usual):
         }
         None => None,
     };
-    Ok(Cut { work, sizes, counted, predicted_s })
+    let predicted_for = model.map(|model| model.of.class());
+    Ok(Cut { work, sizes, counted, predicted_s, predicted_for })
 }
 
 fn even(n: u32, each: u32) -> Vec<u32> {

@@ -1,8 +1,10 @@
 //! `nimbus farm plan` and `calibrate`: what there is to do, and what it will take.
 
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
+use serde_json::{Value, json};
 
 use super::args::{Args, CalibrateArgs, Command, ErrorArgs, FormatArg, PlanArgs, Span};
 use super::farm_cut::{Amounts, Cut, cut};
@@ -32,7 +34,7 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     for warning in super::warnings_of(&loaded).iter().filter(|_| !args.quiet) {
         eprintln!("warning: {warning}");
     }
-    let Cut { work, sizes, counted, predicted_s } = match args.reference {
+    let Cut { work, sizes, counted, predicted_s, predicted_for } = match args.reference {
         Some(of) => farm_reference::cut(args, of, &loaded)?,
         None if args.error => study(args, &set)?,
         None if args.bench => bench(args, &set)?,
@@ -46,14 +48,16 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         set,
         seed: args.seed,
         shaders: args.shaders.clone(),
+        device: args.device.clone(),
         work,
         sizes,
         counted,
         predicted_s,
+        predicted_for,
     })?;
     plan.write(&args.output)?;
     if args.json {
-        return output::object(&plan);
+        return output::object(&told(&plan, &args.output)?);
     }
     let (n_shards, folder) = (plan.shards.len(), args.output.display());
     let items = plan.work.items();
@@ -66,6 +70,19 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
         estimate.unwrap_or_default(),
         n_shards - 1
     ))
+}
+
+/// The plan, and with each shard what `nimbus` is to be called with and which files come of it.
+fn told(plan: &Plan, folder: &Path) -> Result<Value> {
+    let wrong = |cause| Error::io(folder, cause);
+    let mut value = serde_json::to_value(plan).map_err(|cause| wrong(cause.to_string()))?;
+    let shards = value.get_mut("shards").and_then(Value::as_array_mut);
+    for (said, shard) in shards.into_iter().flatten().zip(&plan.shards) {
+        let folder = folder.display().to_string();
+        said["arguments"] = json!(["farm", "run", "--plan", folder, "--shard", shard.index.to_string()]);
+        said["outputs"] = json!(plan.outputs(shard));
+    }
+    Ok(value)
 }
 
 /// All frames of a scene, or of its phases.
@@ -179,6 +196,7 @@ pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
         ("set-up", model.setup_s),
         ("a step", model.step_s),
         ("a particle and step", model.particle_step_s),
+        ("a cell of the grid", model.cell_s),
         ("a pixel and sample", model.pixel_sample_s),
         ("a pair of facets", model.facet_pair_s),
         ("making textures", model.texture_s),

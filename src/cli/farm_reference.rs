@@ -8,7 +8,6 @@ use crate::farm::plan::{PictureFormat, Work};
 use crate::farm::reference;
 use crate::io::scene_file::LoadedScene;
 use crate::study::against::Against;
-use crate::study::layers::Layers;
 
 /// Pixels along a side of a tile, and samples of a range, where nothing is known of what they take.
 const USUAL_TILE: u32 = 256;
@@ -39,19 +38,24 @@ pub(super) fn cut(args: &PlanArgs, of: Against, loaded: &LoadedScene) -> Result<
         format,
     };
     reference::check(&cut, loaded)?;
-    let layers = cut.layers(loaded)?;
+    let seen = cut.seen(loaded)?;
     if let Some(model) = &model {
         model.check(&Work::Reference(cut.clone()))?;
-        cut = shortened(args, cut, |cut| longest(cut, loaded, &layers, model))?;
+        cut = shortened(args, cut, |cut| longest(cut, loaded, &seen, model))?;
     }
-    let amounts = Amounts { items: cut.work(loaded, &layers)?, of_shard: Counted::default() };
+    let amounts = Amounts { items: cut.work(loaded, &seen)?, of_shard: Counted::default() };
     // Without a model every piece is a shard; with one neighbours go together as far as they are short.
     farm_cut::cut(args, Work::Reference(cut), &amounts, (None, 1))
 }
 
 /// The longest piece, s, and how many there are.
-fn longest(cut: &reference::Cut, loaded: &LoadedScene, layers: &Layers, model: &Model<'_>) -> Result<(f64, usize)> {
-    let work = cut.work(loaded, layers)?;
+fn longest(
+    cut: &reference::Cut,
+    loaded: &LoadedScene,
+    seen: &reference::Seen,
+    model: &Model<'_>,
+) -> Result<(f64, usize)> {
+    let work = cut.work(loaded, seen)?;
     let seconds = work.iter().map(|piece| model.seconds(1.0, piece)).collect::<Result<Vec<f64>>>()?;
     Ok((seconds.iter().copied().fold(0.0, f64::max), seconds.len()))
 }

@@ -18,8 +18,10 @@ use crate::error::{Error, Result};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::io::text_file::{RECORD_LIMIT, read_result};
 use crate::model::scene::{LightingMode, Scene};
+use crate::study::cells::n_visited;
 use crate::study::layers::Layers;
 use crate::study::machine::{self, Cpu, Device};
+use crate::study::truth::Truth;
 
 pub const SCHEMA_VERSION: u32 = 1;
 
@@ -57,11 +59,13 @@ const SIZES: [f64; 3] = [0.5, 0.75, 1.0];
 /// What a frame of a scene at that time makes work of.
 pub fn work_of(scene: &Scene, time_s: f64) -> Result<Counted> {
     let n_facets = scene.n_facets() as f64;
+    let truth = Truth::unlit(scene, time_s)?;
     let is_second = scene.lighting.mode == LightingMode::TwoReflection;
     Ok(Counted {
         steps: 1.0,
         particle_steps: scene.n_particles() as f64,
-        pixel_samples: Layers::of(scene, time_s, scene.draw.cutoff)?.n_whole(),
+        cells: n_visited(scene, &truth),
+        pixel_samples: Layers::of(scene, &truth, scene.draw.cutoff).n_whole(),
         facet_pairs: if is_second { n_facets * n_facets } else { 0.0 },
         textures: 0.0,
     })
@@ -193,9 +197,18 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
     set.extend([format!("film.width={width}"), format!("film.height={height}")]);
     let work = plan::Work::Frames { first: 0, n, format: PictureFormat::Png };
     let (scene_file, sizes) = (scene.to_owned(), vec![n]);
-    let wish =
-        Wish { scene: scene_file, set, seed: None, shaders: None, work, sizes, counted: vec![], predicted_s: None };
-    let plan = Plan::new(wish)?;
+    let plan = Plan::new(Wish {
+        scene: scene_file,
+        set,
+        seed: None,
+        shaders: None,
+        device: None,
+        work,
+        sizes,
+        counted: vec![],
+        predicted_s: None,
+        predicted_for: None,
+    })?;
     plan.write(&folder.0)?;
     let loaded = plan.scene_as_planned()?;
     let begin = Instant::now();
@@ -241,6 +254,11 @@ impl Drop for Folder {
 }
 
 impl Calibration {
+    /// Whom it is for.
+    pub fn class(&self) -> plan::Class {
+        plan::Class { device: self.device.class(), cpu: self.cpu.class() }
+    }
+
     pub fn write(&self, path: &Path) -> Result<()> {
         let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(path, cause))?;
         synced::write(path, format!("{text}\n").as_bytes())

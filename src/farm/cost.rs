@@ -17,6 +17,9 @@ pub struct Work {
     pub steps: f64,
     /// Particles times the steps (frames, mostly) that each is moved, sorted and drawn in.
     pub particle_steps: f64,
+    /// Cells of the density grid that particles leave mass in and that light's ways read, in all steps.
+    #[serde(default)]
+    pub cells: f64,
     /// Pixels times the samples taken in each: one for what lies behind, and one for every layer over it.
     pub pixel_samples: f64,
     /// Pairs of facets between which light is exchanged.
@@ -33,6 +36,7 @@ impl Add for Work {
         Work {
             steps: self.steps + other.steps,
             particle_steps: self.particle_steps + other.particle_steps,
+            cells: self.cells + other.cells,
             pixel_samples: self.pixel_samples + other.pixel_samples,
             facet_pairs: self.facet_pairs + other.facet_pairs,
             textures: self.textures + other.textures,
@@ -47,6 +51,7 @@ impl Mul<f64> for Work {
         Work {
             steps: self.steps * times,
             particle_steps: self.particle_steps * times,
+            cells: self.cells * times,
             pixel_samples: self.pixel_samples * times,
             facet_pairs: self.facet_pairs * times,
             textures: self.textures * times,
@@ -66,10 +71,12 @@ pub struct Timed {
 }
 
 /// The terms in the order of [`terms`], as messages name them.
-const TERMS: [&str; 6] = ["setups", "steps", "particle steps", "pixel samples", "facet pairs", "textures"];
+const TERMS: [&str; 7] =
+    ["setups", "steps", "particle steps", "grid cells", "pixel samples", "facet pairs", "textures"];
 
 fn terms(setups: f64, work: &Work) -> [f64; TERMS.len()] {
-    [setups, work.steps, work.particle_steps, work.pixel_samples, work.facet_pairs, work.textures]
+    let Work { steps, particle_steps, cells, pixel_samples, facet_pairs, textures } = *work;
+    [setups, steps, particle_steps, cells, pixel_samples, facet_pairs, textures]
 }
 
 /// Seconds that one of each takes on one class of devices. None where no run of the calibration had any: nothing is
@@ -83,6 +90,8 @@ pub struct CostModel {
     pub step_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub particle_step_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cell_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pixel_sample_s: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -126,12 +135,20 @@ impl CostModel {
     }
 
     fn each_s(&self) -> [Option<f64>; TERMS.len()] {
-        [self.setup_s, self.step_s, self.particle_step_s, self.pixel_sample_s, self.facet_pair_s, self.texture_s]
+        [
+            self.setup_s,
+            self.step_s,
+            self.particle_step_s,
+            self.cell_s,
+            self.pixel_sample_s,
+            self.facet_pair_s,
+            self.texture_s,
+        ]
     }
 
     fn of(each_s: [Option<f64>; TERMS.len()]) -> Self {
-        let [setup_s, step_s, particle_step_s, pixel_sample_s, facet_pair_s, texture_s] = each_s;
-        CostModel { setup_s, step_s, particle_step_s, pixel_sample_s, facet_pair_s, texture_s }
+        let [setup_s, step_s, particle_step_s, cell_s, pixel_sample_s, facet_pair_s, texture_s] = each_s;
+        CostModel { setup_s, step_s, particle_step_s, cell_s, pixel_sample_s, facet_pair_s, texture_s }
     }
 }
 

@@ -32,8 +32,24 @@ pub struct Plan {
     pub date: String,
     pub command: Vec<String>,
     pub scene: SceneSource,
+    /// Device of every run, by index or part of its name; each node's best where nobody said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub device: Option<String>,
     pub work: Work,
+    /// For whom the shards' seconds are.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub predicted_for: Option<Class>,
     pub shards: Vec<Shard>,
+}
+
+/// Devices and processors that take the same time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Class {
+    /// [`machine::Device::class`]
+    pub device: String,
+    /// [`machine::Cpu::class`]
+    pub cpu: String,
 }
 
 /// What is drawn, and by which shaders.
@@ -146,6 +162,7 @@ pub struct Wish {
     pub set: Vec<String>,
     pub seed: Option<u32>,
     pub shaders: Option<PathBuf>,
+    pub device: Option<String>,
     pub work: Work,
     /// Items of a shard, in the work's order: frames. Their sum is the work's.
     pub sizes: Vec<u32>,
@@ -153,13 +170,15 @@ pub struct Wish {
     pub counted: Vec<cost::Work>,
     /// What each of those will take, s.
     pub predicted_s: Option<Vec<f64>>,
+    /// On what.
+    pub predicted_for: Option<Class>,
 }
 
 impl Plan {
     /// Of what is wished for, by this build, as the files are now.
     pub fn new(wish: Wish) -> Result<Plan> {
         let absolute = |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
-        let Wish { scene, set, seed, shaders, work, sizes, counted, predicted_s } = wish;
+        let Wish { scene, set, seed, shaders, device, work, sizes, counted, predicted_s, predicted_for } = wish;
         let mut source = SceneSource {
             file: absolute(&scene)?,
             set,
@@ -180,7 +199,9 @@ impl Plan {
             date: machine::utc_now(),
             command: std::env::args().collect(),
             scene: source,
+            device,
             work,
+            predicted_for,
             shards: Vec::new(),
         };
         let mut first = plan.work.items().start as u32;

@@ -21,16 +21,25 @@ use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::study::against::Against;
+use crate::study::cells::n_visited;
 use crate::study::layers::Layers;
 use crate::study::machine::{self, Device};
 use crate::study::model_light::reflections_of;
 use crate::study::pixels::{Pixels, Tile};
 use crate::study::samples::{self, MOST_SAMPLES, Pairs, Subject, Sums};
+use crate::study::truth::Truth;
 
 /// Most pieces of a picture: a plan of as many shards is about as large as one can be.
 const MOST_PIECES: u64 = 40_000;
 /// What the picture is of, and how far it may be off.
 pub const ABOUT_FILE: &str = "reference.json";
+
+/// What is known of a picture before any of it is drawn.
+pub struct Seen {
+    layers: Layers,
+    /// [`n_visited`].
+    n_cells: f64,
+}
 
 /// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k / n_ranges, tiles row by
 /// row.
@@ -112,17 +121,20 @@ impl Cut {
         self.of.parse().map_err(Error::usage)
     }
 
-    /// How many layers its pixels have.
-    pub fn layers(&self, loaded: &LoadedScene) -> Result<Layers> {
+    /// Its layers, and the cells that its light visits.
+    pub fn seen(&self, loaded: &LoadedScene) -> Result<Seen> {
         let scene = loaded.clone().at_frame(self.frame);
         // Where a blob has lost all but a thousandth of its depth; integrals end nowhere, and little is left there.
         const REACH: f64 = 4.0;
-        let reach = if self.against()? == Against::Thin { scene.draw.cutoff } else { REACH };
-        Layers::of(&scene, scene.time.at(self.frame), reach)
+        let (of, truth) = (self.against()?, Truth::unlit(&scene, scene.time.at(self.frame))?);
+        let reach = if of == Against::Thin { scene.draw.cutoff } else { REACH };
+        // The others' light knows no grid.
+        let n_cells = if matches!(of, Against::Thin | Against::Volume) { n_visited(&scene, &truth) } else { 0.0 };
+        Ok(Seen { layers: Layers::of(&scene, &truth, reach), n_cells })
     }
 
     /// What each piece makes work of.
-    pub fn work(&self, loaded: &LoadedScene, layers: &Layers) -> Result<Vec<Counted>> {
+    pub fn work(&self, loaded: &LoadedScene, seen: &Seen) -> Result<Vec<Counted>> {
         let scene = loaded.clone().at_frame(self.frame);
         let of = self.against()?;
         let n_particles = scene.n_particles() as f64;
@@ -133,8 +145,9 @@ impl Cut {
         let n_reflections = if let Against::Reflections(k) = of { k } else { reflections_of(&scene) };
         let tile = |i: u32| self.piece(i * self.n_ranges()).0;
         let n_tiles = self.n_pieces() as u32 / self.n_ranges();
-        let of_tiles: Vec<[f64; 2]> =
-            (0..n_tiles).map(|i| [layers.n_within(tile(i)), layers.n_solid_within(tile(i))]).collect();
+        let layers = &seen.layers;
+        let of_tile = |tile| [layers.n_within(tile), layers.n_solid_within(tile)];
+        let of_tiles: Vec<[f64; 2]> = (0..n_tiles).map(|i| of_tile(tile(i))).collect();
         let of_piece = |k: u32| {
             let (_, samples) = self.piece(k);
             let (n, n_lit) = (samples.len() as f64, if n_reflections >= 3 { samples.len() as f64 } else { 1.0 });
@@ -143,6 +156,7 @@ impl Cut {
             Counted {
                 steps: n,
                 particle_steps: n_particles,
+                cells: seen.n_cells,
                 pixel_samples: n * n_layers,
                 facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_emitters },
                 // The processor makes them once, a part of the set-up.

@@ -31,7 +31,7 @@ pub enum Outcome {
 
 /// On which device, until when, and who is told of every item.
 pub struct How<'a> {
-    /// But for the shaders, which are the plan's.
+    /// But for the shaders, which are the plan's, as the device is where none is named here.
     pub choice: &'a DeviceChoice,
     pub stop: &'a AtomicBool,
     pub on_item: &'a dyn Fn(),
@@ -99,7 +99,11 @@ impl Attempt<'_> {
         // The log tells people; without it work goes on.
         let _ = log.say(shard.index, &shard.key, Event::Begun);
         let mut workplace = store.begin(shard, &who)?;
-        let choice = DeviceChoice { shaders: plan.scene.shaders.clone(), ..self.how.choice.clone() };
+        let choice = DeviceChoice {
+            device: self.how.choice.device.clone().or_else(|| plan.device.clone()),
+            shaders: plan.scene.shaders.clone(),
+            ..self.how.choice.clone()
+        };
         let stop = self.how.stop;
         let made = match &plan.work {
             Work::Frames { .. } => {

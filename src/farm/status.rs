@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::attempts::{self, Attempt, Event};
 use super::cost::Compared;
-use super::plan::{Plan, Shard};
+use super::plan::{Class, Plan, Shard};
 use super::slurm;
 use super::store::{Other, Standing, Store};
 use crate::error::Result;
@@ -19,6 +19,8 @@ pub struct Status {
     pub n_done: usize,
     /// How far what was predicted is off from what it took, of shards that one run did from beginning to end.
     pub predicted: Option<Compared>,
+    /// Shards that a device or processor did for which nothing was predicted; they are not in that.
+    pub n_other_class: usize,
     /// Why the engine that shards were submitted to does not say what it does with them.
     pub engine_silent: Option<String>,
 }
@@ -85,7 +87,7 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     let others = store.others();
     let mut by_key: BTreeMap<&str, Vec<&Attempt>> = BTreeMap::new();
     attempts.iter().for_each(|attempt| by_key.entry(&attempt.key).or_default().push(attempt));
-    let mut pairs = Vec::new();
+    let (mut pairs, mut n_other_class) = (Vec::new(), 0);
     let of = |shard: &Shard| {
         let standing = store.standing(plan, shard);
         let of_shard = by_key.get(shard.key.as_str()).map_or(&[][..], Vec::as_slice);
@@ -94,7 +96,12 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
         if let (Standing::Verified(manifest), Some(predicted_s)) = (&standing, shard.predicted_s)
             && manifest.n_resumed == 0
         {
-            pairs.push((predicted_s, manifest.seconds));
+            let class = Class { device: manifest.device.class(), cpu: manifest.cpu.class() };
+            if plan.predicted_for.as_ref().is_none_or(|of| *of == class) {
+                pairs.push((predicted_s, manifest.seconds));
+            } else {
+                n_other_class += 1;
+            }
         }
         let manifest = if let Standing::Verified(manifest) = standing { Some(manifest) } else { None };
         ShardStatus {
@@ -114,7 +121,7 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     };
     let shards: Vec<ShardStatus> = plan.shards.iter().map(of).collect();
     let n_done = shards.iter().filter(|shard| shard.state == State::Done).count();
-    Ok(Status { shards, n_done, predicted: Compared::of(&pairs), engine_silent: None })
+    Ok(Status { shards, n_done, predicted: Compared::of(&pairs), n_other_class, engine_silent: None })
 }
 
 fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) {
@@ -183,7 +190,7 @@ mod tests {
         };
         let states = [State::Open, State::Done, State::Failed, State::Broken, State::Begun, State::Done, State::Open];
         let shards: Vec<ShardStatus> = states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();
-        let status = |shards| Status { shards, n_done: 0, predicted: None, engine_silent: None };
+        let status = |shards| Status { shards, n_done: 0, predicted: None, n_other_class: 0, engine_silent: None };
         assert_eq!(status(shards).missing(), "0,2-4,6");
         assert_eq!(status(vec![shard(0, State::Done)]).missing(), "");
     }

@@ -3,6 +3,7 @@
 //! Densities are extinction per unit length; cell (x, y, z) is at index x + n_x (y + n_y z).
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::ops::RangeInclusive;
 
 use glam::DVec3;
 use libm::{erf, erfc};
@@ -32,6 +33,25 @@ pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     cells
 }
 
+/// Cells that [`deposit`] adds to, over all blobs: what depositing them takes.
+pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
+    let n = spec.n_cells.as_usizevec3();
+    let of_blob = |blob: &Blob| {
+        let (sigma, edges) = (blob.sigma * blob.axes(), spec.edges());
+        let axis = |i: usize| reached(blob.position[i], sigma[i], spec.low[i], edges[i], n[i]).map_or(0, |r| r.count());
+        axis(0) as f64 * axis(1) as f64 * axis(2) as f64
+    };
+    blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
+}
+
+/// First to last cell of one axis within the cut; `None` where there is none.
+fn reached(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> Option<RangeInclusive<usize>> {
+    let reach = DEPOSIT_CUT_SIGMA * sigma;
+    let first = ((p - reach - low) / cell).floor().max(0.0);
+    let last = ((p + reach - low) / cell).floor().min(n as f64 - 1.0);
+    (p.is_finite() && first <= last).then_some(first as usize..=last as usize)
+}
+
 /// erf(3/√2): the share of a Gaussian within the cut, by which the weights are normalised.
 const WITHIN_CUT: f64 = 0.997_300_203_936_739_8;
 
@@ -39,20 +59,11 @@ const WITHIN_CUT: f64 = 0.997_300_203_936_739_8;
 /// They sum to 1, less what lies outside the grid, and change continuously with `p`. Empty where no cell exists
 /// within the cut, or `p` is not a number.
 pub fn axis_weights(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> (usize, Vec<f64>) {
-    if !p.is_finite() {
-        return (0, Vec::new());
-    }
-    let reach = DEPOSIT_CUT_SIGMA * sigma;
-    let first = ((p - reach - low) / cell).floor().max(0.0);
-    let last = ((p + reach - low) / cell).floor().min(n as f64 - 1.0);
-    if first > last {
-        return (0, Vec::new());
-    }
-    let (first, last) = (first as usize, last as usize);
+    let Some(cells) = reached(p, sigma, low, cell, n) else { return (0, Vec::new()) };
     let edge = |i: usize| (low + cell * i as f64 - p) / sigma;
     let cut = |v: f64| v.clamp(-DEPOSIT_CUT_SIGMA, DEPOSIT_CUT_SIGMA);
     let weight = |i: usize| normal_share(cut(edge(i)), cut(edge(i + 1))) / WITHIN_CUT;
-    (first, (first..=last).map(weight).collect())
+    (*cells.start(), cells.map(weight).collect())
 }
 
 /// Share of the unit normal distribution in [a, b]: ½[erf(b/√2) − erf(a/√2)], in its tails through erfc.
@@ -132,6 +143,23 @@ mod tests {
 
     fn blob(x: f64, sigma: f64, kappa: f64) -> Blob {
         Blob { aspect: 1.0, position: DVec3::new(x, 0.3, -0.2), sigma, kappa }
+    }
+
+    #[test]
+    fn cells_that_blobs_meet_by_hand() {
+        let spec = spec(20, 0.5, -5.0);
+        let at = |x: f64, sigma: f64, kappa: f64| Blob { aspect: 1.0, position: DVec3::splat(x), sigma, kappa };
+        // ±1.5 about 0.1: cells 7 to 13 along each axis. About the corner at 5: 17 to 19. Beyond it: none.
+        let blobs = [at(0.1, 0.5, 1.0), at(5.0, 0.5, 1.0), at(7.0, 0.5, 1.0), at(f64::NAN, 0.5, 1.0)];
+        let counts = blobs.map(|blob| n_deposited(&spec, &[blob]));
+        assert_eq!(counts, [343.0, 27.0, 0.0, 0.0]);
+        assert_eq!(n_deposited(&spec, &blobs), 370.0);
+        // Without mass nothing is left.
+        assert_eq!(n_deposited(&spec, &[at(0.1, 0.0, 1.0), at(0.1, 0.5, 0.0)]), 0.0);
+        // Twice as high, twice as many along y: ±3 is 4 to 16.
+        assert_eq!(n_deposited(&spec, &[Blob { aspect: 2.0, ..blobs[0] }]), 7.0 * 13.0 * 7.0);
+        let met = deposit(&spec, &blobs[..1]).iter().filter(|density| **density > 0.0).count();
+        assert_eq!(met, 343);
     }
 
     #[test]

@@ -69,6 +69,11 @@ pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, distanc
     (0..n_steps(length, step)).map(of_step).sum()
 }
 
+/// Samples of the grid that [`optical_depth`] takes.
+pub fn n_samples(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64, step: f64) -> u32 {
+    crossing(spec, p, d, distance).map_or(0, |(enter, leave)| n_steps(leave - enter, step / spec.cells_along(d)))
+}
+
 impl Obstacles<'_> {
     /// e^{−(1−g)τ} on the way from `p` to the light.
     pub fn through_the_cloud(&self, p: DVec3, light: &Light) -> f64 {
@@ -111,6 +116,16 @@ mod tests {
     fn transmittance(cells: &[f64], positions: &[DVec3], light: Light, forward: f64) -> Vec<f64> {
         let receivers: Vec<_> = positions.iter().map(|&position| Receiver { position, i_region: 0 }).collect();
         Obstacles { spec: &SPEC, cells, rectangles: &[], step: 0.5, forward }.transmittance(&receivers, &[light])
+    }
+
+    #[test]
+    fn samples_of_a_way_by_hand() {
+        let of = |p: DVec3, d: DVec3, distance: f64| n_samples(&SPEC, p, d, distance, 0.5);
+        // From ¼ to the face at 4, steps of ¼; a lamp at 1; a way that misses the grid.
+        let p = DVec3::new(0.25, 1.0, 1.0);
+        assert_eq!(of(p, DVec3::X, f64::INFINITY), 15);
+        assert_eq!(of(p, DVec3::X, 1.0), 4);
+        assert_eq!(of(p + 5.0 * DVec3::Y, DVec3::X, f64::INFINITY), 0);
     }
 
     #[test]

@@ -3,7 +3,6 @@
 use super::picture;
 use super::pixels::Tile;
 use super::truth::Truth;
-use crate::error::Result;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
 use crate::reference::{layers, surfaces};
@@ -18,16 +17,15 @@ pub struct Layers {
 }
 
 impl Layers {
-    /// Of a scene at one time, whose blobs end at `reach` σ.
-    pub fn of(scene: &Scene, time_s: f64, reach: f64) -> Result<Layers> {
-        let truth = Truth::unlit(scene, time_s)?;
-        let view = picture::view(scene, &truth);
+    /// Of a scene as it is in `truth`, lit or not; its blobs end at `reach` σ.
+    pub fn of(scene: &Scene, truth: &Truth, reach: f64) -> Layers {
+        let view = picture::view(scene, truth);
         let origin = truth.setting.light_origin;
         let placed: Vec<Surface> = scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect();
         let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();
         let all = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
         let solid = all.map(|(i, j)| !placed.is_empty() && sees(i, j)).collect();
-        Ok(Layers { width: view.width, n: layers::n_layers(&view, &truth.blobs, reach), solid })
+        Layers { width: view.width, n: layers::n_layers(&view, &truth.blobs, reach), solid }
     }
 
     fn rows<'a, T>(&self, values: &'a [T], tile: Tile) -> impl Iterator<Item = &'a [T]> {

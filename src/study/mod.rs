@@ -7,6 +7,7 @@ pub mod bench;
 pub mod bench_parts;
 pub mod beside;
 pub mod cases;
+pub mod cells;
 pub mod compare;
 pub mod counts;
 pub mod difference;

@@ -152,7 +152,11 @@ pub struct PlanArgs {
     /// Folder with shaders that replace those built in
     #[arg(long, value_name = "DIR", help_heading = "Device")]
     pub shaders: Option<PathBuf>,
-    /// Print the plan as JSON
+    /// Vulkan device of every run, by index or part of its name: a node without it refuses the work. `farm run
+    /// --device` says otherwise for one
+    #[arg(long, value_name = "INDEX|NAME", conflicts_with = "reference", help_heading = "Device")]
+    pub device: Option<String>,
+    /// Print the plan as JSON, with each shard's arguments and outputs
     #[arg(long)]
     pub json: bool,
     /// No warnings

@@ -8,10 +8,12 @@ fn wish(sizes: &[u32]) -> Wish {
         set: vec![],
         seed: None,
         shaders: None,
+        device: None,
         work,
         sizes: sizes.to_vec(),
         counted: vec![],
         predicted_s: None,
+        predicted_for: None,
     }
 }
 

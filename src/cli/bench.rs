@@ -10,7 +10,7 @@ use super::args::{BenchArgs, Span, ThreadingArg};
 use super::farm_cut::Amounts;
 use super::{bench_plot, bench_table, device_choice, load, output, say_sizes, warnings_of};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::{textures_of, work_of};
+use crate::farm::amounts::{Played, textures_of};
 use crate::farm::cost::Work as Counted;
 use crate::frame::limits;
 use crate::frame::stage::Stage;
@@ -21,7 +21,7 @@ use crate::model::scene::Threading;
 use crate::study::bench::{self, BenchPlan, Ran};
 use crate::study::bench_parts::numbers;
 use crate::study::beside::Beside;
-use crate::study::cases::{Axis, Case, SIZE_KEY, cases, overrides, points, sweep_text};
+use crate::study::cases::{Axis, Case, Loop, SIZE_KEY, cases, overrides, points, sweep_text};
 use crate::study::machine;
 use crate::study::outcome::pass_names;
 use crate::study::records::{self, Run};
@@ -145,13 +145,15 @@ pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
     };
     let quiet = super::SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     let cases = prepare(args, scene, &quiet)?.cases;
-    let frames =
-        |case: &Case| case.loops.len() as f64 * f64::from(case.n_frames + args.warmup) * f64::from(args.repeat);
-    // Of several cases each block begins anew.
-    let n_begun = |case: &Case| f64::from(args.repeat) * case.loops.len() as f64;
+    let n_frames = |case: &Case| f64::from(case.n_frames + args.warmup);
     let counted = |case: &Case| {
-        let frame = work_of(&case.scene, case.scene.time.at(case.i_first))?;
-        Ok(frame * frames(case) + textures_of(&case.scene) * n_begun(case))
+        let Played { next, first } = Played::of(&case.scene, case.i_first)?;
+        // Of several cases each block begins anew.
+        let block = |of: &Loop| {
+            let others = if of.skip { next } else { first };
+            first + others * (n_frames(case) - 1.0) + textures_of(&case.scene)
+        };
+        Ok(case.loops.iter().map(block).fold(Counted::default(), |sum, of| sum + of) * f64::from(args.repeat))
     };
     let counted = cases.iter().map(counted).collect::<Result<Vec<Counted>>>()?;
     let of_shard = counted.first().copied().unwrap_or_default();

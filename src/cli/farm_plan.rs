@@ -10,7 +10,8 @@ use super::args::{Args, CalibrateArgs, Command, ErrorArgs, FormatArg, PlanArgs, 
 use super::farm_cut::{Amounts, Cut, cut};
 use super::{farm_bench, farm_reference, output, tradeoff};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::{calibrate, n_runs, of_farms, textures_of, work_of_frames};
+use crate::farm::amounts::{work_of_beginning, work_of_frames};
+use crate::farm::calibrate::{calibrate, n_runs, of_farms};
 use crate::farm::pack::{Packing, Rate, pack, price};
 use crate::farm::plan::{PictureFormat, Plan, Wish, Work};
 use crate::farm::run::How;
@@ -99,7 +100,7 @@ fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
         Some(FormatArg::Png) | None => PictureFormat::Png,
     };
     let work = Work::Frames { first, n, format };
-    let amounts = Amounts { items: work_of_frames(loaded, first..end)?, of_shard: textures_of(&loaded.scene) };
+    let amounts = Amounts { items: work_of_frames(loaded, first..end)?, of_shard: work_of_beginning(loaded, first)? };
     cut(args, work, &amounts, (args.shard_frames, USUAL_FRAMES))
 }
 

@@ -13,7 +13,7 @@ use super::farm_cut::Amounts;
 use super::render_reference::Shown;
 use super::{device_choice, load, output, say_sizes, tradeoff_table};
 use crate::error::{Error, Result};
-use crate::farm::calibrate::{textures_of, work_of};
+use crate::farm::amounts::{Played, textures_of, work_of};
 use crate::frame::limits;
 use crate::frame::stage::Bed;
 use crate::io::image;
@@ -149,7 +149,15 @@ pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)>
     let time_s = scene.time.at(args.frame);
     // A turn begins anew, textures and all, as the picture did.
     let n_begun = f64::from(args.rounds + 1);
-    let of_scene = |scene: &Scene| Ok(work_of(scene, time_s)? * frames + textures_of(scene) * n_begun);
+    let of_scene = |scene: &Scene| {
+        let drawn = if args.as_played {
+            let Played { next, first } = Played::of(scene, args.frame)?;
+            next * (frames - 1.0) + first
+        } else {
+            work_of(scene, time_s)? * frames
+        };
+        Ok(drawn + textures_of(scene) * n_begun)
+    };
     let base = of_scene(&scene)?;
     let of_one = |settings: &Vec<Setting>| {
         let of = load_with(args, &options, settings)?;

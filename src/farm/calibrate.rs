@@ -2,26 +2,22 @@
 //! shard is, and the cost model that is fitted to them.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::cost::{Fit, Timed, Work as Counted, fit};
+use super::amounts::{work_of_beginning, work_of_frames};
+use super::cost::{Fit, Timed, fit};
 use super::failing::of_io;
 use super::plan::{self, PictureFormat, Plan, Wish};
 use super::run::{self, How};
 use super::store::{Manifest, Standing, Store};
 use super::synced;
 use crate::error::{Error, Result};
-use crate::io::scene_file::{self, LoadedScene};
+use crate::io::scene_file;
 use crate::io::text_file::{RECORD_LIMIT, read_result};
-use crate::model::scene::{LightingMode, Scene};
-use crate::study::cells::n_visited;
-use crate::study::layers::Layers;
 use crate::study::machine::{self, Cpu, Device};
-use crate::study::truth::Truth;
 
 pub const SCHEMA_VERSION: u32 = 1;
 
@@ -55,40 +51,6 @@ pub struct Row {
 
 /// Sizes of the pictures, by the scene's own along each side: what grows with the pixels and what does not come apart.
 const SIZES: [f64; 3] = [0.5, 0.75, 1.0];
-
-/// What a frame of a scene at that time makes work of.
-pub fn work_of(scene: &Scene, time_s: f64) -> Result<Counted> {
-    let n_facets = scene.n_facets() as f64;
-    let truth = Truth::unlit(scene, time_s)?;
-    let is_second = scene.lighting.mode == LightingMode::TwoReflection;
-    Ok(Counted {
-        steps: 1.0,
-        particle_steps: scene.n_particles() as f64,
-        cells: n_visited(scene, &truth),
-        pixel_samples: Layers::of(scene, &truth, scene.draw.cutoff).n_whole(),
-        facet_pairs: if is_second { n_facets * n_facets } else { 0.0 },
-        textures: 0.0,
-    })
-}
-
-/// What making a scene's textures once is.
-pub fn textures_of(scene: &Scene) -> Counted {
-    Counted { textures: if scene.is_textured() { 1.0 } else { 0.0 }, ..Counted::default() }
-}
-
-/// Frame by frame, of `frames`: at some of them, each of which stands for its neighbours.
-pub fn work_of_frames(loaded: &LoadedScene, frames: Range<u32>) -> Result<Vec<Counted>> {
-    const N_LOOKED_AT: u32 = 16;
-    let n_alike = (frames.end - frames.start).div_ceil(N_LOOKED_AT).max(1);
-    let of = |first: u32| {
-        let n = n_alike.min(frames.end - first);
-        let middle = first + n / 2;
-        let scene = loaded.clone().at_frame(middle);
-        Ok(vec![work_of(&scene, scene.time.at(middle))?; n as usize])
-    };
-    let parts = frames.clone().step_by(n_alike as usize).map(of).collect::<Result<Vec<_>>>()?;
-    Ok(parts.concat())
-}
 
 /// How many runs [`calibrate`] makes of so many scenes.
 pub fn n_runs(n_scenes: usize) -> usize {
@@ -214,7 +176,8 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
     let begin = Instant::now();
     run::run(&folder.0, 0, how)?;
     let seconds = begin.elapsed().as_secs_f64();
-    let work = work_of_frames(&loaded, 0..n)?.into_iter().fold(textures_of(&loaded.scene), |sum, of| sum + of);
+    let begin = work_of_beginning(&loaded, 0)?;
+    let work = work_of_frames(&loaded, 0..n)?.into_iter().fold(begin, |sum, of| sum + of);
     let device = match Store::open(&folder.0).standing(&plan, &plan.shards[0]) {
         Standing::Verified(manifest) => manifest.device,
         other => return Err(Error::Fault { what: format!("a shard that was just done is not there: {other:?}") }),

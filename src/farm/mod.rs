@@ -9,6 +9,7 @@
 //! What that takes is predicted by [`cost`], fitted with [`nnls`]; [`split`] cuts items into shards of such a length,
 //! and [`pack`] says who does which of them, when all is done, and at what price.
 
+pub mod amounts;
 pub mod ask;
 pub mod attempts;
 pub mod bench;

@@ -21,7 +21,7 @@ use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
 use crate::study::against::Against;
-use crate::study::cells::n_visited;
+use crate::study::cells::Visits;
 use crate::study::layers::Layers;
 use crate::study::machine::{self, Device};
 use crate::study::model_light::reflections_of;
@@ -37,8 +37,7 @@ pub const ABOUT_FILE: &str = "reference.json";
 /// What is known of a picture before any of it is drawn.
 pub struct Seen {
     layers: Layers,
-    /// [`n_visited`].
-    n_cells: f64,
+    visits: Visits,
 }
 
 /// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k / n_ranges, tiles row by
@@ -129,8 +128,9 @@ impl Cut {
         let (of, truth) = (self.against()?, Truth::unlit(&scene, scene.time.at(self.frame))?);
         let reach = if of == Against::Thin { scene.draw.cutoff } else { REACH };
         // The others' light knows no grid.
-        let n_cells = if matches!(of, Against::Thin | Against::Volume) { n_visited(&scene, &truth) } else { 0.0 };
-        Ok(Seen { layers: Layers::of(&scene, &truth, reach), n_cells })
+        let by_grid = matches!(of, Against::Thin | Against::Volume);
+        let visits = if by_grid { Visits::of(&scene, &truth) } else { Visits::default() };
+        Ok(Seen { layers: Layers::of(&scene, &truth, reach), visits })
     }
 
     /// What each piece makes work of.
@@ -156,7 +156,7 @@ impl Cut {
             Counted {
                 steps: n,
                 particle_steps: n_particles,
-                cells: seen.n_cells,
+                cells: seen.visits.filled + seen.visits.marched,
                 pixel_samples: n * n_layers,
                 facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_emitters },
                 // The processor makes them once, a part of the set-up.

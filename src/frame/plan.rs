@@ -4,13 +4,17 @@
 use std::fmt;
 
 use super::culling::culls;
+use super::exchange::is_glossy;
+use super::grouping::is_grouped;
+use super::lives::lives;
 use super::packet::Packet;
 use crate::error::Result;
 use crate::gpu::Recorder;
 use crate::layout::facet::RegionRecord;
 use crate::layout::frame::LightRecord;
+use crate::model::cloud::CloudSource;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{DrawPath, Scene};
+use crate::model::scene::{DrawPath, Impostors, LightingMode, Scene};
 
 /// The passes in their order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -217,6 +221,32 @@ pub struct Traits {
 }
 
 impl Traits {
+    /// Of `scene`, in which nothing is "auto". `skip`: frames leave out what they do not need.
+    pub fn of(scene: &Scene, tensors: Tensors, skip: bool) -> Traits {
+        let traits = Traits {
+            has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
+            has_discs: lives(scene),
+            n_particles: scene.n_particles() as u32,
+            n_facets: scene.n_facets() as u32,
+            lit: scene.lighting.mode != LightingMode::None,
+            two_reflections: scene.lighting.mode == LightingMode::TwoReflection,
+            grouped: is_grouped(scene),
+            textured: scene.is_textured(),
+            n_surfaces: scene.surfaces.len() as u32,
+            n_terrains: scene.terrains.len() as u32,
+            glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
+            tensors,
+            impostors: scene.draw.impostors != Impostors::Off,
+            shrunk: false,
+            culls: false,
+            path: DrawPath::Sprites,
+            skip,
+            keeps_made: false,
+            made: false,
+        };
+        traits.drawn_by(scene)
+    }
+
     /// The same where `scene`, in which nothing is "auto", is drawn as its `draw` says.
     pub fn drawn_by(self, scene: &Scene) -> Traits {
         Traits { culls: culls(scene), path: scene.draw.path, shrunk: scene.draw.resolution != Resolution::Full, ..self }

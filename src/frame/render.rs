@@ -8,10 +8,10 @@ use tracing::info_span;
 use super::buffers::{Buffers, Placed, has_second};
 use super::culling::{Culling, record_sort};
 use super::drawing::Drawing;
-use super::exchange::{gathers_from_tree, is_glossy};
+use super::exchange::gathers_from_tree;
 use super::feed::IN_FLIGHT;
 use super::grouping::{Grouping, is_grouped};
-use super::lives::{Lives, lives};
+use super::lives::Lives;
 use super::packet::Packet;
 use super::plan::{Pass, Plan, Traits, pass, plan};
 use super::relay::Relay;
@@ -21,8 +21,7 @@ use super::{limits, ms};
 use crate::error::{Error, Result};
 use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, ScopeTime};
 use crate::model::boxes::MAX_ATTEMPTS;
-use crate::model::cloud::CloudSource;
-use crate::model::scene::{DrawPath, Impostors, LightingMode, Scene, Simulate};
+use crate::model::scene::{LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
 use crate::passes::first::{First, Push as FirstPush};
 use crate::passes::generate::Generate;
@@ -101,7 +100,6 @@ impl Renderer {
         let scene = &*scene.exact();
         let groups = scene.groups();
         let n_particles = scene.n_particles() as u32;
-        let lit = scene.lighting.mode != LightingMode::None;
         let settings = Settings::of(scene);
         let host_places = scene.threads.simulate == Simulate::Cpu;
         let mut host = Commands::new(device, "frame.host")?;
@@ -142,28 +140,7 @@ impl Renderer {
             i_ended_picture: 0,
             readback: Buffer::new::<u8>(device, "film.readback", settings.n_bytes(), Place::Readback)?,
             settings,
-            traits: Traits {
-                has_boxes: scene.clouds.iter().any(|c| matches!(c.source, CloudSource::Boxes { .. })),
-                has_discs: lives(scene),
-                n_particles,
-                n_facets: scene.n_facets() as u32,
-                lit,
-                two_reflections,
-                grouped,
-                textured,
-                n_surfaces: scene.surfaces.len() as u32,
-                n_terrains: scene.terrains.len() as u32,
-                glossy: (0..scene.n_regions()).any(|i| is_glossy(scene, i)),
-                tensors,
-                impostors: scene.draw.impostors != Impostors::Off,
-                shrunk: false,
-                culls: false,
-                path: DrawPath::Sprites,
-                skip,
-                keeps_made: false,
-                made: false,
-            }
-            .drawn_by(scene),
+            traits: Traits::of(scene, tensors, skip),
             last: None,
             n_begun: 0,
             last_end: Instant::now(),

@@ -151,6 +151,15 @@ fn what_cannot_be_planned_is_said() {
     let cubes = ["farm", "plan", "scenes/cubes-554.toml", "-o", &folder, "--reference", "volume"];
     let (code, said) = bad(&cubes);
     assert!(code == Some(2) && said.contains("cloud 0 is textured"), "{said}");
+    // The processor does it.
+    let thin = [&hello[..], &["--reference", "thin"]].concat();
+    let (code, said) = bad(&[&thin[..], &["--device", "0"]].concat());
+    assert!(code == Some(2) && said.contains("cannot be used with"), "{said}");
+    good(&thin);
+    for run in [&["run", "--shard", "0"][..], &["local"]] {
+        let (code, said) = bad(&[&["farm"], run, &["--plan", &folder, "--device", "0"]].concat());
+        assert!(code == Some(2) && said.contains("a reference needs no device"), "{said}");
+    }
 }
 
 #[test]

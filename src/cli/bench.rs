@@ -18,13 +18,13 @@ use crate::gpu::ClockFit;
 use crate::io::atomic;
 use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
-use crate::study::bench::{self, BenchPlan, Ran};
+use crate::study::bench::{self, BenchPlan, Outcome, Ran};
 use crate::study::bench_parts::numbers;
 use crate::study::beside::Beside;
 use crate::study::cases::{Axis, Case, Loop, SIZE_KEY, cases, overrides, points, sweep_text};
 use crate::study::machine;
 use crate::study::outcome::pass_names;
-use crate::study::records::{self, Run};
+use crate::study::records::{self, FrameRow, Run};
 use crate::study::trace;
 
 /// Of the device's clock beside the host's, before the frames and after them.
@@ -203,6 +203,21 @@ fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
     Ok(stage)
 }
 
+/// What people read.
+fn print(
+    (args, color): (&BenchArgs, ColorChoice),
+    path: &Path,
+    (run, rows): (&Run, &[FrameRow]),
+    (cases, outcome): (&[Case], &Outcome),
+) -> Result<()> {
+    let same: Vec<Option<bool>> = cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case)).collect();
+    output::text(&bench_table::report(path, run, &same, args.options.verbose))?;
+    if args.plot {
+        output::text(&bench_plot::text(run, rows, color)?)?;
+    }
+    Ok(())
+}
+
 /// The run, and why it ended before its end, if it did.
 fn bench_one(
     (args, color): (&BenchArgs, ColorChoice),
@@ -264,12 +279,7 @@ fn bench_one(
         records::write_results_with(dir, &run, &pass_names(), &rows, &beside)?;
     }
     if !args.json {
-        let same: Vec<Option<bool>> =
-            cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case)).collect();
-        output::text(&bench_table::report(path, &run, &same, args.options.verbose))?;
-        if args.plot {
-            output::text(&bench_plot::text(&run, &rows, color)?)?;
-        }
+        print((args, color), path, (&run, &rows), (&cases, &outcome))?;
     }
     if let Some(file) = &args.trace {
         if let Some(stage) = &stage {
@@ -278,11 +288,9 @@ fn bench_one(
         let zones = zones.map(Zones::take);
         trace::write(file, &outcome.samples, &trace::Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
     }
-    for chosen in outcome.chosen.iter().filter(|_| !args.options.quiet) {
-        eprintln!("note: {chosen}");
-    }
-    for note in outcome.notes.iter().filter(|_| !args.options.quiet) {
-        eprintln!("warning: {note}");
+    if !args.options.quiet {
+        outcome.chosen.iter().for_each(|chosen| eprintln!("note: {chosen}"));
+        outcome.notes.iter().for_each(|note| eprintln!("warning: {note}"));
     }
     if failure.is_none() {
         stage.map_or(Ok(()), Stage::close)?;

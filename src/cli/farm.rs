@@ -32,8 +32,17 @@ pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<
     }
 }
 
+/// Of a reference the processor does all.
+fn refuse_needless(plan: &Plan, device: Option<&String>, validation: bool) -> Result<()> {
+    if matches!(plan.work, Work::Reference(_)) && (device.is_some() || validation) {
+        return Err(Error::usage("a reference needs no device: expected no --device and no --validation"));
+    }
+    Ok(())
+}
+
 fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
+    refuse_needless(&plan, args.device.as_ref(), args.validation)?;
     let n_items = plan.shard(args.shard)?.n;
     let bar = output::progress(u64::from(n_items), plan.work.noun(), args.quiet);
     let choice = DeviceChoice { device: args.device.clone(), validation: args.validation, ..DeviceChoice::default() };
@@ -67,6 +76,7 @@ fn given_up(args: &RunArgs, error: Error) -> Error {
 
 fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
     let plan = Plan::read(&args.plan)?;
+    refuse_needless(&plan, args.device.as_ref(), false)?;
     // What every shard would say is said once.
     plan.scene_as_planned()?;
     let found = status(&args.plan, &plan)?;

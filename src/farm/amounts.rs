@@ -27,11 +27,13 @@ impl Parts {
     fn of(scene: &Scene, time_s: f64) -> Result<Parts> {
         let (truth, n_facets) = (Truth::unlit(scene, time_s)?, scene.n_facets() as f64);
         let is_second = scene.lighting.mode == LightingMode::TwoReflection;
+        // A pair is an exchange, and a test of every rectangle that may stand between.
+        let n_tests = 1.0 + scene.surfaces.len() as f64;
         let n_pixels = f64::from(scene.film.width) * f64::from(scene.film.height);
         Ok(Parts {
             n_particles: scene.n_particles() as f64,
             visits: Visits::of(scene, &truth),
-            facet_pairs: if is_second { n_facets * n_facets } else { 0.0 },
+            facet_pairs: if is_second { n_facets * n_facets * n_tests } else { 0.0 },
             n_pixels,
             n_layers: Layers::of(scene, &truth, scene.draw.cutoff).n_whole() - n_pixels,
         })

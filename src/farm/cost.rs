@@ -1,5 +1,5 @@
-//! How long work takes: t = setup + d · steps + a · particles · steps + b · pixels · samples + c · facet pairs + e ·
-//! textures (docs/model.md §17), fitted to what a class of devices took, and how far off that is.
+//! How long work takes: t = setup + d · steps + a · particles · steps + g · grid cells + b · pixels · samples + c · facet
+//! pairs + e · textures (docs/model.md §17), fitted to what a class of devices took, and how far off that is.
 
 use std::ops::{Add, Mul};
 
@@ -22,7 +22,8 @@ pub struct Work {
     pub cells: f64,
     /// Pixels times the samples taken in each: one for what lies behind, and one for every layer over it.
     pub pixel_samples: f64,
-    /// Pairs of facets between which light is exchanged.
+    /// Pairs of facets between which light is exchanged, each once and once more for every rectangle that may stand
+    /// between.
     pub facet_pairs: f64,
     /// How often the textures of a scene are made: with each device that begins with it, each time that it begins anew.
     #[serde(default)]

@@ -32,10 +32,10 @@ pub enum FarmCommand {
     Plan(PlanArgs),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
-    /// t = setup + d · steps + a · particles · steps + b · layers of pixels + c · facet pairs + e · textures, by
-    /// non-negative least squares of relative errors over runs of one frame and of several at three sizes, each timed
-    /// as a shard is. It is for this class of devices; scenes like those to come make it good. What it is off by for
-    /// runs that it has not seen is said (each left out in turn).
+    /// t = setup + d · steps + a · particles · steps + g · cells of the density grid + b · layers of pixels + c · facet
+    /// pairs + e · textures, by non-negative least squares of relative errors over runs of one frame and of several at
+    /// three sizes, each timed as a shard is. It is for this class of devices; scenes like those to come make it good.
+    /// What it is off by for runs that it has not seen is said (each left out in turn).
     Calibrate(CalibrateArgs),
     /// Do one shard, unless it is done
     ///

@@ -123,8 +123,8 @@ fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
     let is_device = options.device.is_some() || options.shaders.is_some() || options.validation || options.poison;
     if is_results || is_budget || is_scene || is_device {
         return Err(Error::usage(
-            "after \"--\": expected no --out, --resume, --force, --plot, --json, --csv, --part, --budget-…, --device or --validation; --set, --seed, \
-             --size and --shaders stand before it",
+            "after \"--\": expected no --out, --resume, --force, --plot, --json, --csv, --part, --budget-… or \
+             --validation; --set, --seed, --size, --device and --shaders stand before it",
         ));
     }
     let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));

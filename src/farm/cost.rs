@@ -1,5 +1,5 @@
-//! How long work takes: t = setup + d · steps + a · particles · steps + g · grid cells + b · pixels · samples + c · facet
-//! pairs + e · textures (docs/model.md §17), fitted to what a class of devices took, and how far off that is.
+//! How long work takes: t = setup + d · steps + a · particles · steps + g · grid cells + b · pixels · samples +
+//! c · facet pairs + e · textures (docs/model.md §17), fitted to what a class of devices took, and how far off that is.
 
 use std::ops::{Add, Mul};
 

@@ -29,7 +29,7 @@ pub enum FarmCommand {
         --sweep draw.particles=500,5000,50000 --sweep size=400x300,800x600,1024x768,1600x1200\n\n\
         A picture in f64 of 64 samples a pixel, as `nimbus render --reference` draws it:\n  \
         nimbus farm plan scenes/study-light.toml -o farm --reference model --samples 64 --tile 80x60")]
-    Plan(PlanArgs),
+    Plan(Box<PlanArgs>),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
     /// t = setup + d · steps + a · particles · steps + g · cells of the density grid + b · layers of pixels + c · facet

@@ -22,8 +22,8 @@ pub(super) fn work(args: &PlanArgs, set: &[String]) -> Result<(Work, Amounts)> {
     let is_device = options.device.is_some() || options.shaders.is_some() || options.validation || options.poison;
     if is_results || is_scene || is_device || options.quiet || options.verbose {
         return Err(Error::usage(
-            "after \"--\": expected no other scene, --out, --trace, --plot, --force, --json, --part, --device, --validation, \
-             --poison, --quiet or --verbose; --set, --seed, --size and --shaders stand before it",
+            "after \"--\": expected no other scene, --out, --trace, --plot, --force, --json, --part, --validation, \
+             --poison, --quiet or --verbose; --set, --seed, --size, --device and --shaders stand before it",
         ));
     }
     let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));

@@ -64,10 +64,11 @@ pub fn plan(args: &PlanArgs) -> Result<()> {
     let items = plan.work.items();
     let (n, noun) = (items.end - items.start, plan.work.noun());
     output::text(&format!(
-        "{n} {noun} in {n_shards} shards\n{}\
+        "{n} {noun} in {n_shards} shard{}\n{}\
          all of them here:      nimbus farm local --plan {folder}\n\
          by Slurm:              nimbus farm submit slurm --plan {folder}\n\
          one, by any engine:    nimbus farm run --plan {folder} --shard I     (I from 0 to {})\n",
+        if n_shards == 1 { "" } else { "s" },
         estimate.unwrap_or_default(),
         n_shards - 1
     ))

@@ -1,14 +1,15 @@
-//! Hands the git revision to the program as `NIMBUS_GIT_REVISION`, so that every result names the code it came from:
-//! twelve digits, with `-dirty` when what is built differs from the commit, or `unknown` outside a git checkout. A digest of all
-//! that is built as `NIMBUS_CODE`, which tells such builds apart, and one of all that f64 references are computed by as
+//! Hands the git revision to the program as `NIMBUS_GIT_REVISION`, so that every result names the
+//! code it came from: twelve digits, with `-dirty` when what is built differs from the commit, or
+//! `unknown` outside a git checkout. A digest of all that is built as `NIMBUS_CODE`, which tells
+//! such builds apart, and one of all that f64 references are computed by as
 //! `NIMBUS_REFERENCE_CODE`, so that none that older code made is taken for new.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What goes into the binary. Only this makes a build dirty, and only this (and a new HEAD) makes the question worth
-/// asking again: whatever changes here compiles nimbus anew in any case. The index is not watched: staging a file
-/// changes nothing that is built.
+/// What goes into the binary. Only this makes a build dirty, and only this (and a new HEAD) makes
+/// the question worth asking again: whatever changes here compiles nimbus anew in any case. The
+/// index is not watched: staging a file changes nothing that is built.
 const BUILT_FROM: [&str; 5] = ["src", "shaders", "Cargo.toml", "Cargo.lock", "build.rs"];
 
 /// What f64 references are computed by.
@@ -26,7 +27,10 @@ const REFERENCES_FROM: [&str; 9] = [
 
 fn main() {
     let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").unwrap_or_else(|| ".".into()));
-    println!("cargo:rustc-env=NIMBUS_GIT_REVISION={}", revision(&root).unwrap_or_else(|| "unknown".into()));
+    println!(
+        "cargo:rustc-env=NIMBUS_GIT_REVISION={}",
+        revision(&root).unwrap_or_else(|| "unknown".into())
+    );
     println!("cargo:rustc-env=NIMBUS_CODE={:016x}", digest(&root, &BUILT_FROM));
     println!("cargo:rustc-env=NIMBUS_REFERENCE_CODE={:016x}", digest(&root, &REFERENCES_FROM));
     for path in BUILT_FROM.iter().map(|name| root.join(name)).chain(head_files(&root)) {
@@ -39,7 +43,8 @@ fn main() {
 
 /// FNV-1a over the files' names and texts in the order of their names.
 fn digest(root: &Path, names: &[&str]) -> u64 {
-    let mut files: Vec<PathBuf> = names.iter().flat_map(|name| files_under(&root.join(name))).collect();
+    let mut files: Vec<PathBuf> =
+        names.iter().flat_map(|name| files_under(&root.join(name))).collect();
     files.sort();
     let mut hash = 0xcbf2_9ce4_8422_2325u64;
     for file in files {
@@ -76,21 +81,30 @@ fn is_our_checkout(root: &Path) -> bool {
     matches!((Path::new(&top).canonicalize(), root.canonicalize()), (Ok(top), Ok(root)) if top == root)
 }
 
-/// HEAD (another branch), its log (a commit, a reset) and the branch itself (where logs are off). `--git-path` finds
-/// them in worktrees too, where HEAD and the branches live in different folders.
+/// HEAD (another branch), its log (a commit, a reset) and the branch itself (where logs are off).
+/// `--git-path` finds them in worktrees too, where HEAD and the branches live in different folders.
 fn head_files(root: &Path) -> Vec<PathBuf> {
     if !is_our_checkout(root) {
         return Vec::new();
     }
     let branch = git(root, &["symbolic-ref", "-q", "HEAD"]);
     let names = ["HEAD".to_owned(), "logs/HEAD".to_owned()].into_iter().chain(branch);
-    names.filter_map(|name| git(root, &["rev-parse", "--git-path", &name])).map(|path| root.join(path)).collect()
+    names
+        .filter_map(|name| git(root, &["rev-parse", "--git-path", &name]))
+        .map(|path| root.join(path))
+        .collect()
 }
 
-/// None when git is missing, refuses, or fails. Without optional locks: `status` would otherwise rewrite the index
-/// while another git command may be at work.
+/// None when git is missing, refuses, or fails. Without optional locks: `status` would otherwise
+/// rewrite the index while another git command may be at work.
 fn git(root: &Path, arguments: &[&str]) -> Option<String> {
-    let output = Command::new("git").arg("--no-optional-locks").arg("-C").arg(root).args(arguments).output().ok()?;
+    let output = Command::new("git")
+        .arg("--no-optional-locks")
+        .arg("-C")
+        .arg(root)
+        .args(arguments)
+        .output()
+        .ok()?;
     if !output.status.success() {
         return None;
     }

@@ -1,5 +1,6 @@
-//! What generating the paper's boxes costs on the GPU, beside a single-thread f64 loop (the reference) in the same run.
-//! `cargo bench --bench generate` prints a table of CPU times first, then divan's wall times.
+//! What generating the paper's boxes costs on the GPU, beside a single-thread f64 loop (the
+//! reference) in the same run. `cargo bench --bench generate` prints a table of CPU times first,
+//! then divan's wall times.
 
 mod cpu;
 
@@ -45,7 +46,8 @@ impl OnGpu {
     fn new(n: u32) -> OnGpu {
         let instance = Instance::new(false).expect("an instance");
         let device = Device::open(&instance, None).expect("a device");
-        let compiler = Compiler::new(passes::sources(), Compiler::default_cache()).expect("shaderc");
+        let compiler =
+            Compiler::new(passes::sources(), Compiler::default_cache()).expect("shaderc");
         let mut commands = Commands::new(&device, "bench").expect("commands");
         let (mut records, mut i_group) = (Vec::new(), Vec::new());
         for (b, i_box) in boxes(n).iter().zip(0u32..) {
@@ -54,8 +56,10 @@ impl OnGpu {
         }
         let mut upload = |words: &[u32]| {
             let n_words = words.len() as u64;
-            let mut staging = Buffer::new::<u32>(&device, "bench.staging", n_words, Place::Upload).expect("staging");
-            let buffer = Buffer::new::<u32>(&device, "bench.input", n_words, Place::Device).expect("input");
+            let mut staging = Buffer::new::<u32>(&device, "bench.staging", n_words, Place::Upload)
+                .expect("staging");
+            let buffer =
+                Buffer::new::<u32>(&device, "bench.input", n_words, Place::Device).expect("input");
             staging.write(words).expect("write");
             commands
                 .run(|rec| {
@@ -68,7 +72,8 @@ impl OnGpu {
         let buffers = [
             upload(bytemuck::cast_slice(&records)),
             upload(&i_group),
-            Buffer::new::<ParticleRecord>(&device, "bench.particles", n.into(), Place::Device).expect("particles"),
+            Buffer::new::<ParticleRecord>(&device, "bench.particles", n.into(), Place::Device)
+                .expect("particles"),
             Buffer::new::<u32>(&device, "bench.status", n.into(), Place::Device).expect("status"),
         ];
         let pass = Generate::new(&device, &compiler).expect("generate");
@@ -95,10 +100,17 @@ fn main() {
 }
 
 fn table() {
-    let made: Vec<_> =
-        boxes(50_000).iter().zip(0u32..).flat_map(|(b, i)| generate_box(b, i, 1, LAW.form, 1.0, 0.6)).collect();
+    let made: Vec<_> = boxes(50_000)
+        .iter()
+        .zip(0u32..)
+        .flat_map(|(b, i)| generate_box(b, i, 1, LAW.form, 1.0, 0.6))
+        .collect();
     let rate = Acceptance::of(&made).rate().unwrap_or(f64::NAN);
-    println!("attempts a particle: {:.3}; device: {}", 1.0 / rate, OnGpu::new(1).device.info().name);
+    println!(
+        "attempts a particle: {:.3}; device: {}",
+        1.0 / rate,
+        OnGpu::new(1).device.info().name
+    );
     println!("process CPU time a call, ms (p50 [min, max] of n = {})", cpu::N_SAMPLES);
     println!("{:>9}  {:>28}  {:>28}  {:>9}", "particles", "GPU pass", "f64 loop", "GPU/loop");
     for n in COUNTS {

@@ -1,5 +1,6 @@
-//! What the gusts of a cloud cost the game thread: for several particles side by side, and one after the other with the
-//! standard library's sine. `cargo bench --bench gusts` prints a table of CPU times first, then divan's wall times.
+//! What the gusts of a cloud cost the game thread: for several particles side by side, and one
+//! after the other with the standard library's sine. `cargo bench --bench gusts` prints a table of
+//! CPU times first, then divan's wall times.
 
 mod cpu;
 
@@ -21,7 +22,9 @@ fn modes(n_waves: u32) -> Vec<Mode> {
 }
 
 fn positions() -> Vec<DVec3> {
-    (0..N_PARTICLES as u32).map(|i| DVec3::new(0.618, 0.414, 0.732) * f64::from(i) % 8.0 - 4.0).collect()
+    (0..N_PARTICLES as u32)
+        .map(|i| DVec3::new(0.618, 0.414, 0.732) * f64::from(i) % 8.0 - 4.0)
+        .collect()
 }
 
 fn side_by_side(waves: &Waves, positions: &[DVec3]) {
@@ -61,8 +64,15 @@ fn table() {
         let ns = 1e6 / (N_PARTICLES as f64 * f64::from(n_waves));
         match (Summary::of(&together), Summary::of(&alone)) {
             (Some(a), Some(b)) => {
-                let show = |s: &Summary| format!("{:.2} [{:.2}, {:.2}]", ns * s.p50, ns * s.min, ns * s.max);
-                println!("{n_waves:>6}  {:>24}  {:>24}  {:>8.3}", show(&a), show(&b), a.p50 / b.p50);
+                let show = |s: &Summary| {
+                    format!("{:.2} [{:.2}, {:.2}]", ns * s.p50, ns * s.min, ns * s.max)
+                };
+                println!(
+                    "{n_waves:>6}  {:>24}  {:>24}  {:>8.3}",
+                    show(&a),
+                    show(&b),
+                    a.p50 / b.p50
+                );
             }
             _ => println!("{n_waves:>6}  no process CPU time on this system"),
         }
@@ -72,7 +82,9 @@ fn table() {
 #[divan::bench(args = N_WAVES, max_time = 2)]
 fn lanes(bencher: Bencher<'_, '_>, n_waves: u32) {
     let (waves, positions) = (Waves::at(&modes(n_waves), TIME_S), positions());
-    bencher.counter(divan::counter::ItemsCount::new(N_PARTICLES)).bench_local(|| side_by_side(&waves, &positions));
+    bencher
+        .counter(divan::counter::ItemsCount::new(N_PARTICLES))
+        .bench_local(|| side_by_side(&waves, &positions));
 }
 
 #[divan::bench(args = N_WAVES, max_time = 2)]

@@ -1,7 +1,7 @@
 #version 460
 
-// What has been composed near to far: shown; or the pixels that let no more through than may be left out, and those alone
-// (docs/model.md §11 "chunks").
+// What has been composed near to far: shown; or the pixels that let no more through than may be
+// left out, and those alone (docs/model.md §11 "chunks").
 
 // 0: shows; 1: picks.
 layout(constant_id = 0) const uint PICKS = 0;

@@ -3,7 +3,8 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Entries near to far, in chunks of equal numbers, and each chunk's draw (docs/model.md §11 "chunks").
+// Entries near to far, in chunks of equal numbers, and each chunk's draw (docs/model.md §11
+// "chunks").
 
 layout(local_size_x = 64) in;
 

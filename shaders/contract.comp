@@ -6,8 +6,8 @@
 #include "tensor.glsl"
 #include "sum.glsl"
 
-// Radiance and irradiance of every facet from the tensors T1 and T2, the lights' energies and the materials' coefficients,
-// C (13)-(16) (docs/model.md §7, §11 "contract").
+// Radiance and irradiance of every facet from the tensors T1 and T2, the lights' energies and the
+// materials' coefficients, C (13)-(16) (docs/model.md §7, §11 "contract").
 
 // N_b.
 #ifndef N_BASES
@@ -33,7 +33,8 @@ layout(binding = 3) uniform usamplerBuffer coefficients;
 layout(binding = 4) uniform samplerBuffer t1;
 // As tensor.glsl has it.
 layout(binding = 5) uniform samplerBuffer t2;
-// By region (first, number) of its spans; then the spans, (first, number) of columns that it can receive light from.
+// By region (first, number) of its spans; then the spans, (first, number) of columns that it can
+// receive light from.
 layout(std430, binding = 6) readonly buffer Spans { uvec2 spans[]; };
 layout(std430, binding = 7) writeonly buffer LitFacets { Lit lit[]; };
 

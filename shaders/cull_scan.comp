@@ -3,8 +3,8 @@
 #include "records.glsl"
 #include "cull.glsl"
 
-// Where each tile's kept particles begin, and what those that come after need of their number. One workgroup: an invocation
-// a run of tiles.
+// Where each tile's kept particles begin, and what those that come after need of their number. One
+// workgroup: an invocation a run of tiles.
 
 layout(local_size_x = 256) in;
 

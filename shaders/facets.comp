@@ -4,8 +4,8 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// One facet a particle (docs/model.md §5, §11): normal from the gradient of the smoothed density where that is well
-// conditioned, else away from the cloud's centre.
+// One facet a particle (docs/model.md §5, §11): normal from the gradient of the smoothed density
+// where that is well conditioned, else away from the cloud's centre.
 
 layout(local_size_x = 64) in;
 
@@ -24,7 +24,8 @@ void main() {
         vec3 p = placed[i].position;
         float sigma = placed[i].sigma;
         Group group = groups[i_group[i]];
-        // The light on a small blob is that of the blobs it lies among: on its own scale it would be a speck.
+        // The light on a small blob is that of the blobs it lies among: on its own scale it would
+        // be a speck.
         float scale = max(sigma, group.sigma_mean);
         float aspect = particles[i].aspect;
         vec3 n = normal_at(p, scale, aspect, group.cloud_center);

@@ -4,8 +4,8 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// One facet a run of particles in Morton order (docs/model.md §5, §11). Means are taken about the first particle of the
-// run, so that a run of one is that particle, to the bit.
+// One facet a run of particles in Morton order (docs/model.md §5, §11). Means are taken about the
+// first particle of the run, so that a run of one is that particle, to the bit.
 
 layout(local_size_x = 64) in;
 

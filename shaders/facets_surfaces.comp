@@ -3,7 +3,8 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Facets of the surfaces: each rectangle's grid, along u first, row by row along v (docs/model.md §5, §11).
+// Facets of the surfaces: each rectangle's grid, along u first, row by row along v (docs/model.md
+// §5, §11).
 
 layout(local_size_x = 64) in;
 

@@ -4,7 +4,8 @@
 #include "each.glsl"
 #include "light.glsl"
 
-// T1: the first reflection by light and basis, without energies and materials (docs/model.md §7, §11 "contract").
+// T1: the first reflection by light and basis, without energies and materials (docs/model.md §7,
+// §11 "contract").
 
 layout(local_size_x = 64) in;
 

@@ -48,9 +48,10 @@ vec4 draw(Box b, uint i, uint attempt) {
 // Attempts of the particles found so far, a byte each with the last one lowest: 16 fit.
 const uint BYTE_OUTSIDE = 0x80u;
 
-// The particles begin, begin + hop, ... below end, all of box b. First the search, one attempt a turn of whichever
-// particle this invocation is at: a lucky one goes on to its next particle instead of waiting for its neighbours. Then
-// the particles, from the attempts that were kept: computed twice, but stored without neighbours waiting.
+// The particles begin, begin + hop, ... below end, all of box b. First the search, one attempt a
+// turn of whichever particle this invocation is at: a lucky one goes on to its next particle
+// instead of waiting for its neighbours. Then the particles, from the attempts that were kept:
+// computed twice, but stored without neighbours waiting.
 void make(Box b, uint begin, uint end, uint hop) {
     vec3 h = 0.5 * b.extent;
     uvec4 found = uvec4(0);
@@ -86,7 +87,8 @@ void main() {
     uint first = push.i_first + gl_WorkGroupID.x * n_chunk;
     for (uint chunk = first; chunk < run_end; chunk += gl_NumWorkGroups.x * n_chunk) {
         uint chunk_end = min(chunk + n_chunk, run_end);
-        // Groups are runs of consecutive particles, so that a workgroup reads a box once and not for each of them.
+        // Groups are runs of consecutive particles, so that a workgroup reads a box once and not
+        // for each of them.
         uint last = i_group[chunk_end - 1];
         for (uint g = i_group[chunk]; g <= last; ++g) {
             Box b = boxes[g];

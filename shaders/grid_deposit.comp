@@ -3,8 +3,8 @@
 #include "records.glsl"
 #include "functions.glsl"
 
-// Deposits each blob's mass into the cells it meets (docs/model.md §8, "grid"): a workgroup a blob. Sums are 64-bit fixed
-// point, so that they do not depend on the order of the atomics.
+// Deposits each blob's mass into the cells it meets (docs/model.md §8, "grid"): a workgroup a blob.
+// Sums are 64-bit fixed point, so that they do not depend on the order of the atomics.
 
 // One subgroup wide where the host says how wide that is: barriers are then cheap.
 #ifndef WORKGROUP
@@ -14,7 +14,8 @@ layout(local_size_x = WORKGROUP) in;
 
 const uint MAX_CELLS = 512;
 const float CUT_SIGMA = 3.0;
-// erf(3/sqrt 2): the share of a Gaussian within the cut, to which the weights sum before they are normalised.
+// erf(3/sqrt 2): the share of a Gaussian within the cut, to which the weights sum before they are
+// normalised.
 const float WITHIN_CUT = 0.9973002039367398;
 // (2 pi)^(3/2)
 const float MASS_FACTOR = 15.7496099457224;
@@ -62,8 +63,8 @@ void main() {
         for (int z = 0; z < n.z; ++z) {
             int first = begin.x + row * begin.y + layer * (begin.z + z);
             float layer_quanta = total_quanta * weights[2][z];
-            // k / n.x by a float quotient: exact, as k < MAX_CELLS^2 = 2^18 leaves the half a margin of many ulp. Integer
-            // division is slow on most devices.
+            // k / n.x by a float quotient: exact, as k < MAX_CELLS^2 = 2^18 leaves the half a
+            // margin of many ulp. Integer division is slow on most devices.
             for (int k = int(gl_LocalInvocationID.x); k < n.x * n.y; k += int(gl_WorkGroupSize.x)) {
                 int y = int((float(k) + 0.5) / float(n.x));
                 int x = k - y * n.x;

@@ -3,10 +3,11 @@
 #extension GL_EXT_control_flow_attributes : require
 #include "records.glsl"
 
-// A shell's picture seen from elsewhere: the pixel's place in it by a homography, Catmull and Rom's cubic between its texels
-// (docs/model.md §11 "impostors").
+// A shell's picture seen from elsewhere: the pixel's place in it by a homography, Catmull and Rom's
+// cubic between its texels (docs/model.md §11 "impostors").
 
-// From pixels off the middle of the picture to texels off the middle of the shell's: (column, row) over under.
+// From pixels off the middle of the picture to texels off the middle of the shell's: (column, row)
+// over under.
 layout(push_constant) uniform Push { vec3 column; float depth; vec3 row; uint width; vec3 under; uint height; vec2 middle; vec2 low; vec2 high; } push;
 // Four floats a texel, rows from the top.
 layout(binding = 0) uniform usamplerBuffer shell;

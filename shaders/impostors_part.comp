@@ -3,7 +3,8 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// The sorted entries once with what is far alone, once with what is near (docs/model.md §11 "impostors").
+// The sorted entries once with what is far alone, once with what is near (docs/model.md §11
+// "impostors").
 
 layout(local_size_x = 64) in;
 

@@ -5,7 +5,8 @@
 #include "philox.glsl"
 #include "functions.glsl"
 
-// C §2.3 (docs/model.md §2): the particles of a disc at a frame's time, each in closed form of (seed, slot, time).
+// C §2.3 (docs/model.md §2): the particles of a disc at a frame's time, each in closed form of
+// (seed, slot, time).
 
 layout(local_size_x = 64) in;
 

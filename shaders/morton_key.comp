@@ -33,7 +33,8 @@ vec3 position_of(uint i) { return placed[i].position; }
 uint region_of(uint i) { return groups[i_group[i]].i_region; }
 #endif
 
-// What is no number goes to cell 0: told by its bits, since comparisons with it may be optimised away.
+// What is no number goes to cell 0: told by its bits, since comparisons with it may be optimised
+// away.
 uint cell_of(float x) {
     bool is_number = (floatBitsToUint(x) & 0x7FFFFFFFu) <= 0x7F800000u;
     return is_number ? uint(clamp(x, 0.0, float((1u << push.axis_bits) - 1u))) : 0u;

@@ -4,8 +4,8 @@
 #include "each.glsl"
 #include "functions.glsl"
 
-// Positions relative to the lighting origin: position, as it has grown, + its group's offset + the gusts' displacement
-// (docs/model.md §11 to §13).
+// Positions relative to the lighting origin: position, as it has grown, + its group's offset + the
+// gusts' displacement (docs/model.md §11 to §13).
 
 layout(local_size_x = 64) in;
 

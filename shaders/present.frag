@@ -1,7 +1,7 @@
 #version 460
 
-// A picture as a display shows it: over the background, tone-mapped, in sRGB, dithered; or two, compared (docs/model.md
-// §11 "present").
+// A picture as a display shows it: over the background, tone-mapped, in sRGB, dithered; or two,
+// compared (docs/model.md §11 "present").
 
 // 0: bytes, 1: half floats, 2: floats.
 layout(constant_id = 0) const uint FORMAT = 1;
@@ -61,8 +61,8 @@ vec3 neutral(vec3 color) {
     return peak > 3e38 ? vec3(1.0) : mix(color * (new_peak / peak), vec3(new_peak), gray);
 }
 
-// How far two pixels over the background are apart, times the gain; from differences, so that small ones keep their
-// digits. What is no number is 1: nobody is to take it for none.
+// How far two pixels over the background are apart, times the gain; from differences, so that small
+// ones keep their digits. What is no number is 1: nobody is to take it for none.
 vec3 apart(vec4 a, vec4 b) {
     vec4 d = a - b;
     vec3 far = push.gain * (push.exposure * abs(d.rgb - d.a * push.background));

@@ -8,8 +8,9 @@
 #include "functions.glsl"
 #include "stencil.glsl"
 
-// The second reflection, C (16), gathered fused: radiance at once, no tensor (docs/model.md §7, §11 "second"). A
-// workgroup takes a block of receivers of one region, and goes through the regions that it can receive light from.
+// The second reflection, C (16), gathered fused: radiance at once, no tensor (docs/model.md §7, §11
+// "second"). A workgroup takes a block of receivers of one region, and goes through the regions
+// that it can receive light from.
 
 #ifndef WORKGROUP
 #define WORKGROUP 8
@@ -69,7 +70,8 @@ layout(std430, binding = 12) buffer LitFacets { Lit lit[]; };
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
 // As second_sources.comp leaves them.
 layout(binding = 14) uniform usamplerBuffer stencils;
-// Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
+// Workgroups of each round, three numbers a round: those of the next are counted where a receiver
+// is not done.
 layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
 #include "sum.glsl"
@@ -86,7 +88,8 @@ layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 // What the receiver has got.
 SUM3 indirect = EMPTY3;
 SUM3 glossy = EMPTY3;
-// Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest channel.
+// Cells that stayed wider than asked for, and a bound on what they may change of L2's greatest
+// channel.
 float n_unresolved = 0.0;
 float unresolved = 0.0;
 
@@ -173,7 +176,8 @@ float nearest_gap(float gap, float turn) {
 // A bound on what a cell that stayed too wide may change (docs/model.md §11 "unresolved").
 void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, float area) {
     float turn = TURN * view.width;
-    // Nothing is nearer than the centre less half a diagonal, and no cell fills more than the hemisphere.
+    // Nothing is nearer than the centre less half a diagonal, and no cell fills more than the
+    // hemisphere.
     float distance = sqrt(view.d2);
     float nearest = distance * max(1.0 - 0.70710678 * view.width, 0.0);
     float most = min(PI, area / max(nearest * nearest, 1e-30));
@@ -200,8 +204,9 @@ void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, f
     received += taker.region.ks * at;
     taken += taker.region.ks * max(at, lobe_at(taker.region.i_lobe, nearest_gap(view.taker_gap, turn)));
 #endif
-    // Of geometry: all that it may be where the cell is wider than far, else the midpoint rule's error. Of lobes: their
-    // greatest values, since the quarters' middles may have met nothing of them.
+    // Of geometry: all that it may be where the cell is wider than far, else the midpoint rule's
+    // error. Of lobes: their greatest values, since the quarters' middles may have met nothing of
+    // them.
     vec3 e = met * received * share * min(view.width * view.width, 1.0) + (sent * taken - plain * taker.albedo) * share;
     unresolved += max(e.x, max(e.y, e.z));
     n_unresolved += 1.0;

@@ -3,8 +3,8 @@
 #include "records.glsl"
 #include "each.glsl"
 
-// Clusters of sources from the clusters or facets below them, one height of the tree at a time (docs/model.md §7, §11
-// "tree").
+// Clusters of sources from the clusters or facets below them, one height of the tree at a time
+// (docs/model.md §7, §11 "tree").
 
 layout(local_size_x = 64) in;
 

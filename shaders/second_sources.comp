@@ -8,8 +8,8 @@
 #include "stencil.glsl"
 #include "turns.glsl"
 
-// Facets as sources of the second reflection (docs/model.md §7, §11 "second"): what each sends diffusely, and by light the
-// flux that its lobe reflects.
+// Facets as sources of the second reflection (docs/model.md §7, §11 "second"): what each sends
+// diffusely, and by light the flux that its lobe reflects.
 
 layout(local_size_x = 64) in;
 
@@ -28,9 +28,9 @@ layout(std430, binding = 5) readonly buffer Order { uint order[]; };
 // Source of each place.
 layout(std430, binding = 6) readonly buffer Leaves { uint leaves[]; };
 layout(std430, binding = 7) writeonly buffer Sources { Source sources[]; };
-// [source][light], w: sum of A g, g the facet's share of the light's energy; xyz: of a cloud sum of A g c, c the facet's own
-// colour; xyz: of a surface's facet A times the greatest share at one of its points, what the clouds let through, and the
-// surfaces whose shadows reach it.
+// [source][light], w: sum of A g, g the facet's share of the light's energy; xyz: of a cloud sum of
+// A g c, c the facet's own colour; xyz: of a surface's facet A times the greatest share at one of
+// its points, what the clouds let through, and the surfaces whose shadows reach it.
 layout(std430, binding = 8) writeonly buffer Fluxes { vec4 fluxes[]; };
 // [source][light], of surfaces' facets: the shares at the points by the greatest.
 layout(std430, binding = 9) writeonly buffer Stencils { Packed stencils[]; };

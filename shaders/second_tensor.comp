@@ -9,8 +9,9 @@
 #include "stencil.glsl"
 #include "tensor.glsl"
 
-// T2 of one light: the second reflection by basis of the receiver and column of the emitters, without energies and
-// materials (docs/model.md §7, §11 "contract"). Blocks, pairings and cells are those of second_gather.comp.
+// T2 of one light: the second reflection by basis of the receiver and column of the emitters,
+// without energies and materials (docs/model.md §7, §11 "contract"). Blocks, pairings and cells are
+// those of second_gather.comp.
 
 #ifndef WORKGROUP
 #define WORKGROUP 8
@@ -71,7 +72,8 @@ layout(std430, binding = 12) buffer Second { float t2[]; };
 layout(std430, binding = 13) buffer Reached { uint reached[]; };
 // As second_sources.comp leaves them.
 layout(binding = 14) uniform usamplerBuffer stencils;
-// Workgroups of each round, three numbers a round: those of the next are counted where a receiver is not done.
+// Workgroups of each round, three numbers a round: those of the next are counted where a receiver
+// is not done.
 layout(std430, binding = 15) buffer Rounds { uint rounds[]; };
 
 #include "lobe.glsl"
@@ -91,8 +93,8 @@ const uint N_RESPONSES = 1u;
 #endif
 const uint N_VECTORS = N_BASES - 1u;
 
-// Sums of one receiver and pairing, by basis of the receiver: of the emitter's diffuse basis (by channel where it has
-// colours, else in x) and of its lobe's bases.
+// Sums of one receiver and pairing, by basis of the receiver: of the emitter's diffuse basis (by
+// channel where it has colours, else in x) and of its lobe's bases.
 vec3 plain[N_RESPONSES];
 #if N_BASES > 1
 float shiny[N_RESPONSES * N_VECTORS];
@@ -112,8 +114,8 @@ void clear() {
 #endif
 }
 
-// Adds what comes along a way: `share` of the light's energy that a source or cell is lit with, by channel where it
-// has colours.
+// Adds what comes along a way: `share` of the light's energy that a source or cell is lit with, by
+// channel where it has colours.
 void add(vec4 share, vec3 normal, vec3 position, vec3 way, float taker_gap, Region emitter) {
     Light light = LIGHT(push.i_light);
     float response[N_RESPONSES];
@@ -239,7 +241,8 @@ void main() {
         bool fresh = begins && push.is_first_light != 0u;
         n_lost += fresh ? 0.0 : lit[j].n_lost;
         lit[j].n_lost = n_lost;
-        // What may be wrong hangs on materials and energies that tensors do not know: there is no bound.
+        // What may be wrong hangs on materials and energies that tensors do not know: there is no
+        // bound.
         lit[j].unresolved = n_lost > 0.0 || lit[j].n_unresolved > 0.0 ? uintBitsToFloat(0x7f800000u) : 0.0;
         reached[j] = next >= last ? DONE : next;
         if (next < last) {

@@ -4,8 +4,8 @@
 #include "key.glsl"
 #include "each.glsl"
 
-// Sort keys of the drawn particles from view depth relative to the lighting origin; far to near is ascending
-// (docs/model.md §11). They are the first of each group, and keep their order.
+// Sort keys of the drawn particles from view depth relative to the lighting origin; far to near is
+// ascending (docs/model.md §11). They are the first of each group, and keep their order.
 
 layout(local_size_x = 64) in;
 

@@ -12,7 +12,8 @@ layout(binding = 8) uniform usamplerBuffer pool;
 #define SHEET_PIXELS
 #include "texture.glsl"
 
-// Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md §9).
+// Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md
+// §9).
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; uint i_first; } push;
 
@@ -28,7 +29,8 @@ layout(location = 0) out vec4 out_color;
 void main() {
     // The ray (x, y, 1) through the pixel's centre; pixel = (2 tan_x/W, 2 tan_y/H).
     vec2 ray = vec2(gl_FragCoord.x * push.pixel.x - push.camera.tan_x, push.camera.tan_y - gl_FragCoord.y * push.pixel.y);
-    // b^2 = |c x d|^2/|d|^2 with c = z (s, 1) and d = (s + delta, 1): one subtraction that can cancel, the delta.
+    // b^2 = |c x d|^2/|d|^2 with c = z (s, 1) and d = (s + delta, 1): one subtraction that can
+    // cancel, the delta.
     vec2 s = in_blob.xy;
     vec2 delta = ray - s;
     float twist = s.x * delta.y - s.y * delta.x;

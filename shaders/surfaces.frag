@@ -5,7 +5,8 @@
 // Surfaces that hide and are not seen.
 layout(constant_id = 0) const uint DEPTH_ONLY = 0;
 
-// Where the pixel's ray meets a rectangle: its depth, and the radiance there (docs/model.md §11 "surfaces").
+// Where the pixel's ray meets a rectangle: its depth, and the radiance there (docs/model.md §11
+// "surfaces").
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; vec2 unused; } push;
 layout(std430, binding = 0) readonly buffer Regions { Region regions[]; };
@@ -38,7 +39,8 @@ void main() {
     // Through the pixel's centre; pixel = (2 tan_x/W, 2 tan_y/H).
     vec2 at = gl_FragCoord.xy * push.pixel;
     vec3 ray = vec3(at.x - push.camera.tan_x, push.camera.tan_y - at.y, 1.0);
-    // z ray = C + s u + t v by Cramer's rule: z = q/d, s = (ray.(V x C))/(|u| d), t = (ray.(C x U))/(|v| d).
+    // z ray = C + s u + t v by Cramer's rule: z = q/d, s = (ray.(V x C))/(|u| d), t = (ray.(C x
+    // U))/(|v| d).
     float d = dot(ray, in_plane.xyz), size = abs(d);
     float q = d < 0.0 ? -in_plane.w : in_plane.w;
     float s = dot(ray, in_s.xyz), t = dot(ray, in_t.xyz);
@@ -48,7 +50,8 @@ void main() {
         discard;
     }
     gl_FragDepth = min(push.camera.near * size / q, 1.0);
-    // (right, up, forward) is left-handed: the triple product of the front side, which faces the eye, is positive.
+    // (right, up, forward) is left-handed: the triple product of the front side, which faces the
+    // eye, is positive.
     if (DEPTH_ONLY != 0) {
         out_color = vec4(0.0);
         return;

@@ -2,25 +2,28 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 
-// A screen-aligned quad around what is seen of each rectangle (docs/model.md §11 "surfaces"). The fragment shader's own
-// test decides which pixels it covers, so that neither clipping nor snapping of corners far off the screen does.
+// A screen-aligned quad around what is seen of each rectangle (docs/model.md §11 "surfaces"). The
+// fragment shader's own test decides which pixels it covers, so that neither clipping nor snapping
+// of corners far off the screen does.
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; vec2 unused; } push;
 layout(std430, binding = 0) readonly buffer Regions { Region regions[]; };
 
 layout(location = 0) flat out uint out_i;
-// U x V, C.(U x V); V x C, |u|; C x U, |v|: centre C from the eye, directions U = u/|u|, V = v/|v|, all along (right, up,
-// forward), where |.| is the greatest component: f32 holds no product of two lengths of 1e-15 with a third.
+// U x V, C.(U x V); V x C, |u|; C x U, |v|: centre C from the eye, directions U = u/|u|, V = v/|v|,
+// all along (right, up, forward), where |.| is the greatest component: f32 holds no product of two
+// lengths of 1e-15 with a third.
 layout(location = 1) flat out vec4 out_plane;
 layout(location = 2) flat out vec4 out_s;
 layout(location = 3) flat out vec4 out_t;
 
-// Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is snapped.
+// Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is
+// snapped.
 const float SNAP = 1.0 / 16.0;
-// A corner's coordinate errs by less than this share of |C|_1 + |u|_1 + |v|_1. In units of 2^-24 of numbers that are at
-// most that sum: 1 for C's subtraction, 6 for dividing u and v by their lengths and multiplying again, 3 for the dot
-// product, 2 for the sums; and 13 for a crossing of the near plane (two differences, a quotient of 5, product, sum, and
-// those of both ends): 25, 1.5e-6.
+// A corner's coordinate errs by less than this share of |C|_1 + |u|_1 + |v|_1. In units of 2^-24 of
+// numbers that are at most that sum: 1 for C's subtraction, 6 for dividing u and v by their lengths
+// and multiplying again, 3 for the dot product, 2 for the sums; and 13 for a crossing of the near
+// plane (two differences, a quotient of 5, product, sum, and those of both ends): 25, 1.5e-6.
 const float ROUNDING = 2e-6;
 
 vec3 along_view(vec3 v) {

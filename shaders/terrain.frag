@@ -5,8 +5,8 @@
 // Ground that hides and is not seen.
 layout(constant_id = 0) const uint DEPTH_ONLY = 0;
 
-// Where the pixel's ray meets a triangle's plane, no farther out than the triangle reaches: its depth, and the radiance there
-// (docs/model.md §16).
+// Where the pixel's ray meets a triangle's plane, no farther out than the triangle reaches: its
+// depth, and the radiance there (docs/model.md §16).
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; uint i_region; uint i_first_ground; } push;
 

@@ -2,16 +2,17 @@
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
 
-// A cell of the ground: a strip of two triangles over four points (docs/model.md §16). The rasteriser says which pixels they
-// cover; what is seen in one follows from its own ray and the triangle's plane, which the first vertex of each hands on.
+// A cell of the ground: a strip of two triangles over four points (docs/model.md §16). The
+// rasteriser says which pixels they cover; what is seen in one follows from its own ray and the
+// triangle's plane, which the first vertex of each hands on.
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; uint i_region; uint i_first_ground; } push;
 layout(std430, binding = 0) readonly buffer Regions { Region regions[]; };
 layout(std430, binding = 1) readonly buffer Ground { Facet ground[]; };
 layout(std430, binding = 2) readonly buffer LitFacets { Lit lit[]; };
 
-// U x V, C.(U x V); V x C, |u|; C x U, |v|: corner C from the eye, U = u/|u|, V = v/|v|, all along (right, up, forward), where |.|
-// is the greatest component.
+// U x V, C.(U x V); V x C, |u|; C x U, |v|: corner C from the eye, U = u/|u|, V = v/|v|, all along
+// (right, up, forward), where |.| is the greatest component.
 layout(location = 0) flat out vec4 out_plane;
 layout(location = 1) flat out vec4 out_s;
 layout(location = 2) flat out vec4 out_t;
@@ -44,7 +45,8 @@ void main() {
     Region region = regions[push.i_region];
     uint n = region.n_u - 1u, i_cell = gl_InstanceIndex;
     uvec2 at = uvec2(i_cell % n, i_cell / n);
-    // Of the strip's triangles 0 1 2 and 1 3 2 vertices 0 and 1 are the ones that flat values are taken from.
+    // Of the strip's triangles 0 1 2 and 1 3 2 vertices 0 and 1 are the ones that flat values are
+    // taken from.
     bool second = gl_VertexIndex == 1;
     uint a = point_of(region.n_u, at, second ? 3u : 0u);
     uint b = point_of(region.n_u, at, second ? 2u : 1u);

@@ -6,8 +6,9 @@
 #include "texture.glsl"
 #include "each.glsl"
 
-// The pool as it is drawn from (docs/model.md §11 "texture"): a texel has n at its four corners, of its own level and of the one
-// above, 16 bits each, so that one fetch gives all that bilinear interpolation needs.
+// The pool as it is drawn from (docs/model.md §11 "texture"): a texel has n at its four corners, of
+// its own level and of the one above, 16 bits each, so that one fetch gives all that bilinear
+// interpolation needs.
 
 layout(local_size_x = 64) in;
 
@@ -40,7 +41,8 @@ void main() {
             field_at(part, level, at + uvec2(0, 1)), field_at(part, level, at + uvec2(1, 1)));
         vec4 above = vec4(0.0);
         if (level < uint(LAST_LEVEL)) {
-            // The texel lies in one quarter of the level above's: its corners are that one's, middles of edges, the middle.
+            // The texel lies in one quarter of the level above's: its corners are that one's,
+            // middles of edges, the middle.
             uvec2 c = at >> 1;
             vec2 a = vec2(field_at(part, level + 1u, c), field_at(part, level + 1u, c + uvec2(1, 0)));
             vec2 b = vec2(field_at(part, level + 1u, c + uvec2(0, 1)), field_at(part, level + 1u, c + uvec2(1, 1)));

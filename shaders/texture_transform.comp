@@ -5,8 +5,9 @@
 #include "functions.glsl"
 #include "texture.glsl"
 
-// The pool's fields from their waves (docs/model.md §11 "texture"): an inverse DFT, along rows, then along columns. Fields 2t
-// and 2t + 1 are real and imaginary part of one. A workgroup has one row or column of one level.
+// The pool's fields from their waves (docs/model.md §11 "texture"): an inverse DFT, along rows,
+// then along columns. Fields 2t and 2t + 1 are real and imaginary part of one. A workgroup has one
+// row or column of one level.
 
 // One subgroup wide where the host says how wide that is: barriers are then cheap.
 #ifndef WORKGROUP
@@ -66,7 +67,8 @@ void main() {
             roots[j] = unit_at(float(j << level) * (1.0 / float(TEXTURE_SIDE)));
         }
         barrier();
-        // Stockham's form: after a stage with m the transforms of length 2m lie m apart, in order at the end.
+        // Stockham's form: after a stage with m the transforms of length 2m lie m apart, in order
+        // at the end.
         uint from = 0u;
         // Half of the rows have no wave: zeros stay zeros.
         bool empty = push.along_columns == 0u && min(row, n - row) > n / 4u;

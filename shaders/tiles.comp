@@ -12,7 +12,8 @@
 #extension GL_KHR_shader_subgroup_vote : require
 #endif
 
-// Composes the splats near to far, a tile a workgroup, a row of pixels an invocation (docs/model.md §11 "tiles").
+// Composes the splats near to far, a tile a workgroup, a row of pixels an invocation (docs/model.md
+// §11 "tiles").
 
 #ifndef INVOCATIONS
 #define INVOCATIONS 8
@@ -86,7 +87,8 @@ const uint MOST = 8 * INVOCATIONS;
 shared uint found[MOST];
 
 #if ONE_SUBGROUP
-// Of what this invocation found, appends it in the order of invocations; the new number of found ones.
+// Of what this invocation found, appends it in the order of invocations; the new number of found
+// ones.
 uint append(uint n, bool hit, uint r) {
     uvec4 hits = subgroupBallot(hit);
     if (hit) {
@@ -130,7 +132,8 @@ bool all_agree(bool b) {
 #endif
 
 #if THIN
-// 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points, within 1.6e-8 of it.
+// 1 - e^-t for t in [0, 1/8]: t times the cubic through (1 - e^-t)/t at Chebyshev's points, within
+// 1.6e-8 of it.
 float opacity(float t) { return t * ((0.999999984752 - t * 0.499996093888) + t * t * (0.166509869621 - t * 0.039641773912)); }
 #else
 float opacity(float t) { return one_minus_exp(t); }
@@ -295,8 +298,8 @@ Loaded of_invocation(uint m) {
 }
 #endif
 
-// Of the n found ones those from k on, one an invocation, each for all of them. Invocations without one have `spare`, any
-// splat, without depth and light.
+// Of the n found ones those from k on, one an invocation, each for all of them. Invocations without
+// one have `spare`, any splat, without depth and light.
 void compose_some(uint k, uint n, uint spare, float y) {
     uint t = gl_LocalInvocationID.x;
     Loaded splat = load_splat(int(k + t < n ? found[k + t] : spare));
@@ -382,8 +385,8 @@ void draw_tile(uvec4 range, uint i_tile) {
         depth_of[j] = depth_at(p);
 #endif
     }
-    // These loops test at their ends, as do those within: llvmpipe goes through a loop once more, with nothing to do, where the
-    // test comes first. Each has something to do at its first turn.
+    // These loops test at their ends, as do those within: llvmpipe goes through a loop once more,
+    // with nothing to do, where the test comes first. Each has something to do at its first turn.
     uint first = range.x;
     bool is_done;
     do {

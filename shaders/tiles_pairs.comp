@@ -4,8 +4,8 @@
 #include "records.glsl"
 #include "tiles.glsl"
 
-// A pair for every bin that a splat of this round can reach, splat by splat: the bin and, above its number, a bit for each of
-// its tiles that the splat can reach; and the splat.
+// A pair for every bin that a splat of this round can reach, splat by splat: the bin and, above its
+// number, a bit for each of its tiles that the splat can reach; and the splat.
 
 layout(local_size_x = 256) in;
 
@@ -36,8 +36,9 @@ vec4 apart(float c, float low, float width) {
     return d * d;
 }
 
-// A bit for each tile of the bin at `low` (slopes, y upward from the bin's last row) that is near enough to the splat. On
-// the screen b^2/(2 sigma^2) is at least scale d^2/(1 + |ray|^2), d the distance in slopes.
+// A bit for each tile of the bin at `low` (slopes, y upward from the bin's last row) that is near
+// enough to the splat. On the screen b^2/(2 sigma^2) is at least scale d^2/(1 + |ray|^2), d the
+// distance in slopes.
 uint near(vec2 center, float scale, float cut, vec2 low) {
     vec2 high = low + 4.0 * push.tile;
     vec2 far = max(abs(low), abs(high));

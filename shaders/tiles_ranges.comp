@@ -4,13 +4,14 @@
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Where each bin's pairs lie among the sorted ones, and the tiles of it that any of them reaches, dealt to workgroups. Their order
-// decides nothing: no two share a pixel.
+// Where each bin's pairs lie among the sorted ones, and the tiles of it that any of them reaches,
+// dealt to workgroups. Their order decides nothing: no two share a pixel.
 
 layout(local_size_x = 64) in;
 
 layout(push_constant) uniform Push { uint n_bins; uint i_round; uint max_groups; uint most_tiles; } push;
-// Pairs that a workgroup goes through: once for each of its tiles, 0.8 turns of its loops a pair, and llvmpipe ends loops after 65 535.
+// Pairs that a workgroup goes through: once for each of its tiles, 0.8 turns of its loops a pair,
+// and llvmpipe ends loops after 65 535.
 const uint MOST_PAIRS = 16384;
 
 layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
@@ -41,7 +42,8 @@ void main() {
     uint n = rounds[push.i_round].extent.w;
     uint first = lower_bound(n, bin), end = lower_bound(n, bin + 1u);
     uint reached = 0;
-    // By eights: llvmpipe ends all loops of an invocation after 65 535 turns, and a bin may have as many pairs.
+    // By eights: llvmpipe ends all loops of an invocation after 65 535 turns, and a bin may have as
+    // many pairs.
     for (uint i = first; i < end; i += 8) {
         [[unroll]] for (uint k = 0; k < 8; ++k) {
             reached |= pairs[min(i + k, end - 1u)].x >> BIN_BITS;

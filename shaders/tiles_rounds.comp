@@ -3,8 +3,8 @@
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Deals the blocks of splats, near to far, to rounds, each as many as the pairs' buffer has room for. One invocation: there
-// are a few hundred blocks.
+// Deals the blocks of splats, near to far, to rounds, each as many as the pairs' buffer has room
+// for. One invocation: there are a few hundred blocks.
 
 layout(local_size_x = 1) in;
 

@@ -12,8 +12,8 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #endif
 
-// Each blob as a splat, near to far: the conic of its optical depth on the screen, and the bins that it can reach
-// (docs/model.md §11 "tiles"). A workgroup goes through a block.
+// Each blob as a splat, near to far: the conic of its optical depth on the screen, and the bins
+// that it can reach (docs/model.md §11 "tiles"). A workgroup goes through a block.
 
 #ifndef INVOCATIONS
 #define INVOCATIONS 8
@@ -31,7 +31,8 @@ layout(constant_id = 6) const uint ELLIPSOIDS = 0;
 
 layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
 layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
-// By texels, which llvmpipe fetches for all invocations at once: a Placed is one, a Particle three, a Lit four.
+// By texels, which llvmpipe fetches for all invocations at once: a Placed is one, a Particle three,
+// a Lit four.
 layout(binding = 1) uniform usamplerBuffer placed;
 layout(binding = 2) uniform usamplerBuffer particles;
 layout(binding = 3) uniform usamplerBuffer lit;
@@ -58,7 +59,8 @@ shared uint sums[INVOCATIONS];
 
 const float LOG2_E = 1.44269504089;
 
-// Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is set.
+// Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is
+// set.
 uint project(uint i, uint r) {
     reach[r] = uvec2(0);
     if (i == NO_PARTICLE) {
@@ -101,7 +103,8 @@ uint project(uint i, uint r) {
     if (columns.x == columns.y || rows.x == rows.y) {
         return 0u;
     }
-    // b^2/(2 sigma^2) = scale (d.x^2 + d.y^2 + (s.x d.y - s.y d.x)^2) / (1 + |ray|^2), d = ray - s; in powers of two.
+    // b^2/(2 sigma^2) = scale (d.x^2 + d.y^2 + (s.x d.y - s.y d.x)^2) / (1 + |ray|^2), d = ray - s;
+    // in powers of two.
     float scale = 0.5 * LOG2_E * (v.z / sigma) * (v.z / sigma);
     vec3 radiance = shade.xyz;
     if (LIT != 0) {

@@ -6,7 +6,8 @@
 #include "light.glsl"
 #include "occlude.glsl"
 
-// How much of every light arrives at every facet, past the surfaces and through the density grid (docs/model.md §8, §11).
+// How much of every light arrives at every facet, past the surfaces and through the density grid
+// (docs/model.md §8, §11).
 
 layout(local_size_x = 64) in;
 
@@ -44,8 +45,8 @@ Way way_to(Light light, vec3 p) {
     return Way(PLACE(a.toward), a.distance);
 }
 
-// From where to where the way from p along d, so far, leads through the grid's box; the end before the begin where it
-// misses the box.
+// From where to where the way from p along d, so far, leads through the grid's box; the end before
+// the begin where it misses the box.
 WEIGHTS2 crossing(PLACE p, PLACE d, WEIGHT distance) {
     PLACE low = push.grid.low;
     PLACE high = low + cell_edges() * PLACE(push.grid.n_cells);
@@ -78,7 +79,8 @@ float through_the_cloud(PLACE p, Way way) {
         WEIGHT ds = min(step_length, length_total - t0);
         ADD(tau, density_at(p + (part.x + (t0 + 0.5 * ds)) * d) * ds);
     }
-    // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing. There is none of doubles.
+    // Vulkan's exp(0) may be three ulp off 1: nothing on the way is exactly nothing. There is none
+    // of doubles.
     float depth = float(push.backward * TOTAL(tau));
     return depth > 0.0 ? exp(-depth) : 1.0;
 }

@@ -4,8 +4,8 @@
 #include "each.glsl"
 #include "upsample.glsl"
 
-// Puts the blobs' smaller picture over the full one, a run of 4 N pixels of two rows an invocation: two that have their taps in
-// the same six rows of small pixels (docs/model.md §11 "upsample").
+// Puts the blobs' smaller picture over the full one, a run of 4 N pixels of two rows an invocation:
+// two that have their taps in the same six rows of small pixels (docs/model.md §11 "upsample").
 
 layout(local_size_x = 64) in;
 
@@ -20,7 +20,8 @@ const uint AHEAD = SHIFT % TEXEL_PIXELS;
 // Texels of depth that hold the taps of a row.
 const uint DEPTH_TEXELS = (SHIFT + COLUMNS + 3) / 4;
 
-// Whether all taps of the run and all of its pixels are of one surface, as far as can be told at once.
+// Whether all taps of the run and all of its pixels are of one surface, as far as can be told at
+// once.
 bool is_plain(uvec2 first, uvec2 at) {
     vec4 low = vec4(1.0), high = vec4(0.0);
     [[dont_unroll]] for (uint r = 0; r < 6; ++r) {
@@ -103,7 +104,8 @@ void draw_pair(uint x, uint i) {
             }
         }
     }
-    // Before the first row and after the last one there may be one that is none: far below, or at the height.
+    // Before the first row and after the last one there may be one that is none: far below, or at
+    // the height.
     uint y = 2u * i - push.offset_y / 2u;
     [[unroll]] for (uint j = 0; j < ROWS; ++j) {
         draw_run(x, y + j, sums[j]);

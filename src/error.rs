@@ -1,5 +1,5 @@
-//! One error type, by cause. Each message says what was wrong, where (file:line:column, key, or pass and
-//! Vulkan call) and what was expected, so that a command prints it and nothing else.
+//! One error type, by cause. Each message says what was wrong, where (file:line:column, key, or
+//! pass and Vulkan call) and what was expected, so that a command prints it and nothing else.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -100,8 +100,9 @@ impl Error {
         self
     }
 
-    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 70 results that contradict each other; 75 worth
-    /// another try (as sysexits.h has the two); 101 a fault of nimbus itself; 130 interrupted.
+    /// 0 done; 1 a check failed; 2 bad input or usage; 3 device or driver; 70 results that
+    /// contradict each other; 75 worth another try (as sysexits.h has the two); 101 a fault of
+    /// nimbus itself; 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
             Error::Check { .. } => 1,

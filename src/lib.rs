@@ -2,11 +2,12 @@
 //!
 //! Data flows one way, and the modules stand in that order (see ARCHITECTURE.md):
 //!
-//! `io` turns text into a `model` (plain f64 data and mathematics); `layout` turns the model into the f32 records
-//! that the GPU reads; `passes` are the GPU's stages, one a room, on `gpu`, which knows Vulkan and no cloud;
-//! `frame` runs them (game step → packet → render step); `study` measures; `viewer` shows and is what is changed by
-//! hand; `cli` is what was typed. `reference` holds the f64 twin of every pass, written from the mathematics, and meets
-//! the passes only in tests and studies.
+//! `io` turns text into a `model` (plain f64 data and mathematics); `layout` turns the model into
+//! the f32 records that the GPU reads; `passes` are the GPU's stages, one a room, on `gpu`, which
+//! knows Vulkan and no cloud; `frame` runs them (game step → packet → render step); `study`
+//! measures; `viewer` shows and is what is changed by hand; `cli` is what was typed. `reference`
+//! holds the f64 twin of every pass, written from the mathematics, and meets the passes only in
+//! tests and studies.
 
 pub mod cli;
 pub mod error;

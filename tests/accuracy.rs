@@ -1,5 +1,5 @@
-//! How far two reflections of facets are from the integrals over the surfaces' areas (docs/model.md §11 "second", "area
-//! reference"; docs/measured.md "Lighting accuracy").
+//! How far two reflections of facets are from the integrals over the surfaces' areas (docs/model.md
+//! §11 "second", "area reference"; docs/measured.md "Lighting accuracy").
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -41,8 +41,9 @@ fn double(v: [f32; 3]) -> DVec3 {
 
 /// Every facet's surface, and its number in it.
 fn places(scene: &Scene) -> Vec<(usize, u32)> {
-    let of =
-        |(s, surface): (usize, &nimbus::model::surface::Surface)| (0..surface.n_facets() as u32).map(move |i| (s, i));
+    let of = |(s, surface): (usize, &nimbus::model::surface::Surface)| {
+        (0..surface.n_facets() as u32).map(move |i| (s, i))
+    };
     scene.surfaces.iter().enumerate().flat_map(of).collect()
 }
 
@@ -76,7 +77,9 @@ impl Squares {
         for (j, truth) in truths {
             let lit = &f.lit[*j];
             for (k, (gpu, truth)) in
-                [(lit.second, truth.radiance), (lit.indirect, truth.irradiance)].into_iter().enumerate()
+                [(lit.second, truth.radiance), (lit.indirect, truth.irradiance)]
+                    .into_iter()
+                    .enumerate()
             {
                 sum.error[k] += (double(gpu) - truth).length_squared();
                 sum.value[k] += truth.length_squared();
@@ -96,8 +99,8 @@ impl Squares {
     }
 }
 
-/// What the product promises of the default settings: 1 % (root mean square over all facets and channels, by that of the
-/// values).
+/// What the product promises of the default settings: 1 % (root mean square over all facets and
+/// channels, by that of the values).
 const PROMISED: f64 = 0.01;
 
 #[test]
@@ -132,7 +135,10 @@ fn random_rooms_are_within_one_percent() {
 #[test]
 fn the_scene_of_rectangles_is_within_one_percent() {
     let gpu = Gpu::new();
-    let scene = nimbus::io::scene_file::load(std::path::Path::new("scenes/rectangles.toml"), &[], None).unwrap().scene;
+    let scene =
+        nimbus::io::scene_file::load(std::path::Path::new("scenes/rectangles.toml"), &[], None)
+            .unwrap()
+            .scene;
     let eye = scene.camera.pose(0.0).expect("a camera").position;
     let truths = truths(&scene, eye, 1, 1e-3);
     let [radiance, irradiance] = Squares::of(&frame(&gpu, scene), &truths).relative();
@@ -146,7 +152,11 @@ fn what_the_lights_bring_is_right_to_rounding() {
     for seed in 0..3 {
         let f = frame(&gpu, random_room(seed, 8, "gather = 'exact'"));
         let brdfs = brdfs(&f.scene);
-        let basis = Basis::new(f.scene.lighting.exponents, f.scene.lighting.bases, f.scene.lighting.sampling);
+        let basis = Basis::new(
+            f.scene.lighting.exponents,
+            f.scene.lighting.bases,
+            f.scene.lighting.sampling,
+        );
         let tables: Vec<_> = brdfs.iter().map(|b| basis.lobe(b.ns)).collect();
         let scenery = Scenery::new(&f.scene.surfaces, &brdfs, &f.scene.lights, &[], 0.0, &[]);
         let mut greatest = [0f64; 2];
@@ -156,22 +166,31 @@ fn what_the_lights_bring_is_right_to_rounding() {
             let (mut direct, mut first, mut reach) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
             for light in &f.scene.lights {
                 let arrival = light.arrival(at.position);
-                let e = light.energy() * light.share(at.normal, &arrival, scenery.in_light(at.position, light));
-                // What cos θ and the lobe can turn by: coordinates up to 4 rounded to f32, by the lamp's distance.
+                let e = light.energy()
+                    * light.share(at.normal, &arrival, scenery.in_light(at.position, light));
+                // What cos θ and the lobe can turn by: coordinates up to 4 rounded to f32, by the
+                // lamp's distance.
                 let turn = 8.0 * f64::from(f32::EPSILON) * (1.0 + 4.0 / arrival.distance.min(4.0));
                 let w = 0.5 * (at.normal - (arrival.toward + toward).normalize()).length_squared();
-                let lobe = |w: f64| if at.normal.dot(toward) > 0.0 { evaluate(&tables[s], w) } else { 0.0 };
+                let lobe = |w: f64| {
+                    if at.normal.dot(toward) > 0.0 { evaluate(&tables[s], w) } else { 0.0 }
+                };
                 let gap = (2.0 * w).sqrt();
-                let slope = (lobe(0.5 * (gap + turn).powi(2)) - lobe(0.5 * (gap - turn).max(0.0).powi(2))).abs();
+                let slope = (lobe(0.5 * (gap + turn).powi(2))
+                    - lobe(0.5 * (gap - turn).max(0.0).powi(2)))
+                .abs();
                 direct += e;
                 first += e * (brdfs[s].kd / std::f64::consts::PI + brdfs[s].ks * lobe(w));
                 // Energy that comes under a grazing angle errs by the whole cosine's turn.
                 reach += light.energy() * arrival.falloff * turn + e * brdfs[s].ks * slope;
             }
             // Sums of two lights of products of some ten factors: 32 roundings.
-            let bound = |value: DVec3| reach + 32.0 * bounded::U * value.abs() + DVec3::splat(1e-12);
+            let bound =
+                |value: DVec3| reach + 32.0 * bounded::U * value.abs() + DVec3::splat(1e-12);
             let lit = &f.lit[j];
-            for (k, (gpu, truth)) in [(lit.direct, direct), (lit.first, first)].into_iter().enumerate() {
+            for (k, (gpu, truth)) in
+                [(lit.direct, direct), (lit.first, first)].into_iter().enumerate()
+            {
                 let ratio = ((double(gpu) - truth).abs() / bound(truth)).max_element();
                 assert!(ratio <= 1.0, "room {seed}, facet {j}, {k}: {gpu:?} is not {truth}");
                 greatest[k] = greatest[k].max(ratio);
@@ -181,25 +200,36 @@ fn what_the_lights_bring_is_right_to_rounding() {
     }
 }
 
-/// Every facet within `tolerance` of the truth, or no farther than it says itself; gives the number of negative and of
-/// unresolved facets, and the greatest bound by the greatest truth.
+/// Every facet within `tolerance` of the truth, or no farther than it says itself; gives the number
+/// of negative and of unresolved facets, and the greatest bound by the greatest truth.
 fn assert_honest(what: &str, f: &Frame, truths: &[(usize, Estimate)], tolerance: f64) -> [f64; 3] {
     let greatest = truths.iter().map(|(_, t)| t.radiance.max_element()).fold(0.0, f64::max);
     let mut worst = 0f64;
     for (j, truth) in truths {
         let lit = &f.lit[*j];
-        assert!(lit.second.iter().chain(&lit.first).chain(&lit.indirect).all(|v| v.is_finite()), "{what}: {j}");
+        assert!(
+            lit.second.iter().chain(&lit.first).chain(&lit.indirect).all(|v| v.is_finite()),
+            "{what}: {j}"
+        );
         let error = (double(lit.second) - truth.radiance).abs().max_element();
         let known = if truth.error.is_finite() { truth.error } else { f64::INFINITY };
-        let allowed = tolerance * (truth.radiance.max_element() + 0.1 * greatest) + f64::from(lit.unresolved) + known;
+        let allowed = tolerance * (truth.radiance.max_element() + 0.1 * greatest)
+            + f64::from(lit.unresolved)
+            + known;
         worst = worst.max(error / allowed);
-        assert!(error <= allowed, "{what}: facet {j}: {:?} is not {truth:?}, says {}", lit.second, lit.unresolved);
+        assert!(
+            error <= allowed,
+            "{what}: facet {j}: {:?} is not {truth:?}, says {}",
+            lit.second,
+            lit.unresolved
+        );
     }
     let n_negative = f.lit.iter().filter(|l| l.second.iter().any(|v| *v < 0.0)).count();
     let n_unresolved = f.lit.iter().filter(|l| l.n_unresolved > 0.0).count();
     let bound = f.lit.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max) / greatest;
     println!(
-        "{what}: greatest error/allowed {worst:.3}, {n_negative} negative, {n_unresolved} unresolved, bound {bound:.3e}"
+        "{what}: greatest error/allowed {worst:.3}, {n_negative} negative, {n_unresolved} \
+         unresolved, bound {bound:.3e}"
     );
     [n_negative as f64, n_unresolved as f64, bound]
 }
@@ -208,24 +238,36 @@ fn plate(center: DVec3, u: DVec3, v: DVec3, kd: f64, ks: f64, ns: f64, n: u32) -
     Plate { center, u, v, kd: DVec3::splat(kd), ks: DVec3::splat(ks), ns, subdivide: [n, n] }
 }
 
-const SUN: &str = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = [3.0, 3.0, 3.0]\n";
+const SUN: &str =
+    "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = [3.0, 3.0, 3.0]\n";
 
 #[test]
 fn extremes_are_near_or_say_so() {
     let gpu = Gpu::new();
-    let up =
-        |c: DVec3, half: f64, kd: f64, ks: f64, ns: f64, n| plate(c, half * DVec3::Z, half * DVec3::X, kd, ks, ns, n);
-    let down = |c: DVec3, half: f64, kd: f64, n| plate(c, half * DVec3::X, half * DVec3::Z, kd, 0.0, 1.0, n);
-    // A polished floor that mirrors a lit wall, and a polished wall that throws the sun onto a ceiling.
+    let up = |c: DVec3, half: f64, kd: f64, ks: f64, ns: f64, n| {
+        plate(c, half * DVec3::Z, half * DVec3::X, kd, ks, ns, n)
+    };
+    let down = |c: DVec3, half: f64, kd: f64, n| {
+        plate(c, half * DVec3::X, half * DVec3::Z, kd, 0.0, 1.0, n)
+    };
+    // A polished floor that mirrors a lit wall, and a polished wall that throws the sun onto a
+    // ceiling.
     let wall = plate(DVec3::new(0.0, 1.0, -1.0), DVec3::X, DVec3::Y, 0.4, 0.1, 1e4, 8);
-    let mirrors = [up(DVec3::ZERO, 1.0, 0.1, 0.2, 1e4, 8), wall, down(DVec3::new(0.0, 2.2, 0.0), 0.9, 0.5, 8)];
+    let mirrors = [
+        up(DVec3::ZERO, 1.0, 0.1, 0.2, 1e4, 8),
+        wall,
+        down(DVec3::new(0.0, 2.2, 0.0), 0.9, 0.5, 8),
+    ];
     let eye = DVec3::new(0.4, 1.2, 3.0);
-    let lit_wall = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, -0.9]\nirradiance = [3.0, 3.0, 3.0]\n";
-    let scene = room(&mirrors, eye, lit_wall, "gather = 'exact'\nexponents = [1, 10000]\nbases = 16");
+    let lit_wall = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, -0.9]\nirradiance = \
+        [3.0, 3.0, 3.0]\n";
+    let scene =
+        room(&mirrors, eye, lit_wall, "gather = 'exact'\nexponents = [1, 10000]\nbases = 16");
     let truth = truths(&scene, eye, 1, 1e-3);
     assert_honest("mirrors, n_s = 10^4", &frame(&gpu, scene), &truth, 0.05);
     // A ground of 10^4 and a unit plate one above it.
-    let ratio = [up(DVec3::ZERO, 5e3, 0.5, 0.0, 1.0, 64), down(DVec3::new(100.0, 1.0, 30.0), 0.5, 0.5, 4)];
+    let ratio =
+        [up(DVec3::ZERO, 5e3, 0.5, 0.0, 1.0, 64), down(DVec3::new(100.0, 1.0, 30.0), 0.5, 0.5, 4)];
     let eye = DVec3::new(120.0, 5.0, 40.0);
     for gather in ["exact", "tree"] {
         let scene = room(&ratio, eye, SUN, &format!("gather = '{gather}'"));
@@ -259,8 +301,14 @@ fn corner(n: u32) -> Scene {
     let floor = plate(DVec3::ZERO, DVec3::Z, DVec3::X, 0.5, 0.05, 8.0, n);
     let wall = plate(DVec3::new(0.0, 1.3, -1.2), DVec3::X, DVec3::Y, 0.4, 0.0, 1.0, n);
     let other = plate(DVec3::new(-1.2, 1.3, 0.0), DVec3::Y, DVec3::Z, 0.6, 0.0, 1.0, n);
-    let lamp = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1.0, -0.6]\nirradiance = [3.0, 2.9, 2.7]\n";
-    room(&[floor, wall, other], EYE, lamp, "gather = 'exact'\npair_size = 100\nbases = 16\nexponents = [7, 9]")
+    let lamp = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1.0, -0.6]\nirradiance = \
+        [3.0, 2.9, 2.7]\n";
+    room(
+        &[floor, wall, other],
+        EYE,
+        lamp,
+        "gather = 'exact'\npair_size = 100\nbases = 16\nexponents = [7, 9]",
+    )
 }
 
 #[test]
@@ -269,7 +317,10 @@ fn plot() {
     let gpu = Gpu::new();
     let curves = [
         ("corner without occluders, pairs as they are", by_subdivision(&gpu, corner, EYE)),
-        ("random rooms, default", by_subdivision(&gpu, |n| random_room(0, n, "gather = 'exact'"), EYE)),
+        (
+            "random rooms, default",
+            by_subdivision(&gpu, |n| random_room(0, n, "gather = 'exact'"), EYE),
+        ),
         ("random rooms, tree", by_subdivision(&gpu, |n| random_room(0, n, "gather = 'tree'"), EYE)),
     ];
     for (name, points) in &curves {
@@ -289,7 +340,9 @@ fn svg(curves: &[(&str, Vec<(u32, f64)>)]) -> String {
         format!("<text x='{x:.0}' y='{y:.0}' text-anchor='{anchor}'>{text}</text>\n")
     };
     let mut s = format!(
-        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width} {height}' font-family='sans-serif' font-size='12'>\n<rect width='{width}' height='{height}' fill='white'/>\n"
+        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {width} {height}' \
+         font-family='sans-serif' font-size='12'>\n<rect width='{width}' height='{height}' \
+         fill='white'/>\n"
     );
     for k in 0..=4 {
         let e = 10f64.powi(-k);
@@ -307,12 +360,20 @@ fn svg(curves: &[(&str, Vec<(u32, f64)>)]) -> String {
         );
     }
     s += &text(350.0, bottom + 40.0, "middle", "facets along each side of a surface");
-    s += "<text transform='translate(20 200) rotate(-90)' text-anchor='middle'>relative RMS error of L2</text>\n";
+    s += "<text transform='translate(20 200) rotate(-90)' text-anchor='middle'>relative RMS error \
+        of L2</text>\n";
     for (k, (name, points)) in curves.iter().enumerate() {
         let color = ["#1b6ca8", "#c0392b", "#2e8b57"][k % 3];
-        let path: Vec<String> = points.iter().map(|(n, e)| format!("{:.1} {:.1}", x(*n), y(*e))).collect();
-        s += &format!("<path d='M{}' fill='none' stroke='{color}' stroke-width='2'/>\n", path.join("L"));
-        s += &format!("<g fill='{color}'>{}</g>\n", text(330.0, 46.0 + 16.0 * k as f64, "start", name));
+        let path: Vec<String> =
+            points.iter().map(|(n, e)| format!("{:.1} {:.1}", x(*n), y(*e))).collect();
+        s += &format!(
+            "<path d='M{}' fill='none' stroke='{color}' stroke-width='2'/>\n",
+            path.join("L")
+        );
+        s += &format!(
+            "<g fill='{color}'>{}</g>\n",
+            text(330.0, 46.0 + 16.0 * k as f64, "start", name)
+        );
     }
     s + "</svg>\n"
 }

@@ -1,5 +1,6 @@
-//! The rules of ARCHITECTURE.md that a machine can keep: who may import whom, one room one name, names that say
-//! something, no file too long, no `.unwrap()`. The checker is shown bad trees first, so that silence means something.
+//! The rules of ARCHITECTURE.md that a machine can keep: who may import whom, one room one name,
+//! names that say something, no file too long, no `.unwrap()`. The checker is shown bad trees
+//! first, so that silence means something.
 
 #[path = "architecture/source.rs"]
 mod source;
@@ -21,9 +22,27 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("frame", &["passes", "layout", "gpu", "model"]),
     ("measure", &[]),
     ("study", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
-    ("viewer", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"]),
+    (
+        "viewer",
+        &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"],
+    ),
     ("farm", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"]),
-    ("cli", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study", "viewer", "farm"]),
+    (
+        "cli",
+        &[
+            "model",
+            "io",
+            "layout",
+            "reference",
+            "gpu",
+            "passes",
+            "frame",
+            "measure",
+            "study",
+            "viewer",
+            "farm",
+        ],
+    ),
     ("main", &["cli"]),
 ];
 
@@ -73,7 +92,8 @@ fn check_imports(source: &Source, complaints: &mut Vec<String>) {
         let at = format!("src/{}:{}", source.path, import.line);
         let to = import.path[0].as_str();
         // A pass and its reference meet in tests.
-        let meets_in_test = import.in_test && matches!((from, to), ("passes", "reference") | ("reference", "passes"));
+        let meets_in_test = import.in_test
+            && matches!((from, to), ("passes", "reference") | ("reference", "passes"));
         let allowed = to == from || to == "error" || may.contains(&to) || meets_in_test;
         if !allowed {
             complaints.push(format!("{at}: {from} may not import {to}"));
@@ -81,7 +101,9 @@ fn check_imports(source: &Source, complaints: &mut Vec<String>) {
         if let (Some(own), "passes") = (source.pass(), to) {
             let other = import.path.get(1).map_or("all passes", String::as_str);
             if other != own {
-                complaints.push(format!("{at}: the pass {own} imports {other}, and no pass imports a pass"));
+                complaints.push(format!(
+                    "{at}: the pass {own} imports {other}, and no pass imports a pass"
+                ));
             }
         }
     }
@@ -92,7 +114,8 @@ fn check_crates(source: &Source, crates: &[String], complaints: &mut Vec<String>
     for Token { text, line, .. } in source.crate_mentions(crates) {
         let at = format!("src/{}:{line}", source.path);
         if room == "model" && !MODEL_CRATES.contains(&text.as_str()) {
-            complaints.push(format!("{at}: model rests on std, glam, libm and nalgebra, not on {text}"));
+            complaints
+                .push(format!("{at}: model rests on std, glam, libm and nalgebra, not on {text}"));
         }
         if text == "ash" && room != "gpu" && source.pass() != Some("sprites") {
             complaints.push(format!("{at}: only gpu speaks ash"));
@@ -133,7 +156,8 @@ fn empty_words(name: &str) -> Vec<&str> {
 
 /// Every pass has its reference, its test and its shader, all of one name.
 fn check_rooms(root: &Path, complaints: &mut Vec<String>) {
-    let shaders: Vec<String> = files_under(&root.join("shaders")).iter().map(|path| file_name(path)).collect();
+    let shaders: Vec<String> =
+        files_under(&root.join("shaders")).iter().map(|path| file_name(path)).collect();
     for entry in fs::read_dir(root.join("src/passes")).into_iter().flatten() {
         let path = entry.unwrap().path();
         let room = path.file_stem().unwrap().to_string_lossy().into_owned();
@@ -146,10 +170,14 @@ fn check_rooms(root: &Path, complaints: &mut Vec<String>) {
                 complaints.push(format!("the pass {room} has no {what}"));
             }
         };
-        need(reference.with_extension("rs").is_file() || reference.is_dir(), format!("src/reference/{room}.rs"));
+        need(
+            reference.with_extension("rs").is_file() || reference.is_dir(),
+            format!("src/reference/{room}.rs"),
+        );
         need(root.join(format!("tests/pass_{room}.rs")).is_file(), format!("tests/pass_{room}.rs"));
         let is_shader = |name: &String| {
-            name.split_once('.').is_some_and(|(stem, kind)| stem.starts_with(&room) && SHADER_KINDS.contains(&kind))
+            name.split_once('.')
+                .is_some_and(|(stem, kind)| stem.starts_with(&room) && SHADER_KINDS.contains(&kind))
         };
         need(shaders.iter().any(is_shader), format!("shaders/{room}*.{{comp,vert,frag}}"));
     }
@@ -179,7 +207,8 @@ fn file_name(path: &Path) -> String {
 /// A tree of files in a temporary folder, and what the checker says of it.
 fn complaints_of(files: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
-    let cargo_toml = [("Cargo.toml", "[dependencies]\nash = \"1\"\nglam = \"1\"\nserde_json = \"1\"\n")];
+    let cargo_toml =
+        [("Cargo.toml", "[dependencies]\nash = \"1\"\nglam = \"1\"\nserde_json = \"1\"\n")];
     for (path, text) in cargo_toml.iter().chain(files) {
         let path = folder.path().join(path);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -193,12 +222,19 @@ fn a_tree_in_order_is_passed() {
     let complaints = complaints_of(&[
         ("src/lib.rs", "pub mod model; pub mod gpu;"),
         ("src/main.rs", "use nimbus::{cli, error::Error}; fn main() {}"),
-        ("src/model/box.rs", "use super::life; use glam::DVec3; // use crate::gpu;\nconst A: &str = \"crate::gpu\";"),
+        (
+            "src/model/box.rs",
+            "use super::life; use glam::DVec3; // use crate::gpu;\nconst A: &str = \"crate::gpu\";",
+        ),
         ("src/model/life.rs", "fn f<'a>(x: &'a str) -> char { let _ = r#\"crate::\"gpu\"#; '\"' }"),
-        ("src/gpu/device.rs", "use ash::vk; use crate::error::Result; /* crate::model /* nested */ crate::io */"),
+        (
+            "src/gpu/device.rs",
+            "use ash::vk; use crate::error::Result; /* crate::model /* nested */ crate::io */",
+        ),
         (
             "src/passes/sort.rs",
-            "use crate::{gpu::{self, kernel::Kernel}, layout::key};\n#[cfg(test)]\nmod tests { use super::*; use crate::reference::sort; fn f() { g().unwrap(); } }",
+            "use crate::{gpu::{self, kernel::Kernel}, layout::key};\n#[cfg(test)]\nmod tests { use \
+             super::*; use crate::reference::sort; fn f() { g().unwrap(); } }",
         ),
         ("src/passes/sprites.rs", "pub use ash::vk;"),
         ("src/reference/sort.rs", "use crate::model::{boxes, camera as eye};"),
@@ -212,14 +248,23 @@ fn a_tree_in_order_is_passed() {
     assert_eq!(complaints, [""; 0]);
 }
 
-/// One bad file each, in a tree that is otherwise in order, and a part of the only complaint it must raise.
+/// One bad file each, in a tree that is otherwise in order, and a part of the only complaint it
+/// must raise.
 const BREACHES: [(&str, &str, &str); 22] = [
     ("src/model/a.rs", "use crate::io;", "a.rs:1: model may not import io"),
-    ("src/io/a.rs", "use crate::{\n    model,\n    gpu::device,\n};", "a.rs:3: io may not import gpu"),
+    (
+        "src/io/a.rs",
+        "use crate::{\n    model,\n    gpu::device,\n};",
+        "a.rs:3: io may not import gpu",
+    ),
     ("src/io/a.rs", "use crate::{error::{Error, Result}, measure};", "io may not import measure"),
     ("src/gpu/a.rs", "fn f() -> crate::model::Scene {}", "gpu may not import model"),
     ("src/gpu/a/b.rs", "use super::super::super::model::film;", "gpu may not import model"),
-    ("src/gpu/a.rs", "#[cfg(test)]\nmod tests { use super::super::super::model; }", "a.rs:2: gpu may not import model"),
+    (
+        "src/gpu/a.rs",
+        "#[cfg(test)]\nmod tests { use super::super::super::model; }",
+        "a.rs:2: gpu may not import model",
+    ),
     ("src/measure/a.rs", "use crate :: frame;", "measure may not import frame"),
     ("src/frame/a.rs", "use crate::reference::sort;", "frame may not import reference"),
     ("src/passes/sort.rs", "use crate::reference::sort;", "passes may not import reference"),
@@ -252,10 +297,17 @@ fn every_breach_is_reported() {
     for (path, text, complaint) in BREACHES {
         let mut files = vec![(path, text)];
         if path == "src/passes/sort.rs" {
-            files.extend([("src/reference/sort.rs", ""), ("tests/pass_sort.rs", ""), ("shaders/sort.comp", "")]);
+            files.extend([
+                ("src/reference/sort.rs", ""),
+                ("tests/pass_sort.rs", ""),
+                ("shaders/sort.comp", ""),
+            ]);
         }
         let complaints = complaints_of(&files);
-        assert!(complaints.len() == 1 && complaints[0].contains(complaint), "{path}: {text}\n{complaints:?}");
+        assert!(
+            complaints.len() == 1 && complaints[0].contains(complaint),
+            "{path}: {text}\n{complaints:?}"
+        );
     }
 }
 
@@ -263,7 +315,9 @@ fn every_breach_is_reported() {
 fn an_incomplete_room_is_reported() {
     let complaints = complaints_of(&[("src/passes/mod.rs", ""), ("src/passes/grid.rs", "")]);
     assert_eq!(complaints.len(), 3, "{complaints:?}");
-    for (complaint, what) in complaints.iter().zip(["src/reference/grid.rs", "tests/pass_grid.rs", "shaders/grid"]) {
+    for (complaint, what) in
+        complaints.iter().zip(["src/reference/grid.rs", "tests/pass_grid.rs", "shaders/grid"])
+    {
         assert!(complaint.contains(what), "{complaint}");
     }
 }

@@ -1,5 +1,6 @@
-//! The area reference by its two ways in random rooms: quadrature over polygons (docs/model.md §11 "area reference")
-//! against random paths, which share nothing with it but the lights' and materials' laws.
+//! The area reference by its two ways in random rooms: quadrature over polygons (docs/model.md §11
+//! "area reference") against random paths, which share nothing with it but the lights' and
+//! materials' laws.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -37,7 +38,8 @@ enum Kind {
     Standing,
 }
 
-const KINDS: [Kind; 6] = [Kind::Plain, Kind::Sharp, Kind::Walled, Kind::NearLamp, Kind::Spots, Kind::Standing];
+const KINDS: [Kind; 6] =
+    [Kind::Plain, Kind::Sharp, Kind::Walled, Kind::NearLamp, Kind::Spots, Kind::Standing];
 
 fn room(seed: u64, kind: Kind) -> Scene {
     let mut r = Random(100 + seed);
@@ -54,10 +56,15 @@ fn room(seed: u64, kind: Kind) -> Scene {
             text += "intensity = [0.01, 0.01, 0.01]\nradius = 0.05\n";
         }
         Kind::Spots => {
-            for (angles, direction) in [([20.0, 30.0], [0.3, -1.0, 0.2]), ([3.0, 8.0], [-0.5, -0.2, 1.0])] {
-                text += "[[light]]\nkind = 'spot'\nposition = [-0.6, 0.7, -1.6]\nintensity = [9.0, 8.0, 8.0]\n";
-                text +=
-                    &format!("direction = {direction:?}\ninner_deg = {:?}\nouter_deg = {:?}\n", angles[0], angles[1]);
+            for (angles, direction) in
+                [([20.0, 30.0], [0.3, -1.0, 0.2]), ([3.0, 8.0], [-0.5, -0.2, 1.0])]
+            {
+                text += "[[light]]\nkind = 'spot'\nposition = [-0.6, 0.7, -1.6]\nintensity = \
+                    [9.0, 8.0, 8.0]\n";
+                text += &format!(
+                    "direction = {direction:?}\ninner_deg = {:?}\nouter_deg = {:?}\n",
+                    angles[0], angles[1]
+                );
                 text += "radius = 0.05\n";
             }
         }
@@ -75,7 +82,9 @@ fn room(seed: u64, kind: Kind) -> Scene {
 /// A cube of half edge 1.7 without its front.
 fn wall_in(plates: &mut [Plate]) {
     let (x, y, z) = (1.7 * DVec3::X, 1.7 * DVec3::Y, 1.7 * DVec3::Z);
-    for (p, wall) in plates.iter_mut().zip([(-x, y, z), (x, z, y), (-y, z, x), (y, x, z), (-z, x, y)]) {
+    for (p, wall) in
+        plates.iter_mut().zip([(-x, y, z), (x, z, y), (-y, z, x), (y, x, z), (-z, x, y)])
+    {
         (p.center, p.u, p.v) = wall;
     }
 }
@@ -107,19 +116,24 @@ impl Differences {
     fn assert_normal(&self, what: &str) {
         let (n, mean, square) = (self.n, self.sum / self.n, self.squares / self.n);
         println!("{what}: of {n} differences mean {mean:.3}, mean square {square:.3}");
-        assert!(mean.abs() < 4.0 / n.sqrt() && square < 1.0 + 4.0 * (2.0 / n).sqrt(), "{what}: {self:?}");
+        assert!(
+            mean.abs() < 4.0 / n.sqrt() && square < 1.0 + 4.0 * (2.0 / n).sqrt(),
+            "{what}: {self:?}"
+        );
     }
 }
 
-/// L2 toward the eye and I_i at every `stride`-th facet's centre of room `seed`, by both ways: differences of L2 before
-/// the eye and behind, and of I_i.
+/// L2 toward the eye and I_i at every `stride`-th facet's centre of room `seed`, by both ways:
+/// differences of L2 before the eye and behind, and of I_i.
 fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3]) {
     let kind = KINDS[seed as usize % KINDS.len()];
     let scene = room(u64::from(seed), kind);
-    let brdfs: Vec<Brdf> = (0..scene.n_regions()).map(|i| scene.region_material(i).at(0.0)).collect();
+    let brdfs: Vec<Brdf> =
+        (0..scene.n_regions()).map(|i| scene.region_material(i).at(0.0)).collect();
     let scenery = Scenery::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
     let facets = scene.surfaces.iter().enumerate();
-    let facets = facets.flat_map(|(s, surface)| (0..surface.n_facets() as u32).map(move |i| (s, i)));
+    let facets =
+        facets.flat_map(|(s, surface)| (0..surface.n_facets() as u32).map(move |i| (s, i)));
     for (s, i) in facets.skip(seed as usize % stride).step_by(stride) {
         let at = scenery.on_surface(s, scene.surfaces[s].facet_center(i));
         let toward = (EYE - at.position).normalize();
@@ -133,7 +147,11 @@ fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3])
         let is_behind = usize::from(at.normal.dot(toward) <= 0.0);
         found[is_behind].add(by_paths(&at, seed), [e.radiance.x, e.error], &what);
         // A white receiver's L2 is I_i/π.
-        let white = Receiver::new(at.position, at.normal, Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 1.0 });
+        let white = Receiver::new(
+            at.position,
+            at.normal,
+            Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 1.0 },
+        );
         let irradiance = by_paths(&white, seed + 1000).map(|l| PI * l);
         found[2].add(irradiance, [e.irradiance.x, e.irradiance_error], &what);
     }

@@ -1,5 +1,6 @@
-//! Every "auto" of a drawing together: what is taken keeps the first frame within `draw.error` of the exact picture, is what a
-//! scene that names it draws, and changes nothing where no error is allowed.
+//! Every "auto" of a drawing together: what is taken keeps the first frame within `draw.error` of
+//! the exact picture, is what a scene that names it draws, and changes nothing where no error is
+//! allowed.
 
 use std::fmt::Write;
 
@@ -24,11 +25,14 @@ fn scene(blobs: &[([f64; 3], f64, f64)], overrides: &[&str]) -> Scene {
     let dir = tempfile::tempdir().expect("a folder");
     let mut list = "x,y,z,radius,kappa,r,g,b\n".to_owned();
     for (i, ([x, y, z], sigma, depth)) in blobs.iter().enumerate() {
-        let (shade, kappa) = (0.5 + 0.4 * (i as f64).sin(), depth / (sigma * std::f64::consts::TAU.sqrt()));
-        writeln!(list, "{x},{y},{z},{},{kappa},1.0,{shade},{}", 3.0 * sigma, 1.5 - shade).expect("a line");
+        let (shade, kappa) =
+            (0.5 + 0.4 * (i as f64).sin(), depth / (sigma * std::f64::consts::TAU.sqrt()));
+        writeln!(list, "{x},{y},{z},{},{kappa},1.0,{shade},{}", 3.0 * sigma, 1.5 - shade)
+            .expect("a line");
     }
     std::fs::write(dir.path().join("list.csv"), list).expect("a list");
-    let text = "[film]\nwidth = 96\nheight = 72\nformat = 'rgba32f'\n[camera]\nposition = [0.0, 0.0, 12.0]\n\
+    let text = "[film]\nwidth = 96\nheight = 72\nformat = 'rgba32f'\n[camera]\nposition = [0.0, \
+        0.0, 12.0]\n\
                 [lighting]\nmode = 'none'\n[[cloud]]\nfrom = 'particles'\nfile = 'list.csv'\n";
     let path = dir.path().join("s.toml");
     std::fs::write(&path, text).expect("a scene");
@@ -40,7 +44,8 @@ fn scene(blobs: &[([f64; 3], f64, f64)], overrides: &[&str]) -> Scene {
 fn blobs(n: usize, sigma: [f64; 2], depth: [f64; 2]) -> Vec<([f64; 3], f64, f64)> {
     let mut state = 3u64;
     let mut within = |[low, high]: [f64; 2]| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (state >> 11) as f64 / (1u64 << 53) as f64
     };
     let mut blob = || {
@@ -63,7 +68,8 @@ fn frame(scene: Scene) -> Frame {
     let mut stage = Stage::new(scene, &choice, true).expect("a stage");
     let packet = stage.game.step(0).expect("a packet");
     stage.renderer.step(packet).expect("a frame");
-    let (bytes, values) = (stage.renderer.image_bytes().expect("bytes"), stage.renderer.image().expect("a picture"));
+    let (bytes, values) =
+        (stage.renderer.image_bytes().expect("bytes"), stage.renderer.image().expect("a picture"));
     let (draw, choices) = (stage.scene.draw, std::mem::take(&mut stage.choices));
     stage.close().expect("no message");
     Frame { draw, choices, bytes, values }
@@ -97,10 +103,12 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
     // What the last one says of all together is what is found, and every value was tried.
     let n_tried: Vec<(&str, usize)> = auto.choices.iter().map(|c| (c.key, c.tried.len())).collect();
     let of_sprites = if auto.draw.path == DrawPath::Sprites { &[("chunks", 4)][..] } else { &[] };
-    let of_size = if asked.draw.resolution == Resolution::Auto { &[("resolution", 3)][..] } else { &[] };
+    let of_size =
+        if asked.draw.resolution == Resolution::Auto { &[("resolution", 3)][..] } else { &[] };
     let cuts = [("threshold", 4), ("smallest", 4)];
     assert_eq!(n_tried, [&[("path", 2)], of_sprites, &[("cull", 2)], of_size, &cuts].concat());
-    let last = auto.choices.last().map(|c| &c.tried[c.taken]).and_then(|t| t.rmse).expect("an error");
+    let last =
+        auto.choices.last().map(|c| &c.tried[c.taken]).and_then(|t| t.rmse).expect("an error");
     assert!((last - found).abs() <= 1e-6 * (1.0 + found), "told {last:e}, found {found:e}");
     assert!(auto.choices.iter().flat_map(|c| &c.tried).all(|t| t.ms().is_some_and(|ms| ms > 0.0)));
     if error == 0.0 {
@@ -112,7 +120,12 @@ fn check(blobs: &[([f64; 3], f64, f64)], error: f64, more: &[&str]) -> Frame {
 #[test]
 fn with_sprites_chunks_are_chosen_too() {
     let layers = blobs(600, [0.8, 1.2], [0.5, 1.0]);
-    let set = ["draw.path='sprites'", "draw.chunks='auto'", "draw.threshold='auto'", "film.format='rgba16f'"];
+    let set = [
+        "draw.path='sprites'",
+        "draw.chunks='auto'",
+        "draw.threshold='auto'",
+        "film.format='rgba16f'",
+    ];
     let asked = scene(&layers, &set);
     let auto = frame(asked.clone());
     auto.choices.iter().for_each(|choice| println!("{}", choice.text()));
@@ -126,7 +139,8 @@ fn with_sprites_chunks_are_chosen_too() {
 
 #[test]
 fn where_thresholds_help_they_are_taken_within_the_error() {
-    // τ₀ 0.002 out to 8 σ of three pixels: cut at 0.001 they end at 1.2 σ, with a 45th of the pixels.
+    // τ₀ 0.002 out to 8 σ of three pixels: cut at 0.001 they end at 1.2 σ, with a 45th of the
+    // pixels.
     let thin = blobs(2500, [0.4, 0.5], [0.002, 0.0021]);
     // A smaller size would be taken before.
     let far = ["draw.cutoff=8", "draw.resolution=1.0"];
@@ -163,19 +177,28 @@ fn what_is_small_goes_where_it_may() {
 #[test]
 fn other_knobs_stay_what_they_are() {
     let few = blobs(30, [0.4, 0.5], [0.1, 0.5]);
-    let set =
-        ["draw.path='tiles'", "draw.cull='off'", "draw.threshold=0.01", "draw.resolution='auto'", "draw.error=0.5"];
+    let set = [
+        "draw.path='tiles'",
+        "draw.cull='off'",
+        "draw.threshold=0.01",
+        "draw.resolution='auto'",
+        "draw.error=0.5",
+    ];
     let asked = scene(&few, &set);
     let auto = frame(asked.clone());
     let draw = Draw { resolution: auto.draw.resolution, ..asked.draw };
     assert_eq!(auto.draw, draw);
-    assert_eq!((draw.path, draw.cull, draw.threshold), (DrawPath::Tiles, Cull::Off, Least::Of(0.01)));
+    assert_eq!(
+        (draw.path, draw.cull, draw.threshold),
+        (DrawPath::Tiles, Cull::Off, Least::Of(0.01))
+    );
     // Errors are by what the scene asks for: its first value has none.
     let [choice] = &auto.choices[..] else { panic!("{:?}", auto.choices) };
     assert_eq!(choice.tried[0].rmse, Some(0.0));
     assert!(choice.tried[1..].iter().all(|t: &Tried| t.rmse.is_some_and(|rmse| rmse > 0.0)));
     // A scene without particles has nothing to choose, and what shells show is not culled.
-    for (blobs, set) in [(&[][..], &ALL[..]), (&few, &["draw.cull='auto'", "draw.impostors='on'"])] {
+    for (blobs, set) in [(&[][..], &ALL[..]), (&few, &["draw.cull='auto'", "draw.impostors='on'"])]
+    {
         let frame = frame(scene(blobs, set));
         assert!(frame.choices.is_empty(), "{:?}", frame.choices);
         assert_eq!(frame.draw.cull, Cull::On);

@@ -1,9 +1,11 @@
-//! The BRDF basis (model.md §6) against its own definition, closed forms, and the table that the page prints.
+//! The BRDF basis (model.md §6) against its own definition, closed forms, and the table that the
+//! page prints.
 
 use nimbus::model::basis::{Basis, MAX_BASES, N_NODES, Sampling, evaluate, node, node_t};
 use nimbus::model::material::Brdf;
 
-/// ∫ f g 4 cos γ sin γ dγ = ∫ 16 t³ (1 − t⁴) f g dt by plain trapezoids: not the module's own quadrature.
+/// ∫ f g 4 cos γ sin γ dγ = ∫ 16 t³ (1 − t⁴) f g dt by plain trapezoids: not the module's own
+/// quadrature.
 fn product(f: &[f64], g: &[f64]) -> f64 {
     (0..N_NODES).map(|i| term(f, g, i)).sum()
 }
@@ -14,15 +16,16 @@ fn term(f: &[f64], g: &[f64], i: usize) -> f64 {
     16.0 * t.powi(3) * (1.0 - t.powi(4)) * f[i] * g[i] / (N_NODES - 1) as f64
 }
 
-/// How far [`product`] can lie from Gregory's rule: weights 299/240, 211/240 and 739/720 at the nodes next to the ends
-/// in place of 1, and the roundings of 1025 terms.
+/// How far [`product`] can lie from Gregory's rule: weights 299/240, 211/240 and 739/720 at the
+/// nodes next to the ends in place of 1, and the roundings of 1025 terms.
 fn rules_differ(f: &[f64], g: &[f64]) -> f64 {
-    let ends =
-        [(1, 0.25), (2, 0.13), (3, 0.03)].map(|(k, d)| d * (term(f, g, k).abs() + term(f, g, N_NODES - 1 - k).abs()));
+    let ends = [(1, 0.25), (2, 0.13), (3, 0.03)]
+        .map(|(k, d)| d * (term(f, g, k).abs() + term(f, g, N_NODES - 1 - k).abs()));
     ends.iter().sum::<f64>() + N_NODES as f64 * f64::EPSILON
 }
 
-/// range of n_s, N_b, greatest relative error with C's sampling and with the default, as model.md §6 prints them.
+/// range of n_s, N_b, greatest relative error with C's sampling and with the default, as model.md
+/// §6 prints them.
 const PRINTED: [([f64; 2], u32, f64, f64); 5] = [
     ([1.0, 64.0], 8, 6.1e-3, 2.6e-3),
     ([1.0, 256.0], 8, 5.0e-2, 1.2e-2),
@@ -37,7 +40,11 @@ fn the_table_of_the_page_comes_out() {
         for (sampling, printed) in [(Sampling::Uniform, uniform), (Sampling::Log, log)] {
             let basis = Basis::new(range, n_bases, sampling);
             let found = basis.greatest_error();
-            assert_eq!(format!("{found:.1e}"), format!("{printed:.1e}"), "{range:?}, {n_bases}, {sampling:?}: {found}");
+            assert_eq!(
+                format!("{found:.1e}"),
+                format!("{printed:.1e}"),
+                "{range:?}, {n_bases}, {sampling:?}: {found}"
+            );
             // One vector more would be another number: the diffuse basis counts.
             let more = Basis::new(range, n_bases + 1, sampling).greatest_error();
             assert_ne!(format!("{more:.1e}"), format!("{printed:.1e}"));
@@ -50,7 +57,8 @@ fn nodes_and_interpolation_at_worked_points() {
     assert_eq!((node(0), node(512), node(N_NODES - 1)), (0.0, 1.0 / 16.0, 1.0));
     let squares: Vec<f64> = (0..N_NODES).map(|i| (i * i) as f64).collect();
     for (i, square) in squares.iter().enumerate() {
-        // ∜ of t⁴ comes back within 2⁻⁵² of t: 1025 · 2 · 1024 · 2⁻⁵² of the greatest square's neighbourhood.
+        // ∜ of t⁴ comes back within 2⁻⁵² of t: 1025 · 2 · 1024 · 2⁻⁵² of the greatest square's
+        // neighbourhood.
         assert!((evaluate(&squares, node(i)) - square).abs() < 1e-9);
     }
     // Half way between nodes 2 and 3 in t, not in w: (4 + 9)/2.
@@ -59,8 +67,8 @@ fn nodes_and_interpolation_at_worked_points() {
     assert!(evaluate(&squares, f64::NAN).is_nan());
 }
 
-/// Greatest |d²/dt²| of (1 − t⁴)^{n_s} over [0, 1]: 12 and 32 at t = 1 for n_s = 1 and 2, found on 4·10⁵ points for the
-/// others; in the limit 3.8343 √n_s, of exp(−n_s t⁴).
+/// Greatest |d²/dt²| of (1 − t⁴)^{n_s} over [0, 1]: 12 and 32 at t = 1 for n_s = 1 and 2, found on
+/// 4·10⁵ points for the others; in the limit 3.8343 √n_s, of exp(−n_s t⁴).
 const CURVATURE: [(f64, f64); 6] =
     [(1.0, 12.0), (2.0, 32.0), (8.0, 13.56), (100.0, 38.97), (1e4, 383.5), (1e6, 3834.4)];
 
@@ -74,13 +82,25 @@ fn interpolation_keeps_its_bound() {
         let greatest = (0..=8 * 1024).map(wrong).fold(0.0, f64::max);
         // h²/8 of the curvature, reached in the middle of a cell, which the eighths meet.
         let bound = curvature / (8.0 * 1024.0 * 1024.0);
-        assert!(greatest <= bound * 1.001 && greatest > 0.95 * bound, "n_s = {ns}: {greatest}, bound {bound}");
+        assert!(
+            greatest <= bound * 1.001 && greatest > 0.95 * bound,
+            "n_s = {ns}: {greatest}, bound {bound}"
+        );
     }
 }
 
 /// Ranges and counts at and beyond what a scene can ask for.
 fn all_kinds() -> Vec<Basis> {
-    let ranges = [[1.0, 256.0], [0.0, 1.0], [0.0, 1e6], [1.0, 1e6], [0.5, 0.6], [100.0, 101.0], [7.0, 7.0], [0.0, 0.0]];
+    let ranges = [
+        [1.0, 256.0],
+        [0.0, 1.0],
+        [0.0, 1e6],
+        [1.0, 1e6],
+        [0.5, 0.6],
+        [100.0, 101.0],
+        [7.0, 7.0],
+        [0.0, 0.0],
+    ];
     let kinds = ranges.iter().flat_map(|r| [Sampling::Log, Sampling::Uniform].map(|s| (*r, s)));
     kinds.flat_map(|(r, s)| [1, 2, 8, MAX_BASES].map(|n| Basis::new(r, n, s))).collect()
 }
@@ -93,7 +113,11 @@ fn vectors_are_orthonormal_and_their_greatest_entry_is_positive() {
             for (b, u) in basis.vectors()[..=a].iter().enumerate() {
                 let expected = if a == b { 1.0 } else { 0.0 };
                 let found = product(v, u);
-                assert!((found - expected).abs() < rules_differ(v, u), "{:?}: {a} {b} {found}", basis.exponents());
+                assert!(
+                    (found - expected).abs() < rules_differ(v, u),
+                    "{:?}: {a} {b} {found}",
+                    basis.exponents()
+                );
             }
             let greatest = v.iter().fold(0.0f64, |g, x| g.max(x.abs()));
             assert_eq!(v.iter().find(|x| x.abs() == greatest), Some(&greatest));
@@ -107,7 +131,8 @@ fn the_lobe_of_the_basis_is_the_projection() {
     for ns in [1.0, 30.0, 1e4] {
         let (coefficients, lobe) = (basis.coefficients(ns), basis.lobe(ns));
         assert_eq!((coefficients.len(), lobe.len()), (15, N_NODES));
-        let sum = |i: usize| coefficients.iter().zip(basis.vectors()).map(|(c, v)| c * v[i]).sum::<f64>();
+        let sum =
+            |i: usize| coefficients.iter().zip(basis.vectors()).map(|(c, v)| c * v[i]).sum::<f64>();
         let peak = Brdf::lobe(ns, 0.0);
         assert!((0..N_NODES).all(|i| (lobe[i] - sum(i)).abs() < 1e-13 * peak));
         // Pythagoras: ‖lobe‖² = Σ c² + (error ‖lobe‖)², and ‖lobe‖² in closed form.
@@ -120,15 +145,22 @@ fn the_lobe_of_the_basis_is_the_projection() {
 
 #[test]
 fn enough_bases_leave_roundings_only_whatever_the_exponent() {
-    // The lobes that the basis is made from lie in the span of all singular vectors; between them the range [0, 1]
-    // is so narrow that no lobe lies further from it than the rank's threshold and its roundings.
+    // The lobes that the basis is made from lie in the span of all singular vectors; between them
+    // the range [0, 1] is so narrow that no lobe lies further from it than the rank's threshold and
+    // its roundings.
     let basis = Basis::new([0.0, 1.0], MAX_BASES, Sampling::Log);
-    assert!(basis.n_bases() < MAX_BASES && basis.greatest_error() < 1e-9, "{}", basis.greatest_error());
-    for (ns, range) in [(0.0, [0.0, 1e6]), (1.0, [0.0, 1e6]), (1e4, [1.0, 1e6]), (1e6, [1.0, 1e6])] {
+    assert!(
+        basis.n_bases() < MAX_BASES && basis.greatest_error() < 1e-9,
+        "{}",
+        basis.greatest_error()
+    );
+    for (ns, range) in [(0.0, [0.0, 1e6]), (1.0, [0.0, 1e6]), (1e4, [1.0, 1e6]), (1e6, [1.0, 1e6])]
+    {
         let error = Basis::new(range, MAX_BASES, Sampling::Log).error(ns);
         assert!(error < 1e-4, "n_s = {ns} of {range:?}: {error}");
     }
-    // Singular values say what is lost: the squares of those left out are the squared errors of the 64 unit lobes.
+    // Singular values say what is lost: the squares of those left out are the squared errors of the
+    // 64 unit lobes.
     let basis = Basis::new([1.0, 256.0], 8, Sampling::Log);
     let lost: f64 = basis.singular_values()[7..].iter().map(|s| s * s).sum();
     let of_lobes = |i: u32| basis.error(256f64.powf(f64::from(i) / 63.0)).powi(2);
@@ -138,8 +170,12 @@ fn enough_bases_leave_roundings_only_whatever_the_exponent() {
 
 #[test]
 fn one_exponent_is_one_lobe() {
-    for (ns, sampling) in [(0.0, Sampling::Log), (20.0, Sampling::Log), (20.0, Sampling::Uniform), (1e6, Sampling::Log)]
-    {
+    for (ns, sampling) in [
+        (0.0, Sampling::Log),
+        (20.0, Sampling::Log),
+        (20.0, Sampling::Uniform),
+        (1e6, Sampling::Log),
+    ] {
         let basis = Basis::new([ns, ns], 8, sampling);
         assert_eq!((basis.n_asked(), basis.n_bases(), basis.singular_values().len()), (8, 2, 1));
         assert!(basis.greatest_error() < 1e-14, "{}", basis.greatest_error());
@@ -153,14 +189,23 @@ fn one_exponent_is_one_lobe() {
 fn without_vectors_no_lobe_is_represented() {
     for n_bases in [0, 1] {
         let basis = Basis::new([1.0, 256.0], n_bases, Sampling::Log);
-        assert_eq!((basis.n_bases(), basis.vectors().len(), basis.coefficients(5.0).len()), (1, 0, 0));
-        assert!(basis.lobe(5.0).iter().all(|v| *v == 0.0) && basis.error(5.0) == 1.0 && basis.greatest_error() == 1.0);
+        assert_eq!(
+            (basis.n_bases(), basis.vectors().len(), basis.coefficients(5.0).len()),
+            (1, 0, 0)
+        );
+        assert!(
+            basis.lobe(5.0).iter().all(|v| *v == 0.0)
+                && basis.error(5.0) == 1.0
+                && basis.greatest_error() == 1.0
+        );
     }
 }
 
 #[test]
 fn a_narrow_range_keeps_the_vectors_that_differ() {
-    for (range, most) in [([10.0, 10.001], 6), ([10.0, 10.0 + 2e-15], 3), ([1e6, 1e6 + 1.0], 6), ([10.0, 12.0], 12)] {
+    for (range, most) in
+        [([10.0, 10.001], 6), ([10.0, 10.0 + 2e-15], 3), ([1e6, 1e6 + 1.0], 6), ([10.0, 12.0], 12)]
+    {
         for sampling in [Sampling::Log, Sampling::Uniform] {
             let basis = Basis::new(range, MAX_BASES, sampling);
             assert!(
@@ -183,6 +228,7 @@ fn the_same_basis_every_time() {
         assert_eq!(make(), make());
     }
     // Vectors do not depend on how many are kept.
-    let (few, many) = (Basis::new([1.0, 64.0], 4, Sampling::Log), Basis::new([1.0, 64.0], 8, Sampling::Log));
+    let (few, many) =
+        (Basis::new([1.0, 64.0], 4, Sampling::Log), Basis::new([1.0, 64.0], 8, Sampling::Log));
     assert_eq!(few.vectors(), &many.vectors()[..3]);
 }

@@ -33,7 +33,8 @@ fn render_writes_png_and_exr_without_a_validation_message() {
     let dir = temp();
     for name in ["a.png", "a.exr"] {
         let out = path(&dir, name);
-        let (code, stdout, stderr) = run(&["render", "scenes/hello.toml", "-o", &out, "--validation"]);
+        let (code, stdout, stderr) =
+            run(&["render", "scenes/hello.toml", "-o", &out, "--validation"]);
         assert_eq!((code, stdout.as_str(), stderr.as_str()), (0, "", ""));
         let image = image::open(&out).expect("a picture");
         assert_eq!((image.width(), image.height()), (320, 240));
@@ -60,7 +61,11 @@ fn the_driver_s_threads_and_a_second_run_change_no_byte() {
         .args(["render", "scenes/cubes-554.toml", "--size", "200x150", "--seed", "8", "-o", &out])
         .assert()
         .success();
-    assert_ne!(std::fs::read(&out).expect("the picture"), pictures[0], "another seed is another cloud");
+    assert_ne!(
+        std::fs::read(&out).expect("the picture"),
+        pictures[0],
+        "another seed is another cloud"
+    );
 }
 
 #[test]
@@ -83,17 +88,29 @@ fn bad_input_is_one_clear_message_and_nothing_written() {
     for (args, expected) in [
         (&["scenes/hello.toml", "--set", "film.widht=3"][..], "film.widht"),
         (&["scenes/none.toml"], "scenes/none.toml"),
-        (&["scenes/hello.toml", "--device", "no such device"], "expected an index or a part of a name"),
+        (
+            &["scenes/hello.toml", "--device", "no such device"],
+            "expected an index or a part of a name",
+        ),
         (&["scenes/hello.toml", "--shaders", "scenes"], "none of nimbus's shaders"),
-        (&["scenes/hello.toml", "--device", ""], "expected an index or a part of a name; found: 0: "),
-        (&["scenes/hello.toml", "--device", "4090"], "expected an index or a part of a name; found: 0: "),
+        (
+            &["scenes/hello.toml", "--device", ""],
+            "expected an index or a part of a name; found: 0: ",
+        ),
+        (
+            &["scenes/hello.toml", "--device", "4090"],
+            "expected an index or a part of a name; found: 0: ",
+        ),
         (&["scenes/hello.toml", "--set", "film.width=20000"], "film.width"),
         (
             &["scenes/hello.toml", "--size", "20000x10"],
             "'--size <WxH>': expected WIDTHxHEIGHT such as 800x600, each from 1",
         ),
         (&["scenes/hello.toml", "--time", "nan"], "finite"),
-        (&["scenes/hello.toml", "--time", "1e300"], "time 1e300 s: expected a finite number from -1e15 to 1e15"),
+        (
+            &["scenes/hello.toml", "--time", "1e300"],
+            "time 1e300 s: expected a finite number from -1e15 to 1e15",
+        ),
         (
             &["scenes/threads.toml", "--set", "cloud.0.wind=[1e9,0,0]", "--time", "1e12"],
             "carries a cloud's origin too far",
@@ -118,7 +135,8 @@ fn a_thousand_million_particles_are_refused_by_the_limit_s_name() {
     let scene = "[[cloud]]\nfrom = \"boxes\"\nfile = \"huge.dat\"\n";
     std::fs::write(dir.path().join("huge.toml"), scene).expect("a scene");
     let begin = Instant::now();
-    let (code, _, stderr) = run(&["render", &path(&dir, "huge.toml"), "-o", &path(&dir, "huge.png")]);
+    let (code, _, stderr) =
+        run(&["render", &path(&dir, "huge.toml"), "-o", &path(&dir, "huge.png")]);
     assert_eq!(code, 2);
     assert!(stderr.contains("1000000000") && stderr.contains("maxStorageBufferRange"), "{stderr}");
     assert!(begin.elapsed() < Duration::from_secs(30), "refused before anything is made");
@@ -128,7 +146,18 @@ fn a_thousand_million_particles_are_refused_by_the_limit_s_name() {
 fn bench_prints_its_table_and_writes_its_results_once() {
     let dir = temp();
     let out = path(&dir, "run");
-    let args = ["bench", "scenes/hello.toml", "--frames", "6", "--warmup", "2", "--repeat", "2", "--out", &out];
+    let args = [
+        "bench",
+        "scenes/hello.toml",
+        "--frames",
+        "6",
+        "--warmup",
+        "2",
+        "--repeat",
+        "2",
+        "--out",
+        &out,
+    ];
     let (code, stdout, stderr) = run(&args);
     assert_eq!((code, stderr.as_str()), (0, ""));
     for word in [
@@ -145,10 +174,17 @@ fn bench_prints_its_table_and_writes_its_results_once() {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }
     let json: Value =
-        serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json")).expect("JSON");
+        serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json"))
+            .expect("JSON");
     let case = &json["cases"][0];
-    assert_eq!((json["cases"].as_array().map(Vec::len), case["modes"].as_array().map(Vec::len)), (Some(1), Some(3)));
-    assert_eq!((&case["modes"][0]["frames"], &case["modes"][2]["skip"]), (&12.into(), &false.into()));
+    assert_eq!(
+        (json["cases"].as_array().map(Vec::len), case["modes"].as_array().map(Vec::len)),
+        (Some(1), Some(3))
+    );
+    assert_eq!(
+        (&case["modes"][0]["frames"], &case["modes"][2]["skip"]),
+        (&12.into(), &false.into())
+    );
     assert_eq!(json["block_order"].as_array().map(Vec::len), Some(6));
     assert!((0..3).all(|i| case["modes"][i]["image_hash"] == case["modes"][0]["image_hash"]));
     assert_eq!(case["skipping"]["same_bytes"], true);
@@ -159,8 +195,17 @@ fn bench_prints_its_table_and_writes_its_results_once() {
     };
     assert_eq!((&tiles(0)["n_skipped"], &tiles(2)["n_skipped"]), (&12.into(), &0.into()));
     assert_eq!(tiles(0)["saved_ms"], tiles(2)["p50_ms"]);
-    assert_eq!(tiles(0)["reasons"], serde_json::json!([{ "reason": "the picture is the same", "n": 12 }]));
-    for word in ["1 % low: p99", "mean of slowest 1 %", "1 % of the time", "perfect overlap = max(game", "host clock"] {
+    assert_eq!(
+        tiles(0)["reasons"],
+        serde_json::json!([{ "reason": "the picture is the same", "n": 12 }])
+    );
+    for word in [
+        "1 % low: p99",
+        "mean of slowest 1 %",
+        "1 % of the time",
+        "perfect overlap = max(game",
+        "host clock",
+    ] {
         assert!(stdout.contains(word), "{word} in\n{stdout}");
     }
     let number = |pointer: &str| case.pointer(pointer).and_then(Value::as_f64).expect("a number");
@@ -179,10 +224,12 @@ fn several_scenes_get_a_folder_each_and_a_bad_one_none() {
     let dir = temp();
     let out = path(&dir, "runs");
     let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--out", &out];
-    let (code, _, stderr) = run(&[&["bench", "scenes/hello.toml", "scenes/absent.toml"], &short[..]].concat());
+    let (code, _, stderr) =
+        run(&[&["bench", "scenes/hello.toml", "scenes/absent.toml"], &short[..]].concat());
     assert!(code == 2 && stderr.contains("absent.toml"), "{stderr}");
     assert!(!Path::new(&out).exists(), "no folder for results that did not come");
-    let (code, _, stderr) = run(&[&["bench", "scenes/hello.toml", "tests/data/modes.toml"], &short[..]].concat());
+    let (code, _, stderr) =
+        run(&[&["bench", "scenes/hello.toml", "tests/data/modes.toml"], &short[..]].concat());
     assert_eq!((code, stderr.as_str()), (0, ""));
     for name in ["hello", "modes"] {
         assert!(Path::new(&out).join(name).join("run.json").exists(), "{name}");
@@ -208,42 +255,74 @@ fn bench_writes_a_time_line_of_every_step_and_pass() {
         &file,
     ];
     assert_eq!(run(&args).0, 0);
-    let trace: Value = serde_json::from_slice(&std::fs::read(&file).expect("the trace")).expect("JSON");
+    let trace: Value =
+        serde_json::from_slice(&std::fs::read(&file).expect("the trace")).expect("JSON");
     let events = trace["traceEvents"].as_array().expect("events");
     let steps = |tid: u64| events.iter().filter(move |e| e["ph"] == "X" && e["tid"] == tid);
     // Four frames of each loop.
     assert_eq!((steps(0).count(), steps(1).count()), (8, 8));
-    let span =
-        |e: &Value| [e["ts"].as_f64().expect("ts"), e["ts"].as_f64().expect("ts") + e["dur"].as_f64().expect("dur")];
+    let span = |e: &Value| {
+        [
+            e["ts"].as_f64().expect("ts"),
+            e["ts"].as_f64().expect("ts") + e["dur"].as_f64().expect("dur"),
+        ]
+    };
     for frame in steps(0) {
-        let same =
-            |e: &&Value| e["args"]["frame"] == frame["args"]["frame"] && e["args"]["block"] == frame["args"]["block"];
+        let same = |e: &&Value| {
+            e["args"]["frame"] == frame["args"]["frame"]
+                && e["args"]["block"] == frame["args"]["block"]
+        };
         let record = span(steps(1).find(same).expect("it was recorded"));
         let id = format!("{}/{}", frame["args"]["block"], frame["args"]["frame"]);
-        let end =
-            events.iter().find(|e| e["ph"] == "e" && e["id"] == *id).expect("it ended")["ts"].as_f64().expect("ts");
+        let end = events.iter().find(|e| e["ph"] == "e" && e["id"] == *id).expect("it ended")["ts"]
+            .as_f64()
+            .expect("ts");
         let passes: Vec<[f64; 2]> = steps(2).filter(same).map(span).collect();
-        assert!(passes.len() >= 5 && passes.windows(2).all(|p| p[0][1] <= p[1][0] + 1e-3), "passes in their order");
-        // Game step, recording, passes, end: in this order, but for a clock that is laid on another one.
+        assert!(
+            passes.len() >= 5 && passes.windows(2).all(|p| p[0][1] <= p[1][0] + 1e-3),
+            "passes in their order"
+        );
+        // Game step, recording, passes, end: in this order, but for a clock that is laid on another
+        // one.
         assert!(span(frame)[0] >= 0.0 && span(frame)[1] <= record[0] + 1.0 && record[1] <= end);
         assert!(passes.iter().all(|p| p[1] <= end + 1e-3 && p[0] >= record[0] - 1000.0));
     }
     let (code, _, stderr) = run(&args);
     assert!(code == 2 && stderr.contains("trace.json"), "{stderr}");
     let nowhere = run(&["bench", "scenes/hello.toml", "--trace", &path(&dir, "absent/b.json")]);
-    assert!(nowhere.0 == 2 && nowhere.1.is_empty() && nowhere.2.contains("does not exist"), "{}", nowhere.2);
-    let two = run(&["bench", "scenes/hello.toml", "scenes/static.toml", "--trace", &path(&dir, "b.json")]);
+    assert!(
+        nowhere.0 == 2 && nowhere.1.is_empty() && nowhere.2.contains("does not exist"),
+        "{}",
+        nowhere.2
+    );
+    let two = run(&[
+        "bench",
+        "scenes/hello.toml",
+        "scenes/static.toml",
+        "--trace",
+        &path(&dir, "b.json"),
+    ]);
     assert!(two.0 == 2 && two.2.contains("one scene, found 2"), "{}", two.2);
 }
 
 #[test]
 fn bench_json_is_json_and_nothing_else() {
-    let (code, stdout, _) =
-        run(&["bench", "scenes/hello.toml", "--frames", "3", "--warmup", "1", "--repeat", "1", "--json"]);
+    let (code, stdout, _) = run(&[
+        "bench",
+        "scenes/hello.toml",
+        "--frames",
+        "3",
+        "--warmup",
+        "1",
+        "--repeat",
+        "1",
+        "--json",
+    ]);
     assert_eq!(code, 0);
     let json: Value = serde_json::from_str(&stdout).expect("JSON");
     assert!(json["cases"][0]["ratio"]["parallel_by_serial"].as_f64().is_some_and(|r| r > 0.0));
-    let schema: Value = serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
+    let schema: Value =
+        serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
     assert!(jsonschema::is_valid(&schema, &json), "{:?}", jsonschema::validate(&schema, &json));
 }
 
@@ -253,9 +332,13 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     let dir = temp();
     let out = path(&dir, "run");
     let program = assert_cmd::cargo::cargo_bin("nimbus");
-    let args = ["bench", "scenes/hello.toml", "--frames", "1000000", "--warmup", "0", "--out", &out];
+    let args =
+        ["bench", "scenes/hello.toml", "--frames", "1000000", "--warmup", "0", "--out", &out];
     // Shaders are compiled here, so that the time below is not theirs.
-    assert_eq!(run(&["bench", "scenes/hello.toml", "--frames", "1", "--warmup", "0", "--repeat", "1"]).0, 0);
+    assert_eq!(
+        run(&["bench", "scenes/hello.toml", "--frames", "1", "--warmup", "0", "--repeat", "1"]).0,
+        0
+    );
     // The folder is made before the first frame, and one frame is always finished.
     let is_begun = || Path::new(&out).exists();
     let (code, stderr, took) = interrupt(std::process::Command::new(program).args(args), &is_begun);
@@ -263,20 +346,28 @@ fn an_interrupted_bench_keeps_its_finished_part() {
     assert!(stderr.contains("keeps what is done") && stderr.lines().count() == 2, "{stderr}");
     assert!(took < Duration::from_secs(20));
     let json: Value =
-        serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json")).expect("JSON");
+        serde_json::from_slice(&std::fs::read(path(&dir, "run/run.json")).expect("run.json"))
+            .expect("JSON");
     assert_eq!(json["interrupted"], true);
     assert!(json["cases"][0]["modes"][0]["frames"].as_u64().is_some_and(|n| n > 0));
 }
 
-/// Sends Ctrl-C's signal once `is_begun`: the exit code, stderr, and the time from the signal to the end.
-fn interrupt(command: &mut std::process::Command, is_begun: &dyn Fn() -> bool) -> (Option<i32>, String, Duration) {
+/// Sends Ctrl-C's signal once `is_begun`: the exit code, stderr, and the time from the signal to
+/// the end.
+fn interrupt(
+    command: &mut std::process::Command,
+    is_begun: &dyn Fn() -> bool,
+) -> (Option<i32>, String, Duration) {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("a child");
     let deadline = Instant::now() + Duration::from_secs(120);
     while !is_begun() {
         assert!(Instant::now() < deadline, "it never begins");
         std::thread::sleep(Duration::from_millis(1));
     }
-    std::process::Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    std::process::Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status()
+        .expect("kill");
     let begin = Instant::now();
     let output = child.wait_with_output().expect("it ends");
     (output.status.code(), String::from_utf8(output.stderr).expect("UTF-8"), begin.elapsed())
@@ -295,7 +386,8 @@ fn an_interrupted_render_ends_at_once_and_leaves_nothing() {
     // The first file to appear is the temporary one.
     let while_writing = || names() > 0;
     for is_begun in [&while_drawing as &dyn Fn() -> bool, &while_writing] {
-        let (code, stderr, took) = interrupt(std::process::Command::new(&program).args(args), is_begun);
+        let (code, stderr, took) =
+            interrupt(std::process::Command::new(&program).args(args), is_begun);
         assert_eq!((code, stderr.as_str()), (Some(130), ""));
         assert!(took < Duration::from_secs(5), "{took:?}");
         assert_eq!(names(), 0, "neither a picture nor a part of one");
@@ -306,10 +398,14 @@ fn an_interrupted_render_ends_at_once_and_leaves_nothing() {
 fn render_says_what_it_drew() {
     let dir = temp();
     let out = path(&dir, "a.exr");
-    let (code, json, stderr) = run(&["render", "scenes/hello.toml", "-o", &out, "--frame", "3", "--json"]);
+    let (code, json, stderr) =
+        run(&["render", "scenes/hello.toml", "-o", &out, "--frame", "3", "--json"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     let json: Value = serde_json::from_str(&json).expect("JSON");
-    assert_eq!((&json["file"], &json["width"], &json["height"]), (&out.as_str().into(), &320.into(), &240.into()));
+    assert_eq!(
+        (&json["file"], &json["width"], &json["height"]),
+        (&out.as_str().into(), &320.into(), &240.into())
+    );
     assert_eq!((&json["frame"], &json["not_finite"]), (&3.into(), &0.into()));
     assert!(json["time_s"].as_f64().is_some_and(|t| t > 0.0) && json["device"]["name"].is_string());
     let pixels = image::open(&out).expect("a picture").into_rgba32f();
@@ -317,10 +413,15 @@ fn render_says_what_it_drew() {
     assert_eq!(json["image_hash"], format!("{:x}", Sha256::digest(bytes)));
     let passes = json["passes"].as_array().expect("a list");
     assert_eq!(passes.len(), Pass::ALL.len());
-    assert!(passes.iter().all(|p| p["name"].is_string() && p["reason"].is_string() && p["run"].is_boolean()));
+    assert!(
+        passes
+            .iter()
+            .all(|p| p["name"].is_string() && p["reason"].is_string() && p["run"].is_boolean())
+    );
     assert!(passes.iter().all(|p| p["ms"].is_null() || p["run"] == true));
 
-    let (_, json, _) = run(&["render", "scenes/hello.toml", "-o", &out, "--force", "--time", "0.5", "--json"]);
+    let (_, json, _) =
+        run(&["render", "scenes/hello.toml", "-o", &out, "--force", "--time", "0.5", "--json"]);
     let json: Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!((&json["frame"], &json["time_s"]), (&Value::Null, &0.5.into()));
 }
@@ -330,7 +431,8 @@ fn inspect_says_more_on_stderr_when_asked() {
     for more in [&[][..], &["--reference"]] {
         let (code, quiet, nothing) = run(&[&["inspect", "scenes/cubes-615.toml"], more].concat());
         assert_eq!((code, nothing.as_str()), (0, ""));
-        let (_, stdout, stderr) = run(&[&["inspect", "scenes/cubes-615.toml", "-v"], more].concat());
+        let (_, stdout, stderr) =
+            run(&[&["inspect", "scenes/cubes-615.toml", "-v"], more].concat());
         assert_eq!(stdout, quiet);
         assert!(stderr.contains("615 particles in 23 groups, film "), "{stderr}");
         assert_eq!(stderr.lines().count(), if more.is_empty() { 2 } else { 1 });
@@ -343,9 +445,11 @@ fn inspect_gives_device_and_reference_in_the_same_columns() {
     assert_eq!(code, 0);
     assert_eq!(device.lines().next(), Some("index,cloud,x,y,z,radius,sigma,kappa,r,g,b"));
     assert_eq!(device.lines().count(), 555);
-    let (_, reference, _) = run(&["inspect", "scenes/cubes-554.toml", "--particles", "--reference"]);
-    let number =
-        |line: &str, column: usize| line.split(',').nth(column).and_then(|t| t.parse::<f64>().ok()).expect("a number");
+    let (_, reference, _) =
+        run(&["inspect", "scenes/cubes-554.toml", "--particles", "--reference"]);
+    let number = |line: &str, column: usize| {
+        line.split(',').nth(column).and_then(|t| t.parse::<f64>().ok()).expect("a number")
+    };
     for (a, b) in device.lines().zip(reference.lines()).skip(1) {
         for column in 2..5 {
             // tests/pass_generate.rs has the derived bound; here: the columns mean the same.
@@ -393,7 +497,9 @@ fn devices_lists_at_least_the_one_that_is_used() {
 fn help_teaches() {
     let (code, help, _) = run(&["--help"]);
     assert_eq!(code, 0);
-    for word in ["render", "bench", "compare", "inspect", "devices", "Exit codes", "scenes/hello.toml"] {
+    for word in
+        ["render", "bench", "compare", "inspect", "devices", "Exit codes", "scenes/hello.toml"]
+    {
         assert!(help.contains(word), "{word}");
     }
 }

@@ -21,7 +21,8 @@ fn scene(lighting: &str) -> (tempfile::TempDir, String) {
     let dir = tempfile::tempdir().expect("a temporary folder");
     let hello = fs::read_to_string("scenes/hello.toml").expect("the scene");
     fs::copy("scenes/hello.csv", dir.path().join("hello.csv")).expect("the list");
-    let materials = "[[material]]\nname = \"cloud\"\nkd = [0.5, 0.5, 0.5]\n\n[[material]]\nname = \"gloss\"\n\
+    let materials = "[[material]]\nname = \"cloud\"\nkd = [0.5, 0.5, 0.5]\n\n[[material]]\nname \
+        = \"gloss\"\n\
                      kd = [0.3, 0.3, 0.3]\nks = [0.1, 0.1, 0.1]\nns = 50\n";
     let path = dir.path().join("scene.toml");
     fs::write(&path, format!("{hello}\n[lighting]\n{lighting}\n{materials}")).expect("a scene");
@@ -58,10 +59,22 @@ fn values_and_errors_are_tables_of_their_own() {
     assert_eq!(values.lines().count(), 1 + 64);
     let (code, errors, _) = run(&["inspect", &scene, "--basis", "errors"]);
     let lines: Vec<&str> = errors.lines().collect();
-    assert_eq!((code, lines[0], lines.len()), (0, "of,material,ns,error", 1 + 17 + 1 + 1), "{errors}");
-    let error = |line: &str| line.rsplit(',').next().and_then(|cell| cell.parse::<f64>().ok()).expect("an error");
-    assert!(lines[1].starts_with("range,,1.0,") && lines[17].starts_with("range,,256.0,"), "{errors}");
-    assert!(lines[18].starts_with("worst,,") && lines[1..].iter().all(|l| error(l) <= error(lines[18])), "{errors}");
+    assert_eq!(
+        (code, lines[0], lines.len()),
+        (0, "of,material,ns,error", 1 + 17 + 1 + 1),
+        "{errors}"
+    );
+    let error = |line: &str| {
+        line.rsplit(',').next().and_then(|cell| cell.parse::<f64>().ok()).expect("an error")
+    };
+    assert!(
+        lines[1].starts_with("range,,1.0,") && lines[17].starts_with("range,,256.0,"),
+        "{errors}"
+    );
+    assert!(
+        lines[18].starts_with("worst,,") && lines[1..].iter().all(|l| error(l) <= error(lines[18])),
+        "{errors}"
+    );
     assert!(lines[19].starts_with("material,gloss,50.0,"), "{errors}");
 }
 
@@ -71,13 +84,22 @@ fn json_holds_all_of_it() {
     let (code, text, stderr) = run(&["inspect", &scene, "--basis", "--json"]);
     assert_eq!((code, stderr.as_str()), (0, ""));
     let found: Value = serde_json::from_str(&text).expect("JSON");
-    assert_eq!((&found["asked"], &found["kept"], &found["sampling"]), (&8.into(), &8.into(), &"log".into()));
+    assert_eq!(
+        (&found["asked"], &found["kept"], &found["sampling"]),
+        (&8.into(), &8.into(), &"log".into())
+    );
     assert_eq!(found["exponents"], serde_json::json!([1.0, 64.0]));
     let length = |v: &Value| v.as_array().map(Vec::len);
-    assert_eq!((length(&found["table"]["bases"]), length(&found["table"]["t"])), (Some(8), Some(1025)));
+    assert_eq!(
+        (length(&found["table"]["bases"]), length(&found["table"]["t"])),
+        (Some(8), Some(1025))
+    );
     assert_eq!(length(&found["singular_values"]), Some(64));
     // The page's first row: 2.6e-3.
-    let worst = found["errors"].as_array().and_then(|e| e.iter().find(|row| row["of"] == "worst")).expect("a worst");
+    let worst = found["errors"]
+        .as_array()
+        .and_then(|e| e.iter().find(|row| row["of"] == "worst"))
+        .expect("a worst");
     assert_eq!(format!("{:.1e}", worst["error"].as_f64().expect("a number")), "2.6e-3");
     assert_eq!(run(&["inspect", &scene, "--basis", "errors", "--json"]).1, text);
 }
@@ -88,8 +110,10 @@ fn fewer_bases_than_asked_for_are_said() {
     let (code, table, stderr) = run(&["inspect", &scene, "--basis"]);
     assert_eq!(code, 0);
     let n_bases = table.lines().next().map_or(0, |header| header.split(',').count() - 2);
-    let expected =
-        format!("note: 32 bases asked for, {n_bases} kept: the lobes of n_s from 49 to 51 have no more that differ\n");
+    let expected = format!(
+        "note: 32 bases asked for, {n_bases} kept: the lobes of n_s from 49 to 51 have no more \
+         that differ\n"
+    );
     assert!(n_bases < 32 && stderr == expected, "{stderr}");
     let (_, again, nothing) = run(&["inspect", &scene, "--basis", "-q"]);
     assert_eq!((again, nothing), (table, String::new()));
@@ -98,8 +122,12 @@ fn fewer_bases_than_asked_for_are_said() {
 #[test]
 fn what_does_not_fit_together_is_refused() {
     for more in [&["--plan"][..], &["--reference"], &["--frame", "3"], &["--particles"]] {
-        let (code, stdout, stderr) = run(&[&["inspect", "scenes/hello.toml", "--basis"], more].concat());
-        assert!(code == 2 && stdout.is_empty() && stderr.contains("cannot be used with"), "{more:?}: {stderr}");
+        let (code, stdout, stderr) =
+            run(&[&["inspect", "scenes/hello.toml", "--basis"], more].concat());
+        assert!(
+            code == 2 && stdout.is_empty() && stderr.contains("cannot be used with"),
+            "{more:?}: {stderr}"
+        );
     }
     let (code, _, stderr) = run(&["inspect", "scenes/hello.toml", "--basis", "vectors"]);
     assert!(code == 2 && stderr.contains("table, values, errors"), "{stderr}");
@@ -115,7 +143,8 @@ fn a_basis_too_small_for_a_material_is_warned_of() {
     };
     let found = warnings("bases = 3");
     assert!(
-        found.len() == 1 && found[0].starts_with("material `gloss`: 3 bases represent n_s = 50 only to"),
+        found.len() == 1
+            && found[0].starts_with("material `gloss`: 3 bases represent n_s = 50 only to"),
         "{found:?}"
     );
     assert!(warnings("bases = 1")[0].contains("leaves out its lobe"));

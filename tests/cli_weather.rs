@@ -33,14 +33,16 @@ fn tables_for_people() {
         "clouds from the file's mixing ratios",
         "note: QICE is missing",
         "note: MP_PHYSICS is 3: QCLOUD is ice below 273.15 K",
-        "note: at step 1 clouds of 302 columns reach the highest level: what is above is not in the file",
+        "note: at step 1 clouds of 302 columns reach the highest level: what is above is \
+         not in the file",
         "QCLOUD    float  4 x 14 x 48 x 48",
         "kg kg-1",
     ];
     for line in lines {
         assert!(out.contains(line), "{line}\n{out}");
     }
-    // The first step as another program has it (tests/weather.rs); the sun is 4 degrees above the Gulf of Mexico.
+    // The first step as another program has it (tests/weather.rs); the sun is 4 degrees above the
+    // Gulf of Mexico.
     let row = out.lines().find(|line| line.starts_with("0 ")).expect("the first step");
     let words: Vec<&str> = row.split_whitespace().collect();
     let expected = [
@@ -87,7 +89,10 @@ fn one_step_as_json() {
         (&step["clouds"]["cells"], &step["clouds"]["columns"], &step["negative"]),
         (&24891.into(), &1583.into(), &0.into())
     );
-    let snow = json["variables"].as_array().and_then(|v| v.iter().find(|v| v["name"] == "QSNOW")).expect("snow");
+    let snow = json["variables"]
+        .as_array()
+        .and_then(|v| v.iter().find(|v| v["name"] == "QSNOW"))
+        .expect("snow");
     assert_eq!(
         (&snow["type"], &snow["units"], &snow["dimensions"][1]["length"]),
         (&"float".into(), &"kg kg-1".into(), &40.into())
@@ -97,7 +102,8 @@ fn one_step_as_json() {
 #[test]
 fn what_is_diagnosed_and_what_is_clear_says_so() {
     let dir = tempfile::tempdir().expect("a folder");
-    let write = |name: &str, made: &Made| fs::write(path(&dir, name), made.bytes()).expect("written");
+    let write =
+        |name: &str, made: &Made| fs::write(path(&dir, name), made.bytes()).expect("written");
     write("dry.nc", &Made::wrf(2, 1).without("QCLOUD"));
     let (code, out, _) = said(&["weather", &path(&dir, "dry.nc")]);
     assert_eq!(code, Some(0));
@@ -110,7 +116,11 @@ fn what_is_diagnosed_and_what_is_clear_says_so() {
     ] {
         assert!(out.contains(words), "{words}\n{out}");
     }
-    write("odd.nc", &Made::wrf(5, 1).with_floats("QCLOUD", |q| q[..3].copy_from_slice(&[-1e-9, f32::NAN, -2.0])));
+    write(
+        "odd.nc",
+        &Made::wrf(5, 1)
+            .with_floats("QCLOUD", |q| q[..3].copy_from_slice(&[-1e-9, f32::NAN, -2.0])),
+    );
     let (_, out, _) = said(&["weather", &path(&dir, "odd.nc")]);
     assert!(out.contains("2 negative, 1 missing"), "{out}");
 }
@@ -120,7 +130,8 @@ fn bad_files_exit_with_2_and_one_message() {
     let dir = tempfile::tempdir().expect("a folder");
     let bad = path(&dir, "bad.nc");
     fs::write(&bad, Made::wrf(1, 2).without("PHB").bytes()).expect("written");
-    let message = format!("error: {bad}: variable PHB is missing: expected P, PB, T, PH, PHB of WRF\n");
+    let message =
+        format!("error: {bad}: variable PHB is missing: expected P, PB, T, PH, PHB of WRF\n");
     assert_eq!(said(&["weather", &bad]), (Some(2), String::new(), message));
     let katrina = scenery("katrina.nc");
     let message = format!("error: step 4: {katrina} has steps 0 to 3\n");
@@ -133,7 +144,9 @@ fn bad_files_exit_with_2_and_one_message() {
 fn help_teaches() {
     let (code, help, _) = said(&["weather", "--help"]);
     assert_eq!(code, Some(0));
-    for word in ["WRF", "diagnosed", "--step <N>", "--json", "Exit codes", "scenes/weather/katrina.nc"] {
+    for word in
+        ["WRF", "diagnosed", "--step <N>", "--json", "Exit codes", "scenes/weather/katrina.nc"]
+    {
         assert!(help.contains(word), "{word}\n{help}");
     }
 }

@@ -1,4 +1,5 @@
-//! `nimbus compare` as a user runs it, on results folders made here: verdicts, refusals, and files that are not whole.
+//! `nimbus compare` as a user runs it, on results folders made here: verdicts, refusals, and files
+//! that are not whole.
 
 #[path = "harness/results.rs"]
 mod results;
@@ -73,10 +74,17 @@ fn a_run_and_itself_and_a_slower_one() {
 
     let (code, table, _) = compare(&[&a, &b]);
     assert_eq!(code, 0, "a verdict is no failure");
-    assert!(table.contains("parallel frame: B takes 1.050 of A's time") && table.contains("): slower"), "{table}");
+    assert!(
+        table.contains("parallel frame: B takes 1.050 of A's time") && table.contains("): slower"),
+        "{table}"
+    );
     let (_, table, _) = compare(&[&b, &a]);
-    assert!(table.contains("serial frame: B takes 0.952 of A's time") && table.contains("): faster"), "{table}");
-    for word in ["corrected for many comparisons", "block bootstrap, 2000 resamples", "(frame: 8)"] {
+    assert!(
+        table.contains("serial frame: B takes 0.952 of A's time") && table.contains("): faster"),
+        "{table}"
+    );
+    for word in ["corrected for many comparisons", "block bootstrap, 2000 resamples", "(frame: 8)"]
+    {
         assert!(table.contains(word), "{word} in\n{table}");
     }
 }
@@ -88,12 +96,14 @@ fn a_machine_that_was_not_steady_is_remarked_on() {
     let drifting = dir.path().join("b");
     fs::create_dir(&drifting).expect("a folder");
     let mut all = [rows("serial", 10.0), rows("parallel", 0.9 * 10.2)].concat();
-    // Serial, a block of 9 frames at 10 ms and one of 51 at 11: 1.1 between them, and 1.08 from A to B.
+    // Serial, a block of 9 frames at 10 ms and one of 51 at 11: 1.1 between them, and 1.08 from A
+    // to B.
     for row in all.iter_mut().filter(|row| row.threading == "serial" && row.frame > 10) {
         row.block = 3;
         row.frame_ms *= 1.1;
     }
-    write_results(&drifting, &run(), &["grid".to_owned(), "sort".to_owned()], &all).expect("results");
+    write_results(&drifting, &run(), &["grid".to_owned(), "sort".to_owned()], &all)
+        .expect("results");
     let (code, table, _) = compare(&[&a, drifting.to_str().expect("UTF-8")]);
     assert!(code == 0 && table.matches("note: ").count() == 1, "{table}");
     assert!(table.contains("note: serial: B's own blocks lie a factor of 1.1"), "{table}");
@@ -107,19 +117,30 @@ fn json_says_what_the_table_says() {
     let json: Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!((code, &json["headline"], &json["a"]["folder"]), (0, &json!("frame"), &json!(a)));
     let frame = &json["modes"][0]["measures"][0];
-    assert_eq!((&frame["measure"], &frame["verdict"], &frame["n_a"]), (&json!("frame"), &json!("slower"), &json!(60)));
+    assert_eq!(
+        (&frame["measure"], &frame["verdict"], &frame["n_a"]),
+        (&json!("frame"), &json!("slower"), &json!(60))
+    );
     let number = |value: &Value| value.as_f64().expect("a number");
     // Medians of a pattern about 10 ms with a step of 0.02 ms, warm-up left out.
     assert!((number(&frame["a_ms"]) - 10.0).abs() < 0.05, "{frame}");
     let ratio = &frame["b_by_a"];
     assert!((number(&ratio["estimate"]) - 1.05).abs() < 1e-12, "{frame}");
-    assert!(number(&ratio["low"]) > 1.0 && number(&ratio["low"]) <= 1.05 && number(&ratio["high"]) >= 1.05, "{frame}");
+    assert!(
+        number(&ratio["low"]) > 1.0
+            && number(&ratio["low"]) <= 1.05
+            && number(&ratio["high"]) >= 1.05,
+        "{frame}"
+    );
     // render = record + submit + wait = 0.9 of the frame.
     let render = &json["modes"][0]["measures"][2];
     assert_eq!(render["measure"], "render");
     assert!((number(&render["a_ms"]) - 0.9 * number(&frame["a_ms"])).abs() < 1e-9);
     let game = &json["modes"][0]["measures"][1];
-    assert_eq!((&game["measure"], &game["verdict"]), (&json!("game"), &json!("no_difference_found")));
+    assert_eq!(
+        (&game["measure"], &game["verdict"]),
+        (&json!("game"), &json!("no_difference_found"))
+    );
 }
 
 /// A change of the run, the kind it is, and what the refusal has to show of it.
@@ -131,7 +152,11 @@ const CHANGES: [Change; 8] = [
     (|r| r.cpu.logical_cores = 3, "device", &["cores: A 2, B 3"]),
     (|r| r.environment.clear(), "device", &["LP_NUM_THREADS: A 1, B not set"]),
     (|r| r.nimbus = "0.2.0".to_owned(), "build", &["build, version: A 0.1.0, B 0.2.0"]),
-    (|r| r.revision = "ba9876543210".to_owned(), "build", &["revision: A 0123456789ab, B ba9876543210"]),
+    (
+        |r| r.revision = "ba9876543210".to_owned(),
+        "build",
+        &["revision: A 0123456789ab, B ba9876543210"],
+    ),
     (|r| r.scene_hash = "cd".repeat(32), "scene", &["scene_hash: A abab", "B cdcd"]),
     (
         |r| {
@@ -152,7 +177,8 @@ fn what_differs_is_refused_by_name_unless_allowed() {
         let mut changed = run();
         change(&mut changed);
         let b = written(&dir, &format!("b{i}"), 10.0, &changed);
-        let others: Vec<&str> = ["device", "build", "scene"].into_iter().filter(|k| *k != kind).collect();
+        let others: Vec<&str> =
+            ["device", "build", "scene"].into_iter().filter(|k| *k != kind).collect();
         for refused in [compare(&[&a, &b]), compare(&[&a, &b, "--allow", &others.join(",")])] {
             assert_eq!((refused.0, refused.1.as_str()), (2, ""), "{kind}");
             assert!(shown.iter().all(|s| refused.2.contains(s)), "{}", refused.2);
@@ -161,7 +187,10 @@ fn what_differs_is_refused_by_name_unless_allowed() {
         assert!(stderr.contains(&format!("--allow {kind} compares them")), "{stderr}");
         let (code, table, stderr) = compare(&[&a, &b, "--allow", kind]);
         assert_eq!((code, stderr.as_str()), (0, ""));
-        assert!(table.contains("allowed to differ: ") && shown.iter().all(|s| table.contains(s)), "{table}");
+        assert!(
+            table.contains("allowed to differ: ") && shown.iter().all(|s| table.contains(s)),
+            "{table}"
+        );
     }
 }
 
@@ -173,7 +202,10 @@ fn the_flag_to_add_names_all_that_differs_and_what_was_allowed() {
     let b = written(&dir, "b", 10.0, &other);
     assert!(compare(&[&a, &b]).2.contains("--allow build,scene"));
     let (code, _, stderr) = compare(&[&a, &b, "--allow", "scene"]);
-    assert!(code == 2 && stderr.contains("--allow build,scene") && !stderr.contains("scene_hash"), "{stderr}");
+    assert!(
+        code == 2 && stderr.contains("--allow build,scene") && !stderr.contains("scene_hash"),
+        "{stderr}"
+    );
     assert_eq!(compare(&[&a, &b, "--allow", "scene,build"]).0, 0);
     let (code, _, stderr) = compare(&[&a, &b, "--allow", "everything"]);
     assert!(code == 2 && stderr.contains("device, build, scene"), "{stderr}");
@@ -188,7 +220,11 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
     let (a, b) = (written(&dir, "a", 10.0, &dirty), written(&dir, "b", 10.0, &asked));
     let (code, table, _) = compare(&[&a, &b]);
     assert_eq!((code, table.matches("note: ").count()), (0, 3), "{table}");
-    for word in ["-dirty: that does not say", "B was interrupted", "A \"bench a.toml\", B \"bench a.toml --no-skip\""] {
+    for word in [
+        "-dirty: that does not say",
+        "B was interrupted",
+        "A \"bench a.toml\", B \"bench a.toml --no-skip\"",
+    ] {
         assert!(table.contains(word), "{word} in\n{table}");
     }
     let mut serial = run();
@@ -196,13 +232,15 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
     serial.cases[0].modes[0].threading = "elsewhere".to_owned();
     let none = dir.path().join("none");
     fs::create_dir(&none).expect("a folder");
-    write_results(&none, &serial, &["grid".to_owned(), "sort".to_owned()], &rows("elsewhere", 1.0)).expect("results");
+    write_results(&none, &serial, &["grid".to_owned(), "sort".to_owned()], &rows("elsewhere", 1.0))
+        .expect("results");
     let a = written(&dir, "c", 10.0, &run());
     let (code, _, stderr) = compare(&[&a, none.to_str().expect("UTF-8")]);
     assert!(code == 2 && stderr.contains("A has serial, parallel, B has elsewhere"), "{stderr}");
 }
 
-/// A change of a good folder, and the two parts of the one message it must give: the file and the fault.
+/// A change of a good folder, and the two parts of the one message it must give: the file and the
+/// fault.
 type Damage = (fn(&Path), &'static str, &'static str);
 
 fn edit(path: &Path, change: impl Fn(&str) -> String) {
@@ -214,15 +252,31 @@ const DAMAGES: [Damage; 14] = [
     (|d| fs::remove_dir_all(d).expect("removed"), "b: ", "no such folder"),
     (|d| fs::remove_file(d.join(RUN_FILE)).expect("removed"), "b: ", "holds no run.json"),
     (|d| fs::remove_file(d.join(FRAMES_FILE)).expect("removed"), "frames.csv", "No such file"),
-    (|d| edit(&d.join(RUN_FILE), |t| t[..t.len() / 2].to_owned()), "run.json", "not JSON, or not all of it"),
-    (|d| edit(&d.join(RUN_FILE), |_| "{\"name\": 1}".to_owned()), "run.json", "names no schema version"),
+    (
+        |d| edit(&d.join(RUN_FILE), |t| t[..t.len() / 2].to_owned()),
+        "run.json",
+        "not JSON, or not all of it",
+    ),
+    (
+        |d| edit(&d.join(RUN_FILE), |_| "{\"name\": 1}".to_owned()),
+        "run.json",
+        "names no schema version",
+    ),
     (
         |d| edit(&d.join(RUN_FILE), |_| "{\"schema\": 3}".to_owned()),
         "run.json",
         "not a run.json of nimbus: missing field",
     ),
-    (|d| edit(&d.join(RUN_FILE), |t| t.replace("\"schema\": 3", "\"schema\": 2")), "run.json", "schema 2; this nimbus"),
-    (|d| edit(&d.join(FRAMES_FILE), |t| t[..t.len() - 40].to_owned()), "frames.csv: line 125: ", "cut off?"),
+    (
+        |d| edit(&d.join(RUN_FILE), |t| t.replace("\"schema\": 3", "\"schema\": 2")),
+        "run.json",
+        "schema 2; this nimbus",
+    ),
+    (
+        |d| edit(&d.join(FRAMES_FILE), |t| t[..t.len() - 40].to_owned()),
+        "frames.csv: line 125: ",
+        "cut off?",
+    ),
     (
         |d| edit(&d.join(FRAMES_FILE), |t| whole_lines(t, 100)),
         "frames.csv",
@@ -230,9 +284,17 @@ const DAMAGES: [Damage; 14] = [
     ),
     (|d| edit(&d.join(FRAMES_FILE), |_| String::new()), "frames.csv", "no column phase"),
     (|d| edit(&d.join(FRAMES_FILE), |_| "x,y\n1,2\n".to_owned()), "frames.csv", "no column phase"),
-    (|d| edit(&d.join(FRAMES_FILE), |t| t.replace(",1,1.0", ",fast,1.0")), "frames.csv", "expected"),
+    (
+        |d| edit(&d.join(FRAMES_FILE), |t| t.replace(",1,1.0", ",fast,1.0")),
+        "frames.csv",
+        "expected",
+    ),
     (|d| fs::write(d.join(FRAMES_FILE), [0xff, 0xfe, 0]).expect("written"), "frames.csv", "UTF-8"),
-    (|d| edit(&d.join(FRAMES_FILE), |t| t.replace("parallel", "sideways")), "frames.csv", "0 timed parallel frames"),
+    (
+        |d| edit(&d.join(FRAMES_FILE), |t| t.replace("parallel", "sideways")),
+        "frames.csv",
+        "0 timed parallel frames",
+    ),
 ];
 
 fn whole_lines(text: &str, n: usize) -> String {
@@ -249,8 +311,15 @@ fn what_is_not_whole_or_not_ours_is_one_message_with_its_path() {
         damage(Path::new(&b));
         for args in [[&a, &b], [&b, &a]] {
             let (code, stdout, stderr) = compare(&args.map(String::as_str));
-            assert_eq!((code, stdout.as_str(), stderr.lines().count()), (2, "", 1), "{fault}: {stderr}");
-            assert!(stderr.contains(&b) && stderr.contains(file) && stderr.contains(fault), "{fault}: {stderr}");
+            assert_eq!(
+                (code, stdout.as_str(), stderr.lines().count()),
+                (2, "", 1),
+                "{fault}: {stderr}"
+            );
+            assert!(
+                stderr.contains(&b) && stderr.contains(file) && stderr.contains(fault),
+                "{fault}: {stderr}"
+            );
         }
     }
 }
@@ -260,7 +329,10 @@ fn a_folder_of_folders_is_explained() {
     let dir = temp();
     let a = written(&dir, "hello", 10.0, &run());
     let (code, _, stderr) = compare(&[dir.path().to_str().expect("UTF-8"), &a]);
-    assert!(code == 2 && stderr.contains("name one of those, such as ") && stderr.contains("hello"), "{stderr}");
+    assert!(
+        code == 2 && stderr.contains("name one of those, such as ") && stderr.contains("hello"),
+        "{stderr}"
+    );
 }
 
 #[test]
@@ -268,20 +340,34 @@ fn what_bench_wrote_is_read_back_whole_and_does_not_differ_from_itself() {
     let dir = temp();
     let out = dir.path().join("run");
     let mut bench = Command::cargo_bin("nimbus").expect("the program is built");
-    bench.args(["bench", "scenes/hello.toml", "--size", "64x48", "--frames", "16", "--warmup", "2", "--repeat", "2"]);
+    bench.args([
+        "bench",
+        "scenes/hello.toml",
+        "--size",
+        "64x48",
+        "--frames",
+        "16",
+        "--warmup",
+        "2",
+        "--repeat",
+        "2",
+    ]);
     bench.arg("--out").arg(&out).assert().success();
     let recorded = read_results(&out).expect("results");
-    let order: Vec<(&str, bool)> = recorded.run.block_order.iter().map(|b| (&b.threading[..], b.skip)).collect();
+    let order: Vec<(&str, bool)> =
+        recorded.run.block_order.iter().map(|b| (&b.threading[..], b.skip)).collect();
     let there = [("serial", true), ("parallel", true), ("serial", false)];
     let back = there.iter().rev();
     assert_eq!(order, there.iter().chain(back).copied().collect::<Vec<_>>());
     let modes = &recorded.run.cases[0].modes;
     assert_eq!((recorded.modes.len(), modes.len()), (3, 3));
     for (timed, mode) in recorded.modes.iter().zip(modes) {
-        let name = if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) };
+        let name =
+            if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) };
         assert_eq!((&timed.name, timed.frames.len()), (&name, 32));
         // Every summary can be computed again from the frames.
-        let summaries = [mode.frame_ms, mode.game_ms, mode.render_ms, mode.gpu_ms].map(|m| m.map(|m| m.of));
+        let summaries =
+            [mode.frame_ms, mode.game_ms, mode.render_ms, mode.gpu_ms].map(|m| m.map(|m| m.of));
         for (measure, summary) in timed.measures.iter().zip(summaries) {
             assert_eq!(Summary::of(&measure.ms), summary, "{}", measure.name);
         }
@@ -296,9 +382,14 @@ fn what_bench_wrote_is_read_back_whole_and_does_not_differ_from_itself() {
 fn help_teaches() {
     let (code, help, _) = compare(&["--help"]);
     assert_eq!(code, 0);
-    for word in
-        ["95 % interval", "twenty", "--allow", "bench scenes/threads.toml --out before", "Exit codes", "not the same"]
-    {
+    for word in [
+        "95 % interval",
+        "twenty",
+        "--allow",
+        "bench scenes/threads.toml --out before",
+        "Exit codes",
+        "not the same",
+    ] {
         assert!(help.contains(word), "{word} in\n{help}");
     }
 }

@@ -1,4 +1,5 @@
-//! `nimbus compare` of two pictures as a user types it: numbers known by hand, and everything that is no pair of pictures.
+//! `nimbus compare` of two pictures as a user types it: numbers known by hand, and everything that
+//! is no pair of pictures.
 
 use std::process::Command;
 
@@ -34,13 +35,25 @@ impl Folder {
         self.0.path().join(name).to_str().expect("UTF-8").to_owned()
     }
 
-    fn exr(&self, name: &str, width: u32, height: u32, pixel: impl Fn(u32, u32) -> [f32; 4]) -> String {
+    fn exr(
+        &self,
+        name: &str,
+        width: u32,
+        height: u32,
+        pixel: impl Fn(u32, u32) -> [f32; 4],
+    ) -> String {
         let path = self.path(name);
         ImageBuffer::from_fn(width, height, |x, y| Rgba(pixel(x, y))).save(&path).expect("an EXR");
         path
     }
 
-    fn png(&self, name: &str, width: u32, height: u32, pixel: impl Fn(u32, u32) -> [u8; 3]) -> String {
+    fn png(
+        &self,
+        name: &str,
+        width: u32,
+        height: u32,
+        pixel: impl Fn(u32, u32) -> [u8; 3],
+    ) -> String {
         let path = self.path(name);
         ImageBuffer::from_fn(width, height, |x, y| Rgb(pixel(x, y))).save(&path).expect("a PNG");
         path
@@ -61,7 +74,10 @@ fn offsets_of_linear_pictures_by_hand() {
     assert_eq!((metric(&json, "alpha_max"), metric(&json, "alpha_rmse")), (0.5, 0.125f64.sqrt()));
     assert!(metric(&json, "ssim") < 1.0 && metric(&json, "flip") > 0.05);
     assert_eq!((json["values"].as_str(), json["not_finite"].as_u64()), (Some("linear"), Some(0)));
-    assert_eq!((json["psnr_peak"].as_f64(), json["rel_mse_epsilon"].as_f64()), (Some(1.0), Some(0.01)));
+    assert_eq!(
+        (json["psnr_peak"].as_f64(), json["rel_mse_epsilon"].as_f64()),
+        (Some(1.0), Some(0.01))
+    );
     assert_eq!(json["pixels_per_degree"].as_f64(), Some(67.0));
 }
 
@@ -71,7 +87,10 @@ fn pngs_of_8_and_16_bits_are_compared_as_display_values() {
     let black = dir.png("black.png", 24, 24, |_, _| [0; 3]);
     let white = dir.png("white.png", 24, 24, |_, _| [255; 3]);
     let apart = json(&[&black, &white]);
-    assert_eq!((metric(&apart, "rmse"), metric(&apart, "max"), metric(&apart, "psnr")), (1.0, 1.0, 0.0));
+    assert_eq!(
+        (metric(&apart, "rmse"), metric(&apart, "max"), metric(&apart, "psnr")),
+        (1.0, 1.0, 0.0)
+    );
     // (C1)/(1 + C1) of SSIM's formula, and FLIP's of black against white (measure::picture::flip).
     assert!((metric(&apart, "ssim") - 1e-4 / 1.0001).abs() < 1e-9);
     assert!((0.95..1.0).contains(&metric(&apart, "flip")));
@@ -79,20 +98,32 @@ fn pngs_of_8_and_16_bits_are_compared_as_display_values() {
     let deep = dir.path("deep.png");
     ImageBuffer::from_fn(24, 24, |_, _| Rgb([65535u16; 3])).save(&deep).expect("a PNG");
     let same = json(&[&white, &deep]);
-    assert!(metric(&same, "rmse") == 0.0 && metric(&same, "flip") == 0.0 && same["metrics"]["psnr"].is_null());
+    assert!(
+        metric(&same, "rmse") == 0.0
+            && metric(&same, "flip") == 0.0
+            && same["metrics"]["psnr"].is_null()
+    );
     assert!((metric(&same, "ssim") - 1.0).abs() < 1e-12);
 }
 
 #[test]
 fn what_is_not_finite_is_counted_and_does_not_spread() {
     let dir = Folder::new();
-    let a = dir.exr("a.exr", 16, 16, |x, y| [0.5, 0.5, if (x, y) == (3, 3) { f32::NAN } else { 0.5 }, 1.0]);
+    let a = dir.exr("a.exr", 16, 16, |x, y| {
+        [0.5, 0.5, if (x, y) == (3, 3) { f32::NAN } else { 0.5 }, 1.0]
+    });
     let bad = |x: u32, y: u32| if x == 9 && y < 2 { f32::INFINITY } else { 0.5 };
     let b = dir.exr("b.exr", 16, 16, |x, y| [bad(x, y), 0.5, 0.5, 1.0]);
     let json = json(&[&a, &b]);
     let count = |name: &str| json[name].as_u64();
-    assert_eq!([count("not_finite_a"), count("not_finite_b"), count("not_finite")], [Some(1), Some(2), Some(3)]);
-    assert_eq!((metric(&json, "rmse"), metric(&json, "max"), metric(&json, "flip")), (0.0, 0.0, 0.0));
+    assert_eq!(
+        [count("not_finite_a"), count("not_finite_b"), count("not_finite")],
+        [Some(1), Some(2), Some(3)]
+    );
+    assert_eq!(
+        (metric(&json, "rmse"), metric(&json, "max"), metric(&json, "flip")),
+        (0.0, 0.0, 0.0)
+    );
     let (code, stdout, stderr) = compare(&[&a, &b, "--fail-above", "not_finite=2"]);
     assert_eq!((code, stderr.as_str()), (1, "error: not_finite is 3, above 2\n"));
     assert!(stdout.contains("not finite: 1 pixels of A, 2 of B"), "{stdout}");
@@ -107,10 +138,15 @@ fn limits_decide_the_exit_code() {
     let a = dir.png("a.png", 20, 20, |_, _| [100; 3]);
     let b = dir.png("b.png", 20, 20, |x, _| [if x < 10 { 100 } else { 110 }; 3]);
     assert_eq!(compare(&[&a, &b, "--fail-above", "rmse=0.1", "--fail-below", "ssim=0.5"]).0, 0);
-    let (code, stdout, stderr) = compare(&[&a, &b, "--fail-above", "max=0.01", "--fail-below", "psnr=60"]);
+    let (code, stdout, stderr) =
+        compare(&[&a, &b, "--fail-above", "max=0.01", "--fail-below", "psnr=60"]);
     assert!(code == 1 && stdout.contains("rmse"), "{stdout}");
-    assert!(stderr.starts_with("error: max is 0.0392") && stderr.contains("; psnr is 31."), "{stderr}");
-    // Equal pictures have a PSNR without end, which is below nothing; of so few pixels there is no SSIM.
+    assert!(
+        stderr.starts_with("error: max is 0.0392") && stderr.contains("; psnr is 31."),
+        "{stderr}"
+    );
+    // Equal pictures have a PSNR without end, which is below nothing; of so few pixels there is no
+    // SSIM.
     assert_eq!(compare(&[&a, &a, "--fail-below", "psnr=200"]).0, 0);
     let small = dir.png("small.png", 10, 20, |_, _| [0; 3]);
     assert_eq!(compare(&[&small, &small, "--fail-below", "ssim=0"]).0, 1);
@@ -154,7 +190,10 @@ fn all_else_is_one_clear_error() {
         (&[&run, &png], "a.png is a picture, "),
         (&[&a, &a, "--allow", "scene"], "--allow is for results folders"),
         (&[&run, &run, "--fail-above", "rmse=1"], "are for pictures"),
-        (&[&a, &a, "--fail-above", "psnr=30"], "--fail-above psnr: expected one of rmse, max, relmse, flip"),
+        (
+            &[&a, &a, "--fail-above", "psnr=30"],
+            "--fail-above psnr: expected one of rmse, max, relmse, flip",
+        ),
         (&[&a, &a, "--fail-below", "rmse=30"], "--fail-below rmse: expected one of psnr, ssim"),
         (&[&a, &a, "--fail-above", "rmse"], "expected METRIC=VALUE such as rmse=1e-3"),
         (&[&a, &a, "--pixels-per-degree", "0"], "expected a number above 0"),

@@ -1,10 +1,12 @@
-//! The defaults lie where they should: in the main scenes no value of a knob that is cheaper than the default is as near to the
-//! reference. By errors alone, which are the same on every machine; what takes longer is known from what a knob does.
+//! The defaults lie where they should: in the main scenes no value of a knob that is cheaper than
+//! the default is as near to the reference. By errors alone, which are the same on every machine;
+//! what takes longer is known from what a knob does.
 
 #[path = "harness/program.rs"]
 mod program;
 
-/// Keys of drawing with values below the default, each of which does less work than the next, and than the default.
+/// Keys of drawing with values below the default, each of which does less work than the next, and
+/// than the default.
 const DRAWING: [&str; 5] = [
     "draw.cutoff=2,2.5",
     "draw.resolution=0.25,0.5",
@@ -15,13 +17,15 @@ const DRAWING: [&str; 5] = [
 /// The same of light in a cloud.
 const LIGHT: [&str; 2] = ["lighting.grid=16,24,32", "lighting.step=4,2"];
 
-/// A cheaper value that is nearer by less than this share of the default's error is as near: both errors are then those of something
-/// else, which the knob moves by chance. (Half of the resolution blurs the rim of the cut at 3 sigma: 1.6 % in study-cloud.)
+/// A cheaper value that is nearer by less than this share of the default's error is as near: both
+/// errors are then those of something else, which the knob moves by chance. (Half of the resolution
+/// blurs the rim of the cut at 3 sigma: 1.6 % in study-cloud.)
 const CHANCE: f64 = 0.02;
 
 /// Every error of a scene by name; the scene as it stands first.
 fn errors(args: &[&str], knobs: &[&str]) -> Vec<(String, f64)> {
-    let mut all = vec!["error", "--csv", "-q", "--rounds", "1", "--frames", "1", "--pixels", "4096"];
+    let mut all =
+        vec!["error", "--csv", "-q", "--rounds", "1", "--frames", "1", "--pixels", "4096"];
     all.extend(args);
     all.extend(knobs.iter().flat_map(|knob| ["--knob", knob]));
     let output = program::run(&all);
@@ -38,7 +42,11 @@ fn as_near(found: &[(String, f64)]) -> Vec<String> {
     let (base, default) = &found[0];
     assert_eq!(base, "as it stands");
     let is_as_near = |(_, error): &&(String, f64)| *error < default * (1.0 - CHANCE);
-    found[1..].iter().filter(is_as_near).map(|(name, error)| format!("{name}: {error:.3e} < {default:.3e}")).collect()
+    found[1..]
+        .iter()
+        .filter(is_as_near)
+        .map(|(name, error)| format!("{name}: {error:.3e} < {default:.3e}"))
+        .collect()
 }
 
 #[test]
@@ -59,7 +67,8 @@ fn no_cheaper_value_is_nearer_to_the_reference() {
 
 #[test]
 fn of_light_in_a_cloud_neither() {
-    let found = errors(&["scenes/study-cloud.toml", "--against", "model", "--size", "200x150"], &LIGHT);
+    let found =
+        errors(&["scenes/study-cloud.toml", "--against", "model", "--size", "200x150"], &LIGHT);
     assert_eq!(found.len(), 6);
     assert_eq!(as_near(&found), Vec::<String>::new(), "{found:?}");
 }
@@ -73,7 +82,8 @@ fn of_light_between_surfaces_neither() {
         "lighting.sampling=uniform",
         "lighting.pair_size=1,2",
     ];
-    let found = errors(&["scenes/study-light.toml", "--against", "model", "--size", "120x90"], &knobs);
+    let found =
+        errors(&["scenes/study-light.toml", "--against", "model", "--size", "120x90"], &knobs);
     assert_eq!(found.len(), 9);
     assert_eq!(as_near(&found), Vec::<String>::new(), "{found:?}");
     // Of 2048 facets the tree gathers.
@@ -86,9 +96,18 @@ fn of_light_between_surfaces_neither() {
 
 #[test]
 fn a_default_that_is_too_cheap_is_found() {
-    // With the default's place taken by a poor value better ones are cheaper or equal: the comparison sees it.
+    // With the default's place taken by a poor value better ones are cheaper or equal: the
+    // comparison sees it.
     let found = errors(
-        &["scenes/hello.toml", "--against", "thin", "--set", "draw.resolution=0.25", "--size", "160x120"],
+        &[
+            "scenes/hello.toml",
+            "--against",
+            "thin",
+            "--set",
+            "draw.resolution=0.25",
+            "--size",
+            "160x120",
+        ],
         &["draw.resolution=0.5,1.0"],
     );
     assert_eq!(as_near(&found).len(), 2, "{found:?}");

@@ -1,5 +1,6 @@
-//! `nimbus edit` under a virtual display: P's boxes by real keys and mouse, saved as they were typed and drawn by `render` as
-//! before; undo, the question about what would be lost, and the picture that a person sees.
+//! `nimbus edit` under a virtual display: P's boxes by real keys and mouse, saved as they were
+//! typed and drawn by `render` as before; undo, the question about what would be lost, and the
+//! picture that a person sees.
 
 #![cfg(feature = "window")]
 
@@ -30,7 +31,8 @@ struct Window<'a> {
 impl<'a> Window<'a> {
     /// `nimbus edit FILE`, 900 by 640 pixels, with what is kept of a user in `dir`.
     fn open(display: &'a Display, dir: &Path, file: &Path) -> Window<'a> {
-        let mut command: Command = nimbus(&["edit", &file.to_string_lossy(), "--size", "900x640", "--validation"]);
+        let mut command: Command =
+            nimbus(&["edit", &file.to_string_lossy(), "--size", "900x640", "--validation"]);
         command.current_dir(dir).env("DISPLAY", display.name()).env("XDG_CONFIG_HOME", dir);
         let child = command.spawn().expect("the program runs");
         let id = display.window_of(child.id());
@@ -44,7 +46,8 @@ impl<'a> Window<'a> {
         self.display.key(name);
     }
 
-    /// Numbers into the active box's fields, from the first on; nothing where a field stays as it is.
+    /// Numbers into the active box's fields, from the first on; nothing where a field stays as it
+    /// is.
     fn types(&self, fields: &[&str]) {
         self.key("Return");
         std::thread::sleep(Duration::from_millis(300));
@@ -133,7 +136,9 @@ fn drags_and_undoes(window: &Window<'_>, path: &Path) {
         size_px: DVec2::new(width, height),
         px_per_point: 1.0,
     };
-    let at = |i: usize| view.project(document.boxes[i].center).expect("in sight").to_array().map(|v| v as u32);
+    let at = |i: usize| {
+        view.project(document.boxes[i].center).expect("in sight").to_array().map(|v| v as u32)
+    };
     // What was typed before a click is for the box that was active then.
     window.key("Return");
     std::thread::sleep(Duration::from_millis(300));
@@ -142,8 +147,10 @@ fn drags_and_undoes(window: &Window<'_>, path: &Path) {
     window.wait_for_title(|title| title.starts_with('*'));
     window.key("ctrl+s");
     window.wait_for_title(|title| !title.starts_with('*'));
-    let counts: Vec<u32> = box_file::read(path).expect("boxes").iter().map(|b| b.n_particles).collect();
-    let expected = document.boxes.iter().enumerate().map(|(i, b)| if i == 0 { 33 } else { b.n_particles });
+    let counts: Vec<u32> =
+        box_file::read(path).expect("boxes").iter().map(|b| b.n_particles).collect();
+    let expected =
+        document.boxes.iter().enumerate().map(|(i, b)| if i == 0 { 33 } else { b.n_particles });
     assert_eq!(counts, expected.collect::<Vec<u32>>());
     window.key("ctrl+z");
     window.wait_for_title(|title| title.starts_with('*'));
@@ -190,8 +197,8 @@ fn a_drag_is_undone_and_what_is_saved_is_drawn_as_before() {
     assert_eq!(window.ended(), "");
 }
 
-/// How far two pictures of a width are apart: the greatest difference of the means of their blocks of 16 by 16 pixels, of any
-/// channel, white being 1.
+/// How far two pictures of a width are apart: the greatest difference of the means of their blocks
+/// of 16 by 16 pixels, of any channel, white being 1.
 fn apart(a: &[u8], b: &[u8], width: u32) -> f64 {
     let width = width as usize;
     let n_columns = width.div_ceil(BLOCK);
@@ -205,8 +212,8 @@ fn apart(a: &[u8], b: &[u8], width: u32) -> f64 {
 }
 
 const BLOCK: usize = 16;
-/// A driver may place an edge half a pixel elsewhere: 1/32 of a block, by at most white; three edges meet in a box's corner.
-/// A face that is missing fills whole blocks.
+/// A driver may place an edge half a pixel elsewhere: 1/32 of a block, by at most white; three
+/// edges meet in a box's corner. A face that is missing fills whole blocks.
 const ALIKE: f64 = 3.0 / 32.0;
 
 #[test]
@@ -230,16 +237,20 @@ fn the_window_looks_as_it_did() {
         let expected = image::open(&kept).expect("the picture that is kept").to_rgb8();
         wait_for(name, || {
             last = window.display.seen(&window.id);
-            (last.0, last.1) == expected.dimensions() && apart(&last.2, expected.as_raw(), last.0) < ALIKE
+            (last.0, last.1) == expected.dimensions()
+                && apart(&last.2, expected.as_raw(), last.0) < ALIKE
         });
         // The red box is what Tab took, and is seen.
         let n_red = last.2.chunks_exact(3).filter(|p| p[0] > 120 && p[1] < 90 && p[2] < 90).count();
         assert!(n_red > 500, "{n_red}");
     }
     // A box less is seen.
-    let kept = image::open(root.join("docs/edit-both.png")).expect("the picture that is kept").to_rgb8();
+    let kept =
+        image::open(root.join("docs/edit-both.png")).expect("the picture that is kept").to_rgb8();
     window.key("Delete");
-    wait_for("a box less", || apart(&window.display.seen(&window.id).2, kept.as_raw(), kept.width()) > 2.0 * ALIKE);
+    wait_for("a box less", || {
+        apart(&window.display.seen(&window.id).2, kept.as_raw(), kept.width()) > 2.0 * ALIKE
+    });
     window.key("ctrl+z");
     window.wait_for_title(|title| !title.starts_with('*'));
     window.key("ctrl+q");

@@ -1,4 +1,5 @@
-//! The macrostructure editor without a window: P's two clouds made by hand, and laws over generated actions.
+//! The macrostructure editor without a window: P's two clouds made by hand, and laws over generated
+//! actions.
 
 #[path = "editor/actions.rs"]
 mod actions;
@@ -48,7 +49,10 @@ fn as_many_undos_as_steps_lead_to_the_first_document_and_redos_to_the_last() {
         let n = last.history().n_undo();
         let undone = after_all(&last, &vec![Action::Undo; n]);
         prop_assert!(undone.document().is_same(first.document()));
-        prop_assert_eq!((undone.history().n_undo(), undone.history().n_redo()), (0, n + last.history().n_redo()));
+        prop_assert_eq!(
+            (undone.history().n_undo(), undone.history().n_redo()),
+            (0, n + last.history().n_redo())
+        );
         let redone = after_all(&undone, &vec![Action::Redo; n]);
         prop_assert!(redone.document().is_same(last.document()));
         prop_assert_eq!(redone.history().n_undo(), n);
@@ -83,7 +87,8 @@ fn no_actions_make_what_the_reader_refuses_and_touched_names_all_that_changed() 
                 continue;
             };
             let written = text(next.boxes());
-            let read = box_file::parse(&written, Path::new("b")).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            let read = box_file::parse(&written, Path::new("b"))
+                .map_err(|e| TestCaseError::fail(e.to_string()))?;
             prop_assert_eq!(text(&read), written);
             let selected = next.selection().boxes();
             prop_assert!(selected.iter().all(|i| *i < next.boxes().len()));
@@ -95,15 +100,22 @@ fn no_actions_make_what_the_reader_refuses_and_touched_names_all_that_changed() 
     assert!(n_refused.get() > 1000, "{}", n_refused.get());
 }
 
-/// By the definition: a box that keeps its number, the seed and its bits keeps its particles, and no other does.
+/// By the definition: a box that keeps its number, the seed and its bits keeps its particles, and
+/// no other does.
 fn check_touched(old: &Document, new: &Document, touched: &Touched) -> Result<(), TestCaseError> {
-    prop_assert_eq!((touched.n_boxes, touched.is_resized), (new.boxes.len(), old.boxes.len() != new.boxes.len()));
+    prop_assert_eq!(
+        (touched.n_boxes, touched.is_resized),
+        (new.boxes.len(), old.boxes.len() != new.boxes.len())
+    );
     for (i, b) in new.boxes.iter().enumerate() {
         let was = old.boxes.get(i).filter(|_| old.seed == new.seed);
         let in_place = was.map(|was| CloudBox { center: b.center, ..*was });
         let keeps_shape = in_place.is_some_and(|was| is_same(&was, b));
         prop_assert_eq!(touched.generate.contains(&i), !keeps_shape);
-        prop_assert_eq!(touched.moved.contains(&i), keeps_shape && !was.is_some_and(|was| is_same(was, b)));
+        prop_assert_eq!(
+            touched.moved.contains(&i),
+            keeps_shape && !was.is_some_and(|was| is_same(was, b))
+        );
     }
     Ok(())
 }
@@ -111,30 +123,36 @@ fn check_touched(old: &Document, new: &Document, touched: &Touched) -> Result<()
 #[test]
 fn mirrored_twice_is_as_it_was() {
     let axes = prop_oneof![Just(Axis::X), Just(Axis::Y), Just(Axis::Z)];
-    check(300, (actions::boxes(), axes, vec(any::<prop::sample::Index>(), 1..4)), |(boxes, axis, picked)| {
-        prop_assume!(!boxes.is_empty());
-        let picked = picked.iter().map(|index| index.index(boxes.len())).collect();
-        let start = after(&Editor::new(boxes), &actions::select(picked));
-        let twice = |plane| {
-            let mirror = Action::Edit(Edit::Mirror { axis, plane, outcome: Outcome::Move });
-            after_all(&start, &[mirror.clone(), mirror])
-        };
-        prop_assert!(twice(Plane::Zero).document().is_same(start.document()));
-        // M bounds the selection's coordinates, u = ε/2: faces are off by uM, their sum by 4uM, what is mirrored by 5uM,
-        // the second sum by 14uM, what comes back by 20uM, which is 10 εM.
-        let chosen = start.selection().boxes().iter().map(|i| start.boxes()[*i]);
-        let most = chosen.map(|b| b.center.abs() + 0.5 * b.extent).fold(DVec3::ZERO, DVec3::max);
-        let again = twice(Plane::Middle);
-        // Rounding may carry a box at the very bound beyond it: then the second is refused.
-        prop_assume!(most.max_element() < 0.9e15);
-        for (a, b) in again.boxes().iter().zip(start.boxes()) {
-            let off = (a.center - b.center).abs();
-            prop_assert!(off.cmple(10.0 * f64::EPSILON * most).all(), "{} {}", off, most);
-            let in_place = CloudBox { center: b.center, ..*a };
-            prop_assert!(is_same(&in_place, b));
-        }
-        Ok(())
-    });
+    check(
+        300,
+        (actions::boxes(), axes, vec(any::<prop::sample::Index>(), 1..4)),
+        |(boxes, axis, picked)| {
+            prop_assume!(!boxes.is_empty());
+            let picked = picked.iter().map(|index| index.index(boxes.len())).collect();
+            let start = after(&Editor::new(boxes), &actions::select(picked));
+            let twice = |plane| {
+                let mirror = Action::Edit(Edit::Mirror { axis, plane, outcome: Outcome::Move });
+                after_all(&start, &[mirror.clone(), mirror])
+            };
+            prop_assert!(twice(Plane::Zero).document().is_same(start.document()));
+            // M bounds the selection's coordinates, u = ε/2: faces are off by uM, their sum by 4uM,
+            // what is mirrored by 5uM, the second sum by 14uM, what comes back by 20uM, which is 10
+            // εM.
+            let chosen = start.selection().boxes().iter().map(|i| start.boxes()[*i]);
+            let most =
+                chosen.map(|b| b.center.abs() + 0.5 * b.extent).fold(DVec3::ZERO, DVec3::max);
+            let again = twice(Plane::Middle);
+            // Rounding may carry a box at the very bound beyond it: then the second is refused.
+            prop_assume!(most.max_element() < 0.9e15);
+            for (a, b) in again.boxes().iter().zip(start.boxes()) {
+                let off = (a.center - b.center).abs();
+                prop_assert!(off.cmple(10.0 * f64::EPSILON * most).all(), "{} {}", off, most);
+                let in_place = CloudBox { center: b.center, ..*a };
+                prop_assert!(is_same(&in_place, b));
+            }
+            Ok(())
+        },
+    );
 }
 
 #[test]
@@ -142,12 +160,19 @@ fn a_mirror_image_lies_across_the_plane() {
     check(200, actions::usual_boxes(), |boxes| {
         prop_assume!(!boxes.is_empty());
         let start = after(&Editor::new(boxes), &Action::Select(Select::All));
-        let mirror = Action::Edit(Edit::Mirror { axis: Axis::Y, plane: Plane::Zero, outcome: Outcome::Copy });
+        let mirror = Action::Edit(Edit::Mirror {
+            axis: Axis::Y,
+            plane: Plane::Zero,
+            outcome: Outcome::Copy,
+        });
         let copied = after(&start, &mirror);
         let (n, old) = (start.boxes().len(), start.boxes());
         prop_assert_eq!(&copied.boxes()[..n], old);
-        let images: Vec<CloudBox> =
-            old.iter().filter(|b| b.center.y != 0.0).map(|b| CloudBox { center: flipped(b.center), ..*b }).collect();
+        let images: Vec<CloudBox> = old
+            .iter()
+            .filter(|b| b.center.y != 0.0)
+            .map(|b| CloudBox { center: flipped(b.center), ..*b })
+            .collect();
         prop_assert_eq!(&copied.boxes()[n..], &images);
         Ok(())
     });
@@ -172,23 +197,32 @@ fn duplicated_and_deleted_is_as_it_was() {
 
 #[test]
 fn a_drag_is_one_step_or_none() {
-    check(300, (actions::usual_boxes(), actions::begin(), vec(actions::drag_to(), 1..50)), |(boxes, begin, moves)| {
-        let start = after(&Editor::new(boxes), &Action::Select(Select::All));
-        let held = after_all(&after(&start, &begin), &moves);
-        prop_assert_eq!(held.history().n_undo(), 0);
-        let ended = after(&held, &END);
-        let is_changed = !ended.document().is_same(start.document());
-        prop_assert_eq!(ended.history().n_undo(), usize::from(is_changed));
-        prop_assert!(after(&ended, &Action::Undo).document().is_same(start.document()));
-        // Where it ends says all: the way there says nothing.
-        let straight = after_all(&start, &[&[begin], &moves[moves.len() - 1..], &[END]].concat());
-        let last_taken = held.after(&moves[moves.len() - 1]).is_ok();
-        let says = |e: &Editor| text(e.boxes());
-        prop_assert!(!last_taken || says(&straight) == says(&ended) || says(&straight) == says(&start));
-        let cancelled = after(&held, &Action::Drag(DragAction::Cancel));
-        prop_assert!(cancelled.document().is_same(start.document()) && cancelled.history().n_undo() == 0);
-        Ok(())
-    });
+    check(
+        300,
+        (actions::usual_boxes(), actions::begin(), vec(actions::drag_to(), 1..50)),
+        |(boxes, begin, moves)| {
+            let start = after(&Editor::new(boxes), &Action::Select(Select::All));
+            let held = after_all(&after(&start, &begin), &moves);
+            prop_assert_eq!(held.history().n_undo(), 0);
+            let ended = after(&held, &END);
+            let is_changed = !ended.document().is_same(start.document());
+            prop_assert_eq!(ended.history().n_undo(), usize::from(is_changed));
+            prop_assert!(after(&ended, &Action::Undo).document().is_same(start.document()));
+            // Where it ends says all: the way there says nothing.
+            let straight =
+                after_all(&start, &[&[begin], &moves[moves.len() - 1..], &[END]].concat());
+            let last_taken = held.after(&moves[moves.len() - 1]).is_ok();
+            let says = |e: &Editor| text(e.boxes());
+            prop_assert!(
+                !last_taken || says(&straight) == says(&ended) || says(&straight) == says(&start)
+            );
+            let cancelled = after(&held, &Action::Drag(DragAction::Cancel));
+            prop_assert!(
+                cancelled.document().is_same(start.document()) && cancelled.history().n_undo() == 0
+            );
+            Ok(())
+        },
+    );
 }
 
 #[test]
@@ -198,7 +232,10 @@ fn what_is_saved_is_loaded_to_the_bit() {
     check(100, (actions::boxes(), vec(actions::action(), 0..30)), |(boxes, actions)| {
         let document = after(&after_all(&Editor::new(boxes), &actions), &END).shared_document();
         let saved = perform(&Request::Save { path: path.clone(), document: document.clone() });
-        prop_assert_eq!(saved, Some(Event::Saved { path: path.clone(), document: document.clone() }));
+        prop_assert_eq!(
+            saved,
+            Some(Event::Saved { path: path.clone(), document: document.clone() })
+        );
         let Some(Event::Opened { boxes, .. }) = perform(&Request::Open(path.clone())) else {
             return Err(TestCaseError::fail("not opened"));
         };
@@ -225,7 +262,8 @@ fn the_numbers_of_boxes_that_were_not_touched_keep_their_bits() {
 #[test]
 fn dirty_is_what_differs_from_what_was_saved() {
     let seen = std::cell::RefCell::new([0, 0]);
-    let steps = vec(prop_oneof![6 => actions::small_action().prop_map(Some), 1 => Just(None)], 1..60);
+    let steps =
+        vec(prop_oneof![6 => actions::small_action().prop_map(Some), 1 => Just(None)], 1..60);
     check(300, (actions::usual_boxes(), steps), |(boxes, steps)| {
         let mut saved = text(&boxes);
         let mut session = Session::opened(Path::new("b.dat"), boxes);

@@ -1,5 +1,5 @@
-//! Blobs that are no balls (docs/model.md §14) in every way that draws, against the f64 reference, within bounds that follow the shaders'
-//! own evaluation of their conics.
+//! Blobs that are no balls (docs/model.md §14) in every way that draws, against the f64 reference,
+//! within bounds that follow the shaders' own evaluation of their conics.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -30,7 +30,13 @@ const F32: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba
 
 fn tiled(gpu: &Gpu, format: FilmFormat, portable: bool) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
-    Tiled { invocations, portable, most_pairs: None, most_tiles: None, saturated: saturated(format) }
+    Tiled {
+        invocations,
+        portable,
+        most_pairs: None,
+        most_tiles: None,
+        saturated: saturated(format),
+    }
 }
 
 /// What is drawn, what should be, and how far the two may be apart.
@@ -69,15 +75,20 @@ fn ellipsoids_of_all_kinds() {
             // Every third one without what subgroups can do.
             let by_tiles = Way::Tiles(tiled(&gpu, format, i.is_multiple_of(3)));
             for way in [Way::Sprites, by_tiles, Way::Chunks(5, saturated(format))] {
-                let [values, truths, bounds] = drawn(&mut gpu, None, &picture, (target, format), way);
-                println!("{what}, {format:?}, {way:?}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
+                let [values, truths, bounds] =
+                    drawn(&mut gpu, None, &picture, (target, format), way);
+                println!(
+                    "{what}, {format:?}, {way:?}: error/bound {:.3}",
+                    greatest_ratio(&values, &truths, &bounds)
+                );
                 assert_within(&what, &values, &truths, &bounds);
             }
         }
     }
 }
 
-/// Flat ones, as cells of the weather are, seen from beside, above and within, with a threshold and without.
+/// Flat ones, as cells of the weather are, seen from beside, above and within, with a threshold and
+/// without.
 fn decks(threshold: f64) -> Vec<(&'static str, Picture)> {
     let mut random = Random(8);
     let mut blobs = || {
@@ -89,7 +100,8 @@ fn decks(threshold: f64) -> Vec<(&'static str, Picture)> {
     let seen = |eye: DVec3, target: DVec3, fov: f64| {
         let mut picture = Picture::new(eye, target, fov, 0.05);
         picture.view.threshold = threshold;
-        all.iter().fold(picture, |p, (at, sigma, tau, aspect)| p.blob(*at, *sigma, *tau).shaped(*aspect))
+        all.iter()
+            .fold(picture, |p, (at, sigma, tau, aspect)| p.blob(*at, *sigma, *tau).shaped(*aspect))
     };
     vec![
         ("beside", seen(DVec3::new(0.3, 0.2, 9.0), DVec3::ZERO, 50.0)),
@@ -104,12 +116,19 @@ fn decks_from_all_sides() {
     let mut gpu = Gpu::new();
     for threshold in [0.0, 0.01] {
         for (what, picture) in decks(threshold) {
-            for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false)), Way::Chunks(7, saturated(F32.1))] {
+            for way in [
+                Way::Sprites,
+                Way::Tiles(tiled(&gpu, F32.1, false)),
+                Way::Chunks(7, saturated(F32.1)),
+            ] {
                 let [values, truths, bounds] = drawn(&mut gpu, None, &picture, F32, way);
-                println!("{what}, {way:?}: error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
+                println!(
+                    "{what}, {way:?}: error/bound {:.3}",
+                    greatest_ratio(&values, &truths, &bounds)
+                );
                 assert_within(what, &values, &truths, &bounds);
-                // The bound says something where most of the picture is; it is made by the worst of all opacities, which the eye finds
-                // within a blob fifty times as wide as high.
+                // The bound says something where most of the picture is; it is made by the worst of
+                // all opacities, which the eye finds within a blob fifty times as wide as high.
                 let mut sorted = bounds.clone();
                 sorted.sort_by(f64::total_cmp);
                 let most = if what == "within" { 1e-2 } else { 1e-3 };
@@ -124,7 +143,11 @@ fn decks_from_all_sides() {
 fn among_ellipsoids_balls_are_what_they_are_by_themselves() {
     let mut gpu = Gpu::new();
     let balls = front();
-    let balls = balls.clone().blob(balls.at(0.3, -0.2, 5.0), 0.6, 1.0).blob(balls.at(-0.5, 0.4, 6.0), 1.1, 0.4);
+    let balls = balls.clone().blob(balls.at(0.3, -0.2, 5.0), 0.6, 1.0).blob(
+        balls.at(-0.5, 0.4, 6.0),
+        1.1,
+        0.4,
+    );
     // A blob of no depth makes all be drawn as ellipsoids are.
     let among = balls.clone().blob(balls.at(0.0, 0.0, 9.0), 0.5, 0.0).shaped(0.5);
     for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false))] {
@@ -154,7 +177,11 @@ fn wrong_ellipsoids_are_noticed() {
         ("include/blob.glsl", "float more = shape.square - 1.0;", "float more = 0.0;"),
         ("sprites.frag", "tau *= sqrt((rest + up * up) / white);", ""),
         ("sprites.frag", "rest + in_conic.w * up * up", "rest + up * up"),
-        ("sprites.vert", "upward = tangents_of(shape, v, 1, r);", "upward = tangents_of(shape, v, 0, r);"),
+        (
+            "sprites.vert",
+            "upward = tangents_of(shape, v, 1, r);",
+            "upward = tangents_of(shape, v, 0, r);",
+        ),
     ];
     let tiles = [
         (
@@ -164,7 +191,11 @@ fn wrong_ellipsoids_are_noticed() {
         ),
         ("include/blob.glsl", "float more = shape.square - 1.0;", "float more = 0.0;"),
         ("tiles.comp", "across[j] + conic.w * along[j]", "across[j] + along[j]"),
-        ("tiles.comp", "deep[j] = place.w * sqrt((across[j] + along[j]) * inv_white);", "deep[j] = place.w;"),
+        (
+            "tiles.comp",
+            "deep[j] = place.w * sqrt((across[j] + along[j]) * inv_white);",
+            "deep[j] = place.w;",
+        ),
         ("tiles_splat.comp", "int(3 * i + 2)).x", "int(3 * i + 2)).y"),
     ];
     let of = |way: Way, mutations: &[(&str, &str, &str)], gpu: &mut Gpu| {

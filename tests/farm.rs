@@ -1,5 +1,6 @@
-//! `nimbus farm` as engines use it: runs that are killed, run twice, race, meet broken results, full disks, other builds and changed
-//! scenes; and what is merged is what `nimbus render` draws, to the byte.
+//! `nimbus farm` as engines use it: runs that are killed, run twice, race, meet broken results,
+//! full disks, other builds and changed scenes; and what is merged is what `nimbus render` draws,
+//! to the byte.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -62,7 +63,8 @@ impl Farm {
     }
 
     fn plan(&self) -> Value {
-        serde_json::from_slice(&fs::read(self.folder.join("plan.json")).expect("a plan")).expect("JSON")
+        serde_json::from_slice(&fs::read(self.folder.join("plan.json")).expect("a plan"))
+            .expect("JSON")
     }
 
     fn status(&self) -> Value {
@@ -94,7 +96,10 @@ impl Farm {
     fn beside(&self, shard: usize, kind: &str) -> Vec<PathBuf> {
         let begin = format!("{}.{kind}.", self.key(shard));
         let entries = fs::read_dir(self.folder.join("shards")).into_iter().flatten().flatten();
-        entries.filter(|e| e.file_name().to_string_lossy().starts_with(&begin)).map(|e| e.path()).collect()
+        entries
+            .filter(|e| e.file_name().to_string_lossy().starts_with(&begin))
+            .map(|e| e.path())
+            .collect()
     }
 
     fn merge(&self) -> (Option<i32>, String, String) {
@@ -112,13 +117,17 @@ fn frame(i: u32) -> String {
 
 fn names(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).expect("a folder").flatten();
-    let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    let mut names: Vec<String> =
+        entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
     names.sort();
     names
 }
 
 fn content(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    names(folder).into_iter().map(|name| (name.clone(), fs::read(folder.join(name)).expect("a file"))).collect()
+    names(folder)
+        .into_iter()
+        .map(|name| (name.clone(), fs::read(folder.join(name)).expect("a file")))
+        .collect()
 }
 
 /// What `nimbus render` makes of a frame.
@@ -147,16 +156,20 @@ fn kill(child: &mut Child) {
 /// Until a run has finished `n` frames of a shard, and not the shard.
 fn wait_for_frames(farm: &Farm, shard: usize, n: usize) {
     wait_for("a frame", || {
-        farm.beside(shard, "tmp")
-            .iter()
-            .any(|folder| fs::read_to_string(folder.join("done.jsonl")).is_ok_and(|text| text.lines().count() >= n))
+        farm.beside(shard, "tmp").iter().any(|folder| {
+            fs::read_to_string(folder.join("done.jsonl"))
+                .is_ok_and(|text| text.lines().count() >= n)
+        })
     });
 }
 
 #[test]
 fn what_is_merged_is_what_render_draws() {
     let farm = Farm::planned("5..19", "4");
-    assert_eq!((farm.missing(), farm.plan()["shards"].as_array().map(Vec::len)), ("0-3".to_owned(), Some(4)));
+    assert_eq!(
+        (farm.missing(), farm.plan()["shards"].as_array().map(Vec::len)),
+        ("0-3".to_owned(), Some(4))
+    );
     let (code, out, said) = ran(&["farm", "local", "--plan", farm.path(), "--jobs", "2"]);
     assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
     assert!(out.starts_with("4 shards are done, 4 of them now"), "{out}");
@@ -179,18 +192,31 @@ fn what_is_merged_is_what_render_draws() {
 fn a_scene_s_phases_and_exr() {
     let dir = tempfile::tempdir().expect("a folder");
     let scene = dir.path().join("phases.toml");
-    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml")).expect("a scene");
-    let phases = "\n[[phase]]\nname = \"a\"\nframes = 2\n\n[[phase]]\nname = \"b\"\nframes = 2\nset = { lighting.mode = \"none\" }\n";
+    let text = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml"))
+        .expect("a scene");
+    let phases = "\n[[phase]]\nname = \"a\"\nframes = 2\n\n[[phase]]\nname = \"b\"\nframes = \
+        2\nset = { lighting.mode = \"none\" }\n";
     fs::write(&scene, text + phases).expect("room");
-    fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.csv"), dir.path().join("hello.csv")).expect("room");
+    fs::copy(
+        concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.csv"),
+        dir.path().join("hello.csv"),
+    )
+    .expect("room");
     let scene = scene.to_str().expect("UTF-8");
-    let (code, _, said) =
-        ran(&["render", scene, "-o", dir.path().join("try.png").to_str().expect("UTF-8"), "--size", SIZE]);
+    let (code, _, said) = ran(&[
+        "render",
+        scene,
+        "-o",
+        dir.path().join("try.png").to_str().expect("UTF-8"),
+        "--size",
+        SIZE,
+    ]);
     assert_eq!(code, Some(0), "{said}");
     let farm = Farm::of(scene, &["--shard-frames", "3", "--size", SIZE]);
     assert_eq!(ran(&["farm", "local", "--plan", farm.path()]).0, Some(0));
     assert_eq!(farm.merge().0, Some(0));
-    let frames: Vec<Vec<u8>> = (0..4).map(|i| fs::read(farm.merged().join(frame(i))).expect("a frame")).collect();
+    let frames: Vec<Vec<u8>> =
+        (0..4).map(|i| fs::read(farm.merged().join(frame(i))).expect("a frame")).collect();
     for (i, frame) in (0..).zip(&frames) {
         assert!(*frame == rendered(dir.path(), scene, i, &["--size", SIZE]), "frame {i}");
     }
@@ -211,7 +237,8 @@ fn a_run_that_is_killed_is_gone_on_with() {
     assert_eq!((code, said.as_str()), (Some(0), ""));
     assert!(out.contains("of 40 frames were there from an attempt before"), "{out}");
     let manifest: Value =
-        serde_json::from_slice(&fs::read(farm.place(0).join("shard.json")).expect("it")).expect("JSON");
+        serde_json::from_slice(&fs::read(farm.place(0).join("shard.json")).expect("it"))
+            .expect("JSON");
     assert!(manifest["n_resumed"].as_u64().is_some_and(|n| (3..40).contains(&n)));
     // What a whole run makes is the same.
     let whole = Farm::planned("0..40", "40");
@@ -230,9 +257,11 @@ fn a_run_that_is_killed_is_gone_on_with() {
 #[test]
 fn two_runs_of_one_shard_race_and_one_result_stays() {
     let farm = Farm::planned("0..6", "6");
-    let children: Vec<Child> =
-        ["n1", "n2", "n3"].map(|n| farm.run(0).env("SLURMD_NODENAME", n).spawn().expect("a child")).into();
-    let ended: Vec<_> = children.into_iter().map(|c| said(&c.wait_with_output().expect("it ends"))).collect();
+    let children: Vec<Child> = ["n1", "n2", "n3"]
+        .map(|n| farm.run(0).env("SLURMD_NODENAME", n).spawn().expect("a child"))
+        .into();
+    let ended: Vec<_> =
+        children.into_iter().map(|c| said(&c.wait_with_output().expect("it ends"))).collect();
     assert!(ended.iter().all(|(code, _, said)| *code == Some(0) && said.is_empty()), "{ended:?}");
     assert_eq!(ended.iter().filter(|(_, out, _)| out.contains("done in")).count(), 1, "{ended:?}");
     assert_eq!(names(&farm.folder.join("shards")), [farm.key(0)]);
@@ -247,7 +276,9 @@ fn a_result_that_differs_is_exit_code_70_and_both_are_kept() {
     // Begins, and meets a result of somebody whose device draws otherwise.
     let child = farm.run(0).spawn().expect("a child");
     wait_for_frames(&farm, 0, 1);
-    let signal = |name: &str| Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill");
+    let signal = |name: &str| {
+        Command::new("kill").args([name, &child.id().to_string()]).status().expect("kill")
+    };
     assert!(signal("-STOP").success());
     let other = Farm::planned("0..4", "4");
     assert_eq!(other.ran(0).0, Some(0));
@@ -257,12 +288,17 @@ fn a_result_that_differs_is_exit_code_70_and_both_are_kept() {
     *forged.last_mut().expect("bytes") ^= 1;
     fs::write(place.join(frame(2)), &forged).expect("room");
     let hash = |bytes: &[u8]| format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(bytes));
-    let manifest = fs::read_to_string(place.join("shard.json")).expect("it").replace(&hash(&drawn), &hash(&forged));
+    let manifest = fs::read_to_string(place.join("shard.json"))
+        .expect("it")
+        .replace(&hash(&drawn), &hash(&forged));
     fs::write(place.join("shard.json"), manifest).expect("room");
     fs::rename(&place, farm.place(0)).expect("the run was stopped before its end");
     assert!(signal("-CONT").success());
     let (code, _, said) = said(&child.wait_with_output().expect("it ends"));
-    assert!(code == Some(70) && said.contains("1 of 4 files differ, frame-00000002.png the first"), "{said}");
+    assert!(
+        code == Some(70) && said.contains("1 of 4 files differ, frame-00000002.png the first"),
+        "{said}"
+    );
     assert_eq!((farm.beside(0, "differs").len(), farm.state(0)), (1, "done".to_owned()));
     assert_eq!(farm.status()["shards"][0]["n_differing"], 1);
     assert!(fs::read(farm.beside(0, "differs")[0].join(frame(2))).expect("it") == drawn);
@@ -327,10 +363,14 @@ fn unfinished_files_of_a_killed_run_count_only_where_they_are_whole() {
     let left = farm.beside(0, "tmp").remove(0);
     // Another device's are not gone on with.
     let device = fs::read_to_string(left.join("device.json")).expect("a device");
-    let elsewhere = left.with_file_name(left.file_name().expect("a name").to_string_lossy().replace("n1", "n9"));
+    let elsewhere = left
+        .with_file_name(left.file_name().expect("a name").to_string_lossy().replace("n1", "n9"));
     fs::create_dir(&elsewhere).expect("room");
-    fs::write(elsewhere.join("device.json"), device.replace("llvmpipe", "another").replace("driver", "Driver"))
-        .expect("room");
+    fs::write(
+        elsewhere.join("device.json"),
+        device.replace("llvmpipe", "another").replace("driver", "Driver"),
+    )
+    .expect("room");
     fs::write(elsewhere.join(frame(39)), b"another's").expect("room");
     let hash = format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(b"another's"));
     let record = format!("{{\"name\":\"{}\",\"bytes\":9,\"sha256\":\"{hash}\"}}\n", frame(39));
@@ -338,7 +378,8 @@ fn unfinished_files_of_a_killed_run_count_only_where_they_are_whole() {
     // A power cut: one file without its end, one full of zeros, and half a line of the list.
     let bytes = fs::read(left.join(frame(0))).expect("a frame");
     fs::write(left.join(frame(0)), &bytes[..bytes.len() / 2]).expect("room");
-    fs::write(left.join(frame(1)), vec![0; fs::read(left.join(frame(1))).expect("a frame").len()]).expect("room");
+    fs::write(left.join(frame(1)), vec![0; fs::read(left.join(frame(1))).expect("a frame").len()])
+        .expect("room");
     let list = fs::read_to_string(left.join("done.jsonl")).expect("a list");
     fs::write(left.join("done.jsonl"), format!("{list}{{\"name\":\"frame-0000")).expect("room");
     assert_eq!(farm.ran(0).0, Some(0));
@@ -352,15 +393,25 @@ fn unfinished_files_of_a_killed_run_count_only_where_they_are_whole() {
 fn what_may_pass_is_75_and_what_stays_is_2() {
     let farm = Farm::planned("0..40", "40");
     // No device, as on a node whose driver is gone.
-    let output =
-        farm.run(0).env("VK_DRIVER_FILES", "/nowhere").env("VK_ICD_FILENAMES", "/nowhere").output().expect("it runs");
+    let output = farm
+        .run(0)
+        .env("VK_DRIVER_FILES", "/nowhere")
+        .env("VK_ICD_FILENAMES", "/nowhere")
+        .output()
+        .expect("it runs");
     let (code, _, text) = said(&output);
     assert!(code == Some(75) && text.contains("Vulkan"), "{text}");
     assert_eq!(farm.state(0), "transient");
     // A signal, as of an engine that takes a node back: what is finished stays.
     let child = farm.run(0).spawn().expect("a child");
     wait_for_frames(&farm, 0, 2);
-    assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill").success());
+    assert!(
+        Command::new("kill")
+            .args(["-TERM", &child.id().to_string()])
+            .status()
+            .expect("kill")
+            .success()
+    );
     assert_eq!(said(&child.wait_with_output().expect("it ends")).0, Some(75));
     let (code, out, _) = farm.ran(0);
     assert!(code == Some(0) && out.contains("from an attempt before"), "{out}");
@@ -377,17 +428,28 @@ fn what_may_pass_is_75_and_what_stays_is_2() {
 fn a_stale_plan_is_refused() {
     let dir = tempfile::tempdir().expect("a folder");
     for name in ["hello.toml", "hello.csv"] {
-        fs::copy(Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name), dir.path().join(name)).expect("room");
+        fs::copy(
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name),
+            dir.path().join(name),
+        )
+        .expect("room");
     }
     let scene = dir.path().join("hello.toml");
     let farm = Farm::of(scene.to_str().expect("UTF-8"), &["--frames", "2", "--size", SIZE]);
     let text = fs::read_to_string(&scene).expect("a scene");
     fs::write(&scene, text.replace("[film]", "[film]\nexposure = 0.5")).expect("room");
     let (code, _, said) = farm.ran(0);
-    assert!(code == Some(2) && said.contains("stale") && said.contains("has changed since"), "{said}");
+    assert!(
+        code == Some(2) && said.contains("stale") && said.contains("has changed since"),
+        "{said}"
+    );
     // Whoever asks later is told why.
     assert_eq!(farm.state(0), "failed");
-    assert!(farm.status()["shards"][0]["what"].as_str().is_some_and(|what| what.contains("has changed since")));
+    assert!(
+        farm.status()["shards"][0]["what"]
+            .as_str()
+            .is_some_and(|what| what.contains("has changed since"))
+    );
     let (code, _, said) = ran(&["farm", "local", "--plan", farm.path()]);
     assert!(code == Some(2) && said.contains("stale"), "{said}");
     fs::write(&scene, text).expect("room");
@@ -401,13 +463,17 @@ fn a_stale_plan_is_refused() {
     fs::write(&path, plan).expect("room");
     assert_eq!(farm.ran(0).0, Some(0));
     // Also where it is done.
-    fs::write(&scene, fs::read_to_string(&scene).expect("a scene").replace("[film]", "[film]\nexposure = 0.5"))
-        .expect("room");
+    fs::write(
+        &scene,
+        fs::read_to_string(&scene).expect("a scene").replace("[film]", "[film]\nexposure = 0.5"),
+    )
+    .expect("room");
     let (code, _, said) = farm.ran(0);
     assert!(code == Some(2) && said.contains("stale"), "{said}");
 }
 
-/// A file system of 1 MiB. Mounting asks for root, or a user namespace: CI and most machines have one of them.
+/// A file system of 1 MiB. Mounting asks for root, or a user namespace: CI and most machines have
+/// one of them.
 #[test]
 fn a_full_disk_is_75_and_leaves_nothing_half_done() {
     let farm = Farm::planned("0..30", "30");
@@ -415,16 +481,22 @@ fn a_full_disk_is_75_and_leaves_nothing_half_done() {
     fs::create_dir(&shards).expect("room");
     let program = assert_cmd::cargo::cargo_bin("nimbus");
     let script = format!(
-        "mount -t tmpfs -o size=64k none {0} && {1} farm run --plan {2} --shard 0; code=$?; ls {0}; umount {0}; exit $code",
+        "mount -t tmpfs -o size=64k none {0} && {1} farm run --plan {2} --shard 0; code=$?; ls \
+         {0}; umount {0}; exit $code",
         shards.display(),
         program.display(),
         farm.path()
     );
-    let output =
-        Command::new("unshare").args(["--mount", "--map-root-user", "sh", "-c", &script]).output().expect("unshare");
+    let output = Command::new("unshare")
+        .args(["--mount", "--map-root-user", "sh", "-c", &script])
+        .output()
+        .expect("unshare");
     let (code, out, text) = said(&output);
     assert_eq!(code, Some(75), "{text}");
-    assert!(text.contains("No space left") && !out.lines().any(|name| name == farm.key(0)), "{out}{text}");
+    assert!(
+        text.contains("No space left") && !out.lines().any(|name| name == farm.key(0)),
+        "{out}{text}"
+    );
     assert_eq!((farm.state(0), farm.missing()), ("transient".to_owned(), "0".to_owned()));
     assert_eq!(farm.ran(0).0, Some(0));
 }

@@ -1,5 +1,5 @@
-//! A sweep in shards: what is merged is the bench that one process makes but for its times, and times that cannot be
-//! compared are not merged.
+//! A sweep in shards: what is merged is the bench that one process makes but for its times, and
+//! times that cannot be compared are not merged.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -17,12 +17,23 @@ use tempfile::TempDir;
 const SCENE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
 const SIZE: [&str; 2] = ["--size", "40x30"];
 /// 3 × 2 cases of two sizes.
-const SWEEP: [&str; 10] =
-    ["--sweep", "draw.cutoff=2,3,4", "--sweep", "size=40x30,48x36", "--frames", "3", "--warmup", "1", "--repeat", "2"];
+const SWEEP: [&str; 10] = [
+    "--sweep",
+    "draw.cutoff=2,3,4",
+    "--sweep",
+    "size=40x30,48x36",
+    "--frames",
+    "3",
+    "--warmup",
+    "1",
+    "--repeat",
+    "2",
+];
 
 fn ran(args: &[&str]) -> (Option<i32>, String, String) {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    let output = command.args(args).env_remove("NIMBUS_EXCLUSIVE").output().expect("the program runs");
+    let output =
+        command.args(args).env_remove("NIMBUS_EXCLUSIVE").output().expect("the program runs");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }
@@ -55,13 +66,18 @@ fn exact(run: &Run) -> Vec<String> {
     let of = |c: &nimbus::study::records::Case| {
         let modes = c.modes.iter().map(|m| {
             let hash = m.image_hash.as_deref().expect("a last frame");
-            let passes: Vec<_> = m.passes.iter().map(|p| (&p.name, p.n_run, p.n_skipped, &p.reasons)).collect();
+            let passes: Vec<_> =
+                m.passes.iter().map(|p| (&p.name, p.n_run, p.n_skipped, &p.reasons)).collect();
             let counts = (m.frames, m.warm_up, m.blocks, m.drawn);
             format!("{} {} {} {counts:?} {hash} {passes:?}", m.threading, m.skip, m.simulate)
         });
         let (modes, counts): (Vec<String>, _) = (modes.collect(), c.counts.expect("counts"));
         let (name, hash, size) = (c.name(), &c.scene_hash, (c.width, c.height));
-        format!("{name} {hash} {} {size:?} {counts:?} {:?} {modes:?}", c.particles, c.skipping.map(|s| s.same_bytes))
+        format!(
+            "{name} {hash} {} {size:?} {counts:?} {:?} {modes:?}",
+            c.particles,
+            c.skipping.map(|s| s.same_bytes)
+        )
     };
     run.cases.iter().map(of).collect()
 }
@@ -84,10 +100,14 @@ fn parts_together_are_the_bench_of_one_process() {
     let merged = dir.path().join("merged");
     let (code, out, said) = ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&merged)]);
     assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
-    let expected = format!("6 cases in {}\nthe first case, timed in each of 3 shards on 1 node: ", text(&merged));
+    let expected = format!(
+        "6 cases in {}\nthe first case, timed in each of 3 shards on 1 node: ",
+        text(&merged)
+    );
     assert!(out.starts_with(&expected), "{out}");
     let alone = dir.path().join("alone");
-    let (code, _, said) = ran(&[&["bench", SCENE, "--out", text(&alone), "-q"], &SIZE[..], &SWEEP].concat());
+    let (code, _, said) =
+        ran(&[&["bench", SCENE, "--out", text(&alone), "-q"], &SIZE[..], &SWEEP].concat());
     assert_eq!(code, Some(0), "{said}");
 
     // Readers check that rows and records fit.
@@ -98,8 +118,14 @@ fn parts_together_are_the_bench_of_one_process() {
     };
     assert_eq!((modes(&ours), ours.modes.len()), (modes(&theirs), 18));
     let (ours, theirs) = (ours.run, theirs.run);
-    assert_eq!((ours.schema, &ours.scene_hash, &ours.scene), (theirs.schema, &theirs.scene_hash, &theirs.scene));
-    assert_eq!((&ours.device, &ours.cpu, &ours.environment), (&theirs.device, &theirs.cpu, &theirs.environment));
+    assert_eq!(
+        (ours.schema, &ours.scene_hash, &ours.scene),
+        (theirs.schema, &theirs.scene_hash, &theirs.scene)
+    );
+    assert_eq!(
+        (&ours.device, &ours.cpu, &ours.environment),
+        (&theirs.device, &theirs.cpu, &theirs.environment)
+    );
     assert!(!ours.interrupted && theirs.parts.is_empty());
     // The same rows in the same columns; in each block as many as it had.
     let ((columns, of_ours), (their_columns, of_theirs)) = (rows(&merged), rows(&alone));
@@ -116,12 +142,17 @@ fn parts_together_are_the_bench_of_one_process() {
         let of_block: Vec<&FrameRow> = of_ours.iter().filter(|row| row.block == block).collect();
         assert_eq!(of_block.len(), 4);
         let name = ours.cases[about.case].name();
-        assert!(of_block.iter().all(|r| (&r.sweep, &r.threading, r.skip) == (&name, &about.threading, about.skip)));
+        assert!(
+            of_block
+                .iter()
+                .all(|r| (&r.sweep, &r.threading, r.skip) == (&name, &about.threading, about.skip))
+        );
     }
     // The same files, and pictures to the byte.
     assert_eq!(names(&merged), names(&alone));
     for picture in (0..6).map(|i| format!("case-{i}.png")) {
-        let [a, b] = [&merged, &alone].map(|folder| fs::read(folder.join(&picture)).expect("a picture"));
+        let [a, b] =
+            [&merged, &alone].map(|folder| fs::read(folder.join(&picture)).expect("a picture"));
         assert!(a == b, "{picture}");
     }
     who_timed_what(&farm, &ours);
@@ -130,13 +161,20 @@ fn parts_together_are_the_bench_of_one_process() {
 
 /// What `run.json` says of the parts is what the shards' own say.
 fn who_timed_what(farm: &Path, merged: &Run) {
-    let plan: Value = serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
-    assert_eq!(merged.parts.iter().map(|p| (p.first, p.end)).collect::<Vec<_>>(), [(0, 2), (2, 4), (4, 6)]);
+    let plan: Value =
+        serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
+    assert_eq!(
+        merged.parts.iter().map(|p| (p.first, p.end)).collect::<Vec<_>>(),
+        [(0, 2), (2, 4), (4, 6)]
+    );
     for (i, part) in merged.parts.iter().enumerate() {
         let place = farm.join("shards").join(plan["shards"][i]["key"].as_str().expect("a key"));
         let run = read_results(&place).expect("results").run;
         let first = &run.cases[0];
-        assert_eq!((run.cases.len(), first.name()), (if i == 0 { 2 } else { 3 }, merged.cases[0].name()));
+        assert_eq!(
+            (run.cases.len(), first.name()),
+            (if i == 0 { 2 } else { 3 }, merged.cases[0].name())
+        );
         assert_eq!((&part.date, part.clocks, part.base.len()), (&run.date, run.clocks, 3));
         for (base, mode) in part.base.iter().zip(&first.modes) {
             assert_eq!((&base.threading, base.skip), (&mode.threading, mode.skip));
@@ -158,14 +196,16 @@ fn readers(dir: &TempDir, merged: &Path, alone: &Path) {
     assert!(page.contains("Who timed what") && page.contains("2..4"));
     let (code, out, said) = ran(&["compare", text(alone), text(merged)]);
     assert!(code == Some(0) && out.contains("draw.cutoff=4, size=48x36"), "{out}{said}");
-    let value: Value = serde_json::from_slice(&fs::read(merged.join("run.json")).expect("a run")).expect("JSON");
-    let schema: Value = serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
+    let value: Value =
+        serde_json::from_slice(&fs::read(merged.join("run.json")).expect("a run")).expect("JSON");
+    let schema: Value =
+        serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");
     assert_eq!(validator.iter_errors(&value).map(|e| e.to_string()).collect::<Vec<_>>(), [""; 0]);
 }
 
-/// Changes `file` of the shard in `place`, and its record with it, as if its node had written it so; and says that the
-/// node was its own.
+/// Changes `file` of the shard in `place`, and its record with it, as if its node had written it
+/// so; and says that the node was its own.
 fn change(place: &Path, file: &str, from: &str, to: &str) {
     let before = fs::read_to_string(place.join(file)).expect("a file");
     assert!(before.contains(from), "{from}");
@@ -193,13 +233,17 @@ fn times_that_cannot_be_compared_are_refused_with_a_list() {
     let merged = dir.path().join("merged");
     let merge = ["farm", "merge", "--plan", text(&farm), "-o", text(&merged)];
     let (code, _, said) = ran(&merge);
-    assert!(code == Some(1) && said.contains("1 of 2 shards are done") && said.contains("to do: 0"), "{said}");
+    assert!(
+        code == Some(1) && said.contains("1 of 2 shards are done") && said.contains("to do: 0"),
+        "{said}"
+    );
     assert_eq!(ran(&["farm", "local", "--plan", text(&farm)]).0, Some(0));
     let (code, _, said) = ran(&merge);
     assert!(code == Some(1) && said.contains("NIMBUS_EXCLUSIVE=1 says so): shards 1"), "{said}");
     assert!(!merged.exists());
 
-    let plan: Value = serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
+    let plan: Value =
+        serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
     let place = farm.join("shards").join(plan["shards"][1]["key"].as_str().expect("a key"));
     let device = read_results(&place).expect("results").run.device;
     for (what, from, to) in [
@@ -210,7 +254,10 @@ fn times_that_cannot_be_compared_are_refused_with_a_list() {
         change(&place, "run.json", from, to);
         let (code, _, said) = ran(&merge);
         assert!(code == Some(1) && said.contains(&format!("\n  {what}: ")), "{said}");
-        assert!(said.contains(to.rsplit(' ').next().expect("a word")) && !said.contains("EXCLUSIVE"), "{said}");
+        assert!(
+            said.contains(to.rsplit(' ').next().expect("a word")) && !said.contains("EXCLUSIVE"),
+            "{said}"
+        );
         assert!(!merged.exists());
         change(&place, "run.json", to, from);
     }
@@ -221,7 +268,9 @@ fn times_that_cannot_be_compared_are_refused_with_a_list() {
 fn a_part_is_the_first_case_and_its_own() {
     let dir = tempfile::tempdir().expect("a folder");
     let out = dir.path().join("out");
-    let bench = |more: &[&str]| ran(&[&["bench", SCENE, "-q", "--force"], &SIZE[..], &SWEEP, more].concat());
+    let bench = |more: &[&str]| {
+        ran(&[&["bench", SCENE, "-q", "--force"], &SIZE[..], &SWEEP, more].concat())
+    };
     let (code, _, said) = bench(&["--out", text(&out), "--part", "3..4"]);
     assert_eq!(code, Some(0), "{said}");
     let run = read_results(&out).expect("results").run;
@@ -286,10 +335,16 @@ fn a_part_that_fails_for_good_is_said_to_and_a_job_has_its_node_alone() {
     let farm = planned(&dir, "6");
     let run = ["farm", "run", "--plan", text(&farm), "--shard", "0", "--device", "no such device"];
     let (code, _, said) = ran(&run);
-    assert!(code == Some(2) && said.contains("nimbus bench ended with exit code 2"), "{code:?} {said}");
+    assert!(
+        code == Some(2) && said.contains("nimbus bench ended with exit code 2"),
+        "{code:?} {said}"
+    );
     assert!(said.contains("no such device"), "{said}");
     let (_, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
-    assert!(out.contains("failed") && out.contains("cases 0..6") && out.contains("to do: 0"), "{out}");
+    assert!(
+        out.contains("failed") && out.contains("cases 0..6") && out.contains("to do: 0"),
+        "{out}"
+    );
     let (code, out, said) = ran(&["farm", "gc", "--plan", text(&farm), "--idle", "0.000001"]);
     assert!(code == Some(0) && out.contains("1 folders") && out.contains("removed"), "{out}{said}");
     let (code, out, said) = ran(&["farm", "emit", "slurm", "--plan", text(&farm)]);
@@ -319,11 +374,16 @@ fn a_part_that_is_ended_is_worth_another_try_and_leaves_no_result() {
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(child.try_wait().expect("a child").is_none(), "it is at work");
-    let ended = Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
+    let ended =
+        Command::new("kill").args(["-TERM", &child.id().to_string()]).status().expect("kill");
     assert!(ended.success());
     assert_eq!(child.wait().expect("it ends").code(), Some(75));
     let (_, out, _) = ran(&["farm", "status", "--plan", text(&farm)]);
-    assert!(out.contains("transient") && out.contains("1 unfinished") && out.contains("0 of 1 shards"), "{out}");
-    let (code, _, said) = ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&dir.path().join("merged"))]);
+    assert!(
+        out.contains("transient") && out.contains("1 unfinished") && out.contains("0 of 1 shards"),
+        "{out}"
+    );
+    let (code, _, said) =
+        ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&dir.path().join("merged"))]);
     assert!(code == Some(1) && said.contains("to do: 0"), "{said}");
 }

@@ -1,5 +1,5 @@
-//! What `nimbus farm` says that work takes: a model is fitted, a plan is priced by it, and status says how far that was
-//! off; and what a plan tells of each shard.
+//! What `nimbus farm` says that work takes: a model is fitted, a plan is priced by it, and status
+//! says how far that was off; and what a plan tells of each shard.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -39,7 +39,18 @@ fn status(folder: &str) -> Value {
 /// A calibration by a few frames of two scenes without pairs of facets.
 fn calibrated(dir: &TempDir) -> String {
     let model = path(dir, "model.json");
-    let args = ["farm", "calibrate", SCENE, HELLO, "--frames", "6", "-o", &model, "--set", "lighting.mode=first"];
+    let args = [
+        "farm",
+        "calibrate",
+        SCENE,
+        HELLO,
+        "--frames",
+        "6",
+        "-o",
+        &model,
+        "--set",
+        "lighting.mode=first",
+    ];
     let out = good(&args);
     assert!(out.contains("12 runs") && out.contains("off by"), "{out}");
     model
@@ -48,7 +59,8 @@ fn calibrated(dir: &TempDir) -> String {
 /// A plan of eight frames by `model`.
 fn planned(dir: &TempDir, name: &str, model: &str, more: &[&str]) -> (String, Value) {
     let folder = path(dir, name);
-    let by = ["farm", "plan", SCENE, "-o", &folder, "--frames", "8", "--size", SIZE, "--model", model];
+    let by =
+        ["farm", "plan", SCENE, "-o", &folder, "--frames", "8", "--size", SIZE, "--model", model];
     let said = good(&[&by[..], more].concat());
     (said, read(Path::new(&folder).join("plan.json")))
 }
@@ -86,7 +98,10 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     let dir = tempfile::tempdir().expect("a folder");
     let model = calibrated(&dir);
     let found = read(&model);
-    assert_eq!((found["rows"].as_array().map(Vec::len), found["fit"]["n"].as_u64()), (Some(12), Some(12)));
+    assert_eq!(
+        (found["rows"].as_array().map(Vec::len), found["fit"]["n"].as_u64()),
+        (Some(12), Some(12))
+    );
     assert!(ran(&["farm", "calibrate", HELLO, "-o", &model]).2.contains("--force"));
 
     // Shards of so little that all are one, and as many as frames where no more than a frame fits.
@@ -103,7 +118,11 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     }
     // One shard: one of two nodes works, and is paid for by the millisecond.
     let cost = 3.0 * (seconds(&whole, 0) / 1e-3).ceil();
-    assert!(said.contains("50 % of their time idle") && said.contains(&format!("price: {cost:.2} for ")), "{said}");
+    assert!(
+        said.contains("50 % of their time idle")
+            && said.contains(&format!("price: {cost:.2} for ")),
+        "{said}"
+    );
 
     let folder = path(&dir, "each");
     good(&["farm", "local", "--plan", &folder]);
@@ -120,26 +139,33 @@ fn a_plan_by_a_model_says_what_it_takes_and_status_how_far_that_was_off() {
     // Shards that another kind of device did say nothing of the model.
     let text = fs::read_to_string(Path::new(&folder).join("plan.json")).expect("a plan");
     let name = each["predicted_for"]["device"].as_str().expect("a name");
-    fs::write(Path::new(&folder).join("plan.json"), text.replace(name, "another device")).expect("room");
+    fs::write(Path::new(&folder).join("plan.json"), text.replace(name, "another device"))
+        .expect("room");
     let other = status(&folder);
     assert_eq!((&other["predicted"], &other["n_other_class"]), (&Value::Null, &json!(8)));
     let said = good(&["farm", "status", "--plan", &folder]);
-    assert!(said.contains("of 8 shards nothing was predicted: the model is of another device"), "{said}");
+    assert!(
+        said.contains("of 8 shards nothing was predicted: the model is of another device"),
+        "{said}"
+    );
 }
 
 #[test]
 fn what_no_calibration_is_and_what_it_does_not_know() {
     let dir = tempfile::tempdir().expect("a folder");
     let (model, other, out) = (calibrated(&dir), path(&dir, "other.json"), path(&dir, "out"));
-    for (from, to, expected) in
-        [("\"schema\": 1", "\"schema\": 9", "schema 9"), ("\"fit\"", "\"fat\"", "fat"), ("{", "", "calibration")]
-    {
+    for (from, to, expected) in [
+        ("\"schema\": 1", "\"schema\": 9", "schema 9"),
+        ("\"fit\"", "\"fat\"", "fat"),
+        ("{", "", "calibration"),
+    ] {
         let text = fs::read_to_string(&model).expect("a model").replacen(from, to, 1);
         fs::write(&other, text).expect("room");
         let (code, _, said) = ran(&["farm", "plan", SCENE, "-o", &out, "--model", &other]);
         assert!(code == Some(2) && said.contains(expected), "{said}");
     }
-    let (code, _, said) = ran(&["farm", "plan", "scenes/rectangles.toml", "-o", &out, "--model", &model, "-q"]);
+    let (code, _, said) =
+        ran(&["farm", "plan", "scenes/rectangles.toml", "-o", &out, "--model", &model, "-q"]);
     assert!(code == Some(2) && said.contains("facet pairs was not measured"), "{said}");
     assert!(!Path::new(&out).exists());
 }
@@ -148,12 +174,25 @@ fn what_no_calibration_is_and_what_it_does_not_know() {
 fn a_plan_tells_what_each_shard_is_called_with_and_makes_and_on_which_device() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = path(&dir, "farm");
-    let plan = ["farm", "plan", HELLO, "--frames", "3", "--shard-frames", "2", "--size", SIZE, "-o", &folder];
+    let plan = [
+        "farm",
+        "plan",
+        HELLO,
+        "--frames",
+        "3",
+        "--shard-frames",
+        "2",
+        "--size",
+        SIZE,
+        "-o",
+        &folder,
+    ];
     let told = good(&[&plan[..], &["--device", "no such device", "--json"]].concat());
     let told: Value = serde_json::from_str(&told).expect("JSON");
     assert_eq!(told["device"], json!("no such device"));
-    let of =
-        |i: usize, key: &str| -> Vec<String> { serde_json::from_value(told["shards"][i][key].clone()).expect("texts") };
+    let of = |i: usize, key: &str| -> Vec<String> {
+        serde_json::from_value(told["shards"][i][key].clone()).expect("texts")
+    };
     assert_eq!(of(0, "outputs"), ["frame-00000000.png", "frame-00000001.png"]);
     assert_eq!(of(1, "outputs"), ["frame-00000002.png"]);
     let arguments = of(1, "arguments");

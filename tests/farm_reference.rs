@@ -1,5 +1,5 @@
-//! A reference picture in tiles and ranges of samples: what is merged is the picture that one machine makes, to the
-//! byte.
+//! A reference picture in tiles and ranges of samples: what is merged is the picture that one
+//! machine makes, to the byte.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -34,7 +34,10 @@ fn plan(dir: &TempDir, name: &str, scene: &[&str], more: &[&str]) -> String {
 
 fn shards(folder: &str) -> Vec<Value> {
     let text = fs::read_to_string(Path::new(folder).join("plan.json")).expect("a plan");
-    serde_json::from_str::<Value>(&text).expect("JSON")["shards"].as_array().expect("shards").clone()
+    serde_json::from_str::<Value>(&text).expect("JSON")["shards"]
+        .as_array()
+        .expect("shards")
+        .clone()
 }
 
 fn sums_of(folder: &str, i: usize) -> PathBuf {
@@ -67,7 +70,11 @@ fn merged_it_is_the_picture_of_one_machine() {
         for i in (0..n_shards).rev().map(|i| i.to_string()) {
             let mut command = nimbus(&["farm", "run", "-q", "--plan", &folder, "--shard", &i]);
             let output = command.env("VK_DRIVER_FILES", "/nowhere.json").output().expect("it runs");
-            assert!(output.status.success(), "{name} {i}: {}", String::from_utf8_lossy(&output.stderr));
+            assert!(
+                output.status.success(),
+                "{name} {i}: {}",
+                String::from_utf8_lossy(&output.stderr)
+            );
         }
         let merged = path(&dir, &format!("{name}-merged"));
         good(&["farm", "merge", "--plan", &folder, "-o", &merged]);
@@ -76,11 +83,19 @@ fn merged_it_is_the_picture_of_one_machine() {
         let said = good(&[&["render", "-q", "--json", "-o", &single], scene, &what].concat());
         let read = |path: &Path| fs::read(path).expect("a picture");
         assert!(read(&Path::new(&merged).join(file)) == read(Path::new(&single)), "{name}");
-        let about: Value = serde_json::from_slice(&read(&Path::new(&merged).join("reference.json"))).expect("JSON");
-        assert_eq!((about["reference"].as_str(), about["samples"].to_string().as_str()), (Some(which), samples));
+        let about: Value =
+            serde_json::from_slice(&read(&Path::new(&merged).join("reference.json")))
+                .expect("JSON");
+        assert_eq!(
+            (about["reference"].as_str(), about["samples"].to_string().as_str()),
+            (Some(which), samples)
+        );
         let said: Value = serde_json::from_str(&said).expect("JSON");
         if samples != "1" {
-            assert_eq!((&about["own_error"], &about["accuracy"]), (&said["own_error"], &said["accuracy"]));
+            assert_eq!(
+                (&about["own_error"], &about["accuracy"]),
+                (&said["own_error"], &said["accuracy"])
+            );
         }
     }
 }
@@ -89,7 +104,8 @@ fn merged_it_is_the_picture_of_one_machine() {
 fn what_is_not_all_there_or_is_something_else_is_no_picture() {
     let dir = tempfile::tempdir().expect("a folder");
     let scene = ["scenes/hello.toml", "--size", "24x18", "--set", PLAIN];
-    let cut = ["--reference", "volume", "--samples", "4", "--tile", "12x18", "--shard-samples", "2"];
+    let cut =
+        ["--reference", "volume", "--samples", "4", "--tile", "12x18", "--shard-samples", "2"];
     let folder = plan(&dir, "farm", &scene, &cut);
     let merge = |name: &str| bad(&["farm", "merge", "--plan", &folder, "-o", &path(&dir, name)]);
     good(&["farm", "run", "-q", "--plan", &folder, "--shard", "1"]);
@@ -111,7 +127,10 @@ fn what_is_not_all_there_or_is_something_else_is_no_picture() {
         fs::write(&sums, content).expect("a file");
         let (code, said) = merge(what);
         assert_eq!(code, Some(1), "{what}: {said}");
-        assert!(said.contains("to do: 2") && said.contains("shard 2: sums-00000002.f64"), "{what}: {said}");
+        assert!(
+            said.contains("to do: 2") && said.contains("shard 2: sums-00000002.f64"),
+            "{what}: {said}"
+        );
         assert!(!Path::new(&path(&dir, what)).exists());
         // It is made anew, the same.
         good(&["farm", "run", "-q", "--plan", &folder, "--shard", "2"]);
@@ -179,12 +198,18 @@ fn a_model_of_finished_shards_cuts_the_next_plan() {
     assert!(code == Some(2) && said.contains("no shard of these farms is done"), "{said}");
     farms.iter().for_each(|farm| drop(good(&["farm", "local", "-q", "--plan", farm])));
     let told = farms.iter().flat_map(|farm| ["--farm", farm]);
-    let said = good(&["farm", "calibrate", "-o", &model].into_iter().chain(told).collect::<Vec<_>>());
+    let said =
+        good(&["farm", "calibrate", "-o", &model].into_iter().chain(told).collect::<Vec<_>>());
     assert!(said.contains("6 runs of reference model"), "{said}");
     // Cut to a third of what it takes beyond a set-up.
     let predicted = |name: &str, lengths: &str| -> Vec<f64> {
         let scene = [room, "--reference", "model", "--samples", "8", "--size", "40x30"];
-        let folder = plan(&dir, name, &scene, &["--model", &model, "--shard-seconds", lengths, "--nodes", "1"]);
+        let folder = plan(
+            &dir,
+            name,
+            &scene,
+            &["--model", &model, "--shard-seconds", lengths, "--nodes", "1"],
+        );
         shards(&folder).iter().map(|s| s["predicted_s"].as_f64().expect("seconds")).collect()
     };
     let whole = predicted("whole", "5000,9000");
@@ -195,10 +220,18 @@ fn a_model_of_finished_shards_cuts_the_next_plan() {
     let most = setup + (whole[0] - setup) / 3.0;
     let cut = predicted("cut", &format!("0,{most}"));
     println!("{setup} {whole:?} {cut:?}");
-    assert!((3..=8).contains(&cut.len()) && cut.iter().all(|s| *s <= most), "{setup} {whole:?} {cut:?}");
+    assert!(
+        (3..=8).contains(&cut.len()) && cut.iter().all(|s| *s <= most),
+        "{setup} {whole:?} {cut:?}"
+    );
     // Of another kind of work the model says nothing.
-    let (code, said) = bad(&[&["farm", "plan", "-o", &path(&dir, "frames"), "--model", &model], &hello[..]].concat());
-    assert!(code == Some(2) && said.contains("calibrated by reference model; expected one of frames"), "{said}");
+    let (code, said) =
+        bad(&[&["farm", "plan", "-o", &path(&dir, "frames"), "--model", &model], &hello[..]]
+            .concat());
+    assert!(
+        code == Some(2) && said.contains("calibrated by reference model; expected one of frames"),
+        "{said}"
+    );
     let thin = ["--reference", "thin", "--model", &model, "-o", &path(&dir, "thin")];
     let (code, said) = bad(&[&["farm", "plan"], &hello[..], &thin].concat());
     assert!(code == Some(2) && said.contains("expected one of reference thin"), "{said}");

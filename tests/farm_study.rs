@@ -1,4 +1,5 @@
-//! An error study in shards: what is merged is the study that one machine makes, and times that cannot be compared are not merged.
+//! An error study in shards: what is merged is the study that one machine makes, and times that
+//! cannot be compared are not merged.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,14 +32,16 @@ const STUDY: [&str; 15] = [
 
 fn ran(args: &[&str]) -> (Option<i32>, String, String) {
     let mut command = Command::new(assert_cmd::cargo::cargo_bin("nimbus"));
-    let output = command.args(args).env_remove("NIMBUS_EXCLUSIVE").output().expect("the program runs");
+    let output =
+        command.args(args).env_remove("NIMBUS_EXCLUSIVE").output().expect("the program runs");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     (output.status.code(), text(&output.stdout), text(&output.stderr))
 }
 
 fn planned(dir: &TempDir, name: &str, each: &str) -> PathBuf {
     let folder = dir.path().join(name);
-    let plan = ["farm", "plan", SCENE, "-o", text(&folder), "--error", "--shard-configurations", each];
+    let plan =
+        ["farm", "plan", SCENE, "-o", text(&folder), "--error", "--shard-configurations", each];
     let (code, out, said) = ran(&[&plan, &SIZE[..], &["--"], &STUDY].concat());
     assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
     assert!(out.starts_with("12 configurations in "), "{out}");
@@ -56,15 +59,20 @@ fn read(folder: &Path) -> Value {
 /// Values, picture, error map.
 type Exact = (Vec<Value>, Vec<u8>, Vec<u8>);
 
-/// What of every configuration follows from it alone, by its name; and its picture. The scene as it stands has turns in every part.
+/// What of every configuration follows from it alone, by its name; and its picture. The scene as it
+/// stands has turns in every part.
 fn exact(folder: &Path) -> BTreeMap<String, Exact> {
     let of = |c: &Value| {
         let keys = ["settings", "hash", "error", "failure", "n_turns"];
         let is_base = c["name"] == "as it stands";
         let keys = if is_base { &keys[..4] } else { &keys[..] };
         let values: Vec<Value> = keys.iter().map(|key| c[*key].clone()).collect();
-        let file = |key: &str| fs::read(folder.join(c[key].as_str().expect("a name"))).expect("a picture");
-        (c["name"].as_str().expect("a name").to_owned(), (values, file("picture"), file("error_map")))
+        let file =
+            |key: &str| fs::read(folder.join(c[key].as_str().expect("a name"))).expect("a picture");
+        (
+            c["name"].as_str().expect("a name").to_owned(),
+            (values, file("picture"), file("error_map")),
+        )
     };
     read(folder)["configurations"].as_array().expect("configurations").iter().map(of).collect()
 }
@@ -80,7 +88,8 @@ fn parts_together_are_the_study_of_one_machine() {
     let (code, out, said) = ran(&["farm", "merge", "--plan", text(&farm), "-o", text(&merged)]);
     assert_eq!((code, said.as_str()), (Some(0), ""), "{out}");
     let alone = dir.path().join("alone");
-    let (code, _, said) = ran(&[&["error", SCENE, "--out", text(&alone), "-q"], &SIZE[..], &STUDY].concat());
+    let (code, _, said) =
+        ran(&[&["error", SCENE, "--out", text(&alone), "-q"], &SIZE[..], &STUDY].concat());
     assert_eq!(code, Some(0), "{said}");
 
     let (ours, theirs) = (exact(&merged), exact(&alone));
@@ -91,9 +100,20 @@ fn parts_together_are_the_study_of_one_machine() {
     assert_eq!(ours.len(), 13);
     // The same form, and statistics of the same kind from as many turns.
     let (merged_study, study) = (read(&merged), read(&alone));
-    let keys = |value: &Value| value.as_object().expect("an object").keys().cloned().collect::<Vec<_>>();
+    let keys =
+        |value: &Value| value.as_object().expect("an object").keys().cloned().collect::<Vec<_>>();
     assert_eq!(keys(&merged_study), keys(&study));
-    for key in ["schema", "code", "scene_hash", "device", "metric", "time", "rounds", "frames", "interrupted"] {
+    for key in [
+        "schema",
+        "code",
+        "scene_hash",
+        "device",
+        "metric",
+        "time",
+        "rounds",
+        "frames",
+        "interrupted",
+    ] {
         assert_eq!(merged_study[key], study[key], "{key}");
     }
     let all = |study: &Value| study["configurations"].as_array().expect("configurations").clone();
@@ -107,7 +127,8 @@ fn parts_together_are_the_study_of_one_machine() {
     assert_eq!(code, Some(0), "{said}");
     let names = |folder: &Path| {
         let entries = fs::read_dir(folder).expect("a folder").flatten();
-        let mut names: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+        let mut names: Vec<String> =
+            entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
         names.sort();
         names
     };
@@ -129,8 +150,10 @@ fn times_that_cannot_be_compared_are_refused_with_a_list() {
     assert!(!merged.exists());
 
     // Another driver: as the node would have written it.
-    let plan: Value = serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
-    let place = |i: usize| farm.join("shards").join(plan["shards"][i]["key"].as_str().expect("a key"));
+    let plan: Value =
+        serde_json::from_slice(&fs::read(farm.join("plan.json")).expect("a plan")).expect("JSON");
+    let place =
+        |i: usize| farm.join("shards").join(plan["shards"][i]["key"].as_str().expect("a key"));
     let hash = |bytes: &[u8]| format!("{:x}", <sha2::Sha256 as sha2::Digest>::digest(bytes));
     let change = |i: usize, file: &str, from: &str, to: &str| {
         let before = fs::read_to_string(place(i).join(file)).expect("a file");
@@ -138,11 +161,13 @@ fn times_that_cannot_be_compared_are_refused_with_a_list() {
         let after = before.replace(from, to);
         fs::write(place(i).join(file), &after).expect("room");
         let path = place(i).join("shard.json");
-        let mut manifest: Value = serde_json::from_slice(&fs::read(&path).expect("it")).expect("JSON");
+        let mut manifest: Value =
+            serde_json::from_slice(&fs::read(&path).expect("it")).expect("JSON");
         manifest["exclusive"] = true.into();
         for record in manifest["files"].as_array_mut().expect("files") {
             if record["name"] == file {
-                (record["sha256"], record["bytes"]) = (hash(after.as_bytes()).into(), after.len().into());
+                (record["sha256"], record["bytes"]) =
+                    (hash(after.as_bytes()).into(), after.len().into());
             }
         }
         fs::write(&path, manifest.to_string()).expect("room");
@@ -150,7 +175,10 @@ fn times_that_cannot_be_compared_are_refused_with_a_list() {
     let driver = read(&place(0))["device"]["driver"].as_str().expect("a driver").to_owned();
     change(0, "study.json", &driver, "another driver 1.0");
     let (code, _, said) = ran(&merge);
-    assert!(code == Some(1) && said.contains("\n  device: ") && said.contains("another driver 1.0"), "{said}");
+    assert!(
+        code == Some(1) && said.contains("\n  device: ") && said.contains("another driver 1.0"),
+        "{said}"
+    );
     assert!(!said.contains("EXCLUSIVE") && !merged.exists(), "{said}");
     change(0, "study.json", "another driver 1.0", &driver);
     assert_eq!(ran(&merge).0, Some(0));

@@ -1,5 +1,6 @@
-//! What 10 000 thin layers become in each format of the target: accumulated rounding, and banding. The truth is
-//! 1 − (1 − a)^n, a pixel each; a target that holds few bits stalls where a layer changes less than it can hold.
+//! What 10 000 thin layers become in each format of the target: accumulated rounding, and banding.
+//! The truth is 1 − (1 − a)^n, a pixel each; a target that holds few bits stalls where a layer
+//! changes less than it can hold.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -57,7 +58,8 @@ fn ulp(c: f16) -> f64 {
     f16::from_bits(c.to_bits() + 1).to_f64() - c.to_f64()
 }
 
-/// The least half float that a layer no longer lifts by `share` of the distance to the next: where α (L − C) < share ulp(C).
+/// The least half float that a layer no longer lifts by `share` of the distance to the next: where
+/// α (L − C) < share ulp(C).
 fn stall(alpha: f64, light: f64, share: f64) -> f64 {
     let numbers = (0..=f16::from_f64(light).to_bits()).map(f16::from_bits);
     let stalled = numbers.into_iter().find(|c| alpha * (light - c.to_f64()) < share * ulp(*c));
@@ -82,20 +84,22 @@ fn floats_of_32_bits_keep_every_layer() {
     for tau in THIN {
         let picture = layers(N_LAYERS, tau);
         let values = channel(&picture.draw(&mut gpu, None, TargetFormat::Rgba32f), 3);
-        // A layer errs by 2⁻²³ of what is written and by what its α is off; those before it count (1 − α) as much. So n
-        // layers are off by n 2⁻²³ at most, and by the share that α is off of n α (1 − C).
+        // A layer errs by 2⁻²³ of what is written and by what its α is off; those before it count
+        // (1 − α) as much. So n layers are off by n 2⁻²³ at most, and by the share that α is off of
+        // n α (1 − C).
         let off = layers(1, tau).rounding(FilmFormat::Rgba32f).alpha;
         for (value, a) in values.iter().zip(one_layer(tau)) {
             let (n, truth) = (f64::from(N_LAYERS), law(a));
-            let bound = (n * 2f64.powi(-23)).min(2f64.powi(-22) / a) * truth + off * n * a * (1.0 - truth);
+            let bound =
+                (n * 2f64.powi(-23)).min(2f64.powi(-22) / a) * truth + off * n * a * (1.0 - truth);
             assert!((value - truth).abs() <= bound, "{value} {truth} {bound:e}");
         }
         assert!(values.iter().any(|v| (v - law(tau)).abs() < 0.01), "it is drawn");
     }
 }
 
-/// Of correct rounding C stands still where α (L − C) < ½ ulp, of rounding toward zero where it is below a whole one; any
-/// device lies between. Until then every layer lifts it by an ulp or more.
+/// Of correct rounding C stands still where α (L − C) < ½ ulp, of rounding toward zero where it is
+/// below a whole one; any device lies between. Until then every layer lifts it by an ulp or more.
 #[test]
 fn floats_of_16_bits_stall_where_a_layer_is_below_half_an_ulp() {
     let mut gpu = Gpu::new();
@@ -105,10 +109,13 @@ fn floats_of_16_bits_stall_where_a_layer_is_below_half_an_ulp() {
         let values = layers(N_LAYERS, tau).draw(&mut gpu, None, TargetFormat::Rgba16f);
         let (mut n_stalled, mut n_at_half, mut most) = (0, 0, 0f64);
         for (light, k) in [(1.0, 3), (RED, 0)] {
-            for (value, a) in channel(&values, k).into_iter().zip(one_layer(tau)).filter(|(_, a)| *a > 0.0) {
+            for (value, a) in
+                channel(&values, k).into_iter().zip(one_layer(tau)).filter(|(_, a)| *a > 0.0)
+            {
                 let [low, high] = [1.0 + BRINK, 0.5 - BRINK].map(|share| stall(a, light, share));
                 let truth = light * law(a);
-                // Rounding up by half an ulp a layer, it reaches the stall even where the truth has not yet.
+                // Rounding up by half an ulp a layer, it reaches the stall even where the truth has
+                // not yet.
                 assert!(value <= high, "{value} above {high} (a = {a:e}, L = {light})");
                 if truth > high {
                     assert!(value >= low, "{value} below {low} (a = {a:e}, L = {light})");
@@ -118,11 +125,14 @@ fn floats_of_16_bits_stall_where_a_layer_is_below_half_an_ulp() {
                 }
             }
         }
-        println!("τ = {tau:e}: {n_stalled} values stalled, {n_at_half} at half an ulp, off by up to {most:.3}");
+        println!(
+            "τ = {tau:e}: {n_stalled} values stalled, {n_at_half} at half an ulp, off by up \
+             to {most:.3}"
+        );
         assert!(n_stalled > 1000 && most > 0.2, "the scene shows it");
     }
-    // By hand: at α = 10⁻³ and L = 1 numbers from ½ on are 2⁻¹¹ apart: 1 − C < 2⁻¹²/10⁻³ from 0.75586 on, the next number
-    // is 0.756347…; at 10⁻⁴ a layer is below half of 2⁻¹² from ¼ on.
+    // By hand: at α = 10⁻³ and L = 1 numbers from ½ on are 2⁻¹¹ apart: 1 − C < 2⁻¹²/10⁻³ from
+    // 0.75586 on, the next number is 0.756347…; at 10⁻⁴ a layer is below half of 2⁻¹² from ¼ on.
     assert_eq!((stall(1e-3, 1.0, 0.5), stall(1e-4, 1.0, 0.5)), (1549.0 / 2048.0, 0.25));
 }
 
@@ -146,16 +156,19 @@ fn the_table_of_formats() {
     for tau in [1e-1, 4e-3, 1e-3, 1e-4] {
         let truth: Vec<f64> = one_layer(tau).into_iter().map(law).collect();
         let covered: Vec<usize> = (0..truth.len()).filter(|i| truth[*i] > 0.0).collect();
-        // Pixels that mirror each other differ in their last bits: the truth's levels are told apart to 10⁻¹², the
-        // formats' spacing is far above.
+        // Pixels that mirror each other differ in their last bits: the truth's levels are told
+        // apart to 10⁻¹², the formats' spacing is far above.
         let level = |v: f64| (v * 1e12).round() as u64;
-        let levels = |values: &[f64]| covered.iter().map(|i| level(values[*i])).collect::<BTreeSet<u64>>().len();
+        let levels = |values: &[f64]| {
+            covered.iter().map(|i| level(values[*i])).collect::<BTreeSet<u64>>().len()
+        };
         println!("| {tau:e} | truth, {} pixels | | | {} |", covered.len(), levels(&truth));
         let (mut worst, mut bands) = (Vec::new(), Vec::new());
         for (target, format) in FORMATS {
             let values = channel(&layers(N_LAYERS, tau).draw(&mut gpu, None, target), 3);
             let off = |i: &usize| (values[*i] - truth[*i]).abs();
-            let rms = (covered.iter().map(|i| off(i) * off(i)).sum::<f64>() / covered.len() as f64).sqrt();
+            let rms = (covered.iter().map(|i| off(i) * off(i)).sum::<f64>() / covered.len() as f64)
+                .sqrt();
             let greatest = covered.iter().map(off).fold(0.0, f64::max);
             println!("| | {format:?} | {rms:.2e} | {greatest:.2e} | {} |", levels(&values));
             worst.push(greatest);

@@ -1,5 +1,6 @@
-//! The shaders' own functions against f64: Philox's words bit for bit, sine, erf and 1 − e^−t within what Vulkan's
-//! precision rules allow (+, −, × correctly rounded or contracted, division 2.5 ulp, exp 3 + 2|x| ulp).
+//! The shaders' own functions against f64: Philox's words bit for bit, sine, erf and 1 − e^−t
+//! within what Vulkan's precision rules allow (+, −, × correctly rounded or contracted, division
+//! 2.5 ulp, exp 3 + 2|x| ulp).
 
 mod harness;
 
@@ -78,8 +79,8 @@ fn wrong_functions(gpu: &Gpu, from: &str, to: &str) -> Kernel {
     Kernel::new(&gpu.device, &compiler, "functions", Push::FIELDS, &[]).unwrap()
 }
 
-/// `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to `high`, then as many
-/// spread evenly over ±`high`.
+/// `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to
+/// `high`, then as many spread evenly over ±`high`.
 fn sweep(low: f64, high: f64, n: usize) -> Vec<f32> {
     let share = |i: usize| (i as f64 + 0.5) / n as f64;
     let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -101,7 +102,8 @@ fn philox_gives_the_published_words() {
     let kernel = gpu.test_kernel("kat", KAT, Push::FIELDS);
     let (found, u) = answers(&mut gpu, &kernel);
     assert_eq!(found, KNOWN.map(|(_, _, words)| words));
-    let expected = KNOWN.map(|(_, _, words)| words.map(|w| nimbus::model::philox::uniform(w) as f32));
+    let expected =
+        KNOWN.map(|(_, _, words)| words.map(|w| nimbus::model::philox::uniform(w) as f32));
     assert_eq!(u, expected);
 
     // One digit of a multiplier, one round too few: both must show.
@@ -127,7 +129,8 @@ fn sine_is_within_its_documented_error() {
     // The reduction holds for |k| < 2^14.
     let mut x = sweep(1e-20, 16_383.0 * std::f64::consts::PI, 400_000);
     x.extend(sweep(1e-3, 12.0, 400_000));
-    // Zeros, extremes, and the arguments at which the reduction changes from one multiple of π to the next.
+    // Zeros, extremes, and the arguments at which the reduction changes from one multiple of π to
+    // the next.
     for k in -20_000..20_000 {
         let at = (f64::from(k) * 0.5 * std::f64::consts::PI) as f32;
         x.extend([at.next_down(), at, at.next_up()]);
@@ -144,7 +147,8 @@ fn sine_is_within_its_documented_error() {
     let huge = evaluate(&mut gpu, &kernel, SINE, &[1e6, -3e8, 6.75e9, -6.8e9, 1e20, -1e37, 3.4e38]);
     assert!(huge.iter().all(|v| v.abs() <= 1.0 + SINE_ERROR), "{huge:?}");
 
-    // A coefficient, and a part of π, in their fourth digits; the sign of every other two half waves.
+    // A coefficient, and a part of π, in their fourth digits; the sign of every other two half
+    // waves.
     for (from, to) in [
         ("0.00833307858", "0.00833007858"),
         ("0.0009670257568359375", "0.0009660257568359375"),
@@ -161,11 +165,13 @@ fn unit_at_is_within_its_documented_error() {
     let mut gpu = Gpu::new();
     let kernel = gpu.test_kernel("functions", FUNCTIONS, Push::FIELDS);
     // Multiples of 2⁻²⁴ from −½ to ½, both ends and the quarters among them.
-    let mut x: Vec<f32> = (-(1 << 19)..=1 << 19).map(|i| (f64::from(i) / f64::from(1 << 20)) as f32).collect();
+    let mut x: Vec<f32> =
+        (-(1 << 19)..=1 << 19).map(|i| (f64::from(i) / f64::from(1 << 20)) as f32).collect();
     x.extend((0..1 << 18).map(|i| (f64::from(i * 61 % (1 << 23)) / f64::from(1 << 24)) as f32));
     let bounds = vec![10.0 * U_F32; x.len()];
     for (axis, of) in [(0, f64::cos as fn(f64) -> f64), (1, f64::sin)] {
-        let truths: Vec<f64> = x.iter().map(|x| of(std::f64::consts::TAU * f64::from(*x))).collect();
+        let truths: Vec<f64> =
+            x.iter().map(|x| of(std::f64::consts::TAU * f64::from(*x))).collect();
         let values = evaluate(&mut gpu, &kernel, UNIT_AT + axis, &x);
         assert_within_and_say("a unit vector", &values, &truths, &bounds);
         let wrong = wrong_functions(&gpu, "min(a, 0.5 - a)", "min(a, 0.49999 - a)");
@@ -185,7 +191,10 @@ fn erf_is_within_the_formulas_error_and_its_rounding() {
     let bounds: Vec<f64> = x.iter().map(|x| erf_bound(f64::from(*x))).collect();
     assert_within_and_say("erf", &values, &truths, &bounds);
     let worst = (0..x.len()).map(|i| (values[i] - truths[i]).abs()).fold(0.0, f64::max);
-    println!("erf: greatest error {worst:e}, greatest bound {:e}", bounds.iter().copied().fold(0.0, f64::max));
+    println!(
+        "erf: greatest error {worst:e}, greatest bound {:e}",
+        bounds.iter().copied().fold(0.0, f64::max)
+    );
     let n = x.len();
     assert_eq!(values[n - 2..], [0.0, 0.0]);
 
@@ -206,8 +215,8 @@ fn powers_of_two_are_within_their_documented_error() {
     }));
     let values = evaluate(&mut gpu, &kernel, POWER_OF_TWO, &x);
     let truths: Vec<f64> = x.iter().map(|x| f64::from(*x).exp2()).collect();
-    // The polynomial's 7.5e-8; and rounding, e_k <= u |p_k| + u |c_k| + |f| (u |p_k+1| + e_k+1) down to k = 0 at |f| = 1/2,
-    // where it is the greatest: 3.7 u.
+    // The polynomial's 7.5e-8; and rounding, e_k <= u |p_k| + u |c_k| + |f| (u |p_k+1| + e_k+1)
+    // down to k = 0 at |f| = 1/2, where it is the greatest: 3.7 u.
     let bounds: Vec<f64> = truths.iter().map(|t| (7.5e-8 + 3.7 * U_F32) * t).collect();
     assert_within_and_say("a power of two", &values, &truths, &bounds);
     let wrong = wrong_functions(&gpu, "0.0555071327386", "0.0555171327386");
@@ -215,9 +224,10 @@ fn powers_of_two_are_within_their_documented_error() {
     assert!(check_within("a wrong power", &values, &truths, &bounds).is_err());
 }
 
-/// The relative error that functions.glsl promises. From t = 1/2 on exp's 3 + 2t ulp (2 u each, of e^−t) are at most
-/// 4.9 u of the 0.39 that is left, 12.4 u relative, and the subtraction adds one; below, the series' outer two rounding
-/// steps dominate, some 4 u, and its end leaves 1e-8. 13.4 u = 8.0e-7.
+/// The relative error that functions.glsl promises. From t = 1/2 on exp's 3 + 2t ulp (2 u each, of
+/// e^−t) are at most 4.9 u of the 0.39 that is left, 12.4 u relative, and the subtraction adds one;
+/// below, the series' outer two rounding steps dominate, some 4 u, and its end leaves 1e-8. 13.4 u
+/// = 8.0e-7.
 const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
 
 #[test]

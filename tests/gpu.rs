@@ -1,5 +1,5 @@
-//! gpu/ itself: what it refuses, what it reports, and that the reports would come: missing barriers, leaks, limits,
-//! shaders that do not compile or do not fit, the SPIR-V cache.
+//! gpu/ itself: what it refuses, what it reports, and that the reports would come: missing
+//! barriers, leaks, limits, shaders that do not compile or do not fit, the SPIR-V cache.
 
 mod harness;
 
@@ -18,8 +18,8 @@ use nimbus::passes;
 use nimbus::passes::{grid, place};
 use sha2::{Digest, Sha256};
 
-/// What validation says of place followed by the grid's deposit, which reads what place wrote; recorded and never
-/// submitted.
+/// What validation says of place followed by the grid's deposit, which reads what place wrote;
+/// recorded and never submitted.
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let spec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
@@ -66,7 +66,9 @@ fn a_missing_barrier_between_copies_is_reported() {
             recorded.unwrap();
             let said = gpu.instance.messages().take();
             match barriers {
-                Barriers::Omitted => assert!(said.iter().any(|m| m.contains(hazard)), "{hazard}: {said:?}"),
+                Barriers::Omitted => {
+                    assert!(said.iter().any(|m| m.contains(hazard)), "{hazard}: {said:?}")
+                }
                 Barriers::Placed => assert!(said.is_empty(), "{said:?}"),
             }
         }
@@ -84,8 +86,13 @@ fn a_leaked_buffer_is_reported_by_name_and_size() {
     drop(device);
     let said = instance.messages().take();
     assert_eq!(said.len(), 1, "{said:?}");
-    let bytes: u64 =
-        said[0].strip_prefix("leak: test.leaked (").unwrap().strip_suffix(" bytes)").unwrap().parse().unwrap();
+    let bytes: u64 = said[0]
+        .strip_prefix("leak: test.leaked (")
+        .unwrap()
+        .strip_suffix(" bytes)")
+        .unwrap()
+        .parse()
+        .unwrap();
     // The allocation may be rounded up to what the device aligns to.
     assert!((4000..=4000 + 65_536).contains(&bytes), "{bytes}");
 }
@@ -105,17 +112,25 @@ fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
     let gpu = Gpu::new();
     let before = gpu.device.allocated_bytes();
     for n in [1_000_000_000, u64::MAX / 2] {
-        let refused = Buffer::new::<[u32; 8]>(&gpu.device, "test.huge", n, Place::Device).err().unwrap();
+        let refused =
+            Buffer::new::<[u32; 8]>(&gpu.device, "test.huge", n, Place::Device).err().unwrap();
         let Error::Limit { what } = &refused else { panic!("{refused:?}") };
         let limit = gpu.device.limits().max_storage_buffer_bytes;
         assert!(what.contains(&format!("test.huge: {n} records of 32 bytes")), "{what}");
         assert!(what.contains(&format!("maxStorageBufferRange {limit}")), "{what}");
     }
-    let refused = Image::color_target(&gpu.device, "test.wide", 10_000_000, 4, TargetFormat::Rgba16f).err().unwrap();
+    let refused =
+        Image::color_target(&gpu.device, "test.wide", 10_000_000, 4, TargetFormat::Rgba16f)
+            .err()
+            .unwrap();
     let most = gpu.device.limits().max_image_extent;
-    assert!(matches!(&refused, Error::Limit { what } if what.contains(&format!("{most} along a side"))), "{refused}");
+    assert!(
+        matches!(&refused, Error::Limit { what } if what.contains(&format!("{most} along a side"))),
+        "{refused}"
+    );
     assert_eq!(gpu.device.allocated_bytes(), before);
-    // What just fits by the count is counted right: one record more than the limit, and one that is none.
+    // What just fits by the count is counted right: one record more than the limit, and one that is
+    // none.
     let limits = gpu.device.limits();
     let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes) / 32;
     assert_eq!(nimbus::gpu::memory::storage_bytes(limits, "test", most, 32), Ok(32 * most));
@@ -146,7 +161,9 @@ fn errors_of_shaders_carry_file_and_line() {
         let source = passes::SHADERS.iter().find(|(n, _)| *n == file).unwrap().1;
         1 + source.lines().position(|l| l.contains(text)).unwrap()
     };
-    for (file, from) in [("place.comp", "FOR_EACH(i"), ("include/functions.glsl", "float s = r * r;")] {
+    for (file, from) in
+        [("place.comp", "FOR_EACH(i"), ("include/functions.glsl", "float s = r * r;")]
+    {
         let compiler = Gpu::wrong_compiler(file, from, &format!("nonsense {from}"));
         let user = if file.starts_with("include") { "facets.comp" } else { file };
         let refused = compiler.compile(user, Optimize::Yes).err().unwrap();
@@ -163,7 +180,9 @@ fn errors_of_shaders_carry_file_and_line() {
 #[test]
 fn what_does_not_fit_the_shader_is_refused() {
     let mut gpu = Gpu::new();
-    let new = |push: &[nimbus::gpu::Field]| Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", push, &[]).err();
+    let new = |push: &[nimbus::gpu::Field]| {
+        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", push, &[]).err()
+    };
     assert!(new(grid::ResolvePush::FIELDS).is_none());
     let wrong: [&[nimbus::gpu::Field]; 4] = [
         &[("n_cells", 0, 4)],
@@ -173,16 +192,23 @@ fn what_does_not_fit_the_shader_is_refused() {
     ];
     for push in wrong {
         let refused = new(push).unwrap();
-        assert!(matches!(&refused, Error::Shader { name, .. } if name == "grid_resolve.comp"), "{refused:?}");
+        assert!(
+            matches!(&refused, Error::Shader { name, .. } if name == "grid_resolve.comp"),
+            "{refused:?}"
+        );
     }
     // While recording: a buffer too few, push constants of another size.
-    let kernel = Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[]).unwrap();
+    let kernel =
+        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[])
+            .unwrap();
     let (sums, density) = (gpu.buffer::<[u32; 2]>(8), gpu.buffer::<f32>(8));
     let push = grid::ResolvePush { n_cells: 8, density_per_quantum: 1.0 };
-    let too_few = gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &[&sums], &push, 8));
+    let too_few =
+        gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &[&sums], &push, 8));
     assert!(matches!(too_few, Err(Error::Shader { .. })));
     let buffers = [&sums, &density];
-    let too_small = gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &buffers, &8u32, 8));
+    let too_small =
+        gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &buffers, &8u32, 8));
     assert!(matches!(too_small, Err(Error::Shader { .. })));
     // And all is well afterwards.
     gpu.run(|rec| {
@@ -195,9 +221,12 @@ fn what_does_not_fit_the_shader_is_refused() {
 #[test]
 fn records_beyond_one_row_of_workgroups_are_all_done() {
     let mut gpu = Gpu::new();
-    let kernel = Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[]).unwrap();
+    let kernel =
+        Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[])
+            .unwrap();
     // Two rows and a bit, and no whole number of workgroups.
-    let in_a_row = u64::from(gpu.device.limits().max_workgroups_x) * u64::from(kernel.local_size_x());
+    let in_a_row =
+        u64::from(gpu.device.limits().max_workgroups_x) * u64::from(kernel.local_size_x());
     if in_a_row > 1 << 23 {
         println!("a row of this device's holds {in_a_row} records: not tested");
         return;
@@ -274,13 +303,21 @@ fn the_cache_is_read_checked_and_mended() {
 #[test]
 fn a_folder_of_shaders_takes_the_place_of_the_embedded_ones() {
     let folder = tempfile::tempdir().unwrap();
-    let compile = |s: Sources| Compiler::new(s, None).unwrap().compile("place.comp", Optimize::Yes).unwrap();
+    let compile =
+        |s: Sources| Compiler::new(s, None).unwrap().compile("place.comp", Optimize::Yes).unwrap();
     let embedded = compile(passes::sources());
     let empty = passes::sources().with_dir(folder.path()).err().unwrap();
     assert!(matches!(&empty, Error::Io { what, .. } if what.contains("place.comp")), "{empty}");
-    assert!(matches!(passes::sources().with_dir(&folder.path().join("absent")), Err(Error::Io { .. })));
+    assert!(matches!(
+        passes::sources().with_dir(&folder.path().join("absent")),
+        Err(Error::Io { .. })
+    ));
     let text = passes::SHADERS.iter().find(|(n, _)| *n == "place.comp").unwrap().1;
-    std::fs::write(folder.path().join("place.comp"), text.replace("+ group.offset", "- group.offset")).unwrap();
+    std::fs::write(
+        folder.path().join("place.comp"),
+        text.replace("+ group.offset", "- group.offset"),
+    )
+    .unwrap();
     assert_ne!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
     std::fs::write(folder.path().join("place.comp"), text).unwrap();
     assert_eq!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
@@ -288,6 +325,7 @@ fn a_folder_of_shaders_takes_the_place_of_the_embedded_ones() {
     std::fs::create_dir(folder.path().join("include")).unwrap();
     std::fs::write(folder.path().join("include/records.glsl"), "nonsense").unwrap();
     let sources = passes::sources().with_dir(folder.path()).unwrap();
-    let refused = Compiler::new(sources, None).unwrap().compile("place.comp", Optimize::Yes).err().unwrap();
+    let refused =
+        Compiler::new(sources, None).unwrap().compile("place.comp", Optimize::Yes).err().unwrap();
     assert!(refused.to_string().contains("include/records.glsl:1:"), "{refused}");
 }

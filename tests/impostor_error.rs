@@ -1,5 +1,5 @@
-//! What an impostor is predicted to be off by against where exact projections show and see its blobs: random shells, moves and
-//! turns (docs/model.md §11 "impostors").
+//! What an impostor is predicted to be off by against where exact projections show and see its
+//! blobs: random shells, moves and turns (docs/model.md §11 "impostors").
 
 use glam::{DQuat, DVec2, DVec3};
 use nimbus::model::impostor::{Far, Shell, View};
@@ -27,11 +27,17 @@ impl Stream {
 }
 
 fn view(eye: DVec3, turn: DQuat, tangents: DVec2) -> View {
-    View { eye, right: turn * DVec3::X, up: turn * DVec3::Y, forward: turn * DVec3::NEG_Z, tangents }
+    View {
+        eye,
+        right: turn * DVec3::X,
+        up: turn * DVec3::Y,
+        forward: turn * DVec3::NEG_Z,
+        tangents,
+    }
 }
 
-/// A shell, and where it is looked at from later: the eye moved by up to `move_share` of the nearest depth, turned by up to
-/// `turn_most`.
+/// A shell, and where it is looked at from later: the eye moved by up to `move_share` of the
+/// nearest depth, turned by up to `turn_most`.
 fn case(s: &mut Stream, move_share: f64, turn_most: f64) -> (Shell, View) {
     let axis = s.direction();
     let turn = DQuat::from_axis_angle(axis, s.between(0.0, 3.0));
@@ -48,17 +54,20 @@ fn case(s: &mut Stream, move_share: f64, turn_most: f64) -> (Shell, View) {
     (shell, view(eye + moved, turned, tangents))
 }
 
-/// Greatest and least singular directions aside, the width of the picture of a small ball at `c` along `n`: |n·∂x/∂c|.
+/// Greatest and least singular directions aside, the width of the picture of a small ball at `c`
+/// along `n`: |n·∂x/∂c|.
 fn width(project: impl Fn(DVec3) -> DVec2, c: DVec3, n: DVec2) -> f64 {
     let h = 1e-5;
     let along = |axis: DVec3| n.dot(project(c + h * axis) - project(c - h * axis)) / (2.0 * h);
     DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)).length()
 }
 
-/// A far point that the shell shows within the view, at the slopes' share `at` in [-1, 1]² of it and the depth's share.
+/// A far point that the shell shows within the view, at the slopes' share `at` in [-1, 1]² of it
+/// and the depth's share.
 fn point(shell: &Shell, now: &View, at: DVec2, depth_share: f64) -> DVec3 {
     let on_shell = shell.homography(now) * (at * now.tangents).extend(1.0);
-    let inverse = (1.0 - depth_share) / shell.far.nearest + depth_share / shell.far.farthest.min(1e9);
+    let inverse =
+        (1.0 - depth_share) / shell.far.nearest + depth_share / shell.far.farthest.min(1e9);
     shell.view.eye + shell.view.ray(on_shell.truncate() / on_shell.z) / inverse
 }
 
@@ -81,32 +90,41 @@ fn nothing_is_farther_off_than_predicted() {
             let shift = (seen(&now, c) - shown(&shell, &now, c)).length();
             // 1e-12 of coordinates up to 1e9.
             let slack = 1e-10 + if shell.far.farthest.is_infinite() { 1e-6 } else { 0.0 };
-            assert!(shift <= predicted.shift * (1.0 + 1e-9) + slack, "{i} {k}: {shift} > {predicted:?}");
+            assert!(
+                shift <= predicted.shift * (1.0 + 1e-9) + slack,
+                "{i} {k}: {shift} > {predicted:?}"
+            );
             closest_shift = closest_shift.max((shift - slack) / predicted.shift);
             n += 1;
             if depth_share > 0.0 && shell.far.farthest.is_infinite() {
                 continue;
             }
             let n_axis = DVec2::from_angle(s.between(0.0, 3.2));
-            let [a, b] = [width(|c| shown(&shell, &now, c), c, n_axis), width(|c| seen(&now, c), c, n_axis)];
+            let [a, b] =
+                [width(|c| shown(&shell, &now, c), c, n_axis), width(|c| seen(&now, c), c, n_axis)];
             let growth = (a / b - 1.0).abs();
             assert!(growth <= predicted.growth + 1e-6, "{i} {k}: {growth} > {predicted:?}");
             closest_growth = closest_growth.max(growth / (predicted.growth + 1e-6));
         }
     }
-    println!("{n} points; greatest actual/predicted: shift {closest_shift:.3}, growth {closest_growth:.3}");
+    println!(
+        "{n} points; greatest actual/predicted: shift {closest_shift:.3}, growth \
+         {closest_growth:.3}"
+    );
     assert!(n > 50_000 && closest_shift > 0.9 && closest_growth > 0.3);
 }
 
 #[test]
 fn small_moves_are_predicted_within_a_factor_of_two() {
-    // What a shell that is used again meets: moves of a hundredth of its distance, turns of a few degrees.
+    // What a shell that is used again meets: moves of a hundredth of its distance, turns of a few
+    // degrees.
     let mut s = Stream(2);
     let mut worst = 0f64;
     for _ in 0..500 {
         let (mut shell, now) = case(&mut s, 0.01, 0.05);
         // Centres alone: sprites that reach in from beside the view widen what is asked for.
-        (shell.far.radius, shell.far.farthest) = (0.0, shell.far.farthest.min(4.0 * shell.far.nearest));
+        (shell.far.radius, shell.far.farthest) =
+            (0.0, shell.far.farthest.min(4.0 * shell.far.nearest));
         let predicted = shell.predict(&now).expect("a bound");
         let mut actual = 0f64;
         for x in [-1.0, 1.0] {
@@ -147,11 +165,16 @@ fn no_bound_where_the_eye_comes_near_or_looks_away() {
         let eye = then.eye + ahead * shell.far.nearest * then.forward;
         View { eye, right, up, forward, tangents: then.tangents / 1.25 }
     };
-    assert!(shell.predict(&at(0.0, 0.0)).is_some_and(|p| p.slopes() == 0.0) && shell.covers(&at(0.0, 0.0), 0.01));
+    assert!(
+        shell.predict(&at(0.0, 0.0)).is_some_and(|p| p.slopes() == 0.0)
+            && shell.covers(&at(0.0, 0.0), 0.01)
+    );
     for now in [at(0.5, 0.0), at(1.5, 0.0), at(0.0, 1.6), at(0.0, 3.1), at(f64::NAN, 0.0)] {
         assert!(shell.predict(&now).is_none());
     }
     assert!(
-        !shell.covers(&at(0.0, 0.5), 0.0) && !shell.covers(&at(0.0, 3.1), 0.0) && !shell.covers(&at(-0.5, 0.0), 0.0)
+        !shell.covers(&at(0.0, 0.5), 0.0)
+            && !shell.covers(&at(0.0, 3.1), 0.0)
+            && !shell.covers(&at(-0.5, 0.0), 0.0)
     );
 }

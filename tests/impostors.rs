@@ -1,5 +1,5 @@
-//! Impostors in a flight through the cloud of scenes/through-615.toml: no popping beyond what is stated, the same bytes in both
-//! loops, one by one as predicted, in both ways to draw.
+//! Impostors in a flight through the cloud of scenes/through-615.toml: no popping beyond what is
+//! stated, the same bytes in both loops, one by one as predicted, in both ways to draw.
 
 mod harness;
 
@@ -20,10 +20,15 @@ const N_FRAMES: u32 = 32;
 const N_PIXELS: usize = 320 * 240;
 
 fn scene(overrides: &[&str]) -> Arc<Scene> {
-    let mut all = vec!["film.width=320", "film.height=240", "lighting.grid=24", "film.format='rgba32f'"];
+    let mut all =
+        vec!["film.width=320", "film.height=240", "lighting.grid=24", "film.format='rgba32f'"];
     all.extend(overrides);
     let all: Vec<String> = all.into_iter().map(str::to_owned).collect();
-    Arc::new(scene_file::load(Path::new("scenes/through-615.toml"), &all, None).expect("the scene loads").scene)
+    Arc::new(
+        scene_file::load(Path::new("scenes/through-615.toml"), &all, None)
+            .expect("the scene loads")
+            .scene,
+    )
 }
 
 /// Every frame from `first` on: its pixels and what it did.
@@ -111,9 +116,10 @@ fn both(gpu: &Gpu, overrides: &[&str], first: u32) -> [Vec<(Vec<f32>, Plan)>; 2]
         .map(|key| fly(gpu, &[overrides, &[key]].concat(), first, Threading::Serial))
 }
 
-/// What a pixel changes by, beyond what it does anyway, where a shell is so many pixels off; and where it is not off at all, which
-/// is what the cubic leaves of specks: radii are spread evenly down to 0, a blob of half a pixel loses half of its height, its τ
-/// is 1/7 of the mean one's where that is 3.5 pixels, and it is up to twice as bright as white. 0.14 was measured.
+/// What a pixel changes by, beyond what it does anyway, where a shell is so many pixels off; and
+/// where it is not off at all, which is what the cubic leaves of specks: radii are spread evenly
+/// down to 0, a blob of half a pixel loses half of its height, its τ is 1/7 of the mean one's where
+/// that is 3.5 pixels, and it is up to twice as bright as white. 0.14 was measured.
 const POP_A_PIXEL: f32 = 0.2;
 const POP_AT_LEAST: f32 = 0.16;
 
@@ -125,22 +131,36 @@ fn a_flight_does_not_pop() {
         let off = fly(&gpu, &["draw.impostors='off'"], first, Threading::Serial);
         for error in [0.5, 0.2] {
             let key = format!("draw.impostor_error={error}");
-            let f = compare(&fly(&gpu, &["draw.impostors='on'", &key], first, Threading::Serial), &off);
+            let f =
+                compare(&fly(&gpu, &["draw.impostors='on'", &key], first, Threading::Serial), &off);
             println!(
-                "from {first}, {error} px: {} made, {} used again; rmse {:.2e}, most {:.3}, new {:.1e}, pop {:.3}; change {:.3}",
+                "from {first}, {error} px: {} made, {} used again; rmse {:.2e}, most {:.3}, new \
+                 {:.1e}, pop {:.3}; change {:.3}",
                 f.n_made, f.n_reused, f.rmse, f.most, f.most_new, f.pop, f.change
             );
             // Before the cloud a fifth of a pixel is too little for any shell.
             assert!(f.n_reused > 0 || (first, error) == (400, 0.2));
-            assert!(f.pop <= POP_A_PIXEL * error as f32 + POP_AT_LEAST, "{first} {error}: {}", f.pop);
-            assert!(f.pop < f.change && f.rmse < 2e-3, "{first} {error}: as much as the flight itself");
-            // Of layers that end within a rounding of a pixel's centre one may be there or not: e^-4.5 of an optical depth, twice as bright as white.
+            assert!(
+                f.pop <= POP_A_PIXEL * error as f32 + POP_AT_LEAST,
+                "{first} {error}: {}",
+                f.pop
+            );
+            assert!(
+                f.pop < f.change && f.rmse < 2e-3,
+                "{first} {error}: as much as the flight itself"
+            );
+            // Of layers that end within a rounding of a pixel's centre one may be there or not:
+            // e^-4.5 of an optical depth, twice as bright as white.
             assert!(f.most_new < 0.04, "{first} {error}: {}", f.most_new);
         }
     }
     let [off, on] = both(&gpu, &["draw.path='sprites'"], 200);
     let f = compare(&on, &off);
-    assert!(f.n_reused > 0 && f.pop <= POP_A_PIXEL * 0.5 + POP_AT_LEAST && f.most_new < 0.04, "{}", f.pop);
+    assert!(
+        f.n_reused > 0 && f.pop <= POP_A_PIXEL * 0.5 + POP_AT_LEAST && f.most_new < 0.04,
+        "{}",
+        f.pop
+    );
 }
 
 /// What the flights are compared with is the truth in f64, which impostors are as near to.
@@ -148,11 +168,16 @@ fn a_flight_does_not_pop() {
 fn the_f64_picture_agrees() {
     let gpu = Gpu::new();
     let [off, on] = both(&gpu, &[], 200);
-    let k = (5..on.len()).find(|k| off_by(&on[*k].1).is_some_and(|px| px > 0)).expect("a shell that is used again");
+    let k = (5..on.len())
+        .find(|k| off_by(&on[*k].1).is_some_and(|px| px > 0))
+        .expect("a shell that is used again");
     let scene = scene(&[]);
     let time_s = scene.time.at(200 + k as u32);
-    let truth = picture(&scene, time_s, Drawing::Thin, &|_, _| {}).expect("a picture").rgba.concat();
-    let most = |a: &[f32]| a.iter().zip(&truth).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max);
+    let truth =
+        picture(&scene, time_s, Drawing::Thin, &|_, _| {}).expect("a picture").rgba.concat();
+    let most = |a: &[f32]| {
+        a.iter().zip(&truth).map(|(a, b)| (f64::from(*a) - b).abs()).fold(0.0, f64::max)
+    };
     let [without, with] = [most(&off[k].0), most(&on[k].0)];
     println!("against f64: {without:.1e} without, {with:.3} with");
     assert!(without < 0.04 && with < f64::from(POP_A_PIXEL) * 0.5 + f64::from(POP_AT_LEAST));
@@ -176,16 +201,21 @@ fn both_loops_give_the_same_bytes_and_no_skip_those_without_impostors() {
         let scene_on = scene(on);
         let scene_off = scene(&["draw.impostors='off'", path, "film.format='rgba16f'"]);
         let draw = |scene: &Arc<Scene>, skip: bool, frames: &[u32]| {
-            let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, scene, skip).expect("a renderer");
+            let mut renderer =
+                Renderer::new(&gpu.device, &gpu.compiler, scene, skip).expect("a renderer");
             let mut game = Game::new(scene.clone(), None);
-            let one = |i: &u32| renderer.step(game.step(*i).expect("a packet")).expect("a frame").plan;
+            let one =
+                |i: &u32| renderer.step(game.step(*i).expect("a packet")).expect("a frame").plan;
             let plans: Vec<Plan> = frames.iter().map(one).collect();
             (renderer.image_bytes().expect("bytes"), plans)
         };
         let wanted = draw(&scene_off, true, &[220]).0;
         assert!(wanted == draw(&scene_on, true, &[220]).0, "{path}: alone");
         let (unskipped, plans) = draw(&scene_on, false, &[217, 218, 219, 220]);
-        assert!(wanted == unskipped && plans.iter().all(|p| !p.runs(Pass::Impostors)), "{path}: no skip");
+        assert!(
+            wanted == unskipped && plans.iter().all(|p| !p.runs(Pass::Impostors)),
+            "{path}: no skip"
+        );
         let (reused, plans) = draw(&scene_on, true, &[217, 218, 219, 220]);
         assert!(off_by(plans.last().expect("a plan")).is_some_and(|px| px > 0) && wanted != reused);
     }
@@ -199,6 +229,7 @@ fn what_moves_or_grows_denser_is_drawn() {
         assert!(frames.iter().all(|(_, plan)| off_by(plan).is_none()), "{change}");
     }
     // All coordinates go with a cloud that drifts alone, and it is only the eye that moves.
-    let frames = fly(&gpu, &["draw.impostors='on'", "cloud.0.wind=[0.1,0,0]"], 200, Threading::Serial);
+    let frames =
+        fly(&gpu, &["draw.impostors='on'", "cloud.0.wind=[0.1,0,0]"], 200, Threading::Serial);
     assert!(frames.iter().any(|(_, plan)| off_by(plan).is_some_and(|px| px > 0)));
 }

@@ -14,14 +14,19 @@ use nimbus::model::film::ToneMap;
 use nimbus::model::light::Light;
 use nimbus::model::scene::{Simulate, Threading};
 use nimbus::model::sort_bits::SortBits;
-use scene_text::{BOXES, CLOUD, assert_message, assert_table, folder, good, load_with, message, to_toml};
+use scene_text::{
+    BOXES, CLOUD, assert_message, assert_table, folder, good, load_with, message, to_toml,
+};
 use serde_json::json;
 
 #[test]
 fn a_cloud_alone_is_a_complete_scene() {
     let loaded = good(CLOUD);
     let scene = &loaded.scene;
-    assert_eq!((scene.film.width, scene.film.height, scene.film.tone_map), (800, 600, ToneMap::Neutral));
+    assert_eq!(
+        (scene.film.width, scene.film.height, scene.film.tone_map),
+        (800, 600, ToneMap::Neutral)
+    );
     assert_eq!(scene.film.background, DVec3::new(0.32, 0.52, 0.80));
     assert_eq!(scene.camera.keys[0].position, DVec3::new(0.0, 0.0, 18.0));
     assert_eq!(scene.camera.fov_y_rad, 45f64.to_radians());
@@ -29,10 +34,15 @@ fn a_cloud_alone_is_a_complete_scene() {
     assert_eq!((scene.lighting.grid, scene.lighting.step, scene.lighting.forward), (64, 1.0, 0.85));
     assert_eq!((scene.draw.cutoff, scene.draw.sort_bits), (3.0, SortBits::Auto));
     assert_eq!((scene.threads.mode, scene.threads.simulate), (Threading::Parallel, Simulate::Gpu));
-    let [Light::Directional { direction, irradiance }, Light::Sky { constant, .. }] = scene.lights[..] else {
+    let [Light::Directional { direction, irradiance }, Light::Sky { constant, .. }] =
+        scene.lights[..]
+    else {
         panic!("{:?}", scene.lights)
     };
-    assert!((direction.length() - 1.0).abs() < 1e-15 && direction.dot(DVec3::new(-0.5, -0.8, -0.3)) > 0.98);
+    assert!(
+        (direction.length() - 1.0).abs() < 1e-15
+            && direction.dot(DVec3::new(-0.5, -0.8, -0.3)) > 0.98
+    );
     assert_eq!((irradiance, constant), (DVec3::new(3.0, 2.9, 2.7), 0.55));
     assert_eq!((scene.materials[0].name.as_str(), scene.materials[0].at(0.0).ns), ("cloud", 8.0));
     assert_eq!((scene.clouds[0].seed, scene.n_particles()), (1, 3));
@@ -68,9 +78,15 @@ fn unknown_keys_are_refused_with_the_nearest_and_all_known_ones() {
         "[time]\nbanana = 1\n",
         "scene.toml:2:1: unknown key `time.banana`; known here: `start_s`, `step_s`, `frames`",
     );
-    assert!(message("[clouds]\n", &[]).starts_with("scene.toml:1:2: unknown key `clouds`; did you mean `cloud`?"));
+    assert!(
+        message("[clouds]\n", &[])
+            .starts_with("scene.toml:1:2: unknown key `clouds`; did you mean `cloud`?")
+    );
     // The first in file order, not in the alphabet's.
-    assert!(message("[film]\nzzzz = 1\naaaa = 1\n", &[]).starts_with("scene.toml:2:1: unknown key `film.zzzz`"));
+    assert!(
+        message("[film]\nzzzz = 1\naaaa = 1\n", &[])
+            .starts_with("scene.toml:2:1: unknown key `film.zzzz`")
+    );
     assert!(
         message("[[light]]\nkind = 'sky'\nirradiance = [1, 1, 1]\ndirection = [0, 1, 0]\n", &[])
             .starts_with("scene.toml:4:1: unknown key `light.0.direction`")
@@ -89,9 +105,15 @@ fn a_camera_that_looks_nowhere_or_runs_backward_is_refused() {
         "[camera]\nposition = [1, 2, 3]\ntarget = [1, 2, 3]",
         &format!("scene.toml:2:12: `camera.position`: {nowhere}"),
     );
-    assert_message("[camera]\nup = [0, 0, 2]", &format!("scene.toml:1:1: `camera.position`: {nowhere}"));
+    assert_message(
+        "[camera]\nup = [0, 0, 2]",
+        &format!("scene.toml:1:1: `camera.position`: {nowhere}"),
+    );
     let path = |second: &str| {
-        format!("[camera]\npath = [\n{{ time_s = 1, position = [0, 0, 9], target = [0, 0, 0] }},\n{second}\n]")
+        format!(
+            "[camera]\npath = [\n{{ time_s = 1, position = [0, 0, 9], target = [0, 0, 0] \
+             }},\n{second}\n]"
+        )
     };
     assert_message(
         &path("{ time_s = 2, position = [0, 9, 0], target = [0, 0, 0] }"),
@@ -146,7 +168,8 @@ fn overrides_are_laid_over_the_file() {
     assert_eq!(scene.lights[0].energy(), DVec3::ONE);
     assert_eq!(scene.threads.mode, Threading::Serial);
     assert_eq!((scene.film.width, scene.film.height, scene.title.as_str()), (7, 9, "a=b"));
-    let later = load_with(CLOUD, &["film.width=1", "film.width=2", "cloud.0.file=b.dat"], None).unwrap();
+    let later =
+        load_with(CLOUD, &["film.width=1", "film.width=2", "cloud.0.file=b.dat"], None).unwrap();
     assert_eq!(later.scene.film.width, 2);
 }
 
@@ -156,10 +179,14 @@ fn overrides_that_do_not_fit_are_named() {
         ("film.width", "expected key.path=VALUE, for example lighting.grid=32"),
         ("film..width=3", "expected key.path=VALUE, found an empty key"),
         ("film.width=", "expected a value after `=`"),
-        ("film.width=wide", "`film.width`: expected an integer from 1 to 16384, found string \"wide\""),
+        (
+            "film.width=wide",
+            "`film.width`: expected an integer from 1 to 16384, found string \"wide\"",
+        ),
         (
             "film.widht=3",
-            "unknown key `film.widht`; did you mean `width`? known here: `width`, `height`, `format`, `background`, `exposure`, `tone_map`",
+            "unknown key `film.widht`; did you mean `width`? known here: `width`, `height`, \
+             `format`, `background`, `exposure`, `tone_map`",
         ),
         ("cloud.1.seed=3", "`cloud`: expected a number from 0 to 0, or *, found `1`"),
         ("material.0.kd=[1,1,2]", "`material.0.kd.2`: expected a number from 0 to 1, found 2.0"),
@@ -167,10 +194,14 @@ fn overrides_that_do_not_fit_are_named() {
         ("surface.0.u=3", "the scene has no `surface`"),
         ("film.exposure=inf", "`film.exposure`: expected a number from 0 to 1e15, found inf"),
     ] {
-        assert_eq!(message(&format!("{CLOUD}seed = 4"), &[set]), format!("--set {set}: {expected}"));
+        assert_eq!(
+            message(&format!("{CLOUD}seed = 4"), &[set]),
+            format!("--set {set}: {expected}")
+        );
     }
     assert!(
-        message(CLOUD, &["light.0.irradiance=[1,1"]).starts_with("--set light.0.irradiance=[1,1: the value is no TOML")
+        message(CLOUD, &["light.0.irradiance=[1,1"])
+            .starts_with("--set light.0.irradiance=[1,1: the value is no TOML")
     );
     assert!(message(CLOUD, &["film.width=1 2"]).starts_with("--set film.width=1 2: "));
 }
@@ -180,7 +211,8 @@ fn the_seed_argument_numbers_the_clouds() {
     let two = format!("{CLOUD}seed = 9\n{CLOUD}");
     let seeds = |seed| {
         let loaded = load_with(&two, &[], seed).unwrap();
-        let resolved: Vec<_> = (0..2).map(|i| loaded.resolved["cloud"][i]["seed"].as_u64().unwrap() as u32).collect();
+        let resolved: Vec<_> =
+            (0..2).map(|i| loaded.resolved["cloud"][i]["seed"].as_u64().unwrap() as u32).collect();
         assert_eq!(loaded.scene.clouds.iter().map(|c| c.seed).collect::<Vec<_>>(), resolved);
         resolved
     };
@@ -222,7 +254,10 @@ fn the_resolved_scene_is_complete_and_reads_back_as_itself() {
         })
     );
     let again = good(&to_toml(&loaded.resolved));
-    assert_eq!((&again.scene, &again.resolved, &again.hash), (&loaded.scene, &loaded.resolved, &loaded.hash));
+    assert_eq!(
+        (&again.scene, &again.resolved, &again.hash),
+        (&loaded.scene, &loaded.resolved, &loaded.hash)
+    );
 }
 
 #[test]
@@ -257,12 +292,28 @@ fn warnings_say_what_and_where() {
 fn files_that_are_none_are_refused_where_they_are_named() {
     let named = |file: &str| format!("[[cloud]]\nfrom = 'boxes'\nfile = '{file}'");
     assert_message(&named("gone.dat"), "scene.toml:3:8: `cloud.0.file`: gone.dat: no such file");
-    assert_message(&named(""), "scene.toml:3:8: `cloud.0.file`: expected a string that is not empty");
+    assert_message(
+        &named(""),
+        "scene.toml:3:8: `cloud.0.file`: expected a string that is not empty",
+    );
     let (dir, path) = folder(&named("sub"));
     fs::create_dir(dir.path().join("sub")).unwrap();
-    assert!(load(&path, &[], None).unwrap_err().to_string().ends_with("sub: is a folder, expected a file"));
-    assert!(message(CLOUD, &["cloud.0.file=gone.dat"]).starts_with("--set cloud.0.file=gone.dat: `cloud.0.file`: "));
-    assert!(load(dir.path(), &[], None).unwrap_err().to_string().ends_with(": is a folder, expected a file"));
+    assert!(
+        load(&path, &[], None)
+            .unwrap_err()
+            .to_string()
+            .ends_with("sub: is a folder, expected a file")
+    );
+    assert!(
+        message(CLOUD, &["cloud.0.file=gone.dat"])
+            .starts_with("--set cloud.0.file=gone.dat: `cloud.0.file`: ")
+    );
+    assert!(
+        load(dir.path(), &[], None)
+            .unwrap_err()
+            .to_string()
+            .ends_with(": is a folder, expected a file")
+    );
     let gone = load(Path::new("gone.toml"), &[], None).unwrap_err();
     assert_eq!(gone.to_string(), "gone.toml: no such file");
 }
@@ -271,11 +322,17 @@ fn files_that_are_none_are_refused_where_they_are_named() {
 fn files_that_are_no_text_are_refused_at_once() {
     let (dir, path) = folder(CLOUD);
     let boxes = dir.path().join("b.dat");
-    let error = || load(&path, &[], None).unwrap_err().to_string().replace(&format!("{}/", dir.path().display()), "");
+    let error = || {
+        load(&path, &[], None)
+            .unwrap_err()
+            .to_string()
+            .replace(&format!("{}/", dir.path().display()), "")
+    };
     fs::File::create(&boxes).unwrap().set_len(1 << 30).unwrap();
     assert_eq!(
         error(),
-        "scene.toml:3:8: `cloud.0.file`: b.dat: too large: 1024 MiB (1073741824 bytes), the limit is 64 MiB"
+        "scene.toml:3:8: `cloud.0.file`: b.dat: too large: 1024 MiB (1073741824 bytes), the \
+         limit is 64 MiB"
     );
     fs::write(&boxes, "3\n1\n3, \0").unwrap();
     assert_eq!(error(), "b.dat:3:4: not a text file: it holds a zero byte");
@@ -284,7 +341,11 @@ fn files_that_are_no_text_are_refused_at_once() {
     fs::write(&boxes, " \n").unwrap();
     assert_eq!(error(), "b.dat:1:1: the file is empty: expected the number of particles");
     fs::write(&path, "").unwrap();
-    assert_eq!(error(), "scene.toml:1:1: the file is empty: expected a scene's tables, such as [camera] and [[cloud]]");
+    assert_eq!(
+        error(),
+        "scene.toml:1:1: the file is empty: expected a scene's tables, such as [camera] \
+         and [[cloud]]"
+    );
     fs::write(&path, format!("title = '{}'", "x".repeat(4 << 20))).unwrap();
     assert!(error().starts_with("scene.toml: too large: 5 MiB"));
     fs::write(&path, "\u{feff}title = 3").unwrap();
@@ -296,15 +357,22 @@ fn an_empty_or_too_heavy_particle_list_is_refused_by_line() {
     let (dir, path) = folder("[[cloud]]\nfrom = 'particles'\nfile = 'p.csv'\n");
     let error = |text: &str| {
         fs::write(dir.path().join("p.csv"), text).unwrap();
-        load(&path, &[], None).unwrap_err().to_string().replace(&format!("{}/", dir.path().display()), "")
+        load(&path, &[], None)
+            .unwrap_err()
+            .to_string()
+            .replace(&format!("{}/", dir.path().display()), "")
     };
-    assert_eq!(error(""), "p.csv:1:1: the file is empty: expected a header x,y,z,sigma,kappa[,r,g,b]");
+    assert_eq!(
+        error(""),
+        "p.csv:1:1: the file is empty: expected a header x,y,z,sigma,kappa[,r,g,b]"
+    );
     assert_eq!(
         error("x,y,z,sigma,kappa\n\n0,0,0,1e12,10\n0,0,0,1,1e4\n"),
         "scene.toml:3:8: `cloud.0.file`: line 3: κ (2π)^{3/2} σ³: expected at most 1e37, \
          found 1.575e38"
     );
-    fs::write(dir.path().join("p.csv"), "x,y,z,sigma,kappa\n1e15,-1e15,0,1e-15,1e15\n0,0,0,0,0\n").unwrap();
+    fs::write(dir.path().join("p.csv"), "x,y,z,sigma,kappa\n1e15,-1e15,0,1e-15,1e15\n0,0,0,0,0\n")
+        .unwrap();
     assert_eq!(load(&path, &[], None).unwrap().scene.n_particles(), 2);
 }
 
@@ -316,10 +384,19 @@ fn nesting_without_end_is_an_error_and_no_crash() {
         (format!("{}x = 1", "a.".repeat(100_000)), "no key of nimbus has this many dots"),
         (format!("[{}x]", "a.".repeat(100_000)), "no key of nimbus has this many dots"),
         // As deep as the bounds allow, so that it is the reader that must bear it.
-        (format!("x = {}", format!("{{{}x=", "a.".repeat(16)).repeat(70)) + "1" + &"}".repeat(70), "unknown key `x`"),
+        (
+            format!("x = {}", format!("{{{}x=", "a.".repeat(16)).repeat(70))
+                + "1"
+                + &"}".repeat(70),
+            "unknown key `x`",
+        ),
     ] {
         let found = message(&scene, &[]);
-        assert!(found.contains(expected), "expected {expected}, found {}", &found[..found.len().min(300)]);
+        assert!(
+            found.contains(expected),
+            "expected {expected}, found {}",
+            &found[..found.len().min(300)]
+        );
         message("title = 'x'", &[&scene]);
     }
 }
@@ -329,12 +406,9 @@ fn more_particles_than_can_be_numbered_are_refused() {
     let (dir, path) = folder(&format!("{CLOUD}{CLOUD}"));
     let n = u32::MAX;
     fs::write(dir.path().join("b.dat"), format!("{n}\n1\n{n}, 1, 1, 1, 0, 0, 0, 1\n")).unwrap();
-    assert!(
-        load(&path, &[], None)
-            .unwrap_err()
-            .to_string()
-            .ends_with("8589934590 particles and 0 facets of surfaces and ground: at most 4294967295 together")
-    );
+    assert!(load(&path, &[], None).unwrap_err().to_string().ends_with(
+        "8589934590 particles and 0 facets of surfaces and ground: at most 4294967295 together"
+    ));
 }
 
 #[test]
@@ -355,5 +429,8 @@ fn every_scene_of_the_repository_loads() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
         load(&path, &[], None).unwrap().scene.n_particles()
     };
-    assert_eq!((count("cubes-554.toml"), count("cubes-615.toml"), count("threads.toml")), (554, 615, 11_690));
+    assert_eq!(
+        (count("cubes-554.toml"), count("cubes-615.toml"), count("threads.toml")),
+        (554, 615, 11_690)
+    );
 }

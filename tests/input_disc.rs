@@ -13,7 +13,8 @@ const LIST: &str = "x,y,z,radius,kappa\n0, 1, 0, 1, 1\n0, 5, 0, 2, 1\n";
 
 fn load(text: &str) -> nimbus::error::Result<Scene> {
     let files = |_: &Path, _: &str| Ok(LIST.to_owned());
-    scene_file::parse_beside(text.to_owned(), Path::new("scene.toml"), &[], None, &files).map(|loaded| loaded.scene)
+    scene_file::parse_beside(text.to_owned(), Path::new("scene.toml"), &[], None, &files)
+        .map(|loaded| loaded.scene)
 }
 
 fn good(text: &str) -> Scene {
@@ -33,14 +34,21 @@ fn disc(cloud: &Cloud) -> &Disc {
 fn a_disc_alone_is_a_complete_cloud() {
     let scene = good(DISC);
     let cloud = &scene.clouds[0];
-    assert_eq!((scene.n_particles(), disc(cloud).period_s, disc(cloud).dilution), (1000, 20.0, Dilution::Mass));
+    assert_eq!(
+        (scene.n_particles(), disc(cloud).period_s, disc(cloud).dilution),
+        (1000, 20.0, Dilution::Mass)
+    );
     assert_eq!((disc(cloud).condensation, cloud.growth.is_none()), (None, true));
     // Its keys one by one.
     let scene = good(&format!(
-        "{DISC}particles = 7\nlifetime_s = 3\ndilution = 'none'\nwind = [1, 0, 0]\nposition = [0, 2, 0]\n"
+        "{DISC}particles = 7\nlifetime_s = 3\ndilution = 'none'\nwind = [1, 0, 0]\nposition \
+         = [0, 2, 0]\n"
     ));
     let cloud = &scene.clouds[0];
-    assert_eq!((disc(cloud).n_particles, disc(cloud).period_s, disc(cloud).dilution), (7, 3.0, Dilution::None));
+    assert_eq!(
+        (disc(cloud).n_particles, disc(cloud).period_s, disc(cloud).dilution),
+        (7, 3.0, Dilution::None)
+    );
     // It stands still in the wind, and so do its bounds.
     assert_eq!(cloud.origin_at(1e6), cloud.position);
     let groups = scene.groups();
@@ -61,7 +69,9 @@ fn bases_are_numbers_or_the_airs() {
 
     // Other clouds are moved: the lowest particle of this list is at 1.
     let list = |base: &str| {
-        let text = format!("[[cloud]]\nfrom = 'particles'\nfile = 'l.csv'\nposition = [3, 7, 0]\nbase = {base}\n");
+        let text = format!(
+            "[[cloud]]\nfrom = 'particles'\nfile = 'l.csv'\nposition = [3, 7, 0]\nbase = {base}\n"
+        );
         good(&text).clouds[0].position
     };
     assert_eq!(list("'none'").to_array(), [3.0, 7.0, 0.0]);
@@ -96,12 +106,22 @@ fn what_a_disc_or_air_cannot_be_is_refused_by_key() {
         ("dilution = 'masse'", "`cloud.0.dilution`: unknown value `masse`; did you mean `mass`?"),
         (
             "base = 'lcm'",
-            "`cloud.0.base`: expected a number from -1e15 to 1e15, \"lcl\" or \"none\", found string \"lcm\"",
+            "`cloud.0.base`: expected a number from -1e15 to 1e15, \"lcl\" or \"none\", found \
+             string \"lcm\"",
         ),
         ("base = true", "`cloud.0.base`: expected a number, found boolean true"),
-        ("wind = [1e15, 0, 0]", "`cloud.0.from`: its particles' places: expected at most 1e15, found 2.000e16"),
-        ("sigma = 1e15\nsigma_spread = 0.5", "its particles' σ: expected at most 1e15, found 1.500e15"),
-        ("sigma = 1e-15\noptical_depth = 10", "its particles' κ = optical_depth / (√(2π) σ): expected at most 1e15"),
+        (
+            "wind = [1e15, 0, 0]",
+            "`cloud.0.from`: its particles' places: expected at most 1e15, found 2.000e16",
+        ),
+        (
+            "sigma = 1e15\nsigma_spread = 0.5",
+            "its particles' σ: expected at most 1e15, found 1.500e15",
+        ),
+        (
+            "sigma = 1e-15\noptical_depth = 10",
+            "its particles' κ = optical_depth / (√(2π) σ): expected at most 1e15",
+        ),
         (
             "outflow = 1e15\nlifetime_s = 1e-15\nsigma = 1e14\noptical_depth = 1e15",
             "κ (2π)^{3/2} σ³: expected at most 1e37",

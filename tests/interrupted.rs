@@ -1,5 +1,5 @@
-//! Ctrl-C in the middle of a bench: exit code 130, and results of the frames that were finished, which are results like
-//! any others. In either loop and in both.
+//! Ctrl-C in the middle of a bench: exit code 130, and results of the frames that were finished,
+//! which are results like any others. In either loop and in both.
 
 use std::fs;
 use std::path::Path;
@@ -55,7 +55,8 @@ fn interrupted(threading: &str, out: &str, after: Duration) -> Output {
     await_folder(out);
     std::thread::sleep(after);
     // Gone already where the machine was faster than before.
-    let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+    let _ =
+        Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
     child.wait_with_output().expect("it ends")
 }
 
@@ -119,13 +120,18 @@ fn check_results(threading: &str, out: &str, whole: &str) {
     let Recorded { run, modes } = read_results(Path::new(out)).expect("results");
     assert!(run.interrupted);
     let text = fs::read_to_string(Path::new(out).join("run.json")).expect("run.json");
-    let schema: Value = serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
+    let schema: Value =
+        serde_json::from_str(include_str!("../docs/run.schema.json")).expect("the schema");
     let json: Value = serde_json::from_str(&text).expect("JSON");
     assert!(jsonschema::is_valid(&schema, &json), "{:?}", jsonschema::validate(&schema, &json));
     // A loop of which only frames to warm up were run has no timed ones.
     let counted: Vec<_> = counted(out).into_iter().filter(|(_, n, _)| *n > 0).collect();
-    let begun: Vec<(String, usize, usize)> =
-        run.cases[0].modes.iter().map(|m| (m.threading.clone(), m.frames, m.warm_up)).filter(|m| m.1 > 0).collect();
+    let begun: Vec<(String, usize, usize)> = run.cases[0]
+        .modes
+        .iter()
+        .map(|m| (m.threading.clone(), m.frames, m.warm_up))
+        .filter(|m| m.1 > 0)
+        .collect();
     assert_eq!(counted, begun, "{threading}");
     assert_eq!(counted.len(), modes.len());
     let n: usize = counted.iter().map(|(_, n, _)| n).sum();
@@ -133,9 +139,12 @@ fn check_results(threading: &str, out: &str, whole: &str) {
     println!("{threading}: {n} of {n_all} frames");
     assert!(n > 0 && n < n_all, "{n} of {n_all}");
     // Whole against part, and part against itself.
-    for (args, note) in [([whole, out], "note: B was interrupted"), ([out, out], "note: A was interrupted")] {
+    for (args, note) in
+        [([whole, out], "note: B was interrupted"), ([out, out], "note: A was interrupted")]
+    {
         let output = nimbus(&[&["compare"], &args[..]].concat()).output().expect("it runs");
-        let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let (stdout, stderr) =
+            (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
         assert_eq!((output.status.code(), stderr.as_ref()), (Some(0), ""));
         assert!(stdout.contains(note) && stdout.contains("frame: B takes"), "{stdout}");
     }

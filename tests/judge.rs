@@ -1,5 +1,5 @@
-//! Judging what is seen: right pictures are right, also those of the device, others are not; what is asked last is
-//! answered.
+//! Judging what is seen: right pictures are right, also those of the device, others are not; what
+//! is asked last is answered.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -21,7 +21,8 @@ use nimbus::viewer::judge::{Judge, Progress, Standing, View};
 /// hello.toml, plain, from aside.
 fn view(set: &[&str]) -> View {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
-    let set: Vec<String> = ["cloud.0.texture=none"].iter().chain(set).map(|s| (*s).to_owned()).collect();
+    let set: Vec<String> =
+        ["cloud.0.texture=none"].iter().chain(set).map(|s| (*s).to_owned()).collect();
     let scene = Arc::new(scene_file::load(&path, &set, None).unwrap().scene);
     let against = View::against(&scene);
     let (position, target) = (DVec3::new(1.0, 0.7, 5.5), DVec3::new(0.1, 0.5, 0.0));
@@ -31,7 +32,8 @@ fn view(set: &[&str]) -> View {
 /// As `Renderer::image` would give it, of an exact device.
 fn exact_picture(view: &View) -> Vec<f32> {
     let drawing = if view.against == Against::Thin { Drawing::Thin } else { Drawing::Volume };
-    let rgba = picture(&Against::of_scene(&view.exact()), view.time_s, drawing, &|_, _| ()).unwrap().rgba;
+    let rgba =
+        picture(&Against::of_scene(&view.exact()), view.time_s, drawing, &|_, _| ()).unwrap().rgba;
     rgba.iter().flatten().map(|v| *v as f32).collect()
 }
 
@@ -52,7 +54,9 @@ const LONG: Duration = Duration::from_secs(1000);
 #[test]
 fn right_pictures_are_right_and_others_are_not() {
     let dir = tempfile::tempdir().unwrap();
-    for (set, against) in [(&[][..], Against::Volume), (&["cloud.0.texture=\"2\""][..], Against::Thin)] {
+    for (set, against) in
+        [(&[][..], Against::Volume), (&["cloud.0.texture=\"2\""][..], Against::Thin)]
+    {
         let view = view(set);
         assert_eq!(view.against, against);
         let judge = Judge::new(Some(dir.path().to_owned()), LONG).unwrap();
@@ -60,32 +64,42 @@ fn right_pictures_are_right_and_others_are_not() {
         let Standing { known, failed, progress, .. } = settled(&judge);
         assert_eq!((failed, progress), (None, None));
         let known = known.unwrap();
-        assert!(known.pixels.at.len() == 64 * 48 && !known.from_cache, "there was time for all of them");
+        assert!(
+            known.pixels.at.len() == 64 * 48 && !known.from_cache,
+            "there was time for all of them"
+        );
         // Rounded to f32 once, of values up to about 1.
         let mut rgba = exact_picture(&view);
         let right = known.error(&rgba).unwrap();
         assert!(right.rmse.value < 3e-8 && right.max < 1e-7, "{against}: {right:?}");
         assert!(known.flip(&rgba).unwrap() < 1e-4);
-        // A block of 8 by 8 that is a tenth brighter in red: the square of one channel in four, of 1 pixel in 48.
+        // A block of 8 by 8 that is a tenth brighter in red: the square of one channel in four, of
+        // 1 pixel in 48.
         for y in 20..28 {
             (24..32).for_each(|x| rgba[4 * (64 * y + x)] += 0.1);
         }
         let wrong = known.error(&rgba).unwrap();
-        assert!((wrong.rmse.value - 0.1 * (1.0f64 / (48.0 * 4.0)).sqrt()).abs() < 1e-6, "{wrong:?}");
+        assert!(
+            (wrong.rmse.value - 0.1 * (1.0f64 / (48.0 * 4.0)).sqrt()).abs() < 1e-6,
+            "{wrong:?}"
+        );
         assert!((wrong.max - 0.1).abs() < 1e-6 && wrong.is_resolved);
         assert!(known.flip(&rgba).unwrap() > 1e-3);
         // No picture of this size, and no number.
         assert_eq!((known.error(&rgba[4..]), known.flip(&rgba[4..])), (None, None));
         rgba[0] = f32::NAN;
         assert_eq!(known.error(&rgba), None);
-        // Somebody else who asks the same is told at once; where it is drawn otherwise it is the same.
+        // Somebody else who asks the same is told at once; where it is drawn otherwise it is the
+        // same.
         drop(judge);
         let judge = Judge::new(Some(dir.path().to_owned()), LONG).unwrap();
         let mut turned = view.clone();
         Arc::make_mut(&mut turned.scene).draw.cutoff = 2.0;
         judge.ask(turned);
         let again = settled(&judge).known.unwrap();
-        assert!(again.from_cache && again.reference == known.reference && again.pixels == known.pixels);
+        assert!(
+            again.from_cache && again.reference == known.reference && again.pixels == known.pixels
+        );
     }
 }
 
@@ -116,7 +130,9 @@ fn a_few_pixels_are_those_of_the_whole_picture() {
             let rows = AtomicUsize::new(0);
             let listener = |work: Work, n: usize| {
                 if work == Work::Drawing {
-                    assert!(rows.fetch_add(1, Ordering::Relaxed) < n && n == pixels.n_rows() as usize);
+                    assert!(
+                        rows.fetch_add(1, Ordering::Relaxed) < n && n == pixels.n_rows() as usize
+                    );
                 }
             };
             let found = Against::Thin.reference(&scene, 0.0, &pixels, &listener).unwrap();
@@ -149,7 +165,12 @@ fn what_is_asked_last_is_answered() {
     let mut other = last.view.clone();
     Arc::make_mut(&mut other.scene).lighting.mode = LightingMode::None;
     judge.ask(other);
-    assert!(judge.standing().known.is_none_or(|known| known.view.scene.lighting.mode == LightingMode::None));
+    assert!(
+        judge
+            .standing()
+            .known
+            .is_none_or(|known| known.view.scene.lighting.mode == LightingMode::None)
+    );
     judge.rest();
     let rests = settled(&judge);
     assert!(rests.known.is_none() && rests.failed.is_none());
@@ -162,7 +183,9 @@ fn what_is_under_way_says_how_far_it_is_and_stops() {
     // All of it, row by row.
     judge.ask(View { size: [1024, 1024], ..view(&[]) });
     let begin = Instant::now();
-    let counts = |judge: &Judge| judge.standing().progress.filter(|p| p.work == Work::Drawing && p.n_done > 1);
+    let counts = |judge: &Judge| {
+        judge.standing().progress.filter(|p| p.work == Work::Drawing && p.n_done > 1)
+    };
     let mut seen = None;
     while seen.is_none() {
         seen = counts(&judge);
@@ -190,11 +213,12 @@ fn what_has_no_reference_says_why() {
     judge.ask(view(&[]));
     assert!(settled(&judge).known.is_some());
 }
-/// The device's own picture, from where the eye was flown to and not where the scene's camera stands.
+/// The device's own picture, from where the eye was flown to and not where the scene's camera
+/// stands.
 #[test]
 fn the_devices_picture_is_judged_as_it_was_seen() {
-    // A hundred layers of f32, some roundings of 2^-24 each; and what light by a grid's directions and a basis of a few
-    // vectors is off.
+    // A hundred layers of f32, some roundings of 2^-24 each; and what light by a grid's directions
+    // and a basis of a few vectors is off.
     const ROUNDED: f64 = 2e-5;
     const LIT: f64 = 5e-3;
     for (set, most) in [
@@ -206,7 +230,8 @@ fn the_devices_picture_is_judged_as_it_was_seen() {
         view.against = Against::Thin;
         let judge = Judge::new(None, LONG).unwrap();
         judge.ask(view.clone());
-        // As the truth is drawn, of which nothing is left out; only the device's f32 and f16 are between them.
+        // As the truth is drawn, of which nothing is left out; only the device's f32 and f16 are
+        // between them.
         let exact = Against::of_scene(&view.exact());
         let pose = exact.camera.pose(0.0).unwrap();
         let size = view.size;

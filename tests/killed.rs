@@ -1,5 +1,5 @@
-//! A process that is killed, at whatever moment, while it replaces results leaves the old ones or the new ones, whole, and
-//! what else lies in their folder.
+//! A process that is killed, at whatever moment, while it replaces results leaves the old ones or
+//! the new ones, whole, and what else lies in their folder.
 
 #[path = "harness/results.rs"]
 mod results;
@@ -22,7 +22,8 @@ const WRITER_FOLDER: &str = "NIMBUS_TEST_WRITER_FOLDER";
 const PAUSE_US: &str = "NIMBUS_TEST_WRITER_PAUSE_US";
 const N_KILLS: u32 = 100;
 
-/// Rows of generation `k`: their number differs from one generation to the next, and every one carries k.
+/// Rows of generation `k`: their number differs from one generation to the next, and every one
+/// carries k.
 fn rows(k: u32) -> Vec<FrameRow> {
     let row = |i: u32| FrameRow { frame_ms: f64::from(k), ..results::row("serial", i) };
     (0..n_rows(k)).map(row).collect()
@@ -33,7 +34,8 @@ fn n_rows(k: u32) -> u32 {
 }
 
 fn run(k: u32) -> Run {
-    let frame_ms = Summary::of(&[f64::from(k)]).map(|of| Measured { of, p50_low: None, p50_high: None });
+    let frame_ms =
+        Summary::of(&[f64::from(k)]).map(|of| Measured { of, p50_low: None, p50_high: None });
     let mode = Mode { frame_ms, ..results::mode("serial", n_rows(k) as usize, 0) };
     Run { scene: json!({ "generation": k }), ..results::run(vec![mode]) }
 }
@@ -43,7 +45,8 @@ fn run(k: u32) -> Run {
 fn writer() {
     let Ok(folder) = std::env::var(WRITER_FOLDER) else { return };
     let folder = Path::new(&folder);
-    let pause = std::env::var(PAUSE_US).ok().map(|us| Duration::from_micros(us.parse().expect("a number")));
+    let pause =
+        std::env::var(PAUSE_US).ok().map(|us| Duration::from_micros(us.parse().expect("a number")));
     for k in generation(folder).expect("results to begin with") + 1.. {
         let written = match pause {
             None => write_results(folder, &run(k), &[], &rows(k)),
@@ -81,8 +84,8 @@ fn prepared() -> (tempfile::TempDir, std::path::PathBuf) {
     (dir, folder)
 }
 
-/// Starts the writer, lets it replace generation `k`, and kills it a few replacements later: 0 to 8 ms by `i`, in steps
-/// of the golden ratio.
+/// Starts the writer, lets it replace generation `k`, and kills it a few replacements later: 0 to 8
+/// ms by `i`, in steps of the golden ratio.
 fn write_and_kill(folder: &Path, k: u32, i: u32, pause_us: Option<u32>) {
     let mut command = Command::new(std::env::current_exe().expect("this program"));
     command.args(["--exact", "writer"]).env(WRITER_FOLDER, folder).stdout(Stdio::null());
@@ -106,13 +109,24 @@ fn a_process_killed_at_any_moment_leaves_results_of_one_run() {
         let found = generation(&folder).unwrap_or_else(|what| panic!("after kill {i}: {what}"));
         assert!(found > k, "generation {found} after {k}");
         k = found;
-        let text = |name: &str| fs::read_to_string(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
-        assert_eq!((text("notes.txt").as_str(), text("a.png").as_str()), ("mine", "picture"), "after kill {i}");
-        assert_eq!(fs::read_dir(&folder).expect("the folder").count(), 4, "nothing else after kill {i}");
+        let text = |name: &str| {
+            fs::read_to_string(folder.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+        };
+        assert_eq!(
+            (text("notes.txt").as_str(), text("a.png").as_str()),
+            ("mine", "picture"),
+            "after kill {i}"
+        );
+        assert_eq!(
+            fs::read_dir(&folder).expect("the folder").count(),
+            4,
+            "nothing else after kill {i}"
+        );
     }
     let n_left = fs::read_dir(dir.path()).expect("a folder").count() - 1;
     println!("{N_KILLS} kills in {} replacements; {n_left} left a temporary folder", k - 1);
-    // Kills that meet a replacement at work leave what it was at; where none did, nothing was tested.
+    // Kills that meet a replacement at work leave what it was at; where none did, nothing was
+    // tested.
     assert!(n_left > 0);
 }
 

@@ -1,5 +1,5 @@
-//! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared with the host's
-//! records, push constants and shared constants.
+//! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared
+//! with the host's records, push constants and shared constants.
 
 mod harness;
 
@@ -17,15 +17,19 @@ use nimbus::layout::facet::{
     FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE, REGION_TERRAIN,
 };
 use nimbus::layout::facet::{RegionBoundsRecord, RegionRecord, RunRecord};
-use nimbus::layout::frame::{CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord};
-use nimbus::layout::particle::{BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord};
+use nimbus::layout::frame::{
+    CameraRecord, GridRecord, LIGHT_DIRECTIONAL, LIGHT_POINT, LIGHT_SKY, LightRecord,
+};
+use nimbus::layout::particle::{
+    BoxRecord, FORM_CENTRED, FORM_GIVEN, FORM_PRINTED, GroupRecord, ParticleRecord,
+};
 use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord, TexturedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
 use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{
-    self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place, second, sort,
-    sprites,
+    self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton,
+    place, second, sort, sprites,
 };
 use nimbus::passes::{present, surfaces, terrain, texture, tiles, transmit, upsample};
 
@@ -60,16 +64,32 @@ const RECORDS: [Record; 25] = [
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
 ];
 
-/// Every shader, the push constants that its pass writes, and the element of each of its buffers: a record's name, or
-/// the bytes of a plain element.
+/// Every shader, the push constants that its pass writes, and the element of each of its buffers: a
+/// record's name, or the bytes of a plain element.
 const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
-    ("contract.comp", contract::Push::FIELDS, &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")]),
-    ("cull_test.comp", cull::TestPush::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)]),
+    (
+        "contract.comp",
+        contract::Push::FIELDS,
+        &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")],
+    ),
+    (
+        "cull_test.comp",
+        cull::TestPush::FIELDS,
+        &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)],
+    ),
     ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
     ("cull_write.comp", cull::WritePush::FIELDS, &[R("Placed"), B(8), B(4), B(8)]),
-    ("facets.comp", facets::Push::FIELDS, &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")]),
+    (
+        "facets.comp",
+        facets::Push::FIELDS,
+        &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")],
+    ),
     ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
-    ("first_tensor.comp", first::TensorPush::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, B(4), R("Lit")]),
+    (
+        "first_tensor.comp",
+        first::TensorPush::FIELDS,
+        &[R("Facet"), R("Light"), B(4), T, F, B(4), R("Lit")],
+    ),
     (
         "facets_groups.comp",
         facets::GroupsPush::FIELDS,
@@ -121,7 +141,24 @@ const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
     (
         "second_tensor.comp",
         second::TensorPush::FIELDS,
-        &[R("Block"), R("Pairing"), B(4), B(4), R("Facet"), T, R("Light"), T, T, F, F, R("Lit"), B(4), B(4), T, B(4)],
+        &[
+            R("Block"),
+            R("Pairing"),
+            B(4),
+            B(4),
+            R("Facet"),
+            T,
+            R("Light"),
+            T,
+            T,
+            F,
+            F,
+            R("Lit"),
+            B(4),
+            B(4),
+            T,
+            B(4),
+        ],
     ),
     ("sort_count.comp", sort::DigitPush::FIELDS, &[B(4), B(8), B(4)]),
     ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(4), R("Drawn"), B(8)]),
@@ -130,7 +167,10 @@ const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
     (
         "sprites.frag",
         sprites::Push::FIELDS,
-        &[Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, T],
+        &[
+            Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere,
+            T,
+        ],
     ),
     (
         "sprites.vert",
@@ -147,7 +187,11 @@ const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
     ("texture_transform.comp", texture::TransformPush::FIELDS, &[B(8)]),
     ("tiles.comp", tiles::Push::FIELDS, &[T, B(8), R("Round"), B(16), B(16), B(4)]),
     ("tiles_clear.comp", tiles::ClearPush::FIELDS, &[R("Round"), B(16)]),
-    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, &[B(8), B(4), B(4), R("Round"), B(8), R("Splat"), R("Kept")]),
+    (
+        "tiles_pairs.comp",
+        tiles::PairsPush::FIELDS,
+        &[B(8), B(4), B(4), R("Round"), B(8), R("Splat"), R("Kept")],
+    ),
     ("tiles_ranges.comp", tiles::RangesPush::FIELDS, &[B(8), R("Round"), B(16)]),
     ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, &[B(4), R("Round"), R("Kept")]),
     (
@@ -200,7 +244,13 @@ fn plain(name: &str) -> &str {
     name.trim_end_matches(|c: char| c.is_ascii_digit()).trim_end_matches('_')
 }
 
-fn compare_record(file: &str, found: &Struct, stride: u32, expected: &str, complaints: &mut Vec<String>) {
+fn compare_record(
+    file: &str,
+    found: &Struct,
+    stride: u32,
+    expected: &str,
+    complaints: &mut Vec<String>,
+) {
     let name = plain(&found.name);
     let Some((_, fields, size)) = RECORDS.iter().find(|(n, _, _)| *n == name) else {
         complaints.push(format!("{file}: struct {name} is no record of the host"));
@@ -210,7 +260,8 @@ fn compare_record(file: &str, found: &Struct, stride: u32, expected: &str, compl
         complaints.push(format!("{file}: a buffer of {name}, the host gives {expected}"));
     }
     if stride as usize != *size {
-        complaints.push(format!("{file}: {name} every {stride} bytes, the host's record has {size}"));
+        complaints
+            .push(format!("{file}: {name} every {stride} bytes, the host's record has {size}"));
     }
     compare_fields(&format!("{file}: {name}"), &found.members, fields, complaints);
 }
@@ -222,18 +273,26 @@ fn compare(file: &str, found: &Reflection, push: &[Field], elements: &[Element])
     let bindings: Vec<u32> = found.bindings.iter().map(|b| b.binding).collect();
     let here = (0u32..).zip(elements).filter(|(_, e)| **e != Elsewhere);
     if bindings != here.clone().map(|(i, _)| i).collect::<Vec<_>>() {
-        complaints.push(format!("{file}: bindings {bindings:?}, the host gives {}", elements.len()));
+        complaints
+            .push(format!("{file}: bindings {bindings:?}, the host gives {}", elements.len()));
         return complaints;
     }
     for (binding, (_, element)) in found.bindings.iter().zip(here) {
         match (&binding.element, element) {
-            (Some(s), R(expected)) => compare_record(file, s, binding.stride, expected, &mut complaints),
-            (None, B(bytes)) if binding.stride == *bytes && binding.kind == BindingKind::Storage => {}
+            (Some(s), R(expected)) => {
+                compare_record(file, s, binding.stride, expected, &mut complaints)
+            }
+            (None, B(bytes))
+                if binding.stride == *bytes && binding.kind == BindingKind::Storage => {}
             (None, T) if binding.kind == BindingKind::Texels => {}
             (None, F) if binding.kind == BindingKind::Floats => {}
             (found, _) => {
-                let found = found.as_ref().map_or(format!("{} bytes", binding.stride), |s| s.name.clone());
-                complaints.push(format!("{file}: {} holds {found}, the host gives {element:?}", binding.name));
+                let found =
+                    found.as_ref().map_or(format!("{} bytes", binding.stride), |s| s.name.clone());
+                complaints.push(format!(
+                    "{file}: {} holds {found}, the host gives {element:?}",
+                    binding.name
+                ));
             }
         }
     }
@@ -257,11 +316,13 @@ fn every_shader_declares_what_the_host_writes() {
     let compiler = embedded();
     let complaints: Vec<String> = INTERFACES
         .iter()
-        .flat_map(|(file, push, elements)| compare(file, &unoptimised(&compiler, file), push, elements))
+        .flat_map(|(file, push, elements)| {
+            compare(file, &unoptimised(&compiler, file), push, elements)
+        })
         .collect();
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
-    // The grid and the camera lie in push constants; their inner layout is read from the text's own struct by use in a
-    // buffer, since reflection gives a nested member's size only.
+    // The grid and the camera lie in push constants; their inner layout is read from the text's own
+    // struct by use in a buffer, since reflection gives a nested member's size only.
     let text = r#"#version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
@@ -272,7 +333,12 @@ void main() { grids[0].cell = cameras[0].near; }
 "#;
     let texts = [&[("nested.comp", text)], SHADERS].concat();
     let compiler = Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).unwrap();
-    let complaints = compare("nested.comp", &unoptimised(&compiler, "nested.comp"), &[], &[R("Grid"), R("Camera")]);
+    let complaints = compare(
+        "nested.comp",
+        &unoptimised(&compiler, "nested.comp"),
+        &[],
+        &[R("Grid"), R("Camera")],
+    );
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
@@ -280,7 +346,8 @@ void main() { grids[0].cell = cameras[0].near; }
 fn every_shader_and_every_record_is_covered() {
     let listed: BTreeSet<&str> = SHADERS.iter().map(|(name, _)| *name).collect();
     let compared: BTreeSet<&str> = INTERFACES.iter().map(|(file, _, _)| *file).collect();
-    let compiled: BTreeSet<&str> = listed.iter().copied().filter(|name| !name.starts_with("include/")).collect();
+    let compiled: BTreeSet<&str> =
+        listed.iter().copied().filter(|name| !name.starts_with("include/")).collect();
     assert_eq!(compared, compiled);
     let mut on_disk = BTreeSet::new();
     for (folder, prefix) in [("", ""), ("include", "include/")] {
@@ -291,13 +358,17 @@ fn every_shader_and_every_record_is_covered() {
         }
     }
     assert_eq!(on_disk, listed.iter().map(|s| (*s).to_owned()).collect());
-    let structs = records_glsl().lines().filter_map(|l| l.strip_prefix("struct ")?.split(' ').next()).collect();
+    let structs = records_glsl()
+        .lines()
+        .filter_map(|l| l.strip_prefix("struct ")?.split(' ').next())
+        .collect();
     let known: BTreeSet<&str> = RECORDS.iter().map(|(name, _, _)| *name).collect();
     assert_eq!(known, structs);
 }
 
-/// Records that shaders read by texels have no layout to reflect: read by the shaders' own function and written as records,
-/// every word is where it was. A source and a packed stencil are four-word fields in the host's order.
+/// Records that shaders read by texels have no layout to reflect: read by the shaders' own function
+/// and written as records, every word is where it was. A source and a packed stencil are four-word
+/// fields in the host's order.
 #[test]
 fn a_region_read_by_texels_is_the_record() {
     let mut gpu = Gpu::new();
@@ -314,14 +385,21 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
     const N_WORDS: usize = size_of::<RegionRecord>() / 4;
     // Small normal floats, so that whatever is taken for a float keeps its bits.
     let words: Vec<u32> = (0..3 * N_WORDS as u32).map(|i| (1.0 + i as f32).to_bits()).collect();
-    let mut from = Buffer::new::<u32>(&gpu.device, "test.from", words.len() as u64, Place::Upload).unwrap();
+    let mut from =
+        Buffer::new::<u32>(&gpu.device, "test.from", words.len() as u64, Place::Upload).unwrap();
     from.write(&words).unwrap();
-    let to = Buffer::new::<u32>(&gpu.device, "test.to", words.len() as u64, Place::Readback).unwrap();
+    let to =
+        Buffer::new::<u32>(&gpu.device, "test.to", words.len() as u64, Place::Readback).unwrap();
     gpu.run(|rec| rec.dispatch_groups(&kernel, &[&from, &to], &(), 3));
     assert_eq!(to.read::<u32>(words.len()).unwrap(), words);
-    // tiles_splat.comp takes the second of a Particle's three texels and the last half of a Lit, and writes a Splat by fours.
-    let texels =
-        [size_of::<PlacedRecord>(), size_of::<ParticleRecord>(), size_of::<LitRecord>(), size_of::<SplatRecord>()];
+    // tiles_splat.comp takes the second of a Particle's three texels and the last half of a Lit,
+    // and writes a Splat by fours.
+    let texels = [
+        size_of::<PlacedRecord>(),
+        size_of::<ParticleRecord>(),
+        size_of::<LitRecord>(),
+        size_of::<SplatRecord>(),
+    ];
     assert_eq!(texels, [16, 48, 64, 32]);
     assert!(text_of("tiles_splat.comp").contains("texelFetch(particles, int(3 * i + 1))"));
     assert!(text_of("tiles_splat.comp").contains("texelFetch(lit, 4 * facet + 2)"));
@@ -416,7 +494,8 @@ fn shared_constants_have_one_value() {
 #[test]
 fn wrong_declarations_are_reported() {
     let wrong = [
-        // A renamed, a missing and two swapped fields; push constants swapped; a plain element widened.
+        // A renamed, a missing and two swapped fields; push constants swapped; a plain element
+        // widened.
         (
             "place.comp",
             "include/records.glsl",
@@ -425,7 +504,13 @@ fn wrong_declarations_are_reported() {
             "float s",
         ),
         ("place.comp", "include/records.glsl", "struct Group {", "uint i_region; vec3", "vec3"),
-        ("generate.comp", "include/records.glsl", "struct Box {", "uint seed; uint i_box;", "uint i_box; uint seed;"),
+        (
+            "generate.comp",
+            "include/records.glsl",
+            "struct Box {",
+            "uint seed; uint i_box;",
+            "uint i_box; uint seed;",
+        ),
         (
             "first.comp",
             "include/records.glsl",

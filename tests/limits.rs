@@ -14,7 +14,8 @@ fn scene(n_particles: u32, grid: u32, mode: &str) -> Scene {
     let boxes = format!("{n_particles}\n1\n{n_particles}, 1, 1, 1, 0, 0, 0, 2\n");
     std::fs::write(dir.path().join("b.dat"), boxes).unwrap();
     let path = dir.path().join("s.toml");
-    std::fs::write(&path, "[[cloud]]\nfrom = \"boxes\"\nfile = \"b.dat\"\nradius_scale = 0.6\n").unwrap();
+    std::fs::write(&path, "[[cloud]]\nfrom = \"boxes\"\nfile = \"b.dat\"\nradius_scale = 0.6\n")
+        .unwrap();
     let set = [format!("lighting.grid={grid}"), format!("lighting.mode={mode}")];
     scene_file::load(&path, &set, None).unwrap().scene
 }
@@ -35,7 +36,10 @@ fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
     assert!(check(&scene, &limits).is_ok());
     limits.max_texels = 1000;
     let refused = check(&scene, &limits).unwrap_err().to_string();
-    assert!(refused.contains("the density grid") && refused.contains("takes 1000 at most"), "{refused}");
+    assert!(
+        refused.contains("the density grid") && refused.contains("takes 1000 at most"),
+        "{refused}"
+    );
     // Without light nothing is read by texels but the pool of textures, where there is one.
     let mut unlit = self::scene(500, 64, "none");
     assert!(check(&unlit, &limits).is_ok());
@@ -55,7 +59,10 @@ fn doubles_are_refused_where_the_device_has_none() {
     let refused = check(&scene, &limits).unwrap_err();
     assert_eq!(refused.exit_code(), 2);
     let said = refused.to_string();
-    assert!(said.contains("lighting.precision = \"f64\"") && said.contains("shaderFloat64"), "{said}");
+    assert!(
+        said.contains("lighting.precision = \"f64\"") && said.contains("shaderFloat64"),
+        "{said}"
+    );
     scene.lighting.sums.precision = Precision::F32;
     assert!(check(&scene, &limits).is_ok());
 }
@@ -66,6 +73,9 @@ fn a_step_that_would_cut_a_march_short_is_refused_by_name() {
     let path = dir.path().join("s.toml");
     std::fs::write(&path, "[lighting]\ngrid = 512\nstep = 0.2\n").unwrap();
     let error = scene_file::load(&path, &[], None).unwrap_err().to_string();
-    assert!(error.contains("s.toml:3:") && error.contains("0.2165") && error.contains("grid = 512"), "{error}");
+    assert!(
+        error.contains("s.toml:3:") && error.contains("0.2165") && error.contains("grid = 512"),
+        "{error}"
+    );
     assert!(scene_file::load(&path, &["lighting.step=0.22".into()], None).is_ok());
 }

@@ -1,5 +1,6 @@
-//! Whatever way a frame is made, it is the same frame: serial and parallel, with and without skipping, twice, alone or
-//! after others. Compared byte for byte as it lies in the target, every frame of a short run.
+//! Whatever way a frame is made, it is the same frame: serial and parallel, with and without
+//! skipping, twice, alone or after others. Compared byte for byte as it lies in the target, every
+//! frame of a short run.
 
 mod harness;
 
@@ -17,7 +18,8 @@ use std::sync::Arc;
 
 const N_FRAMES: u32 = 6;
 
-/// A moving camera, two drifting clouds with gusts, a list beside boxes: every pass has something to do.
+/// A moving camera, two drifting clouds with gusts, a list beside boxes: every pass has something
+/// to do.
 fn scene(overrides: &[&str]) -> Scene {
     let mut all = vec!["film.width=160", "film.height=120", "lighting.grid=24"];
     all.extend(overrides);
@@ -37,7 +39,12 @@ fn run(scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTim
     run_for(N_FRAMES, scene, threading, skip)
 }
 
-fn run_for(n_frames: u32, scene: Scene, threading: Threading, skip: bool) -> Vec<(Vec<u8>, FrameTimes)> {
+fn run_for(
+    n_frames: u32,
+    scene: Scene,
+    threading: Threading,
+    skip: bool,
+) -> Vec<(Vec<u8>, FrameTimes)> {
     let gpu = Gpu::new();
     let scene = Arc::new(scene);
     let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, skip).expect("a renderer");
@@ -67,25 +74,45 @@ fn images(frames: Vec<(Vec<u8>, FrameTimes)>) -> Vec<Vec<u8>> {
 
 #[test]
 fn two_runs_serial_parallel_and_no_skip_give_the_same_bytes_for_every_frame() {
-    for simulate in [&["threads.simulate=gpu"][..], &["threads.simulate=cpu", "lighting.gather='exact'"]] {
-        for motion in [&[][..], &["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"]] {
+    for simulate in
+        [&["threads.simulate=gpu"][..], &["threads.simulate=cpu", "lighting.gather='exact'"]]
+    {
+        for motion in [
+            &[][..],
+            &["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"],
+        ] {
             let overrides = [simulate, motion].concat();
             let first = images(run(scene(&overrides), Threading::Serial, true));
-            assert_eq!(first, images(run(scene(&overrides), Threading::Serial, true)), "{overrides:?}: twice");
-            assert_eq!(first, images(run(scene(&overrides), Threading::Parallel, true)), "{overrides:?}: parallel");
-            assert_eq!(first, images(run(scene(&overrides), Threading::Serial, false)), "{overrides:?}: no skip");
+            assert_eq!(
+                first,
+                images(run(scene(&overrides), Threading::Serial, true)),
+                "{overrides:?}: twice"
+            );
+            assert_eq!(
+                first,
+                images(run(scene(&overrides), Threading::Parallel, true)),
+                "{overrides:?}: parallel"
+            );
+            assert_eq!(
+                first,
+                images(run(scene(&overrides), Threading::Serial, false)),
+                "{overrides:?}: no skip"
+            );
             // The comparison can fail: the camera moves, so no two frames are alike.
             assert!(first.windows(2).all(|w| w[0] != w[1]));
         }
     }
 }
 
-/// A camera that moves, stands still for a while and moves on: frames in flight share a picture and part again.
+/// A camera that moves, stands still for a while and moves on: frames in flight share a picture and
+/// part again.
 #[test]
 fn three_hundred_frames_are_the_same_in_both_loops() {
-    let still = ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
+    let still =
+        ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
     let scene = || {
-        let mut scene = scene(&[&still[..], &["film.width=48", "film.height=36", "time.step_s=0.01"]].concat());
+        let mut scene =
+            scene(&[&still[..], &["film.width=48", "film.height=36", "time.step_s=0.01"]].concat());
         let [first, second] = [0, 1].map(|k| scene.camera.keys[k]);
         // A path's curve between two keys looks at the keys beside them, too.
         let stop = [0.99, 1.0, 2.0, 2.01].map(|time_s| CameraKey { time_s, ..second });
@@ -118,7 +145,9 @@ fn tiles_give_the_same_bytes_in_every_mode() {
 fn ellipsoids_give_the_same_bytes_in_every_mode() {
     let flat = |more: &[&str]| {
         let set: Vec<String> = more.iter().map(|s| (*s).to_owned()).collect();
-        scene_file::load(Path::new("tests/data/flat.toml"), &set, None).expect("the scene loads").scene
+        scene_file::load(Path::new("tests/data/flat.toml"), &set, None)
+            .expect("the scene loads")
+            .scene
     };
     for more in [&[][..], &["lighting.facets_per_cloud=20", "draw.path='sprites'"]] {
         let first = images(run(flat(more), Threading::Serial, true));
@@ -126,7 +155,10 @@ fn ellipsoids_give_the_same_bytes_in_every_mode() {
         assert!(first == images(run(flat(more), Threading::Serial, false)), "no skip");
         let by_host = [more, &["threads.simulate='cpu'"]].concat();
         let placed = images(run(flat(&by_host), Threading::Parallel, true));
-        assert!(placed == images(run(flat(&by_host), Threading::Serial, false)), "placed by the host, no skip");
+        assert!(
+            placed == images(run(flat(&by_host), Threading::Serial, false)),
+            "placed by the host, no skip"
+        );
         assert!(first.windows(2).all(|w| w[0] != w[1]));
     }
 }
@@ -134,11 +166,17 @@ fn ellipsoids_give_the_same_bytes_in_every_mode() {
 #[test]
 fn every_way_to_sum_gives_the_same_bytes_in_every_mode() {
     let summed = |[summation, precision]: [&str; 2]| {
-        let set = [format!("lighting.summation='{summation}'"), format!("lighting.precision='{precision}'")];
+        let set = [
+            format!("lighting.summation='{summation}'"),
+            format!("lighting.precision='{precision}'"),
+        ];
         scene(&[&set[0], &set[1]])
     };
     let default = images(run(scene(&[]), Threading::Serial, true));
-    assert!(default == images(run(summed(["plain", "f32"]), Threading::Serial, true)), "what is said by default");
+    assert!(
+        default == images(run(summed(["plain", "f32"]), Threading::Serial, true)),
+        "what is said by default"
+    );
     for way in [["kahan", "f64"], ["pairwise", "f32"]] {
         let first = images(run(summed(way), Threading::Serial, false));
         assert!(first == images(run(summed(way), Threading::Parallel, true)), "{way:?}");
@@ -198,9 +236,15 @@ fn the_faster_way_is_taken_and_named() {
 
 #[test]
 fn edited_materials_give_the_same_bytes_in_every_mode() {
-    let edited = || scene_file::load(Path::new("tests/data/edited.toml"), &[], None).expect("the scene loads").scene;
+    let edited = || {
+        scene_file::load(Path::new("tests/data/edited.toml"), &[], None)
+            .expect("the scene loads")
+            .scene
+    };
     let frames = run(edited(), Threading::Serial, true);
-    assert!(frames[1..].iter().all(|f| f.1.plan.runs(Pass::Contract) && !f.1.plan.runs(Pass::Second)));
+    assert!(
+        frames[1..].iter().all(|f| f.1.plan.runs(Pass::Contract) && !f.1.plan.runs(Pass::Second))
+    );
     let first = images(frames);
     assert_eq!(first, images(run(edited(), Threading::Parallel, true)), "parallel");
     assert_eq!(first, images(run(edited(), Threading::Serial, false)), "no skip");
@@ -210,13 +254,15 @@ fn edited_materials_give_the_same_bytes_in_every_mode() {
 
 #[test]
 fn a_still_scene_skips_and_a_moving_one_does_not() {
-    let still = ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
+    let still =
+        ["cloud.0.wind=[0,0,0]", "cloud.1.wind=[0,0,0]", "cloud.0.gust=0", "cloud.1.gust=0"];
     let runs = |overrides: &[&str]| {
         let frames = run(scene(overrides), Threading::Serial, true);
         let plan = frames[2].1.plan;
         Pass::ALL.into_iter().filter(|p| plan.runs(*p)).map(Pass::name).collect::<Vec<_>>()
     };
-    // The camera turns, so that the order may change; the floor's lobe shines elsewhere, what is dull stays as it is.
+    // The camera turns, so that the order may change; the floor's lobe shines elsewhere, what is
+    // dull stays as it is.
     assert_eq!(runs(&still), ["first", "second", "cull", "sort", "surfaces", "tiles"]);
     let dull = [&still[..], &["material.1.ks=[0,0,0]"]].concat();
     assert_eq!(runs(&dull), ["cull", "sort", "surfaces", "tiles"]);
@@ -224,15 +270,21 @@ fn a_still_scene_skips_and_a_moving_one_does_not() {
     let all: Vec<&str> = Pass::ALL[1..]
         .iter()
         .map(|p| p.name())
-        .filter(|p| !["live", "contract", "texture", "terrain", "impostors", "sprites", "upsample"].contains(p))
+        .filter(|p| {
+            !["live", "contract", "texture", "terrain", "impostors", "sprites", "upsample"]
+                .contains(p)
+        })
         .collect();
     assert_eq!(moving, all);
 }
 
 #[test]
 fn enough_facets_are_one_a_particle() {
-    // Clouds of different sizes: between them one has a facet a particle among others that have not.
-    let of = |n: u64| images(run(scene(&[&format!("lighting.facets_per_cloud={n}")]), Threading::Serial, true));
+    // Clouds of different sizes: between them one has a facet a particle among others that have
+    // not.
+    let of = |n: u64| {
+        images(run(scene(&[&format!("lighting.facets_per_cloud={n}")]), Threading::Serial, true))
+    };
     let sizes: Vec<u64> = scene(&[]).clouds.iter().map(|c| c.n_particles()).collect();
     let most = sizes.iter().copied().max().unwrap_or(0);
     let singly = of(0);
@@ -249,7 +301,11 @@ fn a_frame_made_alone_is_the_frame_of_the_run() {
     let mut game = Game::new(scene.clone(), None);
     for i_frame in [4, 1] {
         renderer.step(game.step(i_frame).expect("a packet")).expect("a frame");
-        assert_eq!(renderer.image_bytes().expect("bytes"), in_run[i_frame as usize], "frame {i_frame}");
+        assert_eq!(
+            renderer.image_bytes().expect("bytes"),
+            in_run[i_frame as usize],
+            "frame {i_frame}"
+        );
     }
 }
 
@@ -258,7 +314,8 @@ fn the_game_thread_and_the_gpu_place_particles_alike() {
     let placed = |simulate: &str| {
         let gpu = Gpu::new();
         let scene = Arc::new(scene(&[simulate, "cloud.0.grow_to=1.5", "cloud.0.grow_time_s=0.5"]));
-        let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
+        let mut renderer =
+            Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
         let rest = renderer.generate_now(&gpu.device).expect("particles").0;
         let rest = (scene.threads.simulate == Simulate::Cpu).then_some(rest);
         let mut game = Game::new(scene.clone(), rest);
@@ -271,8 +328,8 @@ fn the_game_thread_and_the_gpu_place_particles_alike() {
         // Once rounded against three times.
         assert!((a.sigma - b.sigma).abs() <= 2f32.powi(-22) * a.sigma, "{a:?} {b:?}");
         for axis in 0..3 {
-            // f32 roundings of sums of magnitude < 16 (2⁻²⁰ each, a handful) and of 16 waves whose amplitudes sum to less
-            // than 1 and whose arguments, below 64, are off by 2⁻¹⁸.
+            // f32 roundings of sums of magnitude < 16 (2⁻²⁰ each, a handful) and of 16 waves whose
+            // amplitudes sum to less than 1 and whose arguments, below 64, are off by 2⁻¹⁸.
             assert!((a.position[axis] - b.position[axis]).abs() < 1e-5, "{a:?} {b:?}");
         }
     }
@@ -286,7 +343,8 @@ fn an_error_of_the_game_step_ends_both_loops() {
     broken.camera.keys[1].target = broken.camera.keys[1].position;
     let broken = Arc::new(broken);
     for threading in [Threading::Serial, Threading::Parallel] {
-        let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &broken, true).expect("a renderer");
+        let mut renderer =
+            Renderer::new(&gpu.device, &gpu.compiler, &broken, true).expect("a renderer");
         let mut game = Game::new(broken.clone(), None);
         let mut n = 0;
         let on_frame = &mut |_: FrameTimes, _: &mut Renderer| {
@@ -308,9 +366,12 @@ fn a_panic_of_the_game_thread_ends_both_sides_with_what_it_said() {
     let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
     // Fewer particles than the scene has.
     let mut game = Game::new(scene.clone(), Some(vec![]));
-    let done =
-        parallel::run(&mut game, &mut renderer, 0..10, &mut |_, _| Ok(true)).expect_err("the panic comes through");
-    assert!(done.exit_code() == 101 && done.to_string().contains("the game thread panicked: range end"), "{done}");
+    let done = parallel::run(&mut game, &mut renderer, 0..10, &mut |_, _| Ok(true))
+        .expect_err("the panic comes through");
+    assert!(
+        done.exit_code() == 101 && done.to_string().contains("the game thread panicked: range end"),
+        "{done}"
+    );
 }
 
 #[test]
@@ -337,6 +398,7 @@ fn after_a_frame_that_failed_no_other_is_drawn_on_what_it_left() {
     // More than there is room for.
     packet.lights = packet.lights.repeat(3);
     assert!(renderer.step(packet).is_err());
-    let refused = renderer.step(game.step(1).expect("a packet")).map(|_| ()).expect_err("it is refused");
+    let refused =
+        renderer.step(game.step(1).expect("a packet")).map(|_| ()).expect_err("it is refused");
     assert!(refused.to_string().contains("a frame has failed"), "{refused}");
 }

@@ -17,7 +17,10 @@ fn laws() -> [Vapour; 3] {
 fn table(heading: &str) -> Vec<Vec<String>> {
     let part = PAGE.split("\n## ").find(|part| part.starts_with(heading)).expect("the heading");
     let rows = part.lines().filter(|line| line.starts_with('|')).skip(2);
-    rows.map(|line| line.trim_matches('|').split('|').map(|cell| cell.trim().replace('−', "-")).collect()).collect()
+    rows.map(|line| {
+        line.trim_matches('|').split('|').map(|cell| cell.trim().replace('−', "-")).collect()
+    })
+    .collect()
 }
 
 /// A number as the page writes it.
@@ -31,7 +34,8 @@ fn the_pages_pressures_are_the_laws() {
     assert_eq!(rows.len(), 9);
     for (row, t) in rows.iter().zip((-40..=40).step_by(10)) {
         assert_eq!(row[0], t.to_string());
-        let [bolton, constant, linear] = laws().map(|law| law.saturation(T0_K + f64::from(t)) / 100.0);
+        let [bolton, constant, linear] =
+            laws().map(|law| law.saturation(T0_K + f64::from(t)) / 100.0);
         for (cell, of) in [(&row[1], bolton), (&row[2], constant), (&row[4], linear)] {
             assert_eq!(*cell, format!("{of:.4}"), "{t} °C");
         }
@@ -67,7 +71,11 @@ fn the_pages_cloud_bases_are_where_parcels_condense() {
         *other = other.max((linear - bolton).abs());
     }
     assert_eq!(extremes.map(|m| format!("{m:.0}")), ["-69", "50", "9"]);
-    assert!(PAGE.contains("69 m too low") && PAGE.contains("50 m too high") && PAGE.contains("it is 9 m at most"));
+    assert!(
+        PAGE.contains("69 m too low")
+            && PAGE.contains("50 m too high")
+            && PAGE.contains("it is 9 m at most")
+    );
     // A sixteenth of 250 m.
     let at_20 = Parcel { t_k: T0_K + 20.0, pressure_pa: 101_325.0, humidity: 0.6 };
     let [bolton, constant, _] = laws().map(|law| at_20.condensation(law).height_m);

@@ -1,11 +1,12 @@
-//! The stress suite finds faults: each of these shaders is wrong in one place, and a case that is named fails of it
-//! (docs/stability.md, "Faults that are found").
+//! The stress suite finds faults: each of these shaders is wrong in one place, and a case that is
+//! named fails of it (docs/stability.md, "Faults that are found").
 
 use nimbus::frame::stage::DeviceChoice;
 use nimbus::passes;
 use nimbus::study::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
 
-/// What is wrong, in which file, a text of it and what stands in its place, and the case that fails.
+/// What is wrong, in which file, a text of it and what stands in its place, and the case that
+/// fails.
 type Fault = (&'static str, &'static str, &'static str, &'static str, &'static str);
 
 const FAULTS: &[Fault] = &[
@@ -37,8 +38,20 @@ const FAULTS: &[Fault] = &[
         "if (t < 0.0) {",
         "functions/one-minus-exp",
     ),
-    ("erf's third coefficient", "include/functions.glsl", "0.0092705272", "0.0092805272", "functions/erf"),
-    ("a coefficient of 2^x", "include/functions.glsl", "0.0555071327386", "0.0555171327386", "functions/power-of-two"),
+    (
+        "erf's third coefficient",
+        "include/functions.glsl",
+        "0.0092705272",
+        "0.0092805272",
+        "functions/erf",
+    ),
+    (
+        "a coefficient of 2^x",
+        "include/functions.glsl",
+        "0.0555071327386",
+        "0.0555171327386",
+        "functions/power-of-two",
+    ),
     (
         "1 - cos for half of the chord's square",
         "include/lobe.glsl",
@@ -53,11 +66,41 @@ const FAULTS: &[Fault] = &[
         "dot(h, h)",
         "brdf/opposite",
     ),
-    ("no interpolation between the table's nodes", "include/lobe.glsl", "t - float(i))", "0.0)", "functions/lobe"),
-    ("nine rounds of Philox and not ten", "include/philox.glsl", "i < 10", "i < 9", "generation/unit"),
-    ("a slot's phase forgotten", "live.comp", "d.phase + bitfieldReverse(slot)", "d.phase", "live/late"),
-    ("a death that is not faded", "live.comp", "smooth_rise((1.0 - lived) * d.inv_fade_out)", "1.0", "live/dead"),
-    ("what is outside is left there", "generate.comp", "inside ? v : fold(v, h)", "v", "generation/needle"),
+    (
+        "no interpolation between the table's nodes",
+        "include/lobe.glsl",
+        "t - float(i))",
+        "0.0)",
+        "functions/lobe",
+    ),
+    (
+        "nine rounds of Philox and not ten",
+        "include/philox.glsl",
+        "i < 10",
+        "i < 9",
+        "generation/unit",
+    ),
+    (
+        "a slot's phase forgotten",
+        "live.comp",
+        "d.phase + bitfieldReverse(slot)",
+        "d.phase",
+        "live/late",
+    ),
+    (
+        "a death that is not faded",
+        "live.comp",
+        "smooth_rise((1.0 - lived) * d.inv_fade_out)",
+        "1.0",
+        "live/dead",
+    ),
+    (
+        "what is outside is left there",
+        "generate.comp",
+        "inside ? v : fold(v, h)",
+        "v",
+        "generation/needle",
+    ),
     (
         "one attempt more than there may be",
         "generate.comp",
@@ -102,7 +145,13 @@ const FAULTS: &[Fault] = &[
     ),
     ("growth forgotten", "place.comp", "sigma * group.scale", "sigma", "space/late-growth"),
     ("a wave's phase forgotten", "place.comp", " + modes[m].phase", "", "space/late-gust"),
-    ("1/d for 1/d^2", "include/light.glsl", "cone * cone / (reach * reach)", "cone * cone / reach", "brdf/exponent-40"),
+    (
+        "1/d for 1/d^2",
+        "include/light.glsl",
+        "cone * cone / (reach * reach)",
+        "cone * cone / reach",
+        "brdf/exponent-40",
+    ),
     (
         "the grid's mass by the square of sigma",
         "grid_deposit.comp",
@@ -152,7 +201,13 @@ const FAULTS: &[Fault] = &[
         "max(dot(h, h), 1e-4)",
         "functions/half-vector",
     ),
-    ("pi forgotten in what a diffuse surface sends", "first.comp", "0.318309886183791", "1.0", "brdf/exponent-0"),
+    (
+        "pi forgotten in what a diffuse surface sends",
+        "first.comp",
+        "0.318309886183791",
+        "1.0",
+        "brdf/exponent-0",
+    ),
 ];
 
 fn named(name: &str) -> Case {
@@ -179,7 +234,10 @@ fn every_fault_is_found_by_its_case() {
         let outcome = with(fault);
         println!("{}: {:?} ({}; {:?})", fault.0, outcome.verdict, fault.4, outcome.worst);
         if outcome.verdict != Verdict::Failed {
-            missed.push(format!("{}: {} {:?} {:?}", fault.0, fault.4, outcome.verdict, outcome.remark));
+            missed.push(format!(
+                "{}: {} {:?} {:?}",
+                fault.0, fault.4, outcome.verdict, outcome.remark
+            ));
         }
     }
     assert!(missed.is_empty() && FAULTS.len() >= 20, "not found:\n{}", missed.join("\n"));

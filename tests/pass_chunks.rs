@@ -1,5 +1,6 @@
-//! chunks: whole pictures, in however many chunks, against the f64 reference within a bound that follows f32 blending near to
-//! far, in every format; what is left out behind full pixels; and whole frames, with culling, surfaces and smaller pictures.
+//! chunks: whole pictures, in however many chunks, against the f64 reference within a bound that
+//! follows f32 blending near to far, in every format; what is left out behind full pixels; and
+//! whole frames, with culling, surfaces and smaller pictures.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -34,8 +35,8 @@ use picture::{FORMATS, Picture, Way};
 
 const F32: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
 
-/// Draws `picture` in every format and in several numbers of chunks and compares every number of every pixel. The greatest
-/// value seen.
+/// Draws `picture` in every format and in several numbers of chunks and compares every number of
+/// every pixel. The greatest value seen.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     for ((target, format), n_chunks) in FORMATS.into_iter().zip([1, 3, 16]).chain([(F32, 256)]) {
@@ -78,12 +79,19 @@ fn full_pixels_leave_the_rest_out() {
     let mut gpu = Gpu::new();
     let mut picture = front();
     for k in 0..20 {
-        let at = picture.at(0.2 * f64::from(k % 5) - 0.4, 0.1 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
+        let at = picture.at(
+            0.2 * f64::from(k % 5) - 0.4,
+            0.1 * f64::from(k % 4),
+            4.0 + 0.1 * f64::from(k),
+        );
         picture = picture.blob(at, 0.3, 0.6);
     }
     // The depths grow with the number.
-    let near =
-        Picture { placed: picture.placed[..10].to_vec(), particles: picture.particles[..10].to_vec(), ..front() };
+    let near = Picture {
+        placed: picture.placed[..10].to_vec(),
+        particles: picture.particles[..10].to_vec(),
+        ..front()
+    };
     let mut draw = |p: &Picture, way| p.draw_by(&mut gpu, None, F32.0, way);
     let half = draw(&near, Way::Chunks(1, 0.0));
     let (whole, cut) = (draw(&picture, Way::Chunks(2, 0.0)), draw(&picture, Way::Chunks(2, 0.25)));
@@ -131,7 +139,8 @@ fn wrong_pictures_are_noticed() {
     }
 }
 
-/// Layers so thin that half floats would lose them far to near: once is rounded, and not ten thousand times.
+/// Layers so thin that half floats would lose them far to near: once is rounded, and not ten
+/// thousand times.
 #[test]
 fn ten_thousand_thin_layers_in_half_floats() {
     let mut gpu = Gpu::new();
@@ -143,19 +152,28 @@ fn ten_thousand_thin_layers_in_half_floats() {
     }
     let (target, format) = (TargetFormat::Rgba16f, FilmFormat::Rgba16f);
     let truths = picture.truth(FilmFormat::Rgba32f).0;
-    let off = |values: &[f64]| values.iter().zip(&truths).map(|(v, t)| (v - t).abs()).fold(0.0, f64::max);
+    let off =
+        |values: &[f64]| values.iter().zip(&truths).map(|(v, t)| (v - t).abs()).fold(0.0, f64::max);
     let chunked = off(&picture.draw_by(&mut gpu, None, target, Way::Chunks(4, saturated(format))));
     let layered = off(&picture.draw(&mut gpu, None, target));
     println!("greatest error near to far {chunked:.2e}, far to near {layered:.2e}");
-    // Half a step of half floats below 1 is left out, half a step is rounded off, and 10 000 sums in f32 err by 2^-24 each to
-    // either side.
-    assert!(chunked < 2.0 * 2f64.powi(-12) + 100.0 * 2f64.powi(-24) && layered > 0.1, "{chunked:e}, {layered:e}");
+    // Half a step of half floats below 1 is left out, half a step is rounded off, and 10 000 sums
+    // in f32 err by 2^-24 each to either side.
+    assert!(
+        chunked < 2.0 * 2f64.powi(-12) + 100.0 * 2f64.powi(-24) && layered > 0.1,
+        "{chunked:e}, {layered:e}"
+    );
 }
 
 /// The numbers of some of a scene's frames, and what is said of the last one's impostors.
 fn frames(gpu: &Gpu, file: &str, range: Range<u32>, overrides: &[&str]) -> (Vec<f64>, bool) {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(file);
-    let all = ["draw.path='sprites'", "film.format='rgba32f'", "lighting.mode='first'", "lighting.grid=24"];
+    let all = [
+        "draw.path='sprites'",
+        "film.format='rgba32f'",
+        "lighting.mode='first'",
+        "lighting.grid=24",
+    ];
     let overrides: Vec<String> = all.iter().chain(overrides).map(|o| (*o).to_owned()).collect();
     let scene = Arc::new(scene_file::load(&file, &overrides, None).expect("the scene").scene);
     let mut renderer = Renderer::new(&gpu.device, &gpu.compiler, &scene, true).expect("a renderer");
@@ -163,7 +181,9 @@ fn frames(gpu: &Gpu, file: &str, range: Range<u32>, overrides: &[&str]) -> (Vec<
     let (mut values, mut shown) = (vec![], false);
     for i in range {
         let done = renderer.step(game.step(i).expect("a packet")).expect("a frame");
-        assert!(done.plan.runs(Pass::Sprites) || overrides.contains(&"draw.path='tiles'".to_owned()));
+        assert!(
+            done.plan.runs(Pass::Sprites) || overrides.contains(&"draw.path='tiles'".to_owned())
+        );
         shown = done.plan.runs(Pass::Impostors);
         values.extend(renderer.image().expect("pixels").into_iter().map(f64::from));
     }
@@ -177,27 +197,38 @@ fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / most
 }
 
-/// A cloud over surfaces, and one seen through impostors, through the whole frame: the picture of other ways but for rounding,
-/// with culling or without, whole or smaller. Some hundred layers of f32.
+/// A cloud over surfaces, and one seen through impostors, through the whole frame: the picture of
+/// other ways but for rounding, with culling or without, whole or smaller. Some hundred layers of
+/// f32.
 #[test]
 fn frames_are_those_of_other_ways() {
     let gpu = Gpu::new();
     for resolution in ["draw.resolution=1.0", "draw.resolution=0.5"] {
         let of = |more: &[&str]| {
-            frames(&gpu, "ground.toml", 0..1, &[&["film.width=96", "film.height=72", resolution], more].concat()).0
+            frames(
+                &gpu,
+                "ground.toml",
+                0..1,
+                &[&["film.width=96", "film.height=72", resolution], more].concat(),
+            )
+            .0
         };
         let sprites = of(&[]);
         assert!(apart(&sprites, &of(&["draw.cutoff=0.5"])) > 0.01, "there is a cloud");
-        for more in
-            [&["draw.path='tiles'"][..], &["draw.chunks=1"], &["draw.chunks=6"], &["draw.chunks=6", "draw.cull='off'"]]
-        {
+        for more in [
+            &["draw.path='tiles'"][..],
+            &["draw.chunks=1"],
+            &["draw.chunks=6"],
+            &["draw.chunks=6", "draw.cull='off'"],
+        ] {
             let off = apart(&sprites, &of(more));
             println!("{resolution}, {more:?}: {off:.1e}");
             assert!(off < 1e-5, "{resolution} {more:?}: {off:e}");
         }
     }
     // In a smaller one a shell would save nothing.
-    let large = ["film.width=320", "film.height=240", "draw.impostors='on'", "draw.impostor_error=2"];
+    let large =
+        ["film.width=320", "film.height=240", "draw.impostors='on'", "draw.impostor_error=2"];
     let of = |chunks| frames(&gpu, "through-615.toml", 217..221, &[&large[..], &[chunks]].concat());
     let ((sprites, _), (chunks, shown)) = (of("draw.chunks=0"), of("draw.chunks=4"));
     let off = apart(&sprites, &chunks);

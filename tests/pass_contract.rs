@@ -1,4 +1,5 @@
-//! contract: sums of random tensors, every facet against the f64 reference, within the bound of its roundings.
+//! contract: sums of random tensors, every facet against the f64 reference, within the bound of its
+//! roundings.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -10,7 +11,9 @@ use bounded::{Random, U, greatest_ratio};
 use glam::DVec3;
 use harness::{Gpu, assert_within_and_say};
 use nimbus::gpu::Compiler;
-use nimbus::layout::facet::{FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE};
+use nimbus::layout::facet::{
+    FacetRecord, LitRecord, NO_LOBE, REGION_CLOUD, REGION_COLORED, REGION_SURFACE,
+};
 use nimbus::layout::facet::{RegionRecord, lobe_width};
 use nimbus::layout::frame::LightRecord;
 use nimbus::model::sums::{Precision, Sums};
@@ -23,7 +26,8 @@ const N_BASES: u32 = 5;
 /// Columns that each region can receive light from, of 16: (first, number).
 const SPANS: [&[[u32; 2]]; 4] = [&[[0, 16]], &[[1, 3], [7, 6]], &[], &[[15, 1]]];
 
-/// Regions without and with a lobe, with and without colours, whose facets' number is no multiple of a workgroup's.
+/// Regions without and with a lobe, with and without colours, whose facets' number is no multiple
+/// of a workgroup's.
 struct Case {
     facets: Vec<FacetRecord>,
     regions: Vec<RegionRecord>,
@@ -65,12 +69,17 @@ fn case(n_lights: usize, two_reflections: bool) -> Case {
             i_row,
             ..RegionRecord::default()
         });
-        facets.extend((0..n_facets).map(|_| FacetRecord { i_region, color: color(&mut r), ..FacetRecord::default() }));
+        facets.extend((0..n_facets).map(|_| FacetRecord {
+            i_region,
+            color: color(&mut r),
+            ..FacetRecord::default()
+        }));
         i_row += n_facets * (1 + n_vectors);
         i_column += n_vectors + if kind == REGION_COLORED { 3 } else { 1 };
     }
-    let mut lights: Vec<LightRecord> =
-        (0..n_lights).map(|_| LightRecord { energy: color(&mut r), ..LightRecord::default() }).collect();
+    let mut lights: Vec<LightRecord> = (0..n_lights)
+        .map(|_| LightRecord { energy: color(&mut r), ..LightRecord::default() })
+        .collect();
     if n_lights > 2 {
         lights[1].energy = [0.0; 3];
     }
@@ -85,10 +94,13 @@ fn case(n_lights: usize, two_reflections: bool) -> Case {
         spans.extend(*own);
     }
     // Row by row, and the rest rows of no facet.
-    let of_row = |row: u32| regions.iter().rposition(|r: &RegionRecord| r.i_row <= row).unwrap_or(0);
+    let of_row =
+        |row: u32| regions.iter().rposition(|r: &RegionRecord| r.i_row <= row).unwrap_or(0);
     for (k, value) in t2.iter_mut().enumerate() {
         let (row, column) = (k as u32 % i_row, k as u32 / i_row % n_columns);
-        if !two_reflections || !SPANS[of_row(row)].iter().any(|s| (s[0]..s[0] + s[1]).contains(&column)) {
+        if !two_reflections
+            || !SPANS[of_row(row)].iter().any(|s| (s[0]..s[0] + s[1]).contains(&column))
+        {
             *value = 0.0;
         }
     }
@@ -127,14 +139,19 @@ impl Case {
         gpu.run(|rec| pass.record(rec, buffers.each_ref(), &push));
         let lit: Vec<LitRecord> = gpu.download(&buffers[7], self.facets.len());
         assert!((0..).zip(&lit).all(|(j, l)| (l.n_unresolved, l.unresolved) == (j as f32, 0.5)));
-        lit.iter().flat_map(|l| [l.direct, l.indirect, l.first, l.second].concat()).map(f64::from).collect()
+        lit.iter()
+            .flat_map(|l| [l.direct, l.indirect, l.first, l.second].concat())
+            .map(f64::from)
+            .collect()
     }
 
     /// T2 as the GPU has it: [light][row / TILE][column][row % TILE].
     fn tiled(&self) -> Vec<f32> {
-        let (n_rows, n_columns, tile) = (self.n_rows as usize, self.n_columns as usize, TILE as usize);
+        let (n_rows, n_columns, tile) =
+            (self.n_rows as usize, self.n_columns as usize, TILE as usize);
         let at = |k: usize| {
-            let (lane, column, tile_of_all) = (k % tile, k / tile % n_columns, k / tile / n_columns);
+            let (lane, column, tile_of_all) =
+                (k % tile, k / tile % n_columns, k / tile / n_columns);
             let (l, row) = (tile_of_all * tile / n_rows, tile_of_all * tile % n_rows + lane);
             let value = self.t2[(l * n_columns + column) * n_rows + row];
             // What lies in no span is not read.
@@ -152,7 +169,8 @@ impl Case {
         let (n_rows, n_columns) = (self.n_rows as usize, self.n_columns as usize);
         let tensors = Tensors { t1: &t1, t2: &t2, n_rows, n_columns };
         let energies: Vec<DVec3> = self.lights.iter().map(|l| double(l.energy)).collect();
-        let columns: Vec<DVec3> = self.coefficients.iter().map(|c| of3(double([c[0], c[1], c[2]]))).collect();
+        let columns: Vec<DVec3> =
+            self.coefficients.iter().map(|c| of3(double([c[0], c[1], c[2]]))).collect();
         let lit = |(j, facet): (usize, &FacetRecord)| {
             let region = &self.regions[facet.i_region as usize];
             let n_plain = if region.kind == REGION_COLORED { 3 } else { 1 };
@@ -164,22 +182,24 @@ impl Case {
                 albedo: double(region.kd) * double(facet.color),
                 lobe: columns[first..first + n_vectors].to_vec(),
             };
-            let Reflected { direct, indirect, first, second } = contract(&tensors, &energies, &columns, &receiver);
+            let Reflected { direct, indirect, first, second } =
+                contract(&tensors, &energies, &columns, &receiver);
             [direct, indirect, first, second].map(|v| v.to_array()).concat()
         };
         self.facets.iter().enumerate().flat_map(lit).collect()
     }
 
-    /// Whatever the order of the sums, a term passes at most a rounding for each column, light and basis, and one for each
-    /// of its products (C T, E, K_d c twice or c_b, π) and of π's own; f64's are 2⁻²⁹ of them. A flushed number costs
-    /// less than 2⁻¹²⁰.
+    /// Whatever the order of the sums, a term passes at most a rounding for each column, light and
+    /// basis, and one for each of its products (C T, E, K_d c twice or c_b, π) and of π's own;
+    /// f64's are 2⁻²⁹ of them. A flushed number costs less than 2⁻¹²⁰.
     fn bounds(&self) -> Vec<f64> {
         let n = (self.n_columns as usize + self.lights.len()) as f64 + f64::from(N_BASES) + 6.0;
         self.truth(true).into_iter().map(|m| n * U / (1.0 - n * U) * m + 2f64.powi(-100)).collect()
     }
 
-    /// Of sums that are no plain f32 ones: one over all lights, bases and columns, of products of four (K_d c, E, C, T), which
-    /// in f32 are rounded four times, as are π and the product by it; in f64 2⁻²⁹ of that.
+    /// Of sums that are no plain f32 ones: one over all lights, bases and columns, of products of
+    /// four (K_d c, E, C, T), which in f32 are rounded four times, as are π and the product by it;
+    /// in f64 2⁻²⁹ of that.
     fn bounds_as(&self, sums: Sums) -> Vec<f64> {
         if sums == PLAIN {
             return self.bounds();
@@ -191,11 +211,13 @@ impl Case {
     }
 }
 
-/// Diffuse facets that receive from thousands of columns, the first of which brings all but what by itself is rounded away.
+/// Diffuse facets that receive from thousands of columns, the first of which brings all but what by
+/// itself is rounded away.
 fn long() -> Case {
     const N_COLUMNS: usize = 4096;
     let mut r = Random(3);
-    let region = RegionRecord { kd: [0.5; 3], i_lobe: NO_LOBE, n_facets: 64, ..RegionRecord::default() };
+    let region =
+        RegionRecord { kd: [0.5; 3], i_lobe: NO_LOBE, n_facets: 64, ..RegionRecord::default() };
     let facet = FacetRecord { color: [1.0; 3], ..FacetRecord::default() };
     let light = LightRecord { energy: [1.0, 2.0, 0.5], ..LightRecord::default() };
     let of_column = |c: usize| if c == 0 { 1.0 } else { f64::from(r.within(0.3, 0.45)) * U };
@@ -219,9 +241,19 @@ fn every_facet_is_the_sum_that_the_reference_says() {
     for (n_lights, two_reflections) in [(1, true), (4, true), (3, false)] {
         let case = case(n_lights, two_reflections);
         let (values, truths, bounds) = (case.run(&mut gpu, None), case.truth(false), case.bounds());
-        assert_within_and_say(&format!("{n_lights} lights, T2 {two_reflections}"), &values, &truths, &bounds);
-        // The bound itself says something: of sums of up to 4 · 16 · 5 numbers below 1, 31 roundings of 2⁻²⁴.
-        assert!(bounds.iter().all(|b| *b < 3e-4), "{:?}", bounds.iter().cloned().fold(0.0, f64::max));
+        assert_within_and_say(
+            &format!("{n_lights} lights, T2 {two_reflections}"),
+            &values,
+            &truths,
+            &bounds,
+        );
+        // The bound itself says something: of sums of up to 4 · 16 · 5 numbers below 1, 31
+        // roundings of 2⁻²⁴.
+        assert!(
+            bounds.iter().all(|b| *b < 3e-4),
+            "{:?}",
+            bounds.iter().cloned().fold(0.0, f64::max)
+        );
         if !two_reflections {
             let second = values.chunks(12).flat_map(|c| [&c[3..6], &c[9..12]].concat());
             assert!(second.into_iter().all(|v| v == 0.0));

@@ -1,5 +1,5 @@
-//! cull: what is kept against the f64 reference, over whole buffers: who, in which order, under which keys, and how
-//! many.
+//! cull: what is kept against the f64 reference, over whole buffers: who, in which order, under
+//! which keys, and how many.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -26,7 +26,8 @@ type Entry = [u32; 2];
 const UNTOUCHED: Entry = [7, u32::MAX];
 const RADIUS: f64 = 8.0;
 
-/// View depth: a difference and an f32 axis a term, three products and two sums; and the axis' own length.
+/// View depth: a difference and an f32 axis a term, three products and two sums; and the axis' own
+/// length.
 const DEPTH: f64 = 16.0 * U;
 
 /// Particles, what is drawn of them, and what they are seen with.
@@ -52,7 +53,8 @@ struct Found {
 impl Scene {
     /// From the origin along −z, 53° up, nothing there yet.
     fn new(width: u32, height: u32) -> Scene {
-        let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
+        let pose =
+            Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         let fov_y_rad = 2.0 * 0.5f64.atan();
         let view = View {
             width,
@@ -110,7 +112,11 @@ impl Scene {
 
     fn run_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Found {
         let compiler = compiler.unwrap_or(&gpu.compiler);
-        let variant = [self.weighted, self.view.threshold > 0.0, self.particles.iter().any(|p| p.aspect != 1.0)];
+        let variant = [
+            self.weighted,
+            self.view.threshold > 0.0,
+            self.particles.iter().any(|p| p.aspect != 1.0),
+        ];
         let pass = Cull::new(&gpu.device, compiler, self.n(), variant).expect("cull");
         let (placed, particles) = (gpu.upload(&self.placed), gpu.upload(&self.particles));
         let (i_group, drawn) = (gpu.upload(&self.i_group), gpu.upload(&self.drawn));
@@ -118,10 +124,14 @@ impl Scene {
         let kept = gpu.upload(&[KeptRecord { sort: [9; 4], draw: [9; 4], splat: [9; 4] }]);
         let View { width, height, cutoff, threshold, smallest, .. } = self.view;
         let view = cull::View { camera: &self.camera, width, height, cutoff, threshold, smallest };
-        let order = Order { radius: RADIUS, n_bits: self.n_bits, sort_tile: TILE, splat_block: 256 };
+        let order =
+            Order { radius: RADIUS, n_bits: self.n_bits, sort_tile: TILE, splat_block: 256 };
         let buffers = [&placed, &particles, &i_group, &drawn, &entries, &kept];
         gpu.run(|rec| pass.record(rec, buffers, &view, &order, self.n()));
-        Found { kept: gpu.download(&kept, 1)[0], entries: gpu.download(&entries, self.placed.len()) }
+        Found {
+            kept: gpu.download(&kept, 1)[0],
+            entries: gpu.download(&entries, self.placed.len()),
+        }
     }
 
     /// Every particle's key, as `sort` makes it.
@@ -132,7 +142,9 @@ impl Scene {
         let i_group = gpu.upload(&vec![0u32; self.placed.len()]);
         let entries = gpu.buffer::<Entry>(self.placed.len());
         let buffers = [&placed, &i_group, &drawn, &entries];
-        gpu.run(|rec| sort.record_keys(rec, buffers, self.camera.forward, self.n(), RADIUS, self.n_bits));
+        gpu.run(|rec| {
+            sort.record_keys(rec, buffers, self.camera.forward, self.n(), RADIUS, self.n_bits)
+        });
         gpu.download::<Entry>(&entries, self.placed.len()).iter().map(|e| e[0]).collect()
     }
 
@@ -140,15 +152,22 @@ impl Scene {
         let (p, q) = (&self.placed[i], &self.particles[i]);
         let group = &self.drawn[self.i_group[i] as usize];
         let last = if i as u32 + 1 == group.end { group.last_weight } else { 1.0 };
-        let weight = if self.weighted { f64::from(group.kappa_scale) * f64::from(last) } else { 1.0 };
+        let weight =
+            if self.weighted { f64::from(group.kappa_scale) * f64::from(last) } else { 1.0 };
         let position = DVec3::from(p.position.map(f64::from));
-        Blob { aspect: f64::from(q.aspect), position, sigma: f64::from(p.sigma), kappa: weight * f64::from(q.kappa) }
+        Blob {
+            aspect: f64::from(q.aspect),
+            position,
+            sigma: f64::from(p.sigma),
+            kappa: weight * f64::from(q.kappa),
+        }
     }
 
     fn fates(&self) -> Vec<Fate> {
-        // ln of a product of four, each rounded, by Vulkan's 3 ulp or 2^-21; what is kept beside the silhouette, and
-        // its rounding.
-        let slack = Slack { depth: DEPTH, log: 2f64.powi(-20), growth: 1.01e-4, pixels: 1.01 / 16.0 };
+        // ln of a product of four, each rounded, by Vulkan's 3 ulp or 2^-21; what is kept beside
+        // the silhouette, and its rounding.
+        let slack =
+            Slack { depth: DEPTH, log: 2f64.powi(-20), growth: 1.01e-4, pixels: 1.01 / 16.0 };
         let of = |i: usize| {
             let drawn = (i as u32) < self.drawn[self.i_group[i] as usize].end;
             if drawn { fate(&self.view, &self.blob(i), &slack) } else { Fate::Left }
@@ -181,13 +200,16 @@ fn complaint(scene: &Scene, keys: &[u32], found: &Found) -> Option<String> {
     let mut is_kept = vec![false; keys.len()];
     entries[..n].iter().for_each(|e| is_kept[e[1] as usize] = true);
     let wrong = |(i, fate): (usize, Fate)| match (fate, is_kept[i]) {
-        (Fate::Kept, false) | (Fate::Left, true) => Some(format!("{i}: {:?} {fate:?}", scene.placed[i])),
+        (Fate::Kept, false) | (Fate::Left, true) => {
+            Some(format!("{i}: {:?} {fate:?}", scene.placed[i]))
+        }
         _ => None,
     };
     scene.fates().into_iter().enumerate().find_map(wrong)
 }
 
-/// Particles all around the eye, of widths from a tenth of a pixel to the whole picture; in part weighted.
+/// Particles all around the eye, of widths from a tenth of a pixel to the whole picture; in part
+/// weighted.
 fn random(seed: u64, n: usize) -> Scene {
     let mut random = Random(seed);
     let mut within = |low: f64, high: f64| random.within(low, high);
@@ -207,11 +229,13 @@ fn random(seed: u64, n: usize) -> Scene {
         let at = [0; 3].map(|_| within(-4.0, 4.0));
         // Every seventh where the one before is.
         let at = if i % 7 == 6 { scene.placed[i - 1].position } else { at };
-        let (sigma, tau) = (10f64.powf(f64::from(within(-4.0, 0.0))), 10f64.powf(f64::from(within(-4.0, 0.5))));
+        let (sigma, tau) =
+            (10f64.powf(f64::from(within(-4.0, 0.0))), 10f64.powf(f64::from(within(-4.0, 0.5))));
         scene = scene.with(at, sigma as f32, tau);
     }
     if seed.is_multiple_of(4) {
-        let part = |k: u32| DrawnRecord { shift: 0, end: 10 * k + 7, kappa_scale: 1.2, last_weight: 0.1 };
+        let part =
+            |k: u32| DrawnRecord { shift: 0, end: 10 * k + 7, kappa_scale: 1.2, last_weight: 0.1 };
         scene.weighted = true;
         scene.drawn = (0..n.div_ceil(10) as u32).map(part).collect();
         scene.i_group = (0..n as u32).map(|i| i / 10).collect();
@@ -241,7 +265,9 @@ fn of_ellipsoids_too() {
 fn keep_what_the_reference_keeps(scenes: fn(u64, usize) -> Scene) {
     let mut gpu = Gpu::new();
     let mut counts = [0; 3];
-    for (seed, n) in [0, 1, 2, 31, 33, 255, 256, 257, 511, 1024, 1025, 5000, 20_000].into_iter().enumerate() {
+    for (seed, n) in
+        [0, 1, 2, 31, 33, 255, 256, 257, 511, 1024, 1025, 5000, 20_000].into_iter().enumerate()
+    {
         let scene = scenes(seed as u64 + 1, n);
         let (keys, found) = (scene.keys(&mut gpu), scene.run_by(&mut gpu, None));
         assert_eq!(complaint(&scene, &keys, &found), None, "seed {seed}, {n} particles");
@@ -249,7 +275,8 @@ fn keep_what_the_reference_keeps(scenes: fn(u64, usize) -> Scene) {
         scene.fates().into_iter().for_each(|f| counts[f as usize] += 1);
     }
     println!("kept, left, either: {counts:?}");
-    // The reference decides nearly all of it; what is open is mostly narrower than what is kept for rounding's sake.
+    // The reference decides nearly all of it; what is open is mostly narrower than what is kept for
+    // rounding's sake.
     assert!(counts[0] > 1000 && counts[1] > 1000 && counts[2] * 8 < counts[0], "{counts:?}");
 }
 
@@ -264,7 +291,8 @@ fn no_ray_meets_what_is_left_out() {
             let (blob, view) = (scene.blob(i), &scene.view);
             let c = blob.position - view.pose.position;
             let drawn = (i as u32) < scene.drawn[scene.i_group[i] as usize].end;
-            let meets = |d: DVec3| 0.5 * blob.along(c, d).off.powi(2) <= view.cut(blob.along(c, d).depth);
+            let meets =
+                |d: DVec3| 0.5 * blob.along(c, d).off.powi(2) <= view.cut(blob.along(c, d).depth);
             let pixels = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
             let met = drawn
                 && c.dot(view.pose.forward) >= view.near
@@ -289,10 +317,14 @@ fn edges() {
         found.entries[..n].iter().map(|e| e[1]).collect::<Vec<_>>()
     };
     let empty = || Scene::new(40, 30);
-    let many = |scene: Scene, n: usize, at: [f32; 3]| (0..n).fold(scene, |s, _| s.with(at, 0.2, 1.0));
+    let many =
+        |scene: Scene, n: usize, at: [f32; 3]| (0..n).fold(scene, |s, _| s.with(at, 0.2, 1.0));
     check("none there", &empty(), 0);
     for n in [1, 257, 1500] {
-        assert_eq!(check("all", &many(empty(), n, [0.1, 0.1, -4.0]), n), (0..n as u32).collect::<Vec<_>>());
+        assert_eq!(
+            check("all", &many(empty(), n, [0.1, 0.1, -4.0]), n),
+            (0..n as u32).collect::<Vec<_>>()
+        );
         check("all behind", &many(empty(), n, [0.1, 0.1, 4.0]), 0);
         check("all before the near plane", &many(empty(), n, [0.0, 0.0, -0.499]), 0);
         check("all beside", &many(empty(), n, [5.0, 0.1, -4.0]), 0);
@@ -328,7 +360,8 @@ fn ties_stay_in_order_through_the_sort() {
         let mut scene = Scene::new(40, 30);
         for i in 0..3000 {
             // Beside the picture or in it, at one of three depths.
-            let at = [if i % 5 == 0 { 50.0 } else { 0.01 * (i % 9) as f32 }, 0.0, -3.0 - (i % 3) as f32];
+            let at =
+                [if i % 5 == 0 { 50.0 } else { 0.01 * (i % 9) as f32 }, 0.0, -3.0 - (i % 3) as f32];
             scene = scene.with(at, 0.3, 1.0);
         }
         scene.n_bits = n_bits;
@@ -339,20 +372,26 @@ fn ties_stay_in_order_through_the_sort() {
         let sort = Sort::new(&gpu.device, &gpu.compiler, 3000).expect("sort");
         let (entries, kept) = (gpu.upload(&found.entries), gpu.upload(&[found.kept]));
         assert_ne!(KeptRecord::I_COUNT, NO_COUNT);
-        let counts =
-            nimbus::passes::sort::Counts { buffer: &kept, i_count: KeptRecord::I_COUNT, i_groups: KeptRecord::I_SORT };
+        let counts = nimbus::passes::sort::Counts {
+            buffer: &kept,
+            i_count: KeptRecord::I_COUNT,
+            i_groups: KeptRecord::I_SORT,
+        };
         gpu.run(|rec| sort.record_counted(rec, &entries, n_bits, counts).map(|_| ()));
         let sorted: Vec<Entry> = gpu.download(&entries, 3000);
         let mut expected = found.entries[..n as usize].to_vec();
         expected.sort_by_key(|e| (e[0], e[1]));
-        assert!(sorted[..n as usize] == expected && sorted[n as usize..] == found.entries[n as usize..]);
+        assert!(
+            sorted[..n as usize] == expected && sorted[n as usize..] == found.entries[n as usize..]
+        );
     }
 }
 
 #[test]
 fn wrong_shaders_are_noticed() {
     let mut gpu = Gpu::new();
-    let scenes: Vec<Scene> = [(4, 2000), (6, 2000), (9, 2000)].map(|(seed, n)| random(seed, n)).into();
+    let scenes: Vec<Scene> =
+        [(4, 2000), (6, 2000), (9, 2000)].map(|(seed, n)| random(seed, n)).into();
     let keys: Vec<Vec<u32>> = scenes.iter().map(|s| s.keys(&mut gpu)).collect();
     let noticed = |gpu: &mut Gpu, compiler: Option<&Compiler>| {
         let mut all = scenes.iter().zip(&keys);

@@ -1,4 +1,5 @@
-//! The pass facets against its f64 reference, fed with the GPU's own density, so that this stage is measured alone.
+//! The pass facets against its f64 reference, fed with the GPU's own density, so that this stage is
+//! measured alone.
 
 mod harness;
 #[path = "harness/shells.rs"]
@@ -12,7 +13,9 @@ use nimbus::model::cloud::runs;
 use nimbus::reference::facets::{CONDITIONING, Facet, Members, bunch, grouped};
 use nimbus::reference::morton;
 use nimbus::reference::rounding::DIVISION_ERROR;
-use shells::{Around, LENGTH_ERROR, N_PER_CLOUD, N_SURFACE_FACETS, REGIONS, SIGMA_MEANS, Scene, U, color};
+use shells::{
+    Around, LENGTH_ERROR, N_PER_CLOUD, N_SURFACE_FACETS, REGIONS, SIGMA_MEANS, Scene, U, color,
+};
 
 struct Compared {
     values: Vec<Vec<f64>>,
@@ -55,7 +58,10 @@ fn compare(scene: &Scene, cells: &[f64], made: &[FacetRecord]) -> Compared {
 
 impl Compared {
     fn is_right(&self) -> bool {
-        self.labels_right && (0..4).all(|k| check_within("", &self.values[k], &self.truths[k], &self.bounds[k]).is_ok())
+        self.labels_right
+            && (0..4).all(|k| {
+                check_within("", &self.values[k], &self.truths[k], &self.bounds[k]).is_ok()
+            })
     }
 }
 
@@ -75,10 +81,23 @@ fn facets_are_within_bounds_that_grow_as_the_gradient_vanishes() {
     let truth = scene.reference(&cells);
     let share = |f: &dyn Fn(f64) -> bool| truth.iter().filter(|t| f(t.conditioning)).count();
     let (by_center, by_slope) = (share(&|q| q <= CONDITIONING.0), share(&|q| q >= CONDITIONING.1));
-    println!("normals' bounds: median {:e}, greatest {:e}", bounds[bounds.len() / 2], bounds[bounds.len() - 1]);
-    println!("by the centre {by_center}, by the gradient {by_slope}, blended {}", 3000 - by_center - by_slope);
-    // The bound says something (a twentieth of a degree at the median), and all three branches are met.
-    assert!(bounds[bounds.len() / 2] < 1e-3 && by_center > 10 && by_slope > 1000 && by_center + by_slope < 2990);
+    println!(
+        "normals' bounds: median {:e}, greatest {:e}",
+        bounds[bounds.len() / 2],
+        bounds[bounds.len() - 1]
+    );
+    println!(
+        "by the centre {by_center}, by the gradient {by_slope}, blended {}",
+        3000 - by_center - by_slope
+    );
+    // The bound says something (a twentieth of a degree at the median), and all three branches are
+    // met.
+    assert!(
+        bounds[bounds.len() / 2] < 1e-3
+            && by_center > 10
+            && by_slope > 1000
+            && by_center + by_slope < 2990
+    );
     assert_eq!((made[11].area, made[12].area), (0.0, 0.0));
     assert_eq!(scene.run(&mut gpu, &compiler), (cells, made));
 }
@@ -93,7 +112,12 @@ fn facets_of_ellipsoids_are_within_their_bounds() {
         let compared = compare(&scene, &cells, &made);
         assert!(compared.labels_right);
         for (k, what) in QUANTITIES.into_iter().enumerate() {
-            assert_within_and_say(what, &compared.values[k], &compared.truths[k], &compared.bounds[k]);
+            assert_within_and_say(
+                what,
+                &compared.values[k],
+                &compared.truths[k],
+                &compared.bounds[k],
+            );
         }
         let mut bounds = compared.bounds[0].clone();
         bounds.sort_by(f64::total_cmp);
@@ -113,7 +137,8 @@ fn facets_of_ellipsoids_are_within_their_bounds() {
         ("tau *= aspect / wider;", "tau *= aspect;"),
         ("scale * (axes * d)", "scale * d"),
     ] {
-        let (cells, made) = scene.run(&mut gpu, &Gpu::wrong_compiler("include/shell.glsl", from, to));
+        let (cells, made) =
+            scene.run(&mut gpu, &Gpu::wrong_compiler("include/shell.glsl", from, to));
         assert!(!compare(&scene, &cells, &made).is_right(), "{to} was not noticed");
     }
 }
@@ -132,7 +157,11 @@ fn a_wrong_shader_is_noticed() {
         ("include/shell.glsl", "float radius = 3.0 * sigma", "float radius = 3.0001 * sigma"),
         ("facets.comp", "group.i_region,", "i_group[i],"),
         ("facets.comp", "particles[i].color", "particles[0].color"),
-        ("facets.comp", "push.i_first_facet + i]", "push.i_first_facet + (i + 1) % push.n_particles]"),
+        (
+            "facets.comp",
+            "push.i_first_facet + i]",
+            "push.i_first_facet + (i + 1) % push.n_particles]",
+        ),
         ("include/density.glsl", "mix(low, high, f.x)", "mix(low, high, f.y)"),
     ];
     for (file, from, to) in mutations {
@@ -161,7 +190,11 @@ impl Runs {
             let blobs = &scene.blobs[first as usize..(first + n) as usize];
             let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
             let bounds = [(DVec3::splat(-8.0), DVec3::splat(8.0))];
-            order.extend(morton::order(&positions, &vec![0; blobs.len()], &bounds).iter().map(|i| i + first as u32));
+            order.extend(
+                morton::order(&positions, &vec![0; blobs.len()], &bounds)
+                    .iter()
+                    .map(|i| i + first as u32),
+            );
             all.extend(runs(n, count).map(|(a, b)| (first + a, first + b)));
         }
         Runs { order, runs: all }
@@ -173,11 +206,19 @@ impl Runs {
 
     /// The reference's facets and colours, and the bounds: normal, position, area, colour.
     fn truth(&self, scene: &Scene, cells: &[f64]) -> Vec<(Facet, DVec3, [f64; 4])> {
-        let means: Vec<f64> = scene.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
+        let means: Vec<f64> =
+            scene.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
         let regions: Vec<u32> = scene.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
-        let colors: Vec<DVec3> = scene.blobs.iter().map(|b| Vec3::from(color(b)).as_dvec3()).collect();
-        let members = Members { blobs: &scene.blobs, sigma_means: &means, regions: &regions, colors: &colors };
-        let facets = grouped(&scene.spec, cells, &members, &scene.centers(), &self.order, &self.runs);
+        let colors: Vec<DVec3> =
+            scene.blobs.iter().map(|b| Vec3::from(color(b)).as_dvec3()).collect();
+        let members = Members {
+            blobs: &scene.blobs,
+            sigma_means: &means,
+            regions: &regions,
+            colors: &colors,
+        };
+        let facets =
+            grouped(&scene.spec, cells, &members, &scene.centers(), &self.order, &self.runs);
         let bounded = |(g, (facet, color)): (usize, (Facet, DVec3))| {
             (facet, color, run_bounds(scene, cells, &members, self.members(g), &facet))
         };
@@ -185,50 +226,73 @@ impl Runs {
     }
 }
 
-/// Bounds on normal, position (the greatest axis), area and colour of the facet of `run`. A mean about the first member,
-/// of n numbers at most D from it by weights of relative error w: the weights' errors enter above and below, each sum
-/// rounds n times, and difference, product and quotient follow; what it is added to rounds once.
-fn run_bounds(scene: &Scene, cells: &[f64], m: &Members<'_>, run: &[u32], facet: &Facet) -> [f64; 4] {
+/// Bounds on normal, position (the greatest axis), area and colour of the facet of `run`. A mean
+/// about the first member, of n numbers at most D from it by weights of relative error w: the
+/// weights' errors enter above and below, each sum rounds n times, and difference, product and
+/// quotient follow; what it is added to rounds once.
+fn run_bounds(
+    scene: &Scene,
+    cells: &[f64],
+    m: &Members<'_>,
+    run: &[u32],
+    facet: &Facet,
+) -> [f64; 4] {
     let n = run.len() as f64;
     let mean = |weight: f64, reach: f64, value: f64| {
         (2.0 * weight + (2.0 * n + 3.0 + DIVISION_ERROR) * U) * reach + U * (value + reach)
     };
-    let greatest = |of: &dyn Fn(usize) -> f64| run.iter().map(|i| of(*i as usize)).fold(0.0, f64::max);
+    let greatest =
+        |of: &dyn Fn(usize) -> f64| run.iter().map(|i| of(*i as usize)).fold(0.0, f64::max);
     let ellipsoids = scene.has_ellipsoids();
     let (b, first) = (bunch(m, run, ellipsoids), run[0] as usize);
     // κσ³a: four products.
     let by_mass = 4.0 * U;
     let reach = greatest(&|i| (m.blobs[i].position - m.blobs[first].position).length());
     let p_error = if run.len() == 1 { 0.0 } else { mean(by_mass, reach, b.position.length()) };
-    // σ² + |p − p̄|²/3: p̄'s error and the difference's rounding enter the square, whose five operations and the sum round;
-    // then weights and sums as above, the quotient, and the root, derived from inversesqrt and a division.
+    // σ² + |p − p̄|²/3: p̄'s error and the difference's rounding enter the square, whose five
+    // operations and the sum round; then weights and sums as above, the quotient, and the root,
+    // derived from inversesqrt and a division.
     let far = greatest(&|i| (m.blobs[i].position - b.position).length());
     let d = p_error + U * far;
-    let square =
-        |sigma: f64| (2.0 * by_mass + (2.0 * n + 8.0 + DIVISION_ERROR) * U) * sigma.powi(2) + (2.0 * far * d + d * d);
+    let square = |sigma: f64| {
+        (2.0 * by_mass + (2.0 * n + 8.0 + DIVISION_ERROR) * U) * sigma.powi(2)
+            + (2.0 * far * d + d * d)
+    };
     // |√a − √b| ≤ |a − b|/√a, and ≤ √|a − b|. Of balls a third of what the distance is off counts, of ellipsoids half along x and z, and all along y.
     let share = if ellipsoids { 0.5 } else { 1.0 / 3.0 };
-    let root = |sigma: f64, square: f64| (square / sigma).min(square.sqrt()) + (4.0 + DIVISION_ERROR) * U * sigma;
-    let of = |sigma: f64, share: f64| root(sigma, square(sigma) - (1.0 - share) * (2.0 * far * d + d * d));
+    let root = |sigma: f64, square: f64| {
+        (square / sigma).min(square.sqrt()) + (4.0 + DIVISION_ERROR) * U * sigma
+    };
+    let of = |sigma: f64, share: f64| {
+        root(sigma, square(sigma) - (1.0 - share) * (2.0 * far * d + d * d))
+    };
     let spread = of(b.sigma, share);
     let high = b.sigma * b.aspect;
     let aspect_error = match (run.len(), ellipsoids) {
         (1, _) | (_, false) => 0.0,
-        _ => (of(high, 1.0) + b.aspect * spread) / (b.sigma - spread) + DIVISION_ERROR * U * b.aspect,
+        _ => {
+            (of(high, 1.0) + b.aspect * spread) / (b.sigma - spread) + DIVISION_ERROR * U * b.aspect
+        }
     };
     let means = greatest(&|i| (m.sigma_means[i] - m.sigma_means[first]).abs());
-    let scale_error = if run.len() == 1 { 0.0 } else { spread.max(mean(by_mass, means, b.sigma_mean)) };
+    let scale_error =
+        if run.len() == 1 { 0.0 } else { spread.max(mean(by_mass, means, b.sigma_mean)) };
     let scale = b.sigma.max(b.sigma_mean);
-    let around = Around { p: b.position, p_error, scale, scale_error, aspect: b.aspect, aspect_error };
+    let around =
+        Around { p: b.position, p_error, scale, scale_error, aspect: b.aspect, aspect_error };
     let normal = scene.normal_bound(cells, &around, facet);
     let position = around.shell_bound(normal, facet).max_element();
     let colors = greatest(&|i| (m.colors[i] - m.colors[first]).length());
-    let color = if run.len() == 1 { 0.0 } else { mean(scene.area_error(), colors, b.color.length()) };
+    let color =
+        if run.len() == 1 { 0.0 } else { mean(scene.area_error(), colors, b.color.length()) };
     [normal, position, facet.area * (scene.area_error() + n * U), color]
 }
 
 /// Greatest error/bound of normal, position, area and colour, or what is wrong.
-fn compare_runs(truth: &[(Facet, DVec3, [f64; 4])], made: &[FacetRecord]) -> Result<[f64; 4], String> {
+fn compare_runs(
+    truth: &[(Facet, DVec3, [f64; 4])],
+    made: &[FacetRecord],
+) -> Result<[f64; 4], String> {
     if !truth.iter().zip(made).all(|((facet, _, _), made)| made.i_region == facet.region) {
         return Err("a region".into());
     }
@@ -250,7 +314,8 @@ fn compare_runs(truth: &[(Facet, DVec3, [f64; 4])], made: &[FacetRecord]) -> Res
         let truths: Vec<f64> = truth.iter().flat_map(of_truth).collect();
         let n = if k == 2 { 1 } else { 3 };
         let bounds: Vec<f64> = truth.iter().flat_map(|t| vec![t.2[k]; n]).collect();
-        *ratio = check_within(["normal", "position", "area", "color"][k], &values, &truths, &bounds)?;
+        *ratio =
+            check_within(["normal", "position", "area", "color"][k], &values, &truths, &bounds)?;
     }
     Ok(ratios)
 }
@@ -268,10 +333,17 @@ fn facets_of_runs_are_within_their_bounds() {
         let mut bounds: Vec<f64> = truth.iter().map(|t| t.2[0]).collect();
         bounds.sort_by(f64::total_cmp);
         let (median, greatest) = (bounds[bounds.len() / 2], bounds[bounds.len() - 1]);
-        println!("{counts:?}: error/bound {ratios:.3?}; normals' bounds: median {median:e}, greatest {greatest:e}");
+        println!(
+            "{counts:?}: error/bound {ratios:.3?}; normals' bounds: median {median:e}, greatest \
+             {greatest:e}"
+        );
         assert!(median < 1e-2);
         for g in 0..runs.runs.len() {
-            assert!(runs.members(g).iter().all(|i| i_facet[*i as usize] as usize == N_SURFACE_FACETS + g));
+            assert!(
+                runs.members(g)
+                    .iter()
+                    .all(|i| i_facet[*i as usize] as usize == N_SURFACE_FACETS + g)
+            );
         }
     }
 }
@@ -284,7 +356,8 @@ fn runs_of_one_are_the_particles_facets_to_the_bit() {
     let runs = Runs::new(&scene, [u64::from(N_PER_CLOUD); 2]);
     let (_, singly) = scene.run(&mut gpu, &compiler);
     let (_, made, i_facet) = scene.run_groups(&mut gpu, &compiler, &runs.order, &runs.runs);
-    let by_particle: Vec<FacetRecord> = i_facet.iter().map(|f| made[*f as usize - N_SURFACE_FACETS]).collect();
+    let by_particle: Vec<FacetRecord> =
+        i_facet.iter().map(|f| made[*f as usize - N_SURFACE_FACETS]).collect();
     assert!(by_particle == singly && made != singly);
 }
 
@@ -300,7 +373,10 @@ fn wrong_facets_of_runs_are_noticed() {
         ("s.color += a * c;", "s.color += m * c;"),
         ("max(sigma, sigma_mean)", "max(sigma, group.sigma_mean)"),
         ("max(sigma, sigma_mean)", "sigma"),
-        ("(by_mass ? s.position / s.mass : s.plain_position * n_inverse)", "s.plain_position * n_inverse"),
+        (
+            "(by_mass ? s.position / s.mass : s.plain_position * n_inverse)",
+            "s.plain_position * n_inverse",
+        ),
         ("k < run.i_first + run.n_particles", "k < run.i_first + run.n_particles - 1u"),
     ];
     for (from, to) in mutations {

@@ -44,7 +44,10 @@ fn case(n_suns: usize, n_near: usize, sky: bool) -> Case {
         .collect();
     lights.extend((0..2 * n_near).map(|i| near_light(&mut r, 3.0, i % 2 == 1)));
     if sky {
-        lights.insert(n_suns / 2, Light::Sky { irradiance: DVec3::new(0.25, 0.5, 1.5), constant: 0.125 });
+        lights.insert(
+            n_suns / 2,
+            Light::Sky { irradiance: DVec3::new(0.25, 0.5, 1.5), constant: 0.125 },
+        );
     }
     let facet = |i: usize, r: &mut Random| FacetRecord {
         position: [0; 3].map(|_| r.within(-4.0, 4.0)),
@@ -57,15 +60,21 @@ fn case(n_suns: usize, n_near: usize, sky: bool) -> Case {
     facets[0].normal = [0.0, 1.0, 0.0];
     facets[1].normal = [0.0, -1.0, 0.0];
     // In the first point light itself.
-    if let Some(Light::Point { position, .. }) = lights.iter().find(|l| matches!(l, Light::Point { .. })) {
+    if let Some(Light::Point { position, .. }) =
+        lights.iter().find(|l| matches!(l, Light::Point { .. }))
+    {
         facets[2].position = position.as_vec3().to_array();
     }
-    let mut transmittance: Vec<f32> = (0..N_FACETS * lights.len()).map(|_| r.within(0.0, 1.0)).collect();
+    let mut transmittance: Vec<f32> =
+        (0..N_FACETS * lights.len()).map(|_| r.within(0.0, 1.0)).collect();
     for (i, v) in transmittance.iter_mut().take(40).enumerate() {
         *v = (i % 2) as f32;
     }
-    let mut region =
-        || RegionRecord { kd: [0; 3].map(|_| r.within(0.0, 1.0)), i_lobe: NO_LOBE, ..RegionRecord::default() };
+    let mut region = || RegionRecord {
+        kd: [0; 3].map(|_| r.within(0.0, 1.0)),
+        i_lobe: NO_LOBE,
+        ..RegionRecord::default()
+    };
     let regions = (0..N_REGIONS).map(|_| region()).collect();
     Case { facets, lights, transmittance, regions, table: vec![] }
 }
@@ -91,8 +100,11 @@ impl Case {
 
     /// Irradiance and radiance in the order of the records' floats.
     fn truth(&self) -> Vec<f64> {
-        let vectors = |of: fn(&FacetRecord) -> [f32; 3]| self.facets.iter().map(|f| double(of(f))).collect::<Vec<_>>();
-        let (positions, normals, colors) = (vectors(|f| f.position), vectors(|f| f.normal), vectors(|f| f.color));
+        let vectors = |of: fn(&FacetRecord) -> [f32; 3]| {
+            self.facets.iter().map(|f| double(of(f))).collect::<Vec<_>>()
+        };
+        let (positions, normals, colors) =
+            (vectors(|f| f.position), vectors(|f| f.normal), vectors(|f| f.color));
         let transmittance: Vec<f64> = self.transmittance.iter().map(|&v| f64::from(v)).collect();
         let e = irradiance(&positions, &normals, &transmittance, &self.lights);
         let kd: Vec<DVec3> = self.regions.iter().map(|r| double(r.kd)).collect();
@@ -105,7 +117,8 @@ impl Case {
         (0..N_FACETS).flat_map(|j| self.bound(j)).collect()
     }
 
-    /// Operation by operation as Vulkan bounds them; a sum's order is left open, so that it is taken the longest way.
+    /// Operation by operation as Vulkan bounds them; a sum's order is left open, so that it is
+    /// taken the longest way.
     fn bound(&self, j: usize) -> [f64; N_NUMBERS] {
         let facet = &self.facets[j];
         let mut e = [Bounded::exact(0.0); 3];
@@ -114,9 +127,9 @@ impl Case {
             let a = arrival(light, facet.position);
             let cosine = dot(exact3(facet.normal), a.toward);
             let share = match light {
-                Light::Sky { constant, .. } => {
-                    v.times(Bounded::exact(0.5).plus(cosine.scaled(0.5))).plus(Bounded::exact(*constant))
-                }
+                Light::Sky { constant, .. } => v
+                    .times(Bounded::exact(0.5).plus(cosine.scaled(0.5)))
+                    .plus(Bounded::exact(*constant)),
                 _ => v.times(a.falloff).times(cosine.at_least_0()),
             };
             for (sum, energy) in e.iter_mut().zip(light.energy().to_array()) {
@@ -125,7 +138,8 @@ impl Case {
         }
         let (kd, color) = (self.regions[facet.i_region as usize].kd, facet.color);
         let l = [0, 1, 2].map(|c| {
-            let albedo = Bounded::exact(f64::from(kd[c])).times(Bounded::exact(f64::from(color[c])));
+            let albedo =
+                Bounded::exact(f64::from(kd[c])).times(Bounded::exact(f64::from(color[c])));
             albedo.times(e[c]).times(Bounded::once(1.0 / PI))
         });
         // f64's own rounding is 1e-9 of f32's.
@@ -149,18 +163,24 @@ fn numbers(lit: &[LitRecord]) -> Vec<f64> {
 #[test]
 fn every_facet_is_lit_as_the_reference_says() {
     let mut gpu = Gpu::new();
-    for (n_suns, n_near, sky) in [(1, 0, false), (0, 0, true), (3, 0, true), (9, 0, true), (0, 2, false), (1, 1, true)]
+    for (n_suns, n_near, sky) in
+        [(1, 0, false), (0, 0, true), (3, 0, true), (9, 0, true), (0, 2, false), (1, 1, true)]
     {
         let what = format!("{n_suns} suns, {n_near} points and spots, sky {sky}");
         let case = case(n_suns, n_near, sky);
-        let (values, truths, bounds) = (numbers(&case.run(&mut gpu, None)), case.truth(), case.bounds());
+        let (values, truths, bounds) =
+            (numbers(&case.run(&mut gpu, None)), case.truth(), case.bounds());
         println!("{what}: greatest error/bound {:.3}", greatest_ratio(&values, &truths, &bounds));
         assert_within(&what, &values, &truths, &bounds);
-        // The bound itself says something: 1e-6 of full scale (9 suns of 5, and the sky); a spot's narrow edge multiplies
-        // the cosine's rounding, some 20 u, by 2/(cos inner − cos outer), up to 130.
+        // The bound itself says something: 1e-6 of full scale (9 suns of 5, and the sky); a spot's
+        // narrow edge multiplies the cosine's rounding, some 20 u, by 2/(cos inner − cos outer), up
+        // to 130.
         let most = |of: &[f64]| of.iter().cloned().fold(0.0, f64::max);
         let (bound, greatest) = (most(&bounds), most(&truths));
-        assert!(bound < 5e-5 || (n_near > 0 && bound < 1.5e-4 * greatest), "{what}: {bound:e} of {greatest}");
+        assert!(
+            bound < 5e-5 || (n_near > 0 && bound < 1.5e-4 * greatest),
+            "{what}: {bound:e} of {greatest}"
+        );
     }
 }
 
@@ -203,7 +223,8 @@ fn wrong_light_is_noticed() {
 fn shiny_case() -> Case {
     let mut case = case(2, 0, true);
     let basis = Basis::new([1.0, 1000.0], 12, Sampling::Log);
-    case.table = [3.0, 60.0, 1000.0].iter().flat_map(|ns| basis.lobe(*ns)).map(|v| v as f32).collect();
+    case.table =
+        [3.0, 60.0, 1000.0].iter().flat_map(|ns| basis.lobe(*ns)).map(|v| v as f32).collect();
     for (region, i) in case.regions.iter_mut().zip(0u32..) {
         region.ks = [0.25, 0.5, 0.125 * i as f32];
         region.i_lobe = if i < 3 { i } else { NO_LOBE };
@@ -221,16 +242,18 @@ fn shine(case: &Case, j: usize) -> [(f64, f64); 3] {
     if region.i_lobe == NO_LOBE || n.dot(out) <= 0.0 {
         return sums;
     }
-    let table: Vec<f64> =
-        case.table[region.i_lobe as usize * basis::N_NODES..][..basis::N_NODES].iter().map(|v| f64::from(*v)).collect();
+    let table: Vec<f64> = case.table[region.i_lobe as usize * basis::N_NODES..][..basis::N_NODES]
+        .iter()
+        .map(|v| f64::from(*v))
+        .collect();
     for (l, light) in case.lights.iter().enumerate().filter(|(_, light)| !light.is_sky()) {
         let a = light.arrival(p);
         let v = f64::from(case.transmittance[j * case.lights.len() + l]);
         let share = light.share(n, &a, v);
         let sum = a.toward + out;
         let chord = (n - sum.normalize()).length();
-        // Directions err by 4 roundings and what their sum cancels; the chord by that and its own 4; the place in the table
-        // by 4 of t, which is at most 1, a thousand cells wide.
+        // Directions err by 4 roundings and what their sum cancels; the chord by that and its own
+        // 4; the place in the table by 4 of t, which is at most 1, a thousand cells wide.
         let off = U * (16.0 / sum.length() + 8.0);
         let at = |chord: f64| basis::evaluate(&table, 0.5 * chord * chord);
         let lobe = at(chord);
@@ -258,8 +281,10 @@ fn lobes_shine_toward_the_eye_from_the_front_side() {
         let i = N_NUMBERS * j + 8 + c;
         (plain[i] + value, bounds[i] + bound + 4.0 * U * (plain[i] + value.abs()))
     };
-    let (truths, limits): (Vec<f64>, Vec<f64>) = (0..3 * N_FACETS).map(|i| expect(i / 3, i % 3)).unzip();
-    let first = |lit: &[LitRecord]| lit.iter().flat_map(|l| l.first.map(f64::from)).collect::<Vec<f64>>();
+    let (truths, limits): (Vec<f64>, Vec<f64>) =
+        (0..3 * N_FACETS).map(|i| expect(i / 3, i % 3)).unzip();
+    let first =
+        |lit: &[LitRecord]| lit.iter().flat_map(|l| l.first.map(f64::from)).collect::<Vec<f64>>();
     let values = first(&case.run(&mut gpu, None));
     println!("greatest error/bound {:.3}", greatest_ratio(&values, &truths, &limits));
     assert_within("L1 with lobes", &values, &truths, &limits);

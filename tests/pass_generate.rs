@@ -45,7 +45,9 @@ fn generate_with(gpu: &mut Gpu, compiler: &Compiler, boxes: &[CloudBox], law: &B
     let n = i_group.len();
     let (list, i_group) = (gpu.upload(&list), gpu.upload(&i_group));
     let (particles, status) = (gpu.buffer::<ParticleRecord>(n), gpu.buffer::<u32>(n));
-    gpu.run(|rec| generate.record(rec, [&list, &i_group, &particles, &status], n as u32, MAX_ATTEMPTS));
+    gpu.run(|rec| {
+        generate.record(rec, [&list, &i_group, &particles, &status], n as u32, MAX_ATTEMPTS)
+    });
     (gpu.download(&particles, n), gpu.download(&status, n))
 }
 
@@ -56,23 +58,28 @@ fn generate(gpu: &mut Gpu, boxes: &[CloudBox], law: &BoxLaw) -> Made {
 
 /// The reference and its bounds, particle by particle, on all cores.
 fn reference(boxes: &[CloudBox], law: &BoxLaw) -> Vec<(Generated, ParticleBound)> {
-    let of_box = boxes.iter().zip(0u32..).flat_map(|(b, i_box)| (0..b.n_particles).map(move |i| (b, i_box, i)));
+    let of_box = boxes
+        .iter()
+        .zip(0u32..)
+        .flat_map(|(b, i_box)| (0..b.n_particles).map(move |i| (b, i_box, i)));
     let all: Vec<_> = of_box.collect();
     let one = |&(b, i_box, i): &(&CloudBox, u32, u32)| {
-        let exact = generate_particle(b, i_box, law.seed, law.form, law.optical_depth, law.radius_scale, i);
+        let exact =
+            generate_particle(b, i_box, law.seed, law.form, law.optical_depth, law.radius_scale, i);
         (exact, particle_bound(b, i_box, law.seed, law.form, i, U_F32))
     };
     let n_threads = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         let chunks = all.chunks(all.len().div_ceil(n_threads).max(1));
-        let threads: Vec<_> = chunks.map(|c| scope.spawn(move || c.iter().map(one).collect::<Vec<_>>())).collect();
+        let threads: Vec<_> =
+            chunks.map(|c| scope.spawn(move || c.iter().map(one).collect::<Vec<_>>())).collect();
         threads.into_iter().flat_map(|t| t.join().unwrap()).collect()
     })
 }
 
-/// Bound on σ = fl(fl(factor)·R), R the radius before factor and scale. Centred, the reference's bound holds a rounded
-/// factor and its product already, and σ's factor only is another number: it scales. As printed it holds neither, so
-/// both come on top: (1 + u)² − 1 = 2u + u².
+/// Bound on σ = fl(fl(factor)·R), R the radius before factor and scale. Centred, the reference's
+/// bound holds a rounded factor and its product already, and σ's factor only is another number: it
+/// scales. As printed it holds neither, so both come on top: (1 + u)² − 1 = 2u + u².
 fn sigma_bound(exact: &Generated, bound: &ParticleBound, law: &BoxLaw) -> f64 {
     let u = U_F32;
     let radius = match law.form {
@@ -120,7 +127,9 @@ struct Outcome {
 fn compare(truth: &[(Generated, ParticleBound)], made: &Made, law: &BoxLaw) -> Outcome {
     let mut o = Outcome::default();
     assert!(truth.len() == made.0.len() && truth.len() == made.1.len());
-    for (i, ((exact, bound), (particle, status))) in truth.iter().zip(made.0.iter().zip(&made.1)).enumerate() {
+    for (i, ((exact, bound), (particle, status))) in
+        truth.iter().zip(made.0.iter().zip(&made.1)).enumerate()
+    {
         let same = status & !FOLDED == exact.n_attempts && (status & FOLDED != 0) == exact.folded;
         o.n_folded += usize::from(exact.folded);
         o.kappa.add(particle.kappa, exact.kappa, U_F32 * exact.kappa);
@@ -152,19 +161,26 @@ impl Outcome {
             self.wrongly.len(),
             self.wrongly.first()
         );
-        for (quantity, c) in [("position", &self.position), ("sigma", &self.sigma), ("kappa", &self.kappa)] {
+        for (quantity, c) in
+            [("position", &self.position), ("sigma", &self.sigma), ("kappa", &self.kappa)]
+        {
             assert_within_and_say(&format!("{what}: {quantity}"), &c.values, &c.truths, &c.bounds);
         }
-        println!("{what}: undecided {}, other {}, folded {}", self.n_undecided, self.n_other, self.n_folded);
+        println!(
+            "{what}: undecided {}, other {}, folded {}",
+            self.n_undecided, self.n_other, self.n_folded
+        );
     }
 
     fn is_right(&self) -> bool {
-        self.wrongly.is_empty() && [&self.position, &self.sigma, &self.kappa].iter().all(|c| c.check("").is_ok())
+        self.wrongly.is_empty()
+            && [&self.position, &self.sigma, &self.kappa].iter().all(|c| c.check("").is_ok())
     }
 }
 
-/// Undecided particles that a test of `n` allows: an attempt is undecided where it falls within some 2e-6 of one of six
-/// faces of a box of size 1, a chance of 1e-5, and a particle makes some ten. 1e-3 is ten times that.
+/// Undecided particles that a test of `n` allows: an attempt is undecided where it falls within
+/// some 2e-6 of one of six faces of a box of size 1, a chance of 1e-5, and a particle makes some
+/// ten. 1e-3 is ten times that.
 fn most_undecided(n: usize) -> usize {
     n.div_ceil(1000)
 }
@@ -199,16 +215,19 @@ fn a_million_particles_agree_but_for_decisions_within_rounding_of_a_face() {
     let truth = reference(&boxes, &law);
     let outcome = compare(&truth, &made, &law);
     outcome.assert("a million");
-    // How many to expect within rounding: the margins' density near 0, from those below 1e-4, times the mean bound.
+    // How many to expect within rounding: the margins' density near 0, from those below 1e-4, times
+    // the mean bound.
     let near = truth.iter().filter(|(exact, _)| exact.margin < 1e-4).count() as f64;
-    let mean_bound = truth.iter().map(|(_, b)| b.position.element_sum() / 3.0).sum::<f64>() / truth.len() as f64;
+    let mean_bound =
+        truth.iter().map(|(_, b)| b.position.element_sum() / 3.0).sum::<f64>() / truth.len() as f64;
     let n_attempts: u32 = truth.iter().map(|(exact, _)| exact.n_attempts).sum();
     println!(
         "attempts {n_attempts}, mean bound {mean_bound:e}, expected undecided about {:.1}",
         near * mean_bound / 1e-4
     );
     println!(
-        "of 1000000: {} within rounding of a face, {} of them decided otherwise, the farthest {:e} from it",
+        "of 1000000: {} within rounding of a face, {} of them decided otherwise, the farthest \
+         {:e} from it",
         outcome.n_undecided, outcome.n_other, outcome.farthest_other
     );
     assert!(outcome.n_undecided <= most_undecided(1_000_000));
@@ -216,8 +235,9 @@ fn a_million_particles_agree_but_for_decisions_within_rounding_of_a_face() {
     assert!(outcome.farthest_other < 1e-5);
 }
 
-/// P (5) amplifies: its argument P_x Z/2 multiplies P_x's error by half the extent, twice in a row, so that the bound
-/// on y grows with the square of the extent and more: some 1e-1 here, and in boxes of thousands it says nothing any more.
+/// P (5) amplifies: its argument P_x Z/2 multiplies P_x's error by half the extent, twice in a row,
+/// so that the bound on y grows with the square of the extent and more: some 1e-1 here, and in
+/// boxes of thousands it says nothing any more.
 #[test]
 fn in_large_boxes_decisions_turn_only_within_their_bound() {
     let mut gpu = Gpu::new();
@@ -226,8 +246,12 @@ fn in_large_boxes_decisions_turn_only_within_their_bound() {
     let made = generate(&mut gpu, &boxes, &law);
     let outcome = compare(&reference(&boxes, &law), &made, &law);
     outcome.assert("large boxes");
-    println!("large boxes: the farthest decision that turned, {:e} from its face", outcome.farthest_other);
-    // A bound of 1e-1 beside half extents of 150, on either side of two faces, in three attempts or so: some 0.5 %.
+    println!(
+        "large boxes: the farthest decision that turned, {:e} from its face",
+        outcome.farthest_other
+    );
+    // A bound of 1e-1 beside half extents of 150, on either side of two faces, in three attempts or
+    // so: some 0.5 %.
     assert!(outcome.n_undecided <= made.0.len() / 100 && outcome.farthest_other < 0.5);
 }
 
@@ -250,10 +274,15 @@ fn needles_plates_and_points_are_folded() {
         outcome.assert(&format!("thin boxes {form:?}"));
         // All of the needle and of two more boxes at the least.
         assert!(outcome.n_folded > 900, "{}", outcome.n_folded);
-        // Where an axis has no extent and its phase is sin 0, the bound cannot know that the shader's sine of 0 is 0:
-        // the points, and as printed, where y comes from Z, the needle. The shader's is, so they agree all the same.
+        // Where an axis has no extent and its phase is sin 0, the bound cannot know that the
+        // shader's sine of 0 is 0: the points, and as printed, where y comes from Z, the needle.
+        // The shader's is, so they agree all the same.
         let exactly_on_a_face = if form == Form::Printed { 320 } else { 20 };
-        assert!(outcome.n_undecided <= exactly_on_a_face + most_undecided(made.0.len()), "{}", outcome.n_undecided);
+        assert!(
+            outcome.n_undecided <= exactly_on_a_face + most_undecided(made.0.len()),
+            "{}",
+            outcome.n_undecided
+        );
         assert!(outcome.n_other <= most_undecided(made.0.len()));
         let (_, i_group) = records(&boxes, &law);
         for (p, g) in made.0.iter().zip(i_group) {
@@ -270,9 +299,14 @@ fn given_groups_and_empty_lists_are_left_alone() {
     let mut gpu = Gpu::new();
     let generate = Generate::new(&gpu.device, &gpu.compiler).unwrap();
     let law = law(Form::Centred);
-    let boxes = [one_box(100, [7.4, 1.07, 2.9], 2.1), one_box(0, [1.0; 3], 1.0), one_box(50, [2.0; 3], 2.0)];
+    let boxes = [
+        one_box(100, [7.4, 1.07, 2.9], 2.1),
+        one_box(0, [1.0; 3], 1.0),
+        one_box(50, [2.0; 3], 2.0),
+    ];
     let (made, made_status) = self::generate(&mut gpu, &boxes, &law);
-    // The same boxes with 70 given particles before the last: its numbers within the box stay what they were.
+    // The same boxes with 70 given particles before the last: its numbers within the box stay what
+    // they were.
     let (mut list, mut i_group) = records(&boxes, &law);
     list.insert(2, BoxRecord::given());
     list[3].i_first = 170;
@@ -313,8 +347,14 @@ fn the_number_of_invocations_does_not_matter() {
     let push = Push { i_first: 0, n_particles: 615, max_attempts: MAX_ATTEMPTS };
     for n_groups in [1, 2, 7, 40] {
         let (particles, status) = (gpu.buffer::<ParticleRecord>(615), gpu.buffer::<u32>(615));
-        gpu.run(|rec| rec.dispatch_groups(&kernel, &[&list, &i_group, &particles, &status], &push, n_groups));
-        assert_eq!((gpu.download(&particles, 615), gpu.download(&status, 615)), expected, "{n_groups} groups");
+        gpu.run(|rec| {
+            rec.dispatch_groups(&kernel, &[&list, &i_group, &particles, &status], &push, n_groups)
+        });
+        assert_eq!(
+            (gpu.download(&particles, 615), gpu.download(&status, 615)),
+            expected,
+            "{n_groups} groups"
+        );
     }
 }
 
@@ -326,7 +366,8 @@ fn a_wrong_shader_is_noticed() {
     let made = generate(&mut gpu, &boxes, &law);
     assert!(compare(&truth, &made, &law).is_right());
     let mutations = [
-        // P (4) takes Y for x; P (5) in the wrong order; the radius; the key; the order of the counter.
+        // P (4) takes Y for x; P (5) in the wrong order; the radius; the key; the order of the
+        // counter.
         ("0.5 * PI * sine(0.5 * x.y)", "0.4 * PI * sine(0.5 * x.y)"),
         ("0.5 * PI * sine(0.5 * x.y)", "0.5 * PI * sine(0.5 * x.x)"),
         ("    py += PI * sine(px * x.z * 0.5);\n", ""),
@@ -355,8 +396,9 @@ fn chi_squared(a: &[u32], b: &[u32]) -> (f64, usize) {
     (met().map(term).sum(), met().count() - 1)
 }
 
-/// What χ² of `n` degrees of freedom exceeds with a chance of 1e-6 (z = 4.753): Wilson and Hilferty, whose error at
-/// n ≥ 30 is far below the distance between 1e-6 and any p that a wrong law would give.
+/// What χ² of `n` degrees of freedom exceeds with a chance of 1e-6 (z = 4.753): Wilson and
+/// Hilferty, whose error at n ≥ 30 is far below the distance between 1e-6 and any p that a wrong
+/// law would give.
 fn critical(n: usize) -> f64 {
     let v = 2.0 / (9.0 * n as f64);
     n as f64 * (1.0 - v + 4.753 * v.sqrt()).powi(3)
@@ -385,20 +427,29 @@ fn positions_are_distributed_as_the_references() {
         let truth = reference(&boxes, &law(form));
         let expected = histograms(truth.iter().map(|(g, _)| g.position), boxes[0].extent);
         let of_gpu = |made: Made| {
-            let positions = made.0.into_iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3());
+            let positions =
+                made.0.into_iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3());
             histograms(positions, boxes[0].extent)
         };
         let found = of_gpu(generate(&mut gpu, &boxes, &other_seed));
-        let wrong = Gpu::wrong_compiler("generate.comp", "0.5 * PI * sine(0.5 * x.z)", "0.3 * PI * sine(0.5 * x.z)");
+        let wrong = Gpu::wrong_compiler(
+            "generate.comp",
+            "0.5 * PI * sine(0.5 * x.z)",
+            "0.3 * PI * sine(0.5 * x.z)",
+        );
         let wrong = of_gpu(generate_with(&mut gpu, &wrong, &boxes, &other_seed));
         for (axis, name) in ["x", "y", "z", "all"].into_iter().enumerate() {
             let (value, n) = chi_squared(&found[axis], &expected[axis]);
-            println!("{form:?} {name}: χ² {value:.1} of {n} degrees of freedom, p > 1e-6 below {:.1}", critical(n));
+            println!(
+                "{form:?} {name}: χ² {value:.1} of {n} degrees of freedom, p > 1e-6 below {:.1}",
+                critical(n)
+            );
             assert!(value < critical(n));
         }
         let (value, n) = chi_squared(&wrong[3], &expected[3]);
         assert!(value > critical(n), "a wrong phase passes: {value} of {n}");
     }
-    // By hand: (30 − 10)²/40 + (10 − 30)²/40 = 20; the tables give 112.3 at n = 50 and p = 1e-6 within half a percent.
+    // By hand: (30 − 10)²/40 + (10 − 30)²/40 = 20; the tables give 112.3 at n = 50 and p = 1e-6
+    // within half a percent.
     assert_eq!(chi_squared(&[30, 10, 0], &[10, 30, 0]), (20.0, 1));
 }

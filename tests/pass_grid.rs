@@ -1,4 +1,5 @@
-//! The pass grid against its f64 reference: every cell within a bound derived from its own deposits.
+//! The pass grid against its f64 reference: every cell within a bound derived from its own
+//! deposits.
 
 mod harness;
 
@@ -54,14 +55,22 @@ impl Scene {
     fn run(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<f64> {
         let n_cells = self.spec.n_total() as usize;
         let pass = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
-        let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
-        let particle =
-            |b: &Blob| ParticleRecord { kappa: b.kappa as f32, aspect: b.aspect as f32, ..ParticleRecord::default() };
+        let placed = |b: &Blob| PlacedRecord {
+            position: b.position.as_vec3().to_array(),
+            sigma: b.sigma as f32,
+        };
+        let particle = |b: &Blob| ParticleRecord {
+            kappa: b.kappa as f32,
+            aspect: b.aspect as f32,
+            ..ParticleRecord::default()
+        };
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
         let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
         let density = gpu.buffer::<f32>(n_cells);
         let n = self.blobs.len() as u32;
-        gpu.run(|rec| pass.record(rec, [&placed, &particles, &density], &self.record, n, self.heaviest));
+        gpu.run(|rec| {
+            pass.record(rec, [&placed, &particles, &density], &self.record, n, self.heaviest)
+        });
         gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect()
     }
 
@@ -81,7 +90,8 @@ impl Scene {
                         let (exact, most) = (wx * wy * wz, (wx + ex) * (wy + ey) * (wz + ez));
                         // Half a quantum, where there is a deposit at all.
                         let rounded = if most > 0.0 { 0.5 * quantum } else { 0.0 };
-                        bounds[i + n.x * (j + n.y * k)] += density * (most * (1.0 + ROUNDINGS * U) - exact) + rounded;
+                        bounds[i + n.x * (j + n.y * k)] +=
+                            density * (most * (1.0 + ROUNDINGS * U) - exact) + rounded;
                     }
                 }
             }
@@ -96,8 +106,8 @@ impl Scene {
         let (first, weights) = axis_weights(p, sigma, low, cell, n);
         let x = p - low;
         let face = |i: usize| (cell * i as f64 - x) / sigma;
-        // A face in σ: i·cell and x are rounded, their difference, and the quotient errs by a division's error. Of ellipsoids σ and
-        // the cell are products themselves.
+        // A face in σ: i·cell and x are rounded, their difference, and the quotient errs by a
+        // division's error. Of ellipsoids σ and the cell are products themselves.
         let of_shape = if blob.aspect != 1.0 || self.spec.aspect != 1.0 { 1.0 } else { 0.0 };
         let face_error = |i: usize| {
             let at = cell * i as f64;
@@ -105,10 +115,13 @@ impl Scene {
                 + (DIVISION_ERROR + of_shape) * U * face(i).abs())
                 * (1.0 + 8.0 * U)
         };
-        // The ends of the range: x, 3σ, their sum, 1/h and the product are rounded once each. A cell left out or let in
-        // lies that near to the cut, where the density is φ(3).
-        let range_error = (5.0 + 3.0 * of_shape) * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
-        let weight = |i: usize| if (first..first + weights.len()).contains(&i) { weights[i - first] } else { 0.0 };
+        // The ends of the range: x, 3σ, their sum, 1/h and the product are rounded once each. A
+        // cell left out or let in lies that near to the cut, where the density is φ(3).
+        let range_error =
+            (5.0 + 3.0 * of_shape) * U * (x.abs() + DEPOSIT_CUT_SIGMA * sigma) / sigma;
+        let weight = |i: usize| {
+            if (first..first + weights.len()).contains(&i) { weights[i - first] } else { 0.0 }
+        };
         let beyond = |v: f64, e: f64| v.abs() - e >= DEPOSIT_CUT_SIGMA;
         let of = |i: usize| {
             let (a, b) = (face(i), face(i + 1));
@@ -117,7 +130,9 @@ impl Scene {
                 // Both faces are cut to the same number: erf − erf is 0.
                 return (i, weight(i), 0.0);
             }
-            let e = SHARE * (erf_error(a, ea) + erf_error(b, eb)) + 3.0 * U * weight(i) + PHI_3 * range_error;
+            let e = SHARE * (erf_error(a, ea) + erf_error(b, eb))
+                + 3.0 * U * weight(i)
+                + PHI_3 * range_error;
             (i, weight(i), e * (1.0 + 4.0 * U))
         };
         let last = (first + weights.len()).min(n - 1);
@@ -129,9 +144,10 @@ impl Scene {
 const SHARE: f64 = 0.5 / 0.997_300_203_936_739_8;
 /// The normal density at 3σ over erf(3/√2).
 const PHI_3: f64 = 4.44e-3;
-/// Roundings of a deposit that are relative: the mass 6 (5 products, a constant), quanta a mass 2, the product with the
-/// share and the share's two 3, adding ½ before the cut to whole quanta 1; and of the sum: two words to f32, their
-/// sum, the density of a quantum (one more for the cells' shape) and its product 6.
+/// Roundings of a deposit that are relative: the mass 6 (5 products, a constant), quanta a mass 2,
+/// the product with the share and the share's two 3, adding ½ before the cut to whole quanta 1; and
+/// of the sum: two words to f32, their sum, the density of a quantum (one more for the cells'
+/// shape) and its product 6.
 const ROUNDINGS: f64 = 18.0;
 
 /// Error of erf(c/√2), c the face `a` cut to ±3 that is itself off by `e`.
@@ -145,19 +161,28 @@ fn erf_error(a: f64, e: f64) -> f64 {
     slope * e + erf_bound((t - e).max(0.0)).max(erf_bound(t + e))
 }
 
-/// Blobs from a hundredth of a cell to a fifth of the scene, of masses over nine orders of magnitude.
+/// Blobs from a hundredth of a cell to a fifth of the scene, of masses over nine orders of
+/// magnitude.
 fn scattered(n: u32) -> Vec<Blob> {
     let blob = |i: u32| {
         let ([a, b, c, d], [e, ..]) = (uniforms(0x64123, 0, i, 0), uniforms(0x64123, 1, i, 0));
         let position = DVec3::new(20.0 * a - 8.0, 12.0 * b, 9.0 * c - 40.0);
-        Blob { aspect: 1.0, position, sigma: 0.004 * 500f64.powf(d), kappa: 10f64.powf(3.0 * e - 2.0) }
+        Blob {
+            aspect: 1.0,
+            position,
+            sigma: 0.004 * 500f64.powf(d),
+            kappa: 10f64.powf(3.0 * e - 2.0),
+        }
     };
     (0..n).map(blob).collect()
 }
 
 /// The same, from a fiftieth to five times as high as wide.
 fn ellipsoids(n: u32) -> Vec<Blob> {
-    let shaped = |(b, i): (Blob, u32)| Blob { aspect: 0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0]), ..b };
+    let shaped = |(b, i): (Blob, u32)| Blob {
+        aspect: 0.02 * 250f64.powf(uniforms(0x64124, 0, i, 0)[0]),
+        ..b
+    };
     scattered(n).into_iter().zip(0..).map(shaped).collect()
 }
 
@@ -168,14 +193,19 @@ fn paper() -> Vec<Blob> {
         let center = b.center;
         generate_box(b, i, 1, Form::Centred, 1.0, 0.6)
             .into_iter()
-            .map(move |g| Blob { aspect: g.aspect, position: center + g.position, sigma: g.sigma, kappa: g.kappa })
+            .map(move |g| Blob {
+                aspect: g.aspect,
+                position: center + g.position,
+                sigma: g.sigma,
+                kappa: g.kappa,
+            })
             .collect::<Vec<_>>()
     };
     boxes.iter().zip(0..).flat_map(of_box).collect()
 }
 
-/// Small blobs whose cut ends within rounding of a cell's face, on either side of it: where rounding makes the share of
-/// the cell beyond negative, it must not become 2³² quanta.
+/// Small blobs whose cut ends within rounding of a cell's face, on either side of it: where
+/// rounding makes the share of the cell beyond negative, it must not become 2³² quanta.
 fn at_the_cut() -> Vec<Blob> {
     let blob = |i: u32| {
         let [a, b, ..] = uniforms(0xc07, 0, i, 0);
@@ -200,7 +230,10 @@ fn scenes() -> Vec<(&'static str, Scene)> {
         ("the paper's 554", Scene::fitted(&paper(), 64)),
         ("at the cut", Scene::new(&cells, &at_the_cut())),
         ("a speck", Scene::new(&cells, &[at(4.5, 1e-4, 3.0)])),
-        ("no size, no extinction", Scene::new(&cells, &[at(4.2, 0.0, 3.0), at(4.2, 0.5, 0.0), at(4.4, 0.5, 1.0)])),
+        (
+            "no size, no extinction",
+            Scene::new(&cells, &[at(4.2, 0.0, 3.0), at(4.2, 0.5, 0.0), at(4.4, 0.5, 1.0)]),
+        ),
         (
             "cut by the border and outside",
             Scene::new(&cells, &[at(0.2, 0.9, 1.0), at(-20.0, 1.0, 1.0), at(8.9, 0.3, 2.0)]),
@@ -219,7 +252,8 @@ fn every_cell_is_within_its_bound() {
         let relative = |i: usize| if truths[i] > 0.0 { bounds[i] / truths[i] } else { 0.0 };
         let greatest = (0..truths.len()).max_by(|a, b| truths[*a].total_cmp(&truths[*b])).unwrap();
         println!("{name}: relative bound of the densest cell {:e}", relative(greatest));
-        // Weights are some tenth and their bounds 2.5e-6: a bound that said nothing would show here.
+        // Weights are some tenth and their bounds 2.5e-6: a bound that said nothing would show
+        // here.
         assert!(relative(greatest) < 1e-3);
     }
 }
@@ -231,10 +265,12 @@ fn mass_is_kept() {
         let scene = Scene::fitted(&blobs, 64);
         let volume = scene.spec.cell_volume();
         let values = scene.run(&mut gpu, &compiler());
-        let (found, expected) = (values.iter().sum::<f64>() * volume, scene.blobs.iter().map(Blob::mass).sum::<f64>());
+        let (found, expected) =
+            (values.iter().sum::<f64>() * volume, scene.blobs.iter().map(Blob::mass).sum::<f64>());
         let bound = scene.bounds().iter().sum::<f64>() * volume;
         println!("mass {found} of {expected}, relative error {:e}", found / expected - 1.0);
-        // Every cell's bound at once, and f64's own: the weights of one axis cannot err all to one side, but may.
+        // Every cell's bound at once, and f64's own: the weights of one axis cannot err all to one
+        // side, but may.
         assert!((found - expected).abs() <= bound + 1e-12 * expected);
         assert!(bound < 1e-3 * expected);
     }
@@ -256,7 +292,10 @@ fn two_words_hold_what_overflows_one() {
     // A hundred times the heaviest particle in one cell: 100·2³¹ quanta.
     let mut gpu = Gpu::new();
     let cells = GridSpec { aspect: 1.0, n_cells: UVec3::splat(3), cell: 1.0, low: DVec3::ZERO };
-    let scene = Scene::new(&cells, &[Blob { aspect: 1.0, position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100]);
+    let scene = Scene::new(
+        &cells,
+        &[Blob { aspect: 1.0, position: DVec3::splat(1.5), sigma: 0.1, kappa: 2.0 }; 100],
+    );
     let values = scene.run(&mut gpu, &compiler());
     let (truths, bounds) = (deposit(&scene.spec, &scene.blobs), scene.bounds());
     assert_within_and_say("overflow", &values, &truths, &bounds);
@@ -297,9 +336,16 @@ fn a_grid_without_room_is_refused() {
     let density = gpu.buffer::<f32>(n_cells as usize);
     let mut what = String::new();
     gpu.run(|rec| {
-        let refused = pass.record(rec, [&placed, &particles, &density], &scene.record, 10, scene.heaviest);
+        let refused =
+            pass.record(rec, [&placed, &particles, &density], &scene.record, 10, scene.heaviest);
         what = refused.expect_err("no room").to_string();
         Ok(())
     });
-    assert_eq!(what, format!("limit: a density grid of {n_cells} cells, where there is room for {}", n_cells - 1));
+    assert_eq!(
+        what,
+        format!(
+            "limit: a density grid of {n_cells} cells, where there is room for {}",
+            n_cells - 1
+        )
+    );
 }

@@ -1,5 +1,5 @@
-//! impostors: whole buffers of parted entries, and whole pictures of shells seen from elsewhere, against the f64 reference
-//! within a derived bound.
+//! impostors: whole buffers of parted entries, and whole pictures of shells seen from elsewhere,
+//! against the f64 reference within a derived bound.
 
 mod harness;
 
@@ -31,18 +31,28 @@ fn texels() -> Vec<[f64; 4]> {
     let value = |i: u32, k: u32| f64::from(hashed(4 * i + k) >> 8) / f64::from(1u32 << 24);
     let of = |i: u32| {
         let alpha = (1.5 * value(i, 3) - 0.3).clamp(0.0, 1.0);
-        [2.5 * alpha * value(i, 0), alpha * value(i, 1), alpha * value(i, 2), alpha].map(|v| f64::from(v as f32))
+        [2.5 * alpha * value(i, 0), alpha * value(i, 1), alpha * value(i, 2), alpha]
+            .map(|v| f64::from(v as f32))
     };
     (0..SHELL[0] * SHELL[1]).map(of).collect()
 }
 
 fn view(eye: DVec3, turn: DQuat, tangents: DVec2) -> View {
-    View { eye, right: turn * DVec3::X, up: turn * DVec3::Y, forward: turn * DVec3::NEG_Z, tangents }
+    View {
+        eye,
+        right: turn * DVec3::X,
+        up: turn * DVec3::Y,
+        forward: turn * DVec3::NEG_Z,
+        tangents,
+    }
 }
 
 fn shell() -> Shell {
-    let tangents =
-        TANGENTS * DVec2::new(f64::from(SHELL[0]) / f64::from(SIZE[0]), f64::from(SHELL[1]) / f64::from(SIZE[1]));
+    let tangents = TANGENTS
+        * DVec2::new(
+            f64::from(SHELL[0]) / f64::from(SIZE[0]),
+            f64::from(SHELL[1]) / f64::from(SIZE[1]),
+        );
     let far = Far { nearest: 4.0, farthest: 9.0, sigma: 0.3, radius: 0.9 };
     Shell { view: view(EYE, DQuat::IDENTITY, tangents), far }
 }
@@ -76,23 +86,30 @@ fn shown(shell: &Shell, now: &View, depth: f32) -> Shown {
 
 /// What each pixel should be, and the bound.
 ///
-/// Its place: every entry of the homography between pixels is rounded once, each of the three sums of three terms takes five
-/// roundings more at most, the division 2.5 ulp, and two sums of half an extent: with |terms| the sum of a row's terms'
-/// magnitudes, (6 U |terms| + |place| 6 U |under|)/under + 5 U |place| + 2 U extent. The cubic: weights to 8 U of at most
-/// 1.375 in magnitude (four products and three sums), three products and six sums: 24 U of each term's magnitude, once more
-/// where weights cancel to less: 48 U.
+/// Its place: every entry of the homography between pixels is rounded once, each of the three sums
+/// of three terms takes five roundings more at most, the division 2.5 ulp, and two sums of half an
+/// extent: with |terms| the sum of a row's terms' magnitudes, (6 U |terms| + |place| 6 U
+/// |under|)/under + 5 U |place| + 2 U extent. The cubic: weights to 8 U of at most 1.375 in
+/// magnitude (four products and three sums), three products and six sums: 24 U of each term's
+/// magnitude, once more where weights cancel to less: 48 U.
 fn truth(picture: &Picture<'_>, shell: &Shell, now: &View, unit: f64) -> (Vec<f64>, Vec<f64>) {
     let to_shell = shell.homography(now);
     let (mut truths, mut bounds) = (vec![], vec![]);
     let middle = DVec2::new(f64::from(SIZE[0]), f64::from(SIZE[1])) * 0.5;
-    let slopes = DMat3::from_diagonal(DVec3::new(now.tangents.x / middle.x, -now.tangents.y / middle.y, 1.0));
+    let slopes = DMat3::from_diagonal(DVec3::new(
+        now.tangents.x / middle.x,
+        -now.tangents.y / middle.y,
+        1.0,
+    ));
     let extent = DVec2::new(f64::from(SHELL[0]), f64::from(SHELL[1]));
     let texels = 0.5 * extent / shell.view.tangents;
-    let of = (DMat3::from_diagonal(DVec3::new(texels.x, -texels.y, 1.0)) * to_shell * slopes).transpose();
+    let of = (DMat3::from_diagonal(DVec3::new(texels.x, -texels.y, 1.0)) * to_shell * slopes)
+        .transpose();
     for j in 0..SIZE[1] {
         for i in 0..SIZE[0] {
             let at = place_of(&to_shell, SIZE, now.tangents, picture, [i, j]);
-            let pixel = DVec3::new(f64::from(i) + 0.5 - middle.x, f64::from(j) + 0.5 - middle.y, 1.0);
+            let pixel =
+                DVec3::new(f64::from(i) + 0.5 - middle.x, f64::from(j) + 0.5 - middle.y, 1.0);
             let size = |row: DVec3| (row * pixel).abs().element_sum();
             let under = of.z_axis.dot(pixel);
             let off = (at + 0.5 - 0.5 * extent).abs();
@@ -102,18 +119,27 @@ fn truth(picture: &Picture<'_>, shell: &Shell, now: &View, unit: f64) -> (Vec<f6
             let place = along(of.x_axis, off.x, extent.x).max(along(of.y_axis, off.y, extent.y));
             let (value, bound) = sample(picture, at, 2.0 * place, 48.0 * U);
             truths.extend(value);
-            bounds.extend(value.iter().zip(bound).map(|(v, b)| b + unit * (v.abs() + b) + 6e-8 * unit / U));
+            bounds.extend(
+                value.iter().zip(bound).map(|(v, b)| b + unit * (v.abs() + b) + 6e-8 * unit / U),
+            );
         }
     }
     (truths, bounds)
 }
 
 /// What the pass draws, over what `over` has drawn.
-fn draw(gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat, shown: &Shown) -> Vec<f64> {
-    let pass = Impostors::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false).expect("the pass");
+fn draw(
+    gpu: &mut Gpu,
+    compiler: Option<&Compiler>,
+    format: TargetFormat,
+    shown: &Shown,
+) -> Vec<f64> {
+    let pass = Impostors::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false)
+        .expect("the pass");
     let texels: Vec<[f32; 4]> = texels().iter().map(|t| t.map(|v| v as f32)).collect();
     let shell = gpu.upload(&texels);
-    let mut target = Image::color_target(&gpu.device, "test.target", SIZE[0], SIZE[1], format).expect("a target");
+    let mut target = Image::color_target(&gpu.device, "test.target", SIZE[0], SIZE[1], format)
+        .expect("a target");
     gpu.run(|rec| pass.record_show(rec, &shell, Target::color(&mut target), shown));
     read(gpu, &mut target, format)
 }
@@ -121,13 +147,16 @@ fn draw(gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat, shown:
 fn read(gpu: &mut Gpu, target: &mut Image, format: TargetFormat) -> Vec<f64> {
     let n = (SIZE[0] * SIZE[1]) as usize;
     let bytes = n as u64 * format.bytes_per_pixel();
-    let readback = Buffer::new::<u8>(&gpu.device, "test.readback", bytes, Place::Readback).expect("readback");
+    let readback =
+        Buffer::new::<u8>(&gpu.device, "test.readback", bytes, Place::Readback).expect("readback");
     gpu.run(|rec| {
         rec.copy_image(target, &readback);
         Ok(())
     });
     match format {
-        TargetFormat::Rgba16f => readback.read::<half::f16>(4 * n).expect("read").iter().map(|h| h.to_f64()).collect(),
+        TargetFormat::Rgba16f => {
+            readback.read::<half::f16>(4 * n).expect("read").iter().map(|h| h.to_f64()).collect()
+        }
         _ => readback.read::<f32>(4 * n).expect("read").iter().map(|v| f64::from(*v)).collect(),
     }
 }
@@ -136,10 +165,17 @@ fn read(gpu: &mut Gpu, target: &mut Image, format: TargetFormat) -> Vec<f64> {
 fn shells_seen_from_elsewhere() {
     let mut gpu = Gpu::new();
     let (shell, texels) = (shell(), texels());
-    let picture = Picture { width: SHELL[0], height: SHELL[1], tangents: shell.view.tangents, texels: &texels };
+    let picture = Picture {
+        width: SHELL[0],
+        height: SHELL[1],
+        tangents: shell.view.tangents,
+        texels: &texels,
+    };
     for (what, now) in views() {
         // Half floats are rounded to nearest or toward zero.
-        for (format, unit) in [(TargetFormat::Rgba32f, 0.0), (TargetFormat::Rgba16f, 2f64.powi(-10))] {
+        for (format, unit) in
+            [(TargetFormat::Rgba32f, 0.0), (TargetFormat::Rgba16f, 2f64.powi(-10))]
+        {
             let (truths, bounds) = truth(&picture, &shell, &now, unit);
             let values = draw(&mut gpu, None, format, &shown(&shell, &now, 0.0));
             assert_within_and_say(&format!("{what}, {format:?}"), &values, &truths, &bounds);
@@ -154,7 +190,8 @@ fn nothing_is_drawn_beyond_the_bounds() {
     let whole = draw(&mut gpu, None, TargetFormat::Rgba32f, &shown(&shell, &now, 0.0));
     // Slopes of pixel edges: 24 to 72 of 96 columns, and 8 to 32 of 64 rows from the top.
     let bounds = [DVec2::new(-0.3, 0.0), DVec2::new(0.3, 0.3)];
-    let part = draw(&mut gpu, None, TargetFormat::Rgba32f, &Shown { bounds, ..shown(&shell, &now, 0.0) });
+    let part =
+        draw(&mut gpu, None, TargetFormat::Rgba32f, &Shown { bounds, ..shown(&shell, &now, 0.0) });
     for (p, (a, b)) in part.chunks(4).zip(whole.chunks(4)).enumerate() {
         let (i, j) = (p as u32 % SIZE[0], p as u32 / SIZE[0]);
         let within = (24..72).contains(&i) && (8..32).contains(&j);
@@ -166,7 +203,12 @@ fn nothing_is_drawn_beyond_the_bounds() {
 fn a_wrong_shader_is_noticed() {
     let mut gpu = Gpu::new();
     let (shell, texels) = (shell(), texels());
-    let picture = Picture { width: SHELL[0], height: SHELL[1], tangents: shell.view.tangents, texels: &texels };
+    let picture = Picture {
+        width: SHELL[0],
+        height: SHELL[1],
+        tangents: shell.view.tangents,
+        texels: &texels,
+    };
     let (_, now) = views().swap_remove(5);
     let (truths, bounds) = truth(&picture, &shell, &now, 0.0);
     for (from, to) in [
@@ -184,7 +226,8 @@ fn a_wrong_shader_is_noticed() {
         ),
     ] {
         let compiler = Gpu::wrong_compiler("impostors.frag", from, to);
-        let values = draw(&mut gpu, Some(&compiler), TargetFormat::Rgba32f, &shown(&shell, &now, 0.0));
+        let values =
+            draw(&mut gpu, Some(&compiler), TargetFormat::Rgba32f, &shown(&shell, &now, 0.0));
         assert!(check_within("wrong", &values, &truths, &bounds).is_err(), "{from} as {to}");
     }
     let values = draw(&mut gpu, None, TargetFormat::Rgba32f, &shown(&shell, &now, 0.0));
@@ -196,7 +239,12 @@ fn a_surface_shows_before_the_shell_and_under_it() {
     let mut gpu = Gpu::new();
     let format = TargetFormat::Rgba32f;
     let (shell, texels) = (shell(), texels());
-    let picture = Picture { width: SHELL[0], height: SHELL[1], tangents: shell.view.tangents, texels: &texels };
+    let picture = Picture {
+        width: SHELL[0],
+        height: SHELL[1],
+        tangents: shell.view.tangents,
+        texels: &texels,
+    };
     let (_, now) = views().swap_remove(1);
     let (truths, bounds) = truth(&picture, &shell, &now, 0.0);
     let pass = Impostors::new(&gpu.device, &gpu.compiler, format, true).expect("the pass");
@@ -229,13 +277,19 @@ fn a_surface_shows_before_the_shell_and_under_it() {
     let shell_buffer = gpu.upload(&shell_texels);
     let behind = [0.5, 0.25, 0.125, 1.0];
     for (depth, is_hidden) in [(0.1 / 5.1, true), (0.1 / 4.9, false)] {
-        let mut color = Image::color_target(&gpu.device, "test.target", SIZE[0], SIZE[1], format).expect("a target");
+        let mut color = Image::color_target(&gpu.device, "test.target", SIZE[0], SIZE[1], format)
+            .expect("a target");
         let mut far = Image::depth(&gpu.device, "test.depth", SIZE[0], SIZE[1]).expect("depth");
         let shown = shown(&shell, &now, depth as f32);
         gpu.run(|rec| {
             let target = Target { color: &mut color, depth: Some(&mut far) };
             surfaces.record(rec, [&regions, &lit], target, &camera, 1)?;
-            pass.record_show(rec, &shell_buffer, Target { color: &mut color, depth: Some(&mut far) }, &shown)
+            pass.record_show(
+                rec,
+                &shell_buffer,
+                Target { color: &mut color, depth: Some(&mut far) },
+                &shown,
+            )
         });
         let values = read(&mut gpu, &mut color, format);
         let over = |(i, t): (usize, &f64)| match is_hidden {
@@ -244,8 +298,9 @@ fn a_surface_shows_before_the_shell_and_under_it() {
         };
         let wanted: Vec<f64> = truths.iter().enumerate().map(over).collect();
         // Blending rounds a product and a sum.
-        let bounds: Vec<f64> =
-            (0..wanted.len()).map(|i| bounds[i] + bounds[i / 4 * 4 + 3] + 4.0 * U * (1.0 + wanted[i].abs())).collect();
+        let bounds: Vec<f64> = (0..wanted.len())
+            .map(|i| bounds[i] + bounds[i / 4 * 4 + 3] + 4.0 * U * (1.0 + wanted[i].abs()))
+            .collect();
         assert_within_and_say(&format!("hidden: {is_hidden}"), &values, &wanted, &bounds);
     }
 }
@@ -255,27 +310,36 @@ fn what_is_far_and_what_is_near() {
     let mut gpu = Gpu::new();
     let n = 5000u32;
     // Sorted keys, many alike, each particle once.
-    let entries: Vec<[u32; 2]> =
-        (0..n).map(|k| [k / 7 * 3 + u32::from(k > 4000) * 0x8000_0000, (k * 2741 + 5) % n]).collect();
+    let entries: Vec<[u32; 2]> = (0..n)
+        .map(|k| [k / 7 * 3 + u32::from(k > 4000) * 0x8000_0000, (k * 2741 + 5) % n])
+        .collect();
     let turned: Vec<[u32; 2]> = (0..n).map(|k| [k, (k * 1999 + 77) % n]).collect();
     let run = |gpu: &mut Gpu, compiler: Option<&Compiler>, cut: u32| {
         let format = TargetFormat::Rgba16f;
-        let pass = Impostors::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false).expect("the pass");
+        let pass = Impostors::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false)
+            .expect("the pass");
         let [first, second] = [&entries, &turned].map(|e| gpu.upload(e));
         let members = gpu.upload(&vec![9u32; n as usize + 3]);
         let [far, near] = [gpu.buffer::<[u32; 2]>(n as usize), gpu.buffer::<[u32; 2]>(n as usize)];
         let mut found = vec![];
-        for (from, cut, n_drawn) in [(&first, Some(cut), n), (&second, None, n), (&second, None, n - 900)] {
+        for (from, cut, n_drawn) in
+            [(&first, Some(cut), n), (&second, None, n), (&second, None, n - 900)]
+        {
             gpu.run(|rec| pass.record_part(rec, [from, &members, &far, &near], n_drawn, cut));
             let count = n_drawn as usize;
-            found.push((gpu.download::<[u32; 2]>(&far, count), gpu.download::<[u32; 2]>(&near, count)));
+            found.push((
+                gpu.download::<[u32; 2]>(&far, count),
+                gpu.download::<[u32; 2]>(&near, count),
+            ));
         }
         (found, gpu.download::<u32>(&members, n as usize + 3))
     };
     let wanted = |cut: u32| {
         let mut members = vec![9; n as usize + 3];
         let mut found = vec![];
-        for (from, cut, n_drawn) in [(&entries, Some(cut), n), (&turned, None, n), (&turned, None, n - 900)] {
+        for (from, cut, n_drawn) in
+            [(&entries, Some(cut), n), (&turned, None, n), (&turned, None, n - 900)]
+        {
             let [far, near] = part(&from[..n_drawn as usize], &mut members, cut);
             found.push((far, near));
         }

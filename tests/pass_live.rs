@@ -43,7 +43,8 @@ fn plume(n_particles: u32, dilution: Dilution) -> Disc {
     }
 }
 
-/// Three clouds: a plume in the wind, one without a base that is diluted otherwise and far off, one that does nothing but stand.
+/// Three clouds: a plume in the wind, one without a base that is diluted otherwise and far off, one
+/// that does nothing but stand.
 fn clouds() -> Vec<Cloud> {
     let cloud = |disc, wind, position| Cloud {
         facing: nimbus::model::cloud::Facing::Outward,
@@ -57,7 +58,13 @@ fn clouds() -> Vec<Cloud> {
         seed: 7,
     };
     let plain = Disc { condensation: None, period_s: 0.013, ..plume(3000, Dilution::Mass) };
-    let still = Disc { buoyancy: 0.0, outflow: 0.0, radius: 0.0, cooling_s: 1e-3, ..plume(70, Dilution::None) };
+    let still = Disc {
+        buoyancy: 0.0,
+        outflow: 0.0,
+        radius: 0.0,
+        cooling_s: 1e-3,
+        ..plume(70, Dilution::None)
+    };
     vec![
         cloud(plume(20_000, Dilution::Depth), DVec3::new(0.7, -0.02, 0.3), DVec3::ZERO),
         cloud(plain, DVec3::new(-90.0, 0.0, 0.0), DVec3::splat(1e6)),
@@ -82,7 +89,9 @@ fn disc_of(cloud: &Cloud) -> &Disc {
 fn run(gpu: &mut Gpu, compiler: &Compiler, clouds: &[Cloud], time_s: f64) -> Vec<ParticleRecord> {
     let pass = Live::new(&gpu.device, compiler).unwrap();
     let groups = groups(clouds);
-    let of = |(c, g): (&Cloud, &Group)| DiscRecord::new(disc_of(c), g, c.seed, c.wind, disc_of(c).turn_at(time_s));
+    let of = |(c, g): (&Cloud, &Group)| {
+        DiscRecord::new(disc_of(c), g, c.seed, c.wind, disc_of(c).turn_at(time_s))
+    };
     let records: Vec<DiscRecord> = clouds.iter().zip(&groups).map(of).collect();
     let n = groups.iter().map(|g| g.n_particles as usize).sum();
     let (discs, particles) = (gpu.upload(&records), gpu.buffer::<ParticleRecord>(n));
@@ -93,7 +102,8 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, clouds: &[Cloud], time_s: f64) -> Vec
     gpu.download(&particles, n)
 }
 
-/// What the shader makes of a particle, operation by operation, each with what it rounds: position by axis, σ, κ.
+/// What the shader makes of a particle, operation by operation, each with what it rounds: position
+/// by axis, σ, κ.
 fn bounds(cloud: &Cloud, group: &Group, p: &Alive) -> ([Bounded; 3], Bounded, Bounded) {
     let (d, once, exact) = (disc_of(cloud), Bounded::once, Bounded::exact);
     let one = exact(1.0);
@@ -103,7 +113,8 @@ fn bounds(cloud: &Cloud, group: &Group, p: &Alive) -> ([Bounded; 3], Bounded, Bo
     // Both numbers of 24 and 8 bits are exact, their sum rounds.
     let share = once(p.age.share);
     let spent = if p.lived < 1.0 { share } else { life };
-    // The time is in units of 2⁻³² of the period in both; the lesser of the two errs by no more than the worse.
+    // The time is in units of 2⁻³² of the period in both; the lesser of the two errs by no more
+    // than the worse.
     let spent = Bounded { value: spent.value, error: share.error.max(life.error) };
     let cooled = one_minus_exp(spent.times(once(d.period_s / d.cooling_s)));
     let warm = about_1(d.warmth_spread, p.u[3]).times(one.minus(once(d.core).times(exact(p.u[0]))));
@@ -112,7 +123,11 @@ fn bounds(cloud: &Cloud, group: &Group, p: &Alive) -> ([Bounded; 3], Bounded, Bo
     let spread = once(d.outflow * d.cooling_s).times(cooled);
     let out = on_disc(p.u[5], p.u[6]).map(|x| spread.times(x));
     let drift = (cloud.wind * d.period_s).to_array().map(|w| spent.times(once(w)));
-    let position = [drift[0].plus(birth[0].plus(out[0])), drift[1].plus(rise), drift[2].plus(birth[1].plus(out[1]))];
+    let position = [
+        drift[0].plus(birth[0].plus(out[0])),
+        drift[1].plus(rise),
+        drift[2].plus(birth[1].plus(out[1])),
+    ];
     let relative = [0, 1, 2].map(|k| position[k].minus(once(group.center[k])));
 
     let born = once(d.sigma).times(about_1(d.sigma_spread, p.u[2]));
@@ -165,8 +180,12 @@ struct Compared {
 
 impl Compared {
     fn add(&mut self, value: f32, truth: f64, bounded: Bounded) {
-        // The bound's own evaluation follows the shader's; that it is of the reference's number is part of the test.
-        assert!((bounded.value - truth).abs() <= 1e-9 * (1.0 + truth.abs()), "{bounded:?} is not of {truth}");
+        // The bound's own evaluation follows the shader's; that it is of the reference's number is
+        // part of the test.
+        assert!(
+            (bounded.value - truth).abs() <= 1e-9 * (1.0 + truth.abs()),
+            "{bounded:?} is not of {truth}"
+        );
         self.values.push(f64::from(value));
         self.truths.push(truth);
         self.bounds.push(bounded.error);
@@ -205,8 +224,14 @@ fn particles_live_as_the_reference_says_at_any_time() {
     let clouds = clouds();
     for time_s in TIMES {
         let made = run(&mut gpu, &compiler, &clouds, time_s);
-        for (what, c) in ["position", "sigma", "kappa"].iter().zip(compare(&clouds, &made, time_s)) {
-            assert_within_and_say(&format!("{what} at {time_s} s"), &c.values, &c.truths, &c.bounds);
+        for (what, c) in ["position", "sigma", "kappa"].iter().zip(compare(&clouds, &made, time_s))
+        {
+            assert_within_and_say(
+                &format!("{what} at {time_s} s"),
+                &c.values,
+                &c.truths,
+                &c.bounds,
+            );
         }
         // The same again is the same bytes.
         assert_eq!(run(&mut gpu, &compiler, &clouds, time_s), made);
@@ -220,10 +245,17 @@ fn the_bounds_at_a_million_seconds_are_those_at_the_start() {
         let mut widest = [0.0f64; 3];
         for (cloud, group) in clouds.iter().zip(groups(&clouds)) {
             for i in 0..group.n_particles {
-                let (position, sigma, kappa) =
-                    bounds(cloud, &group, &alive(disc_of(cloud), cloud.seed, cloud.wind, i, time_s));
+                let (position, sigma, kappa) = bounds(
+                    cloud,
+                    &group,
+                    &alive(disc_of(cloud), cloud.seed, cloud.wind, i, time_s),
+                );
                 let position = position.iter().map(|p| p.error).fold(0.0, f64::max);
-                widest = [widest[0].max(position), widest[1].max(sigma.error), widest[2].max(kappa.error)];
+                widest = [
+                    widest[0].max(position),
+                    widest[1].max(sigma.error),
+                    widest[2].max(kappa.error),
+                ];
             }
         }
         widest
@@ -274,7 +306,10 @@ fn all_particles_lie_within_their_groups_bounds() {
                 let place = Vec3::from(p.position).as_dvec3().abs();
                 // f32's own rounding of what lies on the bound.
                 let room = 8.0 * U_F32;
-                assert!(place.cmple(g.half_extent + room * (g.half_extent + g.center.abs())).all(), "{place} {g:?}");
+                assert!(
+                    place.cmple(g.half_extent + room * (g.half_extent + g.center.abs())).all(),
+                    "{place} {g:?}"
+                );
                 assert!(f64::from(p.sigma) <= g.sigma_max * (1.0 + room) && p.sigma > 0.0);
                 assert!(f64::from(p.kappa) <= g.kappa_max * (1.0 + room) && p.kappa >= 0.0);
                 let mass = nimbus::model::cloud::mass(f64::from(p.kappa), f64::from(p.sigma));

@@ -1,5 +1,5 @@
-//! morton: keys against the reference's, exactly but for coordinates within their rounding of a cell's face; places
-//! against its order.
+//! morton: keys against the reference's, exactly but for coordinates within their rounding of a
+//! cell's face; places against its order.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -59,18 +59,29 @@ impl Cloud {
 
     fn records(&self) -> Vec<RegionBoundsRecord> {
         let bits = KeyBits::of(self.bounds.len() as u32);
-        let of = |b: &Bounds| RegionBoundsRecord::new((b.0 + self.origin, b.1 + self.origin), self.origin, bits);
+        let of = |b: &Bounds| {
+            RegionBoundsRecord::new((b.0 + self.origin, b.1 + self.origin), self.origin, bits)
+        };
         self.bounds.iter().map(of).collect()
     }
 
     /// Entries of the points as facets.
     fn facet_entries(&self, gpu: &mut Gpu, compiler: &Compiler) -> Vec<Entry> {
         let pass = Morton::new(&gpu.device, compiler).expect("morton");
-        let facet = |(&position, &i_region)| FacetRecord { position, i_region, ..FacetRecord::default() };
-        let facets = gpu.upload(&self.positions.iter().zip(&self.regions).map(facet).collect::<Vec<_>>());
+        let facet =
+            |(&position, &i_region)| FacetRecord { position, i_region, ..FacetRecord::default() };
+        let facets =
+            gpu.upload(&self.positions.iter().zip(&self.regions).map(facet).collect::<Vec<_>>());
         let (bounds, entries) = (gpu.upload(&self.records()), gpu.buffer::<Entry>(N));
         let n = self.positions.len();
-        gpu.run(|rec| pass.record_facets(rec, [&facets, &bounds, &entries], n as u32, self.bounds.len() as u32));
+        gpu.run(|rec| {
+            pass.record_facets(
+                rec,
+                [&facets, &bounds, &entries],
+                n as u32,
+                self.bounds.len() as u32,
+            )
+        });
         gpu.download(&entries, n)
     }
 
@@ -82,7 +93,8 @@ impl Cloud {
         let i_group: Vec<u32> = self.regions.iter().zip(0..).map(|(r, i)| 2 * r + i % 2).collect();
         let group = |g: u32| GroupRecord { i_region: g / 2, ..GroupRecord::default() };
         let groups: Vec<GroupRecord> = (0..2 * self.bounds.len() as u32).map(group).collect();
-        let (i_group, groups, bounds) = (gpu.upload(&i_group), gpu.upload(&groups), gpu.upload(&self.records()));
+        let (i_group, groups, bounds) =
+            (gpu.upload(&i_group), gpu.upload(&groups), gpu.upload(&self.records()));
         let entries = gpu.buffer::<Entry>(N);
         let n = self.positions.len();
         let buffers = [&placed, &i_group, &groups, &bounds, &entries];
@@ -90,16 +102,18 @@ impl Cloud {
         gpu.download(&entries, n)
     }
 
-    /// The cells that coordinate k of a point may have in f32. Low and scale are rounded once, difference and product
-    /// once each.
+    /// The cells that coordinate k of a point may have in f32. Low and scale are rounded once,
+    /// difference and product once each.
     fn cells(&self, i: usize, k: usize) -> (RangeInclusive<u32>, f64) {
         let (_, axis_bits) = morton::key_bits(self.bounds.len() as u32);
         let (low, high) = self.bounds[self.regions[i] as usize];
         let p = DVec3::from(self.positions[i].map(f64::from));
         let x = morton::coordinates(p, (low, high), axis_bits)[k];
-        // The record's bounds are the scene's less the origin: both of its f64 roundings are below u² of its magnitude.
+        // The record's bounds are the scene's less the origin: both of its f64 roundings are below
+        // u² of its magnitude.
         let low_error = 2f64.powi(-52) * (self.origin[k].abs() + low[k].abs());
-        let low = Bounded { error: Bounded::once(low[k]).error + low_error, ..Bounded::once(low[k]) };
+        let low =
+            Bounded { error: Bounded::once(low[k]).error + low_error, ..Bounded::once(low[k]) };
         let n_cells = f64::from(1 << axis_bits);
         let scale = Bounded::once(n_cells / (high[k] - low.value)).times(Bounded::exact(1.0));
         let error = Bounded::exact(p[k]).minus(low).times(scale).error;
@@ -140,8 +154,9 @@ fn keys_are_the_references_but_for_coordinates_on_a_face() {
         let found = cloud.facet_entries(&mut gpu, &compiler());
         let (n_wrong, n_open) = cloud.wrong(&found);
         assert_eq!(n_wrong, 0, "{n_regions} regions");
-        // A coordinate anywhere in its cell lies within its error e of a face with probability 2e: the count is of
-        // independent events, and six standard deviations above their mean are not met.
+        // A coordinate anywhere in its cell lies within its error e of a face with probability 2e:
+        // the count is of independent events, and six standard deviations above their mean are not
+        // met.
         let mean: f64 = (0..N).flat_map(|i| [0, 1, 2].map(|k| 2.0 * cloud.cells(i, k).1)).sum();
         println!("{n_regions} regions: {n_open} coordinates on a face, {mean:.1} expected");
         assert!((n_open as f64) < mean + 6.0 * mean.sqrt() + 1.0 && mean < 1e-3 * N as f64);
@@ -164,12 +179,17 @@ fn places_are_the_references_order() {
     let places: Vec<u32> = gpu.download(&to, N);
     assert_eq!(places, sort::order(&entries.iter().map(|e| e[0]).collect::<Vec<_>>()));
     // A region's places are its indices.
-    assert!(places.iter().zip(&cloud.regions).all(|(&i, &region)| cloud.regions[i as usize] == region));
+    assert!(
+        places.iter().zip(&cloud.regions).all(|(&i, &region)| cloud.regions[i as usize] == region)
+    );
     // The whole reference differs only where a point on a face went to the cell beside.
-    let positions: Vec<DVec3> = cloud.positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect();
+    let positions: Vec<DVec3> =
+        cloud.positions.iter().map(|p| DVec3::from(p.map(f64::from))).collect();
     let truth = morton::order(&positions, &cloud.regions, &cloud.bounds);
-    let is_open = |i: u32| [0, 1, 2].iter().any(|k| cloud.cells(i as usize, *k).0.clone().count() > 1);
-    let closed = |order: &[u32]| order.iter().copied().filter(|i| !is_open(*i)).collect::<Vec<u32>>();
+    let is_open =
+        |i: u32| [0, 1, 2].iter().any(|k| cloud.cells(i as usize, *k).0.clone().count() > 1);
+    let closed =
+        |order: &[u32]| order.iter().copied().filter(|i| !is_open(*i)).collect::<Vec<u32>>();
     assert_eq!(closed(&places), closed(&truth));
 }
 
@@ -218,7 +238,8 @@ fn wrong_keys_are_noticed() {
         ("(32u - push.region_bits)", "(31u - push.region_bits)"),
         ("clamp(x, 0.0, float((1u << push.axis_bits) - 1u))", "x"),
     ] {
-        let found = cloud.facet_entries(&mut gpu, &Gpu::wrong_compiler("morton_key.comp", from, to));
+        let found =
+            cloud.facet_entries(&mut gpu, &Gpu::wrong_compiler("morton_key.comp", from, to));
         assert!(cloud.wrong(&found).0 > 0, "{from} as {to}");
     }
 }

@@ -18,7 +18,8 @@ use nimbus::reference::rounding::{REDUCTION_ERROR, SINE_ERROR, U_F32};
 const TIME_S: f64 = 3600.25;
 const ORIGIN: DVec3 = DVec3::new(1_000_123.456, 2000.5, -3e5);
 
-/// Lists of particles, one of them empty, one far from the others; the wind carries them for an hour.
+/// Lists of particles, one of them empty, one far from the others; the wind carries them for an
+/// hour.
 fn clouds(gust: Gust, growth: Growth) -> Vec<Cloud> {
     let particle = |i: u32, spread: f64| {
         let [a, b, c, d] = uniforms(0x91ace, 0, i, 0);
@@ -67,11 +68,17 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
     let given = grown(&given, &groups, &clouds, TIME_S).into_iter();
     let (positions, sigmas): (Vec<DVec3>, Vec<f64>) = given.map(|g| (g.position, g.sigma)).unzip();
     let list = |c: &Cloud, g: &Group| match &c.source {
-        CloudSource::Particles(list) => list.iter().map(|p| ParticleRecord::new(p, g)).collect::<Vec<_>>(),
+        CloudSource::Particles(list) => {
+            list.iter().map(|p| ParticleRecord::new(p, g)).collect::<Vec<_>>()
+        }
         CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => vec![],
     };
     let particles = clouds.iter().zip(&groups).flat_map(|(c, g)| list(c, g)).collect();
-    let i_group = groups.iter().zip(0..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();
+    let i_group = groups
+        .iter()
+        .zip(0..)
+        .flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize))
+        .collect();
     let record = |g: &Group| {
         let cloud = &clouds[g.i_cloud];
         let n_modes = cloud.gust.modes(cloud.seed).len() as u32;
@@ -89,7 +96,9 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
         assert!(off.cmple(U_F32 * center.abs() * (1.0 + 1e-6)).all(), "{off}");
         assert_eq!(r.i_region, g.i_cloud as u32);
     }
-    let waves = |c: &Cloud| c.gust.modes(c.seed).iter().map(|m| ModeRecord::new(m, TIME_S)).collect::<Vec<_>>();
+    let waves = |c: &Cloud| {
+        c.gust.modes(c.seed).iter().map(|m| ModeRecord::new(m, TIME_S)).collect::<Vec<_>>()
+    };
     let modes = clouds.iter().flat_map(waves).collect();
     Scene { clouds, modes, positions, sigmas, particles, i_group, groups, records, offsets }
 }
@@ -99,7 +108,8 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, scene: &Scene) -> Vec<PlacedRecord> {
     let n = scene.particles.len();
     let (particles, i_group) = (gpu.upload(&scene.particles), gpu.upload(&scene.i_group));
     // A buffer holds at least one record, also where there is no wind.
-    let modes = if scene.modes.is_empty() { gpu.buffer::<ModeRecord>(1) } else { gpu.upload(&scene.modes) };
+    let modes =
+        if scene.modes.is_empty() { gpu.buffer::<ModeRecord>(1) } else { gpu.upload(&scene.modes) };
     let (groups, placed) = (gpu.upload(&scene.records), gpu.buffer::<PlacedRecord>(n));
     gpu.run(|rec| pass.record(rec, [&particles, &i_group, &groups, &modes, &placed], n as u32));
     gpu.download(&placed, n)
@@ -123,24 +133,32 @@ fn placed_positions_are_within_one_rounding_of_offset_and_sum() {
         placed_bound(own, scene.offsets[scene.i_group[i] as usize], exact[i], U_F32)
     };
     let bounds = flat((0..exact.len()).map(bound));
-    let values = |placed: &[PlacedRecord]| flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()));
+    let values = |placed: &[PlacedRecord]| {
+        flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()))
+    };
     assert_within_and_say("placed", &values(&placed), &truths, &bounds);
     // σ times 1.
     assert!(placed.iter().zip(&scene.sigmas).all(|(p, s)| p.sigma == *s as f32));
     assert_eq!(run(&mut gpu, &compiler, &scene), placed);
 
-    for (from, to) in
-        [("+ group.offset", "- group.offset"), ("groups[i_group[i]]", "groups[0]"), (".offset", ".cloud_center")]
-    {
+    for (from, to) in [
+        ("+ group.offset", "- group.offset"),
+        ("groups[i_group[i]]", "groups[0]"),
+        (".offset", ".cloud_center"),
+    ] {
         let wrong = Gpu::wrong_compiler("place.comp", from, to);
         let placed = run(&mut gpu, &wrong, &scene);
-        assert!(check_within("wrong", &values(&placed), &truths, &bounds).is_err(), "{to} was not noticed");
+        assert!(
+            check_within("wrong", &values(&placed), &truths, &bounds).is_err(),
+            "{to} was not noticed"
+        );
     }
 }
 
-/// Bound on the f32 error of the gusts' displacement of particle `i`, alike on every axis. A wave's argument k·x + phase: x is
-/// the rounded position plus the rounded centre, rounded; k rounds once and the scalar product five times; the phase
-/// rounds once, the sum once. Then the reduction and the sine, the product with a rounded a, and a running sum of 16.
+/// Bound on the f32 error of the gusts' displacement of particle `i`, alike on every axis. A wave's
+/// argument k·x + phase: x is the rounded position plus the rounded centre, rounded; k rounds once
+/// and the scalar product five times; the phase rounds once, the sum once. Then the reduction and
+/// the sine, the product with a rounded a, and a running sum of 16.
 fn gust_bound(scene: &Scene, i: usize) -> f64 {
     let group = &scene.groups[scene.i_group[i] as usize];
     let cloud = &scene.clouds[group.i_cloud];
@@ -174,22 +192,32 @@ fn gusts(gpu: &mut Gpu, growth: Growth) {
     let mut exact = place(&scene.positions, &scene.groups, &scene.offsets);
     let still = exact.clone();
     add_gusts(&mut exact, &scene.positions, &scene.groups, &scene.clouds, TIME_S);
-    assert!(exact.iter().zip(&still).filter(|(a, b)| a.distance(**b) > 0.05).count() > exact.len() / 2);
+    assert!(
+        exact.iter().zip(&still).filter(|(a, b)| a.distance(**b) > 0.05).count() > exact.len() / 2
+    );
     let bound = |i: usize| {
-        let inherited = placed_bound(rest_bound(&scene, i), scene.offsets[scene.i_group[i] as usize], still[i], U_F32);
+        let inherited = placed_bound(
+            rest_bound(&scene, i),
+            scene.offsets[scene.i_group[i] as usize],
+            still[i],
+            U_F32,
+        );
         // One more sum, rounded.
         inherited + gust_bound(&scene, i) + U_F32 * (exact[i].abs() + 1.0)
     };
     let bounds = flat((0..exact.len()).map(bound));
     let truths = flat(exact.iter().copied());
-    let values = |placed: &[PlacedRecord]| flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()));
+    let values = |placed: &[PlacedRecord]| {
+        flat(placed.iter().map(|p| glam::Vec3::from_array(p.position).as_dvec3()))
+    };
     let placed = run(gpu, &compiler, &scene);
     assert_within_and_say("gusts", &values(&placed), &truths, &bounds);
     let sigmas: Vec<f64> = placed.iter().map(|p| f64::from(p.sigma)).collect();
     // Rounded itself, as its factor and as their product.
     let of_sigmas: Vec<f64> = scene.sigmas.iter().map(|s| 3.01 * U_F32 * s).collect();
     assert_within_and_say("sigma", &sigmas, &scene.sigmas, &of_sigmas);
-    // At 10⁴ units from its origin a particle's own f32 rounding decides much of its phase; nearer it does not.
+    // At 10⁴ units from its origin a particle's own f32 rounding decides much of its phase; nearer
+    // it does not.
     let mut wrong = vec![("+ modes[m].phase", "- modes[m].phase")];
     if !growth.is_none() {
         wrong.push(("particles[i].position * group.scale", "particles[i].position"));
@@ -204,8 +232,8 @@ fn gusts(gpu: &mut Gpu, growth: Growth) {
     }
 }
 
-/// Bound on the error of a position relative to its group: the record's rounding, and where the cloud has grown that of
-/// the scale and of the product.
+/// Bound on the error of a position relative to its group: the record's rounding, and where the
+/// cloud has grown that of the scale and of the product.
 fn rest_bound(scene: &Scene, i: usize) -> DVec3 {
     let grows = !scene.clouds[scene.groups[scene.i_group[i] as usize].i_cloud].growth.is_none();
     (if grows { 3.01 } else { 1.0 }) * U_F32 * scene.positions[i].abs()

@@ -1,4 +1,5 @@
-//! present: code values of whole windows against the f64 law, in every format of the film, of one picture and of two.
+//! present: code values of whole windows against the f64 law, in every format of the film, of one
+//! picture and of two.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -19,9 +20,10 @@ const SIZE: [u32; 2] = [71, 49];
 const WINDOW: [u32; 2] = [90, 64];
 const CORNER: [i32; 2] = [7, -3];
 
-/// What a code value may be off before it is rounded down. What Vulkan promises: log2 3 ulp of at most 8.3 (or 2^-21), over 2.4 and
-/// times ln 2 a relative 8e-7; exp2 3 + 2 · 3.5 ulp, 1.2e-6; the composition and the tone map's three quotients some twenty roundings of
-/// 2^-24, 1.2e-6: 3.2e-6 of 255, and twice that for 1.055 v − 0.055 and the sums after it.
+/// What a code value may be off before it is rounded down. What Vulkan promises: log2 3 ulp of at
+/// most 8.3 (or 2^-21), over 2.4 and times ln 2 a relative 8e-7; exp2 3 + 2 · 3.5 ulp, 1.2e-6; the
+/// composition and the tone map's three quotients some twenty roundings of 2^-24, 1.2e-6: 3.2e-6 of
+/// 255, and twice that for 1.055 v − 0.055 and the sums after it.
 const OFF: f64 = 2e-3;
 
 fn film(format: FilmFormat, tone_map: ToneMap) -> Film {
@@ -39,14 +41,16 @@ fn pixels() -> Vec<[f32; 4]> {
         280..344 => [odd[i % 8], odd[(i - 280) / 8], 0.25, 1.0],
         _ => {
             let scale = 10f64.powf(f64::from(random.within(-4.0, 1.0)));
-            [0; 4].map(|_| random.within(0.0, scale)).map(|v| if i.is_multiple_of(3) { v } else { v.min(1.0) })
+            [0; 4]
+                .map(|_| random.within(0.0, scale))
+                .map(|v| if i.is_multiple_of(3) { v } else { v.min(1.0) })
         }
     };
     (0..n).map(pixel).collect()
 }
 
-/// B: of a third of the pixels A's own, of a third nearly, the rest others; what is no number against other such, and
-/// against numbers.
+/// B: of a third of the pixels A's own, of a third nearly, the rest others; what is no number
+/// against other such, and against numbers.
 fn others() -> Vec<[f32; 4]> {
     let mut random = Random(4);
     let a = pixels();
@@ -82,8 +86,8 @@ const COMPARED: [(Option<Compare>, Option<Compared>); 8] = [
 ];
 const ALONE: (Option<Compare>, Option<Compared>) = COMPARED[0];
 
-/// What a difference may be off besides: 4 roundings of 2^-24 of what is added up, 5 more of either where bytes are read
-/// (2.5 ulp of a quotient), 2 of the gains; and 12.92 is the steepest of sRGB.
+/// What a difference may be off besides: 4 roundings of 2^-24 of what is added up, 5 more of either
+/// where bytes are read (2.5 ulp of a quotient), 2 of the gains; and 12.92 is the steepest of sRGB.
 fn off_by_differing(film: &Film, gain: f64, [a, b]: [DVec4; 2]) -> DVec3 {
     let size = |p: DVec4| p.truncate().abs() + p.w.abs() * film.background;
     255.0 * 12.92 * 11.0 * 2f64.powi(-24) * gain * film.exposure * (size(a) + size(b))
@@ -92,7 +96,9 @@ fn off_by_differing(film: &Film, gain: f64, [a, b]: [DVec4; 2]) -> DVec3 {
 fn bytes_of(format: TargetFormat, pixels: &[[f32; 4]]) -> Vec<u8> {
     let all = pixels.iter().flatten();
     match format {
-        TargetFormat::Rgba8 | TargetFormat::Bgra8 => all.map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8).collect(),
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
+            all.map(|v| (255.0 * v.clamp(0.0, 1.0)).round() as u8).collect()
+        }
         TargetFormat::Rgba16f => all.flat_map(|v| f16::from_f32(*v).to_le_bytes()).collect(),
         TargetFormat::Rgba32f => all.flat_map(|v| v.to_le_bytes()).collect(),
     }
@@ -101,7 +107,9 @@ fn bytes_of(format: TargetFormat, pixels: &[[f32; 4]]) -> Vec<u8> {
 /// As the buffer has it.
 fn stored(format: TargetFormat, pixel: [f32; 4]) -> DVec4 {
     DVec4::from(pixel.map(|v| match format {
-        TargetFormat::Rgba8 | TargetFormat::Bgra8 => f64::from((255.0 * v.clamp(0.0, 1.0)).round() as u8) / 255.0,
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
+            f64::from((255.0 * v.clamp(0.0, 1.0)).round() as u8) / 255.0
+        }
         TargetFormat::Rgba16f => f16::from_f32(v).to_f64(),
         TargetFormat::Rgba32f => f64::from(v),
     }))
@@ -115,9 +123,11 @@ fn show(
     film: &Film,
     compare: Option<Compare>,
 ) -> Vec<u8> {
-    let pass = Present::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), from, into).expect("present");
+    let pass =
+        Present::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), from, into).expect("present");
     let pictures = [pixels(), others()].map(|pixels| gpu.upload(&bytes_of(from, &pixels)));
-    let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into).expect("a window");
+    let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into)
+        .expect("a window");
     let n = 4 * window.n_pixels();
     let read = Buffer::new::<u8>(&gpu.device, "test.codes", n, Place::Readback).expect("room");
     let shown = Shown {
@@ -139,32 +149,40 @@ fn show(
 }
 
 /// The first pixel that is another than the law and rounding allow.
-fn first_wrong(film: &Film, from: TargetFormat, compared: Option<Compared>, codes: &[u8]) -> Option<String> {
+fn first_wrong(
+    film: &Film,
+    from: TargetFormat,
+    compared: Option<Compared>,
+    codes: &[u8],
+) -> Option<String> {
     let (a, b) = (pixels(), others());
-    (0..WINDOW[1] as usize).flat_map(|y| (0..WINDOW[0] as usize).map(move |x| (x, y))).find_map(|(x, y)| {
-        let code = &codes[4 * (y * WINDOW[0] as usize + x)..][..4];
-        let (i, j) = (x as i64 - i64::from(CORNER[0]), y as i64 - i64::from(CORNER[1]));
-        let is_inside = (0..i64::from(SIZE[0])).contains(&i) && (0..i64::from(SIZE[1])).contains(&j);
-        let (truth, off) = if is_inside {
-            let (i, j) = (i as usize, j as usize);
-            let both = [&a, &b].map(|pixels| stored(from, pixels[j * SIZE[0] as usize + i]));
-            let differing = match compared {
-                Some(Compared::Difference(gain)) => off_by_differing(film, gain, both),
-                _ => DVec3::ZERO,
+    (0..WINDOW[1] as usize).flat_map(|y| (0..WINDOW[0] as usize).map(move |x| (x, y))).find_map(
+        |(x, y)| {
+            let code = &codes[4 * (y * WINDOW[0] as usize + x)..][..4];
+            let (i, j) = (x as i64 - i64::from(CORNER[0]), y as i64 - i64::from(CORNER[1]));
+            let is_inside =
+                (0..i64::from(SIZE[0])).contains(&i) && (0..i64::from(SIZE[1])).contains(&j);
+            let (truth, off) = if is_inside {
+                let (i, j) = (i as usize, j as usize);
+                let both = [&a, &b].map(|pixels| stored(from, pixels[j * SIZE[0] as usize + i]));
+                let differing = match compared {
+                    Some(Compared::Difference(gain)) => off_by_differing(film, gain, both),
+                    _ => DVec3::ZERO,
+                };
+                (compared_values(film, compared, i, j, both), DVec3::splat(OFF) + differing)
+            } else {
+                (DVec3::ZERO, DVec3::ZERO)
             };
-            (compared_values(film, compared, i, j, both), DVec3::splat(OFF) + differing)
-        } else {
-            (DVec3::ZERO, DVec3::ZERO)
-        };
-        let is_right = |k: usize| {
-            let within = |v: f64| v.floor().clamp(0.0, 255.0);
-            // Of what is no number nothing is rounded.
-            let off = if off[k].is_finite() { off[k] } else { 0.0 };
-            (within(truth[k] - off)..=within(truth[k] + off)).contains(&f64::from(code[k]))
-        };
-        let is_right = (0..3).all(is_right) && code[3] == 255;
-        (!is_right).then(|| format!("pixel ({x}, {y}): {code:?}, expected {truth}"))
-    })
+            let is_right = |k: usize| {
+                let within = |v: f64| v.floor().clamp(0.0, 255.0);
+                // Of what is no number nothing is rounded.
+                let off = if off[k].is_finite() { off[k] } else { 0.0 };
+                (within(truth[k] - off)..=within(truth[k] + off)).contains(&f64::from(code[k]))
+            };
+            let is_right = (0..3).all(is_right) && code[3] == 255;
+            (!is_right).then(|| format!("pixel ({x}, {y}): {code:?}, expected {truth}"))
+        },
+    )
 }
 
 const FORMATS: [(TargetFormat, FilmFormat); 3] = [
@@ -183,13 +201,18 @@ fn windows_show_what_files_have() {
             let codes = codes_of(None, TargetFormat::Rgba8);
             for (compare, compared) in COMPARED {
                 let codes = codes_of(compare, TargetFormat::Rgba8);
-                assert_eq!(first_wrong(&film, from, compared, &codes), None, "{format:?} {tone_map:?} {compare:?}");
+                assert_eq!(
+                    first_wrong(&film, from, compared, &codes),
+                    None,
+                    "{format:?} {tone_map:?} {compare:?}"
+                );
             }
             // Windows that have blue first.
             let mut swapped = codes_of(None, TargetFormat::Bgra8);
             swapped.chunks_exact_mut(4).for_each(|p| p.swap(0, 2));
             assert!(swapped == codes);
-            // Hardly a pixel is left to rounding: no code value is off by more than the bound's share of a step.
+            // Hardly a pixel is left to rounding: no code value is off by more than the bound's
+            // share of a step.
             let n_exact = pixels().len();
             assert!(codes.chunks_exact(4).filter(|p| p[..3] != [0; 3]).count() > n_exact / 2);
         }
@@ -226,11 +249,15 @@ fn wrong_windows_are_noticed() {
         let wrong = Gpu::wrong_compiler("present.frag", from, to);
         let formats = (TargetFormat::Rgba16f, TargetFormat::Rgba8);
         let codes = show(&mut gpu, Some(&wrong), formats, &film, compare);
-        assert!(first_wrong(&film, TargetFormat::Rgba16f, compared, &codes).is_some(), "{to} was not noticed");
+        assert!(
+            first_wrong(&film, TargetFormat::Rgba16f, compared, &codes).is_some(),
+            "{to} was not noticed"
+        );
     }
 }
 
-/// Where two pictures are the same nothing is off, whatever the gain: code value 0 and nothing else.
+/// Where two pictures are the same nothing is off, whatever the gain: code value 0 and nothing
+/// else.
 #[test]
 fn the_same_picture_twice_is_black() {
     let mut gpu = Gpu::new();
@@ -239,8 +266,11 @@ fn the_same_picture_twice_is_black() {
     let codes = show(&mut gpu, None, (TargetFormat::Rgba32f, TargetFormat::Rgba8), &film, apart);
     let (a, b) = (pixels(), others());
     let mut n_same = 0;
-    for (k, (a, b)) in a.iter().zip(&b).enumerate().filter(|(_, (a, b))| a == b && a.iter().all(|v| v.is_finite())) {
-        let (x, y) = ((k as u32 % SIZE[0]) as i32 + CORNER[0], (k as u32 / SIZE[0]) as i32 + CORNER[1]);
+    for (k, (a, b)) in
+        a.iter().zip(&b).enumerate().filter(|(_, (a, b))| a == b && a.iter().all(|v| v.is_finite()))
+    {
+        let (x, y) =
+            ((k as u32 % SIZE[0]) as i32 + CORNER[0], (k as u32 / SIZE[0]) as i32 + CORNER[1]);
         if y >= 0 {
             let code = &codes[4 * (y as usize * WINDOW[0] as usize + x as usize)..][..4];
             assert_eq!(code, [0, 0, 0, 255], "{a:?} {b:?}");

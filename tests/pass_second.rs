@@ -1,4 +1,5 @@
-//! second: the light that every facet gathers from all others, as a frame has it, against the same in f64.
+//! second: the light that every facet gathers from all others, as a frame has it, against the same
+//! in f64.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -30,9 +31,12 @@ fn room(seed: u64, lighting: &str) -> Scene {
         // Half of them without lobe.
         p.ks *= f64::from(i % 2);
     });
-    let lights = sun_and_lamp(&mut r, 2.0).replace("position = [", "position = [300.0, -198.0, 100.0] # [") + SKY;
+    let lights = sun_and_lamp(&mut r, 2.0)
+        .replace("position = [", "position = [300.0, -198.0, 100.0] # [")
+        + SKY;
     let eye = format!(
-        "[camera]\nposition = [302.0, -197.0, 105.0]\ntarget = [300.0, -200.0, 100.0]\n[lighting]\ngather = 'exact'\n{lighting}\n"
+        "[camera]\nposition = [302.0, -197.0, 105.0]\ntarget = [300.0, -200.0, \
+         100.0]\n[lighting]\ngather = 'exact'\n{lighting}\n"
     );
     load_with(&(HEAD.to_owned() + &eye + &lights + &plates_text(&plates)), &[], None).unwrap().scene
 }
@@ -40,13 +44,17 @@ fn room(seed: u64, lighting: &str) -> Scene {
 /// A cloud between a ground and a plate.
 fn cloud(lighting: &str) -> Scene {
     let plates = &mut random_plates(&mut Random(5), 2, 0.5, 0.1);
-    (plates[0].center, plates[0].u, plates[0].v) = (DVec3::new(0.0, -2.0, 0.0), 3.0 * DVec3::Z, 3.0 * DVec3::X);
-    (plates[1].center, plates[1].u, plates[1].v) = (DVec3::new(0.5, 2.0, 0.0), 0.7 * DVec3::X, 0.6 * DVec3::Z);
+    (plates[0].center, plates[0].u, plates[0].v) =
+        (DVec3::new(0.0, -2.0, 0.0), 3.0 * DVec3::Z, 3.0 * DVec3::X);
+    (plates[1].center, plates[1].u, plates[1].v) =
+        (DVec3::new(0.5, 2.0, 0.0), 0.7 * DVec3::X, 0.6 * DVec3::Z);
     plates.iter_mut().for_each(|p| p.subdivide = [4, 4]);
     let head = format!(
-        "{HEAD}[lighting]\ngather = 'exact'\n{lighting}\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\noptical_depth = 2\nradius_scale = 0.5\nmaterial = 'm0'\n"
+        "{HEAD}[lighting]\ngather = 'exact'\n{lighting}\n[[cloud]]\nfrom = 'boxes'\nfile = \
+         'b.dat'\noptical_depth = 2\nradius_scale = 0.5\nmaterial = 'm0'\n"
     );
-    let sun = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = [3.0, 2.9, 2.7]\n";
+    let sun = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = \
+        [3.0, 2.9, 2.7]\n";
     load_with(&(head + sun + SKY + &plates_text(plates)), &[], None).unwrap().scene
 }
 
@@ -57,7 +65,10 @@ fn rooms_of_plates_agree_with_the_reference() {
         assert_agrees(&format!("room {seed}"), &frame(&gpu, room(seed, "")));
     }
     for levels in [0, 2] {
-        assert_agrees(&format!("{levels} levels"), &frame(&gpu, room(1, &format!("pair_levels = {levels}"))));
+        assert_agrees(
+            &format!("{levels} levels"),
+            &frame(&gpu, room(1, &format!("pair_levels = {levels}"))),
+        );
     }
     assert_agrees("pair_size 2", &frame(&gpu, room(2, "pair_size = 2")));
     assert_agrees("diffuse", &frame(&gpu, room(3, "bases = 1")));
@@ -82,9 +93,10 @@ fn a_tree_that_is_opened_whole_is_every_pair_and_two_runs_are_the_same() {
         let tree = frame(&gpu, opened);
         let (a, b) = (values(&exact), values(&tree));
         for k in [0, 1] {
-            // The same terms in another order: a rounding a term, of which there are some hundreds, of their sum; terms
-            // of either sign (lobes) are a few percent of it.
-            let bounds: Vec<f64> = a[k].iter().map(|v| 1000.0 * bounded::U * v.abs() + 1e-9).collect();
+            // The same terms in another order: a rounding a term, of which there are some hundreds,
+            // of their sum; terms of either sign (lobes) are a few percent of it.
+            let bounds: Vec<f64> =
+                a[k].iter().map(|v| 1000.0 * bounded::U * v.abs() + 1e-9).collect();
             assert_within_and_say("tree of theta 0", &b[k], &a[k], &bounds);
         }
     }
@@ -96,7 +108,8 @@ fn wrong_gathers_are_noticed() {
     // With pair_size 4 most facets are taken as wholes.
     let scenes = [room(1, ""), cloud("forward = 0"), room(1, "pair_size = 4")];
     let references = scenes.clone().map(|s| truths(&reference(&frame(&gpu, s))));
-    let wrong = |compiler: &Compiler, i: usize| is_noticed(&gpu, compiler, &scenes[i], &references[i]);
+    let wrong =
+        |compiler: &Compiler, i: usize| is_noticed(&gpu, compiler, &scenes[i], &references[i]);
     assert!((0..3).all(|scene| !wrong(&gpu.compiler, scene)));
     for (scene, file, from, to) in [
         (0, "include/gather.glsl", "2.0 / (3.0 * d2)", "1.0 / (3.0 * d2)"),
@@ -115,7 +128,12 @@ fn wrong_gathers_are_noticed() {
         (0, "include/stencil.glsl", ">> level, v", ">> 0, v"),
         (0, "include/walk.glsl", "by_cells && source.in_part && view.quartered", "false"),
         (0, "include/arriving.glsl", "height * inverse * cone", "height * cone"),
-        (0, "second_sources.comp", "0.0625 * total(s)", "0.0625 * total(s) * through[from] * 0.999"),
+        (
+            0,
+            "second_sources.comp",
+            "0.0625 * total(s)",
+            "0.0625 * total(s) * through[from] * 0.999",
+        ),
         (1, "include/gather.glsl", "float(k) + 0.5", "float(k)"),
         (1, "include/gather.glsl", "push.pair_steps)", "3u)"),
         (1, "include/gather.glsl", "area * PI_INVERSE)", "area)"),
@@ -127,7 +145,9 @@ fn wrong_gathers_are_noticed() {
 #[test]
 fn a_gather_that_does_not_come_to_its_end_says_so() {
     let gpu = Gpu::new();
-    assert!(frame(&gpu, room(0, "")).lit.iter().all(|l| l.n_lost == 0.0 && l.unresolved.is_finite()));
+    assert!(
+        frame(&gpu, room(0, "")).lit.iter().all(|l| l.n_lost == 0.0 && l.unresolved.is_finite())
+    );
     // Receivers that never begin: all of their sources are told, and none of the light has a bound.
     let idle = Gpu::wrong_compiler(
         "include/walk.glsl",

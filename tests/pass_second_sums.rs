@@ -1,5 +1,5 @@
-//! second as its sums may be formed: plain, compensated, pairwise, in f32 and f64, each within its own bound, from every pair
-//! and from a tree.
+//! second as its sums may be formed: plain, compensated, pairwise, in f32 and f64, each within its
+//! own bound, from every pair and from a tree.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -25,12 +25,13 @@ use scene_text::load_with;
 use std::path::Path;
 use sums::{KAHAN, PAIRWISE, PLAIN, every_way};
 
-const SUN: &str = "[[light]]\nkind = 'directional'\ndirection = [0.0, -1.0, 0.0]\nirradiance = [3.0, 3.0, 3.0]\n";
+const SUN: &str =
+    "[[light]]\nkind = 'directional'\ndirection = [0.0, -1.0, 0.0]\nirradiance = [3.0, 3.0, 3.0]\n";
 /// Facets of the dark plate, a side.
 const SIDE: u32 = 64;
 
-/// A receiver over two plates: a bright facet, and thousands of dark ones that come after it and together bring a
-/// ten-thousandth of it, each less than half a rounding.
+/// A receiver over two plates: a bright facet, and thousands of dark ones that come after it and
+/// together bring a ten-thousandth of it, each less than half a rounding.
 fn bright_and_dark(gather: &str) -> Scene {
     let plate = |center, u: DVec3, v: DVec3, kd, subdivide| Plate {
         center,
@@ -78,7 +79,8 @@ fn every_way_to_sum_is_within_its_own_bound_and_plain_is_not_within_others() {
         // From a tree it is the same sum.
         let ways = if gather == "tree" { vec![PLAIN, KAHAN] } else { every_way() };
         for sums in ways {
-            let [values, truths, bounds] = of_receiver(&frame(&gpu, with(&scene, sums)), &truths, sums);
+            let [values, truths, bounds] =
+                of_receiver(&frame(&gpu, with(&scene, sums)), &truths, sums);
             let what = format!("{gather}, {sums:?}");
             println!("{what}: bound {:.1e} of {:.3e}", bounds[0], truths[0]);
             assert_within_and_say(&what, &values, &truths, &bounds);
@@ -104,9 +106,12 @@ fn off(a: &[f64], b: &[f64]) -> f64 {
 #[ignore = "a minute; the table of docs/measured.md"]
 fn what_every_way_is_off_by() {
     let gpu = Gpu::new();
-    for (name, gather) in [("rectangles", Gather::Exact), ("ground", Gather::Exact), ("materials", Gather::Exact)] {
+    for (name, gather) in
+        [("rectangles", Gather::Exact), ("ground", Gather::Exact), ("materials", Gather::Exact)]
+    {
         let set = ["film.width=8".to_owned(), "film.height=8".to_owned()];
-        let mut scene = scene_file::load(Path::new(&format!("scenes/{name}.toml")), &set, None).unwrap().scene;
+        let mut scene =
+            scene_file::load(Path::new(&format!("scenes/{name}.toml")), &set, None).unwrap().scene;
         scene.lighting.gather = gather;
         let lit = |sums: Sums| values(&frame(&gpu, with(&scene, sums)));
         let (truths, _) = truths(&reference(&frame(&gpu, scene.clone())));
@@ -115,7 +120,9 @@ fn what_every_way_is_off_by() {
             let found = lit(sums);
             for (against, of) in [("f64", &truths), ("sums in f64", &exact_sums)] {
                 let [indirect, second] = [0, 1].map(|k| off(&found[k], &of[k]));
-                println!("{name}, {sums:?}, against {against}: I_i {indirect:.2e}, L2 {second:.2e}");
+                println!(
+                    "{name}, {sums:?}, against {against}: I_i {indirect:.2e}, L2 {second:.2e}"
+                );
             }
         }
     }

@@ -22,7 +22,8 @@ use nimbus::model::scene::Scene;
 use rooms::{HEAD, SKY, frame, plates_text, random_plates, sun_and_lamp};
 use scene_text::{CLOUD, folder, load_with};
 
-/// Plates of 12 × 11 facets that shade each other, half of them with a lobe, one in four with nothing else.
+/// Plates of 12 × 11 facets that shade each other, half of them with a lobe, one in four with
+/// nothing else.
 fn room(seed: u64, n: usize, theta: f64) -> Scene {
     let mut r = Random(seed);
     let mut plates = random_plates(&mut r, n, 0.9, 0.1);
@@ -39,17 +40,21 @@ fn room(seed: u64, n: usize, theta: f64) -> Scene {
 /// A cloud of some hundred facets between a ground and two plates.
 fn cloud(theta: f64, lighting: &str) -> Scene {
     let plates = &mut random_plates(&mut Random(5), 3, 0.5, 0.1);
-    (plates[0].center, plates[0].u, plates[0].v) = (DVec3::new(0.0, -2.0, 0.0), 3.0 * DVec3::Z, 3.0 * DVec3::X);
-    (plates[1].center, plates[1].u, plates[1].v) = (DVec3::new(0.5, 2.0, 0.0), 0.7 * DVec3::X, 0.6 * DVec3::Z);
+    (plates[0].center, plates[0].u, plates[0].v) =
+        (DVec3::new(0.0, -2.0, 0.0), 3.0 * DVec3::Z, 3.0 * DVec3::X);
+    (plates[1].center, plates[1].u, plates[1].v) =
+        (DVec3::new(0.5, 2.0, 0.0), 0.7 * DVec3::X, 0.6 * DVec3::Z);
     // Askew: what lies in other plates' planes is in doubt.
     let u = DVec3::new(0.13, 0.21, 0.97).normalize();
     (plates[2].center, plates[2].u, plates[2].v) =
         (DVec3::new(2.0, 0.3, 0.2), 0.5 * u, 0.6 * u.cross(DVec3::X).normalize());
     plates.iter_mut().for_each(|p| p.subdivide = [8, 8]);
     let head = format!(
-        "{HEAD}[lighting]\ngather = 'tree'\ntheta = {theta:?}\n{lighting}\n{CLOUD}optical_depth = 2\nradius_scale = 0.5\nmaterial = 'm0'\n"
+        "{HEAD}[lighting]\ngather = 'tree'\ntheta = {theta:?}\n{lighting}\n{CLOUD}optical_depth = \
+         2\nradius_scale = 0.5\nmaterial = 'm0'\n"
     );
-    let sun = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = [3.0, 2.9, 2.7]\n";
+    let sun = "[[light]]\nkind = 'directional'\ndirection = [0.3, -1.0, 0.2]\nirradiance = \
+        [3.0, 2.9, 2.7]\n";
     let (dir, path) = folder(&(head + sun + SKY + &plates_text(plates)));
     fs::write(
         dir.path().join("b.dat"),
@@ -82,7 +87,8 @@ fn wrong_trees_are_noticed() {
     let gpu = Gpu::new();
     let scenes = [room(0, 8, 0.4), cloud(0.4, ""), room(0, 8, 0.8), cloud(0.8, "")];
     let references = scenes.clone().map(|s| truths(&reference(&frame(&gpu, s))));
-    let wrong = |compiler: &Compiler, i: usize| is_noticed(&gpu, compiler, &scenes[i], &references[i]);
+    let wrong =
+        |compiler: &Compiler, i: usize| is_noticed(&gpu, compiler, &scenes[i], &references[i]);
     assert!((0..4).all(|scene| !wrong(&gpu.compiler, scene)));
     let (cells, merge) = ("include/cells.glsl", "second_merge.comp");
     let mut missed = vec![];
@@ -91,7 +97,12 @@ fn wrong_trees_are_noticed() {
         (1, cells, "12.0 * dot(along, way)", "11.0 * dot(along, way)"),
         (0, cells, "- 2.0 * extent", "- 1.9 * extent"),
         (0, cells, "- 4.0 * (at_source", "- 3.9 * (at_source"),
-        (1, cells, "- at_receiver * dot(source.normal, along)", "+ at_receiver * dot(source.normal, along)"),
+        (
+            1,
+            cells,
+            "- at_receiver * dot(source.normal, along)",
+            "+ at_receiver * dot(source.normal, along)",
+        ),
         (3, cells, "source.normal)) * inverse;", "source.normal)) * inverse * 0.5;"),
         (0, cells, "s.leaning.x * x.x + s.leaning.z * x.z", "s.leaning.x * x.x"),
         (1, cells, "source.normal), 0.0) / 3.0;", "source.normal), 0.0) / 2.9;"),
@@ -117,7 +128,12 @@ fn wrong_trees_are_noticed() {
         (0, merge, "length(apart) + child.place.w", "length(apart)"),
         (0, merge, "bool shines = weight > 0.0", "bool shines = true"),
         (0, merge, "bool shines = weight > 0.0", "bool shines = false"),
-        (1, merge, "normal_by_flux += w * child.face.xyz", "normal_by_flux += w * normalize(child.face.xyz)"),
+        (
+            1,
+            merge,
+            "normal_by_flux += w * child.face.xyz",
+            "normal_by_flux += w * normalize(child.face.xyz)",
+        ),
         (0, merge, "total_area += area", "total_area = area"),
         (0, merge, "flux += child.sent.xyz", "flux += 0.999 * child.sent.xyz"),
         (0, merge, "sum += fluxes[", "sum += 0.99 * fluxes["),

@@ -52,7 +52,11 @@ fn entries_come_out_in_the_stable_order_of_their_keys() {
         for (kind, keys) in kinds(n) {
             for n_bits in [16, 32] {
                 let found = sorted(&mut gpu, &sort, &keys, n_bits);
-                assert_eq!(misplaced(&found, &keys, n_bits), None, "{n} {kind} keys of {n_bits} bits");
+                assert_eq!(
+                    misplaced(&found, &keys, n_bits),
+                    None,
+                    "{n} {kind} keys of {n_bits} bits"
+                );
             }
         }
     }
@@ -65,8 +69,10 @@ fn keys_of_any_width_come_out_in_order_counted_by_the_device() {
     let mut random = Random(4);
     for n_bits in [1, 5, 8, 9, 10, 15, 18, 27] {
         let sort = Sort::for_bits(&gpu.device, &gpu.compiler, n, n_bits).expect("sort");
-        // Above the key nothing, as above the number of a bin there is nothing up to the next multiple of any digits.
-        let entries: Vec<Entry> = (0..n).map(|i| [random.word() as u32 & ((1 << n_bits) - 1), i]).collect();
+        // Above the key nothing, as above the number of a bin there is nothing up to the next
+        // multiple of any digits.
+        let entries: Vec<Entry> =
+            (0..n).map(|i| [random.word() as u32 & ((1 << n_bits) - 1), i]).collect();
         for n_counted in [0, 1, 1025, n] {
             let (buffer, out) = (gpu.upload(&entries), gpu.buffer::<Entry>(n as usize));
             let counts = gpu.upload(&[7, n_counted, n_counted.div_ceil(TILE), 1, 1]);
@@ -114,7 +120,8 @@ fn a_million_entries_and_the_same_bytes_twice() {
 #[test]
 fn an_unstable_sort_and_a_swapped_pair_are_noticed() {
     let mut gpu = Gpu::new();
-    // Invocations take their runs from the tile's end: every digit lands in its place, ties in the wrong order.
+    // Invocations take their runs from the tile's end: every digit lands in its place, ties in the
+    // wrong order.
     let mut sources = passes::sources();
     let last_first = "tile * TILE + (TILE_INVOCATIONS - 1u - t) * RUN";
     assert!(sources.replace("sort_scatter.comp", "tile * TILE + t * RUN", last_first));
@@ -147,12 +154,28 @@ fn placed() -> Vec<PlacedRecord> {
 }
 
 /// Keys on the GPU.
-fn keys(gpu: &mut Gpu, sort: &Sort, placed: &[PlacedRecord], forward: [f32; 3], radius: f64, n_bits: u32) -> Vec<u32> {
+fn keys(
+    gpu: &mut Gpu,
+    sort: &Sort,
+    placed: &[PlacedRecord],
+    forward: [f32; 3],
+    radius: f64,
+    n_bits: u32,
+) -> Vec<u32> {
     let n = placed.len();
     let (from, entries) = (gpu.upload(placed), gpu.buffer::<Entry>(n));
     let all = DrawnRecord { shift: 0, end: n as u32, ..DrawnRecord::default() };
     let (i_group, drawn) = (gpu.upload(&vec![0u32; n]), gpu.upload(&[all]));
-    gpu.run(|rec| sort.record_keys(rec, [&from, &i_group, &drawn, &entries], forward, n as u32, radius, n_bits));
+    gpu.run(|rec| {
+        sort.record_keys(
+            rec,
+            [&from, &i_group, &drawn, &entries],
+            forward,
+            n as u32,
+            radius,
+            n_bits,
+        )
+    });
     let found: Vec<Entry> = gpu.download(&entries, n);
     assert!(found.iter().zip(0..).all(|(e, i)| e[1] == i), "every entry names its particle");
     found.iter().map(|e| e[0]).collect()
@@ -170,7 +193,8 @@ fn depth_bounds(placed: &[PlacedRecord], forward: [f32; 3]) -> Vec<Bounded> {
 
 /// The first key of 32 bits that is no depth within its bound.
 fn wrong_depth(keys: &[u32], depths: &[Bounded]) -> Option<usize> {
-    let right = |i: &usize| (f64::from(depth_of(keys[*i])) - depths[*i].value).abs() <= depths[*i].error;
+    let right =
+        |i: &usize| (f64::from(depth_of(keys[*i])) - depths[*i].value).abs() <= depths[*i].error;
     (0..keys.len()).find(|i| !right(i))
 }
 
@@ -179,7 +203,8 @@ fn keys_of_32_bits_are_depths() {
     let mut gpu = Gpu::new();
     let sort = Sort::new(&gpu.device, &gpu.compiler, N_PLACED as u32).expect("sort");
     let placed = placed();
-    let positions: Vec<DVec3> = placed.iter().map(|p| DVec3::from(p.position.map(f64::from))).collect();
+    let positions: Vec<DVec3> =
+        placed.iter().map(|p| DVec3::from(p.position.map(f64::from))).collect();
     for z in [3.5f32, -3.5, 0.0, 1e-30, f32::MAX] {
         assert_eq!(depth_of(key32(z)), z, "the inverse");
     }
@@ -192,7 +217,10 @@ fn keys_of_32_bits_are_depths() {
         let order = order(&keys);
         for pair in order.windows(2) {
             let [far, near] = [pair[0] as usize, pair[1] as usize];
-            assert!(exact[far] - exact[near] >= -(bounds[far].error + bounds[near].error), "{far} before {near}");
+            assert!(
+                exact[far] - exact[near] >= -(bounds[far].error + bounds[near].error),
+                "{far} before {near}"
+            );
         }
     }
 }
@@ -256,7 +284,8 @@ fn wrong_keys_are_noticed() {
     }
 }
 
-/// Runs of particles, some of which are drawn in part, some not at all: what the entries hold before the sort.
+/// Runs of particles, some of which are drawn in part, some not at all: what the entries hold
+/// before the sort.
 #[test]
 fn entries_are_those_of_the_drawn_particles() {
     let mut gpu = Gpu::new();
@@ -274,10 +303,11 @@ fn entries_are_those_of_the_drawn_particles() {
         (i_first, n_drawn) = (i_first + size, n_drawn + count);
     }
     assert_eq!((i_first as usize, expected.len()), (N_PLACED, n_drawn as usize));
-    let wrongs = [("i < group.end", "i <= group.end"), ("i + group.shift", "i")].map(|(from, to)| {
-        let compiler = Gpu::wrong_compiler("sort_key.comp", from, to);
-        (to, Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort"))
-    });
+    let wrongs =
+        [("i < group.end", "i <= group.end"), ("i + group.shift", "i")].map(|(from, to)| {
+            let compiler = Gpu::wrong_compiler("sort_key.comp", from, to);
+            (to, Sort::new(&gpu.device, &compiler, N_PLACED as u32).expect("sort"))
+        });
     let mut run = |sort: &Sort, n_sorted: u32| {
         let (from, groups, parts) = (gpu.upload(&placed), gpu.upload(&i_group), gpu.upload(&drawn));
         let entries = gpu.upload(&vec![[7u32, u32::MAX]; N_PLACED]);

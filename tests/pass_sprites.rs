@@ -32,7 +32,8 @@ use nimbus::reference::texture::Pool;
 use nimbus::reference::{generate, place};
 use picture::{FORMATS, Picture};
 
-/// Draws `picture` in both formats, lit and unlit, and compares every number of every pixel. Greatest value seen.
+/// Draws `picture` in both formats, lit and unlit, and compares every number of every pixel.
+/// Greatest value seen.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     let mut random = Random(77);
@@ -50,7 +51,10 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let shared = Picture { lit: shared, i_facet, ..picture.clone() };
     for picture in [picture.clone(), singly, shared] {
         for (target, format) in FORMATS {
-            let what = format!("{what}, {format:?}, {}", if picture.lit.is_some() { "lit" } else { "unlit" });
+            let what = format!(
+                "{what}, {format:?}, {}",
+                if picture.lit.is_some() { "lit" } else { "unlit" }
+            );
             let values = picture.draw(gpu, None, target);
             let (truths, bounds) = picture.truth(format);
             let r = picture.rounding(format);
@@ -72,7 +76,12 @@ fn blobs_of_all_kinds_are_near_the_truth() {
         assert!(if least > 0.0 { greatest > least } else { greatest == 0.0 }, "{what}: {greatest}");
         for (target, format) in &FORMATS[1..] {
             let values = picture.draw(&mut gpu, None, *target);
-            assert_small(&what, *format, [&values, &picture.truth(*format).0], picture.most_layers());
+            assert_small(
+                &what,
+                *format,
+                [&values, &picture.truth(*format).0],
+                picture.most_layers(),
+            );
         }
     }
 }
@@ -80,7 +89,9 @@ fn blobs_of_all_kinds_are_near_the_truth() {
 #[test]
 fn one_blob_centred_and_off_axis() {
     let mut gpu = Gpu::new();
-    for (what, at, tau) in [("centred", (0.0, 0.0), 1.0), ("off axis", (1.7, 1.1), 0.3), ("dense", (-1.9, 0.9), 30.0)] {
+    for (what, at, tau) in
+        [("centred", (0.0, 0.0), 1.0), ("off axis", (1.7, 1.1), 0.3), ("dense", (-1.9, 0.9), 30.0)]
+    {
         let picture = front();
         let position = picture.at(at.0, at.1, 5.0);
         let drawn = compare(&mut gpu, what, &picture.blob(position, 0.4, tau));
@@ -96,8 +107,13 @@ fn the_papers_cloud() {
     let groups = scene.groups();
     let generated = generate::cloud(&scene.clouds[0]);
     let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
-    let placed = place::place(&positions, &groups, &place::offsets(&groups, &scene.clouds, 0.0, DVec3::ZERO));
-    let mut picture = Picture::new(DVec3::new(-0.2, -0.3, 18.0), DVec3::new(-0.2, -0.3, 0.0), 45.0, 0.1);
+    let placed = place::place(
+        &positions,
+        &groups,
+        &place::offsets(&groups, &scene.clouds, 0.0, DVec3::ZERO),
+    );
+    let mut picture =
+        Picture::new(DVec3::new(-0.2, -0.3, 18.0), DVec3::new(-0.2, -0.3, 0.0), 45.0, 0.1);
     for (position, g) in placed.iter().zip(&generated) {
         let tau = g.kappa * g.sigma * nimbus::model::cloud::SQRT_TAU;
         picture = picture.blob(*position, g.sigma, tau);
@@ -124,7 +140,13 @@ fn blobs_around_beside_and_far_from_the_camera() {
     let at = around.at(0.2, 0.1, 0.5);
     assert!(compare(&mut gpu, "around the camera", &around.blob(at, 2.0, 1.0)) > 0.5);
     let far = front();
-    for (x, y, z) in [(1e4, 0.0, 5.0), (-300.0, 40.0, 5.0), (0.0, -1e3, 5.0), (3.0, 1e6, 100.0), (0.0, 0.0, -50.0)] {
+    for (x, y, z) in [
+        (1e4, 0.0, 5.0),
+        (-300.0, 40.0, 5.0),
+        (0.0, -1e3, 5.0),
+        (3.0, 1e6, 100.0),
+        (0.0, 0.0, -50.0),
+    ] {
         assert_eq!(compare(&mut gpu, "far off", &far.clone().blob(far.at(x, y, z), 0.5, 1.0)), 0.0);
     }
 }
@@ -141,7 +163,10 @@ fn huge_and_sub_pixel_blobs() {
     let on = small.clone().blob(EYE + ray, 0.0005, 1.0);
     assert!(compare(&mut gpu, "sub-pixel on a ray", &on) > 0.5);
     let between = small.view.ray(100, 30) * 2.5 + small.view.ray(101, 31) * 2.5;
-    assert_eq!(compare(&mut gpu, "sub-pixel between rays", &small.blob(EYE + between, 0.0005, 1.0)), 0.0);
+    assert_eq!(
+        compare(&mut gpu, "sub-pixel between rays", &small.blob(EYE + between, 0.0005, 1.0)),
+        0.0
+    );
 }
 
 #[test]
@@ -165,18 +190,22 @@ fn equal_layers_compose_to_a_power() {
         picture = picture.blob(at, 0.5, 0.02);
     }
     assert!(compare(&mut gpu, "64 layers", &picture) > 0.7);
-    // In f32 the transmittance through the 64 is that of their sum: 64·0.02, looked at where the ray meets the centre.
+    // In f32 the transmittance through the 64 is that of their sum: 64·0.02, looked at where the
+    // ray meets the centre.
     let values = picture.draw(&mut gpu, None, TargetFormat::Rgba32f);
     let most = values.iter().skip(3).step_by(4).cloned().fold(0.0, f64::max);
-    // The nearest ray passes within half a pixel's diagonal, 0.025 = 0.05 σ: less by at most 0.13 %.
+    // The nearest ray passes within half a pixel's diagonal, 0.025 = 0.05 σ: less by at most 0.13
+    // %.
     let whole = -(-1.28f64).exp_m1();
     assert!(most <= whole * (1.0 + 1e-5) && most >= whole * (1.0 - 2e-3), "{most} {whole}");
 }
 
-/// Blobs over a field of view of 120 degrees (133 across): in the corner, beside the eye, reaching behind it.
+/// Blobs over a field of view of 120 degrees (133 across): in the corner, beside the eye, reaching
+/// behind it.
 fn wide() -> Picture {
     let p = Picture::new(EYE, DVec3::new(3.0, 1.0, 0.0), 120.0, 0.1);
-    let (a, b, c, d) = (p.at(2.0, 1.5, 1.0), p.at(-3.0, -2.4, 1.5), p.at(4.0, 0.0, 2.3), p.at(0.1, -1.0, 0.5));
+    let (a, b, c, d) =
+        (p.at(2.0, 1.5, 1.0), p.at(-3.0, -2.4, 1.5), p.at(4.0, 0.0, 2.3), p.at(0.1, -1.0, 0.5));
     p.blob(a, 0.2, 1.0).blob(b, 0.5, 0.5).blob(c, 1.4, 0.4).blob(d, 0.33, 0.7)
 }
 
@@ -223,18 +252,25 @@ fn what_is_drawn_in_part_has_weights() {
     let mut gpu = Gpu::new();
     let mut picture = front();
     for k in 0..12 {
-        let at = picture.at(0.35 * f64::from(k) - 2.0, 0.1 * f64::from(k % 3), 5.0 + 0.1 * f64::from(k % 5));
+        let at = picture.at(
+            0.35 * f64::from(k) - 2.0,
+            0.1 * f64::from(k % 3),
+            5.0 + 0.1 * f64::from(k % 5),
+        );
         picture = picture.blob(at, 0.4, 0.5);
     }
-    let part = |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
+    let part =
+        |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
     let i_group = vec![0, 0, 0, 0, 1, 1, 2, 2, 2, 2, 2, 3];
     let drawn = vec![part(3, 1.6, 0.25), part(4, 1.0, 1.0), part(11, 1.0, 1.0), part(12, 3.0, 0.5)];
     let picture = Picture { drawn: Some((i_group, drawn)), ..picture };
     assert!(compare(&mut gpu, "weights", &picture) > 0.3);
     let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
-    for (from, to) in
-        [("group.kappa_scale *", "1.0 *"), ("? group.last_weight : 1.0", "? 1.0 : 1.0"), ("i + 1u ==", "i ==")]
-    {
+    for (from, to) in [
+        ("group.kappa_scale *", "1.0 *"),
+        ("? group.last_weight : 1.0", "? 1.0 : 1.0"),
+        ("i + 1u ==", "i =="),
+    ] {
         let wrong = Gpu::wrong_compiler("sprites.vert", from, to);
         let values = picture.draw(&mut gpu, Some(&wrong), TargetFormat::Rgba32f);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
@@ -246,12 +282,14 @@ fn textures_of_every_size_and_their_mutations() {
     let mut gpu = Gpu::new();
     let pool = Arc::new(Pool::new(4).rounded());
     let picture = sheets::textured(front(), &pool);
-    let levels: std::collections::BTreeSet<usize> = picture.sheets().iter().flatten().map(|s| s.level).collect();
+    let levels: std::collections::BTreeSet<usize> =
+        picture.sheets().iter().flatten().map(|s| s.level).collect();
     assert_eq!(levels.len(), 6, "every level is met: {levels:?}");
     assert!(compare(&mut gpu, "textured", &picture) > 0.5);
     let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
     // Textures are seen.
-    let plain = Picture { textured: None, ..picture.clone() }.draw(&mut gpu, None, TargetFormat::Rgba32f);
+    let plain =
+        Picture { textured: None, ..picture.clone() }.draw(&mut gpu, None, TargetFormat::Rgba32f);
     assert!(greatest_ratio(&plain, &truths, &bounds) > 10.0);
     for (from, to) in [
         ("turn.x * delta.x - turn.y * delta.y", "turn.x * delta.x + turn.y * delta.y"),
@@ -282,10 +320,17 @@ fn textures_of_a_wide_field_and_of_parts() {
     let wide = wide();
     let record = |i| TexturedRecord { seed: 3, i_box: 0, i_first: 0, i_field: i, strength: 1.0 };
     let textured = Some((vec![0, 1, 0, 1], vec![record(2), record(5)], pool.clone()));
-    let part = |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
+    let part =
+        |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
     let drawn = Some((vec![0, 1, 0, 1], vec![part(4, 1.5, 1.0), part(4, 1.0, 0.4)]));
     for drawn in [None, drawn] {
-        assert!(compare(&mut gpu, "wide", &Picture { textured: textured.clone(), drawn, ..wide.clone() }) > 0.3);
+        assert!(
+            compare(
+                &mut gpu,
+                "wide",
+                &Picture { textured: textured.clone(), drawn, ..wide.clone() }
+            ) > 0.3
+        );
     }
     let around = front();
     let at = around.at(0.2, 0.1, 0.5);
@@ -294,7 +339,8 @@ fn textures_of_a_wide_field_and_of_parts() {
     assert!(compare(&mut gpu, "around the camera", &Picture { textured, ..around }) > 0.3);
 }
 
-/// As the camera comes nearer a picture changes by what the step moved, at changes of level as elsewhere.
+/// As the camera comes nearer a picture changes by what the step moved, at changes of level as
+/// elsewhere.
 #[test]
 fn a_nearing_camera_meets_no_step() {
     let pool = Arc::new(Pool::new(4).rounded());
@@ -320,16 +366,20 @@ fn a_nearing_camera_meets_no_step() {
         last = Some(exponent);
     }
     assert_eq!(levels.len(), 6);
-    // A step of 0.15 % changes the fade by at most 0.003 of n, which is below 5, and the mean by a thousandth; pool's rounding.
+    // A step of 0.15 % changes the fade by at most 0.003 of n, which is below 5, and the mean by a
+    // thousandth; pool's rounding.
     println!("greatest step {greatest:.4}");
     assert!(greatest < 0.02, "{greatest}");
 }
 
 #[test]
 fn the_records_say_what_the_reference_is_given() {
-    // A picture's blobs are its records, so that a slip in either would show as a difference of the other.
+    // A picture's blobs are its records, so that a slip in either would show as a difference of the
+    // other.
     let picture = front().blob(DVec3::ONE, 0.25, 2.0);
     let ParticleRecord { sigma, kappa, .. } = picture.particles[0];
-    assert!((f64::from(kappa) * f64::from(sigma) * nimbus::model::cloud::SQRT_TAU - 2.0).abs() < 1e-6);
+    assert!(
+        (f64::from(kappa) * f64::from(sigma) * nimbus::model::cloud::SQRT_TAU - 2.0).abs() < 1e-6
+    );
     assert_eq!((picture.placed[0].position, picture.placed[0].sigma), ([1.0; 3], 0.25));
 }

@@ -1,5 +1,6 @@
-//! surfaces: whole pictures of rectangles against the f64 reference, alone and under sprites, within a bound derived pixel
-//! by pixel. Where rounding decides what a pixel shows it must show one of the candidates; such pixels are counted.
+//! surfaces: whole pictures of rectangles against the f64 reference, alone and under sprites,
+//! within a bound derived pixel by pixel. Where rounding decides what a pixel shows it must show
+//! one of the candidates; such pixels are counted.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -54,9 +55,10 @@ struct Shown {
 
 /// Draws `picture`, which has no particles, in both formats and compares every pixel.
 ///
-/// Of pixels with several candidates there is at most one a line on average: a line crosses at most width + height = 280
-/// rows and columns, in each it passes the nearest pixel's centre at a distance spread evenly over half a pixel, and in
-/// these pictures rounding moves it by 1e-4 pixels or less: 0.1 pixels a line are expected.
+/// Of pixels with several candidates there is at most one a line on average: a line crosses at most
+/// width + height = 280 rows and columns, in each it passes the nearest pixel's centre at a
+/// distance spread evenly over half a pixel, and in these pictures rounding moves it by 1e-4 pixels
+/// or less: 0.1 pixels a line are expected.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> Shown {
     let scenery = picture.scenery.as_ref().expect("rectangles");
     let mut shown = Shown { covered: 0.0, lit: 0.0, n_apart: 0 };
@@ -65,13 +67,19 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> Shown {
         let n_apart = candidates.iter().filter(|c| c.len() > 1).count();
         let values = picture.draw(gpu, None, target);
         let ratio = worst(&values, &candidates);
-        println!("{what}, {format:?}: error/bound {ratio:.3}; {n_apart} pixels with several candidates");
+        println!(
+            "{what}, {format:?}: error/bound {ratio:.3}; {n_apart} pixels with several candidates"
+        );
         assert!(ratio <= 1.0, "{what}, {format:?}: error/bound {ratio}");
         assert!(n_apart <= scenery.n_lines(), "{what}: {n_apart} pixels with several candidates");
         let share = |f: &dyn Fn(&Candidates) -> bool| {
             candidates.iter().filter(|c| f(c)).count() as f64 / candidates.len() as f64
         };
-        shown = Shown { covered: share(&|c| c[0].color[3] > 0.0), lit: share(&|c| c[0].color[0] > 0.0), n_apart };
+        shown = Shown {
+            covered: share(&|c| c[0].color[3] > 0.0),
+            lit: share(&|c| c[0].color[0] > 0.0),
+            n_apart,
+        };
     }
     shown
 }
@@ -97,12 +105,17 @@ fn one_rectangle_from_before_and_behind() {
 #[test]
 fn nearer_rectangles_hide_farther_ones() {
     let mut gpu = Gpu::new();
-    let wall = |s: Scenery, x: f64, z: f64| s.rectangle(v(x, 0.1, z), v(1.0, 0.1, 0.0), v(-0.1, 1.0, 0.0), [4, 4]);
+    let wall = |s: Scenery, x: f64, z: f64| {
+        s.rectangle(v(x, 0.1, z), v(1.0, 0.1, 0.0), v(-0.1, 1.0, 0.0), [4, 4])
+    };
     for depths in [[1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [0.0, 1.0, -1.0]] {
-        let scenery = wall(wall(wall(Scenery::default(), 0.0, depths[0]), 0.5, depths[1]), -0.7, depths[2]);
+        let scenery =
+            wall(wall(wall(Scenery::default(), 0.0, depths[0]), 0.5, depths[1]), -0.7, depths[2]);
         // Two that go through all of them and each other, one of them seen from behind.
-        let scenery = scenery.rectangle(v(0.1, 0.0, 0.0), v(0.9, 0.1, 1.7), v(0.1, -0.9, 0.0), [3, 7]);
-        let scenery = scenery.rectangle(v(0.1, 0.2, 0.0), v(-1.2, 0.3, 2.0), v(0.3, 1.2, 0.0), [2, 2]);
+        let scenery =
+            scenery.rectangle(v(0.1, 0.0, 0.0), v(0.9, 0.1, 1.7), v(0.1, -0.9, 0.0), [3, 7]);
+        let scenery =
+            scenery.rectangle(v(0.1, 0.2, 0.0), v(-1.2, 0.3, 2.0), v(0.3, 1.2, 0.0), [2, 2]);
         let shown = compare(&mut gpu, &format!("{depths:?}"), &front(0.1, scenery));
         assert!(shown.covered > 0.4 && shown.lit > 0.1 && shown.lit < shown.covered - 0.1);
     }
@@ -122,7 +135,8 @@ fn of_equally_near_rectangles_the_last_is_seen() {
     assert_eq!(n_other, n_covered, "the first is seen nowhere");
     // A hair before and behind, 1e-4 of 5: the depths' rounding is some 1e-6.
     for (offset, is_first) in [(5e-4, false), (-5e-4, true)] {
-        let hair = one.scenery.clone().expect("one").rectangle(center + v(0.0, 0.0, offset), u, w, [5, 4]);
+        let hair =
+            one.scenery.clone().expect("one").rectangle(center + v(0.0, 0.0, offset), u, w, [5, 4]);
         let hair = front(0.1, hair);
         assert!(compare(&mut gpu, "a hair apart", &hair).covered > 0.2);
         let middle = 4 * (60 * 160 + 80);
@@ -133,7 +147,12 @@ fn of_equally_near_rectangles_the_last_is_seen() {
 
 /// Runs from behind the eye far before it, rolled, through a near plane that stands far off.
 fn through_near_plane() -> Picture {
-    let scenery = Scenery::default().rectangle(v(0.3, -1.0, 3.0), v(2.0, 0.5, 0.0), v(-0.6, 2.4, -9.0), [3, 9]);
+    let scenery = Scenery::default().rectangle(
+        v(0.3, -1.0, 3.0),
+        v(2.0, 0.5, 0.0),
+        v(-0.6, 2.4, -9.0),
+        [3, 9],
+    );
     front(3.0, scenery)
 }
 
@@ -148,16 +167,22 @@ fn the_near_plane_cuts_through() {
     // 1e-4 from a near plane at 1: the depth's rounding is some 1e-6.
     for (z, is_seen) in [(0.9999, false), (1.0001, true), (-1.0, false)] {
         let wall = Scenery::default().rectangle(EYE - v(0.02, 0.01, z), DVec3::X, DVec3::Y, [2, 2]);
-        assert_eq!(compare(&mut gpu, &format!("a wall at {z}"), &front(1.0, wall)).covered > 0.5, is_seen);
+        assert_eq!(
+            compare(&mut gpu, &format!("a wall at {z}"), &front(1.0, wall)).covered > 0.5,
+            is_seen
+        );
     }
 }
 
 #[test]
 fn edge_on_there_is_nothing_to_see() {
     let mut gpu = Gpu::new();
-    // The eye's height is a number of f32 too: the plane holds the eye and meets the screen between two rows.
+    // The eye's height is a number of f32 too: the plane holds the eye and meets the screen between
+    // two rows.
     let height = f64::from(EYE.y as f32);
-    let floor = |y: f64| Scenery::default().rectangle(v(0.0, y, 0.0), v(0.0, 0.0, 3.0), v(2.0, 0.0, 0.0), [3, 3]);
+    let floor = |y: f64| {
+        Scenery::default().rectangle(v(0.0, y, 0.0), v(0.0, 0.0, 3.0), v(2.0, 0.0, 0.0), [3, 3])
+    };
     let mut picture = front(0.1, floor(height));
     picture.view.pose.position.y = height;
     let shown = compare(&mut gpu, "edge on", &picture);
@@ -173,13 +198,17 @@ fn edge_on_there_is_nothing_to_see() {
 fn room(half: f64) -> Scenery {
     let walls = [(DVec3::X, DVec3::Y), (DVec3::Y, DVec3::Z), (DVec3::Z, DVec3::X)];
     let both = walls.into_iter().flat_map(|(u, v)| [(u, v), (v, u)]);
-    both.fold(Scenery::default(), |s, (u, v)| s.rectangle(-half * u.cross(v), half * u, half * v, [4, 5]))
+    both.fold(Scenery::default(), |s, (u, v)| {
+        s.rectangle(-half * u.cross(v), half * u, half * v, [4, 5])
+    })
 }
 
 #[test]
 fn a_room_all_around() {
     let mut gpu = Gpu::new();
-    for (half, target) in [(6.0, v(3.0, 1.0, 0.0)), (6.0, v(0.5, 7.0, 6.0)), (1000.0, v(-2.0, -1.0, 9.0))] {
+    for (half, target) in
+        [(6.0, v(3.0, 1.0, 0.0)), (6.0, v(0.5, 7.0, 6.0)), (1000.0, v(-2.0, -1.0, 9.0))]
+    {
         let picture = Picture::new(EYE, target, 120.0, 0.1);
         let shown = compare(&mut gpu, "a room", &Picture { scenery: Some(room(half)), ..picture });
         assert!(shown.covered == 1.0 && shown.lit == 1.0);
@@ -189,18 +218,30 @@ fn a_room_all_around() {
 #[test]
 fn tiny_and_huge_rectangles() {
     let mut gpu = Gpu::new();
-    // A floor to the horizon, its corners off the screen by 1e4 to 1e9 screens; f32 knows the near plane at its corners no more.
+    // A floor to the horizon, its corners off the screen by 1e4 to 1e9 screens; f32 knows the near
+    // plane at its corners no more.
     for half in [1e4, 1e6, 1e15] {
-        let floor = |s: Scenery| s.rectangle(v(0.0, -3.0, 0.0), v(0.0, 0.0, half), v(half, 0.0, 0.0), [2, 3]);
+        let floor = |s: Scenery| {
+            s.rectangle(v(0.0, -3.0, 0.0), v(0.0, 0.0, half), v(half, 0.0, 0.0), [2, 3])
+        };
         let picture = front(0.1, floor(Scenery::default()));
         assert!(compare(&mut gpu, &format!("a floor of {half:e}"), &picture).covered > 0.4);
         // Something stands on it, and sinks into it.
-        let on = floor(Scenery::default()).rectangle(v(0.4, -2.9, -1.0), v(0.8, 0.0, 0.3), v(0.0, 0.7, 0.0), [2, 2]);
-        assert!(compare(&mut gpu, &format!("on a floor of {half:e}"), &front(0.1, on)).covered > 0.4);
+        let on = floor(Scenery::default()).rectangle(
+            v(0.4, -2.9, -1.0),
+            v(0.8, 0.0, 0.3),
+            v(0.0, 0.7, 0.0),
+            [2, 2],
+        );
+        assert!(
+            compare(&mut gpu, &format!("on a floor of {half:e}"), &front(0.1, on)).covered > 0.4
+        );
     }
     // Pixels of 0.0345 at depth 5: on a pixel's ray, and between four.
     let view = front(0.1, Scenery::default()).view;
-    let small = |at: DVec3, half: f64| Scenery::default().rectangle(at, half * DVec3::X, half * DVec3::Y, [2, 2]);
+    let small = |at: DVec3, half: f64| {
+        Scenery::default().rectangle(at, half * DVec3::X, half * DVec3::Y, [2, 2])
+    };
     let on = small(EYE + 5.0 * view.ray(100, 30), 0.001);
     assert_eq!(compare(&mut gpu, "sub-pixel on a ray", &front(0.1, on)).covered, 1.0 / 19200.0);
     let between = small(EYE + 2.5 * (view.ray(100, 30) + view.ray(101, 31)), 0.001);
@@ -213,34 +254,52 @@ fn tiny_and_huge_rectangles() {
 
 /// Blobs before, among and behind three walls and a floor, some cut by them, in lit colours.
 fn clouded() -> Picture {
-    let scenery = Scenery::default().rectangle(v(0.0, -1.5, 0.0), v(0.0, 0.0, 6.0), v(6.0, 0.0, 0.3), [3, 3]);
+    let scenery =
+        Scenery::default().rectangle(v(0.0, -1.5, 0.0), v(0.0, 0.0, 6.0), v(6.0, 0.0, 0.3), [3, 3]);
     let scenery = scenery.rectangle(v(-0.9, 0.0, 0.0), v(0.7, 0.0, 0.2), v(0.0, 1.0, 0.0), [4, 4]);
     let scenery = scenery.rectangle(v(1.2, 0.2, 1.0), v(-0.6, 0.0, 0.9), v(0.0, 0.8, 0.0), [2, 2]);
     let picture = front(0.1, scenery);
-    let places =
-        [(-0.9, 0.3, 0.8), (-0.8, 0.1, -0.7), (0.9, 0.0, 1.0), (0.2, -1.4, 0.5), (1.3, 0.4, -2.0), (0.0, 0.2, 3.0)];
-    let add = |p: Picture, ((x, y, z), k): ((f64, f64, f64), i32)| p.blob(v(x, y, z), 0.3 + 0.05 * f64::from(k), 0.8);
+    let places = [
+        (-0.9, 0.3, 0.8),
+        (-0.8, 0.1, -0.7),
+        (0.9, 0.0, 1.0),
+        (0.2, -1.4, 0.5),
+        (1.3, 0.4, -2.0),
+        (0.0, 0.2, 3.0),
+    ];
+    let add = |p: Picture, ((x, y, z), k): ((f64, f64, f64), i32)| {
+        p.blob(v(x, y, z), 0.3 + 0.05 * f64::from(k), 0.8)
+    };
     let picture = places.into_iter().zip(0..).fold(picture, add);
     let lit = (0..6).map(|k| 1.0 + k as f32);
-    let lit = lit.map(|k| LitRecord { first: [k, 0.2, 1.0], second: [0.1, k, 0.5 * k], ..LitRecord::default() });
+    let lit = lit.map(|k| LitRecord {
+        first: [k, 0.2, 1.0],
+        second: [0.1, k, 0.5 * k],
+        ..LitRecord::default()
+    });
     Picture { lit: Some(lit.collect()), ..picture }
 }
 
-/// Draws `picture` in both formats and compares every number of every pixel but those where rounding decides which
-/// surface they show; the greatest difference that the sprites make.
+/// Draws `picture` in both formats and compares every number of every pixel but those where
+/// rounding decides which surface they show; the greatest difference that the sprites make.
 fn compare_clouded(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     for (target, format) in FORMATS {
         let (truths, bounds) = picture.truth(format);
         let values = picture.draw(gpu, None, target);
         let n_apart = bounds.iter().step_by(4).filter(|b| !b.is_finite()).count();
-        assert!(n_apart <= picture.scenery.as_ref().expect("rectangles").n_lines(), "{what}: {n_apart} apart");
+        assert!(
+            n_apart <= picture.scenery.as_ref().expect("rectangles").n_lines(),
+            "{what}: {n_apart} apart"
+        );
         let ratio = greatest_ratio(&values, &truths, &bounds);
         println!("{what}, {format:?}: error/bound {ratio:.3}; {n_apart} pixels apart");
         assert_within(what, &values, &truths, &bounds);
         let bare = picture.behind(format);
-        let change =
-            truths.chunks(4).zip(&bare).map(|(t, b)| (0..4).map(|k| (t[k] - b[0].color[k]).abs()).sum::<f64>());
+        let change = truths
+            .chunks(4)
+            .zip(&bare)
+            .map(|(t, b)| (0..4).map(|k| (t[k] - b[0].color[k]).abs()).sum::<f64>());
         greatest = change.fold(greatest, f64::max);
     }
     greatest
@@ -252,9 +311,19 @@ fn surfaces_hide_the_sprites_behind_them() {
     let picture = clouded();
     assert!(compare_clouded(&mut gpu, "lit", &picture) > 0.5);
     assert!(compare_clouded(&mut gpu, "unlit", &Picture { lit: None, ..picture }) > 0.5);
-    // A wall that faces the eye, at depth 5: a blob 1e-4 before and behind, where the depth's rounding is some 1e-6.
-    let wall =
-        || front(0.1, Scenery::default().rectangle(EYE - v(0.0, 0.0, 5.0), 9.0 * DVec3::X, 9.0 * DVec3::Y, [2, 2]));
+    // A wall that faces the eye, at depth 5: a blob 1e-4 before and behind, where the depth's
+    // rounding is some 1e-6.
+    let wall = || {
+        front(
+            0.1,
+            Scenery::default().rectangle(
+                EYE - v(0.0, 0.0, 5.0),
+                9.0 * DVec3::X,
+                9.0 * DVec3::Y,
+                [2, 2],
+            ),
+        )
+    };
     let at = |z: f64| wall().blob(EYE - v(0.3, 0.1, z), 0.5, 1.0);
     assert!(compare_clouded(&mut gpu, "a hair before", &at(4.9999)) > 0.5);
     assert_eq!(compare_clouded(&mut gpu, "a hair behind", &at(5.0001)), 0.0);
@@ -292,7 +361,8 @@ fn wrong_pictures_are_noticed() {
     let candidates = picture.behind(FilmFormat::Rgba32f);
     let mut values = picture.draw(&mut gpu, None, TargetFormat::Rgba32f);
     assert!(worst(&values, &candidates) <= 1.0);
-    let lit = (0..candidates.len()).find(|i| candidates[*i].len() == 1 && candidates[*i][0].color[0] > 0.0);
+    let lit = (0..candidates.len())
+        .find(|i| candidates[*i].len() == 1 && candidates[*i][0].color[0] > 0.0);
     let lit = lit.expect("a lit pixel");
     for wrong in [values[4 * lit] + 2.0 * candidates[lit][0].bound[0], f64::NAN] {
         values[4 * lit] = wrong;
@@ -307,7 +377,11 @@ fn wrong_pictures_are_noticed() {
         ("surfaces.frag", "abs(t) <= in_t.w * size", "true"),
         ("surfaces.frag", " && q >= push.camera.near * size", ""),
         ("surfaces.frag", "in_plane.w > 0.0", "in_plane.w < 0.0"),
-        ("surfaces.frag", "min(push.camera.near * size / q, 1.0)", "1.0 - min(push.camera.near * size / q, 1.0)"),
+        (
+            "surfaces.frag",
+            "min(push.camera.near * size / q, 1.0)",
+            "1.0 - min(push.camera.near * size / q, 1.0)",
+        ),
         ("surfaces.frag", "regions[in_i]", "regions[in_i / 2]"),
         ("surfaces.vert", "-(top ? high.y : low.y)", "(top ? high.y : low.y)"),
         ("surfaces.vert", "+ SNAP * push.pixel", "- 8.0 * push.pixel"),
@@ -321,9 +395,17 @@ fn wrong_pictures_are_noticed() {
     let picture = clouded();
     let (truths, bounds) = picture.truth(FilmFormat::Rgba32f);
     for wrong in [
-        ("sprites.vert", "min(push.camera.near / v.z, 1.0)", "min(1.1 * push.camera.near / v.z, 1.0)"),
+        (
+            "sprites.vert",
+            "min(push.camera.near / v.z, 1.0)",
+            "min(1.1 * push.camera.near / v.z, 1.0)",
+        ),
         ("sprites.vert", "push.i_first_facet + i", "i"),
-        ("surfaces.frag", "gl_FragDepth = min(push.camera.near * size / q, 1.0)", "gl_FragDepth = 0.0"),
+        (
+            "surfaces.frag",
+            "gl_FragDepth = min(push.camera.near * size / q, 1.0)",
+            "gl_FragDepth = 0.0",
+        ),
     ] {
         let values = draw_wrong(&mut gpu, &picture, wrong);
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{} as {}", wrong.1, wrong.2);
@@ -334,10 +416,12 @@ fn wrong_pictures_are_noticed() {
 fn a_target_that_does_not_fit_is_refused() {
     let mut gpu = Gpu::new();
     let format = TargetFormat::Rgba16f;
-    let over = |behind| Sprites::new(&gpu.device, &gpu.compiler, format, false, behind).expect("sprites");
+    let over =
+        |behind| Sprites::new(&gpu.device, &gpu.compiler, format, false, behind).expect("sprites");
     let (alone, behind) = (over([false; 6]), over([true, false, false, false, false, false]));
     let surfaces = Surfaces::new(&gpu.device, &gpu.compiler, format, false).expect("surfaces");
-    let mut color = Image::color_target(&gpu.device, "test.target", 8, 4, format).expect("a target");
+    let mut color =
+        Image::color_target(&gpu.device, "test.target", 8, 4, format).expect("a target");
     let mut depth = Image::depth(&gpu.device, "test.depth", 8, 4).expect("depth");
     let mut other = Image::depth(&gpu.device, "test.depth", 8, 5).expect("depth");
     let buffer = gpu.buffer::<[u32; 64]>(1);
@@ -345,17 +429,27 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut record = |pass: Option<&Sprites>, depth: Option<&mut Image>| {
         let target = Target { color: &mut color, depth };
         gpu.commands.record(Barriers::Placed, |rec| match pass {
-            Some(pass) => pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], (Amount::Known(0), 0)),
+            Some(pass) => {
+                pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], (Amount::Known(0), 0))
+            }
             None => surfaces.record(rec, [&buffer; 2], target, &camera, 0),
         })
     };
     let is_refused = |r: nimbus::error::Result<()>| matches!(r, Err(Error::Shader { .. }));
     assert!(is_refused(record(Some(&behind), None)) && is_refused(record(None, None)));
     assert!(is_refused(record(Some(&alone), Some(&mut depth))));
-    assert!(is_refused(record(Some(&behind), Some(&mut other))) && is_refused(record(None, Some(&mut other))));
-    assert!(record(None, Some(&mut depth)).is_ok() && record(Some(&behind), Some(&mut depth)).is_ok());
+    assert!(
+        is_refused(record(Some(&behind), Some(&mut other)))
+            && is_refused(record(None, Some(&mut other)))
+    );
+    assert!(
+        record(None, Some(&mut depth)).is_ok() && record(Some(&behind), Some(&mut depth)).is_ok()
+    );
     assert!(record(Some(&alone), None).is_ok());
     // Too large an image is refused before it is allocated.
     let refused = Image::depth(&gpu.device, "test.wide", 10_000_000, 4).err().expect("refused");
-    assert!(matches!(&refused, Error::Limit { what } if what.contains("test.wide: 10000000×4")), "{refused}");
+    assert!(
+        matches!(&refused, Error::Limit { what } if what.contains("test.wide: 10000000×4")),
+        "{refused}"
+    );
 }

@@ -1,5 +1,6 @@
-//! terrain: whole pictures of ground, colour and depth, against the f64 reference, within a bound derived pixel by pixel. Where a
-//! rasteriser or rounding decides which triangle a pixel shows it must show one of those around.
+//! terrain: whole pictures of ground, colour and depth, against the f64 reference, within a bound
+//! derived pixel by pixel. Where a rasteriser or rounding decides which triangle a pixel shows it
+//! must show one of those around.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -29,16 +30,26 @@ fn v(x: f64, y: f64, z: f64) -> DVec3 {
 }
 
 /// Colour and near/z of every pixel.
-fn draw(gpu: &mut Gpu, compiler: Option<&Compiler>, picture: &Picture, relief: &Relief) -> Vec<[f64; 5]> {
+fn draw(
+    gpu: &mut Gpu,
+    compiler: Option<&Compiler>,
+    picture: &Picture,
+    relief: &Relief,
+) -> Vec<[f64; 5]> {
     let format = TargetFormat::Rgba32f;
-    let pass = Terrain::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false).expect("terrain");
+    let pass = Terrain::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), format, false)
+        .expect("terrain");
     let (width, height) = (picture.view.width, picture.view.height);
-    let mut color = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
+    let mut color =
+        Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
     let mut depth = Image::depth(&gpu.device, "test.depth", width, height).expect("depth");
     let n = (width * height) as usize;
-    let buffer = |name, bytes: usize| Buffer::new::<u8>(&gpu.device, name, bytes as u64, Place::Readback);
-    let (colors, depths) = (buffer("test.colors", 16 * n).expect("room"), buffer("test.depths", 4 * n).expect("room"));
-    let [regions, points, lit] = [gpu.upload(&relief.regions), gpu.upload(&relief.points), gpu.upload(&relief.lit)];
+    let buffer =
+        |name, bytes: usize| Buffer::new::<u8>(&gpu.device, name, bytes as u64, Place::Readback);
+    let (colors, depths) =
+        (buffer("test.colors", 16 * n).expect("room"), buffer("test.depths", 4 * n).expect("room"));
+    let [regions, points, lit] =
+        [gpu.upload(&relief.regions), gpu.upload(&relief.points), gpu.upload(&relief.lit)];
     let camera = picture.camera_record();
     gpu.run(|rec| {
         let mut start = Start::Clear;
@@ -82,7 +93,8 @@ fn worst(values: &[[f64; 5]], candidates: &[Vec<Candidate>]) -> f64 {
     values.iter().zip(candidates).map(pixel).fold(0.0, f64::max)
 }
 
-/// Draws and compares; the share of the pixels that can show one thing alone, and of those that surely show ground.
+/// Draws and compares; the share of the pixels that can show one thing alone, and of those that
+/// surely show ground.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture, relief: &Relief) -> [f64; 2] {
     let candidates = may_show(gpu, picture, relief);
     let values = draw(gpu, None, picture, relief);
@@ -92,7 +104,11 @@ fn compare(gpu: &mut Gpu, what: &str, picture: &Picture, relief: &Relief) -> [f6
     };
     let alone = share(&|c| c.len() == 1);
     let covered = share(&|c| c.iter().all(|c| c.values[3] == 1.0));
-    println!("{what}: error/bound {ratio:.3}; {:.1} % alone, {:.1} % covered", 100.0 * alone, 100.0 * covered);
+    println!(
+        "{what}: error/bound {ratio:.3}; {:.1} % alone, {:.1} % covered",
+        100.0 * alone,
+        100.0 * covered
+    );
     assert!(ratio <= 1.0, "{what}: error/bound {ratio}");
     [alone, covered]
 }
@@ -109,23 +125,39 @@ fn hilly() -> Relief {
 #[test]
 fn hills_from_all_sides() {
     let mut gpu = Gpu::new();
-    let eyes = [v(0.3, 2.0, 5.0), v(5.0, 0.4, 0.2), v(0.2, 4.0, 0.1), v(-3.0, 1.0, -4.0), v(0.4, 0.5, 0.3)];
-    for (eye, target) in eyes.into_iter().flat_map(|e| [(e, v(0.1, 0.0, 0.0)), (e, v(1.5, 0.1, -1.0))]) {
-        let [alone, covered] =
-            compare(&mut gpu, &format!("from {eye}"), &Picture::new(eye, target, 45.0, 0.1), &hilly());
-        // A triangle of an edge of 20 pixels has a rim of 1/16 pixel along its sides: 1 to 3 % of its area; of 5 pixels 10 %.
+    let eyes = [
+        v(0.3, 2.0, 5.0),
+        v(5.0, 0.4, 0.2),
+        v(0.2, 4.0, 0.1),
+        v(-3.0, 1.0, -4.0),
+        v(0.4, 0.5, 0.3),
+    ];
+    for (eye, target) in
+        eyes.into_iter().flat_map(|e| [(e, v(0.1, 0.0, 0.0)), (e, v(1.5, 0.1, -1.0))])
+    {
+        let [alone, covered] = compare(
+            &mut gpu,
+            &format!("from {eye}"),
+            &Picture::new(eye, target, 45.0, 0.1),
+            &hilly(),
+        );
+        // A triangle of an edge of 20 pixels has a rim of 1/16 pixel along its sides: 1 to 3 % of
+        // its area; of 5 pixels 10 %.
         assert!(alone > 0.7 && covered > 0.05, "{alone} {covered}");
     }
     // From below: black, and it hides.
     let below = Picture::new(v(0.2, -4.0, 0.1), v(0.0, 0.0, 0.0), 45.0, 0.1);
     let [_, covered] = compare(&mut gpu, "from below", &below, &hilly());
-    assert!(covered > 0.5 && draw(&mut gpu, None, &below, &hilly()).iter().all(|p| p[..3] == [0.0; 3]));
+    assert!(
+        covered > 0.5 && draw(&mut gpu, None, &below, &hilly()).iter().all(|p| p[..3] == [0.0; 3])
+    );
 }
 
 #[test]
 fn the_near_plane_cuts_and_the_eye_may_be_underground() {
     let mut gpu = Gpu::new();
-    for (eye, near) in [(v(0.2, 0.3, 2.0), 1.0), (v(0.2, 0.6, 0.4), 0.5), (v(0.2, -0.3, 0.4), 0.05)] {
+    for (eye, near) in [(v(0.2, 0.3, 2.0), 1.0), (v(0.2, 0.6, 0.4), 0.5), (v(0.2, -0.3, 0.4), 0.05)]
+    {
         let picture = Picture::new(eye, eye + v(0.1, -0.4, -1.0), 70.0, near);
         let [_, covered] = compare(&mut gpu, &format!("{near} before {eye}"), &picture, &hilly());
         assert!(covered > 0.1);
@@ -136,8 +168,9 @@ fn the_near_plane_cuts_and_the_eye_may_be_underground() {
 fn grounds_of_kilometres_far_from_the_origin_and_two_at_once() {
     let mut gpu = Gpu::new();
     // A storm's: 48 by 48 points 10 km apart, the eye 100 km up.
-    let wide =
-        Relief::default().ground(v(2e4, 0.0, -3e4), [48, 48], 1e4, |x, north| 2000.0 * hills(1e-4 * x, 1e-4 * north));
+    let wide = Relief::default().ground(v(2e4, 0.0, -3e4), [48, 48], 1e4, |x, north| {
+        2000.0 * hills(1e-4 * x, 1e-4 * north)
+    });
     let picture = Picture::new(v(4e4, 1e5, 2.5e5), v(1e5, 0.0, -1.3e5), 48.0, 100.0);
     assert!(compare(&mut gpu, "48 x 48", &picture, &wide)[1] > 0.4);
     // One through the other, and another that is a plain to the horizon.
@@ -164,7 +197,9 @@ fn wrong_pictures_are_noticed() {
     ];
     let candidates = pictures.each_ref().map(|p| may_show(&gpu, p, &two));
     let mut is_right = |compiler: Option<&Compiler>| {
-        let of = |(p, c): (&Picture, &Vec<Vec<Candidate>>)| worst(&draw(&mut gpu, compiler, p, &two), c) <= 1.0;
+        let of = |(p, c): (&Picture, &Vec<Vec<Candidate>>)| {
+            worst(&draw(&mut gpu, compiler, p, &two), c) <= 1.0
+        };
         pictures.iter().zip(&candidates).map(of).collect::<Vec<_>>().iter().all(|right| *right)
     };
     assert!(is_right(None));
@@ -173,14 +208,21 @@ fn wrong_pictures_are_noticed() {
         ("terrain.vert", "(k >> 1)", "(k & 1u)"),
         ("terrain.vert", "i_cell / n)", "i_cell / region.n_u)"),
         ("terrain.vert", "region.i_first_facet - push.i_first_ground", "0u"),
-        ("terrain.vert", "radiance_of(region.i_first_facet + d)", "radiance_of(region.i_first_facet + b)"),
+        (
+            "terrain.vert",
+            "radiance_of(region.i_first_facet + d)",
+            "radiance_of(region.i_first_facet + b)",
+        ),
         ("terrain.vert", "lit[i].first + lit[i].second", "lit[i].first"),
         ("terrain.vert", "region.center - push.camera.eye", "-push.camera.eye"),
         ("terrain.frag", "push.camera.near / z", "push.camera.near / in_depths.x"),
         ("terrain.frag", "in_plane.w > 0.0", "in_plane.w != 0.0"),
         ("terrain.frag", "in_along * s", "in_along * t"),
     ] {
-        assert!(!is_right(Some(&Gpu::wrong_compiler(file, from, to))), "{file}: {to} was not noticed");
+        assert!(
+            !is_right(Some(&Gpu::wrong_compiler(file, from, to))),
+            "{file}: {to} was not noticed"
+        );
     }
     // A pixel that shows something else, by a thousandth.
     let mut values = draw(&mut gpu, None, &pictures[0], &two);
@@ -192,10 +234,15 @@ fn wrong_pictures_are_noticed() {
 #[test]
 fn facets_lie_where_their_origins_are() {
     let mut gpu = Gpu::new();
-    let relief =
-        Relief::after(5).ground(v(1e3, 5.0, -7.0), [7, 5], 10.0, hills).ground(v(-4.0, 0.0, 2.0), [3, 9], 2.0, hills);
+    let relief = Relief::after(5).ground(v(1e3, 5.0, -7.0), [7, 5], 10.0, hills).ground(
+        v(-4.0, 0.0, 2.0),
+        [3, 9],
+        2.0,
+        hills,
+    );
     let run = |gpu: &mut Gpu, compiler: Option<&Compiler>| -> Vec<FacetRecord> {
-        let pass = Facets::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), false).expect("facets");
+        let pass =
+            Facets::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), false).expect("facets");
         let (regions, points) = (gpu.upload(&relief.regions), gpu.upload(&relief.points));
         let n = relief.points.len() as u32;
         let facets = gpu.upload(&vec![FacetRecord::default(); (n + 5) as usize]);

@@ -1,5 +1,5 @@
-//! tiles: whole pictures against the f64 reference within a bound that follows the composition near to far, in both formats,
-//! with what subgroups can do and without, in one round and in many.
+//! tiles: whole pictures against the f64 reference within a bound that follows the composition near
+//! to far, in both formats, with what subgroups can do and without, in one round and in many.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -33,10 +33,17 @@ use scenery::Scenery;
 /// As the device does it by default.
 fn usual(gpu: &Gpu, format: FilmFormat) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
-    Tiled { invocations, portable: false, most_pairs: None, most_tiles: None, saturated: saturated(format) }
+    Tiled {
+        invocations,
+        portable: false,
+        most_pairs: None,
+        most_tiles: None,
+        saturated: saturated(format),
+    }
 }
 
-/// Draws `picture` in every format and compares every number of every pixel. The greatest value seen.
+/// Draws `picture` in every format and compares every number of every pixel. The greatest value
+/// seen.
 fn compare(gpu: &mut Gpu, what: &str, picture: &Picture) -> f64 {
     let mut greatest = 0f64;
     for (target, format) in FORMATS {
@@ -67,14 +74,27 @@ fn textures_of_every_size() {
     let pool = Arc::new(Pool::new(4).rounded());
     let picture = sheets::textured(front(), &pool);
     let v = DVec3::new;
-    let scenery = Scenery::default().rectangle(v(0.2, -0.1, 0.5), v(1.1, 0.2, 0.3), v(-0.18, 0.9, 0.06), [2, 3]);
+    let scenery = Scenery::default().rectangle(
+        v(0.2, -0.1, 0.5),
+        v(1.1, 0.2, 0.3),
+        v(-0.18, 0.9, 0.06),
+        [2, 3],
+    );
     let behind = Picture { scenery: Some(scenery), ..picture.clone() };
     assert!(compare(&mut gpu, "textured, over a surface", &behind) > 0.5);
     let tiled = usual(&gpu, FORMATS[2].1);
-    let drawn = |gpu: &mut Gpu, tiled: &Tiled| picture.draw_by(gpu, None, FORMATS[2].0, Way::Tiles(*tiled));
-    assert!(drawn(&mut gpu, &tiled) == drawn(&mut gpu, &Tiled { portable: true, ..tiled }), "without subgroups");
+    let drawn =
+        |gpu: &mut Gpu, tiled: &Tiled| picture.draw_by(gpu, None, FORMATS[2].0, Way::Tiles(*tiled));
+    assert!(
+        drawn(&mut gpu, &tiled) == drawn(&mut gpu, &Tiled { portable: true, ..tiled }),
+        "without subgroups"
+    );
     let (truths, bounds) = picture.tiled_truth(FORMATS[2].1, tiled.saturated);
-    let wrong = Gpu::wrong_compiler("tiles.comp", "uvec2(splat.gain.w, splat.side)", "uvec2(0u, splat.side)");
+    let wrong = Gpu::wrong_compiler(
+        "tiles.comp",
+        "uvec2(splat.gain.w, splat.side)",
+        "uvec2(0u, splat.side)",
+    );
     let values = picture.draw_by(&mut gpu, Some(&wrong), FORMATS[2].0, Way::Tiles(tiled));
     assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "another field");
 }
@@ -111,8 +131,8 @@ fn workgroups_and_rounds_do_not_show() {
     assert!(draw(&Tiled { most_pairs: Some(1), ..tiled }) == once, "several rounds");
 }
 
-/// As many splats as a round may have, all in one bin, of which the last ones alone reach another of its tiles: loops over
-/// a bin's pairs take fewer turns than a device may end them after.
+/// As many splats as a round may have, all in one bin, of which the last ones alone reach another
+/// of its tiles: loops over a bin's pairs take fewer turns than a device may end them after.
 #[test]
 fn a_bin_of_all_splats_keeps_the_last_ones() {
     let mut gpu = Gpu::new();
@@ -125,7 +145,11 @@ fn a_bin_of_all_splats_keeps_the_last_ones() {
     };
     let [near, far] = [at(&picture, 66.0, 34.0, 4.0), at(&picture, 92.0, 60.0, 5.0)];
     for i in 0..65_536 {
-        picture = if i < 65_520 { picture.blob(near, 1.2 * side, 1e-7) } else { picture.blob(far, 10.0 * side, 0.5) };
+        picture = if i < 65_520 {
+            picture.blob(near, 1.2 * side, 1e-7)
+        } else {
+            picture.blob(far, 10.0 * side, 0.5)
+        };
     }
     let (target, format) = FORMATS[2];
     let tiled = usual(&gpu, format);
@@ -152,7 +176,11 @@ fn wrong_pictures_are_noticed() {
         ("tiles.comp", "* inv_norm[j]", ""),
         ("tiles.comp", "opaque[j] += here;", "opaque[j] += 0.999 * here;"),
         ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),
-        ("tiles.comp", "n + subgroupBallotBitCount(hits)", "n + min(subgroupBallotBitCount(hits), 7u)"),
+        (
+            "tiles.comp",
+            "n + subgroupBallotBitCount(hits)",
+            "n + min(subgroupBallotBitCount(hits), 7u)",
+        ),
         ("tiles_splat.comp", "n_splats - 1u - r", "r"),
         ("tiles_splat.comp", "before + here.x - n;", "before + here.x;"),
         ("tiles_pairs.comp", "y[3 - j]", "y[j]"),
@@ -163,7 +191,8 @@ fn wrong_pictures_are_noticed() {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{from}");
         let compiler = Compiler::new(sources, None).expect("shaderc");
-        let values = picture.draw_by(&mut gpu, Some(&compiler), TargetFormat::Rgba32f, Way::Tiles(tiled));
+        let values =
+            picture.draw_by(&mut gpu, Some(&compiler), TargetFormat::Rgba32f, Way::Tiles(tiled));
         assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "{from} as {to}");
     }
 }

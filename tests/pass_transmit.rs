@@ -1,5 +1,5 @@
-//! transmit: the way of every light to every facet, past rectangles and through the grid, against the same in f64, within
-//! a running bound.
+//! transmit: the way of every light to every facet, past rectangles and through the grid, against
+//! the same in f64, within a running bound.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -35,22 +35,30 @@ fn through_flat_cells_too() {
 
 fn agree_at_every_step_size(case: Case) {
     let mut gpu = Gpu::new();
-    // The outermost cells hold nothing: without that the density would jump at the hull of the centres.
+    // The outermost cells hold nothing: without that the density would jump at the hull of the
+    // centres.
     let n = case.spec.n_cells.as_usizevec3();
     let outer = |i: usize| {
         let at = [i % n.x, i / n.x % n.y, i / (n.x * n.y)];
         (0..3).any(|k| at[k] == 0 || at[k] + 1 == n.to_array()[k])
     };
     assert!((0..case.density.len()).all(|i| !outer(i) || case.density[i] == 0.0));
-    for (step, forward) in [(0.5, 0.0), (0.5, 0.85), (1.0, 0.0), (0.1, 0.0), (3.7, 0.0), (1000.0, 0.0)] {
-        let ([values, through], [truths, _]) = (case.run(&mut gpu, None, step, forward), case.truth(step, forward));
+    for (step, forward) in
+        [(0.5, 0.0), (0.5, 0.85), (1.0, 0.0), (0.1, 0.0), (3.7, 0.0), (1000.0, 0.0)]
+    {
+        let ([values, through], [truths, _]) =
+            (case.run(&mut gpu, None, step, forward), case.truth(step, forward));
         let ([bounds, _], n_unsure) = case.bounds(step, forward);
         let what = format!("step {step}, forward {forward}");
         let most = bounds.iter().cloned().fold(0.0, f64::max);
-        println!("{what}: greatest error/bound {:.3}, bound {most:.1e}", greatest_ratio(&values, &truths, &bounds));
+        println!(
+            "{what}: greatest error/bound {:.3}, bound {most:.1e}",
+            greatest_ratio(&values, &truths, &bounds)
+        );
         assert_within(&what, &values, &truths, &bounds);
-        // The bound itself says something, and so do the inputs: shade and light both occur.
-        // (Of flat cells a single step through all of them lies in one, and the flatter the cell the more its place decides.)
+        // The bound itself says something, and so do the inputs: shade and light both occur. (Of
+        // flat cells a single step through all of them lies in one, and the flatter the cell the
+        // more its place decides.)
         let flat_at_once = case.spec.aspect != 1.0 && step > 10.0;
         assert!(most < if flat_at_once { 1e-2 } else { 1e-3 } && n_unsure == 0);
         assert!(truths.contains(&1.0) && (step > 10.0 || truths.iter().any(|v| *v < 0.8)));
@@ -67,19 +75,25 @@ fn rectangles_hide_and_marches_begin_and_end_where_the_way_does() {
         let (bounds, n_unsure) = case.bounds(step, forward);
         for (k, quantity) in ["transmittance", "through"].into_iter().enumerate() {
             let what = format!("{quantity}, step {step}, forward {forward}");
-            println!("{what}: greatest error/bound {:.3}", greatest_ratio(&values[k], &truths[k], &bounds[k]));
+            println!(
+                "{what}: greatest error/bound {:.3}",
+                greatest_ratio(&values[k], &truths[k], &bounds[k])
+            );
             assert_within(&what, &values[k], &truths[k], &bounds[k]);
         }
-        // Of some four thousand ways, asked of nine rectangles, edges a few units long pass within some 1e-6 of hardly any;
-        // ten would be a wrong bound.
+        // Of some four thousand ways, asked of nine rectangles, edges a few units long pass within
+        // some 1e-6 of hardly any; ten would be a wrong bound.
         println!("{n_unsure} decisions within rounding");
         assert!(n_unsure < 10, "{n_unsure}");
         let mut sorted = bounds[0].clone();
         sorted.sort_by(f64::total_cmp);
         assert!(sorted[sorted.len() * 99 / 100] < 1e-3, "{:e}", sorted[sorted.len() * 99 / 100]);
         // All kinds occur: hidden, clear, through the cloud; hidden facets behind it.
-        let share = |of: &dyn Fn(f64) -> bool| truths[0].iter().filter(|v| of(**v)).count() * 100 / truths[0].len();
-        let (hidden, clear, dimmed) = (share(&|v| v == 0.0), share(&|v| v == 1.0), share(&|v| v > 0.0 && v < 0.9));
+        let share = |of: &dyn Fn(f64) -> bool| {
+            truths[0].iter().filter(|v| of(**v)).count() * 100 / truths[0].len()
+        };
+        let (hidden, clear, dimmed) =
+            (share(&|v| v == 0.0), share(&|v| v == 1.0), share(&|v| v > 0.0 && v < 0.9));
         assert!(hidden > 10 && clear > 10 && dimmed > 5, "{hidden} {clear} {dimmed}");
         let behind = |(v, s): (&f64, &f64)| *v == 0.0 && *s > 0.0 && *s < 0.9;
         assert!(truths[0].iter().zip(&truths[1]).filter(|(v, s)| behind((v, s))).count() > 30);
@@ -115,7 +129,10 @@ fn a_march_ends_at_its_cap_of_steps() {
 fn nothing_on_the_way_is_exactly_one() {
     let mut gpu = Gpu::new();
     let mut case = case();
-    assert!(case.run(&mut gpu, None, 0.5, 1.0)[0].iter().all(|v| *v == 1.0), "all light goes forward");
+    assert!(
+        case.run(&mut gpu, None, 0.5, 1.0)[0].iter().all(|v| *v == 1.0),
+        "all light goes forward"
+    );
     // Past the box on every side, and away from it.
     let (low, high) = (case.spec.low, case.spec.high());
     let mut outside = Vec::new();
@@ -125,11 +142,18 @@ fn nothing_on_the_way_is_exactly_one() {
         outside.push(in_cloud(p.to_array()));
     }
     case.facets = outside;
-    case.lights = vec![sun(DVec3::NEG_Y), sun(DVec3::Z), Light::Sky { irradiance: DVec3::ONE, constant: 0.0 }];
+    case.lights = vec![
+        sun(DVec3::NEG_Y),
+        sun(DVec3::Z),
+        Light::Sky { irradiance: DVec3::ONE, constant: 0.0 },
+    ];
     assert_eq!(case.run(&mut gpu, None, 0.5, 0.0)[0], [1.0; 12], "past the box");
     case.lights = vec![sun(DVec3::X)];
     let through = &case.run(&mut gpu, None, 0.5, 0.0)[0];
-    assert!(through[0] == 1.0 && through[2] == 1.0 && through[1] < 1.0 && through[3] < 1.0, "{through:?}");
+    assert!(
+        through[0] == 1.0 && through[2] == 1.0 && through[1] < 1.0 && through[3] < 1.0,
+        "{through:?}"
+    );
     case = ways::case();
     case.density.fill(0.0);
     assert!(case.run(&mut gpu, None, 0.5, 0.0)[0].iter().all(|v| *v == 1.0), "no density");
@@ -142,7 +166,8 @@ fn wrong_transmittance_is_noticed() {
     // A long step, so that the last and shorter one is not in the empty margin.
     let (step, forward) = (3.7, 0.5);
     let (truths, (bounds, _)) = (case.truth(step, forward), case.bounds(step, forward));
-    let ratio = |values: &[Vec<f64>; 2], k: usize| greatest_ratio(&values[k], &truths[k], &bounds[k]);
+    let ratio =
+        |values: &[Vec<f64>; 2], k: usize| greatest_ratio(&values[k], &truths[k], &bounds[k]);
     let mut values = case.run(&mut gpu, None, step, forward);
     assert!(ratio(&values, 0) <= 1.0 && ratio(&values, 1) <= 1.0);
     for k in [0, 1] {

@@ -1,5 +1,5 @@
-//! upsample: whole pictures against the f64 reference, in every format, of every remainder of widths and heights, over
-//! surfaces with edges of depth and without.
+//! upsample: whole pictures against the f64 reference, in every format, of every remainder of
+//! widths and heights, over surfaces with edges of depth and without.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -13,7 +13,8 @@ use nimbus::model::resolution::{ALIKE, SmallPicture};
 use nimbus::passes::upsample::{Extents, Upsample};
 use nimbus::reference::upsample::{Summed, Under, render_alike};
 
-const FORMATS: [TargetFormat; 3] = [TargetFormat::Rgba8, TargetFormat::Rgba16f, TargetFormat::Rgba32f];
+const FORMATS: [TargetFormat; 3] =
+    [TargetFormat::Rgba8, TargetFormat::Rgba16f, TargetFormat::Rgba32f];
 
 /// Four numbers as a format holds them, four of each of its words in a row.
 fn stored(format: TargetFormat, v: [f64; 4]) -> Vec<u32> {
@@ -30,14 +31,17 @@ fn stored(format: TargetFormat, v: [f64; 4]) -> Vec<u32> {
 fn numbers(format: TargetFormat, words: &[u32]) -> Vec<f64> {
     let half = |w: u32| half::f16::from_bits(w as u16).to_f64();
     let of = |w: &u32| match format {
-        TargetFormat::Rgba8 | TargetFormat::Bgra8 => w.to_le_bytes().map(|b| f64::from(b) / 255.0).to_vec(),
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
+            w.to_le_bytes().map(|b| f64::from(b) / 255.0).to_vec()
+        }
         TargetFormat::Rgba16f => vec![half(w & 0xffff), half(w >> 16)],
         TargetFormat::Rgba32f => vec![f64::from(f32::from_bits(*w))],
     };
     words.iter().flat_map(of).collect()
 }
 
-/// What of a number's rounding the format adds: faithful, relative above its least normal number, or absolute.
+/// What of a number's rounding the format adds: faithful, relative above its least normal number,
+/// or absolute.
 fn roundoff(format: TargetFormat, value: f64) -> f64 {
     match format {
         // Twice half a step.
@@ -47,7 +51,8 @@ fn roundoff(format: TargetFormat, value: f64) -> f64 {
     }
 }
 
-/// A small picture of blobs, and surfaces of one of a few depths in rectangles, their edges anywhere.
+/// A small picture of blobs, and surfaces of one of a few depths in rectangles, their edges
+/// anywhere.
 struct Case {
     small: SmallPicture,
     format: TargetFormat,
@@ -69,7 +74,8 @@ impl Case {
             let v = numbers(format, &stored(format, v));
             [v[0], v[1], v[2], v[3]]
         };
-        // Steep enough for the weights below 0 to show, and brighter than 1 where the format allows it.
+        // Steep enough for the weights below 0 to show, and brighter than 1 where the format allows
+        // it.
         let most = if format == TargetFormat::Rgba8 { 1.0 } else { 3.0 };
         let mut color = |most: f64| {
             let a = f64::from(random.within(0.0, 1.0)).powi(3);
@@ -99,34 +105,49 @@ impl Case {
         };
         let [w, h] = size.map(f64::from);
         let n = f64::from(n);
-        let to_full = |k: u32, small: u32, full: f64| (f64::from(k) + 0.5 - 0.5 * f64::from(small)) * n + 0.5 * full;
+        let to_full = |k: u32, small: u32, full: f64| {
+            (f64::from(k) + 0.5 - 0.5 * f64::from(small)) * n + 0.5 * full
+        };
         let [sw, sh] = small.size;
-        let small_depths = (0..sw * sh).map(|i| depth_at(to_full(i % sw, sw, w), to_full(i / sw, sh, h)));
-        let depths =
-            (0..size[0] * size[1]).map(|p| depth_at(f64::from(p % size[0]) + 0.5, f64::from(p / size[0]) + 0.5));
-        let surfaces = Surfaces { picture, depths: depths.collect(), small_depths: small_depths.collect() };
+        let small_depths =
+            (0..sw * sh).map(|i| depth_at(to_full(i % sw, sw, w), to_full(i / sw, sh, h)));
+        let depths = (0..size[0] * size[1])
+            .map(|p| depth_at(f64::from(p % size[0]) + 0.5, f64::from(p / size[0]) + 0.5));
+        let surfaces =
+            Surfaces { picture, depths: depths.collect(), small_depths: small_depths.collect() };
         Case { small, format, blobs, surfaces: behind.then_some(surfaces) }
     }
 
     fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>) -> Vec<f64> {
         let Case { small, format, .. } = self;
-        let extents = Extents { full: small.full, small: small.size, offsets: small.offsets(), n: small.n };
+        let extents =
+            Extents { full: small.full, small: small.size, offsets: small.offsets(), n: small.n };
         let behind = self.surfaces.is_some();
-        let pass = Upsample::new(&gpu.device, compiler.unwrap_or(&gpu.compiler), &extents, *format, behind);
+        let pass = Upsample::new(
+            &gpu.device,
+            compiler.unwrap_or(&gpu.compiler),
+            &extents,
+            *format,
+            behind,
+        );
         let pass = pass.expect("upsample");
         // Texels are whole.
         let upload = |gpu: &mut Gpu, mut words: Vec<u32>| {
             words.resize(words.len().next_multiple_of(4), 0);
             gpu.upload(&words)
         };
-        let picture_words = |of: &[[f64; 4]]| of.iter().flat_map(|v| stored(*format, *v)).collect::<Vec<u32>>();
+        let picture_words =
+            |of: &[[f64; 4]]| of.iter().flat_map(|v| stored(*format, *v)).collect::<Vec<u32>>();
         let blobs = upload(gpu, picture_words(&self.blobs));
-        let n_words = (small.full[0] * small.full[1]) as usize * format.bytes_per_pixel() as usize / 4;
+        let n_words =
+            (small.full[0] * small.full[1]) as usize * format.bytes_per_pixel() as usize / 4;
         let picture = upload(gpu, vec![0xffff_ffff; n_words]);
         let is_24 = has_depth24(&gpu.device);
-        let depth = |d: &f64| if is_24 { (d * 16_777_215.0).round() as u32 } else { (*d as f32).to_bits() };
+        let depth =
+            |d: &f64| if is_24 { (d * 16_777_215.0).round() as u32 } else { (*d as f32).to_bits() };
         let surfaces: Option<[Buffer; 3]> = self.surfaces.as_ref().map(|s| {
-            let words = [&s.small_depths, &s.depths].map(|d| d.iter().map(depth).collect::<Vec<u32>>());
+            let words =
+                [&s.small_depths, &s.depths].map(|d| d.iter().map(depth).collect::<Vec<u32>>());
             let [small_depths, depths] = words.map(|w| upload(gpu, w));
             [upload(gpu, picture_words(&s.picture)), small_depths, depths]
         });
@@ -143,10 +164,12 @@ impl Case {
             small_depths: &s.small_depths,
         });
         let by = |alike: f64| render_alike(&self.small, &self.blobs, under.as_ref(), alike);
-        // A difference of numbers within a factor of two is exact, and so is its comparison with a sixteenth.
+        // A difference of numbers within a factor of two is exact, and so is its comparison with a
+        // sixteenth.
         let summed: Vec<Summed> = by(ALIKE);
-        // A weight is a product of five differences (exact: t has three bits) and five quotients, each within 5 u; six terms
-        // are summed twice; their total divides at most once (5 u), and surfaces come with four roundings.
+        // A weight is a product of five differences (exact: t has three bits) and five quotients,
+        // each within 5 u; six terms are summed twice; their total divides at most once (5 u), and
+        // surfaces come with four roundings.
         const ROUNDINGS: f64 = 2.0 * (5.0 * 6.0 + 1.0 + 6.0) + 5.0 + 4.0;
         let bound = |(v, of_terms): &([f64; 4], [f64; 4])| {
             [0, 1, 2, 3].map(|k| {
@@ -180,7 +203,8 @@ fn pictures_of_every_remainder() {
     for (i, (size, n)) in sizes.into_iter().flat_map(|s| [(s, 2), (s, 4)]).enumerate() {
         // Each size in one of the formats over surfaces, in another without.
         for behind in [false, true] {
-            Case::new(size, n, FORMATS[(i + usize::from(behind)) % 3], behind, i as u64).compare(&mut gpu);
+            Case::new(size, n, FORMATS[(i + usize::from(behind)) % 3], behind, i as u64)
+                .compare(&mut gpu);
         }
     }
 }

@@ -1,4 +1,5 @@
-//! `[[phase]]` sections and `--sweep`: parts of a run with settings of their own, from the scene file to the results.
+//! `[[phase]]` sections and `--sweep`: parts of a run with settings of their own, from the scene
+//! file to the results.
 
 use std::fs;
 use std::path::Path;
@@ -53,7 +54,8 @@ fn temp(scene: &str) -> (tempfile::TempDir, String) {
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("scene.toml");
     fs::write(&path, scene).expect("the scene");
-    fs::write(dir.path().join("points.csv"), "x,y,z,radius,kappa\n0,0,0,3,1\n2,1,0,2,1\n").expect("points");
+    fs::write(dir.path().join("points.csv"), "x,y,z,radius,kappa\n0,0,0,3,1\n2,1,0,2,1\n")
+        .expect("points");
     (dir, path.display().to_string())
 }
 
@@ -64,7 +66,11 @@ fn loaded(scene: &str, overrides: &[&str]) -> nimbus::error::Result<LoadedScene>
 
 /// Exit code, stdout, stderr.
 fn nimbus(args: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("nimbus").expect("the program is built").args(args).output().expect("it runs");
+    let output = Command::cargo_bin("nimbus")
+        .expect("the program is built")
+        .args(args)
+        .output()
+        .expect("it runs");
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("UTF-8");
     (output.status.code().expect("an exit code"), text(output.stdout), text(output.stderr))
 }
@@ -72,12 +78,19 @@ fn nimbus(args: &[&str]) -> (i32, String, String) {
 #[test]
 fn a_phase_is_the_scene_with_what_it_sets() {
     let all = loaded(SCENE, &[]).expect("the scene loads");
-    let names: Vec<(&str, u32, bool)> = all.phases.iter().map(|p| (p.name.as_str(), p.n_frames, p.sets_mode)).collect();
+    let names: Vec<(&str, u32, bool)> =
+        all.phases.iter().map(|p| (p.name.as_str(), p.n_frames, p.sets_mode)).collect();
     assert_eq!(names, [("lit", 4, false), ("unlit and small", 3, false), ("alone", 5, true)]);
     let [lit, unlit, alone] = [0, 1, 2].map(|i| all.phases[i].scene.clone());
     assert_eq!(lit, all.scene);
-    assert_eq!((lit.time.n_frames, lit.film.width, lit.lighting.mode), (12, 64, LightingMode::First));
-    assert_eq!((unlit.film.width, unlit.film.height, unlit.lighting.mode), (32, 24, LightingMode::None));
+    assert_eq!(
+        (lit.time.n_frames, lit.film.width, lit.lighting.mode),
+        (12, 64, LightingMode::First)
+    );
+    assert_eq!(
+        (unlit.film.width, unlit.film.height, unlit.lighting.mode),
+        (32, 24, LightingMode::None)
+    );
     assert_eq!((unlit.clouds[0].position.x, alone.clouds[0].position.x), (1.0, 0.0));
     assert_eq!((alone.threads.mode, lit.threads.mode), (Threading::Serial, Threading::Parallel));
     // What was typed has the last word, in every phase.
@@ -91,7 +104,11 @@ fn a_phase_is_the_scene_with_what_it_sets() {
 #[test]
 fn frames_are_of_the_phase_they_fall_in() {
     for (i_frame, width) in [(0, 64), (3, 64), (4, 32), (6, 32), (7, 64), (11, 64), (99, 64)] {
-        assert_eq!(loaded(SCENE, &[]).expect("the scene loads").at_frame(i_frame).film.width, width, "{i_frame}");
+        assert_eq!(
+            loaded(SCENE, &[]).expect("the scene loads").at_frame(i_frame).film.width,
+            width,
+            "{i_frame}"
+        );
     }
 }
 
@@ -110,13 +127,21 @@ fn what_is_wrong_in_a_phase_is_said_where_it_stands() {
         loaded(&SCENE.replace(from, to), &[]).expect_err(to).to_string()
     };
     for (from, to, parts) in [
-        ("set.lighting.mode = \"none\"", "set.lighting.mode = \"nine\"", &["toml:30:", "`nine`", "small\")"][..]),
+        (
+            "set.lighting.mode = \"none\"",
+            "set.lighting.mode = \"nine\"",
+            &["toml:30:", "`nine`", "small\")"][..],
+        ),
         (
             "set.lighting.mode = \"none\"",
             "set.lightning.mode = 1",
             &["toml:30:", "unknown key `lightning`", "in phase"],
         ),
-        ("set.lighting.mode = \"none\"", "set.time.step_s = 1", &["toml:30:", "cannot set `title`, `time`, `phase`"]),
+        (
+            "set.lighting.mode = \"none\"",
+            "set.time.step_s = 1",
+            &["toml:30:", "cannot set `title`, `time`, `phase`"],
+        ),
         (
             "set.lighting.mode = \"none\"",
             "set.cloud.3.seed = 1",
@@ -127,23 +152,44 @@ fn what_is_wrong_in_a_phase_is_said_where_it_stands() {
         ("frames = 4", "", &["missing key `phase.0.frames`"]),
         ("frames = 4", "frames = 0", &["expected an integer from 1"]),
         ("step_s = 0.1", "frames = 7", &["toml:17:", "the phases have 12 frames in all"]),
-        ("[[phase]]\nname = \"lit\"", "[[phase]]\nnme = 1\nname = \"lit\"", &["unknown key `phase.0.nme`"]),
+        (
+            "[[phase]]\nname = \"lit\"",
+            "[[phase]]\nnme = 1\nname = \"lit\"",
+            &["unknown key `phase.0.nme`"],
+        ),
     ] {
         let message = refusal(from, to);
         assert!(parts.iter().all(|part| message.contains(part)), "{to}: {message}");
     }
     assert!(loaded(SCENE, &["time.frames=12"]).is_ok());
-    assert!(loaded(SCENE, &["time.frames=13"]).expect_err("13").to_string().contains("--set time.frames=13"));
+    assert!(
+        loaded(SCENE, &["time.frames=13"])
+            .expect_err("13")
+            .to_string()
+            .contains("--set time.frames=13")
+    );
 }
 
 #[test]
 fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
     let (dir, path) = temp(SCENE);
     let out = dir.path().join("run").display().to_string();
-    let args = ["bench", &path, "--warmup", "2", "--repeat", "2", "--sweep", "draw.cutoff=2,3", "--out", &out];
+    let args = [
+        "bench",
+        &path,
+        "--warmup",
+        "2",
+        "--repeat",
+        "2",
+        "--sweep",
+        "draw.cutoff=2,3",
+        "--out",
+        &out,
+    ];
     let (code, table, stderr) = nimbus(&args);
     assert_eq!((code, stderr.as_str()), (0, ""));
-    let cases: Vec<&str> = table.lines().filter(|l| l.contains(" serial  ") && !l.contains("no-skip")).collect();
+    let cases: Vec<&str> =
+        table.lines().filter(|l| l.contains(" serial  ") && !l.contains("no-skip")).collect();
     assert_eq!(cases.len(), 6, "{table}");
     assert!(table.contains("6 of 6 cases gave the same last frame"), "{table}");
     let run = read_run(Path::new(&out)).expect("the run");
@@ -168,7 +214,10 @@ fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
     assert_eq!(frames("unlit and small, draw.cutoff=3: parallel"), [4, 5, 6, 4, 5, 6]);
     assert_eq!(frames("alone, draw.cutoff=3: serial no-skip"), [7, 8, 9, 10, 11, 7, 8, 9, 10, 11]);
     let csv = fs::read_to_string(Path::new(&out).join("frames.csv")).expect("frames.csv");
-    assert!(csv.lines().filter(|l| l.contains(",unlit and small,draw.cutoff=3,")).count() == 2 * 3 * 5, "{csv}");
+    assert!(
+        csv.lines().filter(|l| l.contains(",unlit and small,draw.cutoff=3,")).count() == 2 * 3 * 5,
+        "{csv}"
+    );
     // Read back, every case meets itself.
     let (code, table, _) = nimbus(&["compare", &out, &out]);
     assert!(code == 0 && table.contains("lit, draw.cutoff=2: serial frame"), "{table}");
@@ -178,12 +227,24 @@ fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
 fn each_setting_of_a_sweep_reaches_the_picture() {
     let (_dir, path) = temp(SCENE.split("[[phase]]").next().expect("a part"));
     let sweep = ["--sweep", "size=32x24,40x30", "--sweep", "cloud.0.position=[0,0,0],[1,0,0]"];
-    let short = ["--frames", "2", "--warmup", "0", "--repeat", "1", "--threading", "serial", "--no-saved", "--json"];
+    let short = [
+        "--frames",
+        "2",
+        "--warmup",
+        "0",
+        "--repeat",
+        "1",
+        "--threading",
+        "serial",
+        "--no-saved",
+        "--json",
+    ];
     let (code, text, stderr) = nimbus(&[&["bench", path.as_str()][..], &sweep, &short].concat());
     assert_eq!(code, 0, "{stderr}");
     let run: Value = serde_json::from_str(&text).expect("JSON");
     let cases = run["cases"].as_array().expect("cases");
-    let sizes: Vec<String> = cases.iter().map(|c| format!("{}x{}", c["width"], c["height"])).collect();
+    let sizes: Vec<String> =
+        cases.iter().map(|c| format!("{}x{}", c["width"], c["height"])).collect();
     assert_eq!(sizes, ["32x24", "32x24", "40x30", "40x30"]);
     let mut hashes: Vec<&Value> = cases.iter().map(|c| &c["modes"][0]["image_hash"]).collect();
     hashes.dedup();
@@ -216,7 +277,10 @@ fn a_sweep_that_makes_no_scene_is_refused_before_anything_runs() {
 
 #[test]
 fn a_case_that_cannot_run_is_named_before_any_does() {
-    let scene = SCENE.replace("from = \"particles\"\nfile = \"points.csv\"", "from = \"boxes\"\nfile = \"box.dat\"");
+    let scene = SCENE.replace(
+        "from = \"particles\"\nfile = \"points.csv\"",
+        "from = \"boxes\"\nfile = \"box.dat\"",
+    );
     let (dir, path) = temp(&scene);
     fs::write(dir.path().join("box.dat"), "5\n1\n5, 1, 1, 1, 0, 0, 0, 0.5\n").expect("a box");
     let out = dir.path().join("run").display().to_string();
@@ -236,8 +300,19 @@ fn a_sweep_over_files_knows_what_is_in_them() {
     };
     let run = |name: &str| {
         let out = dir.path().join(name).display().to_string();
-        let args = ["bench", &path, "--sweep", "cloud.0.file=points.csv,other.csv", "--frames", "2", "--no-saved"];
-        assert_eq!(nimbus(&[&args[..], &["--warmup", "0", "--repeat", "1", "--out", &out]].concat()).0, 0);
+        let args = [
+            "bench",
+            &path,
+            "--sweep",
+            "cloud.0.file=points.csv,other.csv",
+            "--frames",
+            "2",
+            "--no-saved",
+        ];
+        assert_eq!(
+            nimbus(&[&args[..], &["--warmup", "0", "--repeat", "1", "--out", &out]].concat()).0,
+            0
+        );
         out
     };
     other("3");
@@ -246,7 +321,9 @@ fn a_sweep_over_files_knows_what_is_in_them() {
     let b = run("b");
     let (code, _, stderr) = nimbus(&["compare", &a, &b]);
     assert!(
-        code == 2 && stderr.contains("cloud.0.file=other.csv, hash") && !stderr.contains("=points.csv, hash"),
+        code == 2
+            && stderr.contains("cloud.0.file=other.csv, hash")
+            && !stderr.contains("=points.csv, hash"),
         "{stderr}"
     );
     assert_eq!(nimbus(&["compare", &a, &b, "--allow", "scene"]).0, 0);
@@ -255,14 +332,16 @@ fn a_sweep_over_files_knows_what_is_in_them() {
 #[test]
 fn one_loop_alone_is_not_compared_with_what_measures_skipping() {
     let (_dir, path) = temp(SCENE.split("[[phase]]").next().expect("a part"));
-    let short = ["--frames", "3", "--warmup", "1", "--repeat", "1", "--threading", "parallel", "--json"];
+    let short =
+        ["--frames", "3", "--warmup", "1", "--repeat", "1", "--threading", "parallel", "--json"];
     let (code, text, stderr) = nimbus(&[&["bench", path.as_str()][..], &short].concat());
     assert_eq!(code, 0, "{stderr}");
     let run: Value = serde_json::from_str(&text).expect("JSON");
     let case = &run["cases"][0];
     assert_eq!((&case["overlap"], &case["ratio"]), (&Value::Null, &Value::Null));
     // The loop that skips nothing is of the same kind.
-    let loops: Vec<_> = (0..2).map(|i| (&case["modes"][i]["threading"], &case["modes"][i]["skip"])).collect();
+    let loops: Vec<_> =
+        (0..2).map(|i| (&case["modes"][i]["threading"], &case["modes"][i]["skip"])).collect();
     assert_eq!(loops, [(&json!("parallel"), &json!(true)), (&json!("parallel"), &json!(false))]);
     assert_eq!(case["skipping"]["same_bytes"], true);
 }

@@ -1,5 +1,5 @@
-//! What must hold of every scene and every number, tried on generated ones; where one fails, it is made as small as it can be.
-//! The same ones in every run.
+//! What must hold of every scene and every number, tried on generated ones; where one fails, it is
+//! made as small as it can be. The same ones in every run.
 
 #[path = "properties/drawn.rs"]
 mod drawn;
@@ -27,12 +27,16 @@ fn load(text: &str, overrides: &[String]) -> Result<LoadedScene, Error> {
     let files = |path: &Path, first: &str| match path.file_name().and_then(|name| name.to_str()) {
         Some("b.dat") => Ok(scenes::BOXES.to_owned()),
         Some("p.csv") => Ok(scenes::LIST.to_owned()),
-        _ => Err(Error::scene(Place::line(path, 1, 1), format!("the file is empty: expected {first}"))),
+        _ => Err(Error::scene(
+            Place::line(path, 1, 1),
+            format!("the file is empty: expected {first}"),
+        )),
     };
     parse_beside(text.to_owned(), Path::new("scene.toml"), overrides, None, &files)
 }
 
-/// A scene's text as the fuzz target has it: what loads is resolved to one that loads to the same hash, and is played.
+/// A scene's text as the fuzz target has it: what loads is resolved to one that loads to the same
+/// hash, and is played.
 fn read(text: &str) -> Result<(), String> {
     readers::scene_file([text, scenes::BOXES, scenes::LIST].join("\0").as_bytes())
 }
@@ -49,7 +53,8 @@ fn usual_scenes_load_and_resolve_to_themselves() {
             Err(message) => message,
         };
         // What one key alone cannot know: the others.
-        let together = ["`lighting.step`", "`lighting.exponents`", "`camera.position`", "`cloud.", "`draw."];
+        let together =
+            ["`lighting.step`", "`lighting.exponents`", "`camera.position`", "`cloud.", "`draw."];
         prop_assert!(together.iter().any(|key| message.contains(key)), "{message}");
         Ok(())
     });
@@ -76,7 +81,10 @@ fn unusual_scenes_load_or_give_one_error_at_its_place() {
         }
         prop_assert!(at.line >= 1 && at.column >= 1, "{message}");
         let line = lines.get(at.line - 1);
-        prop_assert!(lines.is_empty() || line.is_some_and(|line| at.column <= line.chars().count() + 1), "{message}");
+        prop_assert!(
+            lines.is_empty() || line.is_some_and(|line| at.column <= line.chars().count() + 1),
+            "{message}"
+        );
         Ok(())
     });
     assert!(n_refused.get() > 300, "only {} of 600 are refused", n_refused.get());
@@ -86,7 +94,9 @@ fn unusual_scenes_load_or_give_one_error_at_its_place() {
 fn what_is_set_is_as_if_the_file_said_it() {
     check(200, (scenes::setting(), scenes::setting()), |((table, key, value), (_, _, other))| {
         let set = |value: &str| format!("{table}.{key}={value}");
-        let said = |value: &str| format!("[{table}]\n{key} = {value}\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n");
+        let said = |value: &str| {
+            format!("[{table}]\n{key} = {value}\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n")
+        };
         let hash = |text: &str, overrides: &[String]| {
             load(text, overrides).map(|loaded| loaded.hash).map_err(|e| match e {
                 Error::Scene { what, .. } => what,
@@ -108,8 +118,11 @@ fn whatever_is_set_loads_or_gives_an_error_that_names_it() {
     let scene = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
     check(600, vec(scenes::odd_setting(), 1..3), |overrides| {
         let Err(error) = load(scene, &overrides) else { return Ok(()) };
-        let Error::Scene { at, .. } = &error else { return Err(TestCaseError::fail(error.to_string())) };
-        // A scene that lacks what it was made to lack is at fault itself, and so is a file that it was made to name.
+        let Error::Scene { at, .. } = &error else {
+            return Err(TestCaseError::fail(error.to_string()));
+        };
+        // A scene that lacks what it was made to lack is at fault itself, and so is a file that it
+        // was made to name.
         let is_named = overrides.iter().any(|text| at.source == format!("--set {text}"));
         prop_assert!(is_named || !at.source.starts_with("--set"), "{error}");
         Ok(())
@@ -118,29 +131,41 @@ fn whatever_is_set_loads_or_gives_an_error_that_names_it() {
 
 /// Any number that a box file takes: zero, or between the least and the greatest, of either sign.
 fn coordinate() -> impl Strategy<Value = f64> {
-    prop_oneof![Just(0.0), Just(-0.0), -1e15..=1e15, any::<f64>().prop_filter("in bounds", |v| v.abs() <= 1e15)]
+    prop_oneof![
+        Just(0.0),
+        Just(-0.0),
+        -1e15..=1e15,
+        any::<f64>().prop_filter("in bounds", |v| v.abs() <= 1e15)
+    ]
 }
 
 fn extent() -> impl Strategy<Value = f64> {
-    prop_oneof![Just(0.0), 1e-30..=1e15, (-30.0..=15.0).prop_map(|e| 10f64.powf(e).clamp(1e-30, 1e15))]
+    prop_oneof![
+        Just(0.0),
+        1e-30..=1e15,
+        (-30.0..=15.0).prop_map(|e| 10f64.powf(e).clamp(1e-30, 1e15))
+    ]
 }
 
 fn cloud_box() -> impl Strategy<Value = CloudBox> {
     let extents = [extent(), extent(), extent()].prop_map(DVec3::from_array);
     let centers = [coordinate(), coordinate(), coordinate()].prop_map(DVec3::from_array);
-    (any::<u32>(), extents, centers, coordinate()).prop_map(|(n_particles, extent, center, radius)| CloudBox {
-        n_particles,
-        extent,
-        center,
-        radius_max: radius.abs(),
-    })
+    (any::<u32>(), extents, centers, coordinate()).prop_map(
+        |(n_particles, extent, center, radius)| CloudBox {
+            n_particles,
+            extent,
+            center,
+            radius_max: radius.abs(),
+        },
+    )
 }
 
 #[test]
 fn boxes_are_read_as_they_were_written_to_the_bit() {
     check(500, vec(cloud_box(), 0..20), |boxes| {
         let text = box_file::format(&boxes);
-        let again = box_file::parse(&text, Path::new("b.dat")).map_err(|e| TestCaseError::fail(e.to_string()))?;
+        let again = box_file::parse(&text, Path::new("b.dat"))
+            .map_err(|e| TestCaseError::fail(e.to_string()))?;
         let bits = |b: &CloudBox| {
             let numbers = [b.extent.to_array(), b.center.to_array(), [b.radius_max; 3]];
             (b.n_particles, numbers.map(|v| v.map(f64::to_bits)))
@@ -148,7 +173,10 @@ fn boxes_are_read_as_they_were_written_to_the_bit() {
         prop_assert!(boxes.iter().map(bits).eq(again.iter().map(bits)), "{}", text);
         // However its words are parted.
         let parted = text.replace(", ", " \t").replace('\n', "\r\n\r\n");
-        prop_assert_eq!(box_file::parse(&parted, Path::new("b.dat")).map_err(|e| e.to_string()), Ok(again));
+        prop_assert_eq!(
+            box_file::parse(&parted, Path::new("b.dat")).map_err(|e| e.to_string()),
+            Ok(again)
+        );
         Ok(())
     });
 }
@@ -158,8 +186,8 @@ fn texts_of_any_kind_are_read_or_refused() {
     // Words that files of numbers are made of, in any order.
     let words = prop::sample::select(
         &[
-            "0", "1", "-1", "3", ",", "\n", "\r", " ", "\"", "nan", "1e400", "x", "y", "z", "sigma", "kappa", "é",
-            "1e-320",
+            "0", "1", "-1", "3", ",", "\n", "\r", " ", "\"", "nan", "1e400", "x", "y", "z",
+            "sigma", "kappa", "é", "1e-320",
         ][..],
     );
     check(2000, vec(words, 0..60), |words| {

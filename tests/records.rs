@@ -13,8 +13,8 @@ use nimbus::study::counts::Counts;
 use nimbus::study::machine::{Cpu, cpu, environment, revision, utc_now};
 use nimbus::study::overlap::{Overlap, SerialFrame};
 use nimbus::study::records::{
-    Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, Setting, Skipping,
-    prepare_out_dir, read_run, write_results, write_run,
+    Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, Setting,
+    Skipping, prepare_out_dir, read_run, write_results, write_run,
 };
 use serde_json::{Value, json};
 
@@ -29,7 +29,9 @@ fn complaints(run: &Value) -> Vec<String> {
 }
 
 fn mode(threading: &str) -> Mode {
-    let measured = |values: &[f64], p50_low, p50_high| Summary::of(values).map(|of| Measured { of, p50_low, p50_high });
+    let measured = |values: &[f64], p50_low, p50_high| {
+        Summary::of(values).map(|of| Measured { of, p50_low, p50_high })
+    };
     let ms = measured(&[16.5, 17.0, 16.0, 40.25], Some(16.0), Some(17.0));
     Mode {
         frame_ms: ms,
@@ -75,7 +77,10 @@ fn sample() -> Run {
         phase: Some("dense".to_owned()),
         sweep: vec![Setting { key: "draw.cutoff".to_owned(), value: "2".to_owned() }],
         ratio: Some(Ratio { parallel_by_serial: 0.5, low: Some(0.25), high: Some(0.75) }),
-        overlap: Overlap::of(&[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5], &[21.0; 5]),
+        overlap: Overlap::of(
+            &[SerialFrame { frame_ms: 22.0, game_ms: 2.0, render_ms: 20.0 }; 5],
+            &[21.0; 5],
+        ),
         skipping: Some(Skipping { gpu_ms: 1.0, gpu_no_skip_ms: 3.0, same_bytes: Some(true) }),
         counts: Some(Counts { values: 8, ..Counts::default() }),
         ..blank.cases[0].clone()
@@ -176,11 +181,19 @@ fn the_schema_refuses_what_is_wrong() {
 }
 
 /// Every object of a written run, and the part of the schema that describes it.
-fn compare_keys(written: &Value, described: &Value, root: &Value, at: &str, n_compared: &mut usize) {
+fn compare_keys(
+    written: &Value,
+    described: &Value,
+    root: &Value,
+    at: &str,
+    n_compared: &mut usize,
+) {
     let described = resolve(described, root);
     match written {
         Value::Object(object) => {
-            let Some(properties) = described.get("properties").and_then(Value::as_object) else { return };
+            let Some(properties) = described.get("properties").and_then(Value::as_object) else {
+                return;
+            };
             let keys: Vec<&String> = object.keys().collect();
             assert_eq!(keys, properties.keys().collect::<Vec<_>>(), "{at}");
             *n_compared += 1;
@@ -209,9 +222,16 @@ fn resolve<'a>(described: &'a Value, root: &'a Value) -> &'a Value {
 #[test]
 fn keys_and_their_order_are_the_schema_s() {
     let mut n_compared = 0;
-    compare_keys(&serde_json::to_value(sample()).unwrap(), &schema(), &schema(), "", &mut n_compared);
-    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its share, skipping, counts;
-    // twice a mode, seven summaries, lows, two passes, a reason. A part, its clocks and its time.
+    compare_keys(
+        &serde_json::to_value(sample()).unwrap(),
+        &schema(),
+        &schema(),
+        "",
+        &mut n_compared,
+    );
+    // The run, device, cpu, clocks, two blocks, the case, its setting, ratio, overlap and its
+    // share, skipping, counts; twice a mode, seven summaries, lows, two passes, a reason. A part,
+    // its clocks and its time.
     assert_eq!(n_compared, 3 + 4 + 2 + 7 + 2 * (1 + 7 + 1 + 2 + 1));
 }
 
@@ -221,17 +241,21 @@ fn a_run_comes_back_as_it_was_written() {
     let out_dir = folder.path().join("a/b");
     prepare_out_dir(&out_dir, false).unwrap();
     let passes = ["sort".to_owned(), "first".to_owned()];
-    write_results(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &passes, &[row(0), row(3)]).unwrap();
+    write_results(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &passes, &[row(0), row(3)])
+        .unwrap();
     assert_eq!(read_run(&out_dir).unwrap(), sample_at("2024-02-29T12:34:56Z"));
     assert_eq!(read_run(&out_dir.join(RUN_FILE)).unwrap(), sample_at("2024-02-29T12:34:56Z"));
-    let names: Vec<_> = fs::read_dir(&out_dir).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let names: Vec<_> =
+        fs::read_dir(&out_dir).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
     assert_eq!(
         fs::read_to_string(out_dir.join(FRAMES_FILE)).unwrap(),
         "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_ms,wait_ms,gpu_ms,latency_ms,\
          queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,image_hash\n\
-         0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
-         1,dense,\"a=1, b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n"
+         0,dense,\"a=1, \
+         b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
+         1,dense,\"a=1, \
+         b=2\",serial,true,0,3,0.30000000000000004,false,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n"
     );
 }
 
@@ -283,5 +307,8 @@ fn one_value_has_no_standard_deviation() {
 #[test]
 fn the_revision_is_one() {
     let digits = revision().trim_end_matches("-dirty");
-    assert!(revision() == "unknown" || (digits.len() >= 12 && digits.chars().all(|c| c.is_ascii_hexdigit())));
+    assert!(
+        revision() == "unknown"
+            || (digits.len() >= 12 && digits.chars().all(|c| c.is_ascii_hexdigit()))
+    );
 }

@@ -1,4 +1,5 @@
-//! The f64 reference on hand-worked and published numbers. Rooms small enough are tested in their own file.
+//! The f64 reference on hand-worked and published numbers. Rooms small enough are tested in their
+//! own file.
 
 use glam::{DVec2, DVec3};
 use half::f16;
@@ -8,7 +9,8 @@ use nimbus::model::cloud::{SQRT_TAU, box_kappa};
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::generate::{
-    Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, offset, radius, uniforms,
+    Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, offset, radius,
+    uniforms,
 };
 use nimbus::reference::rounding::{U_F32, particle_bound};
 use nimbus::reference::sprites::{Rounding, View, alpha, render, render_with_bound};
@@ -19,7 +21,10 @@ const FORMS: [Form; 2] = [Form::Centred, Form::Printed];
 /// The boxes of the paper's Table 2 in the order of the file: count, extents, centre, R_max.
 fn paper_boxes() -> Vec<CloudBox> {
     let text = include_str!("../scenes/cubes-554.dat");
-    let rows = text.lines().skip(2).map(|line| line.split(',').map(|v| v.trim().parse::<f64>().unwrap()).collect());
+    let rows = text
+        .lines()
+        .skip(2)
+        .map(|line| line.split(',').map(|v| v.trim().parse::<f64>().unwrap()).collect());
     rows.map(|v: Vec<f64>| CloudBox {
         n_particles: v[0] as u32,
         extent: DVec3::new(v[1], v[2], v[3]),
@@ -43,21 +48,38 @@ fn a_particle_worked_by_hand() {
     // Philox's published answer for key 0, counter 0: 6627e8d5 e169c58d bc57ac4c 9b00dbd8.
     let words = [0x6627e8u32, 0xe169c5, 0xbc57ac, 0x9b00db].map(|w| f64::from(w) / 16_777_216.0);
     assert_eq!(uniforms(0, 0, 0, 0), words);
-    // The law evaluated elsewhere (Python, step by step) at these four numbers, box 8 × 6 × 4:
-    // X, Y, Z = −1.6152…, 4.5662…, 1.8857…; P (4): 1.1888…, −1.1351…, 1.2711…; P (5): 4.0178…, −3.0279….
-    let p = generate_particle(&one_box(1, DVec3::new(8.0, 6.0, 4.0), 2.0), 0, 0, Form::Centred, 1.5, 0.5, 0);
+    // The law evaluated elsewhere (Python, step by step) at these four numbers, box 8 × 6 × 4: X,
+    // Y, Z = −1.6152…, 4.5662…, 1.8857…; P (4): 1.1888…, −1.1351…, 1.2711…; P (5): 4.0178…,
+    // −3.0279….
+    let p = generate_particle(
+        &one_box(1, DVec3::new(8.0, 6.0, 4.0), 2.0),
+        0,
+        0,
+        Form::Centred,
+        1.5,
+        0.5,
+        0,
+    );
     // 16 digits and some ten roundings of numbers below 8.
     let expected = DVec3::new(1.2012904103575917, 0.7691475461587762, 1.5784238024958326);
     assert!((p.position - expected).length() < 1e-14, "{}", p.position);
     assert_eq!((p.n_attempts, p.folded), (1, false));
     // The face z = 2 is the nearest.
     assert!((p.margin - (2.0 - expected.z)).abs() < 1e-14);
-    // R = 1.2109636068344116 + π/2 sin R = 2.681159443746758, times 2 over the greatest 3.428321058021832, which
-    // was found by a scan of 10⁶ steps: its error is below 1e-12.
+    // R = 1.2109636068344116 + π/2 sin R = 2.681159443746758, times 2 over the greatest
+    // 3.428321058021832, which was found by a scan of 10⁶ steps: its error is below 1e-12.
     assert!((p.radius - 1.564123895265403).abs() < 1e-11);
     assert!((p.sigma - p.radius * 0.5 / 3.0).abs() < 1e-15);
     // Printed, box 6 × 10 × 8: y repeats z.
-    let printed = generate_particle(&one_box(1, DVec3::new(6.0, 10.0, 8.0), 2.0), 0, 0, Form::Printed, 1.0, 1.0, 0);
+    let printed = generate_particle(
+        &one_box(1, DVec3::new(6.0, 10.0, 8.0), 2.0),
+        0,
+        0,
+        Form::Printed,
+        1.0,
+        1.0,
+        0,
+    );
     let expected = DVec3::new(1.9451384363068946, 3.0979168168704407, 3.0979168168704407);
     assert!((printed.position - expected).length() < 1e-14);
     assert!((printed.radius - 2.681159443746758).abs() < 1e-14);
@@ -70,7 +92,9 @@ fn p9_holds_centred_and_breaks_for_most_particles_as_printed() {
         let b = CloudBox { n_particles: 2000, ..*b };
         let centred = generate_box(&b, i_box, 1, Form::Centred, 1.0, 1.0);
         // One rounding of the factor, one of the product.
-        assert!(centred.iter().all(|p| p.radius >= 0.0 && p.radius <= b.radius_max * (1.0 + 4e-16)));
+        assert!(
+            centred.iter().all(|p| p.radius >= 0.0 && p.radius <= b.radius_max * (1.0 + 4e-16))
+        );
         let printed = generate_box(&b, i_box, 1, Form::Printed, 1.0, 1.0);
         n_broken += printed.iter().filter(|p| p.radius > b.radius_max).count();
         n += printed.len();
@@ -89,10 +113,14 @@ fn particles_lie_in_their_boxes_and_acceptance_is_a_share() {
             assert!(particles.iter().all(|p| is_inside(p.position, 0.5 * b.extent)));
             let a = Acceptance::of(&particles);
             assert_eq!(a.n_accepted + a.n_folded, u64::from(b.n_particles));
-            let many = generate_box(&CloudBox { n_particles: 20_000, ..*b }, i_box, 1, form, 1.0, 1.0);
+            let many =
+                generate_box(&CloudBox { n_particles: 20_000, ..*b }, i_box, 1, form, 1.0, 1.0);
             let many = Acceptance::of(&many);
             let rate = many.rate().unwrap();
-            println!("{form:?} box {i_box}: {a:?}; of 20000: rate {rate:.4}, folded {}", many.n_folded);
+            println!(
+                "{form:?} box {i_box}: {a:?}; of 20000: rate {rate:.4}, folded {}",
+                many.n_folded
+            );
             assert!(rate > 0.0 && rate < 1.0);
         }
     }
@@ -107,7 +135,10 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
         assert_eq!((p.n_attempts, p.folded), (MAX_ATTEMPTS, true));
         assert!(p.position.y == 0.0 && p.position.z == 0.0 && p.position.x.abs() <= 5.0);
     }
-    assert_eq!(Acceptance::of(&particles), Acceptance { n_attempts: 50 * 64, n_accepted: 0, n_folded: 50 });
+    assert_eq!(
+        Acceptance::of(&particles),
+        Acceptance { n_attempts: 50 * 64, n_accepted: 0, n_folded: 50 }
+    );
     // A point moves nothing: sin 0 everywhere, and the centre is inside.
     let point = generate_box(&one_box(3, DVec3::ZERO, 0.0), 0, 1, Form::Centred, 1.0, 1.0);
     assert!(point.iter().all(|p| p.n_attempts == 1 && p.position == DVec3::ZERO && p.kappa == 0.0));
@@ -116,8 +147,18 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
 
 #[test]
 fn folding_mirrors_at_the_faces() {
-    // By hand, h = 2: 3 is one beyond the face and comes back to 1; 7 passes both and lands on 1 … (period 8).
-    let cases = [(0.0, 0.0), (2.0, 2.0), (3.0, 1.0), (-3.0, -1.0), (6.0, -2.0), (7.0, -1.0), (-7.0, 1.0), (9.0, 1.0)];
+    // By hand, h = 2: 3 is one beyond the face and comes back to 1; 7 passes both and lands on 1 …
+    // (period 8).
+    let cases = [
+        (0.0, 0.0),
+        (2.0, 2.0),
+        (3.0, 1.0),
+        (-3.0, -1.0),
+        (6.0, -2.0),
+        (7.0, -1.0),
+        (-7.0, 1.0),
+        (9.0, 1.0),
+    ];
     for (v, expected) in cases {
         assert_eq!(fold(v, 2.0), expected, "{v}");
     }
@@ -142,8 +183,8 @@ fn radii_have_their_mean_and_positions_their_symmetry() {
         let (mean, error) = mean_of(&|i| particles[i].radius);
         assert!((mean - mean_radius(form, 2.1)).abs() < 5.0 * error);
         if form == Form::Centred {
-            // X, Y → −X, −Y turns P_x, P_y and both swirls around and leaves Z: x and y are symmetric together.
-            // z is not, because acceptance along x depends on the sign of Z.
+            // X, Y → −X, −Y turns P_x, P_y and both swirls around and leaves Z: x and y are
+            // symmetric together. z is not, because acceptance along x depends on the sign of Z.
             for axis in 0..2 {
                 let (mean, error) = mean_of(&|i| particles[i].position[axis]);
                 assert!(mean.abs() < 5.0 * error, "{axis}: {mean} ± {error}");
@@ -211,8 +252,11 @@ fn f32_evaluations_stay_within_their_bound() {
     // The paper's boxes accept before the bound on attempts; one so thin mostly folds.
     let mut boxes = paper_boxes();
     boxes.push(one_box(0, DVec3::new(7.4, 0.03, 2.9), 2.0));
-    for (form, sine) in [(FORMS[0], &good as &dyn Fn(f32) -> f32), (FORMS[0], &poor), (FORMS[1], &poor)] {
-        let (mut n, mut n_folded, mut n_undecided, mut n_other, mut ratios) = (0u32, 0u32, 0u32, 0u32, Vec::new());
+    for (form, sine) in
+        [(FORMS[0], &good as &dyn Fn(f32) -> f32), (FORMS[0], &poor), (FORMS[1], &poor)]
+    {
+        let (mut n, mut n_folded, mut n_undecided, mut n_other, mut ratios) =
+            (0u32, 0u32, 0u32, 0u32, Vec::new());
         for (b, i_box) in boxes.iter().zip(0..) {
             for i in 0..100_000 / 18 + 1 {
                 n += 1;
@@ -237,7 +281,8 @@ fn f32_evaluations_stay_within_their_bound() {
         ratios.sort_by(f64::total_cmp);
         let (least, median) = (ratios[0], ratios[ratios.len() / 2]);
         println!(
-            "{form:?}: bound/actual least {least:.2}, median {median:.1}; undecided {n_undecided}, other {n_other}, folded {n_folded} of {n}"
+            "{form:?}: bound/actual least {least:.2}, median {median:.1}; undecided {n_undecided}, \
+             other {n_other}, folded {n_folded} of {n}"
         );
         assert!(median < 1000.0 && n_folded > 100);
         // The bounds are some 1e-6 of boxes of size 1, with a few attempts each.
@@ -277,8 +322,8 @@ fn one_blob_at_two_pixels() {
     let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
     let color = DVec3::new(0.2, 0.5, 2.0);
     let image = render(&view(5, 3), &[blob], &[color], &[0]);
-    // Centre pixel: b = 0, τ = √(2π)κσ. Column 3 of the middle row: direction (2·3.5/5 − 1)·5/3 = 2/3 to the
-    // right of forward, b = 3·(2/3)/√(1 + 4/9) = 6/√13, e^{−b²/2} = e^{−18/13}.
+    // Centre pixel: b = 0, τ = √(2π)κσ. Column 3 of the middle row: direction (2·3.5/5 − 1)·5/3 =
+    // 2/3 to the right of forward, b = 3·(2/3)/√(1 + 4/9) = 6/√13, e^{−b²/2} = e^{−18/13}.
     for (i, tau) in [(7, 0.6 * SQRT_TAU), (8, 0.6 * SQRT_TAU * (-18.0f64 / 13.0).exp())] {
         let a = 1.0 - (-tau).exp();
         let expected = [0.2 * a, 0.5 * a, 2.0 * a, a];
@@ -305,7 +350,9 @@ fn what_is_behind_near_or_absent_is_not_drawn() {
     // Beyond three σ nothing: b = 3·(4/5·5/3)/√(1 + 16/9) = 2.4 at column 4.
     let image = render(&view(5, 3), &[Blob { sigma: 0.79, ..at(-3.0) }], &[DVec3::ONE], &[0]);
     assert_eq!(image[9], [0.0; 4]);
-    assert!(render(&view(5, 3), &[Blob { sigma: 0.81, ..at(-3.0) }], &[DVec3::ONE], &[0])[9][3] > 0.0);
+    assert!(
+        render(&view(5, 3), &[Blob { sigma: 0.81, ..at(-3.0) }], &[DVec3::ONE], &[0])[9][3] > 0.0
+    );
 }
 
 #[test]
@@ -324,15 +371,25 @@ fn equal_colors_hide_the_order_and_equal_layers_multiply() {
     let layer = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
     let image = render(&view, &[layer; 7], &[color; 7], &[0, 1, 2, 3, 4, 5, 6]);
     let one = render(&view, &[layer], &[color], &[0]);
-    assert!(image.iter().zip(&one).all(|(n, one)| (n[3] - (1.0 - (1.0 - one[3]).powi(7))).abs() < 1e-14));
+    assert!(
+        image
+            .iter()
+            .zip(&one)
+            .all(|(n, one)| (n[3] - (1.0 - (1.0 - one[3]).powi(7))).abs() < 1e-14)
+    );
 }
 
-/// The pixel's layers by the definition, without rectangles: α and radiance of every blob, far to near.
+/// The pixel's layers by the definition, without rectangles: α and radiance of every blob, far to
+/// near.
 fn layers(view: &View, blobs: &[Blob], radiance: &[DVec3], i: u32, j: u32) -> Vec<(f64, DVec3)> {
     let d = view.ray(i, j);
-    let seen = blobs.iter().zip(radiance).filter(|(b, _)| b.position.dot(view.pose.forward) >= view.near);
+    let seen =
+        blobs.iter().zip(radiance).filter(|(b, _)| b.position.dot(view.pose.forward) >= view.near);
     let lines = seen.map(|(blob, l)| (blob.along(blob.position, d), *l));
-    lines.filter(|(line, _)| line.off <= view.cutoff).map(|(line, l)| (alpha(line.tau()), l)).collect()
+    lines
+        .filter(|(line, _)| line.off <= view.cutoff)
+        .map(|(line, l)| (alpha(line.tau()), l))
+        .collect()
 }
 
 #[test]
@@ -345,7 +402,9 @@ fn no_rectangle_is_too_small() {
     for (pixel, k) in image.iter().zip(0..) {
         let composed = layers(&view, &blobs, &radiance, k % 40, k / 40)
             .iter()
-            .fold((DVec3::ZERO, 0.0), |(c, a), &(alpha, l)| (alpha * l + (1.0 - alpha) * c, alpha + (1.0 - alpha) * a));
+            .fold((DVec3::ZERO, 0.0), |(c, a), &(alpha, l)| {
+                (alpha * l + (1.0 - alpha) * c, alpha + (1.0 - alpha) * a)
+            });
         // The same operations in the same order.
         assert_eq!((DVec3::from_slice(pixel), pixel[3]), composed);
     }
@@ -363,7 +422,8 @@ fn half_float_targets_stay_within_their_bound() {
     let mut ratios = Vec::new();
     for k in 0..1200 {
         let mut stored = [0.0; 4];
-        for (i, &(alpha, l)) in layers(&view, &blobs, &radiance, k % 40, k / 40).iter().enumerate() {
+        for (i, &(alpha, l)) in layers(&view, &blobs, &radiance, k % 40, k / 40).iter().enumerate()
+        {
             // α off by as much as allowed, its sign by lot.
             let alpha = alpha * (1.0 + ALPHA * (2.0 * lots(i as u32)[0].round() - 1.0));
             for (c, s) in stored.iter_mut().zip([l.x, l.y, l.z, 1.0]) {
@@ -377,7 +437,11 @@ fn half_float_targets_stay_within_their_bound() {
         }
     }
     ratios.sort_by(f64::total_cmp);
-    println!("half float: bound/actual least {:.2}, median {:.1}", ratios[0], ratios[ratios.len() / 2]);
+    println!(
+        "half float: bound/actual least {:.2}, median {:.1}",
+        ratios[0],
+        ratios[ratios.len() / 2]
+    );
     assert!(ratios[ratios.len() / 2] < 1000.0);
 }
 

@@ -1,6 +1,6 @@
-//! Inputs that once made a reader crash, hang or take too much memory, and some made by hand to do so: each is refused with one
-//! message, or read, within a second. tests/data/found/<target>/ holds them, and <target>.txt what is said of each;
-//! docs/fuzzing.md tells how they are found.
+//! Inputs that once made a reader crash, hang or take too much memory, and some made by hand to do
+//! so: each is refused with one message, or read, within a second. tests/data/found/<target>/ holds
+//! them, and <target>.txt what is said of each; docs/fuzzing.md tells how they are found.
 
 #[path = "harness/readers.rs"]
 mod readers;
@@ -20,7 +20,8 @@ use nimbus::study::tradeoff::files::read_found;
 type Reader = fn(&[u8]) -> Result<(), String>;
 
 const LONGEST: Duration = Duration::from_secs(1);
-/// Of a file at its kind's limit, on a machine that has other things to do: what hangs takes longer.
+/// Of a file at its kind's limit, on a machine that has other things to do: what hangs takes
+/// longer.
 const LONGEST_OF_LARGE: Duration = Duration::from_secs(20);
 /// KiB.
 const MOST_MEMORY: u64 = 2 << 20;
@@ -31,16 +32,22 @@ fn folder(target: &str) -> PathBuf {
 
 /// Names and bytes of a target's inputs, in order.
 fn inputs(target: &str) -> Vec<(String, Vec<u8>)> {
-    let entries = fs::read_dir(folder(target)).expect("the inputs").map(|entry| entry.expect("an input"));
-    let mut inputs: Vec<(String, Vec<u8>)> =
-        entries.map(|e| (e.file_name().into_string().expect("UTF-8"), fs::read(e.path()).expect("bytes"))).collect();
+    let entries =
+        fs::read_dir(folder(target)).expect("the inputs").map(|entry| entry.expect("an input"));
+    let mut inputs: Vec<(String, Vec<u8>)> = entries
+        .map(|e| (e.file_name().into_string().expect("UTF-8"), fs::read(e.path()).expect("bytes")))
+        .collect();
     inputs.sort();
     inputs
 }
 
-/// What `work` comes to, if that takes no longer than `limit`. A thread of the usual size: a stack that overflows in it
-/// overflows anywhere.
-fn in_time<T: Send + 'static>(what: &str, limit: Duration, work: impl FnOnce() -> T + Send + 'static) -> T {
+/// What `work` comes to, if that takes no longer than `limit`. A thread of the usual size: a stack
+/// that overflows in it overflows anywhere.
+fn in_time<T: Send + 'static>(
+    what: &str,
+    limit: Duration,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> T {
     let (done, wait) = mpsc::channel();
     let worker = thread::spawn(move || drop(done.send(work())));
     match wait.recv_timeout(limit) {
@@ -72,7 +79,8 @@ fn assert_as_listed(target: &str, read: Reader) {
 /// What the process has taken at most.
 fn assert_memory(what: &str) {
     let Ok(status) = fs::read_to_string("/proc/self/status") else { return };
-    let of = |line: &str| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<u64>().ok();
+    let of =
+        |line: &str| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<u64>().ok();
     let most = status.lines().find_map(of).expect("a peak");
     assert!(most < MOST_MEMORY, "{what}: {most} KiB");
 }
@@ -106,8 +114,12 @@ fn weather_files() {
 #[test]
 fn files_are_read_or_refused() {
     let dir = tempfile::tempdir().expect("a folder");
-    let no_text: Vec<Vec<u8>> = vec![vec![0xff, 0xfe, 0], vec![0; 4096], b"\xed\xa0\x80".to_vec(), vec![0xc3]];
-    let found = ["scene_file", "box_file", "particle_list", "results", "weather"].map(inputs).into_iter().flatten();
+    let no_text: Vec<Vec<u8>> =
+        vec![vec![0xff, 0xfe, 0], vec![0; 4096], b"\xed\xa0\x80".to_vec(), vec![0xc3]];
+    let found = ["scene_file", "box_file", "particle_list", "results", "weather"]
+        .map(inputs)
+        .into_iter()
+        .flatten();
     for (i, bytes) in found.map(|(_, bytes)| bytes).chain(no_text).enumerate() {
         let folder = dir.path().join(i.to_string());
         fs::create_dir(&folder).expect("a folder");
@@ -135,7 +147,8 @@ fn files_are_read_or_refused() {
 
 fn read_all(folder: &Path) -> Vec<Error> {
     let path = |name: &str| folder.join(name);
-    let results = ["run.json", "study.json", "ledger.json"].map(|name| source::read(&path(name)).err());
+    let results =
+        ["run.json", "study.json", "ledger.json"].map(|name| source::read(&path(name)).err());
     let others = [
         scene_file::load(&path("scene.toml"), &[], None).err(),
         box_file::read(&path("b.dat")).err(),
@@ -153,8 +166,9 @@ fn large_inputs_are_refused_or_read_in_time() {
     const DATA: usize = 8 << 20;
     // Each is tried as three kinds.
     const JSON: usize = 1 << 20;
-    let repeated =
-        |begin: &str, what: &str, size: usize| [begin.as_bytes(), &what.as_bytes().repeat(size / what.len())].concat();
+    let repeated = |begin: &str, what: &str, size: usize| {
+        [begin.as_bytes(), &what.as_bytes().repeat(size / what.len())].concat()
+    };
     let many_keys: String = (0..SCENE / 16).map(|i| format!("k{i} = {i}\n")).collect();
     let cases: [(&str, Reader, Vec<u8>); 12] = [
         ("brackets", readers::scene_file, repeated("title = ", "[", SCENE)),

@@ -1,4 +1,5 @@
-//! `nimbus render --reference`: the whole picture in f64 against the device's, and what the volume shows in its place.
+//! `nimbus render --reference`: the whole picture in f64 against the device's, and what the volume
+//! shows in its place.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -14,7 +15,11 @@ use serde_json::Value;
 fn render(dir: &tempfile::TempDir, name: &str, scene: &[&str], more: &[&str]) -> Value {
     let out = path(dir, name);
     let output = run(&[&["render", "-q", "--json", "--force", "-o", &out], scene, more].concat());
-    assert!(output.status.success(), "{scene:?} {more:?}: {}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{scene:?} {more:?}: {}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     serde_json::from_slice(&output.stdout).expect("JSON")
 }
 
@@ -28,8 +33,8 @@ const CUBES: [&str; 3] = ["scenes/cubes-554.toml", "--size", "100x75"];
 
 const FLAT: [&str; 3] = ["tests/data/flat.toml", "--size", "100x75"];
 
-/// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one way. A pixel on a
-/// sprite's edge may be drawn or not: e^{−4.5} of its α.
+/// f32 lighting and drawing: some hundred roundings of 2⁻²⁴ a value, 10⁻⁵ where they all go one
+/// way. A pixel on a sprite's edge may be drawn or not: e^{−4.5} of its α.
 const RMSE_OF_F32: f64 = 1e-5;
 const MAX_OF_F32: f64 = 0.012;
 
@@ -40,16 +45,38 @@ fn the_thin_reference_is_what_the_device_draws() {
     for (what, scene) in [
         ("two reflections and a list's colours", vec!["scenes/hello.toml", "--size", "80x60"]),
         ("boxes", CUBES.to_vec()),
-        ("later, with wind", [&CUBES[..], &["--time", "3", "--set", "cloud.0.wind=[0.5,0,0]"]].concat()),
-        ("facets of many particles", [&CUBES[..], &["--set", "lighting.facets_per_cloud=50"]].concat()),
-        ("fewer by distance", [&CUBES[..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=20"]].concat()),
+        (
+            "later, with wind",
+            [&CUBES[..], &["--time", "3", "--set", "cloud.0.wind=[0.5,0,0]"]].concat(),
+        ),
+        (
+            "facets of many particles",
+            [&CUBES[..], &["--set", "lighting.facets_per_cloud=50"]].concat(),
+        ),
+        (
+            "fewer by distance",
+            [&CUBES[..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=20"]]
+                .concat(),
+        ),
         ("ellipsoids", FLAT.to_vec()),
         // Of a scene that stands still the grid has no more room than it needs.
         ("ellipsoids that stand still", [&FLAT[..], &["--set", "cloud.0.wind=[0,0,0]"]].concat()),
-        ("ellipsoids that grow", [&FLAT[..], &["--time", "2", "--set", "cloud.0.grow_to=1.5"]].concat()),
-        ("facets of many ellipsoids", [&FLAT[..], &["--set", "lighting.facets_per_cloud=20"]].concat()),
-        ("ellipsoids in chunks", [&FLAT[..], &["--set", "draw.path=\"sprites\"", "--set", "draw.chunks=3"]].concat()),
-        ("surfaces that nothing lights", vec!["scenes/ground.toml", "--size", "80x60", "--set", unlit]),
+        (
+            "ellipsoids that grow",
+            [&FLAT[..], &["--time", "2", "--set", "cloud.0.grow_to=1.5"]].concat(),
+        ),
+        (
+            "facets of many ellipsoids",
+            [&FLAT[..], &["--set", "lighting.facets_per_cloud=20"]].concat(),
+        ),
+        (
+            "ellipsoids in chunks",
+            [&FLAT[..], &["--set", "draw.path=\"sprites\"", "--set", "draw.chunks=3"]].concat(),
+        ),
+        (
+            "surfaces that nothing lights",
+            vec!["scenes/ground.toml", "--size", "80x60", "--set", unlit],
+        ),
     ] {
         render(&dir, "thin.exr", &scene, &["--reference", "thin"]);
         render(&dir, "drawn.exr", &scene, &["--set", "film.format=\"rgba32f\""]);
@@ -57,11 +84,17 @@ fn the_thin_reference_is_what_the_device_draws() {
         println!("{what}: RMSE {rmse:.1e}, greatest {max:.1e}");
         assert!(rmse <= RMSE_OF_F32 && max <= MAX_OF_F32, "{what}: {rmse:e} {max:e}");
     }
-    // What the comparison would say of another picture: other particles, and one particle's share fewer.
+    // What the comparison would say of another picture: other particles, and one particle's share
+    // fewer.
     render(&dir, "thin.exr", &CUBES, &["--reference", "thin"]);
-    for other in [&["--seed", "8"][..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=5000"]] {
+    for other in
+        [&["--seed", "8"][..], &["--set", "draw.count=\"distance\"", "--set", "draw.count_a=5000"]]
+    {
         render(&dir, "drawn.exr", &CUBES, &[&["--set", "film.format=\"rgba32f\""], other].concat());
-        assert!(differ(&dir, "thin.exr", "drawn.exr").0 > 5.0 * RMSE_OF_F32, "{other:?} is noticed");
+        assert!(
+            differ(&dir, "thin.exr", "drawn.exr").0 > 5.0 * RMSE_OF_F32,
+            "{other:?} is noticed"
+        );
     }
 }
 
@@ -71,10 +104,15 @@ fn the_volume_has_all_particles_and_says_how_exact_it_is() {
     let size = ["scenes/cubes-554.toml", "--size", "40x30", "--set", PLAIN];
     let fewer = ["--set", "draw.count=\"distance\"", "--set", "draw.count_a=20"];
     let [all, counted] = [&[][..], &fewer].map(|more| {
-        let volume = render(&dir, "volume.exr", &size, &[&["--reference", "volume"], more].concat());
+        let volume =
+            render(&dir, "volume.exr", &size, &[&["--reference", "volume"], more].concat());
         let thin = render(&dir, "thin.exr", &size, &[&["--reference", "thin"], more].concat());
-        assert_eq!((volume["particles"].as_u64(), volume["not_finite"].as_u64()), (Some(554), Some(0)));
-        let (error, brightest) = (volume["error"].as_f64().expect("one"), volume["brightest"].as_f64().expect("one"));
+        assert_eq!(
+            (volume["particles"].as_u64(), volume["not_finite"].as_u64()),
+            (Some(554), Some(0))
+        );
+        let (error, brightest) =
+            (volume["error"].as_f64().expect("one"), volume["brightest"].as_f64().expect("one"));
         assert!(error > 0.0 && error < 1e-5 * brightest, "{error:e}");
         assert!(thin["error"].is_null());
         (volume, thin)
@@ -96,12 +134,22 @@ fn the_volume_has_all_particles_and_says_how_exact_it_is() {
 fn a_target_of_eight_bits_holds_steps_of_0_to_1() {
     let dir = temp();
     // A light that takes the cloud's radiance beyond 1, where the target cuts it.
-    let bright = ["--set", "light.0.irradiance=[9,9,9]", "--validation", "--set", "film.format=\"rgba8\""];
+    let bright =
+        ["--set", "light.0.irradiance=[9,9,9]", "--validation", "--set", "film.format=\"rgba8\""];
     render(&dir, "drawn.exr", &CUBES, &bright);
     let drawn = image::open(path(&dir, "drawn.exr")).expect("a picture").into_rgba32f();
-    assert!(drawn.as_raw().iter().all(|v| (0.0..=1.0).contains(v) && (255.0 * v - (255.0 * v).round()).abs() < 1e-4));
-    assert!(drawn.pixels().any(|p| p.0[0] == 1.0) && drawn.pixels().any(|p| p.0[0] > 0.0 && p.0[0] < 0.5));
-    // Where nothing is cut it is near the truth: 20 layers and more, each off by up to two steps where it covers much.
+    assert!(
+        drawn
+            .as_raw()
+            .iter()
+            .all(|v| (0.0..=1.0).contains(v) && (255.0 * v - (255.0 * v).round()).abs() < 1e-4)
+    );
+    assert!(
+        drawn.pixels().any(|p| p.0[0] == 1.0)
+            && drawn.pixels().any(|p| p.0[0] > 0.0 && p.0[0] < 0.5)
+    );
+    // Where nothing is cut it is near the truth: 20 layers and more, each off by up to two steps
+    // where it covers much.
     render(&dir, "thin.exr", &CUBES, &["--reference", "thin"]);
     let dim = ["--set", "light.0.irradiance=[1,1,1]", "--set", "light.1.irradiance=[0.5,0.5,0.5]"];
     render(&dir, "dim.exr", &CUBES, &[&dim[..], &["--set", "film.format=\"rgba8\""]].concat());
@@ -136,7 +184,8 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
         (&["--reference", "volume", "--no-skip"], "cannot be used with"),
         (
             &["--reference", "thin", "--set", "material.0.ks=[0.01,0,0]"],
-            "cloud 0: its material \"cloud\" has a lobe, and the f64 reference knows clouds that reflect diffusely alone",
+            "cloud 0: its material \"cloud\" has a lobe, and the f64 reference knows clouds that \
+             reflect diffusely alone",
         ),
         (&["--reference", "volume"], "cloud 0 is textured"),
         (&["--reference", "volume", "--set", PLAIN, "--time", "nan"], "finite"),
@@ -149,7 +198,10 @@ fn what_a_reference_cannot_do_is_said_and_nothing_written() {
     }
     let nowhere = path(&dir, "gone/never.exr");
     let output = run(&[&["render", "-o", &nowhere, "--reference", "volume"], &CUBES[..]].concat());
-    assert!(output.status.code() == Some(2) && String::from_utf8_lossy(&output.stderr).contains("does not exist"));
+    assert!(
+        output.status.code() == Some(2)
+            && String::from_utf8_lossy(&output.stderr).contains("does not exist")
+    );
 }
 
 #[test]
@@ -157,12 +209,23 @@ fn ctrl_c_leaves_nothing_half_written() {
     let dir = temp();
     let out = path(&dir, "late.exr");
     // Minutes of work; begun when its process is.
-    let args =
-        ["render", "scenes/cubes-554.toml", "--size", "1600x1200", "--set", PLAIN, "--reference", "volume", "-o", &out];
+    let args = [
+        "render",
+        "scenes/cubes-554.toml",
+        "--size",
+        "1600x1200",
+        "--set",
+        PLAIN,
+        "--reference",
+        "volume",
+        "-o",
+        &out,
+    ];
     let child = nimbus(&args).spawn().expect("a child");
     std::thread::sleep(Duration::from_millis(700));
     let begin = Instant::now();
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+    let killed =
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
     assert!(killed.success());
     assert_eq!(child.wait_with_output().expect("it ends").status.code(), Some(130));
     assert!(begin.elapsed() < Duration::from_secs(5));

@@ -1,4 +1,5 @@
-//! `nimbus report` as a user runs it, and its pages as a browser shows them: whole without a script, quiet, on their own.
+//! `nimbus report` as a user runs it, and its pages as a browser shows them: whole without a
+//! script, quiet, on their own.
 
 #[path = "harness/browser.rs"]
 mod browser;
@@ -48,7 +49,8 @@ fn written(dir: &TempDir) -> [String; 2] {
 }
 
 fn write_study(folder: &std::path::Path, study: &Study) {
-    fs::write(folder.join("study.json"), serde_json::to_string(study).expect("JSON")).expect("a study");
+    fs::write(folder.join("study.json"), serde_json::to_string(study).expect("JSON"))
+        .expect("a study");
 }
 
 /// Two real benches of a few frames: the second one's picture is another.
@@ -76,7 +78,11 @@ fn benches(dir: &TempDir) -> [String; 2] {
         let output = run(&args);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let shown = String::from_utf8(output.stdout).expect("UTF-8");
-        assert!(shown.contains("Frame time\n● serial  ○ parallel") && shown.contains("frame of the scene"), "{shown}");
+        assert!(
+            shown.contains("Frame time\n● serial  ○ parallel")
+                && shown.contains("frame of the scene"),
+            "{shown}"
+        );
         assert!(!shown.contains('\u{1b}'), "no colours where no terminal is");
         for file in ["run.json", "frames.csv", "frames.svg", "passes.svg", "case-0.png"] {
             assert!(PathBuf::from(&out).join(file).exists(), "{file}");
@@ -90,7 +96,11 @@ fn report(dir: &TempDir, runs: &[&str]) -> PathBuf {
     let page = path(dir, "page.html");
     let output = run(&[&["report"], runs, &["-o", &page, "--force"]].concat());
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert!(output.stdout.is_empty() && output.stderr.is_empty(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.stdout.is_empty() && output.stderr.is_empty(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     if let Ok(kept) = std::env::var("NIMBUS_TEST_KEEP_PAGE") {
         fs::copy(&page, kept).expect("a copy");
     }
@@ -106,24 +116,42 @@ fn a_page_of_everything_is_whole_quiet_and_alone() {
     browser.size(1200, 900);
     browser.open(&page);
     let n = |browser: &mut Browser, selector: &str| {
-        browser.eval(&format!("document.querySelectorAll({selector:?}).length")).as_u64().expect("a number")
+        browser
+            .eval(&format!("document.querySelectorAll({selector:?}).length"))
+            .as_u64()
+            .expect("a number")
     };
     // Two benches with two charts each, a study, a ledger, and the comparison.
     assert_eq!((n(&mut browser, "main > section"), n(&mut browser, "figure.chart svg")), (5, 6));
-    let titles =
-        browser.eval("[...document.querySelectorAll('figure.chart svg')].map(s => s.getAttribute('aria-label'))");
+    let titles = browser.eval(
+        "[...document.querySelectorAll('figure.chart svg')].map(s => s.getAttribute('aria-label'))",
+    );
     let bench = ["Frame time", "GPU time of an average frame by pass"];
     assert_eq!(
         titles,
-        json!([bench[0], bench[1], bench[0], bench[1], "Time against error", "What every approximation is off by"])
+        json!([
+            bench[0],
+            bench[1],
+            bench[0],
+            bench[1],
+            "Time against error",
+            "What every approximation is off by"
+        ])
     );
     assert_eq!(n(&mut browser, "#run-2 .mark"), 23);
     assert_eq!(n(&mut browser, "#run-2 table:first-of-type tbody tr"), 23 + 3);
     // Nothing hangs over, no picture is broken, all have texts, no two elements one name.
     assert_eq!(browser.eval("document.documentElement.scrollWidth <= innerWidth"), json!(true));
-    let pictures = browser.eval("[...document.images].every(i => i.complete && i.naturalWidth > 0 && i.alt !== '')");
+    let pictures = browser
+        .eval("[...document.images].every(i => i.complete && i.naturalWidth > 0 && i.alt !== '')");
     assert_eq!(pictures, json!(true));
-    assert_eq!(browser.eval("document.querySelectorAll('[id]').length === new Set([...document.querySelectorAll('[id]')].map(e => e.id)).size"), json!(true));
+    assert_eq!(
+        browser.eval(
+            "document.querySelectorAll('[id]').length === new \
+        Set([...document.querySelectorAll('[id]')].map(e => e.id)).size"
+        ),
+        json!(true)
+    );
     assert_eq!(n(&mut browser, "table:not(:has(caption)), th:not([scope])"), 0);
     pointing(&mut browser);
     sliding(&mut browser);
@@ -144,10 +172,12 @@ fn a_page_of_everything_is_whole_quiet_and_alone() {
 
 /// A hint on pointing and on focus, gone after.
 fn pointing(browser: &mut Browser) {
-    let hint = "(() => { const h = document.getElementById('hint'); return h.hidden ? '' : h.textContent; })()";
+    let hint = "(() => { const h = document.getElementById('hint'); return h.hidden ? '' : \
+        h.textContent; })()";
     assert_eq!(browser.eval(hint), json!(""));
     let at = browser.eval(
-        "(() => { const m = document.querySelector('#run-2 .mark'); m.scrollIntoView({ block: 'center' }); \
+        "(() => { const m = document.querySelector('#run-2 .mark'); m.scrollIntoView({ block: \
+         'center' }); \
          const b = m.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()",
     );
     let at = [0, 1].map(|i| at[i].as_f64().expect("a number"));
@@ -166,10 +196,14 @@ fn pointing(browser: &mut Browser) {
     browser.eval("document.querySelector('#run-2 .mark').focus()");
     assert!(browser.eval(hint).as_str().is_some_and(|s| s.contains("draw.resolution=0.25")));
     browser.key("Tab", 9);
-    assert!(browser.eval(hint).as_str().is_some_and(|s| s.contains("draw.resolution=0.5")), "the next on the front");
+    assert!(
+        browser.eval(hint).as_str().is_some_and(|s| s.contains("draw.resolution=0.5")),
+        "the next on the front"
+    );
     browser.key("Escape", 27);
     assert_eq!(browser.eval(hint), json!(""));
-    let inside = "(() => { document.querySelector('#run-2 .mark').focus(); const b = document.getElementById('hint').getBoundingClientRect(); \
+    let inside = "(() => { document.querySelector('#run-2 .mark').focus(); const b = \
+        document.getElementById('hint').getBoundingClientRect(); \
                   document.activeElement.blur(); return b.left >= 0 && b.right <= innerWidth; })()";
     assert_eq!(browser.eval(inside), json!(true));
 }
@@ -179,22 +213,32 @@ fn sliding(browser: &mut Browser) {
     let sliders = "document.querySelectorAll('.slider').length";
     assert_eq!(browser.eval(sliders), json!(4));
     let cut = |browser: &mut Browser| {
-        browser.eval("(() => { const s = document.querySelector('#versus-0 .slider'); return [s.querySelector('input').value, s.querySelectorAll('img')[1].style.clipPath]; })()")
+        browser.eval(
+            "(() => { const s = document.querySelector('#versus-0 .slider'); return \
+            [s.querySelector('input').value, s.querySelectorAll('img')[1].style.clipPath]; })()",
+        )
     };
     assert_eq!(cut(browser), json!(["50", "inset(0px 0px 0px 50%)"]));
     browser.eval("document.querySelector('#versus-0 .slider input').focus()");
     browser.key("ArrowRight", 39);
     assert_eq!(cut(browser), json!(["51", "inset(0px 0px 0px 51%)"]));
     // The two pictures and where they differ, which they do.
-    let captions = browser.eval("[...document.querySelectorAll('#versus-0 .pair figcaption')].map(c => c.textContent)");
+    let captions = browser.eval(
+        "[...document.querySelectorAll('#versus-0 .pair figcaption')].map(c => c.textContent)",
+    );
     assert_eq!(captions.as_array().map(Vec::len), Some(3));
-    assert!(captions[2].as_str().is_some_and(|c| c.contains("FLIP") && !c.contains("mean 0;")), "{captions}");
+    assert!(
+        captions[2].as_str().is_some_and(|c| c.contains("FLIP") && !c.contains("mean 0;")),
+        "{captions}"
+    );
 }
 
 fn sorting(browser: &mut Browser) {
     let rmse = "[...document.querySelectorAll('#run-2 table')].find(t => t.rows.length === 24)";
     let column = |browser: &mut Browser| -> Vec<f64> {
-        let all = browser.eval(&format!("[...{rmse}.tBodies[0].rows].map(r => Number(r.cells[6].dataset.value))"));
+        let all = browser.eval(&format!(
+            "[...{rmse}.tBodies[0].rows].map(r => Number(r.cells[6].dataset.value))"
+        ));
         all.as_array().expect("rows").iter().map(|v| v.as_f64().expect("a number")).collect()
     };
     let before = column(browser);
@@ -205,10 +249,12 @@ fn sorting(browser: &mut Browser) {
     assert!(column(browser).iter().rev().is_sorted());
 }
 
-/// Light and dark, on a screen and on paper: all differ that should, and what is written can be read.
+/// Light and dark, on a screen and on paper: all differ that should, and what is written can be
+/// read.
 fn appearances(browser: &mut Browser) {
     let mut shown = Vec::new();
-    for (name, scheme, media) in [("light", "light", "screen"), ("dark", "dark", "screen"), ("print", "dark", "print")]
+    for (name, scheme, media) in
+        [("light", "light", "screen"), ("dark", "dark", "screen"), ("print", "dark", "print")]
     {
         browser.media(scheme, media);
         let contrasts = browser.eval(CONTRAST);
@@ -218,8 +264,9 @@ fn appearances(browser: &mut Browser) {
             // WCAG 2.1, 1.4.3.
             assert!(of[0].as_f64().is_some_and(|c| c >= 4.5), "{name}: {of}");
         }
-        let dark =
-            browser.eval(&format!("({LUMINANCE})(getComputedStyle(document.documentElement).backgroundColor) < 0.2"));
+        let dark = browser.eval(&format!(
+            "({LUMINANCE})(getComputedStyle(document.documentElement).backgroundColor) < 0.2"
+        ));
         assert_eq!(dark, json!(name == "dark"), "{name}");
         let picture = browser.picture();
         let bytes = base64::engine::general_purpose::STANDARD.decode(&picture).expect("base64");
@@ -233,18 +280,26 @@ fn appearances(browser: &mut Browser) {
 }
 
 /// Relative luminance of "rgb(…)" (WCAG 2.1).
-const LUMINANCE: &str = "c => { const v = c.match(/[0-9.]+/g).slice(0, 3).map(x => x / 255).map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; }";
+const LUMINANCE: &str = "c => { const v = c.match(/[0-9.]+/g).slice(0, 3).map(x => x / 255).map(x \
+    => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return 0.2126 * v[0] + 0.7152 * \
+    v[1] + 0.0722 * v[2]; }";
 
 /// Contrast of every element that has text of its own against what it stands on.
-const CONTRAST: &str = "(() => { const lum = c => { const v = c.match(/[0-9.]+/g).slice(0, 3).map(x => x / 255).map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return 0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };\
-  const behind = e => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor; if (!c.endsWith(', 0)') && c !== 'transparent') return c; } return 'rgb(255, 255, 255)'; };\
+const CONTRAST: &str = "(() => { const lum = c => { const v = c.match(/[0-9.]+/g).slice(0, \
+    3).map(x => x / 255).map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return \
+    0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };\
+  const behind = e => { for (; e; e = e.parentElement) { const c = \
+  getComputedStyle(e).backgroundColor; if (!c.endsWith(', 0)') && c !== 'transparent') return c; } \
+  return 'rgb(255, 255, 255)'; };\
   const out = [];\
   for (const e of document.querySelectorAll('body *')) {\
     if (!e.checkVisibility() || e.closest('script, style, title')) continue;\
-    const own = [...e.childNodes].filter(n => n.nodeType === 3).map(n => n.textContent.trim()).join('');\
+    const own = [...e.childNodes].filter(n => n.nodeType === 3).map(n => \
+    n.textContent.trim()).join('');\
     if (own === '') continue;\
     const style = getComputedStyle(e);\
-    const [a, b] = [lum(e.namespaceURI.endsWith('svg') ? style.fill : style.color), lum(behind(e))];\
+    const [a, b] = [lum(e.namespaceURI.endsWith('svg') ? style.fill : style.color), \
+    lum(behind(e))];\
     out.push([(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), own.slice(0, 40)]);\
   } return out; })()";
 
@@ -252,24 +307,29 @@ const CONTRAST: &str = "(() => { const lum = c => { const v = c.match(/[0-9.]+/g
 fn without_scripts(browser: &mut Browser) {
     let document = browser.call("DOM.getDocument", json!({ "depth": 0 }))["root"]["nodeId"].clone();
     let mut n = |selector: &str| {
-        let found = browser.call("DOM.querySelectorAll", json!({ "nodeId": document, "selector": selector }));
+        let found = browser
+            .call("DOM.querySelectorAll", json!({ "nodeId": document, "selector": selector }));
         found["nodeIds"].as_array().map(Vec::len).expect("a list")
     };
     assert_eq!(n(".slider"), 0);
     assert_eq!(n("thead button"), 0);
     assert_eq!(n("figure.chart svg"), 6);
-    // Each bench: loops, cases, passes; the study: configurations and budgets; the ledger; what differs, and the ratios.
+    // Each bench: loops, cases, passes; the study: configurations and budgets; the ledger; what
+    // differs, and the ratios.
     assert_eq!(n("table"), 2 * 3 + 2 + 1 + 2);
     assert_eq!(n(".mark title"), n(".mark"));
-    // The benches' last frames; the study's reference, three pictures and three error maps; A, B and where they differ.
+    // The benches' last frames; the study's reference, three pictures and three error maps; A, B
+    // and where they differ.
     assert_eq!(n("img"), 2 + 7 + 3);
 }
 
 #[test]
 fn what_files_say_cannot_act() {
     let dir = tempfile::tempdir().expect("a folder");
-    let evil = "</script><script>document.title='owned'</script><img src=x onerror=\"document.title='owned'\">\"'&";
-    let mut study = studies::study(vec![studies::configuration(&[(evil, evil)], 10.0, 0.01, Front::On)]);
+    let evil = "</script><script>document.title='owned'</script><img src=x \
+        onerror=\"document.title='owned'\">\"'&";
+    let mut study =
+        studies::study(vec![studies::configuration(&[(evil, evil)], 10.0, 0.01, Front::On)]);
     (study.made.device.name, study.made.command, study.made.scene) =
         (evil.to_owned(), vec![evil.to_owned()], json!({ evil: evil }));
     study.configurations[0].failure = Some(evil.to_owned());
@@ -281,7 +341,12 @@ fn what_files_say_cannot_act() {
     browser.open(&page);
     assert_eq!(browser.eval("document.scripts.length + document.images.length"), json!(1));
     assert!(browser.eval("document.title").as_str().is_some_and(|t| t.starts_with("nimbus: ")));
-    assert!(browser.eval("document.body.innerText").as_str().is_some_and(|t| t.matches("onerror=").count() >= 5));
+    assert!(
+        browser
+            .eval("document.body.innerText")
+            .as_str()
+            .is_some_and(|t| t.matches("onerror=").count() >= 5)
+    );
     assert_eq!(browser.complaints(), [""; 0]);
     // A picture elsewhere is none of the study's.
     study.configurations[0].picture = Some("../../secret.png".to_owned());
@@ -306,14 +371,19 @@ fn bad_input_is_one_message_and_no_page() {
         folder.to_str().expect("UTF-8").to_owned()
     };
     let later = other("later", |v| v["schema"] = json!(99));
-    let lacking = other("lacking", |v| drop(v.as_object_mut().expect("an object").remove("reference")));
+    let lacking =
+        other("lacking", |v| drop(v.as_object_mut().expect("an object").remove("reference")));
     let none = other("none", |v| *v = json!({}));
     let cut = path(&dir, "cut");
     fs::create_dir(&cut).expect("a folder");
     fs::write(format!("{cut}/study.json"), "{\"schema\": 1,").expect("a file");
     let picture = path(&dir, "study/reference.png");
     for (given, said) in [
-        (empty.as_str(), "holds no results: none of run.json, study.json, ledger.json; expected a folder that bench"),
+        (
+            empty.as_str(),
+            "holds no results: none of run.json, study.json, ledger.json; expected a \
+             folder that bench",
+        ),
         ("nowhere", "nowhere: no such file or folder"),
         (&picture, "expected a results folder, or in one run.json, study.json, ledger.json"),
         (&later, "a study of schema 99; this nimbus reads 1"),
@@ -327,9 +397,10 @@ fn bad_input_is_one_message_and_no_page() {
         assert!(stderr.contains(said), "{stderr}");
         assert!(!PathBuf::from(&page).exists(), "{said}");
     }
-    for (output, said) in
-        [("page.pdf", "expected a file name that ends in .html"), ("gone/page.html", "does not exist")]
-    {
+    for (output, said) in [
+        ("page.pdf", "expected a file name that ends in .html"),
+        ("gone/page.html", "does not exist"),
+    ] {
         let output = run(&["report", &study, "-o", &path(&dir, output)]);
         assert_eq!(output.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&output.stderr).contains(said));
@@ -341,8 +412,14 @@ fn bad_input_is_one_message_and_no_page() {
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));
     let again = run(&["report", &format!("{study}/study.json"), "-o", &page, "--force"]);
-    assert!(again.status.success() && fs::read(&page).expect("a page") != first, "the file's name is in it");
-    assert!(!nimbus(&["report", "-o", &page]).output().expect("it runs").status.success(), "a run is needed");
+    assert!(
+        again.status.success() && fs::read(&page).expect("a page") != first,
+        "the file's name is in it"
+    );
+    assert!(
+        !nimbus(&["report", "-o", &page]).output().expect("it runs").status.success(),
+        "a run is needed"
+    );
 }
 
 #[test]
@@ -351,25 +428,34 @@ fn a_run_without_anything_to_draw_has_a_page() {
     let folder = dir.path().join("bare");
     fs::create_dir(&folder).expect("a folder");
     let rows = [FrameRow { warm_up: false, ..results::row("serial", 0) }];
-    write_results(&folder, &results::run(vec![results::mode("serial", 1, 0)]), &[], &rows).expect("results");
+    write_results(&folder, &results::run(vec![results::mode("serial", 1, 0)]), &[], &rows)
+        .expect("results");
     let bare = folder.to_str().expect("UTF-8").to_owned();
     let empty = dir.path().join("empty");
     fs::create_dir(&empty).expect("a folder");
     write_study(&empty, &Study { interrupted: true, ..studies::study(vec![]) });
     let page = report(&dir, &[&bare, empty.to_str().expect("UTF-8")]);
     let text = fs::read_to_string(page).expect("a page");
-    assert!(text.contains("No pass was timed") && text.contains("nothing was both timed and compared"));
+    assert!(
+        text.contains("No pass was timed") && text.contains("nothing was both timed and compared")
+    );
     assert!(text.contains("Interrupted:"));
 }
 
 #[test]
 fn a_bench_keeps_the_last_frame_of_its_cases_and_no_other_run_s() {
     let dir = tempfile::tempdir().expect("a folder");
-    let (scene, out) = (format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR")), path(&dir, "run"));
+    let (scene, out) =
+        (format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR")), path(&dir, "run"));
     let scene = [scene.as_str(), "--size", "64x48", "--set", "draw.particles=200"];
     let bench = |more: &[&str]| {
-        let args =
-            [&["bench"], &scene[..], &["--frames", "4", "--warmup", "1", "--no-saved", "--out", &out], more].concat();
+        let args = [
+            &["bench"],
+            &scene[..],
+            &["--frames", "4", "--warmup", "1", "--no-saved", "--out", &out],
+            more,
+        ]
+        .concat();
         let output = run(&args);
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let mut names: Vec<String> = fs::read_dir(&out)
@@ -380,15 +466,23 @@ fn a_bench_keeps_the_last_frame_of_its_cases_and_no_other_run_s() {
         names
     };
     let swept = bench(&["--sweep", "film.exposure=1,0.5", "--plot", "--threading", "serial"]);
-    let all = ["case-0.png", "case-1.png", "frames-0.svg", "frames-1.svg", "frames.csv", "passes.svg", "run.json"];
+    let all = [
+        "case-0.png",
+        "case-1.png",
+        "frames-0.svg",
+        "frames-1.svg",
+        "frames.csv",
+        "passes.svg",
+        "run.json",
+    ];
     assert_eq!(swept, all);
     // The frame itself, as `render` writes it.
     let drawn = path(&dir, "drawn.png");
     for (i, exposure) in ["film.exposure=1", "film.exposure=0.5"].into_iter().enumerate() {
         let more = ["--set", exposure, "--frame", "3", "-o", &drawn, "--force"];
         assert!(run(&[&["render"], &scene[..], &more].concat()).status.success());
-        let [kept, drawn] =
-            [format!("{out}/case-{i}.png"), drawn.clone()].map(|file| fs::read(file).expect("a picture"));
+        let [kept, drawn] = [format!("{out}/case-{i}.png"), drawn.clone()]
+            .map(|file| fs::read(file).expect("a picture"));
         assert!(kept == drawn, "{exposure}");
     }
     fs::write(format!("{out}/picture-7.png"), "mine").expect("a file");

@@ -1,5 +1,5 @@
-//! A player that goes on with other boxes, as an editor has it: what it holds and draws is what a fresh one holds and draws,
-//! and particles that nothing has changed are not generated.
+//! A player that goes on with other boxes, as an editor has it: what it holds and draws is what a
+//! fresh one holds and draws, and particles that nothing has changed are not generated.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -25,8 +25,10 @@ use nimbus::viewer::editor::{Document, Touched};
 /// A scene of two clouds, of which the first is edited.
 fn scene(more: &str, of_cloud: &str) -> Scene {
     let text = format!(
-        "[film]\nwidth = 40\nheight = 30\nformat = 'rgba32f'\n[camera]\nposition = [0, 0, 18]\ntarget = [0, 0, 0]\n\
-         [draw]\nparticles = 150\n{more}\n[[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\n\
+        "[film]\nwidth = 40\nheight = 30\nformat = 'rgba32f'\n[camera]\nposition = [0, 0, \
+         18]\ntarget = [0, 0, 0]\n\
+         [draw]\nparticles = 150\n{more}\n[[light]]\nkind = 'directional'\ndirection = [-0.5, \
+         -0.8, -0.3]\n\
          irradiance = [3, 3, 3]\n[[cloud]]\nfrom = 'boxes'\nfile = 'cubes-554.dat'\n{of_cloud}\n\
          [[cloud]]\nfrom = 'boxes'\nfile = 'cubes-615.dat'\nposition = [0, 5, -3]\nseed = 4\n"
     );
@@ -35,13 +37,17 @@ fn scene(more: &str, of_cloud: &str) -> Scene {
 }
 
 fn document(scene: &Scene) -> Document {
-    let CloudSource::Boxes { boxes, .. } = &scene.clouds[0].source else { unreachable!("a cloud of boxes") };
+    let CloudSource::Boxes { boxes, .. } = &scene.clouds[0].source else {
+        unreachable!("a cloud of boxes")
+    };
     Document { boxes: boxes.clone(), seed: scene.clouds[0].seed }
 }
 
 fn with(scene: &Scene, document: &Document) -> Arc<Scene> {
     let mut scene = scene.clone();
-    let CloudSource::Boxes { boxes, .. } = &mut scene.clouds[0].source else { unreachable!("a cloud of boxes") };
+    let CloudSource::Boxes { boxes, .. } = &mut scene.clouds[0].source else {
+        unreachable!("a cloud of boxes")
+    };
     *boxes = document.boxes.clone();
     scene.clouds[0].seed = document.seed;
     scene.into()
@@ -106,7 +112,11 @@ const N_KINDS: usize = 9;
 fn after_any_edits_all_is_as_of_a_fresh_player() {
     let cases = [
         ("[lighting]\nmode = 'first'\ngrid = 12", "texture = 'by-box'"),
-        ("path = 'sprites'\n[lighting]\nmode = 'two-reflection'\ngrid = 12\nfacets_per_cloud = 20", "gust = 0.3"),
+        (
+            "path = 'sprites'\n[lighting]\nmode = 'two-reflection'\ngrid = \
+             12\nfacets_per_cloud = 20",
+            "gust = 0.3",
+        ),
         ("[lighting]\nmode = 'none'\n[threads]\nsimulate = 'cpu'", "form = 'printed'"),
     ];
     let bed = bed();
@@ -121,8 +131,13 @@ fn after_any_edits_all_is_as_of_a_fresh_player() {
             let is_same_size = edit(&mut document, i_edit % N_KINDS, &mut random);
             let touched = Touched::between(&before, &document);
             let scene = with(&base, &document);
-            let reshaped = player.reshape(&bed, scene.clone(), &touched.generate).expect("reshaped");
-            assert_eq!(reshaped == Reshaped::InPlace, is_same_size, "edit {i_edit} of case {i_case}");
+            let reshaped =
+                player.reshape(&bed, scene.clone(), &touched.generate).expect("reshaped");
+            assert_eq!(
+                reshaped == Reshaped::InPlace,
+                is_same_size,
+                "edit {i_edit} of case {i_case}"
+            );
             // Several edits may come before a frame.
             if i_edit % 3 == 1 {
                 continue;
@@ -135,7 +150,8 @@ fn after_any_edits_all_is_as_of_a_fresh_player() {
     bed.close().expect("nothing to complain of");
 }
 
-/// What is not named as touched is left as it lies, on both ways: so who names too little sees what was.
+/// What is not named as touched is left as it lies, on both ways: so who names too little sees what
+/// was.
 #[test]
 fn only_what_is_touched_is_generated() {
     let bed = bed();
@@ -149,23 +165,26 @@ fn only_what_is_touched_is_generated() {
     }
     let mut longer = changed.clone();
     longer.boxes.push(changed.boxes[0]);
-    let n_before =
-        |document: &Document, i: usize| -> usize { document.boxes[..i].iter().map(|b| b.n_particles as usize).sum() };
+    let n_before = |document: &Document, i: usize| -> usize {
+        document.boxes[..i].iter().map(|b| b.n_particles as usize).sum()
+    };
     let of = |held: &Held, document: &Document, i: usize| {
         let begin = n_before(document, i);
         held.particles[begin..begin + document.boxes[i].n_particles as usize].to_vec()
     };
     let old = fresh(&bed, &with(&base, &first));
-    for (document, touched, way) in
-        [(&changed, vec![5], Reshaped::InPlace), (&longer, vec![5, first.boxes.len()], Reshaped::Anew)]
-    {
+    for (document, touched, way) in [
+        (&changed, vec![5], Reshaped::InPlace),
+        (&longer, vec![5, first.boxes.len()], Reshaped::Anew),
+    ] {
         let mut player = bed.player(base.clone(), true).expect("a player");
         held(&bed, &mut player);
         let scene = with(&base, document);
         assert_eq!(player.reshape(&bed, scene.clone(), &touched).expect("reshaped"), way);
         let (found, new) = (held(&bed, &mut player).0, fresh(&bed, &scene));
         for i in 0..first.boxes.len() {
-            let [old, found, new] = [of(&old, &first, i), of(&found, document, i), of(&new, document, i)];
+            let [old, found, new] =
+                [of(&old, &first, i), of(&found, document, i), of(&new, document, i)];
             assert!(!old.is_empty());
             assert_eq!(found == old, i != 5, "box {i}, {way:?}");
             assert_eq!(found == new, ![2, 6].contains(&i), "box {i}, {way:?}");
@@ -211,13 +230,16 @@ fn nothing_but_boxes_may_differ_and_what_is_refused_changes_nothing() {
     bed.close().expect("nothing to complain of");
 }
 
-/// Tiles compute thin blobs otherwise: what a radius turns thin, or no longer so, takes other pipelines.
+/// Tiles compute thin blobs otherwise: what a radius turns thin, or no longer so, takes other
+/// pipelines.
 #[test]
 fn a_radius_that_makes_blobs_thin_makes_all_anew() {
     let bed = bed();
     let base = scene("[lighting]\nmode = 'none'", "");
     let mut base = Scene { clouds: base.clouds[..1].to_vec(), ..base };
-    let CloudSource::Boxes { optical_depth, .. } = &mut base.clouds[0].source else { unreachable!("boxes") };
+    let CloudSource::Boxes { optical_depth, .. } = &mut base.clouds[0].source else {
+        unreachable!("boxes")
+    };
     *optical_depth = 0.08;
     // A greatest radius of 3 is 1.4 times the mean, one of 0.5 twice.
     let mut wide = document(&base);
@@ -227,7 +249,9 @@ fn a_radius_that_makes_blobs_thin_makes_all_anew() {
     small.boxes[3].radius_max = 0.5;
     let mut player = bed.player(base.clone(), true).expect("a player");
     held(&bed, &mut player);
-    for (document, way) in [(&small, Reshaped::Anew), (&small, Reshaped::InPlace), (&wide, Reshaped::Anew)] {
+    for (document, way) in
+        [(&small, Reshaped::Anew), (&small, Reshaped::InPlace), (&wide, Reshaped::Anew)]
+    {
         let scene = with(&base, document);
         assert_eq!(player.reshape(&bed, scene.clone(), &[3]).expect("reshaped"), way);
         assert!(held(&bed, &mut player).0 == fresh(&bed, &scene));
@@ -236,7 +260,8 @@ fn a_radius_that_makes_blobs_thin_makes_all_anew() {
     bed.close().expect("nothing to complain of");
 }
 
-/// A long cloud's grid has few cells across it; pulled together it needs more than there was room for.
+/// A long cloud's grid has few cells across it; pulled together it needs more than there was room
+/// for.
 #[test]
 fn the_density_grid_gets_room_for_other_proportions() {
     let bed = bed();
@@ -260,22 +285,28 @@ fn the_density_grid_gets_room_for_other_proportions() {
 #[test]
 fn a_cloud_may_begin_with_no_box_and_lose_its_last() {
     let bed = bed();
-    for more in
-        ["[lighting]\nmode = 'two-reflection'\ngrid = 8", "path = 'sprites'\n[lighting]\nmode = 'first'\ngrid = 8"]
-    {
+    for more in [
+        "[lighting]\nmode = 'two-reflection'\ngrid = 8",
+        "path = 'sprites'\n[lighting]\nmode = 'first'\ngrid = 8",
+    ] {
         let base = scene(more, "");
         let base = Scene { clouds: base.clouds[..1].to_vec(), ..base };
         let [none, no_particles, one] = [vec![], vec![0], vec![40]].map(|counts| {
             let like = document(&base).boxes[0];
-            let boxes = counts.into_iter().map(|n_particles| CloudBox { n_particles, ..like }).collect();
+            let boxes =
+                counts.into_iter().map(|n_particles| CloudBox { n_particles, ..like }).collect();
             Document { boxes, seed: 3 }
         });
         let mut player = bed.player(with(&base, &none), true).expect("a player of nothing");
         let empty = held(&bed, &mut player).0;
         assert!(empty.particles.is_empty() && empty.picture.iter().all(|byte| *byte == 0));
-        for (document, touched) in
-            [(&no_particles, vec![0]), (&one, vec![0]), (&no_particles, vec![0]), (&one, vec![0]), (&none, vec![])]
-        {
+        for (document, touched) in [
+            (&no_particles, vec![0]),
+            (&one, vec![0]),
+            (&no_particles, vec![0]),
+            (&one, vec![0]),
+            (&none, vec![]),
+        ] {
             let scene = with(&base, document);
             player.reshape(&bed, scene.clone(), &touched).expect("reshaped");
             let held = held(&bed, &mut player).0;

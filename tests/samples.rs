@@ -1,4 +1,5 @@
-//! References by samples: means over a pixel's area, and parts that are put together to the bits of the whole.
+//! References by samples: means over a pixel's area, and parts that are put together to the bits of
+//! the whole.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -30,7 +31,9 @@ fn in_parts(subject: &Subject<'_>, n: u32, [columns, rows]: [u32; 2]) -> Sums {
             let (width, height) = (columns.min(film.width - left), rows.min(film.height - top));
             let pixels = Pixels::tile(film.width, film.height, Tile { left, top, width, height });
             let mut pairs = Pairs::default();
-            (0..n).step_by(2).for_each(|first| pairs.push(of(subject, &pixels, first..n.min(first + 2))));
+            (0..n)
+                .step_by(2)
+                .for_each(|first| pairs.push(of(subject, &pixels, first..n.min(first + 2))));
             let found = pairs.finish().expect("a range");
             for (at, value) in pixels.at.iter().zip(found.values.chunks_exact(N_VALUES)) {
                 values[N_VALUES * whole.index(*at)..][..N_VALUES].copy_from_slice(value);
@@ -49,7 +52,12 @@ fn tiles_and_ranges_are_the_whole_to_the_bit() {
         ("the volume", "volume", "scenes/cubes-554.toml", &[plain][..]),
         ("facets of a room", "thin", "scenes/study-light.toml", &["lighting.mode=\"first\""]),
         ("every pixel of a floor lit", "model", "scenes/study-light.toml", &[]),
-        ("random paths", "reflections=3", "scenes/study-light.toml", &["film.width=7", "film.height=5"]),
+        (
+            "random paths",
+            "reflections=3",
+            "scenes/study-light.toml",
+            &["film.width=7", "film.height=5"],
+        ),
         (
             "random paths to particles",
             "reflections=3",
@@ -57,13 +65,22 @@ fn tiles_and_ranges_are_the_whole_to_the_bit() {
             &[plain, "draw.particles=12", "film.width=4", "film.height=3"],
         ),
         ("what nothing lights", "model", "scenes/hello.toml", &[plain, "lighting.mode=\"none\""]),
-        ("hills", "thin", "scenes/katrina.toml", &["lighting.mode=\"none\"", "cloud.0.particles=300"]),
+        (
+            "hills",
+            "thin",
+            "scenes/katrina.toml",
+            &["lighting.mode=\"none\"", "cloud.0.particles=300"],
+        ),
     ] {
         let scene = loaded(scene, &[&size[..], more].concat());
-        let subject = Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
+        let subject =
+            Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
         let pixels = Pixels::all(scene.film.width, scene.film.height);
         let whole = of(&subject, &pixels, 0..3);
-        assert!(whole.values.iter().all(|v| v.is_finite()) && whole.values.iter().any(|v| *v > 0.0), "{what}");
+        assert!(
+            whole.values.iter().all(|v| v.is_finite()) && whole.values.iter().any(|v| *v > 0.0),
+            "{what}"
+        );
         for size in [[4, 5], [11, 7]] {
             assert!(in_parts(&subject, 3, size) == whole, "{what}: tiles of {size:?}");
         }
@@ -73,8 +90,9 @@ fn tiles_and_ranges_are_the_whole_to_the_bit() {
     }
 }
 
-/// A white wall a unit before the eye, which sees two units of it in eight pixels. It ends 0.3 of a pixel into column
-/// 4, and 0.6 of one below the upper edge of row 2; to the left and below it ends out of sight.
+/// A white wall a unit before the eye, which sees two units of it in eight pixels. It ends 0.3 of a
+/// pixel into column 4, and 0.6 of one below the upper edge of row 2; to the left and below it ends
+/// out of sight.
 const WALL: &str = r#"
 [film]
 width = 8
@@ -102,23 +120,33 @@ fn a_pixel_has_what_covers_its_area() {
     std::fs::write(&file, WALL).expect("a file");
     let scene = scene_file::load(&file, &[], None).expect("a scene").at_frame(0);
     for of_which in ["thin", "volume", "model"] {
-        let subject = Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
+        let subject =
+            Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
         let alpha = |n: u32| -> Vec<f64> {
             let mean = of(&subject, &Pixels::all(8, 8), 0..n).mean();
             mean.rgba.iter().map(|v| v[3]).collect()
         };
-        // The wall's upper edge is at y = 0.35: row 2 begins at y = 0.5, 0.25 a pixel, so 0.4 of it is covered.
+        // The wall's upper edge is at y = 0.35: row 2 begins at y = 0.5, 0.25 a pixel, so 0.4 of it
+        // is covered.
         let at = |values: &[f64], column: usize, row: usize| values[8 * row + column];
         let one = alpha(1);
         // Its centre is outside in both.
-        assert_eq!([at(&one, 4, 5), at(&one, 1, 2), at(&one, 1, 5), at(&one, 6, 5)], [0.0, 0.0, 1.0, 0.0]);
+        assert_eq!(
+            [at(&one, 4, 5), at(&one, 1, 2), at(&one, 1, 5), at(&one, 6, 5)],
+            [0.0, 0.0, 1.0, 0.0]
+        );
         for n in [64, 512] {
             let many = alpha(n);
             // A sequence of low discrepancy: a few samples off, not √n.
             let off = 4.0 / f64::from(n);
-            for (column, row, covered) in [(4, 5, 0.3), (1, 2, 0.4), (4, 2, 0.12), (1, 5, 1.0), (6, 5, 0.0)] {
+            for (column, row, covered) in
+                [(4, 5, 0.3), (1, 2, 0.4), (4, 2, 0.12), (1, 5, 1.0), (6, 5, 0.0)]
+            {
                 let found = at(&many, column, row);
-                assert!((found - covered).abs() <= off, "{of_which}, {n}, {column} {row}: {found}, not {covered}");
+                assert!(
+                    (found - covered).abs() <= off,
+                    "{of_which}, {n}, {column} {row}: {found}, not {covered}"
+                );
             }
         }
     }
@@ -126,7 +154,8 @@ fn a_pixel_has_what_covers_its_area() {
 
 /// Root mean square of the differences of two pictures, of the greatest channel.
 fn differ(a: &Mean, b: &Mean) -> f64 {
-    let of = |(a, b): (&[f64; 4], &[f64; 4])| (0..3).map(|k| (a[k] - b[k]).powi(2)).fold(0.0, f64::max);
+    let of =
+        |(a, b): (&[f64; 4], &[f64; 4])| (0..3).map(|k| (a[k] - b[k]).powi(2)).fold(0.0, f64::max);
     let sum: f64 = a.rgba.iter().zip(&b.rgba).map(of).sum();
     (sum / a.rgba.len() as f64).sqrt()
 }

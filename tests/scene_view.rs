@@ -1,5 +1,5 @@
-//! A view saved as a scene: loaded again it is the scene that was seen, wherever it was saved to, and reads as it was
-//! written.
+//! A view saved as a scene: loaded again it is the scene that was seen, wherever it was saved to,
+//! and reads as it was written.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,8 @@ use nimbus::viewer::wanted::Wanted;
 
 fn scenes() -> Vec<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
-    let mut paths: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut paths: Vec<PathBuf> =
+        fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "toml"));
     paths.sort();
     assert!(paths.len() > 15);
@@ -32,7 +33,8 @@ fn seen(loaded: &LoadedScene) -> Vec<String> {
     wanted.overrides(&scene)
 }
 
-/// With particles that are moved where they are at one time: two files that are open are never the same.
+/// With particles that are moved where they are at one time: two files that are open are never the
+/// same.
 fn at_rest(scene: &Scene, time_s: f64) -> Scene {
     let mut scene = scene.clone();
     for cloud in &mut scene.clouds {
@@ -43,8 +45,8 @@ fn at_rest(scene: &Scene, time_s: f64) -> Scene {
     scene
 }
 
-/// Scenes alike, phases' too; and all that was resolved, but for where the files are and for what phases say, which has
-/// to give way.
+/// Scenes alike, phases' too; and all that was resolved, but for where the files are and for what
+/// phases say, which has to give way.
 fn assert_same(a: &LoadedScene, b: &LoadedScene, what: &str) {
     for time_s in [0.0, 7.3] {
         assert!(at_rest(&a.scene, time_s) == at_rest(&b.scene, time_s), "{what}");
@@ -74,7 +76,11 @@ fn every_scene_reads_back_as_it_was_seen_from_any_folder() {
         let expected = load(&path, &set, Some(7)).unwrap();
         let beside = path.with_file_name("view-1.toml");
         let text = text_of(&path, &beside, &set, Some(7)).unwrap();
-        assert_same(&parse(text, &beside, &[], None).unwrap(), &expected, &path.display().to_string());
+        assert_same(
+            &parse(text, &beside, &[], None).unwrap(),
+            &expected,
+            &path.display().to_string(),
+        );
         let name = path.file_name().unwrap();
         let to = elsewhere.path().join(name);
         save(&path, &to, &set, Some(7)).unwrap();
@@ -100,15 +106,33 @@ fn what_was_not_set_stays_as_it_was_written() {
         let set = seen(&load(&path, &[], None).unwrap());
         let saved = text_of(&path, &to, &set, None).unwrap();
         let mut lines = saved.lines();
-        let lost: Vec<&str> =
-            text.lines().filter(|line| !lines.clone().any(|l| l == *line) || !lines.any(|l| l == *line)).collect();
-        let keys = ["width", "height", "position", "target", "path", "mode", "bases", "theta", "resolution", "{", "]"];
-        let is_set =
-            |line: &&str| keys.iter().any(|key| line.trim_start().starts_with(key)) || line.contains("set.film");
+        let lost: Vec<&str> = text
+            .lines()
+            .filter(|line| !lines.clone().any(|l| l == *line) || !lines.any(|l| l == *line))
+            .collect();
+        let keys = [
+            "width",
+            "height",
+            "position",
+            "target",
+            "path",
+            "mode",
+            "bases",
+            "theta",
+            "resolution",
+            "{",
+            "]",
+        ];
+        let is_set = |line: &&str| {
+            keys.iter().any(|key| line.trim_start().starts_with(key)) || line.contains("set.film")
+        };
         assert!(lost.iter().all(is_set), "{}: {lost:#?}", path.display());
         // Not a word of a comment is lost, but within a value that is another now.
-        let comments =
-            |text: &str| text.lines().filter_map(|l| l.split_once('#').map(|(_, c)| c.to_owned())).collect::<Vec<_>>();
+        let comments = |text: &str| {
+            text.lines()
+                .filter_map(|l| l.split_once('#').map(|(_, c)| c.to_owned()))
+                .collect::<Vec<_>>()
+        };
         if !text.contains("path = [") {
             assert_eq!(comments(&saved), comments(&text), "{}", path.display());
         }
@@ -131,22 +155,29 @@ fn strings(texts: &[&str]) -> Vec<String> {
     texts.iter().map(|t| (*t).to_owned()).collect()
 }
 
-const CLOUDS: &str =
-    "[[cloud]]\nfrom = 'particles'\nfile = 'one.csv' # the first\n[[cloud]]\nfrom = 'particles'\nfile = '../two.csv'\n";
+const CLOUDS: &str = "[[cloud]]\nfrom = 'particles'\nfile = 'one.csv' # the first\n[[cloud]]\nfrom \
+    = 'particles'\nfile = '../two.csv'\n";
 
 #[test]
 fn phases_do_not_take_back_what_is_seen() {
-    let phases = "[[phase]]\nname = 'a'\nframes = 2\nset.film = { width = 40, height = 30 }\nset.threads.mode = 'serial'\n\
-        [[phase]]\nname = 'b'\nframes = 3\nset.\"cloud.*.seed\" = 5\nset.\"cloud.0.file\" = '../two.csv'\n\
-        [[phase]]\nname = 'c'\nframes = 1\nset.camera.path = [{ time_s = 0, position = [0, 0, 9], target = [0, 0, 0] }]\n\
-        [[phase]]\nname = 'd'\nframes = 1\nset.\"film.width\" = 50\nset.lighting.bases = 4\nset.\"cloud.1.seed\" = 3\n";
+    let phases = "[[phase]]\nname = 'a'\nframes = 2\nset.film = { width = 40, height = 30 \
+        }\nset.threads.mode = 'serial'\n\
+        [[phase]]\nname = 'b'\nframes = 3\nset.\"cloud.*.seed\" = 5\nset.\"cloud.0.file\" = \
+        '../two.csv'\n\
+        [[phase]]\nname = 'c'\nframes = 1\nset.camera.path = [{ time_s = 0, position = [0, 0, 9], \
+        target = [0, 0, 0] }]\n\
+        [[phase]]\nname = 'd'\nframes = 1\nset.\"film.width\" = 50\nset.lighting.bases = \
+        4\nset.\"cloud.1.seed\" = 3\n";
     let camera = "[camera]\npath = [{ time_s = 1, position = [0, 0, 8], target = [0, 0, 0] }]\n";
     let (_dir, from, to) = two_folders(&format!("{camera}{CLOUDS}{phases}"));
     for set in [
         &["film.width=99", "threads.mode=parallel"][..],
         &["film={ width = 77 }", "lighting.bases=2"],
         &["cloud.0.seed=9", "camera.path.0.position=[0, 0, 12]"],
-        &["cloud.*.seed=11", "camera.path=[{ time_s = 0, position = [1, 0, 8], target = [0, 0, 0] }]"],
+        &[
+            "cloud.*.seed=11",
+            "camera.path=[{ time_s = 0, position = [1, 0, 8], target = [0, 0, 0] }]",
+        ],
         &["cloud.*.file=one.csv"],
         &[
             "title = \"what is = seen\"",
@@ -157,7 +188,11 @@ fn phases_do_not_take_back_what_is_seen() {
     ] {
         let set = strings(set);
         save(&from, &to, &set, None).unwrap();
-        assert_same(&load(&to, &[], None).unwrap(), &load(&from, &set, None).unwrap(), &format!("{set:?}"));
+        assert_same(
+            &load(&to, &[], None).unwrap(),
+            &load(&from, &set, None).unwrap(),
+            &format!("{set:?}"),
+        );
         fs::remove_file(&to).unwrap();
     }
     // Without what gives way to it a phase would be another.
@@ -168,8 +203,12 @@ fn phases_do_not_take_back_what_is_seen() {
 #[test]
 fn however_tables_are_written() {
     for text in [
-        format!("film.width = 3 # inline\ncamera = {{ position = [0, 0, 8], up = [0, 1, 0] }}\n{CLOUDS}"),
-        "cloud = [{ from = 'particles', file = 'one.csv' }, { from = 'particles', file = \"../two.csv\" }]\n"
+        format!(
+            "film.width = 3 # inline\ncamera = {{ position = [0, 0, 8], up = [0, 1, 0] \
+            }}\n{CLOUDS}"
+        ),
+        "cloud = [{ from = 'particles', file = 'one.csv' }, { from = 'particles', file \
+         = \"../two.csv\" }]\n"
             .to_owned(),
         format!("{CLOUDS}[[camera.path]]\ntime_s = 0\nposition = [0, 0, 8]\ntarget = [0, 0, 0]\n"),
         format!("\u{feff}[film]\r\nwidth = 5 # five\r\n\r\n{}", CLOUDS.replace('\n', "\r\n")),
@@ -180,12 +219,19 @@ fn however_tables_are_written() {
         } else {
             "camera.position=[1, 0, 8]"
         };
-        let set = strings(&["film.width=40", "film.height=30", camera, "cloud.1.seed=4", "draw.path=\"sprites\""]);
+        let set = strings(&[
+            "film.width=40",
+            "film.height=30",
+            camera,
+            "cloud.1.seed=4",
+            "draw.path=\"sprites\"",
+        ]);
         save(&from, &to, &set, None).unwrap();
         assert_same(&load(&to, &[], None).unwrap(), &load(&from, &set, None).unwrap(), &text);
         let saved = fs::read_to_string(&to).unwrap();
         assert!(
-            saved.contains("../a/one.csv") && saved.contains("\"../two.csv\"") || saved.contains("'../two.csv'"),
+            saved.contains("../a/one.csv") && saved.contains("\"../two.csv\"")
+                || saved.contains("'../two.csv'"),
             "{saved}"
         );
         for comment in ["# inline", "# five", "# the first"] {
@@ -201,7 +247,10 @@ fn nothing_is_written_over_and_nothing_wrong_is_written() {
     let (dir, from, to) = two_folders(CLOUDS);
     fs::write(&to, "mine").unwrap();
     let error = save(&from, &to, &[], None).unwrap_err().to_string();
-    assert!(error.ends_with("exists already") && fs::read_to_string(&to).unwrap() == "mine", "{error}");
+    assert!(
+        error.ends_with("exists already") && fs::read_to_string(&to).unwrap() == "mine",
+        "{error}"
+    );
     let other = to.with_file_name("other.toml");
     for (set, what) in [
         ("film.width", "expected key.path=VALUE"),

@@ -1,7 +1,9 @@
-//! Many frames: the two loops do not drift apart, and nothing grows. Every frame of both is read back and chained into
-//! one hash; validation layers listen; the process' resident memory is sampled.
+//! Many frames: the two loops do not drift apart, and nothing grows. Every frame of both is read
+//! back and chained into one hash; validation layers listen; the process' resident memory is
+//! sampled.
 //!
-//! `NIMBUS_SOAK_FRAMES=100000 cargo test --release --test soak -- --nocapture` is the long run (docs/measured.md).
+//! `NIMBUS_SOAK_FRAMES=100000 cargo test --release --test soak -- --nocapture` is the long run
+//! (docs/measured.md).
 
 use std::fs;
 use std::path::Path;
@@ -19,9 +21,9 @@ use sha2::{Digest, Sha256};
 const N_FRAMES: u32 = 600;
 /// Samples of the memory over a run.
 const N_SAMPLES: u32 = 60;
-/// What resident memory may grow by after the first fifth of a run. A leak of 100 bytes a frame is 8 MB over the other four
-/// of 100 000 frames, one of a kilobyte is found in 5000. What is allowed for is the allocator's and the validation
-/// layers' own: pages come by the hundred kilobytes.
+/// What resident memory may grow by after the first fifth of a run. A leak of 100 bytes a frame is
+/// 8 MB over the other four of 100 000 frames, one of a kilobyte is found in 5000. What is allowed
+/// for is the allocator's and the validation layers' own: pages come by the hundred kilobytes.
 const MAX_GROWTH_KIB: i64 = 4096;
 
 /// What one loop came to.
@@ -34,7 +36,8 @@ struct Soaked {
 }
 
 fn n_frames() -> u32 {
-    std::env::var("NIMBUS_SOAK_FRAMES").map_or(N_FRAMES, |n| n.parse().expect("NIMBUS_SOAK_FRAMES: a number"))
+    std::env::var("NIMBUS_SOAK_FRAMES")
+        .map_or(N_FRAMES, |n| n.parse().expect("NIMBUS_SOAK_FRAMES: a number"))
 }
 
 fn resident_kib() -> i64 {
@@ -45,7 +48,8 @@ fn resident_kib() -> i64 {
 
 /// Runs `n` frames through one loop, on a device of its own.
 fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
-    let scene = scene_file::load(Path::new("tests/data/soak.toml"), &[], None).expect("the scene").scene;
+    let scene =
+        scene_file::load(Path::new("tests/data/soak.toml"), &[], None).expect("the scene").scene;
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let mut stage = Stage::new(scene, &choice, skip).expect("a stage");
     let mut soaked = Soaked { chain: [0; 32], resident_kib: vec![], wall_s: 0.0 };
@@ -53,11 +57,13 @@ fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
     let (mut n_seen, mut last) = (0, vec![]);
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         assert_eq!(times.i_frame, n_seen, "frames end in their order");
-        // Of the frame that has just ended; the loop does not draw into its picture before this returns.
+        // Of the frame that has just ended; the loop does not draw into its picture before this
+        // returns.
         let bytes = renderer.image_bytes()?;
         assert!(bytes != last, "frame {n_seen} is the one before it");
         assert!([Pass::Place, Pass::Second, Pass::Tiles].iter().all(|pass| times.plan.runs(*pass)));
-        soaked.chain = Sha256::new().chain_update(soaked.chain).chain_update(&bytes).finalize().into();
+        soaked.chain =
+            Sha256::new().chain_update(soaked.chain).chain_update(&bytes).finalize().into();
         last = bytes;
         n_seen += 1;
         if n_seen % n.div_ceil(N_SAMPLES) == 0 {
@@ -73,7 +79,8 @@ fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
     soaked
 }
 
-/// From the second fifth of the samples to the last one: medians, which a single burst does not move.
+/// From the second fifth of the samples to the last one: medians, which a single burst does not
+/// move.
 fn growth_kib(samples: &[i64]) -> i64 {
     let fifth = samples.len() / 5;
     let median = |part: &[i64]| {
@@ -90,10 +97,12 @@ fn check(skip: bool) {
     let soaked = runs.map(|(name, threading)| (name, soak(threading, skip, n)));
     for (name, of) in &soaked {
         let samples = &of.resident_kib;
-        let [start, middle, end] = [0, samples.len() / 2, samples.len() - 1].map(|i| samples[i] as f64 / 1024.0);
+        let [start, middle, end] =
+            [0, samples.len() / 2, samples.len() - 1].map(|i| samples[i] as f64 / 1024.0);
         let hash: String = of.chain.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
         println!(
-            "{name}, skip {skip}: {n} frames in {:.1} s, resident {start:.2}, {middle:.2}, {end:.2} MiB, growth {} KiB, \
+            "{name}, skip {skip}: {n} frames in {:.1} s, resident {start:.2}, {middle:.2}, \
+             {end:.2} MiB, growth {} KiB, \
              chain {hash}…",
             of.wall_s,
             growth_kib(samples)
@@ -101,7 +110,11 @@ fn check(skip: bool) {
     }
     for (name, of) in &soaked {
         let growth = growth_kib(&of.resident_kib);
-        assert!(growth <= MAX_GROWTH_KIB, "{name}: resident memory grew by {growth} KiB: {:?}", of.resident_kib);
+        assert!(
+            growth <= MAX_GROWTH_KIB,
+            "{name}: resident memory grew by {growth} KiB: {:?}",
+            of.resident_kib
+        );
     }
     assert!(soaked[0].1.chain == soaked[1].1.chain, "the loops differ");
 }
@@ -114,7 +127,9 @@ fn the_loops_stay_the_same_and_memory_flat() {
 
 #[test]
 fn a_leak_would_be_seen() {
-    let leak = |kib_a_sample: i64| (0..60).map(|i| 80_000 + kib_a_sample * i + (i % 3) * 50).collect::<Vec<i64>>();
+    let leak = |kib_a_sample: i64| {
+        (0..60).map(|i| 80_000 + kib_a_sample * i + (i % 3) * 50).collect::<Vec<i64>>()
+    };
     assert!(growth_kib(&leak(0)).abs() <= 100);
     // 100 bytes a frame over 100 000 frames: 163 KiB from one sample to the next.
     assert!(growth_kib(&leak(163)) > MAX_GROWTH_KIB);

@@ -18,12 +18,17 @@ fn stress(args: &[&str]) -> (Option<i32>, String, String) {
 fn every_case_passes_here() {
     let (code, stdout, stderr) = stress(&["--json", "--validation", "-q"]);
     let report: Value = serde_json::from_str(&stdout).expect("JSON");
-    let schema: Value = serde_json::from_str(include_str!("../docs/stress.schema.json")).expect("the schema");
-    let errors: Vec<String> =
-        jsonschema::draft202012::new(&schema).expect("a schema").iter_errors(&report).map(|e| e.to_string()).collect();
+    let schema: Value =
+        serde_json::from_str(include_str!("../docs/stress.schema.json")).expect("the schema");
+    let errors: Vec<String> = jsonschema::draft202012::new(&schema)
+        .expect("a schema")
+        .iter_errors(&report)
+        .map(|e| e.to_string())
+        .collect();
     assert!(errors.is_empty(), "{errors:?}");
     let list = report["cases"].as_array().expect("cases");
-    let bad: Vec<&Value> = list.iter().filter(|c| c["verdict"] != "passed" && c["verdict"] != "not-here").collect();
+    let bad: Vec<&Value> =
+        list.iter().filter(|c| c["verdict"] != "passed" && c["verdict"] != "not-here").collect();
     assert!(bad.is_empty() && code == Some(0), "{bad:#?}\n{stderr}");
     assert!(list.len() == cases().len() && list.len() >= 80, "{}", list.len());
     // Nearly all are there on every device, and none compares nothing.
@@ -39,8 +44,16 @@ fn every_case_is_explained() {
     let mut names = BTreeSet::new();
     for case in cases() {
         assert!(names.insert(case.name), "{} twice", case.name);
-        assert!(page.contains(&format!("`{}`", case.name)), "docs/stability.md does not name {}", case.name);
-        assert!(!case.what.is_empty() && !case.bound.is_empty() && case.what.len() < 140, "{}", case.name);
+        assert!(
+            page.contains(&format!("`{}`", case.name)),
+            "docs/stability.md does not name {}",
+            case.name
+        );
+        assert!(
+            !case.what.is_empty() && !case.bound.is_empty() && case.what.len() < 140,
+            "{}",
+            case.name
+        );
     }
     // And names nothing that is not there.
     for word in page.split('`').skip(1).step_by(2) {
@@ -58,12 +71,18 @@ fn a_wrong_shader_is_told_and_ends_with_1() {
     let dir = tempfile::tempdir().expect("a folder");
     std::fs::create_dir(dir.path().join("include")).expect("a folder");
     let text = std::fs::read_to_string("shaders/include/functions.glsl").expect("a shader");
-    std::fs::write(dir.path().join("include/functions.glsl"), text.replace("0.00833307858", "0.00833007858"))
-        .expect("written");
-    let (code, stdout, stderr) = stress(&["functions", "--shaders", &dir.path().display().to_string(), "-q"]);
+    std::fs::write(
+        dir.path().join("include/functions.glsl"),
+        text.replace("0.00833307858", "0.00833007858"),
+    )
+    .expect("written");
+    let (code, stdout, stderr) =
+        stress(&["functions", "--shaders", &dir.path().display().to_string(), "-q"]);
     assert_eq!(code, Some(1));
     assert!(
-        stdout.contains("functions/sine ") && stdout.contains("FAILED") && stdout.contains("out of bound; at x = ")
+        stdout.contains("functions/sine ")
+            && stdout.contains("FAILED")
+            && stdout.contains("out of bound; at x = ")
     );
     assert!(stderr.contains("cases failed: functions/sine"), "{stderr}");
 }
@@ -73,12 +92,16 @@ fn what_is_typed_wrong_is_told() {
     let (code, _, stderr) = stress(&["functoins"]);
     assert_eq!(code, Some(2));
     assert!(
-        stderr.contains("no case begins with \"functoins\"") && stderr.contains("functions, generation"),
+        stderr.contains("no case begins with \"functoins\"")
+            && stderr.contains("functions, generation"),
         "{stderr}"
     );
     let (code, stdout, _) = stress(&["count/most", "functions/rounding", "--csv", "-q"]);
     let rows: Vec<&str> = stdout.lines().collect();
-    assert!(code == Some(0) && rows.len() == 3 && rows[0].starts_with("name,verdict,n,"), "{stdout}");
+    assert!(
+        code == Some(0) && rows.len() == 3 && rows[0].starts_with("name,verdict,n,"),
+        "{stdout}"
+    );
 }
 
 /// As many threads of the driver as there may be: the same bytes.
@@ -88,7 +111,10 @@ fn pictures_do_not_depend_on_the_drivers_threads() {
         let dir = tempfile::tempdir().expect("a folder");
         let out = dir.path().join("out.png").display().to_string();
         let args = ["render", "scenes/hello.toml", "--size", "160x120", "--json", "-q", "-o", &out];
-        let output = program::nimbus(&args).env("LP_NUM_THREADS", threads).output().expect("the program runs");
+        let output = program::nimbus(&args)
+            .env("LP_NUM_THREADS", threads)
+            .output()
+            .expect("the program runs");
         assert!(output.status.success());
         let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
         (told["hash"].clone(), std::fs::read(dir.path().join("out.png")).expect("a picture"))

@@ -1,5 +1,5 @@
-//! `nimbus error` and `nimbus ledger` as a user types them: what stands in the results' folder, and what a study
-//! goes on from.
+//! `nimbus error` and `nimbus ledger` as a user types them: what stands in the results' folder, and
+//! what a study goes on from.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -37,17 +37,29 @@ fn pixels(tiny: &Tiny, name: &str) -> Vec<u8> {
 #[test]
 fn a_study_is_one_in_all_its_files() {
     let tiny = Tiny::new();
-    let budgets = ["--budget-ms=1e-9", "--budget-ms=1e9", "--budget-error=1e-9", "--budget-error=9"];
+    let budgets =
+        ["--budget-ms=1e-9", "--budget-ms=1e9", "--budget-error=1e-9", "--budget-error=9"];
     let printed = tiny.good(&[&SHORT[..], &TWO_KNOBS, &OUT, &budgets, &["--json"]].concat());
     let json = tiny.json("out/study.json");
     assert_eq!(serde_json::from_str::<Value>(&printed).expect("JSON"), json);
     assert_valid(&json, "study.schema.json");
-    assert_eq!((&json["interrupted"], &json["rounds"], &json["frames"]), (&json!(false), &json!(2), &json!(1)));
+    assert_eq!(
+        (&json["interrupted"], &json["rounds"], &json["frames"]),
+        (&json!(false), &json!(2), &json!(1))
+    );
     assert_eq!((&json["metric"], &json["time"]), (&json!("rmse"), &json!("frame")));
-    assert_eq!((&json["scene_file"], &json["reference"]["n_pixels"]), (&json!("scene.toml"), &json!(N_PIXELS)));
-    // The scene's own values are the scene. What is put together depends on what this machine finds faster.
+    assert_eq!(
+        (&json["scene_file"], &json["reference"]["n_pixels"]),
+        (&json!("scene.toml"), &json!(N_PIXELS))
+    );
+    // The scene's own values are the scene. What is put together depends on what this machine finds
+    // faster.
     assert_eq!(names(&json)[..3], ["as it stands", "draw.cutoff=2", "draw.sort_bits=16"]);
-    assert!(names(&json)[3..].iter().all(|name| name.contains("draw.cutoff=2") && name.contains("draw.sort_bits=16")));
+    assert!(
+        names(&json)[3..]
+            .iter()
+            .all(|name| name.contains("draw.cutoff=2") && name.contains("draw.sort_bits=16"))
+    );
     let base = &study(&json)[0];
     assert_eq!(base["by_base"], json!({ "value": 1.0, "low": 1.0, "high": 1.0 }));
     assert_eq!(base["settings"], json!([]));
@@ -55,7 +67,13 @@ fn a_study_is_one_in_all_its_files() {
     assert!(study(&json).iter().any(|c| c["front"] == "on"), "someone is on the front");
     // The reference knows no sort; what is cut of a blob is an error.
     let rmse = |i: usize| study(&json)[i]["error"]["rmse"]["value"].as_f64().expect("an error");
-    assert!(rmse(0) > 0.0 && rmse(1) > rmse(0) && rmse(2) == rmse(0), "{} {} {}", rmse(0), rmse(1), rmse(2));
+    assert!(
+        rmse(0) > 0.0 && rmse(1) > rmse(0) && rmse(2) == rmse(0),
+        "{} {} {}",
+        rmse(0),
+        rmse(1),
+        rmse(2)
+    );
     check_times(&tiny, &json);
     check_pictures(&tiny, &json);
     check_best(&json);
@@ -65,14 +83,17 @@ fn a_study_is_one_in_all_its_files() {
     let again = [&SHORT[..], &TWO_KNOBS, &OUT, &budgets, &["--resume"]].concat();
     assert_eq!(tiny.good(&[&again[..], &["--csv"]].concat()), tiny.text("out/configurations.csv"));
     let printed = tiny.good(&again);
-    let lines =
-        ["within 0.000000001 ms: none of them", "within 1000000000 ms, the most exact: ", "9 of rmse, the fastest: "];
+    let lines = [
+        "within 0.000000001 ms: none of them",
+        "within 1000000000 ms, the most exact: ",
+        "9 of rmse, the fastest: ",
+    ];
     assert!(lines.iter().all(|line| printed.contains(line)), "{printed}");
     assert_eq!(tiny.text("out/times.csv"), times);
 }
 
-/// The figures of times follow from times.csv: those of the scene as it stands are medians, those of others medians of
-/// ratios to the turns of the scene just before and just after.
+/// The figures of times follow from times.csv: those of the scene as it stands are medians, those
+/// of others medians of ratios to the turns of the scene just before and just after.
 fn check_times(tiny: &Tiny, json: &Value) {
     let table = Table::of(&tiny.text("out/times.csv"));
     let turns: Vec<(usize, f64)> = table
@@ -101,7 +122,10 @@ fn check_times(tiny: &Tiny, json: &Value) {
         };
         let by_base = median(of(i).map(ratio).collect());
         let said = c["by_base"]["value"].as_f64().expect("a ratio");
-        assert!(is_near(said, by_base) && is_near(ms, by_base * base), "{i}: {said} {by_base} {ms}");
+        assert!(
+            is_near(said, by_base) && is_near(ms, by_base * base),
+            "{i}: {said} {by_base} {ms}"
+        );
     }
 }
 
@@ -117,9 +141,15 @@ fn check_pictures(tiny: &Tiny, json: &Value) {
     for (i, more) in [(0, "draw.cutoff=3"), (1, "draw.cutoff=2")] {
         tiny.good(&["render", "scene.toml", "-q", "--force", "-o", "drawn.png", "--set", more]);
         let file = format!("out/picture-{i}.png");
-        assert!(pixels(tiny, &file) == pixels(tiny, "drawn.png"), "{file} is not what is drawn with {more}");
+        assert!(
+            pixels(tiny, &file) == pixels(tiny, "drawn.png"),
+            "{file} is not what is drawn with {more}"
+        );
     }
-    assert!(pixels(tiny, "out/picture-0.png") != pixels(tiny, "out/picture-1.png"), "two pictures that differ");
+    assert!(
+        pixels(tiny, "out/picture-0.png") != pixels(tiny, "out/picture-1.png"),
+        "two pictures that differ"
+    );
 }
 
 /// Each budget's choice is the best of all configurations within it.
@@ -127,8 +157,12 @@ fn check_best(json: &Value) {
     let figure = |c: &Value, keys: [&str; 2]| c[keys[0]][keys[1]].as_f64();
     let ms = |c: &Value| figure(c, ["frame_ms", "value"]).expect("a time");
     let rmse = |c: &Value| c["error"]["rmse"]["value"].as_f64().expect("an error");
-    let best: Vec<(&Value, &Value)> =
-        json["best"].as_array().expect("budgets").iter().map(|b| (&b["budget"], &b["configuration"])).collect();
+    let best: Vec<(&Value, &Value)> = json["best"]
+        .as_array()
+        .expect("budgets")
+        .iter()
+        .map(|b| (&b["budget"], &b["configuration"]))
+        .collect();
     assert_eq!(best.len(), 4);
     let all = study(json);
     // Of equally exact ones the faster.
@@ -162,26 +196,44 @@ fn check_rows(tiny: &Tiny, json: &Value) {
         }
         assert_eq!(table.number(row, "max"), c["error"]["max"].as_f64());
         assert_eq!(table.number(row, "relmse"), c["error"]["relmse"].as_f64());
-        assert_eq!(table.number(row, "turns").map(|n| json!(n as u64)).as_ref(), Some(&c["n_turns"]));
+        assert_eq!(
+            table.number(row, "turns").map(|n| json!(n as u64)).as_ref(),
+            Some(&c["n_turns"])
+        );
     }
 }
 
-/// The error of a study is the one that `compare` finds between the picture and the reference, each drawn alone.
+/// The error of a study is the one that `compare` finds between the picture and the reference, each
+/// drawn alone.
 #[test]
 fn an_error_is_what_compare_finds() {
     let tiny = Tiny::new();
     let unlit = ["--set", "lighting.mode=\"none\""];
-    tiny.good(&[&SHORT[..], &OUT, &unlit, &["--against=volume", "--knob", "draw.cutoff=2"]].concat());
-    tiny.good(&[&["render", "scene.toml", "-q", "-o", "volume.exr", "--reference=volume"], &unlit[..]].concat());
+    tiny.good(
+        &[&SHORT[..], &OUT, &unlit, &["--against=volume", "--knob", "draw.cutoff=2"]].concat(),
+    );
+    tiny.good(
+        &[&["render", "scene.toml", "-q", "-o", "volume.exr", "--reference=volume"], &unlit[..]]
+            .concat(),
+    );
     let json = tiny.json("out/study.json");
     assert_valid(&json, "study.schema.json");
     for (c, cutoff) in study(&json).iter().zip(["3", "2"]) {
         let set = format!("draw.cutoff={cutoff}");
-        tiny.good(&[&["render", "scene.toml", "-q", "--force", "-o", "drawn.exr", "--set", &set], &unlit[..]].concat());
+        tiny.good(
+            &[
+                &["render", "scene.toml", "-q", "--force", "-o", "drawn.exr", "--set", &set],
+                &unlit[..],
+            ]
+            .concat(),
+        );
         let found: Value =
-            serde_json::from_str(&tiny.good(&["compare", "volume.exr", "drawn.exr", "--json"])).expect("JSON");
-        for (ours, theirs) in [(&c["error"]["rmse"]["value"], "rmse"), (&c["error"]["max"], "max")] {
-            let (ours, theirs) = (ours.as_f64().expect("ours"), found["metrics"][theirs].as_f64().expect("theirs"));
+            serde_json::from_str(&tiny.good(&["compare", "volume.exr", "drawn.exr", "--json"]))
+                .expect("JSON");
+        for (ours, theirs) in [(&c["error"]["rmse"]["value"], "rmse"), (&c["error"]["max"], "max")]
+        {
+            let (ours, theirs) =
+                (ours.as_f64().expect("ours"), found["metrics"][theirs].as_f64().expect("theirs"));
             // The reference as f32 in a file: half of 2⁻²³ of values of at most 1.
             assert!(ours > 1e-3 && (ours - theirs).abs() <= 6e-8, "{set}: {ours} {theirs}");
         }
@@ -192,7 +244,8 @@ fn an_error_is_what_compare_finds() {
 fn a_grid_has_all_combinations() {
     let tiny = Tiny::new();
     let json: Value =
-        serde_json::from_str(&tiny.good(&[&SHORT[..], &TWO_KNOBS, &["--grid", "--json"]].concat())).expect("JSON");
+        serde_json::from_str(&tiny.good(&[&SHORT[..], &TWO_KNOBS, &["--grid", "--json"]].concat()))
+            .expect("JSON");
     let all = [
         "as it stands",
         "draw.cutoff=2, draw.sort_bits=16",
@@ -210,12 +263,18 @@ fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
     let tiny = Tiny::new();
     let first = [&SHORT[..], &OUT, &["--grid", "--knob", "draw.cutoff=2,3"]].concat();
     tiny.good(&first);
-    let (before, times, picture) =
-        (tiny.json("out/study.json"), tiny.text("out/times.csv"), pixels(&tiny, "out/picture-1.png"));
+    let (before, times, picture) = (
+        tiny.json("out/study.json"),
+        tiny.text("out/times.csv"),
+        pixels(&tiny, "out/picture-1.png"),
+    );
     assert_eq!(names(&before), ["as it stands", "draw.cutoff=2"]);
     // What exists is replaced only where that is asked for.
     assert_eq!(tiny.refused(&first), "out: exists; --force replaces it");
-    assert_eq!((tiny.json("out/study.json"), tiny.text("out/times.csv")), (before.clone(), times.clone()));
+    assert_eq!(
+        (tiny.json("out/study.json"), tiny.text("out/times.csv")),
+        (before.clone(), times.clone())
+    );
     let go_on = |knob: &str| {
         [&SHORT[..], &OUT, &["--resume", "--grid", "--knob", knob]]
             .concat()
@@ -254,7 +313,8 @@ fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
             .into_iter()
             .filter(|a| name == "--set" || a.split('=').next() != Some(name))
             .collect();
-        let message = tiny.refused(&[&own.iter().map(String::as_str).collect::<Vec<_>>()[..], more].concat());
+        let message =
+            tiny.refused(&[&own.iter().map(String::as_str).collect::<Vec<_>>()[..], more].concat());
         assert_eq!(message, format!("out: is of another study; what differs: {what}"), "{more:?}");
     }
     assert_eq!((tiny.json("out/study.json"), tiny.text("out/times.csv")), (after, times));
@@ -264,19 +324,26 @@ fn a_study_is_gone_on_with_and_nothing_is_run_twice() {
     assert!(tiny.path("out/picture-1.png").exists() && !tiny.path("out/picture-2.png").exists());
     // Files that are not whole, or none.
     fs::write(tiny.path("out/study.json"), "{").expect("study.json");
-    assert!(tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat()).starts_with("out/study.json: not JSON"));
+    assert!(
+        tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat())
+            .starts_with("out/study.json: not JSON")
+    );
     fs::write(tiny.path("out/study.json"), "{\"schema\": 99}").expect("study.json");
     assert_eq!(
         tiny.refused(&[&SHORT[..], &OUT, &["--resume"]].concat()),
         "out/study.json: a study of schema 99; this nimbus reads 1"
     );
     let output = tiny.run(&[&SHORT[..], &["--resume"]].concat());
-    assert!(output.status.code() == Some(2) && String::from_utf8_lossy(&output.stderr).contains("--out <DIR>"));
+    assert!(
+        output.status.code() == Some(2)
+            && String::from_utf8_lossy(&output.stderr).contains("--out <DIR>")
+    );
 }
 
 #[test]
 fn a_ledger_sums_up() {
-    let more = "[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 3]\nv = [2.7, 0, 0]\nsubdivide = [2, 2]\n";
+    let more =
+        "[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 3]\nv = [2.7, 0, 0]\nsubdivide = [2, 2]\n";
     let tiny = Tiny::with(&format!("texture = \"0\"\n{more}"));
     let args = [
         "ledger",
@@ -312,19 +379,29 @@ fn a_ledger_sums_up() {
     // The same sums in the same order.
     let quadrature = errors.iter().map(|error| error.powi(2)).sum::<f64>().sqrt();
     assert_eq!((sum, number(&json["quadrature"])), (errors.iter().sum(), quadrature));
-    assert!(total <= sum && total > 0.0 && json["holds"] == true && json["interrupted"] == false, "{total} {sum}");
+    assert!(
+        total <= sum && total > 0.0 && json["holds"] == true && json["interrupted"] == false,
+        "{total} {sum}"
+    );
     for row in rows {
         let error = number(&row["error"]["value"]);
         assert!(is_near(number(&row["share"]), error / sum), "{row}");
         assert!(is_near(number(&row["relative"]), error / number(&json["magnitude"])), "{row}");
         assert_eq!(row["is_resolved"], json!(10.0 * number(&row["own_error"]) <= error), "{row}");
         // Both of the device's are timed; the others it does not draw.
-        assert_eq!(row["time_ratio"].is_object(), row["name"] == "cutoff" || row["name"] == "sort bits", "{row}");
+        assert_eq!(
+            row["time_ratio"].is_object(),
+            row["name"] == "cutoff" || row["name"] == "sort bits",
+            "{row}"
+        );
     }
     assert_eq!((&rows[1]["from"], &rows[1]["to"]), (&json!("3 sigma"), &json!("8 sigma")));
     assert_eq!(tiny.refused(&args), "out: exists; --force replaces it");
     let printed = tiny.good(&[&args[..], &["--force"]].concat());
-    assert!(all.iter().all(|name| printed.contains(name)) && printed.contains("the rows sum to"), "{printed}");
+    assert!(
+        all.iter().all(|name| printed.contains(name)) && printed.contains("the rows sum to"),
+        "{printed}"
+    );
 }
 
 #[test]
@@ -353,10 +430,12 @@ fn ctrl_c_keeps_a_study_that_can_be_gone_on_with() {
         assert!(begin.elapsed() < Duration::from_secs(120), "it never has a round");
         std::thread::sleep(Duration::from_millis(5));
     }
-    let killed = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+    let killed =
+        Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
     assert!(killed.expect("kill").success());
     let output = child.wait_with_output().expect("it ends");
-    let (stdout, stderr) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    let (stdout, stderr) =
+        (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
     assert_eq!(output.status.code(), Some(130), "{stderr}");
     assert!(
         stdout.contains("INTERRUPTED: what was finished") && stderr.contains("keeps what is done"),
@@ -367,7 +446,8 @@ fn ctrl_c_keeps_a_study_that_can_be_gone_on_with() {
     let n = before["rounds"].as_u64().expect("rounds");
     assert!(before["interrupted"] == true && n >= 2 && names(&before).len() == 3, "{before}");
     // Two rounds more, of all.
-    let (rounds, n_turns) = (format!("--rounds={}", n + 2), |c: &Value| c["n_turns"].as_u64().expect("turns"));
+    let (rounds, n_turns) =
+        (format!("--rounds={}", n + 2), |c: &Value| c["n_turns"].as_u64().expect("turns"));
     tiny.good(&[&knob[..], &["--resume", &rounds]].concat());
     let after = tiny.json("out/study.json");
     assert_valid(&after, "study.schema.json");
@@ -393,6 +473,12 @@ fn a_killed_study_can_be_gone_on_with() {
     assert_valid(&tiny.json("out/study.json"), "study.schema.json");
     tiny.good(&[&knob[..], &["--resume"]].concat());
     let json = tiny.json("out/study.json");
-    assert!(json["interrupted"] == false && names(&json) == ["as it stands", "draw.cutoff=2"], "{json}");
-    assert!(study(&json).iter().all(|c| c["error"].is_object() && c["by_base"].is_object()), "{json}");
+    assert!(
+        json["interrupted"] == false && names(&json) == ["as it stands", "draw.cutoff=2"],
+        "{json}"
+    );
+    assert!(
+        study(&json).iter().all(|c| c["error"].is_object() && c["by_base"].is_object()),
+        "{json}"
+    );
 }

@@ -1,4 +1,5 @@
-//! What `nimbus error` and `nimbus ledger` refuse and how they say it; clouds drawn plain; references that are kept.
+//! What `nimbus error` and `nimbus ledger` refuse and how they say it; clouds drawn plain;
+//! references that are kept.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -14,27 +15,56 @@ use tiny::{OUT, SHORT, Tiny, study};
 fn what_cannot_be_studied_is_refused_before_anything_is_done() {
     let tiny = Tiny::new();
     let knobs: [(&[&str], &str); 15] = [
-        (&["draw.cutoff"], "--knob draw.cutoff: no `=`; expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4"),
+        (
+            &["draw.cutoff"],
+            "--knob draw.cutoff: no `=`; expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4",
+        ),
         (
             &["draw.cutoff="],
-            "--knob draw.cutoff=: an empty value; expected KEY=VALUE,VALUE,… such as draw.cutoff=2,3,4",
+            "--knob draw.cutoff=: an empty value; expected KEY=VALUE,VALUE,… such as \
+             draw.cutoff=2,3,4",
         ),
         (&["draw.cutoff=2,,3"], "--knob draw.cutoff=2,,3: an empty value; expected"),
         (&["=2"], "--knob =2: no key; expected"),
         (&["draw.cutoff=2,2"], "--knob draw.cutoff=2,2: 2 twice; expected"),
-        (&["draw.cutoff=2", "draw.cutoff=4"], "--knob draw.cutoff: the key twice; name all its values in one"),
-        (&["draw.cutof=2"], "--knob draw.cutof=2: unknown key `draw.cutof`; did you mean `cutoff`?"),
-        (&["draw.cutoff=2,99"], "--knob draw.cutoff=99: `draw.cutoff`: expected a number from 0.5 to 8, found 99.0"),
+        (
+            &["draw.cutoff=2", "draw.cutoff=4"],
+            "--knob draw.cutoff: the key twice; name all its values in one",
+        ),
+        (
+            &["draw.cutof=2"],
+            "--knob draw.cutof=2: unknown key `draw.cutof`; did you mean `cutoff`?",
+        ),
+        (
+            &["draw.cutoff=2,99"],
+            "--knob draw.cutoff=99: `draw.cutoff`: expected a number from 0.5 to 8, found 99.0",
+        ),
         (&["draw.path=pen"], "--knob draw.path=pen: `draw.path`: unknown value `pen`; known here:"),
-        (&["cloud.3.seed=1"], "--knob cloud.3.seed=1: `cloud`: expected a number from 0 to 0, or *, found `3`"),
-        (&["size=8x8"], "--knob size: pictures of several sizes cannot be compared with one reference"),
+        (
+            &["cloud.3.seed=1"],
+            "--knob cloud.3.seed=1: `cloud`: expected a number from 0 to 0, or *, found `3`",
+        ),
+        (
+            &["size=8x8"],
+            "--knob size: pictures of several sizes cannot be compared with one reference",
+        ),
         (
             &["film.width=24,32"],
             "--knob film.width=32: pictures of several sizes cannot be compared with one reference",
         ),
-        (&["film={ width = 8 }"], "--knob film={ width = 8 }: pictures of several sizes cannot be compared"),
-        (&["time.step_s=1"], "--knob time.step_s: changes no picture, or which picture it is; expected a key of film,"),
-        (&["camera={ position = [0, 0, 5] }"], "--knob camera: changes no picture, or which picture it is; expected"),
+        (
+            &["film={ width = 8 }"],
+            "--knob film={ width = 8 }: pictures of several sizes cannot be compared",
+        ),
+        (
+            &["time.step_s=1"],
+            "--knob time.step_s: changes no picture, or which picture it is; expected a \
+             key of film,",
+        ),
+        (
+            &["camera={ position = [0, 0, 5] }"],
+            "--knob camera: changes no picture, or which picture it is; expected",
+        ),
     ];
     for (keys, expected) in knobs {
         let knobs: Vec<&str> = keys.iter().flat_map(|key| ["--knob", key]).collect();
@@ -45,16 +75,19 @@ fn what_cannot_be_studied_is_refused_before_anything_is_done() {
     let others: [(&[&str], &str); 7] = [
         (
             &["error", "scene.toml", "--pixels=0"],
-            "invalid value '0' for '--pixels <N>': expected a number of pixels above 0, or all, found \"0\"",
+            "invalid value '0' for '--pixels <N>': expected a number of pixels above 0, or \
+             all, found \"0\"",
         ),
         (
             &["error", "scene.toml", "--against=nonsense"],
-            "invalid value 'nonsense' for '--against <WHAT>': expected thin, volume, model or reflections=K with \
+            "invalid value 'nonsense' for '--against <WHAT>': expected thin, volume, model or \
+             reflections=K with \
              K from 1 to 64, found \"nonsense\"",
         ),
         (
             &["error", "scene.toml", "--against=reflections=2", "--set", "lighting.mode=\"none\""],
-            "reflections=2: nothing reflects where lighting.mode is \"none\"; expected thin, volume or model",
+            "reflections=2: nothing reflects where lighting.mode is \"none\"; expected thin, \
+             volume or model",
         ),
         (
             &["error", "scene.toml", "--set", textured],
@@ -76,15 +109,28 @@ fn what_cannot_be_studied_is_refused_before_anything_is_done() {
         let message = tiny.refused(&[args, &OUT].concat());
         assert!(message.starts_with(expected), "{args:?}: {message}");
     }
-    assert!(!tiny.path("out").exists() && tiny.kept().is_empty(), "nothing is written, and no reference computed");
+    assert!(
+        !tiny.path("out").exists() && tiny.kept().is_empty(),
+        "nothing is written, and no reference computed"
+    );
 }
 
 #[test]
 fn textures_are_left_out_where_that_is_asked_for() {
     let textured = Tiny::with("texture = \"0\"\n");
-    let same = ["error", "--json", "-q", "--rounds=1", "--frames=1", "--knob", "draw.cutoff=2", "scene.toml"];
+    let same = [
+        "error",
+        "--json",
+        "-q",
+        "--rounds=1",
+        "--frames=1",
+        "--knob",
+        "draw.cutoff=2",
+        "scene.toml",
+    ];
     let error = |tiny: &Tiny, more: &[&str]| {
-        let json: Value = serde_json::from_str(&tiny.good(&[&same[..], more].concat())).expect("JSON");
+        let json: Value =
+            serde_json::from_str(&tiny.good(&[&same[..], more].concat())).expect("JSON");
         (study(&json)[0]["error"].clone(), json["reference"]["hash"].clone())
     };
     let plain = error(&textured, &["--plain"]);
@@ -105,19 +151,30 @@ fn a_reference_is_kept_and_a_broken_one_made_again() {
     let (first, errors) = run(&[]);
     assert_eq!((&first["from_cache"], tiny.kept().len()), (&json!(false), 1));
     let (second, same) = run(&[]);
-    assert_eq!((&second["from_cache"], &second["hash"], &same), (&json!(true), &first["hash"], &errors));
+    assert_eq!(
+        (&second["from_cache"], &second["hash"], &same),
+        (&json!(true), &first["hash"], &errors)
+    );
     // What it was made of is kept with it; what counts for it is told apart from what does not.
-    assert_eq!((&second["own_error"], &second["seconds"]), (&first["own_error"], &first["seconds"]));
+    assert_eq!(
+        (&second["own_error"], &second["seconds"]),
+        (&first["own_error"], &first["seconds"])
+    );
     assert_eq!(run(&["--set", "draw.sort_bits=16"]).0["from_cache"], json!(true));
     let (other, _) = run(&["--set", "cloud.0.position=[0.5,0,0]"]);
-    assert!(other["from_cache"] == false && other["hash"] != first["hash"] && tiny.kept().len() == 2);
+    assert!(
+        other["from_cache"] == false && other["hash"] != first["hash"] && tiny.kept().len() == 2
+    );
     // Cut off.
     let name = format!("{}.f64", first["hash"].as_str().expect("a hash"));
     let file = tiny.path("cache/references").join(name);
     let whole = fs::read(&file).expect("what is kept");
     fs::write(&file, &whole[..whole.len() - 8]).expect("a shorter file");
     let (third, same) = run(&[]);
-    assert_eq!((&third["from_cache"], &third["hash"], &same), (&json!(false), &first["hash"], &errors));
+    assert_eq!(
+        (&third["from_cache"], &third["hash"], &same),
+        (&json!(false), &first["hash"], &errors)
+    );
     // Whole again.
     assert_eq!(run(&[]).0["from_cache"], json!(true));
 }

@@ -1,5 +1,6 @@
-//! Sums as shaders form them (shaders/include/sum.glsl): numbers of every kind summed plainly, compensated and pairwise, in f32
-//! and f64, each within its own bound; and that no compiler takes the compensation for nothing.
+//! Sums as shaders form them (shaders/include/sum.glsl): numbers of every kind summed plainly,
+//! compensated and pairwise, in f32 and f64, each within its own bound; and that no compiler takes
+//! the compensation for nothing.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -41,14 +42,18 @@ void main() {
 /// Of every kind of numbers some, and of every length that matters to a counter of blocks of 8.
 fn rows() -> Vec<Vec<f32>> {
     let mut r = Random(7);
-    let mut rows: Vec<Vec<f32>> = (0..40).map(|n| (0..n).map(|_| r.within(0.0, 1.0)).collect()).collect();
+    let mut rows: Vec<Vec<f32>> =
+        (0..40).map(|n| (0..n).map(|_| r.within(0.0, 1.0)).collect()).collect();
     for n in [63, 64, 65, 1000, 4096, 16_376, 16_384, 16_392, 40_000] {
         rows.push((0..n).map(|_| r.within(-1.0, 1.0)).collect());
         rows.push(vec![0.1; n]);
         rows.push(one_and_dust(n));
         // From 2⁻²⁰ to 2²⁰, of both signs, and back: sums far smaller than what they are made of.
-        let wide: Vec<f32> = (0..n / 2).map(|_| r.within(-1.0, 1.0) * r.within(-20.0, 20.0).exp2()).collect();
-        rows.push(wide.iter().copied().chain(wide.iter().rev().map(|x| -x)).chain([0.25]).collect());
+        let wide: Vec<f32> =
+            (0..n / 2).map(|_| r.within(-1.0, 1.0) * r.within(-20.0, 20.0).exp2()).collect();
+        rows.push(
+            wide.iter().copied().chain(wide.iter().rev().map(|x| -x)).chain([0.25]).collect(),
+        );
     }
     rows
 }
@@ -61,8 +66,10 @@ fn one_and_dust(n: usize) -> Vec<f32> {
 /// The same by fours, in a loop whose length is known.
 fn by_fours() -> Compiler {
     let (from, to) = ("++i) {", "i += 4u) { UNROLL for (uint k = 0u; k < 4u; ++k) {");
-    let text =
-        TEXT.replace(from, to).replace("terms[i]);\n    }", "terms[i]);\n    } }").replace("terms[i]", "terms[i + k]");
+    let text = TEXT
+        .replace(from, to)
+        .replace("terms[i]);\n    }", "terms[i]);\n    } }")
+        .replace("terms[i]", "terms[i + k]");
     compiler_of(&text, None)
 }
 
@@ -82,12 +89,16 @@ fn compiler_of(text: &str, wrong: Option<(&str, &str)>) -> Compiler {
 /// Each row's sum, both times.
 fn run(gpu: &mut Gpu, compiler: &Compiler, sums: Sums, rows: &[Vec<f32>]) -> [Vec<f64>; 2] {
     let kernel =
-        Kernel::with_macros(&gpu.device, compiler, "sums", &[], &[], SumMacros::from(sums).list()).expect("the kernel");
+        Kernel::with_macros(&gpu.device, compiler, "sums", &[], &[], SumMacros::from(sums).list())
+            .expect("the kernel");
     let ends: Vec<u32> = rows
         .iter()
-        .scan(0, |end, row| Some(std::mem::replace(end, *end + row.len() as u32) + row.len() as u32))
+        .scan(0, |end, row| {
+            Some(std::mem::replace(end, *end + row.len() as u32) + row.len() as u32)
+        })
         .collect();
-    let (terms, ends, totals) = (gpu.upload(&rows.concat()), gpu.upload(&ends), gpu.buffer::<[f32; 2]>(rows.len()));
+    let (terms, ends, totals) =
+        (gpu.upload(&rows.concat()), gpu.upload(&ends), gpu.buffer::<[f32; 2]>(rows.len()));
     gpu.run(|rec| rec.dispatch_groups(&kernel, &[&terms, &ends, &totals], &(), rows.len() as u32));
     let totals: Vec<[f32; 2]> = gpu.download(&totals, rows.len());
     [0, 1].map(|k| totals.iter().map(|t| f64::from(t[k])).collect())
@@ -129,7 +140,12 @@ fn sums_in_loops_of_a_known_length_are_within_their_bounds() {
     let truths: Vec<f64> = rows.iter().map(|row| exact(row)).collect();
     for way in every_way() {
         let found = run(&mut gpu, &by_fours(), way, &rows);
-        assert_within_and_say(&format!("{way:?} by fours"), &found[0], &truths, &bounds(way, &rows));
+        assert_within_and_say(
+            &format!("{way:?} by fours"),
+            &found[0],
+            &truths,
+            &bounds(way, &rows),
+        );
     }
 }
 
@@ -165,7 +181,10 @@ fn wrong_sums_are_noticed() {
         (PAIRWISE, "sum.parts[k] = ends", "sum.parts[k] = ends && k < 9u"),
     ] {
         let found = run(&mut gpu, &compiler(Some((from, to))), way, &rows);
-        assert!(check_within("wrong", &found[0], &truths, &bounds(way, &rows)).is_err(), "{from} as {to}");
+        assert!(
+            check_within("wrong", &found[0], &truths, &bounds(way, &rows)).is_err(),
+            "{from} as {to}"
+        );
     }
 }
 

@@ -1,5 +1,5 @@
-//! Light by way of the tensors: what T1 holds, that contracted it is what gathering at once gives, that an edit's frame is
-//! the frame from scratch, and what happens where the tensors do not fit.
+//! Light by way of the tensors: what T1 holds, that contracted it is what gathering at once gives,
+//! that an edit's frame is the frame from scratch, and what happens where the tensors do not fit.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -29,7 +29,9 @@ use nimbus::reference::first;
 
 fn scene(overrides: &[&str]) -> Scene {
     let all: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
-    scene_file::load(Path::new("tests/data/edited.toml"), &all, None).expect("the scene loads").scene
+    scene_file::load(Path::new("tests/data/edited.toml"), &all, None)
+        .expect("the scene loads")
+        .scene
 }
 
 struct Frames {
@@ -40,14 +42,21 @@ struct Frames {
 }
 
 /// Frames one after the other from one renderer.
-fn run(gpu: &Gpu, compiler: Option<&Compiler>, scene: &Scene, frames: &[u32], skip: bool) -> Frames {
+fn run(
+    gpu: &Gpu,
+    compiler: Option<&Compiler>,
+    scene: &Scene,
+    frames: &[u32],
+    skip: bool,
+) -> Frames {
     let scene = Arc::new(scene.clone());
     let compiler = compiler.unwrap_or(&gpu.compiler);
     let mut renderer = Renderer::new(&gpu.device, compiler, &scene, skip).expect("a renderer");
     let mut game = Game::new(scene.clone(), None);
     let mut out = Frames { facets: vec![], lit: vec![], images: vec![], plans: vec![] };
     for i_frame in frames {
-        out.plans.push(renderer.step(game.step(*i_frame).expect("a packet")).expect("a frame").plan);
+        out.plans
+            .push(renderer.step(game.step(*i_frame).expect("a packet")).expect("a frame").plan);
         out.images.push(renderer.image_bytes().expect("bytes"));
         let (facets, lit) = renderer.facets(&gpu.device).expect("facets");
         out.facets = facets;
@@ -71,14 +80,18 @@ fn an_edit_is_contracted_alone_and_its_frame_is_the_frame_from_scratch() {
         let anew = run(&gpu, None, &scene, &[0, 2, 4], false);
         let alone = run(&gpu, None, &scene, &[4], true);
         assert!(edited.lit == anew.lit && edited.images == anew.images, "{overrides:?}: no skip");
-        assert!(edited.lit[2] == alone.lit[0] && edited.images[2] == alone.images[0], "{overrides:?}: alone");
+        assert!(
+            edited.lit[2] == alone.lit[0] && edited.images[2] == alone.images[0],
+            "{overrides:?}: alone"
+        );
         // The comparison can fail: an edit changes light and picture.
         assert!(edited.lit[0] != edited.lit[1] && edited.images[0] != edited.images[1]);
         assert!(edited.lit[1] != edited.lit[2] && edited.images[1] != edited.images[2]);
     }
 }
 
-/// The same scene at frame 3 with the materials as they are then, n_s and so the cells being no different, and no edits.
+/// The same scene at frame 3 with the materials as they are then, n_s and so the cells being no
+/// different, and no edits.
 fn unedited(scene: &Scene) -> Scene {
     let mut fixed = scene.clone();
     for material in &mut fixed.materials {
@@ -90,11 +103,11 @@ fn unedited(scene: &Scene) -> Scene {
 
 /// Cells of a facet at the pair_levels = 1 of the comparison.
 const MAX_CELLS: f64 = 4.0;
-/// Roundings of the two ways together in the factors of one term: position, offset, form factor and share some ten each,
-/// energy, area, colour, coefficients and table.
+/// Roundings of the two ways together in the factors of one term: position, offset, form factor and
+/// share some ten each, energy, area, colour, coefficients and table.
 const FACTORS: f64 = 40.0;
-/// Units of round-off that a compiler's choices may move a unit half vector by: those of a position some four units from
-/// its facet within a scene of eight, and of two normalisations.
+/// Units of round-off that a compiler's choices may move a unit half vector by: those of a position
+/// some four units from its facet within a scene of eight, and of two normalisations.
 const TURN: f64 = 32.0;
 
 #[test]
@@ -114,12 +127,18 @@ fn contracted_light_is_light_gathered_at_once() {
     let counts = |lit: &[LitRecord]| lit.iter().map(|l| l.n_unresolved).collect::<Vec<_>>();
     assert_eq!(counts(&tensors.lit[0]), counts(&fused.lit[0]));
     // The bound says something: it is below 1 % of the scene's mean second reflection.
-    let mean = |of: fn(&[f64]) -> f64, v: &[f64]| v.chunks(12).map(of).sum::<f64>() / (v.len() / 12) as f64;
+    let mean = |of: fn(&[f64]) -> f64, v: &[f64]| {
+        v.chunks(12).map(of).sum::<f64>() / (v.len() / 12) as f64
+    };
     let second = |c: &[f64]| c[9] + c[10] + c[11];
     println!("mean L2 {:.3e}, mean bound {:.3e}", mean(second, &truths), mean(second, &bounds));
     assert!(mean(second, &bounds) < 0.01 * mean(second, &truths));
     for (file, from, to) in [
-        ("second_tensor.comp", "plain[r] += response[r] * diffuse", "plain[r] += response[0] * diffuse"),
+        (
+            "second_tensor.comp",
+            "plain[r] += response[r] * diffuse",
+            "plain[r] += response[0] * diffuse",
+        ),
         (
             "second_tensor.comp",
             "shiny[b * N_RESPONSES + r] += response[r] * e",
@@ -131,34 +150,51 @@ fn contracted_light_is_light_gathered_at_once() {
             "emitter.kind == REGION_COLORED ? share.rgb",
             "emitter.kind == REGION_COLORED ? share.www",
         ),
-        ("include/cells.glsl", "float excess = view.width / (broad", "float excess = 0.5 * view.width / (broad"),
+        (
+            "include/cells.glsl",
+            "float excess = view.width / (broad",
+            "float excess = 0.5 * view.width / (broad",
+        ),
         ("second_tensor.comp", "front * value_at", "value_at"),
     ] {
         let compiler = Gpu::wrong_compiler(file, from, to);
         let wrong = run(&gpu, Some(&compiler), &scene, &[3], true);
-        assert!(check_within(from, &numbers(&wrong.lit[0]), &truths, &bounds).is_err(), "{from} as {to}");
+        assert!(
+            check_within(from, &numbers(&wrong.lit[0]), &truths, &bounds).is_err(),
+            "{from} as {to}"
+        );
     }
 }
 
 fn numbers(lit: &[LitRecord]) -> Vec<f64> {
-    lit.iter().flat_map(|l| [l.direct, l.indirect, l.first, l.second].concat()).map(f64::from).collect()
+    lit.iter()
+        .flat_map(|l| [l.direct, l.indirect, l.first, l.second].concat())
+        .map(f64::from)
+        .collect()
 }
 
-/// What the two ways may differ in. Both add the same cells' terms, no more than n of them, each rounded FACTORS times; T
-/// splits a lobe into bases of both signs, so what is rounded is a sum of magnitudes: where gathering at once multiplies
-/// a flux φ = Σ E A g/(d² + …) by f_i and f_j, tensors multiply it by no more than K_d/π + Σ|C_b| max|v_b| of either.
-/// φ itself is at most I_i over the least diffuse albedo/π of any emitter, since no lobe takes away more than `negative` of it.
+/// What the two ways may differ in. Both add the same cells' terms, no more than n of them, each
+/// rounded FACTORS times; T splits a lobe into bases of both signs, so what is rounded is a sum of
+/// magnitudes: where gathering at once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j,
+/// tensors multiply it by no more than K_d/π + Σ|C_b| max|v_b| of either. φ itself is at most I_i
+/// over the least diffuse albedo/π of any emitter, since no lobe takes away more than `negative` of
+/// it.
 fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     let basis = basis_of(scene).expect("a basis");
     let shape = Shape::of(scene, basis.n_bases());
-    let n = MAX_CELLS * scene.n_facets() as f64 + f64::from(shape.n_columns) + f64::from(basis.n_bases()) + FACTORS;
+    let n = MAX_CELLS * scene.n_facets() as f64
+        + f64::from(shape.n_columns)
+        + f64::from(basis.n_bases())
+        + FACTORS;
     let n = n + scene.lights.len() as f64;
     let color = |j: usize| DVec3::from(fused.facets[j].color.map(f64::from));
     // By region: K_d and Σ|K_s c_b| max|v_b|, the angle's roundings counted into the maximum.
     let region = |i: usize| {
         let brdf = scene.region_material(i).at(scene.time.at(3));
-        let coefficients = if scene.region_material(i).is_glossy() { basis.coefficients(brdf.ns) } else { vec![] };
-        let lobe: f64 = coefficients.iter().zip(basis.vectors()).map(|(c, v)| c.abs() * greatest(v, n)).sum();
+        let coefficients =
+            if scene.region_material(i).is_glossy() { basis.coefficients(brdf.ns) } else { vec![] };
+        let lobe: f64 =
+            coefficients.iter().zip(basis.vectors()).map(|(c, v)| c.abs() * greatest(v, n)).sum();
         let least = basis.lobe(brdf.ns).into_iter().fold(0.0, f64::min);
         (brdf.kd, brdf.ks * lobe, brdf.ks * -least)
     };
@@ -166,7 +202,8 @@ fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     let pi = std::f64::consts::PI;
     let most = regions.iter().map(|r| r.0 / pi + r.1).fold(DVec3::ZERO, DVec3::max);
     let albedo = |j: usize| regions[fused.facets[j].i_region as usize].0 * color(j) / pi;
-    let sure = (0..fused.facets.len()).map(|j| albedo(j) - regions[fused.facets[j].i_region as usize].2);
+    let sure =
+        (0..fused.facets.len()).map(|j| albedo(j) - regions[fused.facets[j].i_region as usize].2);
     let least = sure.fold(DVec3::INFINITY, DVec3::min);
     assert!(least.min_element() > 0.0, "{least}");
     let bound = |(j, lit): (usize, &LitRecord)| {
@@ -178,11 +215,13 @@ fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     fused.lit[0].iter().enumerate().flat_map(bound).collect()
 }
 
-/// The greatest magnitude of a table's values, and what the angle's roundings move them by, as so many of `n` roundings:
-/// δw = |chord| δ chord = √2 t² TURN u, and δt = δw/4t³.
+/// The greatest magnitude of a table's values, and what the angle's roundings move them by, as so
+/// many of `n` roundings: δw = |chord| δ chord = √2 t² TURN u, and δt = δw/4t³.
 fn greatest(table: &[f64], n: f64) -> f64 {
     let at = |i: usize| i as f64 / (table.len() - 1) as f64;
-    let moved = |i: usize| (table[i + 1] - table[i]).abs() / at(1) * 2f64.sqrt() * TURN / (4.0 * at(i).max(at(1)));
+    let moved = |i: usize| {
+        (table[i + 1] - table[i]).abs() / at(1) * 2f64.sqrt() * TURN / (4.0 * at(i).max(at(1)))
+    };
     let value = table.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     value + (0..table.len() - 1).map(moved).fold(0.0, f64::max) / n
 }
@@ -192,14 +231,14 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     let gpu = Gpu::new();
     let scene = scene(&[]);
     let shape = Shape::of(&scene, basis_of(&scene).expect("a basis").n_bases());
-    // Floor 25, ceiling 16, wall 16 (a lobe), shelf 4 facets, 40 particles with colours and a lobe, 5 vectors; the floor too
-    // has a lobe.
+    // Floor 25, ceiling 16, wall 16 (a lobe), shelf 4 facets, 40 particles with colours and a lobe,
+    // 5 vectors; the floor too has a lobe.
     let n_rows: u64 = 6 * 25 + 16 + 6 * 16 + 4 + 6 * 40;
     assert_eq!(shape.n_rows, n_rows.next_multiple_of(64));
     assert_eq!(shape.n_columns, 6 + 1 + 6 + 1 + 8);
     let bytes = 4 * 3 * shape.n_rows * 22;
-    // Floor, ceiling, wall, shelf and cloud begin at columns 0, 6, 7, 13 and 14. Floor and shelf face up and don't see each
-    // other; nothing sees itself but the cloud.
+    // Floor, ceiling, wall, shelf and cloud begin at columns 0, 6, 7, 13 and 14. Floor and shelf
+    // face up and don't see each other; nothing sees itself but the cloud.
     let spans = shape.spans(&scene);
     let of = |i: usize| spans[spans[i][0] as usize..][..spans[i][1] as usize].to_vec();
     assert_eq!(of(0), [[6, 7], [14, 8]]);
@@ -211,15 +250,27 @@ fn tensors_that_do_not_fit_are_not_kept_and_the_plan_says_so() {
     assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::Kept);
     let first = 4 * 3 * shape.n_rows;
     assert_eq!(limits::tensors(&shape, &limits, bytes + first), Tensors::Kept);
-    assert_eq!(limits::tensors(&shape, &limits, bytes + first - 1), Tensors::TooLarge { bytes, most: bytes - 1 });
+    assert_eq!(
+        limits::tensors(&shape, &limits, bytes + first - 1),
+        Tensors::TooLarge { bytes, most: bytes - 1 }
+    );
     limits.max_storage_buffer_bytes = bytes - 4;
-    assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
+    assert_eq!(
+        limits::tensors(&shape, &limits, u64::MAX),
+        Tensors::TooLarge { bytes, most: bytes - 4 }
+    );
     limits.max_storage_buffer_bytes = u64::MAX;
     limits.max_texels = bytes / 4 - 1;
-    assert_eq!(limits::tensors(&shape, &limits, u64::MAX), Tensors::TooLarge { bytes, most: bytes - 4 });
+    assert_eq!(
+        limits::tensors(&shape, &limits, u64::MAX),
+        Tensors::TooLarge { bytes, most: bytes - 4 }
+    );
     // Sizes beyond 64 bits are only large.
     let huge = Shape { n_rows: u64::MAX / 4, ..shape };
-    assert!(matches!(limits::tensors(&huge, &limits, u64::MAX), Tensors::TooLarge { bytes: u64::MAX, .. }));
+    assert!(matches!(
+        limits::tensors(&huge, &limits, u64::MAX),
+        Tensors::TooLarge { bytes: u64::MAX, .. }
+    ));
 }
 
 #[test]
@@ -227,8 +278,8 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
     let gpu = Gpu::new();
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("s.toml");
-    // Two large rectangles back to back: nothing to gather, and 2 · 90 000 · 8 rows of 16 columns by one light, 92 MB each
-    // a light; two lights make 184 MB.
+    // Two large rectangles back to back: nothing to gather, and 2 · 90 000 · 8 rows of 16 columns
+    // by one light, 92 MB each a light; two lights make 184 MB.
     let text = r#"
         camera = { path = [{ time_s = 0, position = [0, 1, 9], target = [0, 0, 0] }] }
         film = { width = 8, height = 8 }
@@ -260,21 +311,26 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
     let reason = frames.plans[1].decision(Pass::Contract).reason.to_string();
     if bytes > most {
         assert_eq!(running(&frames.plans[1]), ["first", "second", "surfaces", "tiles"]);
-        assert!(reason.contains(&bytes.to_string()) && reason.contains(&most.to_string()), "{reason}");
+        assert!(
+            reason.contains(&bytes.to_string()) && reason.contains(&most.to_string()),
+            "{reason}"
+        );
     } else {
         assert_eq!(running(&frames.plans[1]), ["contract", "surfaces", "tiles"]);
     }
     assert!(frames.lit[0] != frames.lit[1]);
 }
 
-/// Everything T1 is made of, in f32 numbers on both sides: facets of a glossy and of a diffuse region, a sun and the sky.
+/// Everything T1 is made of, in f32 numbers on both sides: facets of a glossy and of a diffuse
+/// region, a sun and the sky.
 fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
     const N: u32 = 3000;
     let mut r = Random(9);
     let double = |v: [f32; 3]| DVec3::from(v.map(f64::from));
     let basis = Basis::new([1.0, 64.0], 6, Sampling::Log);
     let table: Vec<f32> = basis.vectors().iter().flatten().map(|v| *v as f32).collect();
-    let tables: Vec<Vec<f64>> = table.chunks(N_NODES).map(|v| v.iter().map(|v| f64::from(*v)).collect()).collect();
+    let tables: Vec<Vec<f64>> =
+        table.chunks(N_NODES).map(|v| v.iter().map(|v| f64::from(*v)).collect()).collect();
     let toward = r.direction();
     let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.25 };
     let lights = [Light::Directional { direction: -double(toward), irradiance: DVec3::ONE }, sky];
@@ -298,7 +354,8 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
         .collect();
     let shares: Vec<f32> = (0..4 * N).map(|_| r.within(0.0, 1.0)).collect();
     let n_rows = N * (2 + n_vectors);
-    let pass = FirstTensor::new(&gpu.device, compiler.unwrap_or(&gpu.compiler)).expect("first.tensor");
+    let pass =
+        FirstTensor::new(&gpu.device, compiler.unwrap_or(&gpu.compiler)).expect("first.tensor");
     let buffers = [
         gpu.upload(&facets),
         gpu.upload(&lights.map(|l| LightRecord::new(&l, DVec3::ZERO))),
@@ -308,9 +365,17 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
         gpu.buffer::<f32>(2 * n_rows as usize),
         gpu.buffer::<LitRecord>(2 * N as usize),
     ];
-    let push = TensorPush { eye, n_facets: 2 * N, n_lights: 2, n_bases: 1 + n_vectors, n_rows, i_vectors: 0 };
+    let push = TensorPush {
+        eye,
+        n_facets: 2 * N,
+        n_lights: 2,
+        n_bases: 1 + n_vectors,
+        n_rows,
+        i_vectors: 0,
+    };
     gpu.run(|rec| pass.record(rec, buffers.each_ref(), &push));
-    let values = gpu.download::<f32>(&buffers[5], 2 * n_rows as usize).into_iter().map(f64::from).collect();
+    let values =
+        gpu.download::<f32>(&buffers[5], 2 * n_rows as usize).into_iter().map(f64::from).collect();
     let (mut truths, mut bounds) = (vec![0.0; 2 * n_rows as usize], vec![0.0; 2 * n_rows as usize]);
     for (j, facet) in facets.iter().enumerate() {
         let (normal, region) = (double(facet.normal), regions[j / N as usize]);
@@ -323,9 +388,11 @@ fn responses(gpu: &mut Gpu, compiler: Option<&Compiler>) -> [Vec<f64>; 3] {
             let g = light.share(normal, &arrival, f64::from(shares[2 * j + l]));
             let row = first::responses(light, g, normal, arrival.toward, outgoing, of_region);
             for (b, truth) in row.into_iter().enumerate() {
-                let k =
-                    l * n_rows as usize + (region.i_row + j as u32 - region.i_first_facet) as usize + b * N as usize;
-                // g: a cosine of three products, its share and sum, 1 at most; then a product, or the table's interpolation.
+                let k = l * n_rows as usize
+                    + (region.i_row + j as u32 - region.i_first_facet) as usize
+                    + b * N as usize;
+                // g: a cosine of three products, its share and sum, 1 at most; then a product, or
+                // the table's interpolation.
                 let magnitude = if b == 0 { 1.0 } else { greatest(&tables[b - 1], RESPONSE) };
                 (truths[k], bounds[k]) = (truth, RESPONSE * U * magnitude);
             }

@@ -1,4 +1,5 @@
-//! Ground of weather files in scenes: the device's picture against the f64 one, what it does to the light, and what is refused.
+//! Ground of weather files in scenes: the device's picture against the f64 one, what it does to the
+//! light, and what is refused.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -24,7 +25,9 @@ fn file() -> Made {
             }
         })
         .with_floats("QCLOUD", |q| {
-            q.iter_mut().enumerate().for_each(|(i, q)| *q = if i / (NX * NY) == 3 && i % NX > 3 { 2e-4 } else { 0.0 });
+            q.iter_mut()
+                .enumerate()
+                .for_each(|(i, q)| *q = if i / (NX * NY) == 3 && i % NX > 3 { 2e-4 } else { 0.0 });
         })
 }
 
@@ -77,13 +80,15 @@ fn render(dir: &TempDir, name: &str, more: &[&str]) {
     assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// f32 lighting and drawing, as in tests/render_reference.rs. The ground's rim, of which a pixel may show it or not, is out of view.
+/// f32 lighting and drawing, as in tests/render_reference.rs. The ground's rim, of which a pixel
+/// may show it or not, is out of view.
 const RMSE_OF_F32: f64 = 1e-5;
 
 #[test]
 fn the_device_draws_the_ground_as_the_reference_does() {
     let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"\nexaggeration = 1.5");
-    let plate = "[[surface]]\ncenter = [3000.0, 400.0, 1000.0]\nu = [900.0, 0.0, 0.0]\nv = [0.0, 0.0, -900.0]\n\
+    let plate = "[[surface]]\ncenter = [3000.0, 400.0, 1000.0]\nu = [900.0, 0.0, 0.0]\nv = [0.0, \
+        0.0, -900.0]\n\
                  subdivide = [3, 3]\nmaterial = \"rock\"\n";
     let scene = fs::read_to_string(dir.path().join("scene.toml")).expect("the scene");
     let unlit = ["--set", "lighting.mode=\"none\""];
@@ -107,14 +112,16 @@ fn the_device_draws_the_ground_as_the_reference_does() {
             ],
         ),
     ] {
-        // Surfaces' own light is another matter: the reference's is in closed form, the device's marched.
+        // Surfaces' own light is another matter: the reference's is in closed form, the device's
+        // marched.
         for plates in ["", plate].into_iter().take(if what == "nothing lit" { 2 } else { 1 }) {
             fs::write(dir.path().join("scene.toml"), format!("{scene}{plates}")).expect("a scene");
             render(&dir, "thin.exr", &[&["--reference", "thin"], &more[..]].concat());
             render(&dir, "drawn.exr", &[&["--validation"], &more[..]].concat());
             let (rmse, max) = differ(&dir, "thin.exr", "drawn.exr");
             println!("{what}, {} plates: RMSE {rmse:.1e}, greatest {max:.1e}", plates.len().min(1));
-            // Pairs of facets err by more than rounding: 1 % of L2 is what lighting.pair_size is held to.
+            // Pairs of facets err by more than rounding: 1 % of L2 is what lighting.pair_size is
+            // held to.
             let most = if what == "two reflections" { 2e-3 } else { RMSE_OF_F32 };
             assert!(rmse <= most, "{what}: {rmse:e}");
         }
@@ -138,15 +145,21 @@ fn smaller_pictures_chunks_and_shells_have_the_ground_too() {
     // In half the size no more is lost than without ground.
     let loss = |more: &[&str]| {
         render(&dir, "full.exr", more);
-        render(&dir, "half.exr", &[&["--validation", "--set", "draw.resolution=0.5"], more].concat());
+        render(
+            &dir,
+            "half.exr",
+            &[&["--validation", "--set", "draw.resolution=0.5"], more].concat(),
+        );
         differ(&dir, "full.exr", "half.exr").0
     };
     for more in [&[][..], &["--set", "draw.path=\"sprites\""]] {
-        let [with, without] = [loss(more), loss(&[more, &["--set", "cloud.0.ground=\"none\""]].concat())];
+        let [with, without] =
+            [loss(more), loss(&[more, &["--set", "cloud.0.ground=\"none\""]].concat())];
         println!("half the size: {with:.1e}, without ground {without:.1e}");
         assert!(with < 1.1 * without, "{with:e} {without:e}");
     }
-    // A flight, in both loops, with impostors and without: the same bytes, and validation has nothing to say.
+    // A flight, in both loops, with impostors and without: the same bytes, and validation has
+    // nothing to say.
     let bench = ["--frames", "4", "--repeat", "2", "--warmup", "1", "-q", "--validation"];
     let scene = path(&dir, "scene.toml");
     for more in [&["--set", "draw.impostors=\"on\""][..], &[]] {
@@ -166,24 +179,36 @@ fn clouds_throw_their_shadow_on_the_ground_and_it_lightens_them() {
         let names = reader.headers().expect("names").clone();
         let column = |name: &str| names.iter().position(|n| n == name).expect(name);
         let columns = ["region", "x", "y", "id_g", "ii_g"].map(column);
-        reader.records().map(|r| r.expect("a row")).map(|r| columns.map(|c| r[c].parse().expect("a number"))).collect()
+        reader
+            .records()
+            .map(|r| r.expect("a row"))
+            .map(|r| columns.map(|c| r[c].parse().expect("a number")))
+            .collect()
     };
     let sun = ["--set", "light.1.irradiance=[0,0,0]", "--set", "lighting.mode=\"two-reflection\""];
     let found = facets(&sun);
     let ground: Vec<_> = found.iter().filter(|f| f[0] == 0.0).collect();
     assert_eq!(ground.len(), NX * NY);
-    // The light comes from the west of above, so the shadow of the east half lies a little west of it: the easternmost two columns
-    // are in it, the plain of the middle west is not.
+    // The light comes from the west of above, so the shadow of the east half lies a little west of
+    // it: the easternmost two columns are in it, the plain of the middle west is not.
     let cosine = 1.0 / (0.09f64 + 1.0 + 0.04).sqrt();
-    let in_shadow: Vec<f64> = ground.iter().filter(|f| f[1] > 1900.0 && f[1] < 3000.0).map(|f| f[3]).collect();
+    let in_shadow: Vec<f64> =
+        ground.iter().filter(|f| f[1] > 1900.0 && f[1] < 3000.0).map(|f| f[3]).collect();
     assert!(in_shadow.iter().all(|light| *light < 0.9 * 2.9 * cosine), "{in_shadow:?}");
-    let lit = ground.iter().filter(|f| f[1] < -3000.0 && f[2] < 100.0).map(|f| f[3] / (2.9 * cosine));
+    let lit =
+        ground.iter().filter(|f| f[1] < -3000.0 && f[2] < 100.0).map(|f| f[3] / (2.9 * cosine));
     let lit: Vec<f64> = lit.collect();
     assert!(!lit.is_empty() && lit.iter().all(|light| (light - 1.0).abs() < 0.15), "{lit:?}");
     // The clouds have light from the ground, which they have not where it is black.
-    let of_clouds = |found: &[[f64; 5]]| found.iter().filter(|f| f[0] == 1.0).map(|f| f[4]).sum::<f64>();
+    let of_clouds =
+        |found: &[[f64; 5]]| found.iter().filter(|f| f[0] == 1.0).map(|f| f[4]).sum::<f64>();
     let black = facets(&[&sun[..], &["--set", "material.1.kd=[0,0,0]"]].concat());
-    assert!(of_clouds(&found) > 1.05 * of_clouds(&black), "{} {}", of_clouds(&found), of_clouds(&black));
+    assert!(
+        of_clouds(&found) > 1.05 * of_clouds(&black),
+        "{} {}",
+        of_clouds(&found),
+        of_clouds(&black)
+    );
 }
 
 #[test]
@@ -200,17 +225,33 @@ fn what_is_wrong_with_the_ground_is_told() {
             "ground = \"rock\"",
             "`cloud.0.ground`: expected \"none\": the file has no variable HGT",
         ),
-        (file(), "ground = \"rok\"", "`cloud.0.ground`: unknown material `rok`; did you mean `rock`?"),
+        (
+            file(),
+            "ground = \"rok\"",
+            "`cloud.0.ground`: unknown material `rok`; did you mean `rock`?",
+        ),
         (file(), "ground = 3", "`cloud.0.ground`: expected a string, found integer 3"),
         (
             Made::wrf_of(1, 1, [4, 1, 5]),
             "ground = \"rock\"",
             "the file has 4 x 1 columns, and ground lies between 2 x 2",
         ),
-        (file(), "ground = \"rock\"\nbase = 300.0", "`cloud.0.ground`: expected \"none\" where a `base` or `grow_to`"),
-        (file(), "ground = \"rock\"\ngrow_to = 2.0", "`cloud.0.ground`: expected \"none\" where a `base` or `grow_to`"),
+        (
+            file(),
+            "ground = \"rock\"\nbase = 300.0",
+            "`cloud.0.ground`: expected \"none\" where a `base` or `grow_to`",
+        ),
+        (
+            file(),
+            "ground = \"rock\"\ngrow_to = 2.0",
+            "`cloud.0.ground`: expected \"none\" where a `base` or `grow_to`",
+        ),
         (file().with_units("HGT", "feet"), "ground = \"rock\"", "w.nc: variable HGT"),
-        (file().with_floats("HGT", |h| h[9] = f32::NAN), "ground = \"rock\"", "w.nc: variable HGT, step 0"),
+        (
+            file().with_floats("HGT", |h| h[9] = f32::NAN),
+            "ground = \"rock\"",
+            "w.nc: variable HGT, step 0",
+        ),
         (
             file().with_floats("HGT", |h| h[9] = 1e6),
             "ground = \"rock\"",

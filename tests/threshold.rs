@@ -1,5 +1,5 @@
-//! `draw.threshold`: on random scenes and cameras both draw paths end sprites where the f64 reference does, and the picture
-//! changes by no more than what is cut can.
+//! `draw.threshold`: on random scenes and cameras both draw paths end sprites where the f64
+//! reference does, and the picture changes by no more than what is cut can.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -31,30 +31,44 @@ use scenery::Scenery;
 
 const FORMAT: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
 
-/// Blobs all around the eye, of optical depths from 10^-4.5 to 3; textured, in part, before a rectangle or not.
+/// Blobs all around the eye, of optical depths from 10^-4.5 to 3; textured, in part, before a
+/// rectangle or not.
 fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
     let mut random = Random(seed);
     let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
-    let mut point = |reach: f64| DVec3::new(within(-reach, reach), within(-reach, reach), within(-reach, reach));
+    let mut point = |reach: f64| {
+        DVec3::new(within(-reach, reach), within(-reach, reach), within(-reach, reach))
+    };
     let (eye, target) = (point(2.0), point(2.0));
     let mut picture = Picture::new(eye, target, within(15.0, 130.0), within(0.01, 0.3));
     let n = 60;
     for _ in 0..n {
-        let v = |w: &mut dyn FnMut(f64, f64) -> f64| DVec3::new(w(-3.0, 3.0), w(-3.0, 3.0), w(-3.0, 3.0));
+        let v = |w: &mut dyn FnMut(f64, f64) -> f64| {
+            DVec3::new(w(-3.0, 3.0), w(-3.0, 3.0), w(-3.0, 3.0))
+        };
         let at = v(&mut within);
         picture = picture.blob(at, 10f64.powf(within(-2.5, 0.0)), 10f64.powf(within(-4.5, 0.5)));
     }
     let threshold = 2f64.powf(within(-13.0, -2.0));
     let view = View { width: 60, height: 45, cutoff: within(1.0, 5.0), threshold, ..picture.view };
     if seed.is_multiple_of(2) {
-        let record =
-            |i: u32| TexturedRecord { seed: 9, i_box: i, i_first: 0, i_field: i % 8, strength: 0.2 * i as f32 };
+        let record = |i: u32| TexturedRecord {
+            seed: 9,
+            i_box: i,
+            i_first: 0,
+            i_field: i % 8,
+            strength: 0.2 * i as f32,
+        };
         let i_group = (0..n).map(|i| i / 10).collect();
         picture.textured = Some((i_group, (0..6).map(record).collect(), pool.clone()));
     }
     if seed.is_multiple_of(3) {
-        let part =
-            |i: u32| DrawnRecord { shift: 0, end: 10 * i + 7, kappa_scale: 1.0 + 0.2 * i as f32, last_weight: 0.3 };
+        let part = |i: u32| DrawnRecord {
+            shift: 0,
+            end: 10 * i + 7,
+            kappa_scale: 1.0 + 0.2 * i as f32,
+            last_weight: 0.3,
+        };
         picture.drawn = Some(((0..n).map(|i| i / 10).collect(), (0..6).map(part).collect()));
     }
     if seed % 4 == 1 {
@@ -71,7 +85,13 @@ fn without(picture: &Picture) -> Picture {
 
 fn usual(gpu: &Gpu) -> Tiled {
     let invocations = passes::tiles::invocations(gpu.device.limits());
-    Tiled { invocations, portable: false, most_pairs: None, most_tiles: None, saturated: saturated(FORMAT.1) }
+    Tiled {
+        invocations,
+        portable: false,
+        most_pairs: None,
+        most_tiles: None,
+        saturated: saturated(FORMAT.1),
+    }
 }
 
 /// The reference's picture and its bound, by `sprites` or by `tiles`.
@@ -94,18 +114,23 @@ fn cut_of(picture: &Picture) -> Vec<Cut> {
     cut(&picture.view, &behind, &picture.blobs(), Some(&factor))
 }
 
-/// Of each of a pixel's four numbers how much the cut may change it: what is met is of radiances and of nothing, or of what
-/// the rectangle shows.
+/// Of each of a pixel's four numbers how much the cut may change it: what is met is of radiances
+/// and of nothing, or of what the rectangle shows.
 fn changes(picture: &Picture) -> Vec<f64> {
     let mut met = picture.radiance();
     met.push(DVec3::ZERO);
     if picture.scenery.is_some() {
-        met.extend(picture.behind(FORMAT.1).iter().flatten().map(|b| DVec3::from_slice(&b.color[..3])));
+        met.extend(
+            picture.behind(FORMAT.1).iter().flatten().map(|b| DVec3::from_slice(&b.color[..3])),
+        );
     }
     let high = met.iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
     let low = met.iter().copied().fold(DVec3::INFINITY, DVec3::min);
     let spread = (high - low).to_array();
-    cut_of(picture).iter().flat_map(|c| [spread[0], spread[1], spread[2], 1.0].map(|s| c.share() * s)).collect()
+    cut_of(picture)
+        .iter()
+        .flat_map(|c| [spread[0], spread[1], spread[2], 1.0].map(|s| c.share() * s))
+        .collect()
 }
 
 #[test]
@@ -129,14 +154,21 @@ fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
             // In true numbers, and as drawn.
             let exact: Vec<f64> = changes.iter().map(|c| c + 1e-13).collect();
             assert_within(&format!("{what}, true numbers"), &on.1, &off.1, &exact);
-            let allowed: Vec<f64> = (0..changes.len()).map(|i| changes[i] + on.2[i] + off.2[i]).collect();
+            let allowed: Vec<f64> =
+                (0..changes.len()).map(|i| changes[i] + on.2[i] + off.2[i]).collect();
             assert_within(&format!("{what}, as drawn"), &on.0, &off.0, &allowed);
             let cut: Vec<usize> = (0..changes.len()).filter(|i| changes[*i] > 1e-6).collect();
-            closest = cut.iter().map(|&i| (on.1[i] - off.1[i]).abs() / changes[i]).fold(closest, f64::max);
+            closest = cut
+                .iter()
+                .map(|&i| (on.1[i] - off.1[i]).abs() / changes[i])
+                .fold(closest, f64::max);
             n_cut += cut.len();
         }
     }
-    println!("{n_cut} numbers cut, up to {closest:.3} of what may be; rounding up to {greatest:.3} of its bound");
+    println!(
+        "{n_cut} numbers cut, up to {closest:.3} of what may be; rounding up to {greatest:.3} \
+         of its bound"
+    );
     // The bound is met: a single layer is cut before black.
     assert!(n_cut > 10_000 && closest > 0.5 && closest <= 1.0 + 1e-6, "{n_cut} {closest}");
 }
@@ -162,13 +194,19 @@ fn wrong_cuts_are_noticed() {
     let mut gpu = Gpu::new();
     let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1);
     for k in 0..12 {
-        let at = picture.at(0.4 * f64::from(k) - 2.2, 0.2 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
+        let at =
+            picture.at(0.4 * f64::from(k) - 2.2, 0.2 * f64::from(k % 4), 4.0 + 0.1 * f64::from(k));
         picture = picture.blob(at, 0.1 + 0.04 * f64::from(k), 0.5 * 0.5f64.powi(k % 6));
     }
     picture.view.threshold = 1.0 / 40.0;
     let tiled = Way::Tiles(usual(&gpu));
     for (way, file, from, to) in [
-        (Way::Sprites, "sprites.vert", "log(tau * push.inv_threshold)", "0.98 * log(tau * push.inv_threshold)"),
+        (
+            Way::Sprites,
+            "sprites.vert",
+            "log(tau * push.inv_threshold)",
+            "0.98 * log(tau * push.inv_threshold)",
+        ),
         (Way::Sprites, "sprites.vert", "sqrt(2.0 * max", "sqrt(1.8 * max"),
         (Way::Sprites, "sprites.vert", "if (THRESHOLD != 0) {", "if (THRESHOLD > 1) {"),
         (Way::Sprites, "sprites.frag", "? in_cut :", "? 1.02 * in_cut :"),
@@ -190,7 +228,8 @@ fn wrong_cuts_are_noticed() {
 fn what_is_below_the_threshold_everywhere_is_not_drawn() {
     let mut gpu = Gpu::new();
     let tiled = usual(&gpu);
-    let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1).blob(DVec3::ZERO, 0.5, 0.0099);
+    let mut picture =
+        Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1).blob(DVec3::ZERO, 0.5, 0.0099);
     picture.view.threshold = 0.01;
     for way in [Way::Sprites, Way::Tiles(tiled), Way::Chunks(2, tiled.saturated)] {
         let drawn = |p: &Picture, gpu: &mut Gpu| p.draw_by(gpu, None, FORMAT.0, way);

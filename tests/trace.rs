@@ -1,4 +1,5 @@
-//! The time line of a bench: threads' zones that nest, passes inside their frames, on whichever clock.
+//! The time line of a bench: threads' zones that nest, passes inside their frames, on whichever
+//! clock.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,15 +18,24 @@ use serde_json::Value;
 use tracing_subscriber::layer::SubscriberExt;
 
 const N_FRAMES: u32 = 8;
-/// Zones of all threads of this program are collected, and two benches at a time have two threads of one name.
+/// Zones of all threads of this program are collected, and two benches at a time have two threads
+/// of one name.
 static ONE_BENCH: Mutex<()> = Mutex::new(());
 
 /// Two loops of a lit scene whose particles the game thread moves, with every pass in every frame.
 fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
     let _alone = ONE_BENCH.lock().unwrap_or_else(PoisonError::into_inner);
-    let overrides = ["film.width=64", "film.height=48", "lighting.grid=16", "threads.simulate=cpu"].map(str::to_owned);
-    let loaded = scene_file::load(Path::new("tests/data/modes.toml"), &overrides, None).expect("a scene");
-    let cases = cases(loaded, &[], &[Threading::Serial, Threading::Parallel], Some(N_FRAMES), [false, false]);
+    let overrides = ["film.width=64", "film.height=48", "lighting.grid=16", "threads.simulate=cpu"]
+        .map(str::to_owned);
+    let loaded =
+        scene_file::load(Path::new("tests/data/modes.toml"), &overrides, None).expect("a scene");
+    let cases = cases(
+        loaded,
+        &[],
+        &[Threading::Serial, Threading::Parallel],
+        Some(N_FRAMES),
+        [false, false],
+    );
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
@@ -75,7 +85,9 @@ fn check_nesting(track: &str, mut zones: Vec<([f64; 2], &str)>) -> Result<(), St
         while open.last().is_some_and(|(outer, _)| outer[1] <= zone[0] + ROUNDING_US) {
             open.pop();
         }
-        if let Some((outer, outer_name)) = open.last().filter(|(outer, _)| zone[1] > outer[1] + ROUNDING_US) {
+        if let Some((outer, outer_name)) =
+            open.last().filter(|(outer, _)| zone[1] > outer[1] + ROUNDING_US)
+        {
             return Err(format!("{track}: {name} {zone:?} ends after {outer_name} {outer:?}"));
         }
         open.push((zone, name));
@@ -85,7 +97,9 @@ fn check_nesting(track: &str, mut zones: Vec<([f64; 2], &str)>) -> Result<(), St
 
 #[test]
 fn crossing_zones_would_be_noticed() {
-    assert!(check_nesting("x", vec![([0.0, 5.0], "a"), ([1.0, 2.0], "b"), ([2.0, 5.0], "c")]).is_ok());
+    assert!(
+        check_nesting("x", vec![([0.0, 5.0], "a"), ([1.0, 2.0], "b"), ([2.0, 5.0], "c")]).is_ok()
+    );
     assert!(check_nesting("x", vec![([0.0, 5.0], "a"), ([4.0, 6.0], "b")]).is_err());
     assert!(check_nesting("x", vec![([3.0, 2.0], "a")]).is_err());
 }
@@ -96,14 +110,20 @@ fn check_passes(trace: &Value, slack_us: f64) {
     let recorded = |e: &&Value| e["tid"] == 1 && e["ph"] == "X";
     let mut n = 0;
     for record in events.iter().filter(recorded) {
-        let of =
-            |e: &&Value| e["args"]["frame"] == record["args"]["frame"] && e["args"]["block"] == record["args"]["block"];
+        let of = |e: &&Value| {
+            e["args"]["frame"] == record["args"]["frame"]
+                && e["args"]["block"] == record["args"]["block"]
+        };
         let id = format!("{}/{}", record["args"]["block"], record["args"]["frame"]);
-        let end = events.iter().find(|e| e["ph"] == "e" && e["id"] == *id).expect("it ended")["ts"].as_f64();
+        let end = events.iter().find(|e| e["ph"] == "e" && e["id"] == *id).expect("it ended")["ts"]
+            .as_f64();
         let end = end.expect("a number");
         for pass in events.iter().filter(|e| e["tid"] == 2 && e["ph"] == "X").filter(of) {
             let [from, to] = span(pass);
-            assert!(from >= span(record)[1] - slack_us && to <= end + slack_us, "{pass} of {record}, ended {end}");
+            assert!(
+                from >= span(record)[1] - slack_us && to <= end + slack_us,
+                "{pass} of {record}, ended {end}"
+            );
             n += 1;
         }
     }
@@ -113,7 +133,8 @@ fn check_passes(trace: &Value, slack_us: f64) {
 #[test]
 fn zones_nest_and_passes_lie_in_their_frames() {
     let zones = Zones::default();
-    tracing::subscriber::set_global_default(tracing_subscriber::registry().with(zones.clone())).expect("the first");
+    tracing::subscriber::set_global_default(tracing_subscriber::registry().with(zones.clone()))
+        .expect("the first");
     let (samples, stage, collected) = benched(&zones);
     let trace = written(&samples, &Beside { zones: Some(&collected), clock: None });
     assert_eq!(trace["otherData"]["gpu_clock"], "laid on the host's clock by the ends of frames");
@@ -122,31 +143,43 @@ fn zones_nest_and_passes_lie_in_their_frames() {
     let mut of_tracks: BTreeMap<&str, Vec<([f64; 2], &str)>> = BTreeMap::new();
     for event in events(&trace).iter().filter(|e| e["cat"] == "zone") {
         let track = &tracks[&event["tid"].as_u64().expect("a number")];
-        of_tracks.entry(track).or_default().push((span(event), event["name"].as_str().expect("a name")));
+        of_tracks
+            .entry(track)
+            .or_default()
+            .push((span(event), event["name"].as_str().expect("a name")));
     }
     for (track, zones) in &of_tracks {
         check_nesting(track, zones.clone()).unwrap_or_else(|what| panic!("{what}"));
     }
     // Every step of every frame, and every pass that ran, where it was done.
-    let count = |track: &str, name: &str| of_tracks[track].iter().filter(|(_, zone)| *zone == name).count();
+    let count =
+        |track: &str, name: &str| of_tracks[track].iter().filter(|(_, zone)| *zone == name).count();
     let drawing = format!("thread {}", std::thread::current().name().expect("a name"));
     let n = N_FRAMES as usize;
     for name in ["game step", "setting", "visibility", "groups", "place particles"] {
         assert_eq!((count(&drawing, name), count("thread game", name)), (n, n), "{name}");
     }
-    // After each loop its last frame is read back, and after the last one facets and light, each once more recorded,
-    // submitted and waited for; and to count what is odd the picture, status, facets and light.
-    for (name, extra) in
-        [("render step", 0), ("plan", 0), ("upload", 0), ("record", 8), ("submit", 8), ("read back", 3)]
-    {
+    // After each loop its last frame is read back, and after the last one facets and light, each
+    // once more recorded, submitted and waited for; and to count what is odd the picture, status,
+    // facets and light.
+    for (name, extra) in [
+        ("render step", 0),
+        ("plan", 0),
+        ("upload", 0),
+        ("record", 8),
+        ("submit", 8),
+        ("read back", 3),
+    ] {
         let want = if name == "read back" { extra } else { 2 * n + extra };
         assert_eq!(count(&drawing, name), want, "{name}");
     }
     assert_eq!(count("thread wait", "wait"), n);
     let n_passes: usize = samples.iter().map(|s| s.times.passes.len()).sum();
-    let of_passes = of_tracks[drawing.as_str()].iter().filter(|(_, name)| name.starts_with("record ")).count();
+    let of_passes =
+        of_tracks[drawing.as_str()].iter().filter(|(_, name)| name.starts_with("record ")).count();
     assert_eq!(of_passes, n_passes);
-    // Waiting is noticed a little after it is over, and the promptest frame's a little is what the clock is off by.
+    // Waiting is noticed a little after it is over, and the promptest frame's a little is what the
+    // clock is off by.
     check_passes(&trace, 5000.0);
     stage.close().expect("no validation message");
 }
@@ -157,11 +190,16 @@ fn a_calibrated_clock_lays_the_passes_where_they_were() {
     let real = ClockFit::of(&stage.device.read_clocks(4).expect("readings"));
     assert_eq!(real.is_some(), stage.info().calibrated_timestamps.is_some());
     println!("{:?}: {real:?}", stage.info().calibrated_timestamps);
-    // A device whose own clock is unknown: the last pass of a frame ends when the frame does, so read there.
+    // A device whose own clock is unknown: the last pass of a frame ends when the frame does, so
+    // read there.
     let pairs: Vec<ClockPair> = samples
         .iter()
         .filter_map(|s| Some((s, s.times.passes.last()?.end_ns)))
-        .map(|(s, device_ns)| ClockPair { device_ns, host: s.times.marks.end, deviation_ns: 1000.0 })
+        .map(|(s, device_ns)| ClockPair {
+            device_ns,
+            host: s.times.marks.end,
+            deviation_ns: 1000.0,
+        })
         .collect();
     let clock = ClockFit::of(&pairs).expect("frames");
     for clock in [Some(clock), real].into_iter().flatten() {

@@ -1,5 +1,6 @@
-//! Studies of run time against error: a knob whose law is known comes out with the front that it must have, what goes on with an
-//! earlier study runs nothing twice, and other seeds of the particles give the same front within the intervals.
+//! Studies of run time against error: a knob whose law is known comes out with the front that it
+//! must have, what goes on with an earlier study runs nothing twice, and other seeds of the
+//! particles give the same front within the intervals.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -22,8 +23,9 @@ use nimbus::study::tradeoff::records::{Configuration, Front};
 use nimbus::study::tradeoff::run::{Event, Found, Loaded, Setup, StudyPlan, Subject};
 use nimbus::study::tradeoff::turns::{Time, Turn};
 
-/// A subject of quality q: q ms a frame, and a picture that is off by 0.2/q² everywhere but for a pattern of its own; with
-/// `waste` it takes half as long again for nothing. All on a machine that is now fast, now slow.
+/// A subject of quality q: q ms a frame, and a picture that is off by 0.2/q² everywhere but for a
+/// pattern of its own; with `waste` it takes half as long again for nothing. All on a machine that
+/// is now fast, now slow.
 #[derive(Default)]
 struct Law {
     /// (q, waste) of each configuration.
@@ -44,12 +46,16 @@ impl Law {
         0.2 / (q * q)
     }
 
-    /// Slow drifts and bursts by a factor of up to three, and single frames by chance, all the same in every run.
+    /// Slow drifts and bursts by a factor of up to three, and single frames by chance, all the same
+    /// in every run.
     fn noise(&mut self) -> f64 {
         self.n_turns += 1;
         let t = self.n_turns as f64;
-        let chance = (self.n_turns.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);
-        (1.0 + 0.5 * (t / 40.0).sin()) * if (self.n_turns / 60) % 3 == 1 { 2.0 } else { 1.0 } * (1.0 + 0.02 * chance)
+        let chance =
+            (self.n_turns.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / 2f64.powi(24);
+        (1.0 + 0.5 * (t / 40.0).sin())
+            * if (self.n_turns / 60) % 3 == 1 { 2.0 } else { 1.0 }
+            * (1.0 + 0.02 * chance)
     }
 }
 
@@ -64,7 +70,9 @@ impl Subject for Law {
         if q > 6.9 {
             return Err(Error::limit("q is too great for this device"));
         }
-        let value = |k: u32| Law::error(q) as f32 * if (k / 7 + k / SIDE).is_multiple_of(2) { 1.2 } else { -0.75 };
+        let value = |k: u32| {
+            Law::error(q) as f32 * if (k / 7 + k / SIDE).is_multiple_of(2) { 1.2 } else { -0.75 }
+        };
         Ok((0..SIDE * SIDE).flat_map(|k| [value(k); 4]).collect())
     }
 
@@ -89,8 +97,13 @@ fn plan(knobs: &[&str], design: Design, n_rounds: usize) -> StudyPlan {
 fn study(law: &mut Law, plan: &StudyPlan, found: &mut Found, stop: &AtomicBool) -> bool {
     let pixels = Pixels::all(SIDE, SIDE);
     let n = (SIDE * SIDE) as usize;
-    let reference =
-        Reference { rgba: vec![[0.0; 4]; n], own_error: 1e-6, accuracy: String::new(), seconds: 0.0, pixels_s: 0.0 };
+    let reference = Reference {
+        rgba: vec![[0.0; 4]; n],
+        own_error: 1e-6,
+        accuracy: String::new(),
+        seconds: 0.0,
+        pixels_s: 0.0,
+    };
     let setup = Setup { plan, load: &loaded, reference: &reference, pixels: &pixels, stop };
     setup.run(law, found, &mut |_: Event<'_>| Ok(())).unwrap()
 }
@@ -102,8 +115,10 @@ fn named<'a>(found: &'a Found, name: &str) -> &'a Configuration {
 #[test]
 fn a_knob_of_known_law_has_the_front_it_must_have() {
     let (mut law, mut found) = (Law::default(), Found::default());
-    // The scene as it stands has q = 3 and no waste. Four qualities that nobody beats, the same with waste, one too great.
-    let plan = plan(&["draw.cutoff=2.0,2.5,3.0,4.0,5.0,7.0", "draw.sort_bits=32,16"], Design::Grid, 24);
+    // The scene as it stands has q = 3 and no waste. Four qualities that nobody beats, the same
+    // with waste, one too great.
+    let plan =
+        plan(&["draw.cutoff=2.0,2.5,3.0,4.0,5.0,7.0", "draw.sort_bits=32,16"], Design::Grid, 24);
     assert!(study(&mut law, &plan, &mut found, &AtomicBool::new(false)));
     for (q, text) in [(2.0, "2.0"), (2.5, "2.5"), (4.0, "4.0"), (5.0, "5.0")] {
         let pure = named(&found, &format!("draw.cutoff={text}, draw.sort_bits=32"));
@@ -112,26 +127,39 @@ fn a_knob_of_known_law_has_the_front_it_must_have() {
         let (ratio, wasted) = (pure.by_base.unwrap(), waste.by_base.unwrap());
         // Chance moves a frame by 2 % at most, a burst may begin or end between two turns.
         assert!(
-            (ratio.value / (q / 3.0) - 1.0).abs() < 0.05 && (wasted.value / (q / 2.0) - 1.0).abs() < 0.05,
+            (ratio.value / (q / 3.0) - 1.0).abs() < 0.05
+                && (wasted.value / (q / 2.0) - 1.0).abs() < 0.05,
             "{ratio:?}"
         );
-        assert!(ratio.low.unwrap() <= q / 3.0 * 1.02 && ratio.high.unwrap() >= q / 3.0 * 0.98, "{ratio:?}");
+        assert!(
+            ratio.low.unwrap() <= q / 3.0 * 1.02 && ratio.high.unwrap() >= q / 3.0 * 0.98,
+            "{ratio:?}"
+        );
         let error = pure.error.unwrap();
-        // The pattern's mean square: as many of 1.2² as of 0.75², nearly: 1.0006 together, its root 1.0003.
-        assert!((error.rmse.value / Law::error(q) - 1.0).abs() < 0.02 && error.is_resolved, "{error:?}");
+        // The pattern's mean square: as many of 1.2² as of 0.75², nearly: 1.0006 together, its root
+        // 1.0003.
+        assert!(
+            (error.rmse.value / Law::error(q) - 1.0).abs() < 0.02 && error.is_resolved,
+            "{error:?}"
+        );
     }
     // What is as the scene stands is not there twice; what does not fit says why, and is nowhere.
     assert_eq!(found.configurations[0].front, Front::On);
     assert!(!found.configurations.iter().any(|c| c.name == "draw.cutoff=3.0, draw.sort_bits=32"));
     let beyond = named(&found, "draw.cutoff=7.0, draw.sort_bits=32");
-    assert!(beyond.front == Front::Unknown && beyond.failure.as_ref().unwrap().contains("too great"));
+    assert!(
+        beyond.front == Front::Unknown && beyond.failure.as_ref().unwrap().contains("too great")
+    );
     // What a budget buys, in ms of the machine's median speed.
     let base_ms = found.configurations[0].gpu_ms.unwrap().value;
     let name = |best: Option<usize>| best.map(|i| found.configurations[i].name.as_str());
-    let within = |q: f64| best_within_ms(&found.configurations, Metric::Rmse, base_ms * q / 3.0, true).configuration;
+    let within = |q: f64| {
+        best_within_ms(&found.configurations, Metric::Rmse, base_ms * q / 3.0, true).configuration
+    };
     assert_eq!(name(within(4.4)), Some("draw.cutoff=4.0, draw.sort_bits=32"));
     assert_eq!((name(within(3.2)), within(1.8)), (Some("as it stands"), None));
-    let near = |e: f64| best_within_error(&found.configurations, Metric::Rmse, e, true).configuration;
+    let near =
+        |e: f64| best_within_error(&found.configurations, Metric::Rmse, e, true).configuration;
     assert_eq!(name(near(0.04)), Some("draw.cutoff=2.5, draw.sort_bits=32"));
     assert_eq!(near(0.001), None);
 }
@@ -159,12 +187,18 @@ fn what_is_there_is_not_run_again() {
     assert!(study(&mut law, &first, &mut found, &stopped));
     let (n_pictures, turns) = (law.n_pictures, found.turns.clone());
     assert_eq!(n_pictures, 3);
-    // The same again: nothing to do. With one more value: that one alone, with the scene as it stands beside it.
+    // The same again: nothing to do. With one more value: that one alone, with the scene as it
+    // stands beside it.
     let mut again = Law::default();
     assert!(study(&mut again, &first, &mut found, &stopped));
     assert_eq!((again.n_pictures, found.turns.len()), (0, turns.len()));
     let mut more = Law::default();
-    assert!(study(&mut more, &plan(&["draw.cutoff=2.0,2.5,4.0"], Design::Alone, 4), &mut found, &stopped));
+    assert!(study(
+        &mut more,
+        &plan(&["draw.cutoff=2.0,2.5,4.0"], Design::Alone, 4),
+        &mut found,
+        &stopped
+    ));
     assert_eq!((more.n_pictures, found.turns[..turns.len()] == turns[..]), (1, true));
     assert!(found.turns[turns.len()..].iter().all(|t| [0, 3].contains(&t.i_configuration)));
     assert_eq!(named(&found, "draw.cutoff=4.0").front, Front::On);
@@ -189,7 +223,14 @@ fn other_seeds_of_the_particles_give_errors_that_agree_within_their_intervals() 
             "--frames",
             "1",
         ];
-        let knobs = ["--knob", "draw.cutoff=2,4", "--knob", "lighting.grid=16,32", "--set", "lighting.grid=48"];
+        let knobs = [
+            "--knob",
+            "draw.cutoff=2,4",
+            "--knob",
+            "lighting.grid=16,32",
+            "--set",
+            "lighting.grid=48",
+        ];
         let rest = ["--csv", "-q", "--seed", seed, "--against", "model"];
         let output = program::run(&[&args[..], &knobs[..], &rest[..]].concat());
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -212,12 +253,14 @@ fn other_seeds_of_the_particles_give_errors_that_agree_within_their_intervals() 
             (n, widest) = (n + 1, widest.max(allowed / less[0]));
         }
     }
-    // Intervals that allow anything would agree, too; and who is nearer is the same with every seed.
+    // Intervals that allow anything would agree, too; and who is nearer is the same with every
+    // seed.
     assert!(n >= 12 && widest < 0.8, "{n} {widest}");
     for of in &all {
         let rmse = |name: &str| of.iter().find(|(other, _)| other == name).unwrap().1[0];
         assert!(
-            rmse("draw.cutoff=2") > 2.0 * rmse("as it stands") && rmse("lighting.grid=16") > rmse("lighting.grid=32")
+            rmse("draw.cutoff=2") > 2.0 * rmse("as it stands")
+                && rmse("lighting.grid=16") > rmse("lighting.grid=32")
         );
     }
 }

@@ -1,5 +1,5 @@
-//! `nimbus view` under a virtual display: it opens, draws, hears keys and mouse, is resized, and closes; and says what is missing
-//! where it cannot.
+//! `nimbus view` under a virtual display: it opens, draws, hears keys and mouse, is resized, and
+//! closes; and says what is missing where it cannot.
 
 #![cfg(feature = "window")]
 
@@ -19,7 +19,17 @@ use serde_json::Value;
 fn view(display: &Display, dir: &std::path::Path, more: &[&str]) -> Child {
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
     let args = [
-        &["view", scene, "--size", "200x150", "--validation", "--json", "--present", "immediate", "--no-panels"],
+        &[
+            "view",
+            scene,
+            "--size",
+            "200x150",
+            "--validation",
+            "--json",
+            "--present",
+            "immediate",
+            "--no-panels",
+        ],
         more,
     ]
     .concat();
@@ -35,14 +45,17 @@ fn ended(mut child: Child) -> (String, String) {
         std::thread::sleep(Duration::from_millis(20));
     }
     let output = child.wait_with_output().expect("its output");
-    let [printed, said] = [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).into_owned());
+    let [printed, said] =
+        [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).into_owned());
     assert!(output.status.success(), "{said}");
     (printed, said)
 }
 
 fn loops(printed: &str) -> Vec<(String, u64)> {
     let found: Value = serde_json::from_str(printed).expect("JSON");
-    let of = |row: &Value| (row["loop"].as_str().expect("a name").to_owned(), row["n"].as_u64().expect("a number"));
+    let of = |row: &Value| {
+        (row["loop"].as_str().expect("a name").to_owned(), row["n"].as_u64().expect("a number"))
+    };
     found["loops"].as_array().expect("loops").iter().map(of).collect()
 }
 
@@ -73,9 +86,14 @@ fn keys_and_mouse_and_sizes_are_heard() {
     wait_for("a kept picture", || kept.is_file());
     let drawn = dir.path().join("drawn.png");
     let scene = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/hello.toml");
-    let rendered = nimbus(&["render", scene, "--size", "200x150", "-q", "-o", &drawn.to_string_lossy()]).output();
+    let rendered =
+        nimbus(&["render", scene, "--size", "200x150", "-q", "-o", &drawn.to_string_lossy()])
+            .output();
     assert!(rendered.expect("rendered").status.success());
-    assert!(std::fs::read(&kept).expect("kept") == std::fs::read(&drawn).expect("drawn"), "the same bytes");
+    assert!(
+        std::fs::read(&kept).expect("kept") == std::fs::read(&drawn).expect("drawn"),
+        "the same bytes"
+    );
     // Every knob, on and on; the mouse turns and goes around; sizes change under way.
     for key in ["t", "l", "p", "r", "k", "b", "g", "o", "v", "c", "t", "i"] {
         display.key(key);
@@ -91,13 +109,21 @@ fn keys_and_mouse_and_sizes_are_heard() {
     wait_for("another", || moved.is_file());
     display.key("Escape");
     let (printed, said) = ended(child);
-    for words in ["threads.mode = \"serial\"", "draw.path = \"sprites\"", "skipping is off", "kept view-1.png"] {
+    for words in [
+        "threads.mode = \"serial\"",
+        "draw.path = \"sprites\"",
+        "skipping is off",
+        "kept view-1.png",
+    ] {
         assert!(said.contains(words), "{words}: {said}");
     }
     // The command that draws what was seen does.
     let line = printed.lines().find(|line| line.starts_with("nimbus render ")).expect("a command");
     assert!(line.contains("--no-skip") && line.contains("--set 'draw.path=\"sprites\"'"), "{line}");
-    assert!(std::fs::read(&moved).expect("kept") != std::fs::read(&drawn).expect("drawn"), "the eye has moved");
+    assert!(
+        std::fs::read(&moved).expect("kept") != std::fs::read(&drawn).expect("drawn"),
+        "the eye has moved"
+    );
 }
 
 fn wait_for(what: &str, is_there: impl Fn() -> bool) {
@@ -123,18 +149,32 @@ fn without_a_display_it_says_what_is_missing_and_what_needs_none() {
     };
     for args in [["view", scene, "-q"], ["edit", "none.dat", "-q"]] {
         let said = run(None, &args);
-        assert!(said.contains("there is no display: DISPLAY is not set") && said.contains("nimbus render"), "{said}");
+        assert!(
+            said.contains("there is no display: DISPLAY is not set")
+                && said.contains("nimbus render"),
+            "{said}"
+        );
         let said = run(Some(":6543"), &args);
-        assert!(said.contains("the display :6543 cannot be opened") && said.contains("nimbus render"), "{said}");
+        assert!(
+            said.contains("the display :6543 cannot be opened") && said.contains("nimbus render"),
+            "{said}"
+        );
     }
 }
 
 /// What a child says goes to a file, which is read while it runs.
-fn view_telling(display: &Display, dir: &std::path::Path, args: &[&str]) -> (Child, impl Fn() -> String + use<>) {
+fn view_telling(
+    display: &Display,
+    dir: &std::path::Path,
+    args: &[&str],
+) -> (Child, impl Fn() -> String + use<>) {
     let path = dir.join("said.txt");
     let mut command: Command =
         nimbus(&[&["view"], args, &["--validation", "--json", "--present", "immediate"]].concat());
-    command.current_dir(dir).env("DISPLAY", display.name()).env("NIMBUS_CACHE_DIR", dir.join("cache"));
+    command
+        .current_dir(dir)
+        .env("DISPLAY", display.name())
+        .env("NIMBUS_CACHE_DIR", dir.join("cache"));
     command.stderr(std::fs::File::create(&path).expect("a file"));
     let child = command.spawn().expect("the program runs");
     (child, move || std::fs::read_to_string(&path).unwrap_or_default())
@@ -171,12 +211,19 @@ fn panels_compare_count_and_measure() {
     assert!(output.status.success(), "{}", said());
     let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let rows = found["loops"].as_array().expect("loops");
-    assert!(rows.iter().any(|row| row["panels"] == true) && rows.iter().any(|row| row["panels"] == false), "{found}");
+    assert!(
+        rows.iter().any(|row| row["panels"] == true)
+            && rows.iter().any(|row| row["panels"] == false),
+        "{found}"
+    );
     assert!(found["panels"]["p50"].as_f64().is_some_and(|ms| ms > 0.0), "{found}");
     // The truth is that of what is set, and B has other light.
     let text = said();
     let error = |name: &str| {
-        let line = text.lines().rfind(|line| line.starts_with(&format!("{name}: RMSE "))).expect("an error");
+        let line = text
+            .lines()
+            .rfind(|line| line.starts_with(&format!("{name}: RMSE ")))
+            .expect("an error");
         line.split([' ', ',']).nth(2).expect("a number").parse::<f64>().expect("a number")
     };
     // A's is what sprites' cut-off leaves out: thin sprites of the reference have none.
@@ -188,7 +235,8 @@ fn files_that_change_are_read_again_and_what_is_wrong_leaves_the_picture() {
     let display = Display::open();
     let dir = tempfile::tempdir().expect("a folder");
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let copy = |from: &str, to: &str| std::fs::copy(root.join(from), dir.path().join(to)).expect("a copy");
+    let copy =
+        |from: &str, to: &str| std::fs::copy(root.join(from), dir.path().join(to)).expect("a copy");
     copy("scenes/hello.csv", "hello.csv");
     copy("scenes/hello.toml", "scene.toml");
     std::fs::create_dir(dir.path().join("shaders")).expect("a folder");
@@ -199,13 +247,17 @@ fn files_that_change_are_read_again_and_what_is_wrong_leaves_the_picture() {
             std::fs::copy(entry.path(), shaders.join(entry.file_name())).expect("a copy");
         }
     }
-    let (child, said) =
-        view_telling(&display, dir.path(), &["scene.toml", "--size", "200x150", "--no-panels", "--shaders", "shaders"]);
+    let (child, said) = view_telling(
+        &display,
+        dir.path(),
+        &["scene.toml", "--size", "200x150", "--no-panels", "--shaders", "shaders"],
+    );
     let window = display.window_of(child.id());
     display.focus(&window);
     display.key("space");
     display.key("Home");
-    let write = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).expect("written");
+    let write =
+        |name: &str, text: &str| std::fs::write(dir.path().join(name), text).expect("written");
     let scene = std::fs::read_to_string(dir.path().join("scene.toml")).expect("text");
     write("scene.toml", &scene.replace("width = 320", "width = ]"));
     wait_for("an error", || said().contains("scene.toml:"));
@@ -232,7 +284,9 @@ fn files_that_change_are_read_again_and_what_is_wrong_leaves_the_picture() {
     assert!(output.status.success(), "{}", said());
     let drawn = dir.path().join("drawn.png");
     let saved = dir.path().join("scene-view-1.toml");
-    let rendered = nimbus(&["render", &saved.to_string_lossy(), "-q", "-o", &drawn.to_string_lossy()]).output();
+    let rendered =
+        nimbus(&["render", &saved.to_string_lossy(), "-q", "-o", &drawn.to_string_lossy()])
+            .output();
     assert!(rendered.expect("rendered").status.success());
     let kept = std::fs::read(dir.path().join("view-1.png")).expect("kept");
     assert!(kept == std::fs::read(&drawn).expect("drawn"), "the same bytes");

@@ -1,5 +1,5 @@
-//! Bad weather files: each is refused with one message that says what, where and what was expected, and none crashes,
-//! hangs or takes memory without end.
+//! Bad weather files: each is refused with one message that says what, where and what was expected,
+//! and none crashes, hangs or takes memory without end.
 
 #[path = "harness/readers.rs"]
 mod readers;
@@ -28,9 +28,9 @@ fn said_of(bytes: &[u8]) -> String {
     fs::write(&path, bytes).expect("written");
     let error = match wrf::open(&path) {
         Err(error) => error,
-        Ok(file) => {
-            (0..file.n_steps).find_map(|i| file.step(i).err().or_else(|| file.terrain(i).err())).expect("an error")
-        }
+        Ok(file) => (0..file.n_steps)
+            .find_map(|i| file.step(i).err().or_else(|| file.terrain(i).err()))
+            .expect("an error"),
     };
     assert_eq!(error.exit_code(), 2, "{error}");
     let said = error.to_string();
@@ -50,8 +50,14 @@ fn a_file_that_is_none() {
     assert!(of(dir.path()).ends_with(": is a folder, expected a NetCDF file"));
     assert_eq!(said_of(b""), "the file is empty: expected a NetCDF file");
     let not_netcdf = "expected \"CDF\" and 1, 2 or 5, or \"\\x89HDF\"";
-    assert_eq!(said_of(b"GRIB\0\0"), format!("not a NetCDF file: it begins with \"GRIB\", {not_netcdf}"));
-    assert_eq!(said_of(b"CDF\x03 and more"), format!("not a NetCDF file: it begins with \"CDF\\x03\", {not_netcdf}"));
+    assert_eq!(
+        said_of(b"GRIB\0\0"),
+        format!("not a NetCDF file: it begins with \"GRIB\", {not_netcdf}")
+    );
+    assert_eq!(
+        said_of(b"CDF\x03 and more"),
+        format!("not a NetCDF file: it begins with \"CDF\\x03\", {not_netcdf}")
+    );
     assert_eq!(said_of(b"C"), format!("not a NetCDF file: it begins with \"C\", {not_netcdf}"));
 }
 
@@ -66,13 +72,23 @@ fn netcdf_that_is_not_wrf() {
 
 #[test]
 fn variables_that_are_missing() {
-    assert_said(&good().without("PHB"), "variable PHB is missing: expected P, PB, T, PH, PHB of WRF");
-    assert_said(&good().without("T").without("PB"), "variables PB, T are missing: expected P, PB, T, PH, PHB of WRF");
+    assert_said(
+        &good().without("PHB"),
+        "variable PHB is missing: expected P, PB, T, PH, PHB of WRF",
+    );
+    assert_said(
+        &good().without("T").without("PB"),
+        "variables PB, T are missing: expected P, PB, T, PH, PHB of WRF",
+    );
     assert_said(
         &good().without("QCLOUD").without("QVAPOR"),
-        "QCLOUD, QICE, QSNOW and QVAPOR are missing: expected one of the first three, or QVAPOR to diagnose clouds from",
+        "QCLOUD, QICE, QSNOW and QVAPOR are missing: expected one of the first three, or QVAPOR to \
+         diagnose clouds from",
     );
-    assert_said(&good().without("Times"), "no times: expected a variable Times, or XTIME in minutes since a date");
+    assert_said(
+        &good().without("Times"),
+        "no times: expected a variable Times, or XTIME in minutes since a date",
+    );
     let file = wrf::from_container(
         Box::new(netcdf::from_bytes(Made::wrf(1, 1).without("Times").bytes()).expect("a file")),
         Path::new("one.nc"),
@@ -92,7 +108,10 @@ fn variables_of_a_wrong_shape_or_unit() {
         &shaped("QCLOUD", &[0, 5, 3, 2]),
         "variable QCLOUD: it is 2 x 6 x 3 x 4, expected 2 steps of 5 x 3 x 4",
     );
-    assert_said(&shaped("PH", &[0, 4, 3, 2]), "variable PH: it is 2 x 5 x 3 x 4, expected 2 steps of 6 x 3 x 4");
+    assert_said(
+        &shaped("PH", &[0, 4, 3, 2]),
+        "variable PH: it is 2 x 5 x 3 x 4, expected 2 steps of 6 x 3 x 4",
+    );
     assert_said(&shaped("HGT", &[0, 2]), "variable HGT: it is 2 x 4, expected 2 steps of 3 x 4");
     assert_said(
         &shaped("P", &[0, 3, 2]),
@@ -101,36 +120,45 @@ fn variables_of_a_wrong_shape_or_unit() {
     let none = Made::wrf(1, 0);
     assert_said(&none, "variable P: 0 steps of 5 x 3 x 4 cells, expected at least one of each");
     assert_said(&good().with_units("P", "hPa"), "variable P: units \"hPa\", expected \"Pa\"");
-    let ratio = "expected \"kg kg-1\" or \"kg/kg\" or \"kg kg**-1\" or \"g kg-1\" or \"g/kg\" or \"g kg**-1\"";
+    let ratio = "expected \"kg kg-1\" or \"kg/kg\" or \"kg kg**-1\" or \"g kg-1\" or \"g/kg\" \
+        or \"g kg**-1\"";
     let said = format!("variable QCLOUD: units \"\\u{{1b}}[31m\", {ratio}");
     assert_said(&good().with_units("QCLOUD", "\u{1b}[31m"), &said);
 }
 
 #[test]
 fn values_that_are_no_air() {
-    let put = |name: &str, i: usize, value: f32| good().with_floats(name, |numbers| numbers[i] = value);
-    let filled = "1 values are NaN or fill values, the first at level 1, row 0, column 2; expected a number everywhere";
+    let put =
+        |name: &str, i: usize, value: f32| good().with_floats(name, |numbers| numbers[i] = value);
+    let filled = "1 values are NaN or fill values, the first at level 1, row 0, column 2; expected \
+        a number everywhere";
     assert_said(&put("T", 14, f32::NAN), &format!("variable T, step 0: {filled}"));
     assert_said(&put("PB", 14, 9.969_21e36), &format!("variable PB, step 0: {filled}"));
     assert_said(&put("PHB", 14, f32::INFINITY), &format!("variable PHB, step 0: {filled}"));
     let mut marked = put("P", 14, -999.0);
     marked.var("P").attrs.push(("_FillValue".to_owned(), Attr::Float(-999.0)));
     assert_said(&marked, &format!("variable P, step 0: {filled}"));
-    assert_said(&put("PB", 0, 0.0), "step 0: P + PB is 0 Pa at level 0, row 0, column 0, expected 0.1 to 120000");
+    assert_said(
+        &put("PB", 0, 0.0),
+        "step 0: P + PB is 0 Pa at level 0, row 0, column 0, expected 0.1 to 120000",
+    );
     assert_said(
         &put("T", 59, -299.5),
         &format!(
-            "step 0: the temperature of T, P and PB is {} K at level 4, row 2, column 3, expected 100 to 400",
+            "step 0: the temperature of T, P and PB is {} K at level 4, row 2, column 3, \
+             expected 100 to 400",
             cold()
         ),
     );
     assert_said(
         &put("PH", 24, -9810.0),
-        "variables PH, PHB, step 0: heights do not rise: 0.0 m above 500.0 m at level 1, row 0, column 0; expected every staggered level above the one before it",
+        "variables PH, PHB, step 0: heights do not rise: 0.0 m above 500.0 m at level 1, row 0, \
+         column 0; expected every staggered level above the one before it",
     );
     assert_said(
         &put("PH", 71, 9.81e6),
-        "step 0: the height of PH + PHB is 1002500 m at level 5, row 2, column 3, expected -1000 to 200000",
+        "step 0: the height of PH + PHB is 1002500 m at level 5, row 2, column 3, expected \
+         -1000 to 200000",
     );
 }
 
@@ -144,14 +172,24 @@ fn cold() -> f64 {
 fn spacings_and_map_factors() {
     let expected = "expected metres from 1 to 500000";
     assert_said(&good().without("DX"), &format!("attribute DX is missing: {expected}"));
-    assert_said(&good().with_attr("DX", Attr::Float(0.0)), &format!("attribute DX is 0: {expected}"));
-    assert_said(&good().with_attr("DY", Attr::Float(f32::NAN)), &format!("attribute DY is NaN: {expected}"));
-    assert_said(&good().with_attr("DY", Attr::Float(-1000.0)), &format!("attribute DY is -1000: {expected}"));
+    assert_said(
+        &good().with_attr("DX", Attr::Float(0.0)),
+        &format!("attribute DX is 0: {expected}"),
+    );
+    assert_said(
+        &good().with_attr("DY", Attr::Float(f32::NAN)),
+        &format!("attribute DY is NaN: {expected}"),
+    );
+    assert_said(
+        &good().with_attr("DY", Attr::Float(-1000.0)),
+        &format!("attribute DY is -1000: {expected}"),
+    );
     assert_said(
         &good().with_attr("DX", Attr::Text("1 km".to_owned())),
         &format!("attribute DX is missing: {expected}"),
     );
-    let factor = "variables MAPFAC_M, MAPFAC_MX, MAPFAC_MY, step 0: a map factor is 0: expected one from 0.05 to 20";
+    let factor = "variables MAPFAC_M, MAPFAC_MX, MAPFAC_MY, step 0: a map factor is 0: expected \
+        one from 0.05 to 20";
     assert_said(&good().with_attr("MAP_PROJ", Attr::Int(1)), factor);
 }
 
@@ -169,11 +207,13 @@ fn times_that_are_none_or_out_of_order() {
     );
     assert_said(
         &good().with_times(&[first, first]),
-        "variable Times, step 1: 2005-08-28 12:00:00 does not come after step 0, 2005-08-28 12:00:00",
+        "variable Times, step 1: 2005-08-28 12:00:00 does not come after step 0, \
+         2005-08-28 12:00:00",
     );
     assert_said(
         &good().with_times(&[first, "2005-08-28_11:00:00"]),
-        "variable Times, step 1: 2005-08-28 11:00:00 does not come after step 0, 2005-08-28 12:00:00",
+        "variable Times, step 1: 2005-08-28 11:00:00 does not come after step 0, \
+         2005-08-28 12:00:00",
     );
     let minutes = |numbers: &[f32], units: &str| {
         let mut made = Made::wrf(1, numbers.len() as u32).without("Times");
@@ -188,7 +228,8 @@ fn times_that_are_none_or_out_of_order() {
     let since = "minutes since 2005-08-28 12:00:00";
     assert_said(
         &minutes(&[5.0, 5.0], since),
-        "variable XTIME, step 1: 2005-08-28 12:05:00 does not come after step 0, 2005-08-28 12:05:00",
+        "variable XTIME, step 1: 2005-08-28 12:05:00 does not come after step 0, \
+         2005-08-28 12:05:00",
     );
     assert_said(&minutes(&[f32::NAN], since), "variable XTIME, step 0: NaN is no time in minutes");
     assert_said(
@@ -201,27 +242,37 @@ fn times_that_are_none_or_out_of_order() {
 fn a_step_that_is_not_there() {
     let file = netcdf::from_bytes(good().bytes()).expect("a file");
     let file = wrf::from_container(Box::new(file), Path::new("two.nc")).expect("a WRF file");
-    assert_eq!(file.step(2).err().expect("an error").to_string(), "step 2: two.nc has steps 0 to 1");
+    assert_eq!(
+        file.step(2).err().expect("an error").to_string(),
+        "step 2: two.nc has steps 0 to 1"
+    );
 }
 
 fn small_netcdf4() -> Vec<u8> {
-    let path: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/weather/small-netcdf4.nc");
+    let path: PathBuf =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/weather/small-netcdf4.nc");
     fs::read(path).expect("a file")
 }
 
-/// A file of each kind, cut off everywhere: in its header, at its last step, by one byte. NetCDF-4 tells by its
-/// superblock, the others by what their header declares.
+/// A file of each kind, cut off everywhere: in its header, at its last step, by one byte. NetCDF-4
+/// tells by its superblock, the others by what their header declares.
 #[test]
 fn files_that_are_cut_off() {
     let whole = small_netcdf4();
     let n = whole.len();
     for keep in [100, n / 2, n - 1] {
         let said = said_of(&whole[..keep]);
-        assert_eq!(said, format!("the file is cut off: it has {keep} bytes, and by its own superblock it ends at {n}"));
+        assert_eq!(
+            said,
+            format!(
+                "the file is cut off: it has {keep} bytes, and by its own superblock it ends at {n}"
+            )
+        );
     }
     for version in [1, 2, 5] {
         let whole = Made::wrf(version, 2).bytes();
-        for keep in [10, 200, whole.len() / 2, whole.len() - 400, whole.len() - 4, whole.len() - 1] {
+        for keep in [10, 200, whole.len() / 2, whole.len() - 400, whole.len() - 4, whole.len() - 1]
+        {
             let said = said_of(&whole[..keep]);
             assert!(
                 said.starts_with("the file is damaged or cut off: "),
@@ -236,9 +287,11 @@ const LONGEST: Duration = Duration::from_secs(20);
 /// KiB.
 const MOST_MEMORY: u64 = 1 << 20;
 
-/// A file with some bytes otherwise, of a seed: set, swapped for the ends of integers' ranges, moved, or cut.
+/// A file with some bytes otherwise, of a seed: set, swapped for the ends of integers' ranges,
+/// moved, or cut.
 fn mutate(whole: &[u8], seed: u32) -> Vec<u8> {
-    const ENDS: [[u8; 4]; 5] = [[255; 4], [0x7f, 255, 255, 255], [0; 4], [0, 0, 0, 1], [0x80, 0, 0, 0]];
+    const ENDS: [[u8; 4]; 5] =
+        [[255; 4], [0x7f, 255, 255, 255], [0; 4], [0, 0, 0, 1], [0x80, 0, 0, 0]];
     let mut bytes = whole.to_vec();
     for i in 0..1 + seed % 4 {
         let [at, kind, value, length] = philox4x32_10([seed, 0x6d75_7461], [i, 0, 0, 0]);
@@ -247,7 +300,10 @@ fn mutate(whole: &[u8], seed: u32) -> Vec<u8> {
         let at = at as usize % n.max(1);
         match kind % 4 {
             0 => bytes[at] = value as u8,
-            1 => bytes[at..].iter_mut().zip(ENDS[value as usize % ENDS.len()]).for_each(|(b, end)| *b = end),
+            1 => bytes[at..]
+                .iter_mut()
+                .zip(ENDS[value as usize % ENDS.len()])
+                .for_each(|(b, end)| *b = end),
             2 => {
                 let (from, length) = (value as usize % n, (length as usize % 64).min(n - at));
                 let part: Vec<u8> = bytes.iter().skip(from).take(length).copied().collect();
@@ -264,7 +320,12 @@ fn mutate(whole: &[u8], seed: u32) -> Vec<u8> {
 #[test]
 fn damaged_files_are_read_or_refused() {
     let n: u32 = std::env::var("NIMBUS_MUTATIONS").ok().and_then(|n| n.parse().ok()).unwrap_or(150);
-    let wholes = [Made::wrf(1, 2).bytes(), Made::wrf(2, 2).bytes(), Made::wrf(5, 2).bytes(), small_netcdf4()];
+    let wholes = [
+        Made::wrf(1, 2).bytes(),
+        Made::wrf(2, 2).bytes(),
+        Made::wrf(5, 2).bytes(),
+        small_netcdf4(),
+    ];
     for (i_kind, whole) in wholes.into_iter().enumerate() {
         assert_eq!(readers::weather(&whole), Ok(()), "the whole file is read");
         let mut n_refused = 0;
@@ -279,7 +340,10 @@ fn damaged_files_are_read_or_refused() {
                 }
                 Err(mpsc::RecvTimeoutError::Disconnected) => {
                     let cause = worker.join().err();
-                    panic!("kind {i_kind}, seed {seed}: {:?}", cause.and_then(|c| c.downcast::<String>().ok()));
+                    panic!(
+                        "kind {i_kind}, seed {seed}: {:?}",
+                        cause.and_then(|c| c.downcast::<String>().ok())
+                    );
                 }
             }
         }
@@ -288,7 +352,9 @@ fn damaged_files_are_read_or_refused() {
         assert!(n_refused > n / 10, "kind {i_kind}: {n_refused} refused");
     }
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<u64>().ok());
+    let peak = status
+        .lines()
+        .find_map(|l| l.strip_prefix("VmHWM:")?.split_whitespace().next()?.parse::<u64>().ok());
     assert!(peak.is_none_or(|peak| peak < MOST_MEMORY), "{peak:?} KiB");
 }
 
@@ -305,10 +371,18 @@ fn what_is_declared_is_checked_before_room_is_made() {
     };
     for version in [1, 2, 5] {
         let said = declared([60_000, 60_000, 60_000], version);
-        assert!(said.contains("variable P: 0 steps") || said.starts_with("the file is damaged or cut off"), "{said}");
+        assert!(
+            said.contains("variable P: 0 steps")
+                || said.starts_with("the file is damaged or cut off"),
+            "{said}"
+        );
     }
-    let error: Error = wrf::from_container(Box::new(Huge::new()), Path::new("huge.nc")).err().expect("an error");
-    assert_eq!(error.to_string(), "huge.nc: variable P: 60000 x 60000 x 60000 cells, at most 16777216 can be held");
+    let error: Error =
+        wrf::from_container(Box::new(Huge::new()), Path::new("huge.nc")).err().expect("an error");
+    assert_eq!(
+        error.to_string(),
+        "huge.nc: variable P: 60000 x 60000 x 60000 cells, at most 16777216 can be held"
+    );
 }
 
 /// A container that declares what no memory holds.

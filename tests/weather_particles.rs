@@ -1,5 +1,5 @@
-//! Blobs that stand for a file's cells: their mass, their columns' transmittance, their order, and what stays as time
-//! goes on.
+//! Blobs that stand for a file's cells: their mass, their columns' transmittance, their order, and
+//! what stays as time goes on.
 
 use std::path::Path;
 
@@ -16,7 +16,11 @@ fn step(name: &str, i_step: usize) -> Step {
 }
 
 fn mass(grid: &Grid, extinction: &[f64]) -> f64 {
-    of_cells(grid, extinction).iter().enumerate().map(|(i, depth)| depth * grid.ground.area_m2(i)).sum()
+    of_cells(grid, extinction)
+        .iter()
+        .enumerate()
+        .map(|(i, depth)| depth * grid.ground.area_m2(i))
+        .sum()
 }
 
 fn moment(step: &Step) -> Moment<'_> {
@@ -38,9 +42,9 @@ fn plain_grid(nx: usize, ny: usize, nz: usize) -> Grid {
     Grid::new(ground, heights).expect("a grid")
 }
 
-/// Katrina at 100 000: mass to 0.1 %, transmittance of the columns' mean optical depth within 0.055 RMS (0.037 to 0.048
-/// are measured), and light at points, 16 a column, which sees gaps and seams between blobs, too, within 0.02 (0.013 to
-/// 0.017).
+/// Katrina at 100 000: mass to 0.1 %, transmittance of the columns' mean optical depth within 0.055
+/// RMS (0.037 to 0.048 are measured), and light at points, 16 a column, which sees gaps and seams
+/// between blobs, too, within 0.02 (0.013 to 0.017).
 #[test]
 fn columns_of_katrina_let_through_what_the_file_says() {
     for i_step in 0..4 {
@@ -57,12 +61,15 @@ fn columns_of_katrina_let_through_what_the_file_says() {
     }
 }
 
-/// Every column's own blobs have its mass; what thin ones give to others where blobs are few is next to nothing.
+/// Every column's own blobs have its mass; what thin ones give to others where blobs are few is
+/// next to nothing.
 #[test]
 fn every_column_keeps_its_mass() {
-    for (name, n, most_moved) in
-        [("katrina.nc", 20_000, 1e-12), ("supercell.nc", 100_000, 1e-12), ("supercell.nc", 10_000, 1e-6)]
-    {
+    for (name, n, most_moved) in [
+        ("katrina.nc", 20_000, 1e-12),
+        ("supercell.nc", 100_000, 1e-12),
+        ("supercell.nc", 10_000, 1e-6),
+    ] {
         let step = step(name, 1);
         let n_columns = step.grid.shape().n_columns();
         let (layout, blobs) = blobs_of(&step, n, 3);
@@ -71,10 +78,17 @@ fn every_column_keeps_its_mass() {
             masses[place.i_cell as usize % n_columns] += blob.mass();
         }
         let depths = of_cells(&step.grid, &step.extinction);
-        let moved = depths.iter().enumerate().map(|(i, depth)| (masses[i] - depth * step.grid.ground.area_m2(i)).abs());
+        let moved = depths
+            .iter()
+            .enumerate()
+            .map(|(i, depth)| (masses[i] - depth * step.grid.ground.area_m2(i)).abs());
         let share = moved.sum::<f64>() / mass(&step.grid, &step.extinction);
         assert!(share < most_moved, "{name}: {share}");
-        let n_without = depths.iter().zip(&masses).filter(|(depth, mass)| **depth >= THIN && **mass == 0.0).count();
+        let n_without = depths
+            .iter()
+            .zip(&masses)
+            .filter(|(depth, mass)| **depth >= THIN && **mass == 0.0)
+            .count();
         assert_eq!(n_without, 0, "{name}");
     }
 }
@@ -94,8 +108,8 @@ fn few_blobs_still_have_all_of_the_mass() {
     assert_eq!(Layout::new(&clear, &[&[0.0; 18]], 1000, 1).blobs(&clear, &[0.0; 18]), []);
 }
 
-/// Cells of equal 1 − e^{−τ} have equally many blobs; a thick one no more than 1/(1 − e^{−τ}) times those of a thin
-/// one.
+/// Cells of equal 1 − e^{−τ} have equally many blobs; a thick one no more than 1/(1 − e^{−τ}) times
+/// those of a thin one.
 #[test]
 fn blobs_go_by_what_cells_hide() {
     let grid = plain_grid(4, 1, 1);
@@ -110,7 +124,8 @@ fn blobs_go_by_what_cells_hide() {
     assert_eq!(layout.n_blobs().iter().sum::<u32>(), 1000);
 }
 
-/// Of one cell: the mean and the variance of its extinction are the cell's where one blob stands for all of it.
+/// Of one cell: the mean and the variance of its extinction are the cell's where one blob stands
+/// for all of it.
 #[test]
 fn a_blob_alone_is_as_wide_as_its_cell() {
     let grid = plain_grid(1, 1, 1);
@@ -123,13 +138,18 @@ fn a_blob_alone_is_as_wide_as_its_cell() {
     assert!((blob.kappa - 2.6394e-3).abs() < 1e-6, "{}", blob.kappa);
 }
 
-/// Erf over the cells: a blob on the corner of four has a quarter in each, and one far inside all of its mass in its
-/// own.
+/// Erf over the cells: a blob on the corner of four has a quarter in each, and one far inside all
+/// of its mass in its own.
 #[test]
 fn footprints_are_divided_among_columns() {
     let grid = plain_grid(6, 6, 1);
     let of = |x: f64, z: f64| {
-        let blob = WeatherBlob { position: DVec3::new(x, 100.0, z), sigma_xy: 50.0, sigma_z: 50.0, kappa: 1e-2 };
+        let blob = WeatherBlob {
+            position: DVec3::new(x, 100.0, z),
+            sigma_xy: 50.0,
+            sigma_z: 50.0,
+            kappa: 1e-2,
+        };
         (of_blobs(&grid, &[blob]), blob.mass() / 1e6)
     };
     let (depths, whole) = of(0.0, 0.0);
@@ -138,7 +158,10 @@ fn footprints_are_divided_among_columns() {
     }
     // East and south of the middle: the third row from the south, the fourth column.
     let (depths, whole) = of(500.0, 500.0);
-    assert!((depths[15] - whole).abs() < 1e-12 * whole && (depths.iter().sum::<f64>() - whole).abs() < 1e-12 * whole);
+    assert!(
+        (depths[15] - whole).abs() < 1e-12 * whole
+            && (depths.iter().sum::<f64>() - whole).abs() < 1e-12 * whole
+    );
 }
 
 #[test]
@@ -149,13 +172,15 @@ fn blobs_lie_in_their_cells_and_a_first_part_stands_for_all() {
     for (place, blob) in layout.places().iter().zip(&blobs) {
         let (i, i_column) = (place.i_cell as usize, place.i_cell as usize % n);
         let ground = &grid.ground;
-        let from = blob.position - DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
-        let half = DVec3::new(ground.dx_m[i_column], grid.thickness_m(i), ground.dy_m[i_column]) / 2.0;
+        let from = blob.position
+            - DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
+        let half =
+            DVec3::new(ground.dx_m[i_column], grid.thickness_m(i), ground.dy_m[i_column]) / 2.0;
         assert!(from.abs().cmple(half).all(), "{from} {half}");
         assert!(blob.kappa.is_finite() && blob.kappa >= 0.0 && blob.sigma_z > 0.0);
     }
-    // A tenth of the blobs has a tenth of the mass within what blobs of unequal mass scatter by, and lies as all of
-    // them do.
+    // A tenth of the blobs has a tenth of the mass within what blobs of unequal mass scatter by,
+    // and lies as all of them do.
     let of = |part: &[WeatherBlob]| {
         let mass: f64 = part.iter().map(WeatherBlob::mass).sum();
         (mass, part.iter().map(|b| b.position * b.mass()).sum::<DVec3>() / mass)
@@ -172,12 +197,14 @@ fn the_same_seed_gives_the_same_blobs_and_another_one_others() {
     assert_ne!(blobs_of(&step, 5000, 7).1, blobs_of(&step, 5000, 8).1);
 }
 
-/// Between two steps blobs keep their places, and their extinction is linear in the fields': whole in each and halfway.
+/// Between two steps blobs keep their places, and their extinction is linear in the fields': whole
+/// in each and halfway.
 #[test]
 fn a_layout_for_two_steps_serves_all_moments_between() {
     let (a, b) = (step("supercell.nc", 0), step("supercell.nc", 1));
     let layout = Layout::new(&a.grid, &[&a.extinction, &b.extinction], 50_000, 1);
-    let halfway: Vec<f64> = a.extinction.iter().zip(&b.extinction).map(|(a, b)| 0.5 * (a + b)).collect();
+    let halfway: Vec<f64> =
+        a.extinction.iter().zip(&b.extinction).map(|(a, b)| 0.5 * (a + b)).collect();
     let (at_a, at_b) = (layout.blobs(&a.grid, &a.extinction), layout.blobs(&a.grid, &b.extinction));
     let between = layout.blobs(&a.grid, &halfway);
     for ((a, b), half) in at_a.iter().zip(&at_b).zip(&between) {
@@ -198,7 +225,8 @@ fn an_interval_goes_from_one_step_to_the_next() {
     let (a, b) = (step("supercell.nc", 0), step("supercell.nc", 1));
     let layout = Layout::new(&a.grid, &[&a.extinction, &b.extinction], 20_000, 4);
     let interval = Interval::laid_out(&layout, moment(&a), Some(moment(&b)));
-    let at = |weight: f64| (0..interval.len()).map(|i| interval.blob(i, weight)).collect::<Vec<_>>();
+    let at =
+        |weight: f64| (0..interval.len()).map(|i| interval.blob(i, weight)).collect::<Vec<_>>();
     let whole = |blobs: &[WeatherBlob]| blobs.iter().map(WeatherBlob::mass).sum::<f64>();
     let (first, last) = (mass(&a.grid, &a.extinction), mass(&b.grid, &b.extinction));
     for (weight, expected) in [(0.0, first), (0.25, 0.75 * first + 0.25 * last), (1.0, last)] {

@@ -1,4 +1,5 @@
-//! Process CPU time, all threads: the figure to compare on a shared machine, where wall time also says what others do.
+//! Process CPU time, all threads: the figure to compare on a shared machine, where wall time also
+//! says what others do.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +12,8 @@ pub const N_SAMPLES: usize = 9;
 /// CPU milliseconds (user and system) of this process so far; `None` without procfs.
 fn process_ms() -> Option<f64> {
     let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-    // The second field, the name in parentheses, may hold spaces; utime and stime are fields 14 and 15.
+    // The second field, the name in parentheses, may hold spaces; utime and stime are fields 14 and
+    // 15.
     let after_name = stat.rsplit_once(')')?.1;
     let mut fields = after_name.split_whitespace().skip(11);
     let mut ticks = || fields.next()?.parse::<f64>().ok();

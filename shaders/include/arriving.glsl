@@ -1,7 +1,8 @@
-// What of a light's energy arrives at each point of a cell (docs/model.md §11 "second"). Needs stencil.glsl, reach.glsl,
-// turns.glsl.
+// What of a light's energy arrives at each point of a cell (docs/model.md §11 "second"). Needs
+// stencil.glsl, reach.glsl, turns.glsl.
 
-// A lamp's falloff and cosine over one row; `o` from the row's middle to the lamp, its height over the cell's plane.
+// A lamp's falloff and cosine over one row; `o` from the row's middle to the lamp, its height over
+// the cell's plane.
 vec4 row_of_falloffs(Light light, vec3 o, vec3 u, float height) {
     vec4 d2 = max(dot(o, o) - ALONG * (2.0 * dot(o, u)) + ALONG * ALONG * dot(u, u), 1e-30);
     vec4 inverse = inversesqrt(d2);
@@ -16,8 +17,8 @@ vec4 share_by(Light light, vec3 normal, vec4 v) {
     return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant : v * max(cosine, 0.0);
 }
 
-// What of a light's energy arrives at each point of a facet, past the surfaces of the mask (shadows_on). `through`: what the
-// clouds let through.
+// What of a light's energy arrives at each point of a facet, past the surfaces of the mask
+// (shadows_on). `through`: what the clouds let through.
 Stencil arriving(Light light, Cell cell, vec3 normal, float through, uint shadows, uint i_own, uint n_surfaces) {
     Stencil s = Stencil(vec4(through), vec4(through), vec4(through), vec4(through));
     bool lamp = light.kind == LIGHT_POINT;

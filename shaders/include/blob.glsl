@@ -1,12 +1,12 @@
 // A blob as the camera sees it (docs/model.md §11 "sprites"): what both draw paths start from.
 
 const float SQRT_TAU = 2.50662827463;
-// What is drawn of a blob is taken to be this much larger than its silhouette, so that rounding never cuts a pixel that
-// the pixel's own test would keep; that test decides.
+// What is drawn of a blob is taken to be this much larger than its silhouette, so that rounding
+// never cuts a pixel that the pixel's own test would keep; that test decides.
 const float GROWTH = 1.0 + 1e-4;
 
-// Pixels that rounding may move an edge by. Vulkan promises vertices 4 bits below the pixel: a corner may move by as much when it
-// is snapped.
+// Pixels that rounding may move an edge by. Vulkan promises vertices 4 bits below the pixel: a
+// corner may move by as much when it is snapped.
 const float SNAP = 1.0 / 16.0;
 
 // Along the camera's right, up and forward.
@@ -14,8 +14,8 @@ vec3 along_camera(Camera camera, vec3 from_eye) {
     return vec3(dot(camera.right, from_eye), dot(camera.up, from_eye), dot(camera.forward, from_eye));
 }
 
-// Slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the circle reaches beside the eye,
-// lines of either sign meet it, before the eye or behind: no bounds.
+// Slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the circle
+// reaches beside the eye, lines of either sign meet it, before the eye or behind: no bounds.
 vec2 tangents(float a, float z, float r) {
     float t2 = a * a + z * z - r * r;
     if (t2 > 0.0) {
@@ -28,13 +28,15 @@ vec2 tangents(float a, float z, float r) {
     return vec2(-1e9, 1e9);
 }
 
-// An ellipsoid with an axis along y (docs/model.md §14): what its aspect a and the camera make of it.
+// An ellipsoid with an axis along y (docs/model.md §14): what its aspect a and the camera make of
+// it.
 struct Shape {
     // The scene's y along the camera's right, up and forward.
     vec3 y;
     // a^2, and 1/a^2.
     float square, inverse;
-    // Greatest depth of a line through its centre over that of one across, and the widest sigma over that.
+    // Greatest depth of a line through its centre over that of one across, and the widest sigma
+    // over that.
     float wider;
 };
 
@@ -50,8 +52,8 @@ float white_square(Shape shape, vec3 v) {
     return dot(across, across) + shape.inverse * up * up;
 }
 
-// Slopes of the two tangents as `tangents` gives them, along right (k = 0) or up (1): planes through the eye touch where (n.c)^2 = r^2 n.S n, S
-// the ellipsoid's matrix and n = (1, -slope).
+// Slopes of the two tangents as `tangents` gives them, along right (k = 0) or up (1): planes
+// through the eye touch where (n.c)^2 = r^2 n.S n, S the ellipsoid's matrix and n = (1, -slope).
 vec2 tangents_of(Shape shape, vec3 v, int k, float r) {
     float more = shape.square - 1.0;
     float s_xx = 1.0 + more * shape.y[k] * shape.y[k], s_zz = 1.0 + more * shape.y.z * shape.y.z;
@@ -68,15 +70,16 @@ vec2 tangents_of(Shape shape, vec3 v, int k, float r) {
     return vec2(-1e9, 1e9);
 }
 
-// The first pixel and the one after the last whose centres lie within [low, high], in pixels from the first one's edge.
+// The first pixel and the one after the last whose centres lie within [low, high], in pixels from
+// the first one's edge.
 uvec2 pixels_within(float low, float high, uint n) {
     vec2 at = vec2(ceil(low - 0.5 - SNAP), floor(high + 0.5 + SNAP));
     uvec2 range = uvec2(clamp(at, vec2(0.0), vec2(float(n))));
     return uvec2(min(range.x, range.y), range.y);
 }
 
-// (first, end) of columns and of rows whose centres lie in the rectangle around a circle of radius r about v (along_camera);
-// none in either where the rectangle holds no centre.
+// (first, end) of columns and of rows whose centres lie in the rectangle around a circle of radius
+// r about v (along_camera); none in either where the rectangle holds no centre.
 uvec4 silhouette(Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
     vec2 x = (tangents(v.x, v.z, r) + camera.tan_x) / pixel.x;
     vec2 y = (camera.tan_y - tangents(v.y, v.z, r).yx) / pixel.y;
@@ -90,8 +93,9 @@ uvec4 silhouette_of(Shape shape, Camera camera, vec2 pixel, vec3 v, float r, uve
     return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
 }
 
-// z^2/(2 sigma^2) |M' (delta.y, -delta.x, s.x delta.y - s.y delta.x)|^2, M' = M's cofactors, is b^2/(2 sigma^2) |M ray|^2 of a ray delta from the centre's slopes s,
-// b where the ellipsoid is made a ball of sigma: as (xx, 2 xy, yy) of delta, times `scale` in place of z^2/(2 sigma^2).
+// z^2/(2 sigma^2) |M' (delta.y, -delta.x, s.x delta.y - s.y delta.x)|^2, M' = M's cofactors, is
+// b^2/(2 sigma^2) |M ray|^2 of a ray delta from the centre's slopes s, b where the ellipsoid is
+// made a ball of sigma: as (xx, 2 xy, yy) of delta, times `scale` in place of z^2/(2 sigma^2).
 vec3 conic_of(Shape shape, vec2 s, float scale) {
     // What a unit of delta along each axis makes of the cross product of centre and ray.
     vec3 x = vec3(0.0, 1.0, -s.y), y = vec3(-1.0, 0.0, s.x);

@@ -1,24 +1,28 @@
-// How a receiver goes through a region's sources: facet by facet, and a facet too wide for its distance cell by cell
-// (docs/model.md §7, §11 "second"). Needs gather.glsl.
+// How a receiver goes through a region's sources: facet by facet, and a facet too wide for its
+// distance cell by cell (docs/model.md §7, §11 "second"). Needs gather.glsl.
 
 // A lobe is met within this many of its widths (e^-8 of its peak beyond).
 const float LOBE_REACH = 4.0;
-// Wholes no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half vector turns by 3/4 of a
-// width from one to the next, and the midpoint rule on a Gaussian is then exact to 1e-7.
+// Wholes no wider than this many widths of a lobe, times pair_size: at the default 0.5 the half
+// vector turns by 3/4 of a width from one to the next, and the midpoint rule on a Gaussian is then
+// exact to 1e-7.
 const float LOBE_STEP = 3.0;
-// Lobes are met in each quarter of a cell, so that a cell may be this much wider: its quarters, 3/4 as wide as a whole may
-// be, are finer than they need be for the lobe, and its points as fine as rims need (docs/measured.md).
+// Lobes are met in each quarter of a cell, so that a cell may be this much wider: its quarters, 3/4
+// as wide as a whole may be, are finer than they need be for the lobe, and its points as fine as
+// rims need (docs/measured.md).
 const float LOBE_PARTS = 1.5;
-// The half vector turns by at most this share of a cell's width over its distance between its centre and its corner: half
-// the direction's turn, of half a diagonal of sqrt 2; twice that where the light is as near as the receiver.
+// The half vector turns by at most this share of a cell's width over its distance between its
+// centre and its corner: half the direction's turn, of half a diagonal of sqrt 2; twice that where
+// the light is as near as the receiver.
 const float TURN = 0.75;
-// A cluster that a shadow's rim runs through is opened down to this share of the opening angle's diameter.
+// A cluster that a shadow's rim runs through is opened down to this share of the opening angle's
+// diameter.
 const float TORN = 0.5;
-// The opening angle of clouds' clusters over that of surfaces': their facets overlap and look every way, so that they need
-// it this much smaller for the same error, 1 % of L2 at theta = 0.4.
+// The opening angle of clouds' clusters over that of surfaces': their facets overlap and look every
+// way, so that they need it this much smaller for the same error, 1 % of L2 at theta = 0.4.
 const float CLOUD_THETA = 0.4;
-// Where a cluster's normals differ, those nearer to the receiver may be those that face it: an error of the first order,
-// of this share of radius over distance times the normals' spread.
+// Where a cluster's normals differ, those nearer to the receiver may be those that face it: an
+// error of the first order, of this share of radius over distance times the normals' spread.
 const float MIXED = 0.5;
 // 1 - cos gamma where no light shines on a lobe: out of any lobe's reach, and of any turn's.
 const float UNLIT = 1e6;
@@ -28,7 +32,8 @@ const float NEAR = 1.0;
 const float RIM = 0.125;
 // Where only the view of it or only a light on it is torn, this is near enough.
 const float SINGLE = 0.25;
-// Cells that are looked at by their points may be this much wider: it is their points' parts that are to be small.
+// Cells that are looked at by their points may be this much wider: it is their points' parts that
+// are to be small.
 const float BROAD = 3.0;
 // A cluster whose mean normal is at least this long has, but for rounding, a single normal.
 const float EVEN = 0.9999;
@@ -38,8 +43,8 @@ struct Walk { uint s; uint level; uvec2 at; };
 
 Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u)); }
 
-// Facets set aside for a closer look, so that what they take is not gone through for every facet: a device that runs both
-// sides of a condition runs an empty loop at least once.
+// Facets set aside for a closer look, so that what they take is not gone through for every facet: a
+// device that runs both sides of a condition runs an empty loop at least once.
 #ifndef MAX_ASIDE
 #define MAX_ASIDE 8
 #endif
@@ -70,8 +75,8 @@ struct View {
     // Square of the distance, and width over distance.
     float d2;
     float width;
-    // Of each light that is kept: what makes the emitter's lobe shine, and 1 - cos gamma there; the least of them; and that
-    // at the receiver.
+    // Of each light that is kept: what makes the emitter's lobe shine, and 1 - cos gamma there; the
+    // least of them; and that at the receiver.
     vec4 shine;
     vec4 gaps;
     float emitter_gap;
@@ -97,8 +102,8 @@ vec3 moments_by(Sender s, vec3 x) {
     return s.square * x + vec3(dot(s.leaning.xy, x.yz), s.leaning.x * x.x + s.leaning.z * x.z, dot(s.leaning.yz, x.xy));
 }
 
-// The mean of cos cos/d^2 over a cluster: the middle's value, and half its second derivatives times the second moments. A
-// cloud's normals spread about their mean.
+// The mean of cos cos/d^2 over a cluster: the middle's value, and half its second derivatives times
+// the second moments. A cloud's normals spread about their mean.
 float cluster_form(Sender source, vec3 receiver_normal, vec3 way, float d2, uint kind) {
     float at_source = -dot(source.normal, way), at_receiver = dot(receiver_normal, way);
     float inverse = 1.0 / max(d2, 1e-30);
@@ -116,9 +121,10 @@ float cluster_form(Sender source, vec3 receiver_normal, vec3 way, float d2, uint
 }
 #endif
 
-// By how much a cell of this width over its distance is wider than `limit` widths of the region's lobes, its half vector
-// being `gap` from the normal and turning by `turn` within the cell: for the narrowest that can be met of all that its
-// material has over time, so that the cells are the same at any time.
+// By how much a cell of this width over its distance is wider than `limit` widths of the region's
+// lobes, its half vector being `gap` from the normal and turning by `turn` within the cell: for the
+// narrowest that can be met of all that its material has over time, so that the cells are the same
+// at any time.
 float lobe_excess(Region region, float gap, float turn, float width, float limit) {
     float beyond = sqrt(2.0 * gap) - turn;
     bool met = beyond < LOBE_REACH * region.lobe_width_most;
@@ -146,8 +152,8 @@ float form_of(Sender source, View view, Pane pane, Region emitter, Taker taker) 
 }
 
 #if TREE
-// How much more a cluster's extent may change of its form factor than the opening angle allows: in radius over distance,
-// and the cosines.
+// How much more a cluster's extent may change of its form factor than the opening angle allows: in
+// radius over distance, and the cosines.
 float cluster_excess(Sender source, View view, Region emitter, Taker taker) {
     float theta = emitter.kind == REGION_SURFACE ? push.theta : CLOUD_THETA * push.theta;
     float tilt = 0.5 * view.width;
@@ -155,8 +161,9 @@ float cluster_excess(Sender source, View view, Region emitter, Taker taker) {
     float at_taker = max(dot(taker.normal, view.way) + tilt, 0.0);
     float at_source = max(-dot(source.normal, view.way), 0.0) + 1.0 - sqrt(even);
     float mixed = sqrt(max(1.0 - even, 0.0));
-    // Its second moments are in its form factor: beyond them a surface's cluster is wrong by the third order, counted from its
-    // nearest point; where facets look different ways, one of a cloud by the first.
+    // Its second moments are in its form factor: beyond them a surface's cluster is wrong by the
+    // third order, counted from its nearest point; where facets look different ways, one of a cloud
+    // by the first.
     float nearest = tilt / max(1.0 - tilt, 0.01);
     float order = emitter.kind == REGION_SURFACE ? nearest * nearest * nearest : tilt * (tilt + MIXED * mixed);
     float wrong = order * min(at_taker, 1.0) * at_source * source.total_area / max(view.d2, 1e-30);
@@ -234,8 +241,9 @@ bool may_be_torn(Sender source, View view) {
     return view.width > push.pair_size * RIM;
 }
 
-// What of light l's energy the quarters of a facet's cell send on: A times the share at each of their points as they are seen;
-// `own`: of the cell itself, else of the parts of its facet that its points lie in.
+// What of light l's energy the quarters of a facet's cell send on: A times the share at each of
+// their points as they are seen; `own`: of the cell itself, else of the parts of its facet that its
+// points lie in.
 vec4 arriving_by(uint i, Sender source, Walk walk, Cell cell, Stencil seen, uint i_own, const bool own, uint l) {
     vec3 flux = flux_at(i, l).xyz;
     if (own) {

@@ -1,5 +1,5 @@
-// What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of second_gather.comp
-// or of second_tensor.comp.
+// What one facet receives from one source (docs/model.md §7, §11 "second"). Needs the buffers of
+// second_gather.comp or of second_tensor.comp.
 
 const float PI_INVERSE = 0.318309886183791;
 
@@ -84,9 +84,9 @@ float form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, float a
     return max(at_source, 0.0) * max(at_receiver, 0.0) / (d2 + area * PI_INVERSE);
 }
 
-// The mean of cos cos/d^2 over a rectangle of half axes u and v about the end of unit `way`, to the second derivatives: of
-// (n_r x)(-n_s x)/|x|^4 along u it is 4 (-n_s w)[(n_r w)(6 (u w)^2 - u u) - 2 (n_r u)(u w)]/d^4, w the way, and the mean a
-// sixth of it.
+// The mean of cos cos/d^2 over a rectangle of half axes u and v about the end of unit `way`, to the
+// second derivatives: of (n_r x)(-n_s x)/|x|^4 along u it is 4 (-n_s w)[(n_r w)(6 (u w)^2 - u u) -
+// 2 (n_r u)(u w)]/d^4, w the way, and the mean a sixth of it.
 float rectangle_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d2, vec3 u, vec3 v) {
     float at_source = -dot(source_normal, way), at_receiver = dot(receiver_normal, way);
     vec2 along = vec2(dot(u, way), dot(v, way));
@@ -96,8 +96,8 @@ float rectangle_form(vec3 receiver_normal, vec3 source_normal, vec3 way, float d
     return faces ? at_source * max(at_receiver + bent * 2.0 / (3.0 * d2), 0.0) / d2 : 0.0;
 }
 
-// What is at hand of a veil; the rest is loaded, in loops of its own: where both sides of a condition are run, a loop that
-// nothing enters costs the loading of nothing, once.
+// What is at hand of a veil; the rest is loaded, in loops of its own: where both sides of a
+// condition are run, a loop that nothing enters costs the loading of nothing, once.
 uint at_hand(Veil veil) { return veil.whole ? 0u : min(veil.n, N_AT_HAND); }
 
 Region veiling_at(Veil veil, uint k) {
@@ -111,8 +111,8 @@ Region veiling_at(Veil veil, uint k) {
     return r;
 }
 
-// What the veil leaves of a ball about q: x, the share of it that is seen; y, whether the rim of a shadow runs through it.
-// Nothing is looked at where nothing would come.
+// What the veil leaves of a ball about q: x, the share of it that is seen; y, whether the rim of a
+// shadow runs through it. Nothing is looked at where nothing would come.
 vec2 veils_ball(Pairing pairing, Veil veil, vec3 p, vec3 q, float radius, bool wanted) {
     uint n = wanted ? veil.n : 0u, n_near = min(n, at_hand(veil));
     vec2 found = vec2(1.0, 0.0);
@@ -143,13 +143,15 @@ void shade_all(inout Stencil seen, Pairing pairing, Veil veil, vec3 p, Cell cell
 }
 
 #if MARCH
-// e^{-(1-g) tau} between p and q through the density grid: equal steps over what lies in the grid's box, no longer than
-// the march's own and no more than the pair's greatest number, midpoint samples.
+// e^{-(1-g) tau} between p and q through the density grid: equal steps over what lies in the grid's
+// box, no longer than the march's own and no more than the pair's greatest number, midpoint
+// samples.
 float attenuation(vec3 p, vec3 q, bool wanted) {
     vec3 d = q - p;
     vec3 low = push.grid.low;
     vec3 high = low + cell_edges() * vec3(push.grid.n_cells);
-    // A way along an axis' planes divides by zero: the infinities sort themselves out, 0/0 is kept out.
+    // A way along an axis' planes divides by zero: the infinities sort themselves out, 0/0 is kept
+    // out.
     vec3 inverse = 1.0 / mix(d, vec3(1e-30), equal(d, vec3(0.0)));
     vec3 a = (low - p) * inverse, b = (high - p) * inverse;
     vec3 nearer = min(a, b), farther = max(a, b);

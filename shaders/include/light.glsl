@@ -15,7 +15,8 @@ Arrival arrival_at(Light light, vec3 p) {
     return Arrival(toward, d, cone * cone / (reach * reach));
 }
 
-// Irradiance on a facet of normal n as a share of the light's energy, v being the transmittance toward it.
+// Irradiance on a facet of normal n as a share of the light's energy, v being the transmittance
+// toward it.
 float share_of(Light light, Arrival a, vec3 n, float v) {
     float cosine = dot(n, a.toward);
     return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant : v * a.falloff * max(cosine, 0.0);

@@ -1,5 +1,5 @@
-// Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector (docs/model.md §6). Needs
-// `samplerBuffer table`, a lobe a row.
+// Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector
+// (docs/model.md §6). Needs `samplerBuffer table`, a lobe a row.
 
 const uint N_NODES = 1025;
 
@@ -21,7 +21,8 @@ float lobe_at(uint i_row, float w) {
     return value_at(i_row, knot_at(w));
 }
 
-// 1 - cos gamma of the half vector of unit a and b, without the cancellation: half the square of the chord from n to it.
+// 1 - cos gamma of the half vector of unit a and b, without the cancellation: half the square of
+// the chord from n to it.
 float half_vector_gap(vec3 n, vec3 a, vec3 b) {
     vec3 h = a + b;
     vec3 chord = n - h * inversesqrt(max(dot(h, h), 1e-30));

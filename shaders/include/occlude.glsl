@@ -1,7 +1,8 @@
-// Whether a surface's rectangle lies between two points, or before a light (docs/model.md §7). Both sides occlude.
+// Whether a surface's rectangle lies between two points, or before a light (docs/model.md §7). Both
+// sides occlude.
 
-// A point nearer to a rectangle's plane than this share of its distance from the centre lies in it, but for the rounding
-// of its coordinates (a few 2^-24), and what lies in it is not hidden by it.
+// A point nearer to a rectangle's plane than this share of its distance from the centre lies in it,
+// but for the rounding of its coordinates (a few 2^-24), and what lies in it is not hidden by it.
 const float IN_PLANE = 9.5367431640625e-7;
 
 // A ball stands for a square: half its side over its diagonal, halved.
@@ -26,9 +27,9 @@ bool hides(Region r, vec3 p, vec3 q) {
     return apart && holds(r, p + (q - p) * (a / (a - b)));
 }
 
-// How much of the ball about q is hidden from p: x, the share of it, as if the shadow's rim were straight; y, whether it
-// runs through the ball. The ball's size where the way crosses the plane is its own, shortened by the crossing's share of
-// the way and lengthened by the way's slant.
+// How much of the ball about q is hidden from p: x, the share of it, as if the shadow's rim were
+// straight; y, whether it runs through the ball. The ball's size where the way crosses the plane is
+// its own, shortened by the crossing's share of the way and lengthened by the way's slant.
 vec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
     float a = side_of(r, p), b = side_of(r, q);
     vec3 d = q - p;

@@ -1,5 +1,5 @@
-// Waiting within a workgroup that is one subgroup (ONE_SUBGROUP) or not. A workgroup's barrier costs llvmpipe all that it holds
-// in registers, and the sums it would rather do again than keep.
+// Waiting within a workgroup that is one subgroup (ONE_SUBGROUP) or not. A workgroup's barrier
+// costs llvmpipe all that it holds in registers, and the sums it would rather do again than keep.
 
 #ifndef ONE_SUBGROUP
 #define ONE_SUBGROUP 0

@@ -1,5 +1,5 @@
-// A picture's pixels as they lie in buffers, in rows, and how they are stored. Who includes it says PICTURE, the binding that
-// they go to.
+// A picture's pixels as they lie in buffers, in rows, and how they are stored. Who includes it says
+// PICTURE, the binding that they go to.
 
 // Words of a pixel: 1 rgba8, 2 rgba16f, 4 rgba32f.
 #ifndef PIXEL_WORDS

@@ -1,5 +1,5 @@
-// Whether light reaches a point past all surfaces (docs/model.md §11 "transmit"). Needs light.glsl, occlude.glsl and
-// regions.glsl, the surfaces' first.
+// Whether light reaches a point past all surfaces (docs/model.md §11 "transmit"). Needs light.glsl,
+// occlude.glsl and regions.glsl, the surfaces' first.
 
 // Whether no surface but the point's own hides the light from p.
 bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
@@ -12,8 +12,8 @@ bool is_clear(vec3 p, Light light, uint i_own, uint n_surfaces) {
     return true;
 }
 
-// The light's way to the ball about p past one surface: x, whether its middle is hidden; y, whether the shadow's rim runs
-// through it.
+// The light's way to the ball about p past one surface: x, whether its middle is hidden; y, whether
+// the shadow's rim runs through it.
 bvec2 shadow_of(uint i, vec3 p, float radius, Light light, uint i_own) {
     Region r = region_at(i);
     vec2 past = hides_ball(r, light.position, p, radius);

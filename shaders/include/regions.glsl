@@ -1,5 +1,6 @@
-// A region by its number. Read as texels: a device without vectors in memory loads a storage buffer's records invocation by
-// invocation, each in a branch of its own, and texels all at once (docs/measured.md). Needs `usamplerBuffer regions`.
+// A region by its number. Read as texels: a device without vectors in memory loads a storage
+// buffer's records invocation by invocation, each in a branch of its own, and texels all at once
+// (docs/measured.md). Needs `usamplerBuffer regions`.
 
 Region region_at(uint i) {
     int k = int(i) * 7;

@@ -1,4 +1,5 @@
-// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, the push constants' grid and `density`.
+// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, the push
+// constants' grid and `density`.
 
 #include "density.glsl"
 
@@ -8,8 +9,8 @@
 #endif
 
 const float SHELL_SIGMA = 1.5;
-// Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard deviation s, here 2 sigma, to
-// degree 5.
+// Radius of the quadrature's sphere: 14 points at sqrt(5) s integrate a Gaussian of standard
+// deviation s, here 2 sigma, to degree 5.
 const float SMOOTH_SIGMA = 4.47213595499958;
 const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
@@ -22,7 +23,8 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
     return l > 1e-30 ? v / l : otherwise;
 }
 
-// Against the gradient of the density smoothed to 2 scale where that is well conditioned, else away from the centre.
+// Against the gradient of the density smoothed to 2 scale where that is well conditioned, else away
+// from the centre.
 vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
 #if ELLIPSOIDS
     vec3 axes = vec3(1.0, aspect, 1.0);
@@ -71,7 +73,8 @@ vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
 #endif
 }
 
-// pi R^2 (1 - e^-tau) of a blob, R = 3 sigma; of an ellipsoid the mean over all directions it is seen from.
+// pi R^2 (1 - e^-tau) of a blob, R = 3 sigma; of an ellipsoid the mean over all directions it is
+// seen from.
 float area_of(float sigma, float aspect, float kappa) {
     float radius = 3.0 * sigma;
     float area = PI * radius * radius, tau = SQRT_TAU * kappa * sigma;

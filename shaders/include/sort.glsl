@@ -1,6 +1,7 @@
-// Stable radix sort, DIGIT_BITS bits a pass. A workgroup owns a tile of 1024 entries, each invocation a run of consecutive ones, so
-// that order inside a tile is the order of (invocation, turn). The fewer invocations, the fewer counters to clear and sum:
-// the host asks for one subgroup, 32 at most.
+// Stable radix sort, DIGIT_BITS bits a pass. A workgroup owns a tile of 1024 entries, each
+// invocation a run of consecutive ones, so that order inside a tile is the order of (invocation,
+// turn). The fewer invocations, the fewer counters to clear and sum: the host asks for one
+// subgroup, 32 at most.
 
 #ifndef TILE_INVOCATIONS
 #define TILE_INVOCATIONS 32
@@ -14,7 +15,8 @@ const uint TILE = 1024;
 const uint RUN = TILE / TILE_INVOCATIONS;
 const uint N_DIGITS = 1 << DIGIT_BITS;
 
-// `i_count`: the word of `n_counted` that holds the number of entries; NO_COUNT where the host knows it.
+// `i_count`: the word of `n_counted` that holds the number of entries; NO_COUNT where the host
+// knows it.
 layout(push_constant) uniform Push { uint n_entries; uint i_count; uint shift; } push;
 layout(std430, binding = 0) readonly buffer Counts { uint n_counted[]; };
 

@@ -1,11 +1,12 @@
-// A cell of a surface's facet seen point by point: 4 x 4 points, each the middle of a part whose share in light and shadow
-// is found along straight edges (docs/model.md §11 "second"). Needs light.glsl and occlude.glsl.
+// A cell of a surface's facet seen point by point: 4 x 4 points, each the middle of a part whose
+// share in light and shadow is found along straight edges (docs/model.md §11 "second"). Needs
+// light.glsl and occlude.glsl.
 
 // Points along each half axis.
 const vec4 ALONG = vec4(-0.75, -0.25, 0.25, 0.75);
 
-// A number at every point: rows along v, components along u. Rows are named: a device that keeps an indexed array in memory
-// would gather and scatter it.
+// A number at every point: rows along v, components along u. Rows are named: a device that keeps an
+// indexed array in memory would gather and scatter it.
 struct Stencil { vec4 a; vec4 b; vec4 c; vec4 d; };
 
 // A cell: middle, half axes.
@@ -16,8 +17,8 @@ struct Plane { float middle; float u; float v; };
 
 vec4 on_row(Plane plane, float along) { return (plane.middle + along * plane.v) + ALONG * plane.u; }
 
-// For how much of each point's part is where the plane is positive: as a ramp as long as the part, with its middle on the
-// edge; exact for edges along the axes.
+// For how much of each point's part is where the plane is positive: as a ramp as long as the part,
+// with its middle on the edge; exact for edges along the axes.
 Plane ramp(Plane plane) {
     float steep = 2.0 * inversesqrt(max(plane.u * plane.u + plane.v * plane.v, 1e-30));
     return Plane(0.5 + steep * plane.middle, steep * plane.u, steep * plane.v);
@@ -25,8 +26,9 @@ Plane ramp(Plane plane) {
 
 vec4 inside(Plane ramp, float along) { return clamp(on_row(ramp, along), 0.0, 1.0); }
 
-// cos cos/d^2 over one row of parts, but for the source's cosine times d: the means over the parts as rectangle_form has
-// them, of half axes u/4 and v/4; of parts wider than their distance a disc's. `o` the row's middle from the receiver.
+// cos cos/d^2 over one row of parts, but for the source's cosine times d: the means over the parts
+// as rectangle_form has them, of half axes u/4 and v/4; of parts wider than their distance a
+// disc's. `o` the row's middle from the receiver.
 vec4 row_of_forms(vec3 o, vec3 u, vec3 v, vec3 receiver_normal, float part) {
     float uu = 0.0625 * dot(u, u), vv = 0.0625 * dot(v, v);
     float nu = dot(receiver_normal, u), nv = dot(receiver_normal, v);
@@ -70,7 +72,8 @@ Plane combined(float a, Plane x, float b, Plane y) {
     return Plane(a * x.middle + b * y.middle, a * x.u + b * y.u, a * x.v + b * y.v);
 }
 
-// The edges of the shadow that a rectangle throws onto a cell, seen from p, or in direction p where `at` is 0.
+// The edges of the shadow that a rectangle throws onto a cell, seen from p, or in direction p where
+// `at` is 0.
 Edges edges_of(Region r, vec3 p, float at, Cell cell) {
     float a = at > 0.0 ? side_of(r, p) : dot(r.normal, p);
     float toward = -sign(a), reach = abs(a);
@@ -136,7 +139,8 @@ vec4 columns(vec4 row, uvec4 k) {
     return mix(low, high, notEqual(k & 2u, uvec4(0u)));
 }
 
-// What a cell `at` of the 4^level of a facet has of the facet's: its points take the number of the part that they lie in.
+// What a cell `at` of the 4^level of a facet has of the facet's: its points take the number of the
+// part that they lie in.
 Stencil part_of(Stencil s, uvec2 at, uint level) {
     uvec4 u = (at.x * 4u + uvec4(0u, 1u, 2u, 3u)) >> level, v = (at.y * 4u + uvec4(0u, 1u, 2u, 3u)) >> level;
     vec4 a = columns(s.a, u), b = columns(s.b, u), c = columns(s.c, u), d = columns(s.d, u);

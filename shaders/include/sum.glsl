@@ -1,5 +1,6 @@
-// How the long sums of light are formed (docs/model.md §11 "sums"). SUM1 and SUM3 hold a sum, ADD adds to it and TOTAL says
-// what it has come to; as plain sums of floats they are the numbers themselves. Needs GL_EXT_control_flow_attributes.
+// How the long sums of light are formed (docs/model.md §11 "sums"). SUM1 and SUM3 hold a sum, ADD
+// adds to it and TOTAL says what it has come to; as plain sums of floats they are the numbers
+// themselves. Needs GL_EXT_control_flow_attributes.
 
 #define PLAIN 0
 #define KAHAN 1
@@ -20,8 +21,8 @@
 #define REAL3 vec3
 #endif
 
-// A loop that adds to sums. Not unrolled where they are compensated: spirv-opt's copies of an unrolled body lose `precise`, and
-// with it drivers take what is lost for 0.
+// A loop that adds to sums. Not unrolled where they are compensated: spirv-opt's copies of an
+// unrolled body lose `precise`, and with it drivers take what is lost for 0.
 #if SUMMATION == KAHAN
 #define UNROLL [[dont_unroll]]
 #else
@@ -39,9 +40,9 @@
 
 #elif SUMMATION == KAHAN
 
-// The sum, and what its roundings have lost: a term is added together with that, and Knuth's two-sum, which is exact
-// whichever of the two is the greater, says what is lost now. `precise`, since to a compiler that may transform sums all that
-// is lost is 0.
+// The sum, and what its roundings have lost: a term is added together with that, and Knuth's
+// two-sum, which is exact whichever of the two is the greater, says what is lost now. `precise`,
+// since to a compiler that may transform sums all that is lost is 0.
 struct SUM1 { REAL value; REAL lost; };
 struct SUM3 { REAL3 value; REAL3 lost; };
 #define EMPTY1 SUM1(REAL(0.0), REAL(0.0))
@@ -61,9 +62,9 @@ ADDING(SUM3, REAL3)
 
 #elif SUMMATION == PAIRWISE
 
-// Terms are added up by blocks of BLOCK, and blocks as a binary counter counts: part k is the sum of 2^k blocks, and is there
-// where bit k of the number of blocks is set; the last part takes all that there is beyond. No loop and no index, so that
-// parts can lie in registers.
+// Terms are added up by blocks of BLOCK, and blocks as a binary counter counts: part k is the sum
+// of 2^k blocks, and is there where bit k of the number of blocks is set; the last part takes all
+// that there is beyond. No loop and no index, so that parts can lie in registers.
 const uint BLOCK = 8u;
 const uint N_PARTS = 12u;
 struct SUM1 { REAL block; uint n; REAL parts[N_PARTS]; };

@@ -1,5 +1,6 @@
-// Where T2 holds its numbers: [light][row / TILE][column][row % TILE], so that rows of neighbouring facets lie side by
-// side, and a sum over columns walks on through memory. There are a multiple of TILE rows (src/frame/tensor.rs).
+// Where T2 holds its numbers: [light][row / TILE][column][row % TILE], so that rows of neighbouring
+// facets lie side by side, and a sum over columns walks on through memory. There are a multiple of
+// TILE rows (src/frame/tensor.rs).
 
 const uint TILE = 64u;
 

@@ -1,6 +1,7 @@
-// The law of textured splats (docs/model.md §9, §11 "texture"), for every path that draws them: `sheet_of` makes what a
-// splat needs, once; `sheet_exponent` gives ln of the factor on tau in a pixel. Needs records, functions and philox;
-// where pixels are drawn, SHEET_PIXELS and `usamplerBuffer pool`.
+// The law of textured splats (docs/model.md §9, §11 "texture"), for every path that draws them:
+// `sheet_of` makes what a splat needs, once; `sheet_exponent` gives ln of the factor on tau in a
+// pixel. Needs records, functions and philox; where pixels are drawn, SHEET_PIXELS and
+// `usamplerBuffer pool`.
 
 // "text": particles are drawn from other counters.
 const uint TEXTURE_STREAM = 0x74657874u;
@@ -17,7 +18,8 @@ const float PERIOD_SIGMA = 6.0;
 // Quanta of n in the pool, 16 bits each.
 const float QUANTA = 4096.0;
 
-// By level the mean squares, over all places, of n_l, of n_l n_l+1 and of n_l+1, as bilinear interpolation has them.
+// By level the mean squares, over all places, of n_l, of n_l n_l+1 and of n_l+1, as bilinear
+// interpolation has them.
 const vec3 MEAN_SQUARES[6] = vec3[](
     vec3(0.9947730937451398, 0.9811503327856939, 0.9765335236418375),
     vec3(0.9765335236418375, 0.9418785995344559, 0.9311588081134532),
@@ -35,7 +37,8 @@ struct Sheet {
     vec3 gain;
 };
 
-// Of particle i_particle, whose view depth is z_in_sigma sigma, where slopes change by pixel from a pixel to the next.
+// Of particle i_particle, whose view depth is z_in_sigma sigma, where slopes change by pixel from a
+// pixel to the next.
 Sheet sheet_of(Textured textured, uint i_particle, float z_in_sigma, float pixel) {
     uvec4 words = philox4x32_10(uvec2(textured.seed, textured.i_box), uvec4(i_particle - textured.i_first, 0u, 0u, TEXTURE_STREAM));
     vec3 u = uniforms(words).xyz;
@@ -64,7 +67,8 @@ vec2 weighted(uint own, uint above, vec3 gain) {
     return gain.x * vec2(a) + gain.y * vec2(b);
 }
 
-// s n - s^2 <n^2>/2 where the ray's slopes are delta from the centre's. One texel holds all four corners of both levels.
+// s n - s^2 <n^2>/2 where the ray's slopes are delta from the centre's. One texel holds all four
+// corners of both levels.
 float sheet_exponent(vec2 delta, vec4 turn, uvec2 place, vec3 gain) {
     vec2 at = vec2(turn.x * delta.x - turn.y * delta.y, turn.y * delta.x + turn.x * delta.y) + turn.zw;
     vec2 low = floor(at), share = at - low;

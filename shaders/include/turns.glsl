@@ -1,5 +1,6 @@
-// How many turns the loops of a gather may take in one dispatch: some drivers end them after some ten thousand, without a
-// word (src/frame/exchange.rs says how many). Counts are of invocations that take turns together.
+// How many turns the loops of a gather may take in one dispatch: some drivers end them after some
+// ten thousand, without a word (src/frame/exchange.rs says how many). Counts are of invocations
+// that take turns together.
 
 // 1: invocations of a subgroup tell each other what they have counted.
 #ifndef TOGETHER

@@ -4,7 +4,8 @@
 #ifndef N
 #define N 2
 #endif
-// The remainders of the offset across by 2 N, and of the first tap's column by 4: the same for every run.
+// The remainders of the offset across by 2 N, and of the first tap's column by 4: the same for
+// every run.
 #ifndef OFFSET_X
 #define OFFSET_X 1
 #endif

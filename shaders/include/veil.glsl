@@ -1,11 +1,13 @@
-// The pairing's surfaces that may hide something of an emitting surface from one receiver: looked at once, before the
-// emitter's many sources (docs/model.md §11 "second"). Never leaves out what `hides` would find.
+// The pairing's surfaces that may hide something of an emitting surface from one receiver: looked
+// at once, before the emitter's many sources (docs/model.md §11 "second"). Never leaves out what
+// `hides` would find.
 
 // Most occluders that a veil remembers; where more remain it is the whole list.
 const uint MAX_VEIL = 8u;
 // Of these at hand.
 const uint N_AT_HAND = 3u;
-// Planes through p are trusted to this share of the lengths that make them up: some hundred units of round-off.
+// Planes through p are trusted to this share of the lengths that make them up: some hundred units
+// of round-off.
 const float PLANE_TRUST = 1e-5;
 
 struct Veil {
@@ -27,7 +29,8 @@ vec3 corner(Region r, uint k) {
     return r.center + x * r.u + y * r.v;
 }
 
-// How the emitter's corners lie to the pyramid of p over the occluder: 0 outside, 1 partly inside, 2 inside.
+// How the emitter's corners lie to the pyramid of p over the occluder: 0 outside, 1 partly inside,
+// 2 inside.
 uint cover(Region occluder, Region emitter, vec3 p) {
     float side = side_of(occluder, p);
     float count = 0.0;

@@ -1,15 +1,19 @@
-// How a receiver goes through the sources of a pairing (docs/model.md §11 "second"): wholes one by one, and those set aside
-// cell by cell. Who includes it says what is taken, and from where (`own`: the cell's light is its own, not its facet's):
+// How a receiver goes through the sources of a pairing (docs/model.md §11 "second"): wholes one by
+// one, and those set aside
+// cell by cell. Who includes it says what is taken, and from where (`own`: the cell's light is its
+// own, not its facet's):
 //   void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, float share);
-//   void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen, Walk walk, Cell cell, float part,
+//   void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen,
+//   Walk walk, Cell cell, float part,
 //       uint i_own, const bool own);
-//   void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, float area): a cell that stayed too wide.
+//   void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, float area): a
+//   cell that stayed too wide.
 
 // Facets whose cells a driver cut short all the same.
 float n_cut = 0.0;
 
-// Facets that a shadow of a light tears and that are to be quartered: their cells' own light is found when all else is done,
-// so that no other cell has to wait for it. Source and pairing.
+// Facets that a shadow of a light tears and that are to be quartered: their cells' own light is
+// found when all else is done, so that no other cell has to wait for it. Source and pairing.
 uvec2 torn[MAX_TORN];
 uint n_torn = 0u;
 
@@ -52,7 +56,8 @@ void gather_torn(Taker taker) {
         uvec2 facet = torn[walk.s];
         Pairing pairing = pairings[facet.y];
         Region emitter = region_at(pairing.i_region);
-        // All that may stand between the surfaces: a veil of its own would be looked at for one facet.
+        // All that may stand between the surfaces: a veil of its own would be looked at for one
+        // facet.
         Veil veil = whole_veil(pairing);
         walk = advance(walk, take_or_quarter(facet.x, walk, pairing, emitter, taker, veil, pane_of(emitter), true));
     }
@@ -103,7 +108,8 @@ void gather(uint i_pairing, Pairing pairing, Region emitter, Taker taker, Veil v
     count_together();
 }
 
-// Where the walk through a pairing's sources begins, `reached` being the first source that is still to be looked at.
+// Where the walk through a pairing's sources begins, `reached` being the first source that is still
+// to be looked at.
 uint begin_of(Pairing pairing, uint reached) {
     return clamp(reached, pairing.i_source, pairing.i_source + pairing.n_sources) - pairing.i_source;
 }

@@ -4,8 +4,8 @@ use tracing_subscriber::layer::SubscriberExt;
 
 use crate::measure::zones::Zones;
 
-/// Attaches Tracy, where nimbus was built with it, and where `collect` what `bench --trace` writes. Where neither is there
-/// nobody listens, and a zone costs no more than a look at that.
+/// Attaches Tracy, where nimbus was built with it, and where `collect` what `bench --trace` writes.
+/// Where neither is there nobody listens, and a zone costs no more than a look at that.
 pub fn attach(collect: bool) -> Option<Zones> {
     let zones = collect.then(Zones::default);
     #[cfg(feature = "tracy")]

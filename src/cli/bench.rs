@@ -31,7 +31,12 @@ use crate::study::trace;
 const N_CLOCK_READINGS: usize = 8;
 
 /// `zones`: where what the threads do is collected; `color`: of charts.
-pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Option<&Zones>) -> Result<()> {
+pub fn run(
+    args: &BenchArgs,
+    color: ColorChoice,
+    stop: &AtomicBool,
+    zones: Option<&Zones>,
+) -> Result<()> {
     if args.part.is_some() && args.scenes.len() > 1 {
         return Err(Error::usage(format!("--part takes one scene, found {}", args.scenes.len())));
     }
@@ -40,11 +45,14 @@ pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Optio
         super::refuse_existing(file, args.force)?;
         atomic::check_place(file)?;
         if args.scenes.len() > 1 {
-            return Err(Error::usage(format!("--trace takes one scene, found {}", args.scenes.len())));
+            return Err(Error::usage(format!(
+                "--trace takes one scene, found {}",
+                args.scenes.len()
+            )));
         }
     }
-    // All scenes are read before the first is timed, so that a fault in the last does not cost the others, and no
-    // folder is made for results that will not come.
+    // All scenes are read before the first is timed, so that a fault in the last does not cost the
+    // others, and no folder is made for results that will not come.
     let quiet = super::SceneArgs { quiet: true, verbose: false, ..args.options.clone() };
     for scene in &args.scenes {
         prepare(args, scene, &quiet)?;
@@ -64,24 +72,31 @@ pub fn run(args: &BenchArgs, color: ColorChoice, stop: &AtomicBool, zones: Optio
     }
     // Also where a later scene failed: what was finished is told.
     if args.json && !runs.is_empty() {
-        let text =
-            if let [run] = &runs[..] { serde_json::to_string_pretty(run) } else { serde_json::to_string_pretty(&runs) };
-        output::text(&(text.map_err(|e| Error::Io { path: "stdout".into(), what: e.to_string() })? + "\n"))?;
+        let text = if let [run] = &runs[..] {
+            serde_json::to_string_pretty(run)
+        } else {
+            serde_json::to_string_pretty(&runs)
+        };
+        output::text(
+            &(text.map_err(|e| Error::Io { path: "stdout".into(), what: e.to_string() })? + "\n"),
+        )?;
     }
     ended.map_or(Ok(()), Err)
 }
 
-/// A results folder for every scene. What exists already is refused here, before any work; what does not is made once
-/// its scene is ready to run.
+/// A results folder for every scene. What exists already is refused here, before any work; what
+/// does not is made once its scene is ready to run.
 fn out_dirs(args: &BenchArgs) -> Result<Vec<Option<PathBuf>>> {
     let Some(out) = &args.out else { return Ok(vec![None; args.scenes.len()]) };
     super::refuse_existing(out, args.force)?;
     if args.scenes.len() == 1 {
         return Ok(vec![Some(out.clone())]);
     }
-    let names: Vec<PathBuf> = args.scenes.iter().map(|s| PathBuf::from(s.file_stem().unwrap_or_default())).collect();
+    let names: Vec<PathBuf> =
+        args.scenes.iter().map(|s| PathBuf::from(s.file_stem().unwrap_or_default())).collect();
     if let Some((_, twice)) = names.iter().enumerate().find(|(i, n)| names[..*i].contains(n)) {
-        let what = format!("--out needs scenes of different names, found {} twice", twice.display());
+        let what =
+            format!("--out needs scenes of different names, found {} twice", twice.display());
         return Err(Error::usage(what));
     }
     Ok(names.into_iter().map(|n| Some(out.join(n))).collect())
@@ -132,13 +147,15 @@ fn of_part(args: &BenchArgs, cases: Vec<Case>) -> Result<Vec<Case>> {
     let Some(Span { first, end }) = args.part else { return Ok(cases) };
     let (n, range) = (cases.len(), first as usize..end as usize);
     if range.end > n {
-        return Err(Error::usage(format!("--part {first}..{end}: expected a part of cases 0..{n}")));
+        return Err(Error::usage(format!(
+            "--part {first}..{end}: expected a part of cases 0..{n}"
+        )));
     }
     Ok(numbers(&range).into_iter().map(|i| cases[i].clone()).collect())
 }
 
-/// Names of the cases that a bench is asked for, in the order that `--part` counts by; and what each makes work of, the
-/// first being timed in every part.
+/// Names of the cases that a bench is asked for, in the order that `--part` counts by; and what
+/// each makes work of, the first being timed in every part.
 pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
     let [scene] = &args.scenes[..] else {
         return Err(Error::usage(format!("expected one scene, found {}", args.scenes.len())));
@@ -153,7 +170,8 @@ pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
             let others = if of.skip { next } else { first };
             first + others * (n_frames(case) - 1.0) + textures_of(&case.scene)
         };
-        Ok(case.loops.iter().map(block).fold(Counted::default(), |sum, of| sum + of) * f64::from(args.repeat))
+        Ok(case.loops.iter().map(block).fold(Counted::default(), |sum, of| sum + of)
+            * f64::from(args.repeat))
     };
     let counted = cases.iter().map(counted).collect::<Result<Vec<Counted>>>()?;
     let of_shard = counted.first().copied().unwrap_or_default();
@@ -172,7 +190,10 @@ fn axes(args: &BenchArgs) -> Result<Vec<Axis>> {
             return refuse(&axis.key, "the key twice; name all its values in one");
         }
         if axis.key == SIZE_KEY && (has("film.width") || has("film.height")) {
-            return refuse(SIZE_KEY, "sets film.width and film.height, which another --sweep sets, too");
+            return refuse(
+                SIZE_KEY,
+                "sets film.width and film.height, which another --sweep sets, too",
+            );
         }
         if axis.key == "time.frames" && args.frames.is_some() {
             return refuse("time.frames", "--frames says how many frames are timed");
@@ -185,7 +206,9 @@ fn axes(args: &BenchArgs) -> Result<Vec<Axis>> {
 fn as_swept(error: Error, overrides: &[String]) -> Error {
     match error {
         Error::Scene { mut at, what } => {
-            if let Some(set) = at.source.strip_prefix("--set ").filter(|set| overrides.iter().any(|o| o == set)) {
+            if let Some(set) =
+                at.source.strip_prefix("--set ").filter(|set| overrides.iter().any(|o| o == set))
+            {
                 at.source = format!("--sweep {set}");
             }
             Error::Scene { at, what }
@@ -196,7 +219,8 @@ fn as_swept(error: Error, overrides: &[String]) -> Error {
 
 /// Opens the device, and checks what every case asks of it before the first is run.
 fn open(args: &BenchArgs, cases: &[Case]) -> Result<Stage> {
-    let stage = Stage::new(cases[0].scene.clone(), &device_choice(&args.options), cases[0].loops[0].skip)?;
+    let stage =
+        Stage::new(cases[0].scene.clone(), &device_choice(&args.options), cases[0].loops[0].skip)?;
     for case in &cases[1..] {
         limits::check(&case.scene, stage.device.limits()).map_err(|e| e.within(&case.name()))?;
     }
@@ -210,7 +234,8 @@ fn print(
     (run, rows): (&Run, &[FrameRow]),
     (cases, outcome): (&[Case], &Outcome),
 ) -> Result<()> {
-    let same: Vec<Option<bool>> = cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case)).collect();
+    let same: Vec<Option<bool>> =
+        cases.iter().enumerate().map(|(i, case)| outcome.is_same_picture(i, case)).collect();
     output::text(&bench_table::report(path, run, &same, args.options.verbose))?;
     if args.plot {
         output::text(&bench_plot::text(run, rows, color)?)?;
@@ -246,8 +271,13 @@ fn bench_one(
         // What stood here was refused or forced above.
         records::prepare_out_dir(dir, true)?;
     }
-    let bar = output::progress(bench::n_frames_total(&cases, &plan), &path.display().to_string(), args.options.quiet);
-    let Ran { stage, outcome, failure } = bench::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
+    let bar = output::progress(
+        bench::n_frames_total(&cases, &plan),
+        &path.display().to_string(),
+        args.options.quiet,
+    );
+    let Ran { stage, outcome, failure } =
+        bench::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
     bar.finish_and_clear();
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
         // A folder that holds nothing would only be in the way of the next run.
@@ -286,7 +316,11 @@ fn bench_one(
             readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
         }
         let zones = zones.map(Zones::take);
-        trace::write(file, &outcome.samples, &trace::Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) })?;
+        trace::write(
+            file,
+            &outcome.samples,
+            &trace::Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) },
+        )?;
     }
     if !args.options.quiet {
         outcome.chosen.iter().for_each(|chosen| eprintln!("note: {chosen}"));

@@ -8,10 +8,13 @@ use crate::study::machine::Clocks;
 use crate::study::overlap::Overlap;
 use crate::study::records::{Block, Case, Measured, Mode, Ratio, Run, Skipping};
 
-/// The whole of it. `same`: of each case whether all its last frames are the same, to the byte. `verbose`: every table of
-/// every case.
+/// The whole of it. `same`: of each case whether all its last frames are the same, to the byte.
+/// `verbose`: every table of every case.
 pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> String {
-    let threads = run.environment.get("LP_NUM_THREADS").map_or(String::new(), |n| format!(", LP_NUM_THREADS={n}"));
+    let threads = run
+        .environment
+        .get("LP_NUM_THREADS")
+        .map_or(String::new(), |n| format!(", LP_NUM_THREADS={n}"));
     let mut out = format!(
         "{}\n{} ({}), {} ({} cores){threads}\n",
         path.display(),
@@ -42,7 +45,9 @@ pub fn report(path: &Path, run: &Run, same: &[Option<bool>], verbose: bool) -> S
     if run.cases.len() > 1 && !verbose {
         let n_same = same.iter().filter(|s| **s == Some(true)).count();
         let n_told = same.iter().flatten().count();
-        out += &format!("{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n");
+        out += &format!(
+            "{n_same} of {n_told} cases gave the same last frame in all their blocks, to the byte\n"
+        );
     }
     out + &clocks_line(&run.clocks)
 }
@@ -93,14 +98,22 @@ fn blocks_line(run: &Run) -> String {
     }
     let n = order.len();
     let n_rounds = n / kinds.len().max(1);
-    // There and back: a steady drift adds up to the same for all; of an odd number of rounds one is left over.
+    // There and back: a steady drift adds up to the same for all; of an odd number of rounds one is
+    // left over.
     let is_balanced = n_rounds.is_multiple_of(2) && n == n_rounds * kinds.len();
-    let balance = if is_balanced { "" } else { " (a steady drift does not cancel; with an even --repeat it does)" };
+    let balance = if is_balanced {
+        ""
+    } else {
+        " (a steady drift does not cancel; with an even --repeat it does)"
+    };
     match kinds[..] {
         [] => "no block was begun".to_owned(),
         [one] => format!("{n} blocks, all {}", loop_name(&one.threading, one.skip)),
         _ if run.cases.len() > 1 => {
-            format!("{} cases, {n} blocks, every second round in reverse order{balance}", run.cases.len())
+            format!(
+                "{} cases, {n} blocks, every second round in reverse order{balance}",
+                run.cases.len()
+            )
         }
         _ => {
             let letter = |block: &Block| {
@@ -109,7 +122,9 @@ fn blocks_line(run: &Run) -> String {
             };
             let shown: Vec<String> = order.iter().take(N_SHOWN).map(letter).collect();
             let more = if n > N_SHOWN { " …" } else { "" };
-            let name = |kind: &&Block| format!("{} = {}", letter(kind), loop_name(&kind.threading, kind.skip));
+            let name = |kind: &&Block| {
+                format!("{} = {}", letter(kind), loop_name(&kind.threading, kind.skip))
+            };
             let names: Vec<String> = kinds.iter().map(name).collect();
             format!("{n} blocks, {}{more}, {}{balance}", shown.join(" "), names.join(", "))
         }
@@ -125,31 +140,41 @@ fn name_of(mode: &Mode) -> String {
 }
 
 fn ratio_text(r: Ratio) -> String {
-    let interval = r.low.zip(r.high).map_or(String::new(), |(low, high)| format!(" ({low:.3}-{high:.3})"));
+    let interval =
+        r.low.zip(r.high).map_or(String::new(), |(low, high)| format!(" ({low:.3}-{high:.3})"));
     format!("{:.3}{interval}", r.parallel_by_serial)
 }
 
-/// What a case is called, in columns: its phase where there are phases, then the values of the sweep's keys.
+/// What a case is called, in columns: its phase where there are phases, then the values of the
+/// sweep's keys.
 fn case_columns(run: &Run) -> (Vec<String>, impl Fn(&Case) -> Vec<String>) {
     let has_phases = run.cases.iter().any(|c| c.phase.is_some());
     let mut header: Vec<String> = if has_phases { vec!["phase".to_owned()] } else { vec![] };
-    header.extend(run.cases.first().map_or(vec![], |c| c.sweep.iter().map(|s| s.key.clone()).collect()));
+    header.extend(
+        run.cases.first().map_or(vec![], |c| c.sweep.iter().map(|s| s.key.clone()).collect()),
+    );
     let of = move |case: &Case| {
-        let mut row: Vec<String> = if has_phases { vec![case.phase.clone().unwrap_or_default()] } else { vec![] };
+        let mut row: Vec<String> =
+            if has_phases { vec![case.phase.clone().unwrap_or_default()] } else { vec![] };
         row.extend(case.sweep.iter().map(|s| s.value.clone()));
         row
     };
     (header, of)
 }
 
-/// A row a case: the median of every pass that ran in some case, where nothing is skipped or else in the first loop.
+/// A row a case: the median of every pass that ran in some case, where nothing is skipped or else
+/// in the first loop.
 fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
     let whole = |case: &Case| case.modes.iter().position(|m| !m.skip).unwrap_or_default();
     let p50 = |case: &Case, i: usize| case.modes.get(whole(case))?.passes.get(i)?.p50_ms;
-    let names: Vec<&String> =
-        run.cases.iter().find_map(|c| c.modes.first()).map_or(vec![], |m| m.passes.iter().map(|p| &p.name).collect());
-    let ran: Vec<usize> = (0..names.len()).filter(|i| run.cases.iter().any(|c| p50(c, *i).is_some())).collect();
+    let names: Vec<&String> = run
+        .cases
+        .iter()
+        .find_map(|c| c.modes.first())
+        .map_or(vec![], |m| m.passes.iter().map(|p| &p.name).collect());
+    let ran: Vec<usize> =
+        (0..names.len()).filter(|i| run.cases.iter().any(|c| p50(c, *i).is_some())).collect();
     header.push("p50 ms of".to_owned());
     header.extend(ran.iter().map(|i| names[*i].clone()));
     let mut rows = vec![header];
@@ -165,8 +190,20 @@ fn pass_by_case_rows(run: &Run) -> Vec<Vec<String>> {
 /// A row a case and loop.
 fn case_rows(run: &Run) -> Vec<Vec<String>> {
     let (mut header, columns) = case_columns(run);
-    let figures =
-        ["particles", "drawn", "pixels", "loop", "n", "frame p50", "low", "high", "fps", "game", "gpu", "latency"];
+    let figures = [
+        "particles",
+        "drawn",
+        "pixels",
+        "loop",
+        "n",
+        "frame p50",
+        "low",
+        "high",
+        "fps",
+        "game",
+        "gpu",
+        "latency",
+    ];
     header.extend(figures.map(str::to_owned));
     header.extend(["parallel/serial", "reached", "gpu saved"].map(str::to_owned));
     let mut rows = vec![header];
@@ -174,10 +211,13 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
         let reached = case.overlap.and_then(|o| o.reached);
         let saved = case.skipping.map(|s| s.gpu_no_skip_ms - s.gpu_ms);
         for mode in case.modes.iter().filter(|m| m.frames > 0) {
-            let is_parallel = mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
+            let is_parallel =
+                mode.threading == "parallel" && case.modes.iter().all(|m| m.skip <= mode.skip);
             let mut row = columns(case);
             let p50 = |m: &Option<Measured>| m.map_or("-".to_owned(), |m| ms(m.of.p50));
-            let end = |of: fn(&Measured) -> Option<f64>| mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms);
+            let end = |of: fn(&Measured) -> Option<f64>| {
+                mode.frame_ms.as_ref().and_then(of).map_or("-".to_owned(), ms)
+            };
             row.extend([
                 case.particles.to_string(),
                 mode.drawn.map_or("-".to_owned(), |[_, mean, _]| format!("{mean:.0}")),
@@ -191,8 +231,14 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
                 p50(&mode.game_ms),
                 p50(&mode.gpu_ms),
                 p50(&mode.latency_ms),
-                if is_parallel { case.ratio.map_or("-".to_owned(), ratio_text) } else { "-".to_owned() },
-                reached.filter(|_| is_parallel).map_or("-".to_owned(), |r| format!("{:.0}%", 100.0 * r.share)),
+                if is_parallel {
+                    case.ratio.map_or("-".to_owned(), ratio_text)
+                } else {
+                    "-".to_owned()
+                },
+                reached
+                    .filter(|_| is_parallel)
+                    .map_or("-".to_owned(), |r| format!("{:.0}%", 100.0 * r.share)),
                 saved.filter(|_| !mode.skip).map_or("-".to_owned(), ms),
             ]);
             rows.push(row);
@@ -203,26 +249,31 @@ fn case_rows(run: &Run) -> Vec<Vec<String>> {
 
 /// The bound of what overlap can do, and how near the parallel loop came.
 fn overlap_lines(o: &Overlap, case: &Case) -> String {
-    let (game, render, bound, serial) = (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
+    let (game, render, bound, serial) =
+        (ms(o.game_ms), ms(o.render_ms), ms(o.bound_ms), ms(o.serial_ms));
     let share = o.bound_ms / o.serial_ms;
     let mut out = format!(
-        "perfect overlap = max(game {game}, render {render}) = {bound} ms, {share:.3} of the serial {serial} ms\n"
+        "perfect overlap = max(game {game}, render {render}) = {bound} ms, {share:.3} of the \
+         serial {serial} ms\n"
     );
     if let Some(r) = o.reached {
         let [share, low, high] = [r.share, r.low, r.high].map(|s| 100.0 * s);
         let possible = ms(o.serial_ms - o.bound_ms);
         out += &format!(
-            "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval {low:.1} to {high:.1})\n"
+            "of the possible {possible} ms the parallel loop gained {share:.1} % (95 % interval \
+             {low:.1} to {high:.1})\n"
         );
         if r.share > 1.0 {
-            out += "that is more than overlapping game and render alone can give: recording overlapped, too, or the \
+            out += "that is more than overlapping game and render alone can give: recording \
+                overlapped, too, or the \
                     machine changed from block to block\n";
         }
         if r.share < 0.9 {
             out += &slowed_line(o, case).unwrap_or_default();
         }
     } else if o.parallel_ms.is_some() {
-        out += "that is next to nothing, or not certain: what share of it was reached cannot be said\n";
+        out += "that is next to nothing, or not certain: what share of it was reached \
+            cannot be said\n";
     }
     out
 }
@@ -236,7 +287,8 @@ fn slowed_line(o: &Overlap, case: &Case) -> Option<String> {
     let is_slower = game > 1.05 * o.game_ms || render > 1.05 * o.render_ms;
     is_slower.then(|| {
         format!(
-            "side by side the game step takes {} in place of {}, the render step {} in place of {} ms: they share cores\n",
+            "side by side the game step takes {} in place of {}, the render step {} in place of {} \
+             ms: they share cores\n",
             ms(game),
             ms(o.game_ms),
             ms(render),
@@ -250,7 +302,10 @@ fn spread_lines(case: &Case) -> String {
     let effect = case.ratio.map_or(f64::INFINITY, |r| r.parallel_by_serial.ln().abs());
     let of = |m: &Mode| {
         let spread = m.block_spread.filter(|s| s.ln() >= effect || *s >= 1.1)?;
-        Some(format!("{}: blocks lie a factor of {spread:.3} apart: the machine was not steady\n", name_of(m)))
+        Some(format!(
+            "{}: blocks lie a factor of {spread:.3} apart: the machine was not steady\n",
+            name_of(m)
+        ))
     };
     case.modes.iter().filter_map(of).collect()
 }
@@ -258,13 +313,15 @@ fn spread_lines(case: &Case) -> String {
 /// What overlap costs: the picture's age.
 fn latency_line(case: &Case) -> Option<String> {
     let skip = case.modes.iter().any(|m| m.skip);
-    let of = |threading: &str| case.modes.iter().find(|m| m.threading == threading && m.skip == skip);
+    let of =
+        |threading: &str| case.modes.iter().find(|m| m.threading == threading && m.skip == skip);
     let (serial, parallel) = (of("serial")?, of("parallel")?);
     let (a, b) = (serial.latency_ms?.of.p50, parallel.latency_ms?.of.p50);
     let frame = serial.frame_ms?.of.p50;
     let depth = parallel.queue_depth.map_or(String::new(), |n| format!(", {n:.2} frames queued"));
     Some(format!(
-        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the serial loop{depth}\n",
+        "latency, game step to picture: serial {}, parallel {} ms: {:+.2} frames of the serial \
+         loop{depth}\n",
         ms(a),
         ms(b),
         (b - a) / frame
@@ -275,7 +332,8 @@ fn latency_line(case: &Case) -> Option<String> {
 fn drawn_line(case: &Case) -> Option<String> {
     let [least, mean, most] = case.modes.iter().find(|m| m.skip)?.drawn?;
     let n = case.particles;
-    (mean < n as f64).then(|| format!("drawn: {mean:.0} of {n} particles a frame, {least:.0} to {most:.0}\n"))
+    (mean < n as f64)
+        .then(|| format!("drawn: {mean:.0} of {n} particles a frame, {least:.0} to {most:.0}\n"))
 }
 
 fn skipping_line(s: &Skipping) -> String {
@@ -290,30 +348,47 @@ fn skipping_line(s: &Skipping) -> String {
         Some(false) => "; NOT THE SAME BYTES",
         None => "",
     };
-    format!("skipping saves {} of {} ms of GPU time a frame ({times}){bytes}\n", ms(saved), ms(s.gpu_no_skip_ms))
+    format!(
+        "skipping saves {} of {} ms of GPU time a frame ({times}){bytes}\n",
+        ms(saved),
+        ms(s.gpu_no_skip_ms)
+    )
 }
 
 /// The host's clock and the device's: a time near these says nothing.
 fn clocks_line(clocks: &Clocks) -> String {
-    let device = clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
-    let empty = clocks.timestamp_overhead_ns.map_or(String::new(), |ns| format!(", {ns:.0} ns for an empty pass"));
+    let device =
+        clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{ns} ns a tick"));
+    let empty = clocks
+        .timestamp_overhead_ns
+        .map_or(String::new(), |ns| format!(", {ns:.0} ns for an empty pass"));
     format!(
         "host clock: resolution {} ns, {:.0} ns a reading; device timestamps: {device}{empty}\n",
         clocks.resolution_ns, clocks.overhead_ns
     )
 }
 
-/// Frame rates: the median's, and that of the slowest frames by each of the three definitions, beside how much frame times
-/// vary.
+/// Frame rates: the median's, and that of the slowest frames by each of the three definitions,
+/// beside how much frame times vary.
 fn low_rows(case: &Case) -> Vec<Vec<String>> {
-    let header = ["fps", "loop", "p50", "1 % low: p99", "mean of slowest 1 %", "1 % of the time", "sd / mean"];
+    let header = [
+        "fps",
+        "loop",
+        "p50",
+        "1 % low: p99",
+        "mean of slowest 1 %",
+        "1 % of the time",
+        "sd / mean",
+    ];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     for mode in case.modes.iter() {
         let (Some(frame), Some(lows)) = (&mode.frame_ms, &mode.frame_lows) else { continue };
         let rates = [fps(frame.of.p50), lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];
         let mut row = vec!["frame".to_owned(), name_of(mode)];
         row.extend(rates.map(|rate| format!("{rate:.1}")));
-        row.push(frame.of.sd.map_or("-".to_owned(), |sd| format!("{:.1}%", 100.0 * sd / frame.of.mean)));
+        row.push(
+            frame.of.sd.map_or("-".to_owned(), |sd| format!("{:.1}%", 100.0 * sd / frame.of.mean)),
+        );
         rows.push(row);
     }
     rows
@@ -321,7 +396,10 @@ fn low_rows(case: &Case) -> Vec<Vec<String>> {
 
 /// The median of each time with its 95 % interval, and how the times spread.
 fn time_rows(case: &Case) -> Vec<Vec<String>> {
-    let header = ["ms", "loop", "n", "p50", "low", "high", "mean", "sd", "min", "p1", "p5", "p95", "p99", "max"];
+    let header = [
+        "ms", "loop", "n", "p50", "low", "high", "mean", "sd", "min", "p1", "p5", "p95", "p99",
+        "max",
+    ];
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     for (what, of) in [
         ("frame", (|m| m.frame_ms.as_ref()) as fn(&Mode) -> Option<&Measured>),
@@ -334,14 +412,25 @@ fn time_rows(case: &Case) -> Vec<Vec<String>> {
         ("latency", |m| m.latency_ms.as_ref()),
     ] {
         // Of frames that skip nothing only what skipping is measured by.
-        let is_shown = |m: &&Mode| m.skip || what == "frame" || what == "gpu" || case.modes.iter().all(|m| !m.skip);
+        let is_shown = |m: &&Mode| {
+            m.skip || what == "frame" || what == "gpu" || case.modes.iter().all(|m| !m.skip)
+        };
         for mode in case.modes.iter().filter(is_shown) {
             let Some(m) = of(mode) else { continue };
             let s = &m.of;
             let mut row = vec![what.to_owned(), name_of(mode), s.n.to_string(), ms(s.p50)];
             row.extend([m.p50_low, m.p50_high].map(|end| end.map_or("-".to_owned(), ms)));
             let sd = s.sd.map_or("-".to_owned(), ms);
-            row.extend([ms(s.mean), sd, ms(s.min), ms(s.p1), ms(s.p5), ms(s.p95), ms(s.p99), ms(s.max)]);
+            row.extend([
+                ms(s.mean),
+                sd,
+                ms(s.min),
+                ms(s.p1),
+                ms(s.p5),
+                ms(s.p95),
+                ms(s.p99),
+                ms(s.max),
+            ]);
             rows.push(row);
         }
     }
@@ -356,11 +445,21 @@ fn pass_rows(case: &Case) -> Vec<Vec<String>> {
     header.extend(["share", "run", "skipped", "saved", "why"].map(str::to_owned));
     let mut rows = vec![header];
     for (i, pass) in first.passes.iter().enumerate() {
-        let share = pass.share.filter(|_| pass.n_run > 0).map_or("-".to_owned(), |s| format!("{:.1}%", 100.0 * s));
+        let share = pass
+            .share
+            .filter(|_| pass.n_run > 0)
+            .map_or("-".to_owned(), |s| format!("{:.1}%", 100.0 * s));
         let mut row = vec![pass.name.clone()];
-        row.extend(case.modes.iter().map(|m| m.passes.get(i).and_then(|p| p.p50_ms).map_or("-".to_owned(), ms)));
+        row.extend(
+            case.modes
+                .iter()
+                .map(|m| m.passes.get(i).and_then(|p| p.p50_ms).map_or("-".to_owned(), ms)),
+        );
         row.extend([share, pass.n_run.to_string(), pass.n_skipped.to_string()]);
-        row.extend([pass.saved_ms.map_or("-".to_owned(), ms), pass.reason.clone().unwrap_or_default()]);
+        row.extend([
+            pass.saved_ms.map_or("-".to_owned(), ms),
+            pass.reason.clone().unwrap_or_default(),
+        ]);
         rows.push(row);
     }
     rows

@@ -8,7 +8,9 @@ use super::args::{CompareArgs, SamenessArg};
 use super::{compare_pictures, output};
 use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
-use crate::study::compare::{Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks};
+use crate::study::compare::{
+    Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks,
+};
 use crate::study::difference::{Difference, Sameness, differences, remarks};
 use crate::study::recorded::{Recorded, read_results};
 use crate::study::records::Run;
@@ -61,15 +63,20 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
     let found = differences(&a.run, &b.run);
     let is_allowed = |d: &Difference| args.allow.iter().any(|allowed| sameness(*allowed) == d.kind);
-    let (allowed, refused): (Vec<Difference>, Vec<Difference>) = found.into_iter().partition(is_allowed);
+    let (allowed, refused): (Vec<Difference>, Vec<Difference>) =
+        found.into_iter().partition(is_allowed);
     if !refused.is_empty() {
         return Err(Error::usage(refusal(args, &refused)));
     }
     let report = report(args, &a, &b, allowed);
     if report.modes.is_empty() {
-        let ran = |of: &Recorded| of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ");
-        let [of_a, of_b] = [&a, &b].map(ran).map(|names| if names.is_empty() { "none".into() } else { names });
-        return Err(Error::usage(format!("A and B have no timed loop in common: A has {of_a}, B has {of_b}")));
+        let ran =
+            |of: &Recorded| of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ");
+        let [of_a, of_b] =
+            [&a, &b].map(ran).map(|names| if names.is_empty() { "none".into() } else { names });
+        return Err(Error::usage(format!(
+            "A and B have no timed loop in common: A has {of_a}, B has {of_b}"
+        )));
     }
     if args.json { output::object(&report) } else { output::text(&text(&report)) }
 }
@@ -148,7 +155,9 @@ fn text(report: &Report) -> String {
 
 fn rows(mode: &ComparedMode) -> Vec<Vec<String>> {
     let header = ["A p50", "B p50", "B / A", "95 % low", "high", "n A", "n B", "B is"];
-    let mut rows = vec![std::iter::once(format!("{}, ms", mode.name)).chain(header.map(str::to_owned)).collect()];
+    let mut rows = vec![
+        std::iter::once(format!("{}, ms", mode.name)).chain(header.map(str::to_owned)).collect(),
+    ];
     for m in &mode.measures {
         let number = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
         rows.push(vec![
@@ -171,7 +180,9 @@ fn sentence(m: &Compared) -> String {
     match m.b_by_a {
         Some(r) => {
             let (estimate, low, high) = (r.estimate, r.low, r.high);
-            format!("B takes {estimate:.3} of A's time (95 % interval {low:.3} to {high:.3}): {verdict}")
+            format!(
+                "B takes {estimate:.3} of A's time (95 % interval {low:.3} to {high:.3}): {verdict}"
+            )
         }
         None => verdict.to_owned(),
     }
@@ -179,12 +190,18 @@ fn sentence(m: &Compared) -> String {
 
 /// How the intervals were made, and what they do not know.
 fn foot(report: &Report) -> String {
-    let lens: Vec<String> = report.modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
-    let lens =
-        if lens.windows(2).all(|w| w[0] == w[1]) { lens[..lens.len().min(1)].join("") } else { lens.join(" and ") };
+    let lens: Vec<String> =
+        report.modes.iter().filter_map(|m| Some(m.headline()?.block_len.to_string())).collect();
+    let lens = if lens.windows(2).all(|w| w[0] == w[1]) {
+        lens[..lens.len().min(1)].join("")
+    } else {
+        lens.join(" and ")
+    };
     format!(
-        "\nIntervals: block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together (frame: {lens}).\n\
-        They know the noise within the runs, not from one start to the next. frame decides; the other rows are not\n\
+        "\nIntervals: block bootstrap, {} resamples, ⌈√n⌉ neighbouring frames drawn together \
+         (frame: {lens}).\n\
+        They know the noise within the runs, not from one start to the next. frame decides; the \
+        other rows are not\n\
         corrected for many comparisons: of twenty equal ones, one will seem to differ.\n",
         report.n_resamples
     )

@@ -52,10 +52,12 @@ struct Metrics {
 }
 
 /// Names of metrics that are greater where pictures differ more, and of those that are less.
-const OF_DIFFERENCE: [&str; 7] = ["rmse", "max", "relmse", "flip", "alpha_rmse", "alpha_max", "not_finite"];
+const OF_DIFFERENCE: [&str; 7] =
+    ["rmse", "max", "relmse", "flip", "alpha_rmse", "alpha_max", "not_finite"];
 const OF_LIKENESS: [&str; 2] = ["psnr", "ssim"];
 
-/// Whether pictures are to be compared and not runs; an error where that is not clear, or does not fit the flags.
+/// Whether pictures are to be compared and not runs; an error where that is not clear, or does not
+/// fit the flags.
 pub fn are_meant(args: &CompareArgs) -> Result<bool> {
     let is_picture = |path: &Path| !path.is_dir() && ImageKind::of(path).is_ok();
     let mixed = |picture: &Path, other: &Path| {
@@ -67,13 +69,16 @@ pub fn are_meant(args: &CompareArgs) -> Result<bool> {
     match (is_picture(&args.a), is_picture(&args.b)) {
         (true, false) => mixed(&args.a, &args.b),
         (false, true) => mixed(&args.b, &args.a),
-        (true, true) if !args.allow.is_empty() => Err(Error::usage("--allow is for results folders, not for pictures")),
+        (true, true) if !args.allow.is_empty() => {
+            Err(Error::usage("--allow is for results folders, not for pictures"))
+        }
         (true, true) => Ok(true),
         (false, false) => {
             let is_set = args.output.is_some() || args.pixels_per_degree.is_some();
             match is_set || !args.fail_above.is_empty() || !args.fail_below.is_empty() {
                 true => Err(Error::usage(format!(
-                    "-o, --pixels-per-degree, --fail-above and --fail-below are for pictures; {} is none (.png or .exr)",
+                    "-o, --pixels-per-degree, --fail-above and --fail-below are for pictures; {} \
+                     is none (.png or .exr)",
                     args.a.display()
                 ))),
                 false => Ok(false),
@@ -87,7 +92,10 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     check_names(&args.fail_below, &OF_LIKENESS, "--fail-below")?;
     if let Some(path) = &args.output {
         if ImageKind::of(path) != Ok(ImageKind::Png) {
-            return Err(Error::usage(format!("{}: expected a file name that ends in .png", path.display())));
+            return Err(Error::usage(format!(
+                "{}: expected a file name that ends in .png",
+                path.display()
+            )));
         }
         refuse_existing(path, args.force)?;
     }
@@ -127,7 +135,9 @@ pub fn run(args: &CompareArgs) -> Result<()> {
 
 fn check_names(limits: &[(String, f64)], known: &[&str], flag: &str) -> Result<()> {
     match limits.iter().find(|(name, _)| !known.contains(&name.as_str())) {
-        Some((name, _)) => Err(Error::usage(format!("{flag} {name}: expected one of {}", known.join(", ")))),
+        Some((name, _)) => {
+            Err(Error::usage(format!("{flag} {name}: expected one of {}", known.join(", "))))
+        }
         None => Ok(()),
     }
 }
@@ -138,7 +148,9 @@ fn check_alike(args: &CompareArgs, a: &Image, b: &Image) -> Result<()> {
         format!("{path_a} {}, {path_b} {}", of(a), of(b))
     };
     if a.kind != b.kind {
-        let what = said(&|i| if i.kind == ImageKind::Exr { "is linear".into() } else { "is for display".into() });
+        let what = said(&|i| {
+            if i.kind == ImageKind::Exr { "is linear".into() } else { "is for display".into() }
+        });
         return Err(Error::usage(format!("{what}; expected two .exr or two .png")));
     }
     if (a.width, a.height) != (b.width, b.height) {
@@ -156,8 +168,11 @@ fn both_finite(a: &[f64; 4], b: &[f64; 4]) -> bool {
 fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Flip)> {
     let pairs = || a.rgba.iter().zip(&b.rgba).filter(|(p, q)| both_finite(p, q));
     let color = picture::errors(pairs().flat_map(|(p, q)| (0..3).map(|i| (p[i], q[i]))))?;
-    let alpha: Option<Errors> =
-        if a.has_alpha && b.has_alpha { picture::errors(pairs().map(|(p, q)| (p[3], q[3]))) } else { None };
+    let alpha: Option<Errors> = if a.has_alpha && b.has_alpha {
+        picture::errors(pairs().map(|(p, q)| (p[3], q[3])))
+    } else {
+        None
+    };
     // As they are shown; what is left out of the errors is black in both.
     let show = |of: &Image| -> Vec<[f64; 3]> {
         let shown = |((p, q), own): ((&[f64; 4], &[f64; 4]), &[f64; 4])| match both_finite(p, q) {
@@ -167,15 +182,23 @@ fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Fli
         a.rgba.iter().zip(&b.rgba).zip(&of.rgba).map(shown).collect()
     };
     let (shown_a, shown_b) = (show(a), show(b));
-    let bytes = |shown: &[[f64; 3]]| -> Vec<u8> { shown.iter().flatten().map(|v| (255.0 * v).round() as u8).collect() };
+    let bytes = |shown: &[[f64; 3]]| -> Vec<u8> {
+        shown.iter().flatten().map(|v| (255.0 * v).round() as u8).collect()
+    };
     let flip = flip::flip(a.width, a.height, &bytes(&shown_a), &bytes(&shown_b), pixels_per_degree);
-    let luminance = |shown: &[[f64; 3]]| shown.iter().map(|p| ssim::luminance(*p)).collect::<Vec<f64>>();
+    let luminance =
+        |shown: &[[f64; 3]]| shown.iter().map(|p| ssim::luminance(*p)).collect::<Vec<f64>>();
     let metrics = Metrics {
         rmse: color.rmse,
         max: color.max_abs,
         relmse: color.rel_mse,
         psnr: color.psnr_db,
-        ssim: ssim::ssim(a.width as usize, a.height as usize, &luminance(&shown_a), &luminance(&shown_b)),
+        ssim: ssim::ssim(
+            a.width as usize,
+            a.height as usize,
+            &luminance(&shown_a),
+            &luminance(&shown_b),
+        ),
         flip: flip.mean(),
         alpha_rmse: alpha.map(|e| e.rmse),
         alpha_max: alpha.map(|e| e.max_abs),
@@ -183,14 +206,22 @@ fn measure(a: &Image, b: &Image, pixels_per_degree: f64) -> Option<(Metrics, Fli
     Some((metrics, flip))
 }
 
-/// Display values of a pixel: a PNG's own, an EXR's over black and through the tone map that scenes have by default.
+/// Display values of a pixel: a PNG's own, an EXR's over black and through the tone map that scenes
+/// have by default.
 fn display(kind: ImageKind, pixel: &[f64; 4]) -> [f64; 3] {
     let [r, g, b, a] = *pixel;
     match kind {
         ImageKind::Png => [r, g, b],
         ImageKind::Exr => {
             let (format, tone_map) = (FilmFormat::Rgba32f, ToneMap::Neutral);
-            let film = Film { width: 1, height: 1, format, background: DVec3::ZERO, exposure: 1.0, tone_map };
+            let film = Film {
+                width: 1,
+                height: 1,
+                format,
+                background: DVec3::ZERO,
+                exposure: 1.0,
+                tone_map,
+            };
             film.display(DVec3::new(r, g, b), a).to_array()
         }
     }
@@ -201,21 +232,27 @@ fn text(report: &Report) -> String {
     let Metrics { rmse, max, relmse, psnr, ssim, flip, alpha_rmse, alpha_max } = report.metrics;
     let shown = if report.values == "linear" { "over black, tone-mapped" } else { "as stored" };
     let mut rows = vec![["metric", "value", "of"].map(str::to_owned).to_vec()];
-    let mut row = |name: &str, value: String, of: String| rows.push(vec![name.to_owned(), value, of]);
+    let mut row =
+        |name: &str, value: String, of: String| rows.push(vec![name.to_owned(), value, of]);
     row("rmse", format!("{rmse:.6e}"), format!("{} values, RGB", report.values));
     row("max", format!("{max:.6e}"), "the same".into());
     row("relmse", format!("{relmse:.6e}"), format!("the same, (b - a)²/(a² + {RELATIVE_EPSILON})"));
     row("psnr", format!("{psnr:.3} dB"), format!("the same, peak {PEAK}"));
     let of_ssim = format!("luminance, {shown}; Gaussian window 11, σ 1.5, C1 = 0.01², C2 = 0.03²");
     row("ssim", ssim.map_or("-".into(), |v| format!("{v:.6}")), of_ssim);
-    row("flip", format!("{flip:.6}"), format!("mean, {shown}; {:.2} pixels a degree", report.pixels_per_degree));
+    row(
+        "flip",
+        format!("{flip:.6}"),
+        format!("mean, {shown}; {:.2} pixels a degree", report.pixels_per_degree),
+    );
     if let (Some(rmse), Some(max)) = (alpha_rmse, alpha_max) {
         row("alpha_rmse", format!("{rmse:.6e}"), "alpha".into());
         row("alpha_max", format!("{max:.6e}"), "alpha".into());
     }
     row("not_finite", report.not_finite.to_string(), "pixels, left out".into());
     let widths = [0, 1].map(|c| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0));
-    let mut out = format!("A  {}\nB  {}, {}×{} pixels\n\n", report.a, report.b, report.width, report.height);
+    let mut out =
+        format!("A  {}\nB  {}, {}×{} pixels\n\n", report.a, report.b, report.width, report.height);
     for row in &rows {
         let [name, value] = [0, 1].map(|c| " ".repeat(widths[c] - row[c].chars().count()));
         out += format!("{}{name}  {value}{}  {}", row[0], row[1], row[2]).trim_end();

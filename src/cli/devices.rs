@@ -54,7 +54,8 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
         l.max_texels
     );
     out += &format!(
-        "   workgroups {} along x, {} invocations each, {} KiB shared; subgroup {}; push constants {} B\n",
+        "   workgroups {} along x, {} invocations each, {} KiB shared; subgroup {}; push \
+         constants {} B\n",
         l.max_workgroups_x,
         l.max_workgroup_invocations,
         l.max_shared_memory_bytes >> 10,
@@ -67,9 +68,15 @@ fn describe(d: &DeviceInfo, i_used: Option<usize>) -> String {
     };
     out += &format!("   images up to {} a side; {timestamps}\n", l.max_image_extent);
     out + &match d.calibrated_timestamps {
-        Some(name) => format!("   clock calibrated with the host's by {}\n", name.to_string_lossy()),
+        Some(name) => format!(
+            "   clock calibrated with the \
+            host's by {}\n",
+            name.to_string_lossy()
+        ),
         None => {
-            "   clock not calibrated with the host's: VK_KHR_ and VK_EXT_calibrated_timestamps are missing\n".to_owned()
+            "   clock not calibrated with the host's: VK_KHR_ and VK_EXT_calibrated_timestamps \
+             are missing\n"
+                .to_owned()
         }
     }
 }

@@ -15,10 +15,13 @@ use crate::farm::status::{State, Status, status};
 use crate::farm::{attempts, gc, merge, run as shard_run};
 use crate::frame::stage::DeviceChoice;
 
-/// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where `graceful` says that
-/// something is kept.
+/// `stop` is set by Ctrl-C, and by the signal with which an engine takes a node back, where
+/// `graceful` says that something is kept.
 pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
-    graceful.store(matches!(args.command, FarmCommand::Run(_) | FarmCommand::Local(_)), Ordering::Relaxed);
+    graceful.store(
+        matches!(args.command, FarmCommand::Run(_) | FarmCommand::Local(_)),
+        Ordering::Relaxed,
+    );
     match &args.command {
         FarmCommand::Plan(a) => farm_plan::plan(a),
         FarmCommand::Calibrate(a) => farm_plan::calibrated(a, stop),
@@ -35,7 +38,9 @@ pub fn run(args: &FarmArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<
 /// Of a reference the processor does all.
 fn refuse_needless(plan: &Plan, device: Option<&String>, validation: bool) -> Result<()> {
     if matches!(plan.work, Work::Reference(_)) && (device.is_some() || validation) {
-        return Err(Error::usage("a reference needs no device: expected no --device and no --validation"));
+        return Err(Error::usage(
+            "a reference needs no device: expected no --device and no --validation",
+        ));
     }
     Ok(())
 }
@@ -45,7 +50,11 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
     refuse_needless(&plan, args.device.as_ref(), args.validation)?;
     let n_items = plan.shard(args.shard)?.n;
     let bar = output::progress(u64::from(n_items), plan.work.noun(), args.quiet);
-    let choice = DeviceChoice { device: args.device.clone(), validation: args.validation, ..DeviceChoice::default() };
+    let choice = DeviceChoice {
+        device: args.device.clone(),
+        validation: args.validation,
+        ..DeviceChoice::default()
+    };
     let how = How { choice: &choice, stop, on_item: &|| bar.inc(1) };
     let outcome = shard_run::run(&args.plan, args.shard, &how);
     bar.finish_and_clear();
@@ -55,7 +64,8 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
         Outcome::Done { seconds, n_resumed: 0 } => format!("done in {seconds:.1} s"),
         Outcome::Done { seconds, n_resumed } => {
             format!(
-                "done in {seconds:.1} s; {n_resumed} of {n_items} {} were there from an attempt before",
+                "done in {seconds:.1} s; {n_resumed} of {n_items} {} were there from an \
+                 attempt before",
                 plan.work.noun()
             )
         }
@@ -67,9 +77,9 @@ fn shard(args: &RunArgs, stop: &AtomicBool) -> Result<()> {
 fn given_up(args: &RunArgs, error: Error) -> Error {
     let (Error::Transient { what }, Some(n_tries)) = (&error, args.tries) else { return error };
     match attempts::n_fruitless(&args.plan, args.shard) {
-        n if n >= n_tries as usize => {
-            Error::Check { what: format!("{what}; nothing was finished {n} times in a row: this task ends here") }
-        }
+        n if n >= n_tries as usize => Error::Check {
+            what: format!("{what}; nothing was finished {n} times in a row: this task ends here"),
+        },
         _ => error,
     }
 }
@@ -82,7 +92,8 @@ fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
     let found = status(&args.plan, &plan)?;
     let open = found.open();
     let program = std::env::current_exe().map_err(|cause| Error::io(Path::new("nimbus"), cause))?;
-    let mut arguments: Vec<String> = ["farm", "run", "--quiet", "--plan"].map(str::to_owned).to_vec();
+    let mut arguments: Vec<String> =
+        ["farm", "run", "--quiet", "--plan"].map(str::to_owned).to_vec();
     arguments.push(args.plan.display().to_string());
     if let Some(device) = &args.device {
         arguments.extend(["--device".to_owned(), device.clone()]);
@@ -90,8 +101,13 @@ fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
     arguments.push("--shard".to_owned());
     // Times are the device's own where one process uses it.
     let exclusive = args.jobs == 1;
-    let pool =
-        Pool { program: &program, arguments, n_processes: args.jobs as usize, n_tries: args.tries as usize, exclusive };
+    let pool = Pool {
+        program: &program,
+        arguments,
+        n_processes: args.jobs as usize,
+        n_tries: args.tries as usize,
+        exclusive,
+    };
     let bar = output::progress(open.len() as u64, "shards", args.quiet);
     let ended = pool.run(&open, stop, &mut |_| bar.inc(1));
     bar.finish_and_clear();
@@ -103,16 +119,19 @@ fn local(args: &LocalArgs, stop: &AtomicBool) -> Result<()> {
     output::text(&format!("{n} shards are done, {n_open} of them now\n"))
 }
 
-/// An error where shards are not done, with the exit code that says most: 70 before those that stay, those before 75.
+/// An error where shards are not done, with the exit code that says most: 70 before those that
+/// stay, those before 75.
 fn failed(ended: &[Ended], n: usize, plan: &Path) -> Result<()> {
     let failed: Vec<&Ended> = ended.iter().filter(|e| e.exit_code != Some(0)).collect();
     if failed.is_empty() {
         return Ok(());
     }
-    let code = |e: &Ended| e.exit_code.map_or("killed".to_owned(), |code| format!("exit code {code}"));
+    let code =
+        |e: &Ended| e.exit_code.map_or("killed".to_owned(), |code| format!("exit code {code}"));
     let list: Vec<String> = failed.iter().map(|e| format!("{} ({})", e.index, code(e))).collect();
     let (n_failed, list, plan) = (failed.len(), list.join(", "), plan.display());
-    let what = format!("{n_failed} of {n} shards went wrong: {list}; nimbus farm status --plan {plan}");
+    let what =
+        format!("{n_failed} of {n} shards went wrong: {list}; nimbus farm status --plan {plan}");
     let may_pass = |e: &&Ended| matches!(e.exit_code, None | Some(75));
     Err(match () {
         () if failed.iter().any(|e| e.exit_code == Some(70)) => Error::Conflict { what },
@@ -145,7 +164,8 @@ fn table(plan: &Plan, found: &Status) -> String {
     if let Some(Compared { n, median, p90, largest, .. }) = found.predicted {
         let [median, p90, largest] = [median, p90, largest].map(|share| 100.0 * share);
         text += &format!(
-            "predicted against taken, {n} shards: off by {median:.0} % (median), {p90:.0} % (p90), {largest:.0} % at \
+            "predicted against taken, {n} shards: off by {median:.0} % (median), {p90:.0} % (p90), \
+             {largest:.0} % at \
              most\n"
         );
     }
@@ -155,7 +175,8 @@ fn table(plan: &Plan, found: &Status) -> String {
     }
     for s in found.shards.iter().filter(is_told) {
         let range = plan.shards[s.index].items();
-        let attempts = format!("{} attempt{}", s.n_attempts, if s.n_attempts == 1 { "" } else { "s" });
+        let attempts =
+            format!("{} attempt{}", s.n_attempts, if s.n_attempts == 1 { "" } else { "s" });
         let mut notes = vec![attempts];
         notes.extend((s.n_unfinished > 0).then(|| format!("{} unfinished", s.n_unfinished)));
         notes.extend((s.n_differing > 0).then(|| format!("{} that differ", s.n_differing)));
@@ -163,7 +184,8 @@ fn table(plan: &Plan, found: &Status) -> String {
         notes.extend(s.what.clone());
         let name = s.state.name();
         let (noun, notes) = (plan.work.noun(), notes.join("; "));
-        text += &format!("{:>6}  {name:9}  {noun} {}..{}  {notes}\n", s.index, range.start, range.end);
+        text +=
+            &format!("{:>6}  {name:9}  {noun} {}..{}  {notes}\n", s.index, range.start, range.end);
     }
     if let Some(why) = &found.engine_silent {
         text += &format!("what Slurm does with them is not known: {why}\n");
@@ -179,7 +201,11 @@ fn merged(args: &MergeArgs) -> Result<()> {
     let spinner = output::spinner("merging", false);
     let n = merge::merge(&args.plan, &plan, &args.output, args.force, args.mixed)?;
     drop(spinner);
-    let more = if let Work::Bench { .. } = plan.work { farm_bench::spread(&args.output)? } else { String::new() };
+    let more = if let Work::Bench { .. } = plan.work {
+        farm_bench::spread(&args.output)?
+    } else {
+        String::new()
+    };
     output::text(&format!("{n} {} in {}\n{more}", plan.work.noun(), args.output.display()))
 }
 
@@ -190,6 +216,10 @@ fn clear(args: &GcArgs) -> Result<()> {
     let bytes: u64 = removed.iter().map(|r| r.bytes).sum();
     let mut text: String = removed.iter().map(|r| format!("{}\n", r.path.display())).collect();
     let verb = if args.dry_run { "would be removed" } else { "removed" };
-    text += &format!("{} folders, {:.1} MiB, {verb}\n", removed.len(), bytes as f64 / (1u64 << 20) as f64);
+    text += &format!(
+        "{} folders, {:.1} MiB, {verb}\n",
+        removed.len(),
+        bytes as f64 / (1u64 << 20) as f64
+    );
     output::text(&text)
 }

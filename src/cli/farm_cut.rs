@@ -51,16 +51,28 @@ impl<'a> Model<'a> {
 }
 
 /// `work` in shards of `each` items; where nobody said how many, by the model, or else `usual`.
-pub(super) fn cut(args: &PlanArgs, work: Work, amounts: &Amounts, (each, usual): (Option<u32>, u32)) -> Result<Cut> {
+pub(super) fn cut(
+    args: &PlanArgs,
+    work: Work,
+    amounts: &Amounts,
+    (each, usual): (Option<u32>, u32),
+) -> Result<Cut> {
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let n = amounts.items.len() as u32;
     let sizes = match (&model, each) {
         (Some(model), None) => {
             model.check(&work)?;
-            let item_s = amounts.items.iter().map(|item| model.seconds(0.0, item)).collect::<Result<Vec<f64>>>()?;
+            let item_s = amounts
+                .items
+                .iter()
+                .map(|item| model.seconds(0.0, item))
+                .collect::<Result<Vec<f64>>>()?;
             let setup_s = model.seconds(1.0, &amounts.of_shard)?;
             let (least, most) = args.lengths();
-            split(&item_s, setup_s, least, most, args.n_nodes()).iter().map(|r| r.len() as u32).collect()
+            split(&item_s, setup_s, least, most, args.n_nodes())
+                .iter()
+                .map(|r| r.len() as u32)
+                .collect()
         }
         (_, each) => even(n, each.unwrap_or(usual)),
     };
@@ -74,7 +86,12 @@ pub(super) fn cut(args: &PlanArgs, work: Work, amounts: &Amounts, (each, usual):
     let predicted_s = match &model {
         Some(model) => {
             model.check(&work)?;
-            Some(counted.iter().map(|shard| model.seconds(1.0, shard)).collect::<Result<Vec<f64>>>()?)
+            Some(
+                counted
+                    .iter()
+                    .map(|shard| model.seconds(1.0, shard))
+                    .collect::<Result<Vec<f64>>>()?,
+            )
         }
         None => None,
     };

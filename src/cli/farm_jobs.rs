@@ -39,8 +39,12 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     // What every shard would say is said once.
     let planned = Plan::read(&plan)?;
     planned.scene_as_planned()?;
-    if let Some(option) = args.job.sbatch.iter().chain(&args.job.sbatch_merge).find(|option| names_job(option)) {
-        return Err(Error::usage(format!("--sbatch={option}: by names and comments `submit` tells its jobs apart")));
+    if let Some(option) =
+        args.job.sbatch.iter().chain(&args.job.sbatch_merge).find(|option| names_job(option))
+    {
+        return Err(Error::usage(format!(
+            "--sbatch={option}: by names and comments `submit` tells its jobs apart"
+        )));
     }
     let engine = slurm::states(&slurm::submitted(&plan)).map_err(|why| Error::Transient {
         what: format!("what is queued already is not known, nothing was submitted: {}", why.what),
@@ -62,11 +66,14 @@ pub fn submit(args: &SubmitArgs) -> Result<()> {
     }
     let mut text = String::new();
     for array in &submitted.arrays {
-        text += &format!("job {}: shards {}\n", array.job.as_deref().unwrap_or_default(), array.shards);
+        text +=
+            &format!("job {}: shards {}\n", array.job.as_deref().unwrap_or_default(), array.shards);
     }
     let folder = args.job.plan.display();
     let merge = submitted.merge.as_deref().unwrap_or_default();
-    text += &format!("job {merge}: the merge, after them\nfollow them: nimbus farm status --plan {folder}\n");
+    text += &format!(
+        "job {merge}: the merge, after them\nfollow them: nimbus farm status --plan {folder}\n"
+    );
     output::text(&text)
 }
 
@@ -75,7 +82,11 @@ fn names_job(option: &str) -> bool {
 }
 
 /// Writes the engine's files for what is not done: their names, and what that is.
-fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<(Vec<&'static str>, Vec<usize>)> {
+fn write(
+    args: &JobArgs,
+    files: &Path,
+    engine: EngineArg,
+) -> Result<(Vec<&'static str>, Vec<usize>)> {
     let folder = absolute(&args.plan)?;
     let plan = Plan::read(&folder)?;
     let indices = status(&folder, &plan)?.open();
@@ -115,7 +126,8 @@ fn write(args: &JobArgs, files: &Path, engine: EngineArg) -> Result<(Vec<&'stati
 
 fn make_runnable(path: &Path) -> Result<()> {
     use std::os::unix::fs::PermissionsExt;
-    fs::set_permissions(path, fs::Permissions::from_mode(0o755)).map_err(|cause| Error::io(path, cause))
+    fs::set_permissions(path, fs::Permissions::from_mode(0o755))
+        .map_err(|cause| Error::io(path, cause))
 }
 
 fn absolute(path: &Path) -> Result<PathBuf> {

@@ -81,7 +81,8 @@ fn told(plan: &Plan, folder: &Path) -> Result<Value> {
     let shards = value.get_mut("shards").and_then(Value::as_array_mut);
     for (said, shard) in shards.into_iter().flatten().zip(&plan.shards) {
         let folder = folder.display().to_string();
-        said["arguments"] = json!(["farm", "run", "--plan", folder, "--shard", shard.index.to_string()]);
+        said["arguments"] =
+            json!(["farm", "run", "--plan", folder, "--shard", shard.index.to_string()]);
         said["outputs"] = json!(plan.outputs(shard));
     }
     Ok(value)
@@ -90,7 +91,10 @@ fn told(plan: &Plan, folder: &Path) -> Result<Value> {
 /// All frames of a scene, or of its phases.
 fn whole(loaded: &LoadedScene) -> Span {
     let of_phases = loaded.phases.iter().map(|phase| phase.n_frames).fold(0, u32::saturating_add);
-    Span { first: 0, end: if loaded.phases.is_empty() { loaded.scene.time.n_frames } else { of_phases } }
+    Span {
+        first: 0,
+        end: if loaded.phases.is_empty() { loaded.scene.time.n_frames } else { of_phases },
+    }
 }
 
 fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
@@ -101,7 +105,10 @@ fn frames(args: &PlanArgs, loaded: &LoadedScene) -> Result<Cut> {
         Some(FormatArg::Png) | None => PictureFormat::Png,
     };
     let work = Work::Frames { first, n, format };
-    let amounts = Amounts { items: work_of_frames(loaded, first..end)?, of_shard: work_of_beginning(loaded, first)? };
+    let amounts = Amounts {
+        items: work_of_frames(loaded, first..end)?,
+        of_shard: work_of_beginning(loaded, first)?,
+    };
     cut(args, work, &amounts, (args.shard_frames, USUAL_FRAMES))
 }
 
@@ -112,24 +119,45 @@ fn study(args: &PlanArgs, set: &[String]) -> Result<Cut> {
         match Args::try_parse_from(begin.iter().chain(more).chain(&args.told)) {
             Ok(Args { command: Command::Error(of), .. }) => Ok(of),
             Ok(_) => Err(Error::usage("expected arguments of nimbus error after \"--\"")),
-            Err(cause) => {
-                Err(Error::usage(format!("after \"--\": {}", cause.to_string().trim_start_matches("error: "))))
-            }
+            Err(cause) => Err(Error::usage(format!(
+                "after \"--\": {}",
+                cause.to_string().trim_start_matches("error: ")
+            ))),
         }
     };
-    let ErrorArgs { out, resume, force, plot, json, csv, part, budget_ms, budget_error, options, .. } = parsed(&[])?;
+    let ErrorArgs {
+        out,
+        resume,
+        force,
+        plot,
+        json,
+        csv,
+        part,
+        budget_ms,
+        budget_error,
+        options,
+        ..
+    } = parsed(&[])?;
     let is_results = out.is_some() || resume || force || plot || json || csv || part.is_some();
     let is_budget = !budget_ms.is_empty() || !budget_error.is_empty();
     let is_scene = !options.set.is_empty() || options.seed.is_some() || options.size.is_some();
-    let is_device = options.device.is_some() || options.shaders.is_some() || options.validation || options.poison;
+    let is_device = options.device.is_some()
+        || options.shaders.is_some()
+        || options.validation
+        || options.poison;
     if is_results || is_budget || is_scene || is_device {
         return Err(Error::usage(
-            "after \"--\": expected no --out, --resume, --force, --plot, --json, --csv, --part, --budget-… or \
+            "after \"--\": expected no --out, --resume, --force, --plot, --json, --csv, --part, \
+             --budget-… or \
              --validation; --set, --seed, --size, --device and --shaders stand before it",
         ));
     }
-    let of_scene = set.iter().map(|set| format!("--set={set}")).chain(args.seed.iter().map(|n| format!("--seed={n}")));
-    let (configurations, amounts) = tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
+    let of_scene = set
+        .iter()
+        .map(|set| format!("--set={set}"))
+        .chain(args.seed.iter().map(|n| format!("--seed={n}")));
+    let (configurations, amounts) =
+        tradeoff::configurations(&parsed(&of_scene.collect::<Vec<_>>())?)?;
     let work = Work::Error { arguments: args.told.clone(), configurations };
     cut(args, work, &amounts, (args.shard_configurations, USUAL_CONFIGURATIONS))
 }
@@ -152,7 +180,11 @@ fn estimate(args: &PlanArgs, packing: &Packing) -> Result<String> {
     );
     if let Some(price_per_quantum) = args.rate {
         let quantum_s = args.quantum.unwrap_or(USUAL_QUANTUM_S);
-        let rate = Rate { quantum_s, price_per_quantum, retry_share: args.retries.unwrap_or(USUAL_RETRIES) };
+        let rate = Rate {
+            quantum_s,
+            price_per_quantum,
+            retry_share: args.retries.unwrap_or(USUAL_RETRIES),
+        };
         let price = price(packing, &rate).map_err(Error::usage)?;
         text += &format!(
             "price: {:.2} for {} pieces of {} s, and {:.2} for retries to be expected: {:.2}\n",
@@ -192,7 +224,8 @@ pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
         return output::object(&found);
     }
     let (fit, percent) = (&found.fit, |share: f64| format!("{:.0} %", 100.0 * share));
-    let mut text = format!("{} of {}, {} ({})\n", runs(fit.n), found.of, found.device.name, found.cpu.model);
+    let mut text =
+        format!("{} of {}, {} ({})\n", runs(fit.n), found.of, found.device.name, found.cpu.model);
     let model = fit.model;
     for (name, each_s) in [
         ("set-up", model.setup_s),
@@ -206,7 +239,9 @@ pub fn calibrated(args: &CalibrateArgs, stop: &AtomicBool) -> Result<()> {
         let each = each_s.map_or("not measured".to_owned(), |s| format!("{s:.3e} s"));
         text += &format!("{name:>28}: {each}\n");
     }
-    let left_out = fit.left_out_median.map_or(String::new(), |e| format!("; of runs left out in turn {}", percent(e)));
+    let left_out = fit
+        .left_out_median
+        .map_or(String::new(), |e| format!("; of runs left out in turn {}", percent(e)));
     text += &format!(
         "off by {} (median), {} at most{left_out}\n",
         percent(fit.median_relative_error),

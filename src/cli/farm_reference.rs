@@ -23,8 +23,14 @@ pub(super) fn cut(args: &PlanArgs, of: Against, loaded: &LoadedScene) -> Result<
     };
     let usual_range = USUAL_RANGE.min(n_samples.next_power_of_two());
     let (tile, range) = match &model {
-        Some(_) => (args.tile.map_or(whole, Into::into), args.shard_samples.unwrap_or(n_samples.next_power_of_two())),
-        None => (args.tile.map_or([USUAL_TILE; 2], Into::into), args.shard_samples.unwrap_or(usual_range)),
+        Some(_) => (
+            args.tile.map_or(whole, Into::into),
+            args.shard_samples.unwrap_or(n_samples.next_power_of_two()),
+        ),
+        None => (
+            args.tile.map_or([USUAL_TILE; 2], Into::into),
+            args.shard_samples.unwrap_or(usual_range),
+        ),
     };
     let tile = [tile[0].min(whole[0]), tile[1].min(whole[1])];
     let mut cut = reference::Cut {
@@ -44,7 +50,8 @@ pub(super) fn cut(args: &PlanArgs, of: Against, loaded: &LoadedScene) -> Result<
         cut = shortened(args, cut, |cut| longest(cut, loaded, &seen, model))?;
     }
     let amounts = Amounts { items: cut.work(loaded, &seen)?, of_shard: Counted::default() };
-    // Without a model every piece is a shard; with one neighbours go together as far as they are short.
+    // Without a model every piece is a shard; with one neighbours go together as far as they are
+    // short.
     farm_cut::cut(args, Work::Reference(cut), &amounts, (None, 1))
 }
 
@@ -56,12 +63,14 @@ fn longest(
     model: &Model<'_>,
 ) -> Result<(f64, usize)> {
     let work = cut.work(loaded, seen)?;
-    let seconds = work.iter().map(|piece| model.seconds(1.0, piece)).collect::<Result<Vec<f64>>>()?;
+    let seconds =
+        work.iter().map(|piece| model.seconds(1.0, piece)).collect::<Result<Vec<f64>>>()?;
     Ok((seconds.iter().copied().fold(0.0, f64::max), seconds.len()))
 }
 
-/// Halved until the longest piece is short enough and there is one for every node, as far as that makes it shorter;
-/// ranges first, as they cost no more than a set-up and what of the light all samples share.
+/// Halved until the longest piece is short enough and there is one for every node, as far as that
+/// makes it shorter; ranges first, as they cost no more than a set-up and what of the light all
+/// samples share.
 fn shortened(
     args: &PlanArgs,
     mut cut: reference::Cut,
@@ -85,7 +94,8 @@ fn shortened(
     }
     if now > most {
         eprintln!(
-            "note: the longest piece takes {now:.0} s, more than {most:.0}: light that every piece computes anew"
+            "note: the longest piece takes {now:.0} s, more than {most:.0}: light that every piece \
+             computes anew"
         );
     }
     Ok(cut)

@@ -7,8 +7,8 @@ use crate::frame::stage::Stage;
 use crate::model::scene::Scene;
 use crate::study::{air, basis, inspect};
 
-/// Frames that `--plan` shows: the first does everything, the second shows what a step of time changes, the third that
-/// it goes on so.
+/// Frames that `--plan` shows: the first does everything, the second shows what a step of time
+/// changes, the third that it goes on so.
 const PLAN_FRAMES: u32 = 3;
 
 pub fn run(args: &InspectArgs) -> Result<()> {
@@ -27,7 +27,9 @@ pub fn run(args: &InspectArgs) -> Result<()> {
         let scene = &scene;
         let found = match (args.particles, args.facets) {
             (true, _) => Found::Particles(inspect::particles_reference(scene, i_frame)?),
-            (_, true) => Found::Facets(of_surfaces(args, scene, inspect::facets_reference(scene, i_frame)?)),
+            (_, true) => {
+                Found::Facets(of_surfaces(args, scene, inspect::facets_reference(scene, i_frame)?))
+            }
             _ => Found::Boxes(inspect::boxes_reference(scene)),
         };
         drop(spinner);
@@ -56,7 +58,11 @@ pub fn run(args: &InspectArgs) -> Result<()> {
 }
 
 /// The rows, or the surfaces' means of them.
-fn of_surfaces(args: &InspectArgs, scene: &Scene, rows: Vec<inspect::FacetRow>) -> Vec<inspect::FacetRow> {
+fn of_surfaces(
+    args: &InspectArgs,
+    scene: &Scene,
+    rows: Vec<inspect::FacetRow>,
+) -> Vec<inspect::FacetRow> {
     if args.per_surface { inspect::per_surface(scene, &rows) } else { rows }
 }
 
@@ -99,7 +105,14 @@ fn boxes(rows: &[inspect::BoxRow], json: bool) -> Result<()> {
     for r in rows {
         let (particles, attempts) = (r.particles.to_string(), r.attempts.to_string());
         let (cloud, number) = (r.cloud.to_string(), r.r#box.to_string());
-        table.push(vec![cloud, number, particles, attempts, rate(r.acceptance), r.folded.to_string()]);
+        table.push(vec![
+            cloud,
+            number,
+            particles,
+            attempts,
+            rate(r.acceptance),
+            r.folded.to_string(),
+        ]);
     }
     let (particles, attempts) =
         rows.iter().fold((0u64, 0u64), |(p, a), r| (p + u64::from(r.particles), a + r.attempts));

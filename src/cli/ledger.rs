@@ -56,7 +56,8 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     }
     let bed = Bed::open(&device_choice(&args.options))?;
     limits::check(&scene, bed.device.limits())?;
-    let clocks = machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
+    let clocks =
+        machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
     let made = Provenance::now(SCHEMA_VERSION, &args.scene, &loaded, bed.device.info(), clocks);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
@@ -77,7 +78,10 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     match (ledger.interrupted, ledger.holds) {
         (true, _) => Err(Error::Interrupted),
         (false, false) => Err(Error::Check {
-            what: format!("the total {:.3e} is more than the sum of all rows {:.3e}", ledger.total.value, ledger.sum),
+            what: format!(
+                "the total {:.3e} is more than the sum of all rows {:.3e}",
+                ledger.total.value, ledger.sum
+            ),
         }),
         (false, true) => Ok(()),
     }
@@ -99,7 +103,8 @@ fn measure(
     let pixels = Pixels::sample(scene.film.width, scene.film.height, args.pixels);
     let frames = Frames { i_frame: args.frame, time_s, n_frames: args.frames, as_played: false };
     let n_rounds = args.rounds as usize;
-    Setup { bed, scene, frames, n_rounds, pixels: &pixels, n_reflections: args.reflections, stop }.run(made, &on_part)
+    Setup { bed, scene, frames, n_rounds, pixels: &pixels, n_reflections: args.reflections, stop }
+        .run(made, &on_part)
 }
 
 fn write(path: &Path, ledger: &Ledger) -> Result<()> {
@@ -111,7 +116,10 @@ fn write(path: &Path, ledger: &Ledger) -> Result<()> {
 /// What is printed for people.
 fn report(ledger: &Ledger) -> String {
     let made = &ledger.made;
-    let mut out = format!("{}\n{} ({}), {}\n", made.scene_file, made.device.name, made.device.driver, made.cpu.model);
+    let mut out = format!(
+        "{}\n{} ({}), {}\n",
+        made.scene_file, made.device.name, made.device.driver, made.cpu.model
+    );
     out += &format!(
         "frame {}, {} of {} pixels; the last row's truth has an RMS of {:.3}{}\n\n",
         ledger.frame,
@@ -122,7 +130,8 @@ fn report(ledger: &Ledger) -> String {
     );
     out += &output::table(&rows(ledger));
     out += &format!(
-        "\nas it is drawn against the last truth: RMSE {:.2e}; the rows sum to {:.2e}, in quadrature to {:.2e}\n",
+        "\nas it is drawn against the last truth: RMSE {:.2e}; the rows sum to {:.2e}, in \
+         quadrature to {:.2e}\n",
         ledger.total.value, ledger.sum, ledger.quadrature
     );
     if ledger.rows.iter().any(|row| !row.is_resolved) {
@@ -132,16 +141,27 @@ fn report(ledger: &Ledger) -> String {
 }
 
 fn rows(ledger: &Ledger) -> Vec<Vec<String>> {
-    let head =
-        ["approximation", "is", "stands for", "RMSE", "95 %", "relative", "share", "own error", "GPU time by without"];
+    let head = [
+        "approximation",
+        "is",
+        "stands for",
+        "RMSE",
+        "95 %",
+        "relative",
+        "share",
+        "own error",
+        "GPU time by without",
+    ];
     let interval = |f: &Figure, text: &dyn Fn(f64) -> String| {
-        f.low.zip(f.high).map_or("-".to_owned(), |(low, high)| format!("{} to {}", text(low), text(high)))
+        f.low
+            .zip(f.high)
+            .map_or("-".to_owned(), |(low, high)| format!("{} to {}", text(low), text(high)))
     };
     let small = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.2e}") };
     let of = |row: &Row| {
-        let ratio = row
-            .time_ratio
-            .map_or("-".to_owned(), |f| format!("{:.3} ({})", f.value, interval(&f, &|v| format!("{v:.3}"))));
+        let ratio = row.time_ratio.map_or("-".to_owned(), |f| {
+            format!("{:.3} ({})", f.value, interval(&f, &|v| format!("{v:.3}")))
+        });
         vec![
             row.name.clone(),
             row.from.clone(),

@@ -50,7 +50,8 @@ use args::{Args, Command, SceneArgs};
 
 /// Set by Ctrl-C where [`GRACEFUL`] is: the command looks at it between frames.
 static STOP: AtomicBool = AtomicBool::new(false);
-/// Whether the command keeps what it has finished: then only a second Ctrl-C ends the process at once.
+/// Whether the command keeps what it has finished: then only a second Ctrl-C ends the process at
+/// once.
 static GRACEFUL: AtomicBool = AtomicBool::new(false);
 
 /// Parses the command line, runs the command, prints an error and gives the exit code.
@@ -94,8 +95,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Signals so close together are one: an engine tells a job script and all that it runs, and the script tells them,
-/// too.
+/// Signals so close together are one: an engine tells a job script and all that it runs, and the
+/// script tells them, too.
 const ONE_SIGNAL: Duration = Duration::from_secs(1);
 
 /// What Ctrl-C does; runs on a thread of its own.
@@ -104,7 +105,9 @@ fn interrupted() {
     if GRACEFUL.load(Ordering::Relaxed) {
         if !STOP.swap(true, Ordering::Relaxed) {
             FIRST.get_or_init(Instant::now);
-            eprintln!("interrupted: finishes this frame and keeps what is done; once more ends at once");
+            eprintln!(
+                "interrupted: finishes this frame and keeps what is done; once more ends at once"
+            );
             return;
         }
         if FIRST.get().is_some_and(|first| first.elapsed() < ONE_SIGNAL) {
@@ -112,7 +115,8 @@ fn interrupted() {
         }
     }
     atomic::abandon();
-    // std::process::exit would run the exit handlers of a driver that other threads are still inside of.
+    // std::process::exit would run the exit handlers of a driver that other threads are still
+    // inside of.
     unsafe extern "C" {
         fn _exit(code: std::ffi::c_int) -> !;
     }
@@ -147,7 +151,8 @@ fn load_and_name(path: &Path, args: &SceneArgs) -> Result<(LoadedScene, Vec<Path
 
 /// What is allowed but hardly meant in a scene or one of its phases.
 fn warnings_of(loaded: &LoadedScene) -> Vec<String> {
-    let of_scene = |scene: &Scene| basis_warnings(scene).into_iter().chain(advice(scene)).collect::<Vec<_>>();
+    let of_scene =
+        |scene: &Scene| basis_warnings(scene).into_iter().chain(advice(scene)).collect::<Vec<_>>();
     let mut all: Vec<String> = loaded.warnings.clone();
     let phases = loaded.phases.iter().map(|p| &p.scene);
     for warning in std::iter::once(&loaded.scene).chain(phases).flat_map(of_scene) {
@@ -167,7 +172,8 @@ fn device_choice(args: &SceneArgs) -> DeviceChoice {
     }
 }
 
-/// Refuses a time at which the scene is where f32 cannot follow; the frames of the scene itself are not such times.
+/// Refuses a time at which the scene is where f32 cannot follow; the frames of the scene itself are
+/// not such times.
 fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
     // Not a number is refused too.
     let in_time = time_s.abs() <= GREATEST;
@@ -176,9 +182,15 @@ fn check_time(scene: &Scene, time_s: f64) -> Result<()> {
     }
     let greatest = shortest(GREATEST);
     Err(Error::usage(if in_time {
-        format!("time {} s: the wind carries a cloud's origin too far: expected at most {greatest}", shortest(time_s))
+        format!(
+            "time {} s: the wind carries a cloud's origin too far: expected at most {greatest}",
+            shortest(time_s)
+        )
     } else {
-        format!("time {} s: expected a finite number from -{greatest} to {greatest}", shortest(time_s))
+        format!(
+            "time {} s: expected a finite number from -{greatest} to {greatest}",
+            shortest(time_s)
+        )
     }))
 }
 

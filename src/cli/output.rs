@@ -19,7 +19,9 @@ pub fn error(error: &Error, color: ColorChoice) {
     let colored = match color {
         ColorChoice::Always => true,
         ColorChoice::Never => false,
-        ColorChoice::Auto => std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+        ColorChoice::Auto => {
+            std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+        }
     };
     let label = if colored { "\x1b[1;31merror:\x1b[0m" } else { "error:" };
     eprintln!("{label} {error}");
@@ -30,7 +32,9 @@ pub fn colored(color: ColorChoice) -> bool {
     match color {
         ColorChoice::Always => true,
         ColorChoice::Never => false,
-        ColorChoice::Auto => std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none(),
+        ColorChoice::Auto => {
+            std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none()
+        }
     }
 }
 
@@ -101,7 +105,8 @@ pub fn progress(n: u64, what: &str, quiet: bool) -> ProgressBar {
     }
 }
 
-/// A bar that is shown once its work has lasted a second, and that any thread may move on. It is gone when it is dropped.
+/// A bar that is shown once its work has lasted a second, and that any thread may move on. It is
+/// gone when it is dropped.
 pub struct LateProgress {
     bar: ProgressBar,
     begin: Instant,
@@ -140,7 +145,8 @@ pub struct Spinner {
     thread: Option<JoinHandle<()>>,
 }
 
-/// Shows on stderr that work is going on, once it has lasted a second; never when quiet or when stderr is no terminal.
+/// Shows on stderr that work is going on, once it has lasted a second; never when quiet or when
+/// stderr is no terminal.
 pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
     if quiet || !std::io::stderr().is_terminal() {
         return Spinner { done: None, thread: None };
@@ -150,7 +156,8 @@ pub fn spinner(what: &'static str, quiet: bool) -> Spinner {
         if waiting.recv_timeout(SPINNER_DELAY) != Err(RecvTimeoutError::Timeout) {
             return;
         }
-        let spinner = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_message(what);
+        let spinner =
+            ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr()).with_message(what);
         if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
             spinner.set_style(style);
         }
@@ -169,7 +176,8 @@ const SPINNER_STEP: Duration = Duration::from_millis(100);
 impl Drop for Spinner {
     fn drop(&mut self) {
         self.done = None;
-        // The line is cleared before anything else is printed; a thread that failed has drawn nothing to clear.
+        // The line is cleared before anything else is printed; a thread that failed has drawn
+        // nothing to clear.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
@@ -177,7 +185,9 @@ impl Drop for Spinner {
 /// Columns aligned: the first to the left, the others to the right.
 pub fn table(rows: &[Vec<String>]) -> String {
     let n_columns = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0);
+    let width = |c: usize| {
+        rows.iter().filter_map(|r| r.get(c)).map(|t| t.chars().count()).max().unwrap_or(0)
+    };
     let widths: Vec<usize> = (0..n_columns).map(width).collect();
     let mut out = String::new();
     for row in rows {

@@ -3,7 +3,10 @@
 use serde_json::{Value, json};
 
 use super::args::RenderArgs;
-use super::{check_time, device_choice, load, output, refuse_existing, render_reference, say_notes, say_sizes};
+use super::{
+    check_time, device_choice, load, output, refuse_existing, render_reference, say_notes,
+    say_sizes,
+};
 use crate::error::Result;
 use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
@@ -40,7 +43,8 @@ pub fn run(args: &RenderArgs) -> Result<()> {
     if args.options.verbose {
         say_sizes(&stage.scene, Some(&stage));
         for pass in Pass::ALL {
-            let time = pass_ms(&rendered, pass).map_or(String::from("-"), |ms| format!("{ms:.3} ms"));
+            let time =
+                pass_ms(&rendered, pass).map_or(String::from("-"), |ms| format!("{ms:.3} ms"));
             eprintln!("  {:9} {time:>12}  {}", pass.name(), rendered.plan.decision(pass).reason);
         }
     }

@@ -27,26 +27,40 @@ pub fn run(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) ->
         say_sizes(scene, None);
     }
     match reference {
-        Against::Thin if args.samples == 1 => centered(args, reference, Drawing::Thin, scene, time_s),
-        Against::Volume if args.samples == 1 => centered(args, reference, Drawing::Volume, scene, time_s),
+        Against::Thin if args.samples == 1 => {
+            centered(args, reference, Drawing::Thin, scene, time_s)
+        }
+        Against::Volume if args.samples == 1 => {
+            centered(args, reference, Drawing::Volume, scene, time_s)
+        }
         _ => sampled(args, reference, scene, time_s),
     }
 }
 
 /// Of one sample, and what of the drawing there is to be said.
-fn centered(args: &RenderArgs, reference: Against, drawing: Drawing, scene: &Scene, time_s: f64) -> Result<()> {
+fn centered(
+    args: &RenderArgs,
+    reference: Against,
+    drawing: Drawing,
+    scene: &Scene,
+    time_s: f64,
+) -> Result<()> {
     let shown = Progress::new(args.options.quiet);
     let Picture { rgba, error, brightest, n_particles, cut } =
         picture(scene, time_s, drawing, &|work, n| shown.hear(work, n))?;
     drop(shown);
     if let Some(error) = error.filter(|_| args.options.verbose) {
-        eprintln!("error of the integral: at most about {error:.1e}; the brightest particle has {brightest:.3e}");
+        eprintln!(
+            "error of the integral: at most about {error:.1e}; the brightest particle has \
+             {brightest:.3e}"
+        );
     }
     let share = (drawing == Drawing::Thin).then(|| cut.share());
     if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_some()) {
         let n = cut.n_layers;
         eprintln!(
-            "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most {share:.1e} of the radiances"
+            "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most \
+             {share:.1e} of the radiances"
         );
     }
     let more = json!({
@@ -62,14 +76,19 @@ fn sampled(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) ->
     let pixels = Pixels::all(film.width, film.height);
     let shown = Progress::new(args.options.quiet);
     let subject = Subject { of: reference, scene, time_s };
-    let sums = samples::sums(&subject, &pixels, 0..args.samples, &never, &|work, n| shown.hear(work, n))?;
+    let sums =
+        samples::sums(&subject, &pixels, 0..args.samples, &never, &|work, n| shown.hear(work, n))?;
     drop(shown);
     let mean = sums.mean();
     let accuracy = reference.accuracy_of(scene, args.samples);
     if args.options.verbose {
-        eprintln!("off by about {:.1e} (root mean square of the pixels' estimates; {accuracy})", mean.own_error);
+        eprintln!(
+            "off by about {:.1e} (root mean square of the pixels' estimates; {accuracy})",
+            mean.own_error
+        );
     }
-    let more = json!({ "samples": args.samples, "own_error": mean.own_error, "accuracy": accuracy });
+    let more =
+        json!({ "samples": args.samples, "own_error": mean.own_error, "accuracy": accuracy });
     write((args, reference), scene, time_s, &mean.rgba, more)
 }
 
@@ -147,7 +166,8 @@ impl Shown {
             };
             // The line is cleared before another is drawn on it.
             *self = Shown::Nothing;
-            *self = Shown::Bar { work, n_left: n, bar: output::late_progress(n as u64, what, quiet) };
+            *self =
+                Shown::Bar { work, n_left: n, bar: output::late_progress(n as u64, what, quiet) };
         }
         if let Shown::Bar { n_left, bar, .. } = self {
             bar.advance();

@@ -10,10 +10,15 @@ use crate::study::report::{self, source};
 
 pub fn run(args: &ReportArgs) -> Result<()> {
     // All that can be known to be wrong is said before any work.
-    let is_html =
-        args.output.extension().is_some_and(|e| e.eq_ignore_ascii_case("html") || e.eq_ignore_ascii_case("htm"));
+    let is_html = args
+        .output
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("html") || e.eq_ignore_ascii_case("htm"));
     if !is_html {
-        return Err(Error::usage(format!("{}: expected a file name that ends in .html", args.output.display())));
+        return Err(Error::usage(format!(
+            "{}: expected a file name that ends in .html",
+            args.output.display()
+        )));
     }
     refuse_existing(&args.output, args.force)?;
     atomic::check_place(&args.output)?;

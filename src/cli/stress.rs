@@ -75,20 +75,23 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
 /// The cases whose names begin with what was typed; all where nothing was.
 fn chosen(names: &[String]) -> Result<Vec<Case>> {
     let all = cases();
-    if let Some(unknown) =
-        names.iter().find(|name| name.is_empty() || !all.iter().any(|c| c.name.starts_with(name.as_str())))
+    if let Some(unknown) = names
+        .iter()
+        .find(|name| name.is_empty() || !all.iter().any(|c| c.name.starts_with(name.as_str())))
     {
         let mut families: Vec<&str> = all.iter().map(Case::family).collect();
         families.dedup();
         return Err(Error::usage(format!(
-            "no case begins with \"{unknown}\"; expected one of `nimbus stress --list`, or a family: {}",
+            "no case begins with \"{unknown}\"; expected one of `nimbus stress --list`, or \
+             a family: {}",
             families.join(", ")
         )));
     }
     // A whole name is that case alone, though others may begin with it.
     let is_whole = |name: &String| all.iter().any(|c| c.name == name);
-    let is_meant =
-        |c: &Case| names.iter().any(|n| if is_whole(n) { c.name == n } else { c.name.starts_with(n.as_str()) });
+    let is_meant = |c: &Case| {
+        names.iter().any(|n| if is_whole(n) { c.name == n } else { c.name.starts_with(n.as_str()) })
+    };
     Ok(all.iter().copied().filter(|c| names.is_empty() || is_meant(c)).collect())
 }
 
@@ -128,7 +131,8 @@ fn row(o: &Outcome) -> CsvRow<'_> {
 /// What is printed for people.
 fn text(report: &Report) -> String {
     let head =
-        ["case", "verdict", "compared", "device", "reference", "error", "bound", "error/bound"].map(str::to_owned);
+        ["case", "verdict", "compared", "device", "reference", "error", "bound", "error/bound"]
+            .map(str::to_owned);
     let number = |v: f64| if v == 0.0 { "0".to_owned() } else { format!("{v:.3e}") };
     let of = |o: &Outcome| {
         let worst = o.worst.as_ref().map(|w| {
@@ -138,18 +142,24 @@ fn text(report: &Report) -> String {
         let worst = worst.unwrap_or([const { String::new() }; 5]);
         [vec![o.name.clone(), word(o.verdict).to_owned(), o.n.to_string()], worst.to_vec()].concat()
     };
-    let rows: Vec<Vec<String>> = std::iter::once(head.to_vec()).chain(report.cases.iter().map(of)).collect();
+    let rows: Vec<Vec<String>> =
+        std::iter::once(head.to_vec()).chain(report.cases.iter().map(of)).collect();
     let count = |verdict: Verdict| report.cases.iter().filter(|o| o.verdict == verdict).count();
-    let mut out = format!("{} ({}), {}\n\n", report.device.name, report.device.driver, report.cpu.model);
+    let mut out =
+        format!("{} ({}), {}\n\n", report.device.name, report.device.driver, report.cpu.model);
     out += &output::table(&rows);
     for o in report.cases.iter().filter(|o| o.verdict != Verdict::Passed || o.remark.is_some()) {
         let beyond = match (&o.worst, o.verdict) {
-            (Some(w), Verdict::Failed) => format!("{} of {} out of bound; at {}", o.n_beyond, o.n, w.at),
+            (Some(w), Verdict::Failed) => {
+                format!("{} of {} out of bound; at {}", o.n_beyond, o.n, w.at)
+            }
             (None, Verdict::Failed) => "nothing was compared".to_owned(),
             _ => String::new(),
         };
-        let words: Vec<&str> =
-            [beyond.as_str(), o.remark.as_deref().unwrap_or("")].into_iter().filter(|w| !w.is_empty()).collect();
+        let words: Vec<&str> = [beyond.as_str(), o.remark.as_deref().unwrap_or("")]
+            .into_iter()
+            .filter(|w| !w.is_empty())
+            .collect();
         out += &format!("\n{}: {}", o.name, words.join("; "));
     }
     let seconds: f64 = report.cases.iter().map(|o| o.seconds).sum();
@@ -183,5 +193,7 @@ fn judged(cases: &[Outcome]) -> Result<()> {
     if bad.is_empty() {
         return Ok(());
     }
-    Err(Error::Check { what: format!("{} of {} cases failed: {}", bad.len(), cases.len(), bad.join(", ")) })
+    Err(Error::Check {
+        what: format!("{} of {} cases failed: {}", bad.len(), cases.len(), bad.join(", ")),
+    })
 }

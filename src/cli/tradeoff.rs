@@ -38,7 +38,12 @@ use crate::study::tradeoff::run::{Event, Found, Loaded, Setup, StudyPlan};
 use crate::study::tradeoff::turns::{BETWEEN, Time};
 
 /// `graceful`: set once there is something to keep on Ctrl-C.
-pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
+pub fn run(
+    args: &ErrorArgs,
+    color: ColorChoice,
+    stop: &AtomicBool,
+    graceful: &AtomicBool,
+) -> Result<()> {
     if let (Some(out), false) = (&args.out, args.resume) {
         super::refuse_existing(out, args.force)?;
     }
@@ -52,7 +57,8 @@ pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &A
     check_values(args, &options, &axes, &film)?;
     let bed = Bed::open(&device_choice(&args.options))?;
     limits::check(scene, bed.device.limits())?;
-    let clocks = machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
+    let clocks =
+        machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
     if args.options.verbose {
         say_sizes(scene, None);
     }
@@ -74,17 +80,27 @@ pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &A
             files::remove_earlier(out)?;
         }
         write_spread(&out.join("reference.png"), &film, &pixels, &kept.reference.rgba)?;
-        // However early it is ended, the folder holds a study that can be gone on with, and no earlier one's.
+        // However early it is ended, the folder holds a study that can be gone on with, and no
+        // earlier one's.
         files::write(out, &Study { interrupted: true, ..study.clone() }, &found)?;
     }
     graceful.store(true, Ordering::Relaxed);
-    let frames = Frames { i_frame: args.frame, time_s, n_frames: args.frames, as_played: args.as_played };
+    let frames =
+        Frames { i_frame: args.frame, time_s, n_frames: args.frames, as_played: args.as_played };
     let mut players = Players::new(&bed, frames);
     let loader = |settings: &[Setting]| load_with(args, &options, settings);
-    let setup = Setup { plan: &plan, load: &loader, reference: &kept.reference, pixels: &pixels, stop };
+    let setup =
+        Setup { plan: &plan, load: &loader, reference: &kept.reference, pixels: &pixels, stop };
     let bar = output::progress(0, "configurations", args.options.quiet);
     let done = {
-        let mut keeping = Keeping { args, study: &mut study, film: &film, pixels: &pixels, kept: &kept, bar: &bar };
+        let mut keeping = Keeping {
+            args,
+            study: &mut study,
+            film: &film,
+            pixels: &pixels,
+            kept: &kept,
+            bar: &bar,
+        };
         setup.run(&mut players, &mut found, &mut |event| keeping.on(event))
     };
     bar.finish_and_clear();
@@ -102,7 +118,12 @@ pub fn run(args: &ErrorArgs, color: ColorChoice, stop: &AtomicBool, graceful: &A
 }
 
 /// A study that has found nothing yet.
-fn begun(args: &ErrorArgs, made: Provenance, reference: ReferenceRecord, plan: &StudyPlan) -> Study {
+fn begun(
+    args: &ErrorArgs,
+    made: Provenance,
+    reference: ReferenceRecord,
+    plan: &StudyPlan,
+) -> Study {
     Study {
         made,
         reference,
@@ -131,11 +152,15 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
         return Ok(());
     }
     let chart = plot::tradeoff::chart(study);
-    output::text(&format!("\n{}", chart.text(output::columns(), chart.rows(), output::colored(color))?))
+    output::text(&format!(
+        "\n{}",
+        chart.text(output::columns(), chart.rows(), output::colored(color))?
+    ))
 }
 
-/// Names of the configurations that a study is asked for, without the scene as it stands, in the order that `--part`
-/// counts by; and what each makes work of, the scene as it stands being timed beside them.
+/// Names of the configurations that a study is asked for, without the scene as it stands, in the
+/// order that `--part` counts by; and what each makes work of, the scene as it stands being timed
+/// beside them.
 pub(super) fn configurations(args: &ErrorArgs) -> Result<(Vec<String>, Amounts)> {
     let options = plain(args)?;
     let scene = load(&args.scene, &options)?.at_frame(args.frame);
@@ -196,7 +221,9 @@ fn axes(args: &ErrorArgs, scene: &Scene) -> Result<Vec<Axis>> {
         }
         let table = key.split('.').next().unwrap_or_default().trim();
         if key.starts_with("draw.impostor") {
-            return refuse("a frame alone, as it is compared, is drawn without; bench --sweep times them");
+            return refuse(
+                "a frame alone, as it is compared, is drawn without; bench --sweep times them",
+            );
         }
         const ASKED_FOR: [&str; 8] = [
             "film.background",
@@ -209,19 +236,29 @@ fn axes(args: &ErrorArgs, scene: &Scene) -> Result<Vec<Axis>> {
             "draw",
         ];
         if ASKED_FOR.contains(&key.as_str()) || ["light", "material"].contains(&table) {
-            return refuse("changes what is asked for, or nothing that is compared, and not how it is computed");
+            return refuse(
+                "changes what is asked for, or nothing that is compared, and not how \
+                 it is computed",
+            );
         }
         if ["title", "time", "threads", "camera", "phase"].contains(&table) {
             return refuse(
-                "changes no picture, or which picture it is; expected a key of film, lighting, draw, cloud or surface",
+                "changes no picture, or which picture it is; expected a key of film, lighting, \
+                 draw, cloud or surface",
             );
         }
     }
     Ok(axes)
 }
 
-/// Refuses a value that the scene cannot have, before anything takes time and before anything is written.
-fn check_values(args: &ErrorArgs, options: &super::SceneArgs, axes: &[Axis], film: &Film) -> Result<()> {
+/// Refuses a value that the scene cannot have, before anything takes time and before anything is
+/// written.
+fn check_values(
+    args: &ErrorArgs,
+    options: &super::SceneArgs,
+    axes: &[Axis],
+    film: &Film,
+) -> Result<()> {
     // Those that nobody named are checked when they are run.
     let named = if args.knob.is_empty() { &[] } else { axes };
     settings(named, Design::Alone).iter().try_for_each(|alone| {
@@ -240,7 +277,9 @@ fn load_with(args: &ErrorArgs, options: &super::SceneArgs, settings: &[Setting])
     with.set.extend(overrides.iter().cloned());
     let loaded = load(&args.scene, &with).map_err(|error| match error {
         Error::Scene { mut at, what } => {
-            if let Some(set) = at.source.strip_prefix("--set ").filter(|set| overrides.iter().any(|o| o == set)) {
+            if let Some(set) =
+                at.source.strip_prefix("--set ").filter(|set| overrides.iter().any(|o| o == set))
+            {
                 at.source = format!("--knob {set}");
             }
             Error::Scene { at, what }
@@ -248,7 +287,8 @@ fn load_with(args: &ErrorArgs, options: &super::SceneArgs, settings: &[Setting])
         other => other,
     })?;
     let hash = loaded.hash.clone();
-    // What "auto" would take may differ from one to the next, and they would differ in more than their names.
+    // What "auto" would take may differ from one to the next, and they would differ in more than
+    // their names.
     Ok(Loaded { scene: Arc::new(loaded.at_frame(args.frame).exact().into_owned()), hash })
 }
 
@@ -259,12 +299,14 @@ fn reference(args: &ErrorArgs, scene: &Scene, time_s: f64, pixels: &Pixels) -> R
         shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
     };
     let folder = kept::default_folder();
-    kept::reference(args.against, scene, time_s, pixels, folder.as_deref(), &on_part).map_err(|error| match error {
-        Error::Usage { what } if what.contains("textured") => {
-            Error::usage(format!("{what}, or --plain for all clouds, or --against thin"))
-        }
-        other => other,
-    })
+    kept::reference(args.against, scene, time_s, pixels, folder.as_deref(), &on_part).map_err(
+        |error| match error {
+            Error::Usage { what } if what.contains("textured") => {
+                Error::usage(format!("{what}, or --plain for all clouds, or --against thin"))
+            }
+            other => other,
+        },
+    )
 }
 
 fn metric(arg: MetricArg) -> Metric {
@@ -296,7 +338,11 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
     let same = [
         ("the scene", before.made.scene_hash == study.made.scene_hash),
         ("the reference", before.reference.hash == study.reference.hash),
-        ("the device", before.made.device == study.made.device && before.made.environment == study.made.environment),
+        (
+            "the device",
+            before.made.device == study.made.device
+                && before.made.environment == study.made.environment,
+        ),
         ("the build", before.made.code == study.made.code),
         ("the time that decides", before.time == study.time),
         ("--frames", before.frames == study.frames),
@@ -305,7 +351,8 @@ fn earlier(args: &ErrorArgs, study: &Study) -> Result<Found> {
         // What is in such a folder may have changed.
         ("--shaders", !before.own_shaders && !study.own_shaders),
     ];
-    let differ: BTreeSet<&str> = same.iter().filter(|(_, same)| !same).map(|(what, _)| *what).collect();
+    let differ: BTreeSet<&str> =
+        same.iter().filter(|(_, same)| !same).map(|(what, _)| *what).collect();
     if !differ.is_empty() {
         let what = differ.into_iter().collect::<Vec<_>>().join(", ");
         return Err(Error::io(out, format!("is of another study; what differs: {what}")));
@@ -319,7 +366,8 @@ fn sum_up(args: &ErrorArgs, study: &mut Study, found: &Found, metric: Metric, ti
     let is_gpu = time == Time::Gpu;
     let all = &study.configurations;
     let by_ms = args.budget_ms.iter().map(|ms| best_within_ms(all, metric, *ms, is_gpu));
-    let by_error = args.budget_error.iter().map(|error| best_within_error(all, metric, *error, is_gpu));
+    let by_error =
+        args.budget_error.iter().map(|error| best_within_error(all, metric, *error, is_gpu));
     study.best = by_ms.chain(by_error).collect();
 }
 
@@ -357,7 +405,13 @@ impl Keeping<'_> {
     }
 
     /// The picture, and how far each of its pixels is from the reference's.
-    fn write_picture(&self, out: &Path, i: usize, rgba: &[f32], configuration: &mut Configuration) -> Result<()> {
+    fn write_picture(
+        &self,
+        out: &Path,
+        i: usize,
+        rgba: &[f32],
+        configuration: &mut Configuration,
+    ) -> Result<()> {
         let (Film { width, height, .. }, pixels) = (*self.film, self.pixels);
         let [picture, map] = [format!("picture-{i}.png"), format!("error-{i}.png")];
         image::write(&out.join(&picture), self.film, width, height, rgba)?;
@@ -367,7 +421,12 @@ impl Keeping<'_> {
             (0.25 * sum).sqrt()
         };
         let errors: Vec<f64> = self.kept.reference.rgba.iter().enumerate().map(of).collect();
-        image::write_bytes(&out.join(&map), width, height, &error_map(width, height, &pixels.spread(&errors)))?;
+        image::write_bytes(
+            &out.join(&map),
+            width,
+            height,
+            &error_map(width, height, &pixels.spread(&errors)),
+        )?;
         (configuration.picture, configuration.error_map) = (Some(picture), Some(map));
         Ok(())
     }

@@ -8,7 +8,10 @@ use crate::study::tradeoff::records::{Best, Configuration, Front, Study};
 /// The whole of it.
 pub fn report(study: &Study) -> String {
     let made = &study.made;
-    let mut out = format!("{}\n{} ({}), {}\n", made.scene_file, made.device.name, made.device.driver, made.cpu.model);
+    let mut out = format!(
+        "{}\n{} ({}), {}\n",
+        made.scene_file, made.device.name, made.device.driver, made.cpu.model
+    );
     out += &reference_line(&study.reference);
     out += &format!(
         "{} configurations in {} rounds of {} frames{}\n\n",
@@ -31,11 +34,16 @@ pub fn report(study: &Study) -> String {
 
 fn reference_line(r: &ReferenceRecord) -> String {
     let n_all = u64::from(r.width) * u64::from(r.height);
-    let of = if r.n_pixels as u64 == n_all { format!("all {n_all}") } else { format!("{} of {n_all}", r.n_pixels) };
+    let of = if r.n_pixels as u64 == n_all {
+        format!("all {n_all}")
+    } else {
+        format!("{} of {n_all}", r.n_pixels)
+    };
     let own = r.own_error.map_or("unbounded".to_owned(), |e| format!("{e:.1e}"));
     let source = if r.from_cache { "kept from an earlier run" } else { "computed now" };
     format!(
-        "against {} at {of} pixels of frame {}: RMS {:.3}, itself off by about {own} ({}); {:.1} s, {source}\n",
+        "against {} at {of} pixels of frame {}: RMS {:.3}, itself off by about {own} ({}); {:.1} \
+         s, {source}\n",
         r.against, r.frame, r.magnitude, r.accuracy, r.seconds
     )
 }
@@ -73,7 +81,8 @@ fn rows(study: &Study) -> Vec<Vec<String>> {
         let [rmse, rmse_interval] = figure(c.error.map(|e| e.rmse), small);
         let unresolved = c.error.is_some_and(|e| !e.is_resolved);
         let rmse = if unresolved { format!("!{rmse}") } else { rmse };
-        let [max, relmse] = [c.error.map(|e| e.max), c.error.map(|e| e.relmse)].map(|v| v.map_or("-".into(), small));
+        let [max, relmse] = [c.error.map(|e| e.max), c.error.map(|e| e.relmse)]
+            .map(|v| v.map_or("-".into(), small));
         rows.push(vec![
             mark.into(),
             c.name.clone(),
@@ -93,7 +102,9 @@ fn rows(study: &Study) -> Vec<Vec<String>> {
 /// A value and its interval.
 fn figure(figure: Option<Figure>, text: impl Fn(f64) -> String) -> [String; 2] {
     let Some(Figure { value, low, high }) = figure else { return ["-".into(), "-".into()] };
-    let interval = low.zip(high).map_or("-".to_owned(), |(low, high)| format!("{} to {}", text(low), text(high)));
+    let interval = low
+        .zip(high)
+        .map_or("-".to_owned(), |(low, high)| format!("{} to {}", text(low), text(high)));
     [text(value), interval]
 }
 
@@ -114,7 +125,10 @@ fn best_line(study: &Study, best: &Best) -> String {
         return format!("within {within}: none of them\n");
     };
     let time = if study.time == "gpu" { c.gpu_ms } else { c.frame_ms };
-    let metric = Metric::NAMES.iter().find(|(name, _)| *name == study.metric).map_or(Metric::Rmse, |(_, m)| *m);
+    let metric = Metric::NAMES
+        .iter()
+        .find(|(name, _)| *name == study.metric)
+        .map_or(Metric::Rmse, |(_, m)| *m);
     let [ms, ms_interval] = figure(time, ms);
     let [error, error_interval] = figure(metric.of(c), small);
     format!(

@@ -18,7 +18,8 @@ use crate::viewer::window::{self, Ended, Options};
 pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
     let (loaded, files) = load_and_name(&args.scene, &args.options)?;
     let first = Arc::new(loaded.scene);
-    let (typed, shaders) = ((overrides(&args.options), args.options.seed), args.options.shaders.as_deref());
+    let (typed, shaders) =
+        ((overrides(&args.options), args.options.seed), args.options.shaders.as_deref());
     if !args.options.quiet {
         eprint!("{}", help());
     }
@@ -42,12 +43,14 @@ pub fn run(args: &ViewArgs, stop: &'static AtomicBool) -> Result<()> {
         let panels = Summary::of(&panels_ms).map(|s| numbers(&s));
         return output::text(&format!("{:#}\n", json!({ "loops": rows, "panels": panels })));
     }
-    let mut table = vec![["loop", "panels", "n", "p50 ms", "p95", "p99", "max"].map(str::to_owned).to_vec()];
+    let mut table =
+        vec![["loop", "panels", "n", "p50 ms", "p95", "p99", "max"].map(str::to_owned).to_vec()];
     table.extend(loops.iter().map(|t| {
         let s = &t.frame_ms;
         let times = [s.p50, s.p95, s.p99, s.max].map(|ms| format!("{ms:.3}"));
         let panels = if t.has_panels { "shown" } else { "hidden" };
-        [vec![t.threading.name().to_owned(), panels.to_owned(), s.n.to_string()], times.to_vec()].concat()
+        [vec![t.threading.name().to_owned(), panels.to_owned(), s.n.to_string()], times.to_vec()]
+            .concat()
     }));
     output::text(&output::table(&table))
 }

@@ -23,7 +23,8 @@ pub fn run(args: &WeatherArgs) -> Result<()> {
         progress.advance();
     }
     drop(progress);
-    let mut found = Found { about: about(&file, &args.file.display().to_string()), steps: of_steps };
+    let mut found =
+        Found { about: about(&file, &args.file.display().to_string()), steps: of_steps };
     found.about.notes.extend(notes(&found.steps));
     if args.json {
         return output::object(&found);
@@ -90,7 +91,8 @@ struct StepRow {
     sun_elevation_deg: Option<f64>,
     sun_azimuth_deg: Option<f64>,
     clouds: CloudRow,
-    /// Least and greatest height of the ground; none where the file does not say, or says what is none.
+    /// Least and greatest height of the ground; none where the file does not say, or says what is
+    /// none.
     ground_m: Option<[f64; 2]>,
     /// What is wrong with it.
     #[serde(skip)]
@@ -141,7 +143,11 @@ fn about(file: &WeatherFile, name: &str) -> About {
             nz: file.shape.nz,
             dx_m: file.spacing_m.0,
             dy_m: file.spacing_m.1,
-            projection: plain(projection.unwrap_or(if file.is_idealised { "none" } else { "unknown" })),
+            projection: plain(projection.unwrap_or(if file.is_idealised {
+                "none"
+            } else {
+                "unknown"
+            })),
             idealised: file.is_idealised,
         },
         n_steps: file.n_steps,
@@ -165,14 +171,18 @@ fn variable_row(v: &Variable) -> VariableRow {
 
 /// What a file says, short and without characters that a terminal would obey.
 fn plain(text: &str) -> String {
-    text.chars().take(80).flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] }).collect()
+    text.chars()
+        .take(80)
+        .flat_map(|c| if c.is_control() { c.escape_default().collect() } else { vec![c] })
+        .collect()
 }
 
 fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
     let step = file.step(i_step)?;
     let ground = file.terrain(i_step);
     let time_s = file.times_s.as_ref().map(|times| times[i_step]);
-    let toward = time_s.zip(step.middle).map(|(time_s, (north, east))| sun::toward(time_s, north, east));
+    let toward =
+        time_s.zip(step.middle).map(|(time_s, (north, east))| sun::toward(time_s, north, east));
     Ok(StepRow {
         step: i_step,
         time: time_s.map(steps::format),
@@ -181,7 +191,11 @@ fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
         sun_elevation_deg: toward.map(|d| d.y.asin().to_degrees()),
         sun_azimuth_deg: toward.map(|d| d.x.atan2(-d.z).to_degrees().rem_euclid(360.0)),
         clouds: statistics::of(&step.grid, &step.extinction).into(),
-        ground_m: ground.as_ref().ok().and_then(|found| found.as_ref()).map(|(_, heights_m)| extent(heights_m)),
+        ground_m: ground
+            .as_ref()
+            .ok()
+            .and_then(|found| found.as_ref())
+            .map(|(_, heights_m)| extent(heights_m)),
         ground_fault: ground.err().map(|e| e.to_string()),
         negative: step.oddities.n_negative,
         missing: step.oddities.n_missing,
@@ -190,12 +204,19 @@ fn step_row(file: &WeatherFile, i_step: usize) -> Result<StepRow> {
 
 /// What the steps have that their figures do not say.
 fn notes(rows: &[StepRow]) -> Vec<String> {
-    let cut = rows.iter().max_by_key(|r| r.clouds.columns_to_the_top).filter(|r| r.clouds.columns_to_the_top > 0);
+    let cut = rows
+        .iter()
+        .max_by_key(|r| r.clouds.columns_to_the_top)
+        .filter(|r| r.clouds.columns_to_the_top > 0);
     let cut = cut.map(|r| {
         let (n, step) = (r.clouds.columns_to_the_top, r.step);
-        format!("at step {step} clouds of {n} columns reach the highest level: what is above is not in the file")
+        format!(
+            "at step {step} clouds of {n} columns reach the highest level: what is above is \
+            not in the file"
+        )
     });
-    let fault = rows.iter().find_map(|r| r.ground_fault.clone()).map(|what| format!("no ground: {what}"));
+    let fault =
+        rows.iter().find_map(|r| r.ground_fault.clone()).map(|what| format!("no ground: {what}"));
     cut.into_iter().chain(fault).collect()
 }
 
@@ -205,21 +226,36 @@ fn whole(number: f64) -> String {
 }
 
 fn extent(numbers: &[f64]) -> [f64; 2] {
-    [numbers.iter().copied().fold(f64::INFINITY, f64::min), numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+    [
+        numbers.iter().copied().fold(f64::INFINITY, f64::min),
+        numbers.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+    ]
 }
 
 fn describe(found: &Found, quiet: bool) -> String {
     let (a, g) = (&found.about, &found.about.grid);
-    let mut out = format!("{}: {}, {}\n", a.file, a.container, a.title.as_deref().unwrap_or("no title"));
-    let map = if g.idealised { "idealised, no map".to_owned() } else { format!("map {}", g.projection) };
-    out += &format!("{} x {} columns of {} x {} m, {} levels; {map}\n", g.nx, g.ny, g.dx_m, g.dy_m, g.nz);
-    let source = if a.clouds == "given" { "the file's mixing ratios" } else { "relative humidity: diagnosed" };
+    let mut out =
+        format!("{}: {}, {}\n", a.file, a.container, a.title.as_deref().unwrap_or("no title"));
+    let map =
+        if g.idealised { "idealised, no map".to_owned() } else { format!("map {}", g.projection) };
+    out += &format!(
+        "{} x {} columns of {} x {} m, {} levels; {map}\n",
+        g.nx, g.ny, g.dx_m, g.dy_m, g.nz
+    );
+    let source = if a.clouds == "given" {
+        "the file's mixing ratios"
+    } else {
+        "relative humidity: diagnosed"
+    };
     out += &format!("clouds from {source}\n");
     for note in a.notes.iter().filter(|_| !quiet) {
         out += &format!("note: {note}\n");
     }
-    out +=
-        &format!("\n{}\n{}", output::table(&variables(&a.variables)), output::table(&clouds(&found.steps, a.clouds)));
+    out += &format!(
+        "\n{}\n{}",
+        output::table(&variables(&a.variables)),
+        output::table(&clouds(&found.steps, a.clouds))
+    );
     out
 }
 
@@ -274,7 +310,10 @@ fn clouds(rows: &[StepRow], source: &str) -> Vec<Vec<String>> {
             format!("{:.4}", c.mean_opacity),
             or_none(c.base_m.map(|m| format!("{m:.0}"))),
             or_none(c.top_m.map(|m| format!("{m:.0}"))),
-            or_none(r.ground_m.map(|[least, greatest]| format!("{} to {}", whole(least), whole(greatest)))),
+            or_none(
+                r.ground_m
+                    .map(|[least, greatest]| format!("{} to {}", whole(least), whole(greatest))),
+            ),
             odd,
         ]);
     }

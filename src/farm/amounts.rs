@@ -1,5 +1,5 @@
-//! What a scene's frames make work of, counted before any is drawn: all of it where everything is done anew, and what
-//! is left of it where frames leave out what they do not need.
+//! What a scene's frames make work of, counted before any is drawn: all of it where everything is
+//! done anew, and what is left of it where frames leave out what they do not need.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -44,8 +44,10 @@ impl Parts {
         let any = |passes: &[Pass]| if passes.iter().any(|pass| runs(*pass)) { 1.0 } else { 0.0 };
         Work {
             steps: 1.0,
-            particle_steps: any(&[Pass::Live, Pass::Place, Pass::Cull, Pass::Sort]) * self.n_particles,
-            cells: any(&[Pass::Grid]) * self.visits.filled + any(&[Pass::Transmit]) * self.visits.marched,
+            particle_steps: any(&[Pass::Live, Pass::Place, Pass::Cull, Pass::Sort])
+                * self.n_particles,
+            cells: any(&[Pass::Grid]) * self.visits.filled
+                + any(&[Pass::Transmit]) * self.visits.marched,
             pixel_samples: self.n_pixels + any(&[Pass::Sprites, Pass::Tiles]) * self.n_layers,
             facet_pairs: any(&[Pass::Second]) * self.facet_pairs,
             textures: 0.0,
@@ -58,7 +60,8 @@ pub fn work_of(scene: &Scene, time_s: f64) -> Result<Work> {
     Ok(Parts::of(scene, time_s)?.where_run(|_| true))
 }
 
-/// A frame that is drawn after its neighbour, leaving out what that has done; and the same where it is the first.
+/// A frame that is drawn after its neighbour, leaving out what that has done; and the same where it
+/// is the first.
 pub struct Played {
     pub next: Work,
     pub first: Work,
@@ -75,7 +78,8 @@ impl Played {
     }
 }
 
-/// What frame `i_frame` runs after its neighbour. None where that follows from what the host reads while it plays.
+/// What frame `i_frame` runs after its neighbour. None where that follows from what the host reads
+/// while it plays.
 fn plan_of(scene: &Scene, i_frame: u32) -> Result<Option<Plan>> {
     if scene.has_movers() {
         return Ok(None);
@@ -92,7 +96,8 @@ pub fn textures_of(scene: &Scene) -> Work {
     Work { textures: if scene.is_textured() { 1.0 } else { 0.0 }, ..Work::default() }
 }
 
-/// Frame by frame, of `frames`, as they are played: at some of them, each of which stands for its neighbours.
+/// Frame by frame, of `frames`, as they are played: at some of them, each of which stands for its
+/// neighbours.
 pub fn work_of_frames(loaded: &LoadedScene, frames: Range<u32>) -> Result<Vec<Work>> {
     const N_LOOKED_AT: u32 = 16;
     let n_alike = (frames.end - frames.start).div_ceil(N_LOOKED_AT).max(1);
@@ -106,7 +111,8 @@ pub fn work_of_frames(loaded: &LoadedScene, frames: Range<u32>) -> Result<Vec<Wo
     Ok(parts.concat())
 }
 
-/// What frame `i_frame` takes more where a run begins with it: textures, and all that the others need not do again.
+/// What frame `i_frame` takes more where a run begins with it: textures, and all that the others
+/// need not do again.
 pub fn work_of_beginning(loaded: &LoadedScene, i_frame: u32) -> Result<Work> {
     let scene = loaded.clone().at_frame(i_frame);
     let Played { next, first } = Played::of(&scene, i_frame)?;

@@ -1,5 +1,5 @@
-//! What was tried, where, and how it ended: a line an event, a file a node, so that no two machines write one file.
-//! Engines keep such a record as well, but a node that dies leaves none there.
+//! What was tried, where, and how it ended: a line an event, a file a node, so that no two machines
+//! write one file. Engines keep such a record as well, but a node that dies leaves none there.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -47,7 +47,8 @@ pub enum Event {
         n_new: usize,
         what: String,
     },
-    /// A result under the right name was not what it says: what was wrong with it, and where it was put.
+    /// A result under the right name was not what it says: what was wrong with it, and where it was
+    /// put.
     PutAside {
         what: String,
         to: String,
@@ -75,14 +76,15 @@ impl Log {
 
     pub fn say(&self, index: usize, key: &str, event: Event) -> Result<()> {
         let Log { node, pid, job, .. } = self.clone();
-        let attempt = Attempt { date: machine::utc_now(), index, key: key.to_owned(), node, pid, job, event };
+        let attempt =
+            Attempt { date: machine::utc_now(), index, key: key.to_owned(), node, pid, job, event };
         let line = serde_json::to_string(&attempt).unwrap_or_default();
         synced::append(&self.file, &line)
     }
 }
 
-/// All attempts of a plan, in the order of their dates. A line that was cut off by whatever ended its writer is left
-/// out.
+/// All attempts of a plan, in the order of their dates. A line that was cut off by whatever ended
+/// its writer is left out.
 pub fn read(folder: &Path) -> Result<Vec<Attempt>> {
     let folder = folder.join("attempts");
     let Ok(entries) = fs::read_dir(&folder) else { return Ok(Vec::new()) };
@@ -90,26 +92,40 @@ pub fn read(folder: &Path) -> Result<Vec<Attempt>> {
     for entry in entries {
         let path = entry.map_err(|cause| of_io(&folder, &cause))?.path();
         let text = fs::read(&path).map_err(|cause| of_io(&path, &cause))?;
-        all.extend(String::from_utf8_lossy(&text).lines().filter_map(|line| serde_json::from_str(line).ok()));
+        all.extend(
+            String::from_utf8_lossy(&text)
+                .lines()
+                .filter_map(|line| serde_json::from_str(line).ok()),
+        );
     }
     all.sort_by(|a, b| a.date.cmp(&b.date));
     Ok(all)
 }
 
-/// How often the task of the engine that this process is has just failed at shard `index` in a row, in ways that may
-/// pass and without finishing anything. What finished something ends the row, so that whoever ends by this count ends.
-/// Where this failure could not be written down those before may not have been either: then it is how often the engine
-/// began the task, with all that died.
+/// How often the task of the engine that this process is has just failed at shard `index` in a row,
+/// in ways that may pass and without finishing anything. What finished something ends the row, so
+/// that whoever ends by this count ends. Where this failure could not be written down those before
+/// may not have been either: then it is how often the engine began the task, with all that died.
 pub fn n_fruitless(folder: &Path, index: usize) -> usize {
     // What cannot be read counts as not written.
     let all = read(folder).unwrap_or_default();
-    let n_restarts = std::env::var("SLURM_RESTART_COUNT").ok().and_then(|n| n.parse::<usize>().ok()).unwrap_or(0);
+    let n_restarts = std::env::var("SLURM_RESTART_COUNT")
+        .ok()
+        .and_then(|n| n.parse::<usize>().ok())
+        .unwrap_or(0);
     fruitless(&all, index, job().as_deref(), &node(), std::process::id()).unwrap_or(n_restarts + 1)
 }
 
 /// None where the failure of this process is not there.
-fn fruitless(all: &[Attempt], index: usize, job: Option<&str>, node: &str, pid: u32) -> Option<usize> {
-    let task = |job: Option<&str>| job.map(|job| job.split(RESTART).next().unwrap_or(job).to_owned());
+fn fruitless(
+    all: &[Attempt],
+    index: usize,
+    job: Option<&str>,
+    node: &str,
+    pid: u32,
+) -> Option<usize> {
+    let task =
+        |job: Option<&str>| job.map(|job| job.split(RESTART).next().unwrap_or(job).to_owned());
     let ours = all.iter().rev().filter(|a| a.index == index && task(a.job.as_deref()) == task(job));
     let failed: Vec<(&Attempt, usize)> = ours
         .filter_map(|a| match &a.event {
@@ -118,7 +134,10 @@ fn fruitless(all: &[Attempt], index: usize, job: Option<&str>, node: &str, pid: 
         })
         .collect();
     let is_ours = |a: &Attempt| a.job.as_deref() == job && a.node == node && a.pid == pid;
-    failed.iter().any(|(a, _)| is_ours(a)).then(|| failed.iter().take_while(|(_, n_new)| *n_new == 0).count())
+    failed
+        .iter()
+        .any(|(a, _)| is_ours(a))
+        .then(|| failed.iter().take_while(|(_, n_new)| *n_new == 0).count())
 }
 
 const RESTART: &str = " restart ";
@@ -155,7 +174,12 @@ mod tests {
         let log = Log::open(dir.path()).unwrap();
         let events = [
             Event::Begun,
-            Event::Failed { seconds: 1.5, exit_code: 75, n_new: 0, what: "a \"disk\"\nis full".into() },
+            Event::Failed {
+                seconds: 1.5,
+                exit_code: 75,
+                n_new: 0,
+                what: "a \"disk\"\nis full".into(),
+            },
             Event::Done { seconds: 2.0, n_resumed: 3 },
         ];
         for event in &events {
@@ -165,7 +189,9 @@ mod tests {
         fs::write(&log.file, &text[..text.len() - 20]).unwrap();
         let found = read(dir.path()).unwrap();
         assert_eq!(found.iter().map(|a| a.event.clone()).collect::<Vec<_>>(), events[..2]);
-        assert!(found.iter().all(|a| a.index == 4 && a.key == "abc" && a.pid == std::process::id()));
+        assert!(
+            found.iter().all(|a| a.index == 4 && a.key == "abc" && a.pid == std::process::id())
+        );
     }
 
     #[test]
@@ -179,7 +205,12 @@ mod tests {
             job: Some(job.into()),
             event,
         };
-        let failed = |exit_code, n_new| Event::Failed { seconds: 1.0, exit_code, n_new, what: String::new() };
+        let failed = |exit_code, n_new| Event::Failed {
+            seconds: 1.0,
+            exit_code,
+            n_new,
+            what: String::new(),
+        };
         let mut all = vec![
             of("17_4", 1, failed(75, 0)),
             // It got somewhere, and what follows is counted anew; a node that died says nothing.

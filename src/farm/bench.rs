@@ -1,4 +1,5 @@
-//! The work of shards of a sweep: `nimbus bench --part`, in a process of its own, and all parts as one bench.
+//! The work of shards of a sweep: `nimbus bench --part`, in a process of its own, and all parts as
+//! one bench.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -39,9 +40,15 @@ pub fn measure(
     Ok(run.device)
 }
 
-/// All parts, in the order of their shards, as one bench in `out`, whose cases are called `names`; how many. Refuses,
-/// with a list of the differences, where times cannot be compared.
-pub fn merge(plan: &Plan, names: &[String], parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<usize> {
+/// All parts, in the order of their shards, as one bench in `out`, whose cases are called `names`;
+/// how many. Refuses, with a list of the differences, where times cannot be compared.
+pub fn merge(
+    plan: &Plan,
+    names: &[String],
+    parts: &[(PathBuf, Manifest)],
+    out: &Path,
+    force: bool,
+) -> Result<usize> {
     let read = |((folder, manifest), shard): (&(PathBuf, Manifest), &Shard)| {
         let name = format!("shard {} on {}", manifest.index, manifest.node);
         Part::read(folder, name, manifest.node.clone(), range(shard))
@@ -51,11 +58,18 @@ pub fn merge(plan: &Plan, names: &[String], parts: &[(PathBuf, Manifest)], out: 
     let Some(joined) = join(&all) else { return Err(Error::usage("a plan without shards")) };
     let found: Vec<String> = joined.run.cases.iter().map(records::Case::name).collect();
     if found != names {
-        let what = format!("the parts' cases ({}) are not the plan's ({})", found.join("; "), names.join("; "));
+        let what = format!(
+            "the parts' cases ({}) are not the plan's ({})",
+            found.join("; "),
+            names.join("; ")
+        );
         return Err(Error::Check { what });
     }
     prepare_out_dir(out, force)?;
-    let copies = joined.pictures.iter().map(|moved| (moved.to.clone(), parts[moved.i_part].0.join(&moved.from)));
+    let copies = joined
+        .pictures
+        .iter()
+        .map(|moved| (moved.to.clone(), parts[moved.i_part].0.join(&moved.from)));
     let beside = Beside { copies: copies.collect(), ..Beside::default() };
     write_results_with(out, &joined.run, &joined.pass_names, &joined.rows, &beside)?;
     Ok(joined.run.cases.len())

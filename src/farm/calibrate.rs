@@ -1,5 +1,5 @@
-//! What work takes on a class of devices: runs of a few frames at several sizes, timed from one end to the other as a
-//! shard is, and the cost model that is fitted to them.
+//! What work takes on a class of devices: runs of a few frames at several sizes, timed from one end
+//! to the other as a shard is, and the cost model that is fitted to them.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -49,7 +49,8 @@ pub struct Row {
     pub timed: Timed,
 }
 
-/// Sizes of the pictures, by the scene's own along each side: what grows with the pixels and what does not come apart.
+/// Sizes of the pictures, by the scene's own along each side: what grows with the pixels and what
+/// does not come apart.
 const SIZES: [f64; 3] = [0.5, 0.75, 1.0];
 
 /// How many runs [`calibrate`] makes of so many scenes.
@@ -59,7 +60,12 @@ pub fn n_runs(n_scenes: usize) -> usize {
 }
 
 /// Runs every scene with one frame and with `frames`, at every size, and fits the model.
-pub fn calibrate(scenes: &[PathBuf], set: &[String], frames: u32, how: &How<'_>) -> Result<Calibration> {
+pub fn calibrate(
+    scenes: &[PathBuf],
+    set: &[String],
+    frames: u32,
+    how: &How<'_>,
+) -> Result<Calibration> {
     let mut rows = Vec::new();
     let mut device = None;
     for scene in scenes {
@@ -93,23 +99,30 @@ struct Class {
 impl Class {
     fn words(&self) -> String {
         let Class { of, code, device, cpu, environment } = self;
-        format!("{of}, build {code}, {}, {}, environment {environment:?}", device.class(), cpu.class())
+        format!(
+            "{of}, build {code}, {}, {}, environment {environment:?}",
+            device.class(),
+            cpu.class()
+        )
     }
 }
 
-/// Fits the model to farms that are done: to every shard of which it is known what takes time in it, and that one run
-/// did from its beginning to its end.
+/// Fits the model to farms that are done: to every shard of which it is known what takes time in
+/// it, and that one run did from its beginning to its end.
 pub fn of_farms(folders: &[PathBuf]) -> Result<Calibration> {
     let (mut rows, mut class): (_, Option<Class>) = (Vec::new(), None);
     for folder in folders {
         let plan = Plan::read(folder)?;
         let (store, scene) = (Store::open(folder), plan.scene.file.display());
         for shard in &plan.shards {
-            let (Some(work), Standing::Verified(manifest)) = (shard.counted, store.standing(&plan, shard)) else {
+            let (Some(work), Standing::Verified(manifest)) =
+                (shard.counted, store.standing(&plan, shard))
+            else {
                 continue;
             };
             let Manifest { device, cpu, environment, seconds, n_resumed, .. } = *manifest;
-            let here = Class { of: plan.work.kind(), code: plan.code.clone(), device, cpu, environment };
+            let here =
+                Class { of: plan.work.kind(), code: plan.code.clone(), device, cpu, environment };
             let class = class.get_or_insert_with(|| here.clone());
             if class.words() != here.words() {
                 return Err(Error::usage(format!(
@@ -127,7 +140,9 @@ pub fn of_farms(folders: &[PathBuf]) -> Result<Calibration> {
         }
     }
     let Some(Class { of, device, cpu, environment, .. }) = class else {
-        return Err(Error::usage("no shard of these farms is done of which it is known what takes time in it"));
+        return Err(Error::usage(
+            "no shard of these farms is done of which it is known what takes time in it",
+        ));
     };
     fitted(of, rows, (device, cpu, environment))
 }
@@ -153,7 +168,13 @@ fn fitted(
 }
 
 /// A shard of `n` frames, as any farm's, in a folder that goes with it.
-fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &How<'_>) -> Result<(Row, Device)> {
+fn timed(
+    scene: &Path,
+    set: &[String],
+    [width, height]: [u32; 2],
+    n: u32,
+    how: &How<'_>,
+) -> Result<(Row, Device)> {
     let folder = Folder::new()?;
     let mut set = set.to_vec();
     set.extend([format!("film.width={width}"), format!("film.height={height}")]);
@@ -180,7 +201,11 @@ fn timed(scene: &Path, set: &[String], [width, height]: [u32; 2], n: u32, how: &
     let work = work_of_frames(&loaded, 0..n)?.into_iter().fold(begin, |sum, of| sum + of);
     let device = match Store::open(&folder.0).standing(&plan, &plan.shards[0]) {
         Standing::Verified(manifest) => manifest.device,
-        other => return Err(Error::Fault { what: format!("a shard that was just done is not there: {other:?}") }),
+        other => {
+            return Err(Error::Fault {
+                what: format!("a shard that was just done is not there: {other:?}"),
+            });
+        }
     };
     let timed = Timed { setups: 1.0, work, seconds };
     let what = format!("{}, {width}x{height}, {n} frames", scene.display());
@@ -200,12 +225,16 @@ impl Folder {
             let path = base.join(format!("nimbus-calibrate-{pid}-{k}"));
             match std::fs::create_dir(&path) {
                 Ok(()) => return Ok(Folder(path)),
-                // Somebody's of the same number: in another container, or before the machine was started again.
+                // Somebody's of the same number: in another container, or before the machine was
+                // started again.
                 Err(cause) if cause.kind() == std::io::ErrorKind::AlreadyExists => {}
                 Err(cause) => return Err(of_io(&path, &cause)),
             }
         }
-        Err(Error::io(&base, format!("{N_NAMES} folders nimbus-calibrate-{pid}-… are there already")))
+        Err(Error::io(
+            &base,
+            format!("{N_NAMES} folders nimbus-calibrate-{pid}-… are there already"),
+        ))
     }
 }
 
@@ -228,11 +257,16 @@ impl Calibration {
     }
 
     pub fn read(path: &Path) -> Result<Calibration> {
-        let wrong = |cause: &dyn std::fmt::Display| Error::io(path, format!("not a calibration of nimbus: {cause}"));
-        let read: Calibration =
-            serde_json::from_str(&read_result(path, RECORD_LIMIT)?).map_err(|cause| wrong(&cause))?;
+        let wrong = |cause: &dyn std::fmt::Display| {
+            Error::io(path, format!("not a calibration of nimbus: {cause}"))
+        };
+        let read: Calibration = serde_json::from_str(&read_result(path, RECORD_LIMIT)?)
+            .map_err(|cause| wrong(&cause))?;
         if read.schema != SCHEMA_VERSION {
-            return Err(wrong(&format!("it is of schema {}, expected {SCHEMA_VERSION}", read.schema)));
+            return Err(wrong(&format!(
+                "it is of schema {}, expected {SCHEMA_VERSION}",
+                read.schema
+            )));
         }
         read.fit.model.check().map_err(|what| wrong(&what))?;
         Ok(read)

@@ -1,5 +1,5 @@
-//! Shards that are measured: a command of nimbus with `--part`, in a process of its own, and who may put such parts
-//! together.
+//! Shards that are measured: a command of nimbus with `--part`, in a process of its own, and who
+//! may put such parts together.
 
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
@@ -13,14 +13,15 @@ use super::store::Manifest;
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 
-/// Said by job scripts of whole nodes, and by a pool of one process: nobody else's work is in the times.
+/// Said by job scripts of whole nodes, and by a pool of one process: nobody else's work is in the
+/// times.
 pub const EXCLUSIVE: &str = "NIMBUS_EXCLUSIVE";
 
 /// How often a child is looked at.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Runs `nimbus NAME` with `arguments` for the part of `shard`, results in the folder `out`. On `stop` it is asked to
-/// end.
+/// Runs `nimbus NAME` with `arguments` for the part of `shard`, results in the folder `out`. On
+/// `stop` it is asked to end.
 pub fn run(
     name: &str,
     (plan, shard, arguments): (&Plan, &Shard, &[String]),
@@ -30,7 +31,11 @@ pub fn run(
 ) -> Result<()> {
     let mut command = Command::new(program()?);
     command.arg(name).arg(&plan.scene.file).args(arguments);
-    command.arg(format!("--part={}..{}", shard.first, shard.first + shard.n)).arg("--out").arg(out).arg("--quiet");
+    command
+        .arg(format!("--part={}..{}", shard.first, shard.first + shard.n))
+        .arg("--out")
+        .arg(out)
+        .arg("--quiet");
     command.args(plan.scene.set.iter().flat_map(|set| ["--set", set]));
     command.args(plan.scene.seed.iter().map(|seed| format!("--seed={seed}")));
     command.args(choice.shaders.iter().map(|shaders| format!("--shaders={}", shaders.display())));
@@ -69,9 +74,11 @@ fn ended(name: &str, mut child: Child, stop: &AtomicBool) -> Result<()> {
     }
 }
 
-/// Refuses parts whose times cannot be compared, with a list: they `differ`, or had no node for themselves.
+/// Refuses parts whose times cannot be compared, with a list: they `differ`, or had no node for
+/// themselves.
 pub fn check_comparable(mut differ: Vec<String>, parts: &[(PathBuf, Manifest)]) -> Result<()> {
-    let shared = parts.iter().filter(|(_, manifest)| !manifest.exclusive).map(|(_, m)| m.index.to_string());
+    let shared =
+        parts.iter().filter(|(_, manifest)| !manifest.exclusive).map(|(_, m)| m.index.to_string());
     let shared: Vec<String> = shared.collect();
     if !shared.is_empty() {
         let what = "not known to have had a node for themselves";

@@ -1,5 +1,6 @@
-//! How long work takes: t = setup + d · steps + a · particles · steps + g · grid cells + b · pixels · samples +
-//! c · facet pairs + e · textures (docs/model.md §17), fitted to what a class of devices took, and how far off that is.
+//! How long work takes: t = setup + d · steps + a · particles · steps + g · grid cells + b · pixels
+//! · samples + c · facet pairs + e · textures (docs/model.md §17), fitted to what a class of
+//! devices took, and how far off that is.
 
 use std::ops::{Add, Mul};
 
@@ -8,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::nnls;
 use crate::measure::stats::{median, percentile};
 
-/// What of some work takes time, as counts; f64, since they go beyond 2⁵³ and are multiplied by shares.
+/// What of some work takes time, as counts; f64, since they go beyond 2⁵³ and are multiplied by
+/// shares.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Work {
@@ -17,15 +19,18 @@ pub struct Work {
     pub steps: f64,
     /// Particles times the steps (frames, mostly) that each is moved, sorted and drawn in.
     pub particle_steps: f64,
-    /// Cells of the density grid that particles leave mass in and that light's ways read, in all steps.
+    /// Cells of the density grid that particles leave mass in and that light's ways read, in all
+    /// steps.
     #[serde(default)]
     pub cells: f64,
-    /// Pixels times the samples taken in each: one for what lies behind, and one for every layer over it.
+    /// Pixels times the samples taken in each: one for what lies behind, and one for every layer
+    /// over it.
     pub pixel_samples: f64,
-    /// Pairs of facets between which light is exchanged, each once and once more for every rectangle that may stand
-    /// between.
+    /// Pairs of facets between which light is exchanged, each once and once more for every
+    /// rectangle that may stand between.
     pub facet_pairs: f64,
-    /// How often the textures of a scene are made: with each device that begins with it, each time that it begins anew.
+    /// How often the textures of a scene are made: with each device that begins with it, each time
+    /// that it begins anew.
     #[serde(default)]
     pub textures: f64,
 }
@@ -80,8 +85,8 @@ fn terms(setups: f64, work: &Work) -> [f64; TERMS.len()] {
     [setups, steps, particle_steps, cells, pixel_samples, facet_pairs, textures]
 }
 
-/// Seconds that one of each takes on one class of devices. None where no run of the calibration had any: nothing is
-/// known of it, and 0 would be a claim.
+/// Seconds that one of each takes on one class of devices. None where no run of the calibration had
+/// any: nothing is known of it, and 0 would be a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CostModel {
@@ -102,19 +107,25 @@ pub struct CostModel {
 }
 
 impl CostModel {
-    /// Seconds that this work takes with so many set-ups. Err where it has something of which the calibration had
-    /// nothing, or a number of it is not finite or below 0.
+    /// Seconds that this work takes with so many set-ups. Err where it has something of which the
+    /// calibration had nothing, or a number of it is not finite or below 0.
     pub fn seconds(&self, setups: f64, work: &Work) -> Result<f64, String> {
         let mut seconds = 0.0;
-        for ((amount, name), each_s) in terms(setups, work).into_iter().zip(TERMS).zip(self.each_s()) {
+        for ((amount, name), each_s) in
+            terms(setups, work).into_iter().zip(TERMS).zip(self.each_s())
+        {
             if !is_amount(amount) {
-                return Err(format!("the work has {amount} {name}, expected a finite number from 0"));
+                return Err(format!(
+                    "the work has {amount} {name}, expected a finite number from 0"
+                ));
             }
             match each_s {
                 Some(each_s) => seconds += amount * each_s,
                 None if amount == 0.0 => {}
                 None => {
-                    let calibrate = format!("expected a calibration run with some of them: {amount} are to be done");
+                    let calibrate = format!(
+                        "expected a calibration run with some of them: {amount} are to be done"
+                    );
                     return Err(format!("the cost of {name} was not measured, {calibrate}"));
                 }
             }
@@ -122,14 +133,17 @@ impl CostModel {
         Ok(seconds)
     }
 
-    /// Of a model that was read from a file: every coefficient finite and not negative, and one of them there.
+    /// Of a model that was read from a file: every coefficient finite and not negative, and one of
+    /// them there.
     pub fn check(&self) -> Result<(), String> {
         if self.each_s().iter().all(Option::is_none) {
             return Err("the cost model has no coefficient, expected one at least".into());
         }
         for (each_s, name) in self.each_s().into_iter().zip(TERMS) {
             if let Some(each_s) = each_s.filter(|each_s| !is_amount(*each_s)) {
-                return Err(format!("the cost of {name} is {each_s} s, expected a finite number from 0"));
+                return Err(format!(
+                    "the cost of {name} is {each_s} s, expected a finite number from 0"
+                ));
             }
         }
         Ok(())
@@ -148,8 +162,17 @@ impl CostModel {
     }
 
     fn of(each_s: [Option<f64>; TERMS.len()]) -> Self {
-        let [setup_s, step_s, particle_step_s, cell_s, pixel_sample_s, facet_pair_s, texture_s] = each_s;
-        CostModel { setup_s, step_s, particle_step_s, cell_s, pixel_sample_s, facet_pair_s, texture_s }
+        let [setup_s, step_s, particle_step_s, cell_s, pixel_sample_s, facet_pair_s, texture_s] =
+            each_s;
+        CostModel {
+            setup_s,
+            step_s,
+            particle_step_s,
+            cell_s,
+            pixel_sample_s,
+            facet_pair_s,
+            texture_s,
+        }
     }
 }
 
@@ -157,7 +180,8 @@ fn is_amount(value: f64) -> bool {
     value.is_finite() && value >= 0.0
 }
 
-/// A model, and how far it is off from the runs that it was made of. Errors are relative, [`relative_error`].
+/// A model, and how far it is off from the runs that it was made of. Errors are relative,
+/// [`relative_error`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fit {
@@ -166,20 +190,22 @@ pub struct Fit {
     pub n: usize,
     pub median_relative_error: f64,
     pub largest_relative_error: f64,
-    /// The median of each run's error by the model of all others, which says more of work not seen yet. None where no
-    /// run can be left out.
+    /// The median of each run's error by the model of all others, which says more of work not seen
+    /// yet. None where no run can be left out.
     pub left_out_median: Option<f64>,
-    /// Runs in that median. What only one run had, or too few for their terms, the others cannot predict.
+    /// Runs in that median. What only one run had, or too few for their terms, the others cannot
+    /// predict.
     pub n_left_out: usize,
-    /// Terms that the runs cannot tell from each other, since they grow together in all of them: the sum is right where
-    /// they go on doing so, and the share of each is not known.
+    /// Terms that the runs cannot tell from each other, since they grow together in all of them:
+    /// the sum is right where they go on doing so, and the share of each is not known.
     pub not_told_apart: Vec<String>,
 }
 
-/// Coefficients from 0 on for which the sum of squared relative errors is least: every row is divided by its seconds,
-/// because a second more matters to a run of ten and not to one of a thousand. Terms that no row has are left out, not
-/// measured. Err where a row is not one that can be (it says which and what was expected), there are fewer rows than
-/// terms, or no row has anything.
+/// Coefficients from 0 on for which the sum of squared relative errors is least: every row is
+/// divided by its seconds, because a second more matters to a run of ten and not to one of a
+/// thousand. Terms that no row has are left out, not measured. Err where a row is not one that can
+/// be (it says which and what was expected), there are fewer rows than terms, or no row has
+/// anything.
 pub fn fit(rows: &[Timed]) -> Result<Fit, String> {
     for (i, row) in rows.iter().enumerate() {
         check(row).map_err(|what| format!("run {} of the calibration: {what}", i + 1))?;
@@ -212,7 +238,11 @@ fn check(row: &Timed) -> Result<(), String> {
     if !(row.seconds.is_finite() && row.seconds > 0.0) {
         return Err(format!("{} s, expected a finite time above 0", row.seconds));
     }
-    match terms(row.setups, &row.work).into_iter().zip(TERMS).find(|(amount, _)| !is_amount(*amount)) {
+    match terms(row.setups, &row.work)
+        .into_iter()
+        .zip(TERMS)
+        .find(|(amount, _)| !is_amount(*amount))
+    {
         Some((amount, name)) => Err(format!("{amount} {name}, expected a finite number from 0")),
         None => Ok(()),
     }
@@ -221,22 +251,34 @@ fn check(row: &Timed) -> Result<(), String> {
 fn least_squares(rows: &[Timed]) -> Result<CostModel, String> {
     let (occurring, columns) = weighted_columns(rows);
     if occurring.is_empty() || rows.len() < occurring.len() {
-        let (n, some) = (rows.len(), occurring.iter().map(|term| TERMS[*term]).collect::<Vec<_>>().join(", "));
+        let (n, some) =
+            (rows.len(), occurring.iter().map(|term| TERMS[*term]).collect::<Vec<_>>().join(", "));
         return Err(match occurring.len() {
-            0 => format!("the calibration's {n} runs have nothing in them, expected some with work or set-ups"),
-            n_terms => format!("a calibration of {n} runs, expected at least {n_terms}: one for each of {some}"),
+            0 => format!(
+                "the calibration's {n} runs have nothing in them, expected some with \
+                 work or set-ups"
+            ),
+            n_terms => format!(
+                "a calibration of {n} runs, expected at least {n_terms}: one for each of {some}"
+            ),
         });
     }
     let coefficients = nnls::solve(&columns, &vec![1.0; rows.len()])?;
     let mut each_s = [None; TERMS.len()];
-    occurring.iter().zip(coefficients).for_each(|(term, coefficient)| each_s[*term] = Some(coefficient));
+    occurring
+        .iter()
+        .zip(coefficients)
+        .for_each(|(term, coefficient)| each_s[*term] = Some(coefficient));
     Ok(CostModel::of(each_s))
 }
 
 /// Which terms occur at all, and for each the amounts in all rows, over their seconds.
 fn weighted_columns(rows: &[Timed]) -> (Vec<usize>, Vec<Vec<f64>>) {
-    let column = |term: usize| rows.iter().map(|row| terms(row.setups, &row.work)[term] / row.seconds).collect();
-    let columns: Vec<(usize, Vec<f64>)> = (0..TERMS.len()).map(|term| (term, column(term))).collect();
+    let column = |term: usize| {
+        rows.iter().map(|row| terms(row.setups, &row.work)[term] / row.seconds).collect()
+    };
+    let columns: Vec<(usize, Vec<f64>)> =
+        (0..TERMS.len()).map(|term| (term, column(term))).collect();
     columns.into_iter().filter(|(_, column)| column.iter().any(|amount| *amount != 0.0)).unzip()
 }
 

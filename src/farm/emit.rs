@@ -1,6 +1,7 @@
-//! Job files for engines that start runs: Slurm, HyperQueue, Open Job Description, and one machine. All of them do the
-//! same: a task a shard, tried again where that may help, and a merge after all of them, which checks everything
-//! itself: an engine that lost a task, or says that a failed one went well, is found out there.
+//! Job files for engines that start runs: Slurm, HyperQueue, Open Job Description, and one machine.
+//! All of them do the same: a task a shard, tried again where that may help, and a merge after all
+//! of them, which checks everything itself: an engine that lost a task, or says that a failed one
+//! went well, is found out there.
 
 use std::path::Path;
 
@@ -22,7 +23,8 @@ pub struct Job<'a> {
     pub indices: &'a [usize],
     /// So often a shard, or the merge, is tried that fails in a way that may pass (exit code 75).
     pub n_tries: u32,
-    /// `#SBATCH` lines of the shards, as given; the merge has those of them that say where and for whom it runs.
+    /// `#SBATCH` lines of the shards, as given; the merge has those of them that say where and for
+    /// whom it runs.
     pub options: &'a [String],
     /// And these.
     pub merge_options: &'a [String],
@@ -34,10 +36,11 @@ pub struct Job<'a> {
 pub type JobFile = (&'static str, String, bool);
 
 impl Job<'_> {
-    /// A shard, by the array's task and an offset (arrays are shorter than plans may be), and the merge.
+    /// A shard, by the array's task and an offset (arrays are shorter than plans may be), and the
+    /// merge.
     ///
-    /// A task that fails is not queued again by Slurm itself, and one that is may run while the node that was thought
-    /// dead finishes it: both are as good.
+    /// A task that fails is not queued again by Slurm itself, and one that is may run while the
+    /// node that was thought dead finishes it: both are as good.
     pub fn slurm(&self) -> Vec<JobFile> {
         vec![("shard.sh", self.slurm_shard(), true), ("merge.sh", self.slurm_merge(), true)]
     }
@@ -48,7 +51,8 @@ impl Job<'_> {
             false => ("", String::new()),
         };
         let comment = format!(
-            "# One shard of {} a task. Submit: sbatch --array=INDICES shard.sh [OFFSET]; shard = OFFSET + index.\n",
+            "# One shard of {} a task. Submit: sbatch --array=INDICES shard.sh [OFFSET]; shard = \
+             OFFSET + index.\n",
             self.plan.display()
         );
         format!(
@@ -60,8 +64,10 @@ impl Job<'_> {
              set -u\n\
              {say_so}\
              shard=$((${{1:-0}} + SLURM_ARRAY_TASK_ID))\n\
-             # Slurm takes the node back: nimbus finishes its frame, keeps what it has and ends with 75. Some of\n\
-             # Slurm's ways tell this shell alone, others nimbus as well, which takes both for one.\n\
+             # Slurm takes the node back: nimbus finishes its frame, keeps what it has and ends \
+             with 75. Some of\n\
+             # Slurm's ways tell this shell alone, others nimbus as well, which takes both for \
+             one.\n\
              told=0 child=\n\
              trap 'told=1; [ -z \"$child\" ] || kill -TERM \"$child\" 2> /dev/null' TERM\n\
              {run} --tries {tries} &\n\
@@ -82,8 +88,12 @@ impl Job<'_> {
     }
 
     fn slurm_merge(&self) -> String {
-        let kept: Vec<String> = self.options.iter().filter(|option| is_for_all(option)).cloned().collect();
-        let may_pass = format!("[ \"$code\" -eq 75 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt {} ]", self.n_tries - 1);
+        let kept: Vec<String> =
+            self.options.iter().filter(|option| is_for_all(option)).cloned().collect();
+        let may_pass = format!(
+            "[ \"$code\" -eq 75 ] && [ \"${{SLURM_RESTART_COUNT:-0}}\" -lt {} ]",
+            self.n_tries - 1
+        );
         format!(
             "#!/bin/bash\n\
              # Submit: sbatch --dependency=afterany:ARRAY merge.sh\n\
@@ -109,7 +119,8 @@ impl Job<'_> {
              # All shards by HyperQueue, then the merge, which fails where one is missing.\n\
              set -eu\n\
              cd \"$(dirname \"$0\")\"\n\
-             hq submit --wait --name nimbus-farm --array {array} --crash-limit {tries} -- bash \"$PWD/shard.sh\"\n\
+             hq submit --wait --name nimbus-farm --array {array} --crash-limit {tries} -- \
+             bash \"$PWD/shard.sh\"\n\
              {merge}\n",
             array = ranges(self.indices),
             tries = self.n_tries,
@@ -168,7 +179,8 @@ impl Job<'_> {
         format!("{program} farm merge --plan {plan} -o {merged} --force")
     }
 
-    /// The run, again as long as it fails in a way that may pass; for engines that try nothing again.
+    /// The run, again as long as it fails in a way that may pass; for engines that try nothing
+    /// again.
     fn tried(&self, shard: &str) -> String {
         format!(
             "for try in $(seq {}); do\n    {}\n    code=$?\n    [ \"$code\" -eq 75 ] || break\n    \
@@ -180,15 +192,18 @@ impl Job<'_> {
 }
 
 fn head(name: &str, log: &str) -> String {
-    format!("#SBATCH --job-name={name}\n#SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH --output={log}\n")
+    format!(
+        "#SBATCH --job-name={name}\n#SBATCH --requeue\n#SBATCH --open-mode=append\n#SBATCH \
+         --output={log}\n"
+    )
 }
 
 fn lines(options: &[String]) -> String {
     options.iter().map(|option| format!("#SBATCH {option}\n")).collect()
 }
 
-/// Options of shards that hold for the merge as well: where it may run, and who pays. What shards need there it does
-/// not.
+/// Options of shards that hold for the merge as well: where it may run, and who pays. What shards
+/// need there it does not.
 fn is_for_all(option: &str) -> bool {
     const LONG: [&str; 4] = ["--account", "--partition", "--qos", "--reservation"];
     let option = option.trim_start();
@@ -196,12 +211,13 @@ fn is_for_all(option: &str) -> bool {
     LONG.contains(&name) || ["-A", "-p", "-q"].iter().any(|short| option.starts_with(short))
 }
 
-/// Has Slurm queue a job again, which it does with nothing that has failed. A job that is cancelled gets the same
-/// signal as one whose time is up, and could be queued again like it: its reason tells. One that Slurm itself has
-/// queued again has none, too.
+/// Has Slurm queue a job again, which it does with nothing that has failed. A job that is cancelled
+/// gets the same signal as one whose time is up, and could be queued again like it: its reason
+/// tells. One that Slurm itself has queued again has none, too.
 fn again(may_pass: &str, job: &str) -> String {
     format!(
-        "# Slurm queues nothing again that has failed. What was cancelled stays so, and what it has queued itself.\n\
+        "# Slurm queues nothing again that has failed. What was cancelled stays so, and what it \
+         has queued itself.\n\
          if {may_pass}; then\n    \
              for _ in 1 2 3 4 5 6; do\n        \
                  case $(squeue -h -o '%T %r' -j \"{job}\" || echo silent) in\n            \
@@ -244,7 +260,11 @@ mod tests {
     /// A program that writes its arguments into `log` and fails with 75 the first time.
     fn program(folder: &Path) -> std::path::PathBuf {
         let log = quoted(&folder.join("log"));
-        tool(folder, "it's a program", &format!("echo \"$@\" >> {log}\n[ \"$(wc -l < {log})\" -gt 1 ] || exit 75"))
+        tool(
+            folder,
+            "it's a program",
+            &format!("echo \"$@\" >> {log}\n[ \"$(wc -l < {log})\" -gt 1 ] || exit 75"),
+        )
     }
 
     fn bash(folder: &Path, text: &str, variables: &[(&str, &str)]) -> (Option<i32>, String) {
@@ -252,17 +272,22 @@ mod tests {
         std::fs::write(&script, text.replace("sleep", ": sleep")).unwrap();
         let mut command = Command::new("bash");
         command.arg(&script).envs(variables.iter().copied()).stdout(Stdio::null());
-        command.env("PATH", format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default()));
+        command.env(
+            "PATH",
+            format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default()),
+        );
         let code = command.status().unwrap().code();
         (code, std::fs::read_to_string(folder.join("log")).unwrap_or_default())
     }
 
-    /// Slurm tells the shell alone, or all that it runs: the program hears of it, and its code is the script's.
+    /// Slurm tells the shell alone, or all that it runs: the program hears of it, and its code is
+    /// the script's.
     #[test]
     fn a_shard_s_program_is_told_when_the_node_is_taken_back() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path();
-        let text = "trap 'sleep 0.3; echo told >> \"$0.log\"; exit 75' TERM\ntouch \"$0.up\"\nsleep 20 & wait; wait";
+        let text = "trap 'sleep 0.3; echo told >> \"$0.log\"; exit 75' \
+            TERM\ntouch \"$0.up\"\nsleep 20 & wait; wait";
         let program = tool(folder, "program", text);
         tool(folder, "squeue", "echo COMPLETING None");
         let job = Job {
@@ -278,14 +303,23 @@ mod tests {
         let script = tool(folder, "shard.sh", &job.slurm()[0].1);
         let mut command = Command::new(&script);
         command.envs([("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_JOB_ID", "17")]);
-        command.env("PATH", format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default()));
+        command.env(
+            "PATH",
+            format!("{}:{}", folder.display(), std::env::var("PATH").unwrap_or_default()),
+        );
         let mut child = command.spawn().unwrap();
         let begin = std::time::Instant::now();
         while !folder.join("program.up").exists() {
             assert!(begin.elapsed().as_secs() < 20);
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
-        assert!(Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap().success());
+        assert!(
+            Command::new("kill")
+                .args(["-TERM", &child.id().to_string()])
+                .status()
+                .unwrap()
+                .success()
+        );
         assert_eq!(child.wait().unwrap().code(), Some(75));
         assert_eq!(std::fs::read_to_string(folder.join("program.log")).unwrap(), "told\n");
     }
@@ -309,17 +343,31 @@ mod tests {
             exclusive: false,
         };
         let run = |i: u32| format!("farm run --plan {} --shard {i}\n", plan.display());
-        let merge = format!("farm merge --plan {} -o {} --force\n", plan.display(), merged.display());
+        let merge =
+            format!("farm merge --plan {} -o {} --force\n", plan.display(), merged.display());
         let clear = || std::fs::remove_file(folder.join("log")).unwrap_or(());
 
         let [(_, shard, _), (_, merging, _)] = job.slurm().try_into().unwrap();
-        assert!(shard.contains("#SBATCH --gres=gpu:1\n") && shard.contains("a plan/logs/%A_%a.log\"\n"));
-        assert!(merging.contains("merge-%j.log\"\n#SBATCH --partition=a\n#SBATCH -A me\n#SBATCH --time=5\nset -u\n"));
+        assert!(
+            shard.contains("#SBATCH --gres=gpu:1\n") && shard.contains("a plan/logs/%A_%a.log\"\n")
+        );
+        assert!(merging.contains(
+            "merge-%j.log\"\n#SBATCH --partition=a\n#SBATCH -A me\n#SBATCH --time=5\nset -u\n"
+        ));
         // What may pass is queued again, unless Slurm says that it was cancelled.
-        tool(folder, "scontrol", &format!("echo scontrol \"$@\" >> {}", quoted(&folder.join("log"))));
-        tool(folder, "squeue", "[ \"$3 $4 $5\" = '%T %r -j 17_3' ] || [ \"$5\" = 18 ] || exit 1; echo \"$SAYS\"");
+        tool(
+            folder,
+            "scontrol",
+            &format!("echo scontrol \"$@\" >> {}", quoted(&folder.join("log"))),
+        );
+        tool(
+            folder,
+            "squeue",
+            "[ \"$3 $4 $5\" = '%T %r -j 17_3' ] || [ \"$5\" = 18 ] || exit 1; echo \"$SAYS\"",
+        );
         let run_3 = format!("{} --tries 3\n", run(3).trim_end());
-        let says = |says| [("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_JOB_ID", "17"), ("SAYS", says)];
+        let says =
+            |says| [("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_JOB_ID", "17"), ("SAYS", says)];
         for state in ["RUNNING None", "COMPLETING TimeLimit"] {
             let first = (Some(75), format!("{run_3}scontrol requeue 17_3\n"));
             assert_eq!(bash(folder, &shard, &says(state)), first, "{state}");
@@ -331,9 +379,15 @@ mod tests {
             clear();
         }
         let of = [("SLURM_JOB_ID", "18"), ("SAYS", "RUNNING None"), ("SLURM_RESTART_COUNT", "1")];
-        assert_eq!(bash(folder, &merging, &of), (Some(75), format!("{merge}scontrol requeue 18\n")));
+        assert_eq!(
+            bash(folder, &merging, &of),
+            (Some(75), format!("{merge}scontrol requeue 18\n"))
+        );
         clear();
-        assert_eq!(bash(folder, &merging, &[of[0], of[1], ("SLURM_RESTART_COUNT", "2")]), (Some(75), merge.clone()));
+        assert_eq!(
+            bash(folder, &merging, &[of[0], of[1], ("SLURM_RESTART_COUNT", "2")]),
+            (Some(75), merge.clone())
+        );
         assert_eq!(bash(folder, &merging, &of), (Some(0), merge.repeat(2)));
         clear();
 
@@ -346,7 +400,8 @@ mod tests {
         let template: Value = serde_json::from_str(&template).unwrap();
         let steps = &template["steps"];
         assert_eq!(steps[0]["parameterSpace"]["taskParameterDefinitions"][0]["range"], "0,2-4,9");
-        let text = |i: usize| steps[i]["script"]["embeddedFiles"][0]["data"].as_str().unwrap().to_owned();
+        let text =
+            |i: usize| steps[i]["script"]["embeddedFiles"][0]["data"].as_str().unwrap().to_owned();
         let filled = text(0).replace("{{Task.Param.Shard}}", "9");
         assert_eq!(bash(folder, &filled, &[]), (Some(0), run(9).repeat(2)));
         assert_eq!(bash(folder, &text(1), &[]), (Some(0), run(9).repeat(2) + &merge));

@@ -20,7 +20,9 @@ pub fn draw(
     stop: &AtomicBool,
     on_frame: &dyn Fn(),
 ) -> Result<Device> {
-    let Work::Frames { format, .. } = plan.work else { return Err(Error::usage("a plan of something else")) };
+    let Work::Frames { format, .. } = plan.work else {
+        return Err(Error::usage("a plan of something else"));
+    };
     let kind = match format {
         PictureFormat::Png => ImageKind::Png,
         PictureFormat::Exr => ImageKind::Exr,
@@ -37,7 +39,9 @@ pub fn draw(
             }
             let (scene, player) = match playing.take() {
                 // Without phases it is one scene throughout.
-                Some((scene, player)) if loaded.phases.is_empty() || *scene == scene_at(loaded, i_frame) => {
+                Some((scene, player))
+                    if loaded.phases.is_empty() || *scene == scene_at(loaded, i_frame) =>
+                {
                     playing.insert((scene, player))
                 }
                 before => {
@@ -60,7 +64,8 @@ pub fn draw(
     Ok(device)
 }
 
-/// As a frame has it. What "auto" takes may differ from one node to the next, and so would the pictures.
+/// As a frame has it. What "auto" takes may differ from one node to the next, and so would the
+/// pictures.
 fn scene_at(loaded: &LoadedScene, i_frame: u32) -> Scene {
     loaded.clone().at_frame(i_frame).exact().into_owned()
 }

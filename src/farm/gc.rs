@@ -17,19 +17,28 @@ pub struct Removed {
     pub bytes: u64,
 }
 
-/// Removes unfinished folders: of shards that are done, and those in which nothing has happened for `idle`. With `all`
-/// also what was put aside. With `dry` it only says so.
-pub fn gc(folder: &Path, plan: &Plan, idle: Duration, all: bool, dry: bool) -> Result<Vec<Removed>> {
+/// Removes unfinished folders: of shards that are done, and those in which nothing has happened for
+/// `idle`. With `all` also what was put aside. With `dry` it only says so.
+pub fn gc(
+    folder: &Path,
+    plan: &Plan,
+    idle: Duration,
+    all: bool,
+    dry: bool,
+) -> Result<Vec<Removed>> {
     let store = Store::open(folder);
     let (others, mut removed) = (store.others(), Vec::new());
     for shard in &plan.shards {
         let unfinished = others.of(&shard.key, Other::Unfinished);
-        let is_done = !unfinished.is_empty() && matches!(store.standing(plan, shard), Standing::Verified(_));
+        let is_done =
+            !unfinished.is_empty() && matches!(store.standing(plan, shard), Standing::Verified(_));
         let mut paths: Vec<PathBuf> =
             unfinished.iter().filter(|path| is_done || is_idle(path, idle)).cloned().collect();
         if all {
             paths.extend(
-                [Other::Bad, Other::Differing].iter().flat_map(|kind| others.of(&shard.key, *kind).iter().cloned()),
+                [Other::Bad, Other::Differing]
+                    .iter()
+                    .flat_map(|kind| others.of(&shard.key, *kind).iter().cloned()),
             );
         }
         for path in paths {
@@ -37,7 +46,8 @@ pub fn gc(folder: &Path, plan: &Plan, idle: Duration, all: bool, dry: bool) -> R
             if !dry {
                 // What was put aside need not have been a folder.
                 let is_folder = fs::symlink_metadata(&path).is_ok_and(|about| about.is_dir());
-                let gone = if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+                let gone =
+                    if is_folder { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
                 match gone {
                     Ok(()) => {}
                     // A run has cleared it away, or still works in it: the next time.

@@ -1,5 +1,5 @@
-//! All shards' results in one folder, as one machine would have made them. Everything is verified before, and every
-//! copy after.
+//! All shards' results in one folder, as one machine would have made them. Everything is verified
+//! before, and every copy after.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,8 +15,8 @@ use super::{reference, study};
 use crate::error::{Error, Result};
 use crate::io::folder::replace_files;
 
-/// Puts the results of the plan in `folder` into `out`, frames all at once; how many. Refuses where a shard is not
-/// done. With `force` frames of an earlier merge are replaced, and go.
+/// Puts the results of the plan in `folder` into `out`, frames all at once; how many. Refuses where
+/// a shard is not done. With `force` frames of an earlier merge are replaced, and go.
 pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -> Result<usize> {
     if !force && out.symlink_metadata().is_ok() {
         return Err(Error::io(out, "exists; --force replaces it"));
@@ -33,8 +33,10 @@ pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -
     if let Work::Reference(cut) = &plan.work {
         return reference::merge(plan, cut, &parts, out);
     }
-    let parts: Vec<_> = parts.into_iter().map(|(place, manifest)| (place, manifest.files)).collect();
-    let names: Vec<&str> = parts.iter().flat_map(|(_, files)| files).map(|file| file.name.as_str()).collect();
+    let parts: Vec<_> =
+        parts.into_iter().map(|(place, manifest)| (place, manifest.files)).collect();
+    let names: Vec<&str> =
+        parts.iter().flat_map(|(_, files)| files).map(|file| file.name.as_str()).collect();
     let earlier = earlier(out);
     let gone = earlier.iter().map(String::as_str).filter(|name| !names.contains(name));
     let files: Vec<&str> = gone.chain(names.iter().copied()).collect();
@@ -42,7 +44,8 @@ pub fn merge(folder: &Path, plan: &Plan, out: &Path, force: bool, mixed: bool) -
     Ok(names.len())
 }
 
-/// Refuses frames of several devices or drivers, unless they are meant to be `mixed`: they differ in their last bits.
+/// Refuses frames of several devices or drivers, unless they are meant to be `mixed`: they differ
+/// in their last bits.
 fn check_devices(parts: &[(PathBuf, Manifest)], mixed: bool) -> Result<()> {
     let mut by_device: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for (_, Manifest { device, index, .. }) in parts {
@@ -51,8 +54,10 @@ fn check_devices(parts: &[(PathBuf, Manifest)], mixed: bool) -> Result<()> {
     if mixed || by_device.len() < 2 {
         return Ok(());
     }
-    let list: String =
-        by_device.iter().map(|(name, indices)| format!("\n  {name}: shards {}", ranges(indices))).collect();
+    let list: String = by_device
+        .iter()
+        .map(|(name, indices)| format!("\n  {name}: shards {}", ranges(indices)))
+        .collect();
     let what = "pictures of several devices are no single machine's";
     Err(Error::Check { what: format!("{what}, --mixed merges them all the same:{list}") })
 }
@@ -74,7 +79,9 @@ fn verified(plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Manifest)>> {
                 continue;
             }
             Standing::Unreadable(error) => return Err(error),
-            Standing::Broken(what) if broken.is_empty() => broken = format!(" (shard {}: {what})", shard.index),
+            Standing::Broken(what) if broken.is_empty() => {
+                broken = format!(" (shard {}: {what})", shard.index)
+            }
             Standing::Missing | Standing::Broken(_) => {}
         }
         missing.push(shard.index);
@@ -83,7 +90,11 @@ fn verified(plan: &Plan, store: &Store) -> Result<Vec<(PathBuf, Manifest)>> {
         return Ok(parts);
     }
     let (n_done, n, to_do) = (parts.len(), plan.shards.len(), ranges(&missing));
-    Err(Error::Check { what: format!("{n_done} of {n} shards are done, nothing was merged; to do: {to_do}{broken}") })
+    Err(Error::Check {
+        what: format!(
+            "{n_done} of {n} shards are done, nothing was merged; to do: {to_do}{broken}"
+        ),
+    })
 }
 
 fn copy_all(parts: &[(PathBuf, Vec<FileRecord>)], to: &Path) -> Result<()> {

@@ -1,22 +1,26 @@
-//! Least squares whose coefficients are not negative: the x ≥ 0 for which ‖A x − b‖ is least. For small dense problems.
+//! Least squares whose coefficients are not negative: the x ≥ 0 for which ‖A x − b‖ is least. For
+//! small dense problems.
 //!
-//! Lawson & Hanson 1974, "Solving Least Squares Problems", ch. 23: columns enter a passive set by the largest gradient
-//! of what is left, the passive ones are solved for without a bound, and what would become negative goes out at 0 on
-//! the way there. Each passive set is solved by Householder's QR of its columns, since the normal equations would
-//! square the condition. Columns and b are first brought to length 1, so that units don't matter.
+//! Lawson & Hanson 1974, "Solving Least Squares Problems", ch. 23: columns enter a passive set by
+//! the largest gradient of what is left, the passive ones are solved for without a bound, and what
+//! would become negative goes out at 0 on the way there. Each passive set is solved by
+//! Householder's QR of its columns, since the normal equations would square the condition. Columns
+//! and b are first brought to length 1, so that units don't matter.
 
 /// The greatest number of columns: every set of them may be visited, and there are 2⁸.
 pub const MAX_COLUMNS: usize = 8;
 
-/// The constant c of Householder's QR with m rows and k columns: its solution is the exact one of a problem whose
-/// columns and b are changed by c m k ε/2 of their lengths (Higham 2002, theorem 20.3, who leaves c open as "a small
-/// integer"). 4 is a choice; the conditions of a minimum hold within it over thousands of random problems.
+/// The constant c of Householder's QR with m rows and k columns: its solution is the exact one of a
+/// problem whose columns and b are changed by c m k ε/2 of their lengths (Higham 2002, theorem
+/// 20.3, who leaves c open as "a small integer"). 4 is a choice; the conditions of a minimum hold
+/// within it over thousands of random problems.
 const HOUSEHOLDER_CONSTANT: f64 = 4.0;
 
-/// x ≥ 0, one for every column, with ‖Σ xⱼ columnⱼ − b‖ least; its unit is b's over the column's. Where columns depend
-/// on one another many x are as good, and one of them comes out: a column that adds nothing to those taken before it
-/// has 0, as a column of zeros has. At least one finite x always exists; Err where the input is not finite, the
-/// lengths differ, there are more than [`MAX_COLUMNS`], or x itself is beyond f64.
+/// x ≥ 0, one for every column, with ‖Σ xⱼ columnⱼ − b‖ least; its unit is b's over the column's.
+/// Where columns depend on one another many x are as good, and one of them comes out: a column that
+/// adds nothing to those taken before it has 0, as a column of zeros has. At least one finite x
+/// always exists; Err where the input is not finite, the lengths differ, there are more than
+/// [`MAX_COLUMNS`], or x itself is beyond f64.
 pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Result<Vec<f64>, String> {
     check(columns, b)?;
     let scaled: Vec<Scaled> = columns.iter().map(|column| Scaled::of(column)).collect();
@@ -24,13 +28,15 @@ pub fn solve(columns: &[Vec<f64>], b: &[f64]) -> Result<Vec<f64>, String> {
     let (x, _) = Problem::new(&scaled, target.unit.clone()).solve();
     let x: Vec<f64> = x.iter().zip(&scaled).map(|(x, column)| x * target.over(column)).collect();
     match x.iter().position(|x| !x.is_finite()) {
-        Some(j) => Err(format!("least squares: the coefficient of column {j} is beyond f64, expected another unit")),
+        Some(j) => Err(format!(
+            "least squares: the coefficient of column {j} is beyond f64, expected another unit"
+        )),
         None => Ok(x),
     }
 }
 
-/// Whether each column is something that the others together cannot make, to rounding; where it is not, its
-/// coefficient is one of many that fit as well. Errors as of [`solve`].
+/// Whether each column is something that the others together cannot make, to rounding; where it is
+/// not, its coefficient is one of many that fit as well. Errors as of [`solve`].
 pub fn told_apart(columns: &[Vec<f64>]) -> Result<Vec<bool>, String> {
     let zeros = vec![0.0; columns.first().map_or(0, Vec::len)];
     check(columns, &zeros)?;
@@ -42,18 +48,28 @@ pub fn told_apart(columns: &[Vec<f64>]) -> Result<Vec<bool>, String> {
 
 fn check(columns: &[Vec<f64>], b: &[f64]) -> Result<(), String> {
     if columns.len() > MAX_COLUMNS {
-        return Err(format!("least squares: {} columns, expected at most {MAX_COLUMNS}", columns.len()));
+        return Err(format!(
+            "least squares: {} columns, expected at most {MAX_COLUMNS}",
+            columns.len()
+        ));
     }
     if let Some(column) = columns.iter().find(|column| column.len() != b.len()) {
-        return Err(format!("least squares: a column of {} rows, expected {}", column.len(), b.len()));
+        return Err(format!(
+            "least squares: a column of {} rows, expected {}",
+            column.len(),
+            b.len()
+        ));
     }
     match columns.iter().flatten().chain(b).find(|value| !value.is_finite()) {
-        Some(value) => Err(format!("least squares: {value} among the numbers, expected finite ones")),
+        Some(value) => {
+            Err(format!("least squares: {value} among the numbers, expected finite ones"))
+        }
         None => Ok(()),
     }
 }
 
-/// A list as a direction and its length, `largest` · `rest`: squares of the numbers themselves may be beyond f64.
+/// A list as a direction and its length, `largest` · `rest`: squares of the numbers themselves may
+/// be beyond f64.
 struct Scaled {
     unit: Vec<f64>,
     largest: f64,
@@ -83,14 +99,16 @@ impl Scaled {
 struct Problem<'a> {
     columns: Vec<&'a [f64]>,
     b: Vec<f64>,
-    /// What rounding alone makes of a distance or a gradient, relative to ‖b‖ + Σ ‖xⱼ columnⱼ‖. The gradient Aᵀr at the
-    /// computed x is that of the changed problem, 0, and the change: at most 2 c m k ε/2 of that sum. A column that is
-    /// no farther than this from the others' span cannot be told from one within it.
+    /// What rounding alone makes of a distance or a gradient, relative to ‖b‖ + Σ ‖xⱼ columnⱼ‖. The
+    /// gradient Aᵀr at the computed x is that of the changed problem, 0, and the change: at most 2
+    /// c m k ε/2 of that sum. A column that is no farther than this from the others' span cannot be
+    /// told from one within it.
     tolerance: f64,
 }
 
-/// A turn either ends in a set of columns that no turn ended in before, of which there are 2ᵏ − 1 beside the empty one,
-/// or refuses a column, at most k times before and after each; and the last one finds nothing to enter.
+/// A turn either ends in a set of columns that no turn ended in before, of which there are 2ᵏ − 1
+/// beside the empty one, or refuses a column, at most k times before and after each; and the last
+/// one finds nothing to enter.
 fn most_turns(n_columns: usize) -> usize {
     (n_columns + 1) << n_columns
 }
@@ -98,11 +116,16 @@ fn most_turns(n_columns: usize) -> usize {
 impl<'a> Problem<'a> {
     fn new(columns: &'a [Scaled], b: Vec<f64>) -> Self {
         let tolerance = HOUSEHOLDER_CONSTANT * (b.len() * columns.len()) as f64 * f64::EPSILON;
-        Problem { columns: columns.iter().map(|column| column.unit.as_slice()).collect(), b, tolerance }
+        Problem {
+            columns: columns.iter().map(|column| column.unit.as_slice()).collect(),
+            b,
+            tolerance,
+        }
     }
 
-    /// x and how many turns it took, at most [`most_turns`]. Without rounding ‖A x − b‖ falls from turn to turn and no
-    /// set comes twice. With it one could, so sets are remembered, and a column that leads back to one is refused.
+    /// x and how many turns it took, at most [`most_turns`]. Without rounding ‖A x − b‖ falls from
+    /// turn to turn and no set comes twice. With it one could, so sets are remembered, and a column
+    /// that leads back to one is refused.
     fn solve(&self) -> (Vec<f64>, usize) {
         let k = self.columns.len();
         let (mut x, mut passive, mut refused) = (vec![0.0; k], 0, 0);
@@ -111,9 +134,12 @@ impl<'a> Problem<'a> {
         for turn in 1..=most_turns(k) {
             let gradient = self.gradient(&x);
             let least = self.tolerance * (1.0 + x.iter().sum::<f64>());
-            let may_enter = (0..k).filter(|j| (passive | refused) >> j & 1 == 0 && gradient[*j] > least);
+            let may_enter =
+                (0..k).filter(|j| (passive | refused) >> j & 1 == 0 && gradient[*j] > least);
             // The first of equal ones: min_by keeps it.
-            let Some(j) = may_enter.min_by(|i, j| gradient[*j].total_cmp(&gradient[*i])) else { return (x, turn) };
+            let Some(j) = may_enter.min_by(|i, j| gradient[*j].total_cmp(&gradient[*i])) else {
+                return (x, turn);
+            };
             match self.enter(&x, passive, j).filter(|(_, set)| !seen[*set]) {
                 Some((next, set)) => {
                     (x, passive, refused) = (next, set, 0);
@@ -125,8 +151,9 @@ impl<'a> Problem<'a> {
         (x, most_turns(k))
     }
 
-    /// Column j joins the passive ones: the solution of what stays passive, and which those are. None where j adds
-    /// nothing to the others, or rounding alone made its gradient positive, which its own coefficient shows.
+    /// Column j joins the passive ones: the solution of what stays passive, and which those are.
+    /// None where j adds nothing to the others, or rounding alone made its gradient positive, which
+    /// its own coefficient shows.
     fn enter(&self, x: &[f64], passive: usize, j: usize) -> Option<(Vec<f64>, usize)> {
         let (mut x, mut set) = (x.to_vec(), passive | 1 << j);
         let mut free = self.least_squares(set)?;
@@ -157,8 +184,9 @@ impl<'a> Problem<'a> {
         self.columns.iter().map(|column| inner(column, &left)).collect()
     }
 
-    /// Coefficients of the set's columns without a bound, 0 for the others. None where one of them depends on those
-    /// before it. It follows from the set alone, so that the same set gives the same bits.
+    /// Coefficients of the set's columns without a bound, 0 for the others. None where one of them
+    /// depends on those before it. It follows from the set alone, so that the same set gives the
+    /// same bits.
     fn least_squares(&self, set: usize) -> Option<Vec<f64>> {
         let set: Vec<usize> = members(set).collect();
         let mut columns: Vec<Vec<f64>> = set.iter().map(|j| self.columns[*j].to_vec()).collect();
@@ -189,7 +217,9 @@ impl<'a> Problem<'a> {
 
     /// How many columns of the set none of those before them make.
     fn rank(&self, set: usize) -> u32 {
-        let join = |kept: usize, j: usize| self.least_squares(kept | 1 << j).map_or(kept, |_| kept | 1 << j);
+        let join = |kept: usize, j: usize| {
+            self.least_squares(kept | 1 << j).map_or(kept, |_| kept | 1 << j)
+        };
         members(set).fold(0, join).count_ones()
     }
 }
@@ -198,8 +228,8 @@ fn members(set: usize) -> impl Iterator<Item = usize> {
     (0..MAX_COLUMNS).filter(move |j| set >> j & 1 == 1)
 }
 
-/// On the straight way from x to `free`: which coefficient of the set is the first to be 0, and at what share of the
-/// way. None where all of `free` is above 0.
+/// On the straight way from x to `free`: which coefficient of the set is the first to be 0, and at
+/// what share of the way. None where all of `free` is above 0.
 fn first_at_zero(x: &[f64], free: &[f64], set: usize) -> Option<(usize, f64)> {
     let falling = members(set).filter(|j| free[*j] <= 0.0);
     // One that is 0 already goes out where it stands.

@@ -18,9 +18,9 @@ pub struct Packing {
     pub idle_share: f64,
 }
 
-/// Longest first, each onto the node that has least so far (of equals the earlier shard, the earlier node). Takes at
-/// most 4/3 − 1/(3N) times as long as the best packing (Graham 1969). No node at all counts as one; seconds are finite
-/// and not negative.
+/// Longest first, each onto the node that has least so far (of equals the earlier shard, the
+/// earlier node). Takes at most 4/3 − 1/(3N) times as long as the best packing (Graham 1969). No
+/// node at all counts as one; seconds are finite and not negative.
 pub fn pack(seconds: &[f64], n_nodes: usize) -> Packing {
     let n_nodes = n_nodes.max(1);
     let mut longest_first: Vec<usize> = (0..seconds.len()).collect();
@@ -28,7 +28,8 @@ pub fn pack(seconds: &[f64], n_nodes: usize) -> Packing {
     longest_first.sort_by(|i, j| seconds[*j].total_cmp(&seconds[*i]));
     let (mut nodes, mut node_seconds) = (vec![Vec::new(); n_nodes], vec![0.0; n_nodes]);
     for shard in longest_first {
-        let least = (1..n_nodes).fold(0, |least, i| if node_seconds[i] < node_seconds[least] { i } else { least });
+        let least = (1..n_nodes)
+            .fold(0, |least, i| if node_seconds[i] < node_seconds[least] { i } else { least });
         nodes[least].push(shard);
         node_seconds[least] += seconds[shard];
     }
@@ -62,26 +63,30 @@ pub struct Price {
     pub total: f64,
 }
 
-/// The share of a quantum by which a node may be over without paying for one more: a sum of n times is off by n ε/2 at
-/// most, 1e-9 for nine million shards, and three shards of a third of a quantum are one.
+/// The share of a quantum by which a node may be over without paying for one more: a sum of n times
+/// is off by n ε/2 at most, 1e-9 for nine million shards, and three shards of a third of a quantum
+/// are one.
 const QUANTUM_SLACK: f64 = 1e-9;
 
-/// A failed attempt ends, one with another, in the middle of its shard. With a constant hazard failures lie a little
-/// before that, so that this is too much rather than too little: by 2 % of what is lost at a retry share of 0.1.
+/// A failed attempt ends, one with another, in the middle of its shard. With a constant hazard
+/// failures lie a little before that, so that this is too much rather than too little: by 2 % of
+/// what is lost at a retry share of 0.1.
 const SHARE_LOST: f64 = 0.5;
 
 /// Σ over nodes of ⌈seconds / quantum⌉ · price per quantum, and what retries are expected to cost.
 ///
-/// Of those: attempts at a shard fail independently with probability p until one does not, so k of them fail with
-/// probability pᵏ (1 − p), in the mean Σ k pᵏ (1 − p) = p/(1 − p). Each loses `SHARE_LOST` of its shard's seconds,
-/// set-up included, since a shard's seconds have theirs in them; so a node of t seconds is expected to take
-/// ½ t p/(1 − p) more. These are not rounded up: where a node's last quantum ends anywhere, every place as likely,
-/// x seconds more begin x / quantum new ones in the mean. Err where the rate is not one that can be; it says what was
+/// Of those: attempts at a shard fail independently with probability p until one does not, so k of
+/// them fail with probability pᵏ (1 − p), in the mean Σ k pᵏ (1 − p) = p/(1 − p). Each loses
+/// `SHARE_LOST` of its shard's seconds, set-up included, since a shard's seconds have theirs in
+/// them; so a node of t seconds is expected to take ½ t p/(1 − p) more. These are not rounded up:
+/// where a node's last quantum ends anywhere, every place as likely, x seconds more begin x /
+/// quantum new ones in the mean. Err where the rate is not one that can be; it says what was
 /// expected.
 pub fn price(packing: &Packing, rate: &Rate) -> Result<Price, String> {
     check(rate)?;
     let in_quanta = packing.node_seconds.iter().map(|seconds| seconds / rate.quantum_s);
-    let quanta = in_quanta.map(|n| (n * (1.0 - QUANTUM_SLACK)).ceil() as u64).fold(0, u64::saturating_add);
+    let quanta =
+        in_quanta.map(|n| (n * (1.0 - QUANTUM_SLACK)).ceil() as u64).fold(0, u64::saturating_add);
     let n_failed = rate.retry_share / (1.0 - rate.retry_share);
     let lost_s = SHARE_LOST * n_failed * packing.node_seconds.iter().sum::<f64>();
     let without_retries = quanta as f64 * rate.price_per_quantum;
@@ -95,7 +100,9 @@ fn check(rate: &Rate) -> Result<(), String> {
         return Err(format!("a quantum of {quantum_s} s, expected a finite time above 0"));
     }
     if !(price_per_quantum.is_finite() && price_per_quantum >= 0.0) {
-        return Err(format!("a price of {price_per_quantum} for a quantum, expected a finite number from 0"));
+        return Err(format!(
+            "a price of {price_per_quantum} for a quantum, expected a finite number from 0"
+        ));
     }
     if !(0.0..1.0).contains(&retry_share) {
         return Err(format!("a retry share of {retry_share}, expected one from 0 and below 1"));
@@ -114,7 +121,9 @@ mod tests {
 
     /// The shortest makespan there is, by trying all: shard after shard onto every node.
     fn best_makespan(seconds: &[f64], loads: &mut [f64]) -> f64 {
-        let Some((first, rest)) = seconds.split_first() else { return loads.iter().copied().fold(0.0, f64::max) };
+        let Some((first, rest)) = seconds.split_first() else {
+            return loads.iter().copied().fold(0.0, f64::max);
+        };
         let mut best = f64::INFINITY;
         for node in 0..loads.len() {
             let before = loads[node];
@@ -136,7 +145,8 @@ mod tests {
 
     #[test]
     fn the_worst_of_two_nodes_by_hand() {
-        // Graham's own example: 3 + 2 + 2 and 3 + 2, where 3 + 3 and 2 + 2 + 2 would be 6; 7/6 = 4/3 − 1/6.
+        // Graham's own example: 3 + 2 + 2 and 3 + 2, where 3 + 3 and 2 + 2 + 2 would be 6; 7/6 =
+        // 4/3 − 1/6.
         let packing = pack(&[3.0, 3.0, 2.0, 2.0, 2.0], 2);
         assert_eq!((packing.makespan_s, packing.idle_share), (7.0, 2.0 / 14.0));
         assert_eq!(best_makespan(&[3.0, 3.0, 2.0, 2.0, 2.0], &mut [0.0; 2]), 6.0);
@@ -145,7 +155,10 @@ mod tests {
     #[test]
     fn nodes_without_shards_are_idle() {
         let packing = pack(&[6.0], 3);
-        assert_eq!((packing.nodes, packing.idle_share), (vec![vec![0], vec![], vec![]], 12.0 / 18.0));
+        assert_eq!(
+            (packing.nodes, packing.idle_share),
+            (vec![vec![0], vec![], vec![]], 12.0 / 18.0)
+        );
         let nothing = pack(&[], 2);
         assert_eq!((nothing.makespan_s, nothing.idle_share, nothing.nodes.len()), (0.0, 0.0, 2));
         assert_eq!(pack(&[1.0, 2.0], 0).nodes, [vec![1, 0]]);
@@ -159,7 +172,8 @@ mod tests {
         for i in 0..600 {
             let (n, n_nodes) = (1 + i % 8, 1 + i / 8 % 4);
             // Whole seconds, so that sums are exact and ties happen.
-            let seconds: Vec<f64> = normal(&mut random, n).iter().map(|z| (4.0 * z.exp()).ceil()).collect();
+            let seconds: Vec<f64> =
+                normal(&mut random, n).iter().map(|z| (4.0 * z.exp()).ceil()).collect();
             let packing = pack(&seconds, n_nodes);
             let mut done: Vec<usize> = packing.nodes.concat();
             done.sort_unstable();
@@ -168,7 +182,10 @@ mod tests {
                 assert_eq!(node.iter().map(|i| seconds[*i]).sum::<f64>(), *total);
             }
             let ratio = packing.makespan_s / best_makespan(&seconds, &mut vec![0.0; n_nodes]);
-            assert!(ratio <= 4.0 / 3.0 - 1.0 / (3.0 * n_nodes as f64) + 1e-12, "{ratio} for {seconds:?} on {n_nodes}");
+            assert!(
+                ratio <= 4.0 / 3.0 - 1.0 / (3.0 * n_nodes as f64) + 1e-12,
+                "{ratio} for {seconds:?} on {n_nodes}"
+            );
             worst = worst.max(ratio);
         }
         // The bound is not one that everything keeps: some packings are not the best.
@@ -183,7 +200,10 @@ mod tests {
         assert_eq!(free, Price { quanta: 4, without_retries: 2.0, retries: 0.0, total: 2.0 });
         // p = 1/2: one failed attempt a shard, half a shard each: 80.5 s of 161, 80.5/60 · 0.5.
         let half = price(&packing, &rate(60.0, 0.5, 0.5)).unwrap();
-        assert!((half.retries - 80.5 / 120.0).abs() < 1e-15 && half.total == 2.0 + half.retries, "{half:?}");
+        assert!(
+            (half.retries - 80.5 / 120.0).abs() < 1e-15 && half.total == 2.0 + half.retries,
+            "{half:?}"
+        );
         // p = 1/5: a quarter of an attempt, an eighth of the time.
         let fifth = price(&packing, &rate(60.0, 0.5, 0.2)).unwrap();
         assert!((fifth.retries - 161.0 / 8.0 / 120.0).abs() < 1e-15, "{fifth:?}");
@@ -194,8 +214,14 @@ mod tests {
         let three_tenths = pack(&[0.1; 3], 1);
         assert!(three_tenths.node_seconds[0] > 0.3);
         assert_eq!(price(&three_tenths, &rate(0.3, 1.0, 0.0)).map(|price| price.quanta), Ok(1));
-        assert_eq!(price(&pack(&[60.0, 120.0], 3), &rate(60.0, 1.0, 0.0)).map(|price| price.quanta), Ok(3));
-        assert_eq!(price(&pack(&[60.001], 1), &rate(60.0, 1.0, 0.0)).map(|price| price.quanta), Ok(2));
+        assert_eq!(
+            price(&pack(&[60.0, 120.0], 3), &rate(60.0, 1.0, 0.0)).map(|price| price.quanta),
+            Ok(3)
+        );
+        assert_eq!(
+            price(&pack(&[60.001], 1), &rate(60.0, 1.0, 0.0)).map(|price| price.quanta),
+            Ok(2)
+        );
     }
 
     #[test]
@@ -203,7 +229,8 @@ mod tests {
         for p in [0.01, 0.1, 0.3_f64] {
             let series: f64 = (1..2000).map(|k| f64::from(k) * p.powi(k) * (1.0 - p)).sum();
             assert!((series - p / (1.0 - p)).abs() < 1e-14);
-            // A constant hazard h a shard, p = 1 − e^{−h}: expected (e^h − 1)/h shards' time until one is done.
+            // A constant hazard h a shard, p = 1 − e^{−h}: expected (e^h − 1)/h shards' time until
+            // one is done.
             let hazard = -(1.0 - p).ln();
             let lost = hazard.exp_m1() / hazard - 1.0;
             let ours = price(&pack(&[1.0], 1), &rate(1.0, 1.0, p)).unwrap().retries;

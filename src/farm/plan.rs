@@ -17,7 +17,8 @@ use crate::study::machine;
 
 pub const SCHEMA_VERSION: u32 = 1;
 pub const PLAN_FILE: &str = "plan.json";
-/// Of a key's hex digits: 128 bits, so that no two of 10⁹ shards have the same by chance (10¹⁸/2¹²⁹ = 10⁻²¹).
+/// Of a key's hex digits: 128 bits, so that no two of 10⁹ shards have the same by chance (10¹⁸/2¹²⁹
+/// = 10⁻²¹).
 const KEY_DIGITS: usize = 32;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -177,8 +178,20 @@ pub struct Wish {
 impl Plan {
     /// Of what is wished for, by this build, as the files are now.
     pub fn new(wish: Wish) -> Result<Plan> {
-        let absolute = |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
-        let Wish { scene, set, seed, shaders, device, work, sizes, counted, predicted_s, predicted_for } = wish;
+        let absolute =
+            |path: &Path| std::path::absolute(path).map_err(|cause| Error::io(path, cause));
+        let Wish {
+            scene,
+            set,
+            seed,
+            shaders,
+            device,
+            work,
+            sizes,
+            counted,
+            predicted_s,
+            predicted_for,
+        } = wish;
         let mut source = SceneSource {
             file: absolute(&scene)?,
             set,
@@ -247,7 +260,9 @@ impl Plan {
         let outputs = self.outputs(shard);
         match self.work {
             Work::Frames { .. } | Work::Reference(_) => outputs.iter().eq(names),
-            Work::Error { .. } | Work::Bench { .. } => outputs.iter().all(|name| names.contains(&name.as_str())),
+            Work::Error { .. } | Work::Bench { .. } => {
+                outputs.iter().all(|name| names.contains(&name.as_str()))
+            }
         }
     }
 
@@ -258,7 +273,11 @@ impl Plan {
 
     pub fn shard(&self, index: usize) -> Result<&Shard> {
         self.shards.get(index).ok_or_else(|| {
-            Error::usage(format!("shard {index}: this plan has {}, expected 0 to {}", self.shards.len(), self.last()))
+            Error::usage(format!(
+                "shard {index}: this plan has {}, expected 0 to {}",
+                self.shards.len(),
+                self.last()
+            ))
         })
     }
 
@@ -268,12 +287,15 @@ impl Plan {
 
     /// The scene, if it is still what was planned and this is the build that planned it.
     pub fn scene_as_planned(&self) -> Result<LoadedScene> {
-        let stale = |what: String| Err(Error::usage(format!("the plan of {} is stale: {what}; plan again", self.date)));
+        let stale = |what: String| {
+            Err(Error::usage(format!("the plan of {} is stale: {what}; plan again", self.date)))
+        };
         let code = env!("NIMBUS_CODE");
         if self.code != code {
             let (theirs, ours) = (&self.revision, machine::revision());
             return stale(format!(
-                "it was made by another build of nimbus ({theirs}, code {}; this is {ours}, code {code})",
+                "it was made by another build of nimbus ({theirs}, code {}; this is {ours}, \
+                 code {code})",
                 self.code
             ));
         }
@@ -292,12 +314,16 @@ impl Plan {
     pub fn read(folder: &Path) -> Result<Plan> {
         let path = folder.join(PLAN_FILE);
         let text = read_result(&path, RECORD_LIMIT)?;
-        let wrong = |cause: &dyn std::fmt::Display| Error::io(&path, format!("not a plan of nimbus: {cause}"));
-        let value: serde_json::Value = serde_json::from_str(&text).map_err(|cause| wrong(&cause))?;
+        let wrong = |cause: &dyn std::fmt::Display| {
+            Error::io(&path, format!("not a plan of nimbus: {cause}"))
+        };
+        let value: serde_json::Value =
+            serde_json::from_str(&text).map_err(|cause| wrong(&cause))?;
         match value.get("schema").and_then(serde_json::Value::as_u64) {
             Some(version) if version == u64::from(SCHEMA_VERSION) => {}
             Some(version) => {
-                let what = format!("a plan of schema {version}; this nimbus reads {SCHEMA_VERSION}");
+                let what =
+                    format!("a plan of schema {version}; this nimbus reads {SCHEMA_VERSION}");
                 return Err(Error::io(&path, what));
             }
             None => return Err(wrong(&"it names no schema version")),
@@ -322,10 +348,15 @@ impl Plan {
                 return Err(format!("shard {i} is not what its key says"));
             }
         }
-        if next == end { Ok(()) } else { Err(format!("its shards end at {next}, its work at {end}")) }
+        if next == end {
+            Ok(())
+        } else {
+            Err(format!("its shards end at {next}, its work at {end}"))
+        }
     }
 
-    /// Writes it into `folder`, which is made where it is not there; refuses to replace another plan's.
+    /// Writes it into `folder`, which is made where it is not there; refuses to replace another
+    /// plan's.
     pub fn write(&self, folder: &Path) -> Result<()> {
         let path = folder.join(PLAN_FILE);
         let text = serde_json::to_string_pretty(self).map_err(|cause| Error::io(&path, cause))?;
@@ -351,7 +382,9 @@ pub fn output(i: u32, format: PictureFormat) -> String {
 
 /// Whether a plan of frames makes files of this name.
 pub fn is_output(name: &str) -> bool {
-    let number = name.strip_prefix("frame-").and_then(|rest| rest.strip_suffix(".png").or(rest.strip_suffix(".exr")));
+    let number = name
+        .strip_prefix("frame-")
+        .and_then(|rest| rest.strip_suffix(".png").or(rest.strip_suffix(".exr")));
     number.is_some_and(|digits| digits.len() >= 8 && digits.bytes().all(|b| b.is_ascii_digit()))
 }
 
@@ -380,9 +413,15 @@ fn check(loaded: &LoadedScene, work: &Work) -> Result<()> {
         )));
     }
     let phases = loaded.phases.iter().map(|phase| &phase.scene);
-    if std::iter::once(&loaded.scene).chain(phases).any(|scene| scene.draw.exact().impostors != Impostors::Off) {
-        let what = "a frame with impostors shows what earlier frames have drawn, and no shard has those";
-        return Err(Error::usage(format!("{what}: expected draw.impostors = \"off\" (--set draw.impostors=off)")));
+    if std::iter::once(&loaded.scene)
+        .chain(phases)
+        .any(|scene| scene.draw.exact().impostors != Impostors::Off)
+    {
+        let what =
+            "a frame with impostors shows what earlier frames have drawn, and no shard has those";
+        return Err(Error::usage(format!(
+            "{what}: expected draw.impostors = \"off\" (--set draw.impostors=off)"
+        )));
     }
     Ok(())
 }

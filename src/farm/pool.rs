@@ -1,4 +1,5 @@
-//! The engine of one machine: every shard in a process of its own, some at a time, tried again where it may go well.
+//! The engine of one machine: every shard in a process of its own, some at a time, tried again
+//! where it may go well.
 
 use std::collections::VecDeque;
 use std::os::unix::process::CommandExt;
@@ -48,9 +49,14 @@ const PAUSE: Duration = Duration::from_secs(1);
 const LOOK: Duration = Duration::from_millis(5);
 
 impl Pool<'_> {
-    /// Runs `indices`; `on_end` is told of each. On `stop`, and on an error, no more begin, and those that run are
-    /// asked to end: they keep what they have.
-    pub fn run(&self, indices: &[usize], stop: &AtomicBool, on_end: &mut dyn FnMut(&Ended)) -> Result<Vec<Ended>> {
+    /// Runs `indices`; `on_end` is told of each. On `stop`, and on an error, no more begin, and
+    /// those that run are asked to end: they keep what they have.
+    pub fn run(
+        &self,
+        indices: &[usize],
+        stop: &AtomicBool,
+        on_end: &mut dyn FnMut(&Ended),
+    ) -> Result<Vec<Ended>> {
         let now = Instant::now();
         let mut waiting: VecDeque<Waiting> =
             indices.iter().map(|i| Waiting { index: *i, n_tries: 0, from: now }).collect();
@@ -93,7 +99,8 @@ impl Pool<'_> {
         }
         let mut i = 0;
         while let Some((shard, child)) = running.get_mut(i) {
-            let Some(status) = child.try_wait().map_err(|cause| Error::io(self.program, cause))? else {
+            let Some(status) = child.try_wait().map_err(|cause| Error::io(self.program, cause))?
+            else {
                 i += 1;
                 continue;
             };
@@ -114,7 +121,11 @@ impl Pool<'_> {
 
     fn start(&self, index: usize) -> Result<Child> {
         let mut command = Command::new(self.program);
-        command.args(&self.arguments).arg(index.to_string()).stdin(Stdio::null()).stdout(Stdio::null());
+        command
+            .args(&self.arguments)
+            .arg(index.to_string())
+            .stdin(Stdio::null())
+            .stdout(Stdio::null());
         if self.exclusive {
             command.env(EXCLUSIVE, "1");
         }
@@ -127,5 +138,6 @@ impl Pool<'_> {
 /// As Ctrl-C does.
 pub(super) fn ask_to_end(child: &Child) {
     // One that has ended meanwhile is waited for all the same.
-    let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+    let _ =
+        Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
 }

@@ -1,5 +1,5 @@
-//! The work of shards of a reference picture: sums over a range of samples in a tile, and all of them as the picture
-//! that `nimbus render --reference` makes, to the byte.
+//! The work of shards of a reference picture: sums over a range of samples in a tile, and all of
+//! them as the picture that `nimbus render --reference` makes, to the byte.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -40,8 +40,8 @@ pub struct Seen {
     visits: Visits,
 }
 
-/// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k / n_ranges, tiles row by
-/// row.
+/// A picture in f64, cut into tiles, and the samples of each into ranges. Piece k has tile k /
+/// n_ranges, tiles row by row.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
@@ -75,7 +75,9 @@ impl Cut {
         }
         if self.n_pieces() > MOST_PIECES {
             let n = self.n_pieces();
-            return Err(format!("{n} pieces, expected up to {MOST_PIECES}: larger tiles, or more samples in each"));
+            return Err(format!(
+                "{n} pieces, expected up to {MOST_PIECES}: larger tiles, or more samples in each"
+            ));
         }
         Ok(())
     }
@@ -96,10 +98,15 @@ impl Cut {
     /// Its part of the picture, and which samples.
     pub fn piece(&self, k: u32) -> (Tile, Range<u32>) {
         let (i_tile, i_range) = (k / self.n_ranges(), k % self.n_ranges());
-        let (left, top) = (i_tile % self.n_columns() * self.tile[0], i_tile / self.n_columns() * self.tile[1]);
-        let (width, height) = (self.tile[0].min(self.width - left), self.tile[1].min(self.height - top));
+        let (left, top) =
+            (i_tile % self.n_columns() * self.tile[0], i_tile / self.n_columns() * self.tile[1]);
+        let (width, height) =
+            (self.tile[0].min(self.width - left), self.tile[1].min(self.height - top));
         let first = i_range * self.range;
-        (Tile { left, top, width, height }, first..self.n_samples.min(first.saturating_add(self.range)))
+        (
+            Tile { left, top, width, height },
+            first..self.n_samples.min(first.saturating_add(self.range)),
+        )
     }
 
     /// The file of piece `k`: [`Sums::bytes`] of its pixels. Names sort as the pieces do.
@@ -123,7 +130,8 @@ impl Cut {
     /// Its layers, and the cells that its light visits.
     pub fn seen(&self, loaded: &LoadedScene) -> Result<Seen> {
         let scene = loaded.clone().at_frame(self.frame);
-        // Where a blob has lost all but a thousandth of its depth; integrals end nowhere, and little is left there.
+        // Where a blob has lost all but a thousandth of its depth; integrals end nowhere, and
+        // little is left there.
         const REACH: f64 = 4.0;
         let (of, truth) = (self.against()?, Truth::unlit(&scene, scene.time.at(self.frame))?);
         let reach = if of == Against::Thin { scene.draw.cutoff } else { REACH };
@@ -142,7 +150,8 @@ impl Cut {
         let n_facets = if by_model { n_particles } else { scene.n_facets() as f64 };
         // Light comes from particles' facets, and from surfaces' areas.
         let n_emitters = n_facets + scene.surfaces.len() as f64;
-        let n_reflections = if let Against::Reflections(k) = of { k } else { reflections_of(&scene) };
+        let n_reflections =
+            if let Against::Reflections(k) = of { k } else { reflections_of(&scene) };
         let tile = |i: u32| self.piece(i * self.n_ranges()).0;
         let n_tiles = self.n_pieces() as u32 / self.n_ranges();
         let layers = &seen.layers;
@@ -150,7 +159,8 @@ impl Cut {
         let of_tiles: Vec<[f64; 2]> = (0..n_tiles).map(|i| of_tile(tile(i))).collect();
         let of_piece = |k: u32| {
             let (_, samples) = self.piece(k);
-            let (n, n_lit) = (samples.len() as f64, if n_reflections >= 3 { samples.len() as f64 } else { 1.0 });
+            let (n, n_lit) =
+                (samples.len() as f64, if n_reflections >= 3 { samples.len() as f64 } else { 1.0 });
             let [n_layers, n_solid] = of_tiles[(k / self.n_ranges()) as usize];
             let receivers = n_lit * n_facets + if by_model { n * n_solid } else { 0.0 };
             Counted {
@@ -158,7 +168,11 @@ impl Cut {
                 particle_steps: n_particles,
                 cells: seen.visits.filled + seen.visits.marched,
                 pixel_samples: n * n_layers,
-                facet_pairs: if scene.lighting.mode == LightingMode::None { 0.0 } else { receivers * n_emitters },
+                facet_pairs: if scene.lighting.mode == LightingMode::None {
+                    0.0
+                } else {
+                    receivers * n_emitters
+                },
                 // The processor makes them once, a part of the set-up.
                 textures: 0.0,
             }
@@ -181,8 +195,8 @@ fn scene_of(cut: &Cut, loaded: &LoadedScene) -> Scene {
     loaded.clone().at_frame(cut.frame)
 }
 
-/// Does the pieces of `shard` that are not there yet; the device is the processor, whose last digits another kind's
-/// mathematics may not share.
+/// Does the pieces of `shard` that are not there yet; the device is the processor, whose last
+/// digits another kind's mathematics may not share.
 pub fn draw(
     (store, plan, shard, loaded): (&Store, &Plan, &Shard, &LoadedScene),
     cut: &Cut,
@@ -227,7 +241,8 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
     let picture = encoded(kind, &scene.film, cut.width, cut.height, &rgba)?;
     let n_bad = rgba.iter().filter(|v| !v.is_finite()).count();
     let nodes: BTreeSet<&str> = parts.iter().map(|(_, manifest)| manifest.node.as_str()).collect();
-    let processors: BTreeSet<&str> = parts.iter().map(|(_, manifest)| manifest.cpu.model.as_str()).collect();
+    let processors: BTreeSet<&str> =
+        parts.iter().map(|(_, manifest)| manifest.cpu.model.as_str()).collect();
     let about = json!({
         "schema": 1, "reference": cut.of, "frame": cut.frame, "time_s": scene.time.at(cut.frame),
         "width": cut.width, "height": cut.height, "samples": cut.n_samples, "own_error": mean.own_error,
@@ -239,7 +254,8 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
     });
     let other = ["reference.png", "reference.exr"].into_iter().find(|name| *name != cut.file());
     let gone = other.filter(|name| out.join(name).exists());
-    let files: Vec<String> = gone.map(str::to_owned).into_iter().chain([cut.file(), ABOUT_FILE.to_owned()]).collect();
+    let files: Vec<String> =
+        gone.map(str::to_owned).into_iter().chain([cut.file(), ABOUT_FILE.to_owned()]).collect();
     replace_files(out, &files.iter().map(String::as_str).collect::<Vec<_>>(), |staged| {
         synced::write(&staged.join(cut.file()), &picture)?;
         synced::write(&staged.join(ABOUT_FILE), format!("{about:#}\n").as_bytes())
@@ -247,7 +263,8 @@ pub fn merge(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)], out: &Path) 
     Ok(cut.n_pieces() as usize)
 }
 
-/// The sums of the whole picture: tiles by copy, ranges of samples by their tree, in the order of their shards.
+/// The sums of the whole picture: tiles by copy, ranges of samples by their tree, in the order of
+/// their shards.
 fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result<Sums> {
     let whole = Pixels::all(cut.width, cut.height);
     let mut values = vec![0.0; samples::N_VALUES * whole.at.len()];
@@ -260,13 +277,19 @@ fn put_together(plan: &Plan, cut: &Cut, parts: &[(PathBuf, Manifest)]) -> Result
             let pixels = cut.pixels(tile);
             let is_last = samples.end == cut.n_samples;
             let sums = Sums::from_bytes(&bytes, pixels.at.len(), samples.len() as u32);
-            pairs.push(sums.ok_or_else(|| Error::io(&path, "has other numbers than its piece has pixels"))?);
+            pairs.push(
+                sums.ok_or_else(|| {
+                    Error::io(&path, "has other numbers than its piece has pixels")
+                })?,
+            );
             if !is_last {
                 continue;
             }
             let Some(of_tile) = std::mem::take(&mut pairs).finish() else { continue };
-            for (at, found) in pixels.at.iter().zip(of_tile.values.chunks_exact(samples::N_VALUES)) {
-                values[samples::N_VALUES * whole.index(*at)..][..samples::N_VALUES].copy_from_slice(found);
+            for (at, found) in pixels.at.iter().zip(of_tile.values.chunks_exact(samples::N_VALUES))
+            {
+                values[samples::N_VALUES * whole.index(*at)..][..samples::N_VALUES]
+                    .copy_from_slice(found);
             }
         }
     }

@@ -37,34 +37,50 @@ pub struct How<'a> {
     pub on_item: &'a dyn Fn(),
 }
 
-/// Does shard `index` of the plan in `folder`, unless it is done. Errors have the exit code that engines are told: 75
-/// where another try may go well, 70 where the result contradicts one that is there.
+/// Does shard `index` of the plan in `folder`, unless it is done. Errors have the exit code that
+/// engines are told: 75 where another try may go well, 70 where the result contradicts one that is
+/// there.
 pub fn run(folder: &Path, index: usize, how: &How<'_>) -> Result<Outcome> {
     let plan = Plan::read(folder)?;
     let shard = plan.shard(index)?;
     let log = Log::open(folder)?;
     let store = Store::open(folder);
     let (begin, n_new) = (Instant::now(), Cell::new(0));
-    // A stale plan is refused even where its results are there: they are not of what the files say now.
+    // A stale plan is refused even where its results are there: they are not of what the files say
+    // now.
     let ended = plan.scene_as_planned().and_then(|loaded| {
-        let attempt = Attempt { plan: &plan, loaded: &loaded, shard, store: &store, log: &log, how, n_new: &n_new };
+        let attempt = Attempt {
+            plan: &plan,
+            loaded: &loaded,
+            shard,
+            store: &store,
+            log: &log,
+            how,
+            n_new: &n_new,
+        };
         attempt.run(begin).or_else(|error| match store.standing(&plan, shard) {
-            // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away what we worked in.
-            Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => Ok(Outcome::Beaten),
+            // Whatever went wrong here: somebody else may have done it meanwhile, and cleared away
+            // what we worked in.
+            Standing::Verified(_) if !matches!(error, Error::Conflict { .. }) => {
+                Ok(Outcome::Beaten)
+            }
             _ => Err(may_pass(error)),
         })
     });
     let seconds = begin.elapsed().as_secs_f64();
     let event = match &ended {
         Ok(Outcome::Skipped) => Event::Skipped,
-        Ok(Outcome::Done { seconds, n_resumed }) => Event::Done { seconds: *seconds, n_resumed: *n_resumed },
+        Ok(Outcome::Done { seconds, n_resumed }) => {
+            Event::Done { seconds: *seconds, n_resumed: *n_resumed }
+        }
         Ok(Outcome::Beaten) => Event::Beaten { seconds },
         Err(error) => {
             let (exit_code, what) = (error.exit_code(), error.to_string());
             Event::Failed { seconds, exit_code, n_new: n_new.get(), what }
         }
     };
-    // On a full disk nothing can be written down either, and a result counts without a line about it.
+    // On a full disk nothing can be written down either, and a result counts without a line about
+    // it.
     let _ = log.say(index, &shard.key, event);
     ended
 }
@@ -114,8 +130,12 @@ impl Attempt<'_> {
                 let of = (*store, *plan, *shard, *loaded);
                 reference::draw(of, cut, &mut workplace, stop, self.how.on_item)
             }
-            Work::Error { arguments, .. } => study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop),
-            Work::Bench { arguments, .. } => bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop),
+            Work::Error { arguments, .. } => {
+                study::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)
+            }
+            Work::Bench { arguments, .. } => {
+                bench::measure((*plan, *shard, arguments), &choice, &mut workplace, stop)
+            }
         };
         self.n_new.set(workplace.n_new());
         let device = made?;

@@ -1,22 +1,30 @@
-//! Consecutive items cut into shards that are neither so short that set-ups and the cluster's own work outweigh them,
-//! nor so long that a failure loses much (docs/model.md §17).
+//! Consecutive items cut into shards that are neither so short that set-ups and the cluster's own
+//! work outweigh them, nor so long that a failure loses much (docs/model.md §17).
 
 use std::collections::VecDeque;
 use std::ops::Range;
 
-/// Seconds beyond which an item counts no more: thirty thousand years. Sums of it still resolve a millisecond.
+/// Seconds beyond which an item counts no more: thirty thousand years. Sums of it still resolve a
+/// millisecond.
 const LONGEST_ITEM_S: f64 = 1e12;
 
-/// Items (their predicted seconds, in order) into shards of neighbours, every item in one. A shard takes `setup_s` and
-/// what its items take.
+/// Items (their predicted seconds, in order) into shards of neighbours, every item in one. A shard
+/// takes `setup_s` and what its items take.
 ///
-/// No shard is longer than `longest_s` but for a single item that is. Of all ways to cut that keep to this, the result
-/// has the fewest shards shorter than `shortest_s`: none where that can be. Of those it has at least as many shards as
-/// are needed for `longest_s`, rounded up to a multiple of `n_nodes`, so that shards of one length leave no node idle;
-/// or as many as there can be, where that is less. And shards are as even as going from one to the next makes them.
-/// Deterministic, in time linear in the items. Times that are not numbers, or below 0, count as 0, and so does
-/// no node as one; `shortest_s` above `longest_s` as `longest_s`.
-pub fn split(item_s: &[f64], setup_s: f64, shortest_s: f64, longest_s: f64, n_nodes: usize) -> Vec<Range<usize>> {
+/// No shard is longer than `longest_s` but for a single item that is. Of all ways to cut that keep
+/// to this, the result has the fewest shards shorter than `shortest_s`: none where that can be. Of
+/// those it has at least as many shards as are needed for `longest_s`, rounded up to a multiple of
+/// `n_nodes`, so that shards of one length leave no node idle; or as many as there can be, where
+/// that is less. And shards are as even as going from one to the next makes them. Deterministic, in
+/// time linear in the items. Times that are not numbers, or below 0, count as 0, and so does no
+/// node as one; `shortest_s` above `longest_s` as `longest_s`.
+pub fn split(
+    item_s: &[f64],
+    setup_s: f64,
+    shortest_s: f64,
+    longest_s: f64,
+    n_nodes: usize,
+) -> Vec<Range<usize>> {
     if item_s.is_empty() {
         return Vec::new();
     }
@@ -75,7 +83,12 @@ impl Cuts {
             before_s.push(sum);
         }
         let longest_s = longest_s.max(0.0);
-        Cuts { before_s, setup_s: counted(setup_s), shortest_s: shortest_s.max(0.0).min(longest_s), longest_s }
+        Cuts {
+            before_s,
+            setup_s: counted(setup_s),
+            shortest_s: shortest_s.max(0.0).min(longest_s),
+            longest_s,
+        }
     }
 
     fn n_items(&self) -> usize {
@@ -90,8 +103,8 @@ impl Cuts {
         self.setup_s + self.items_s(from, to)
     }
 
-    /// For every item the fewest shards from it on of which none is too long: each as long as it may be, since what
-    /// begins later never needs more.
+    /// For every item the fewest shards from it on of which none is too long: each as long as it
+    /// may be, since what begins later never needs more.
     fn fewest(&self) -> Vec<usize> {
         let n = self.n_items();
         let (mut fewest, mut last) = (vec![0; n + 1], n);
@@ -104,13 +117,15 @@ impl Cuts {
         fewest
     }
 
-    /// For every item the best of what is from it on, from the last to the first. A shard that begins earlier reaches
-    /// the same length earlier, so that both ranges of ends only move down, and each end enters and leaves once.
+    /// For every item the best of what is from it on, from the last to the first. A shard that
+    /// begins earlier reaches the same length earlier, so that both ranges of ends only move down,
+    /// and each end enters and leaves once.
     fn tails(&self) -> Vec<Tail> {
         let n = self.n_items();
         let mut tails = vec![Tail::END; n + 1];
         let (mut good, mut short) = (Ends::new(n), Ends::new(n));
-        // The first end at which a shard is long enough, n + 1 where none is, and the last at which it is not too long.
+        // The first end at which a shard is long enough, n + 1 where none is, and the last at which
+        // it is not too long.
         let (mut first_good, mut last_good) = (n + 1, n);
         for from in (0..n).rev() {
             while first_good > from + 1 && self.seconds(from, first_good - 1) >= self.shortest_s {
@@ -119,20 +134,23 @@ impl Cuts {
             while last_good > from && self.seconds(from, last_good) > self.longest_s {
                 last_good -= 1;
             }
-            let by_good = good.best(&tails, first_good, last_good).map(|end| tails[end].after(false));
+            let by_good =
+                good.best(&tails, first_good, last_good).map(|end| tails[end].after(false));
             // What is too short is not too long.
-            let by_short = short.best(&tails, from + 1, first_good - 1).map(|end| tails[end].after(true));
+            let by_short =
+                short.best(&tails, from + 1, first_good - 1).map(|end| tails[end].after(true));
             let alone = (last_good == from).then(|| tails[from + 1].after(false));
             let all = [by_good, by_short, alone].into_iter().flatten();
-            let better = |best: Tail, tail: Tail| if tail.is_better_than(best) { tail } else { best };
+            let better =
+                |best: Tail, tail: Tail| if tail.is_better_than(best) { tail } else { best };
             tails[from] = all.reduce(better).unwrap_or(Tail::END);
         }
         tails
     }
 
-    /// Where the shard that begins here ends, when `n_left` are still wanted: of the ends that keep what is best and
-    /// leave enough for the others the one nearest to an even share of all that is left; one after which the others
-    /// can be as few as wanted goes before.
+    /// Where the shard that begins here ends, when `n_left` are still wanted: of the ends that keep
+    /// what is best and leave enough for the others the one nearest to an even share of all that is
+    /// left; one after which the others can be as few as wanted goes before.
     fn next(&self, tails: &[Tail], fewest: &[usize], from: usize, n_left: usize) -> usize {
         let n = self.n_items();
         let even_s = self.items_s(from, n) / n_left.max(fewest[from]) as f64;
@@ -154,8 +172,9 @@ impl Cuts {
     }
 }
 
-/// The best end in a range whose two limits only move down. An end stays no longer than a lower one, so that it
-/// is dropped when a lower one is as good, and those kept get worse from front to back.
+/// The best end in a range whose two limits only move down. An end stays no longer than a lower
+/// one, so that it is dropped when a lower one is as good, and those kept get worse from front to
+/// back.
 struct Ends {
     kept: VecDeque<usize>,
     /// The lowest end that was looked at.

@@ -17,7 +17,8 @@ pub struct Status {
     pub shards: Vec<ShardStatus>,
     /// Of `shards`, done.
     pub n_done: usize,
-    /// How far what was predicted is off from what it took, of shards that one run did from beginning to end.
+    /// How far what was predicted is off from what it took, of shards that one run did from
+    /// beginning to end.
     pub predicted: Option<Compared>,
     /// Shards that a device or processor did for which nothing was predicted; they are not in that.
     pub n_other_class: usize,
@@ -103,7 +104,8 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
                 n_other_class += 1;
             }
         }
-        let manifest = if let Standing::Verified(manifest) = standing { Some(manifest) } else { None };
+        let manifest =
+            if let Standing::Verified(manifest) = standing { Some(manifest) } else { None };
         ShardStatus {
             index: shard.index,
             key: shard.key.clone(),
@@ -121,7 +123,13 @@ pub fn status(folder: &Path, plan: &Plan) -> Result<Status> {
     };
     let shards: Vec<ShardStatus> = plan.shards.iter().map(of).collect();
     let n_done = shards.iter().filter(|shard| shard.state == State::Done).count();
-    Ok(Status { shards, n_done, predicted: Compared::of(&pairs), n_other_class, engine_silent: None })
+    Ok(Status {
+        shards,
+        n_done,
+        predicted: Compared::of(&pairs),
+        n_other_class,
+        engine_silent: None,
+    })
 }
 
 fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) {
@@ -139,10 +147,13 @@ fn state(standing: &Standing, attempts: &[&Attempt]) -> (State, Option<String>) 
 }
 
 impl Status {
-    /// Asks the engine that the plan in `folder` was submitted to, which takes some seconds where it does not answer.
+    /// Asks the engine that the plan in `folder` was submitted to, which takes some seconds where
+    /// it does not answer.
     pub fn ask_engine(&mut self, folder: &Path) {
         match slurm::states(&slurm::submitted(folder)) {
-            Ok(mut states) => self.shards.iter_mut().for_each(|shard| shard.engine = states.remove(&shard.index)),
+            Ok(mut states) => {
+                self.shards.iter_mut().for_each(|shard| shard.engine = states.remove(&shard.index))
+            }
             Err(why) => self.engine_silent = Some(why.what),
         }
     }
@@ -188,9 +199,24 @@ mod tests {
             n_differing: 0,
             engine: None,
         };
-        let states = [State::Open, State::Done, State::Failed, State::Broken, State::Begun, State::Done, State::Open];
-        let shards: Vec<ShardStatus> = states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();
-        let status = |shards| Status { shards, n_done: 0, predicted: None, n_other_class: 0, engine_silent: None };
+        let states = [
+            State::Open,
+            State::Done,
+            State::Failed,
+            State::Broken,
+            State::Begun,
+            State::Done,
+            State::Open,
+        ];
+        let shards: Vec<ShardStatus> =
+            states.iter().enumerate().map(|(i, s)| shard(i, *s)).collect();
+        let status = |shards| Status {
+            shards,
+            n_done: 0,
+            predicted: None,
+            n_other_class: 0,
+            engine_silent: None,
+        };
         assert_eq!(status(shards).missing(), "0,2-4,6");
         assert_eq!(status(vec![shard(0, State::Done)]).missing(), "");
     }

@@ -1,6 +1,6 @@
-//! What is done: `shards/KEY`, a folder with a shard's files and `shard.json`, which says what is in them. A folder
-//! appears under its key at once and whole, by a rename; until then it is `KEY.tmp.NODE.PID`, where whoever tries next
-//! finds the files that were finished.
+//! What is done: `shards/KEY`, a folder with a shard's files and `shard.json`, which says what is
+//! in them. A folder appears under its key at once and whole, by a rename; until then it is
+//! `KEY.tmp.NODE.PID`, where whoever tries next finds the files that were finished.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -58,7 +58,11 @@ pub struct FileRecord {
 
 impl FileRecord {
     fn of(name: &str, bytes: &[u8]) -> FileRecord {
-        FileRecord { name: name.to_owned(), bytes: bytes.len() as u64, sha256: format!("{:x}", Sha256::digest(bytes)) }
+        FileRecord {
+            name: name.to_owned(),
+            bytes: bytes.len() as u64,
+            sha256: format!("{:x}", Sha256::digest(bytes)),
+        }
     }
 
     /// What is wrong with the file of this name in `folder`.
@@ -74,7 +78,9 @@ impl FileRecord {
         let content = fs::read(&path).map_err(|cause| Wrong::of(&path, &cause))?;
         if FileRecord::of(name, &content) != *self {
             let begin: String = sha256.chars().take(8).collect();
-            let what = format!("{name} is not what {MANIFEST_FILE} says: its SHA-256 does not begin with {begin}");
+            let what = format!(
+                "{name} is not what {MANIFEST_FILE} says: its SHA-256 does not begin with {begin}"
+            );
             return Err(Wrong::Broken(what));
         }
         Ok(())
@@ -94,7 +100,9 @@ impl Wrong {
     fn of(path: &Path, cause: &io::Error) -> Wrong {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         match cause.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Wrong::Broken(format!("{name}: {cause}")),
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+                Wrong::Broken(format!("{name}: {cause}"))
+            }
             _ => Wrong::Unreadable(of_io(path, cause)),
         }
     }
@@ -102,7 +110,9 @@ impl Wrong {
     /// As the error of whoever needs it.
     pub fn error(self, folder: &Path) -> Error {
         match self {
-            Wrong::Broken(what) => Error::Transient { what: format!("{}: {what}", folder.display()) },
+            Wrong::Broken(what) => {
+                Error::Transient { what: format!("{}: {what}", folder.display()) }
+            }
             Wrong::Unreadable(error) => error,
         }
     }
@@ -158,8 +168,8 @@ impl Store {
         }
     }
 
-    /// Unfinished folders, and those that were put aside, by key: read at once, since a listing takes as long as there
-    /// are results.
+    /// Unfinished folders, and those that were put aside, by key: read at once, since a listing
+    /// takes as long as there are results.
     pub fn others(&self) -> Others {
         let mut others = Others::default();
         for entry in fs::read_dir(&self.folder).into_iter().flatten().flatten() {
@@ -174,8 +184,8 @@ impl Store {
         others
     }
 
-    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone, or whole: somebody may have
-    /// mended it since it was looked at.
+    /// Puts what lies under a key aside, to be looked at; where to, unless it was gone, or whole:
+    /// somebody may have mended it since it was looked at.
     pub fn put_aside(&self, plan: &Plan, shard: &Shard, who: &str) -> Result<Option<PathBuf>> {
         let key = &shard.key;
         let (place, to) = (self.place(key), self.free(key, Other::Bad, who));
@@ -194,7 +204,9 @@ impl Store {
         let base = format!("{key}.{}.{who}", kind.name());
         let numbered = (1..).map(|k| self.folder.join(format!("{base}.{k}")));
         let mut names = std::iter::once(self.folder.join(&base)).chain(numbered);
-        names.find(|path| path.symlink_metadata().is_err()).unwrap_or_else(|| self.folder.join(base))
+        names
+            .find(|path| path.symlink_metadata().is_err())
+            .unwrap_or_else(|| self.folder.join(base))
     }
 
     /// A folder to work in.
@@ -211,11 +223,18 @@ impl Store {
         }
     }
 
-    /// Takes over what attempts at `shard` before have finished on a device like `device`: another one's pictures
-    /// differ.
-    pub fn resume(&self, workplace: &mut Workplace, plan: &Plan, shard: &Shard, device: &Device) -> Result<()> {
+    /// Takes over what attempts at `shard` before have finished on a device like `device`: another
+    /// one's pictures differ.
+    pub fn resume(
+        &self,
+        workplace: &mut Workplace,
+        plan: &Plan,
+        shard: &Shard,
+        device: &Device,
+    ) -> Result<()> {
         let outputs = plan.outputs(shard);
-        let mark = serde_json::to_string(&device.class()).map_err(|cause| Error::io(&workplace.path, cause))?;
+        let mark = serde_json::to_string(&device.class())
+            .map_err(|cause| Error::io(&workplace.path, cause))?;
         for other in self.others().of(&shard.key, Other::Unfinished) {
             if fs::read_to_string(other.join(DEVICE_FILE)).is_ok_and(|of| of == mark) {
                 let adopted = workplace.adopt(other, &outputs);
@@ -227,9 +246,15 @@ impl Store {
         synced::write(&workplace.path.join(DEVICE_FILE), mark.as_bytes())
     }
 
-    /// Moves a finished folder under its key. What is there already stays, if it is whole: the same is as good, and
-    /// another is a contradiction (exit code 70), which is kept beside it.
-    pub fn put(&self, workplace: Workplace, plan: &Plan, shard: &Shard, who: &str) -> Result<Placed> {
+    /// Moves a finished folder under its key. What is there already stays, if it is whole: the same
+    /// is as good, and another is a contradiction (exit code 70), which is kept beside it.
+    pub fn put(
+        &self,
+        workplace: Workplace,
+        plan: &Plan,
+        shard: &Shard,
+        who: &str,
+    ) -> Result<Placed> {
         // Whoever puts something broken aside makes room for one more try; a few of them may meet.
         const TRIES: usize = 16;
         let place = self.place(&shard.key);
@@ -250,25 +275,36 @@ impl Store {
                 Standing::Broken(_) => {
                     self.put_aside(plan, shard, who)?;
                 }
-                Standing::Verified(theirs) if !plan.is_exact() || theirs.files == workplace.records() => {
+                Standing::Verified(theirs)
+                    if !plan.is_exact() || theirs.files == workplace.records() =>
+                {
                     let _ = fs::remove_dir_all(&workplace.path);
                     return Ok(Placed::Same);
                 }
-                Standing::Verified(theirs) => return Err(self.contradiction(workplace, &theirs, shard, who)),
+                Standing::Verified(theirs) => {
+                    return Err(self.contradiction(workplace, &theirs, shard, who));
+                }
             }
         }
-        Err(Error::Transient { what: format!("{}: others keep putting results there", place.display()) })
+        Err(Error::Transient {
+            what: format!("{}: others keep putting results there", place.display()),
+        })
     }
 
     fn contradiction(&self, ours: Workplace, theirs: &Manifest, shard: &Shard, who: &str) -> Error {
         let kept = self.free(&shard.key, Other::Differing, who);
         let kept = if fs::rename(&ours.path, &kept).is_ok() { kept } else { ours.path.clone() };
         let ours = ours.records();
-        let differing: Vec<&str> =
-            ours.iter().zip(&theirs.files).filter(|(a, b)| a != b).map(|(a, _)| a.name.as_str()).collect();
+        let differing: Vec<&str> = ours
+            .iter()
+            .zip(&theirs.files)
+            .filter(|(a, b)| a != b)
+            .map(|(a, _)| a.name.as_str())
+            .collect();
         Error::Conflict {
             what: format!(
-                "shard {}: {} made another result before (on {}, process {}): {} of {} files differ, {} the first; \
+                "shard {}: {} made another result before (on {}, process {}): {} of {} files \
+                 differ, {} the first; \
                  what was made here is kept in {}. Two devices or drivers in one farm do that: \
                  `nimbus farm status --json` names them",
                 shard.index,
@@ -329,12 +365,19 @@ fn verify(folder: &Path, plan: &Plan, shard: &Shard) -> std::result::Result<Mani
     let broken = |what: String| Err(Wrong::Broken(what));
     let text = fs::read(&path).map_err(|cause| Wrong::of(&path, &cause))?;
     let read = serde_json::from_slice(&text);
-    let manifest: Manifest = read.map_err(|cause| Wrong::Broken(format!("{MANIFEST_FILE}: {cause}")))?;
+    let manifest: Manifest =
+        read.map_err(|cause| Wrong::Broken(format!("{MANIFEST_FILE}: {cause}")))?;
     if manifest.schema != SCHEMA_VERSION {
-        return broken(format!("{MANIFEST_FILE} is of schema {}, expected {SCHEMA_VERSION}", manifest.schema));
+        return broken(format!(
+            "{MANIFEST_FILE} is of schema {}, expected {SCHEMA_VERSION}",
+            manifest.schema
+        ));
     }
     if (&manifest.key, manifest.index) != (&shard.key, shard.index) {
-        return broken(format!("{MANIFEST_FILE} is of shard {}, key {}", manifest.index, manifest.key));
+        return broken(format!(
+            "{MANIFEST_FILE} is of shard {}, key {}",
+            manifest.index, manifest.key
+        ));
     }
     let names: Vec<&str> = manifest.files.iter().map(|file| file.name.as_str()).collect();
     if !plan.are_outputs(shard, &names) {
@@ -381,19 +424,27 @@ impl Workplace {
         Ok(())
     }
 
-    /// Takes over what another attempt finished: it may go on itself, what it has finished it does not change.
+    /// Takes over what another attempt finished: it may go on itself, what it has finished it does
+    /// not change.
     fn adopt(&mut self, other: &Path, outputs: &[String]) -> Result<()> {
         // None, or one that is moved away meanwhile.
         let Ok(text) = fs::read(other.join(DONE_FILE)) else { return Ok(()) };
         for line in String::from_utf8_lossy(&text).lines() {
             let Ok(record) = serde_json::from_str::<FileRecord>(line) else { continue };
-            if !outputs.contains(&record.name) || self.has(&record.name) || record.check(other).is_err() {
+            if !outputs.contains(&record.name)
+                || self.has(&record.name)
+                || record.check(other).is_err()
+            {
                 continue;
             }
             let (from, to) = (other.join(&record.name), self.path.join(&record.name));
-            // Nobody writes into a finished file, so that one file may be in both; a copy where that cannot be.
-            let copy =
-                || fs::copy(&from, &to).is_ok() && record.check(&self.path).is_ok() && synced::folder(&to).is_ok();
+            // Nobody writes into a finished file, so that one file may be in both; a copy where
+            // that cannot be.
+            let copy = || {
+                fs::copy(&from, &to).is_ok()
+                    && record.check(&self.path).is_ok()
+                    && synced::folder(&to).is_ok()
+            };
             if fs::hard_link(&from, &to).is_ok() || copy() {
                 self.record(record)?;
             }
@@ -426,7 +477,8 @@ impl Workplace {
     pub fn finish(&self, manifest: Manifest) -> Result<()> {
         let manifest = Manifest { files: self.records(), ..manifest };
         let path = self.path.join(MANIFEST_FILE);
-        let text = serde_json::to_string_pretty(&manifest).map_err(|cause| Error::io(&path, cause))?;
+        let text =
+            serde_json::to_string_pretty(&manifest).map_err(|cause| Error::io(&path, cause))?;
         synced::write(&path, format!("{text}\n").as_bytes())?;
         synced::folder(&self.path)
     }

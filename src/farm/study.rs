@@ -1,4 +1,5 @@
-//! The work of shards of an error study: `nimbus error --part`, in a process of its own, and all parts as one study.
+//! The work of shards of an error study: `nimbus error --part`, in a process of its own, and all
+//! parts as one study.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -35,8 +36,8 @@ pub fn measure(
     Ok(study.made.device)
 }
 
-/// All parts, in the order of their shards, as one study in `out`; the number of its configurations. Refuses, with a
-/// list of the differences, where times cannot be compared.
+/// All parts, in the order of their shards, as one study in `out`; the number of its
+/// configurations. Refuses, with a list of the differences, where times cannot be compared.
 pub fn merge(parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<usize> {
     let read = |(folder, manifest): &(PathBuf, Manifest)| {
         let (study, found) = files::read_found(folder)?;
@@ -44,7 +45,9 @@ pub fn merge(parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<u
     };
     let all: Vec<Part> = parts.iter().map(read).collect::<Result<_>>()?;
     child::check_comparable(differences(&all), parts)?;
-    let Some((study, found, moved)) = join(&all) else { return Err(Error::usage("a plan without shards")) };
+    let Some((study, found, moved)) = join(&all) else {
+        return Err(Error::usage("a plan without shards"));
+    };
     prepare_out_dir(out, force)?;
     files::remove_earlier(out)?;
     for picture in &moved {

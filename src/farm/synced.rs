@@ -1,5 +1,5 @@
-//! Files that outlast a power cut: written under a name that nobody else has, brought to the disk, renamed, and the new
-//! name brought to the disk.
+//! Files that outlast a power cut: written under a name that nobody else has, brought to the disk,
+//! renamed, and the new name brought to the disk.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;
@@ -35,8 +35,12 @@ fn settle(path: &Path, temporary: &Path, written: std::io::Result<()>) -> Result
 /// Nobody else's, on no node.
 fn temporary(path: &Path) -> Result<PathBuf> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
-    let name = path.file_name().ok_or_else(|| Error::io(path, "expected a file's name"))?.to_string_lossy();
-    let (node, pid, count) = (super::attempts::node(), std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+    let name = path
+        .file_name()
+        .ok_or_else(|| Error::io(path, "expected a file's name"))?
+        .to_string_lossy();
+    let (node, pid, count) =
+        (super::attempts::node(), std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
     Ok(path.with_file_name(format!(".{name}.{node}.{pid}.{count}.part")))
 }
 
@@ -49,7 +53,9 @@ fn write_once(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 /// Adds a line, by one call, so that lines of several processes of one machine do not mix.
 pub fn append(path: &Path, line: &str) -> Result<()> {
     let open = || OpenOptions::new().create(true).append(true).open(path);
-    let write = |mut file: File| file.write_all(format!("{line}\n").as_bytes()).and_then(|()| file.sync_data());
+    let write = |mut file: File| {
+        file.write_all(format!("{line}\n").as_bytes()).and_then(|()| file.sync_data())
+    };
     open().and_then(write).map_err(|cause| of_io(path, &cause))
 }
 

@@ -6,7 +6,9 @@ use crate::layout::cull::KeptRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
 use crate::layout::particle::TexturedRecord;
-use crate::layout::particle::{BoxLaw, BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
+use crate::layout::particle::{
+    BoxLaw, BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord,
+};
 use crate::model::basis::N_NODES;
 use crate::model::cloud::{CloudSource, Group};
 use crate::model::scene::{LightingMode, Scene};
@@ -89,7 +91,9 @@ impl Buffers {
 
     /// Copies it to where shaders read it; the particles' places are `place`'s.
     pub fn record_feeds(&self, rec: &mut Recorder<'_>, slot: usize) {
-        for feed in [&self.groups, &self.drawn, &self.modes, &self.table, &self.regions, &self.lights] {
+        for feed in
+            [&self.groups, &self.drawn, &self.modes, &self.table, &self.regions, &self.lights]
+        {
             feed.record(rec, slot);
         }
     }
@@ -111,26 +115,42 @@ impl Buffers {
         self.kept.as_ref().map_or(Amount::Known(n_drawn), Amount::Counted)
     }
 
-    pub fn new(device: &Device, scene: &Scene, groups: &[Group], host_places: bool) -> Result<Buffers> {
+    pub fn new(
+        device: &Device,
+        scene: &Scene,
+        groups: &[Group],
+        host_places: bool,
+    ) -> Result<Buffers> {
         let n = scene.n_particles();
         let n_facets = scene.n_facets();
         let n_groups = groups.len() as u64;
         let n_modes = scene.clouds.iter().map(|c| c.gust.modes(c.seed).len() as u64).sum();
         let n_lights = scene.lights.len() as u64;
         let n_ground = scene.n_solid_facets() - scene.n_surface_facets();
-        let (n_textured, n_texels) = if scene.is_textured() { (n_groups, POOL_TEXELS) } else { (0, 0) };
+        let (n_textured, n_texels) =
+            if scene.is_textured() { (n_groups, POOL_TEXELS) } else { (0, 0) };
         let n_named = if is_grouped(scene) { n } else { 0 };
         let n_through = if has_second(scene) { n_facets * n_lights } else { 0 };
         // No more vectors than were asked for.
         let n_table_rows = scene.materials.len() as u64 + u64::from(scene.lighting.bases) - 1;
         let placed = match host_places {
             true => Placed::ByHost(Box::new(Feed::new::<PlacedRecord>(device, "place.placed", n)?)),
-            false => Placed::ByDevice(Buffer::new::<PlacedRecord>(device, "place.placed", n, Place::Device)?),
+            false => Placed::ByDevice(Buffer::new::<PlacedRecord>(
+                device,
+                "place.placed",
+                n,
+                Place::Device,
+            )?),
         };
         Ok(Buffers {
             boxes: Buffer::new::<BoxRecord>(device, "generate.boxes", n_groups, Place::Device)?,
             i_group: Buffer::new::<u32>(device, "generate.i_group", n, Place::Device)?,
-            particles: Buffer::new::<ParticleRecord>(device, "generate.particles", n, Place::Device)?,
+            particles: Buffer::new::<ParticleRecord>(
+                device,
+                "generate.particles",
+                n,
+                Place::Device,
+            )?,
             status: Buffer::new::<u32>(device, "generate.status", n, Place::Device)?,
             groups: Feed::new::<GroupRecord>(device, "place.groups", n_groups)?,
             drawn: Feed::new::<DrawnRecord>(device, "sort.drawn", n_groups)?,
@@ -140,8 +160,18 @@ impl Buffers {
             facets: Buffer::new::<FacetRecord>(device, "facets.facets", n_facets, Place::Device)?,
             regions: Feed::new::<RegionRecord>(device, "first.regions", scene.n_regions() as u64)?,
             lights: Feed::new::<LightRecord>(device, "transmit.lights", n_lights)?,
-            transmittance: Buffer::new::<f32>(device, "transmit.transmittance", n_facets * n_lights, Place::Device)?,
-            i_region: Buffer::new::<u32>(device, "facets.i_region", scene.n_surface_facets(), Place::Device)?,
+            transmittance: Buffer::new::<f32>(
+                device,
+                "transmit.transmittance",
+                n_facets * n_lights,
+                Place::Device,
+            )?,
+            i_region: Buffer::new::<u32>(
+                device,
+                "facets.i_region",
+                scene.n_surface_facets(),
+                Place::Device,
+            )?,
             ground: Buffer::new::<FacetRecord>(device, "terrain.ground", n_ground, Place::Device)?,
             table: Feed::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64)?,
             through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
@@ -149,17 +179,37 @@ impl Buffers {
             kept: kept(device, scene)?,
             i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
             entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
-            textured: Buffer::new::<TexturedRecord>(device, "texture.groups", n_textured, Place::Device)?,
-            pool: Buffer::new::<[u32; 4]>(device, "texture.pool", u64::from(n_texels), Place::Device)?,
+            textured: Buffer::new::<TexturedRecord>(
+                device,
+                "texture.groups",
+                n_textured,
+                Place::Device,
+            )?,
+            pool: Buffer::new::<[u32; 4]>(
+                device,
+                "texture.pool",
+                u64::from(n_texels),
+                Place::Device,
+            )?,
         })
     }
 
     /// Fills what never changes: the boxes, each particle's group, the particles of lists.
-    pub fn fill(&self, device: &Device, commands: &mut Commands, scene: &Scene, groups: &[Group]) -> Result<()> {
-        let i_group: Vec<u32> =
-            groups.iter().zip(0u32..).flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize)).collect();
+    pub fn fill(
+        &self,
+        device: &Device,
+        commands: &mut Commands,
+        scene: &Scene,
+        groups: &[Group],
+    ) -> Result<()> {
+        let i_group: Vec<u32> = groups
+            .iter()
+            .zip(0u32..)
+            .flat_map(|(g, i)| std::iter::repeat_n(i, g.n_particles as usize))
+            .collect();
         let surfaces = scene.surfaces.iter().zip(0u32..);
-        let i_region: Vec<u32> = surfaces.flat_map(|(s, i)| std::iter::repeat_n(i, s.n_facets() as usize)).collect();
+        let i_region: Vec<u32> =
+            surfaces.flat_map(|(s, i)| std::iter::repeat_n(i, s.n_facets() as usize)).collect();
         upload(device, commands, &i_region, &self.i_region)?;
         upload(device, commands, &ground_records(scene), &self.ground)?;
         upload(device, commands, &box_records(scene, groups), &self.boxes)?;
@@ -169,7 +219,8 @@ impl Buffers {
         }
         commands.run(|rec| {
             rec.fill(&self.status, 0);
-            // What no pass of this scene writes is zero: L2 where there is a first reflection alone.
+            // What no pass of this scene writes is zero: L2 where there is a first reflection
+            // alone.
             rec.fill(&self.lit, 0);
             Ok(())
         })?;
@@ -182,7 +233,9 @@ impl Buffers {
 
 /// Where the number of kept particles is; none where all are drawn.
 pub(super) fn kept(device: &Device, scene: &Scene) -> Result<Option<Buffer>> {
-    culls(scene).then(|| Buffer::new::<KeptRecord>(device, "cull.kept", 1, Place::Device)).transpose()
+    culls(scene)
+        .then(|| Buffer::new::<KeptRecord>(device, "cull.kept", 1, Place::Device))
+        .transpose()
 }
 
 /// Whether there is a second reflection: it asks for what clouds alone let through.
@@ -190,20 +243,26 @@ pub fn has_second(scene: &Scene) -> bool {
     scene.lighting.mode == LightingMode::TwoReflection
 }
 
-/// Surfaces and ground that nothing lights show their materials' K_d, as particles show their colours.
+/// Surfaces and ground that nothing lights show their materials' K_d, as particles show their
+/// colours.
 fn unlit(scene: &Scene) -> Vec<LitRecord> {
     let of = |(i_material, n_facets): (usize, u64)| {
         let first = scene.materials[i_material].at(scene.time.start_s).kd.as_vec3().to_array();
         std::iter::repeat_n(LitRecord { first, ..LitRecord::default() }, n_facets as usize)
     };
     let surfaces = scene.surfaces.iter().map(|s| (s.i_material, s.n_facets()));
-    surfaces.chain(scene.terrains.iter().map(|t| (t.i_material, t.n_facets()))).flat_map(of).collect()
+    surfaces
+        .chain(scene.terrains.iter().map(|t| (t.i_material, t.n_facets())))
+        .flat_map(of)
+        .collect()
 }
 
 /// The facets of all grounds.
 fn ground_records(scene: &Scene) -> Vec<FacetRecord> {
     let grounds = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
-    grounds.flat_map(|(t, i_region)| t.facets().map(move |f| FacetRecord::terrain(&f, i_region))).collect()
+    grounds
+        .flat_map(|(t, i_region)| t.facets().map(move |f| FacetRecord::terrain(&f, i_region)))
+        .collect()
 }
 
 /// A record a group, in order.
@@ -232,10 +291,14 @@ pub(super) fn textured_records(scene: &Scene, groups: &[Group]) -> Vec<TexturedR
         let cloud = &scene.clouds[g.i_cloud];
         TexturedRecord::new(&cloud.texture, cloud.seed, i_box, g.i_first)
     };
-    groups.chunk_by(|a, b| a.i_cloud == b.i_cloud).flat_map(|boxes| boxes.iter().zip(0u32..).map(of_group)).collect()
+    groups
+        .chunk_by(|a, b| a.i_cloud == b.i_cloud)
+        .flat_map(|boxes| boxes.iter().zip(0u32..).map(of_group))
+        .collect()
 }
 
-/// Every particle that comes from a list at its place; zeros where particles are generated. Empty without lists.
+/// Every particle that comes from a list at its place; zeros where particles are generated. Empty
+/// without lists.
 fn given_particles(scene: &Scene, groups: &[Group]) -> Vec<ParticleRecord> {
     let mut records = Vec::new();
     for group in groups {
@@ -248,7 +311,12 @@ fn given_particles(scene: &Scene, groups: &[Group]) -> Vec<ParticleRecord> {
 }
 
 /// Fills a device buffer with `data`.
-pub fn upload<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, data: &[T], to: &Buffer) -> Result<()> {
+pub fn upload<T: bytemuck::Pod>(
+    device: &Device,
+    commands: &mut Commands,
+    data: &[T],
+    to: &Buffer,
+) -> Result<()> {
     if data.is_empty() {
         return Ok(());
     }
@@ -262,7 +330,12 @@ pub fn upload<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, data: 
 }
 
 /// The first `n` records of a device buffer.
-pub fn download<T: bytemuck::Pod>(device: &Device, commands: &mut Commands, from: &Buffer, n: u32) -> Result<Vec<T>> {
+pub fn download<T: bytemuck::Pod>(
+    device: &Device,
+    commands: &mut Commands,
+    from: &Buffer,
+    n: u32,
+) -> Result<Vec<T>> {
     let readback = Buffer::new::<T>(device, "frame.readback", u64::from(n), Place::Readback)?;
     commands.run(|rec| {
         rec.copy(from, &readback);

@@ -1,8 +1,11 @@
-//! Blobs drawn near to far in chunks, what is full left out from one to the next (docs/model.md §11 "chunks").
+//! Blobs drawn near to far in chunks, what is full left out from one to the next (docs/model.md §11
+//! "chunks").
 
 use crate::error::{Error, Result};
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Amount, Buffer, Compiler, Device, Image, Instances, Place, Recorder, Start, Target};
+use crate::gpu::{
+    Amount, Buffer, Compiler, Device, Image, Instances, Place, Recorder, Start, Target,
+};
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::passes::chunks::{Chunks as Pass, FORMAT};
@@ -38,7 +41,8 @@ pub struct Chunks {
 }
 
 impl Chunks {
-    /// For pictures of `size` in `format`, of at most `n_max` particles in `n_chunks`. `variant` as in [`Sprites::under`].
+    /// For pictures of `size` in `format`, of at most `n_max` particles in `n_chunks`. `variant` as
+    /// in [`Sprites::under`].
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -48,13 +52,14 @@ impl Chunks {
         variant: [bool; 6],
     ) -> Result<Chunks> {
         let named = |error| match error {
-            Error::Limit { what } => {
-                Error::limit(format!("draw.chunks is composed in floats: {what}; or draw.chunks = 0"))
-            }
+            Error::Limit { what } => Error::limit(format!(
+                "draw.chunks is composed in floats: {what}; or draw.chunks = 0"
+            )),
             error => error,
         };
         let stride = n_max.div_ceil(n_chunks);
-        let (n_texels, n_places) = (u64::from(width) * u64::from(height), u64::from(stride) * u64::from(n_chunks));
+        let (n_texels, n_places) =
+            (u64::from(width) * u64::from(height), u64::from(stride) * u64::from(n_chunks));
         let image = |name| Image::color_target(device, name, width, height, FORMAT);
         // First: it tells whether the device can blend into it.
         let composed = image("chunks.composed").map_err(named)?;
@@ -65,15 +70,17 @@ impl Chunks {
             stride,
             composed,
             depth: Image::depth(device, "chunks.depth", width, height).map_err(named)?,
-            texels: Buffer::new::<[f32; 4]>(device, "chunks.texels", n_texels, Place::Device).map_err(named)?,
-            nearest: Buffer::new::<[u32; 2]>(device, "chunks.nearest", n_places, Place::Device).map_err(named)?,
+            texels: Buffer::new::<[f32; 4]>(device, "chunks.texels", n_texels, Place::Device)
+                .map_err(named)?,
+            nearest: Buffer::new::<[u32; 2]>(device, "chunks.nearest", n_places, Place::Device)
+                .map_err(named)?,
             draws: Buffer::new::<[u32; 4]>(device, "chunks.draws", n_chunks.into(), Place::Device)?,
             known: Buffer::new::<KeptRecord>(device, "chunks.known", 1, Place::Device)?,
         })
     }
 
-    /// Draws what is sorted over `target`, or alone where `start` clears it. `buffers` as in `sprites`. The depth of
-    /// `target` is spent.
+    /// Draws what is sorted over `target`, or alone where `start` clears it. `buffers` as in
+    /// `sprites`. The depth of `target` is spent.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,

@@ -16,7 +16,9 @@ use crate::passes::tiles::BLOCK;
 /// Whether the device leaves out particles of `scene`.
 pub fn culls(scene: &Scene) -> bool {
     // Who is in a shell must not depend on the view.
-    scene.draw.cull != CullMode::Off && scene.draw.impostors == Impostors::Off && scene.n_particles() > 0
+    scene.draw.cull != CullMode::Off
+        && scene.draw.impostors == Impostors::Off
+        && scene.n_particles() > 0
 }
 
 pub(super) struct Culling {
@@ -27,7 +29,11 @@ pub(super) struct Culling {
 
 impl Culling {
     /// None where the scene asks for none.
-    pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene) -> Result<Option<Culling>> {
+    pub fn of_scene(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+    ) -> Result<Option<Culling>> {
         if !culls(scene) {
             return Ok(None);
         }
@@ -52,12 +58,18 @@ impl Culling {
         let (camera, [width, height]) = drawing.seen(&packet.camera, s);
         let Settings { cutoff, threshold, size, .. } = *s;
         // Pixels of the film; the blobs' are as many times as wide as fewer of them cover a slope.
-        let pixels =
-            f64::from(height) * f64::from(packet.camera.tan_y) / (f64::from(size[1]) * f64::from(camera.tan_y));
+        let pixels = f64::from(height) * f64::from(packet.camera.tan_y)
+            / (f64::from(size[1]) * f64::from(camera.tan_y));
         let smallest = s.smallest * pixels;
         let view = View { camera: &camera, width, height, cutoff, threshold, smallest };
-        let order = Order { radius: packet.radius, n_bits: packet.sort_bits, sort_tile: TILE, splat_block: BLOCK };
-        let buffers = [b.placed.buffer(), &b.particles, &b.i_group, &b.drawn.buffer, &b.entries, kept];
+        let order = Order {
+            radius: packet.radius,
+            n_bits: packet.sort_bits,
+            sort_tile: TILE,
+            splat_block: BLOCK,
+        };
+        let buffers =
+            [b.placed.buffer(), &b.particles, &b.i_group, &b.drawn.buffer, &b.entries, kept];
         self.cull.record(rec, buffers, &view, &order, s.n_particles)
     }
 
@@ -85,10 +97,18 @@ pub(super) fn record_sort(
 ) -> Result<()> {
     let Some(kept) = &b.kept else {
         let buffers = [b.placed.buffer(), &b.i_group, &b.drawn.buffer, &b.entries];
-        sort.record_keys(rec, buffers, packet.camera.forward, s.n_particles, packet.radius, packet.sort_bits)?;
+        sort.record_keys(
+            rec,
+            buffers,
+            packet.camera.forward,
+            s.n_particles,
+            packet.radius,
+            packet.sort_bits,
+        )?;
         return sort.record(rec, &b.entries, packet.n_drawn, packet.sort_bits);
     };
-    let counts = Counts { buffer: kept, i_count: KeptRecord::I_COUNT, i_groups: KeptRecord::I_SORT };
+    let counts =
+        Counts { buffer: kept, i_count: KeptRecord::I_COUNT, i_groups: KeptRecord::I_SORT };
     // Both key widths take an even number of passes, so the result lies where it began.
     sort.record_counted(rec, &b.entries, packet.sort_bits, counts).map(|_| ())
 }

@@ -1,4 +1,5 @@
-//! What draws a frame's picture, and into what: surfaces and ground first, over them the blobs, in one of two ways.
+//! What draws a frame's picture, and into what: surfaces and ground first, over them the blobs, in
+//! one of two ways.
 
 use super::buffers::Buffers;
 use super::chunks::{self, Chunks};
@@ -15,7 +16,9 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Start, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks as ChunkMode, DrawPath, Impostors as ImpostorMode, LightingMode, Scene};
+use crate::model::scene::{
+    Chunks as ChunkMode, DrawPath, Impostors as ImpostorMode, LightingMode, Scene,
+};
 use crate::passes::sprites::Sprites;
 use crate::passes::tiles::View;
 
@@ -28,8 +31,8 @@ pub(super) struct Drawing {
     chunks: Option<Chunks>,
     /// None where only sprites draw.
     tiling: Option<Tiling>,
-    /// A frame that changes the picture draws into the one that the frame before has not. None where nothing is drawn by
-    /// the graphics pipeline.
+    /// A frame that changes the picture draws into the one that the frame before has not. None
+    /// where nothing is drawn by the graphics pipeline.
     targets: Option<[Image; IN_FLIGHT]>,
     /// What hides the blobs; none where nothing does.
     scenery: Option<Scenery>,
@@ -43,7 +46,12 @@ pub(super) struct Drawing {
 
 impl Drawing {
     /// What `scene`, in which nothing is "auto", is drawn with.
-    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Drawing> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        format: TargetFormat,
+    ) -> Result<Drawing> {
         let mut drawing = Drawing::of_size(device, compiler, scene, format, false)?;
         if scene.draw.resolution != Resolution::Full {
             drawing.shrunk = Some(Box::new(Shrunk::new(device, compiler, scene, format)?));
@@ -51,7 +59,8 @@ impl Drawing {
         Ok(drawing)
     }
 
-    /// The same of surfaces that are drawn as depth alone, of the scene's film whatever its resolution.
+    /// The same of surfaces that are drawn as depth alone, of the scene's film whatever its
+    /// resolution.
     pub fn without_colors(
         device: &Device,
         compiler: &Compiler,
@@ -88,7 +97,14 @@ impl Drawing {
         let chunks = || {
             let [grouped, counted, textured, threshold, ellipsoids] = of_shells;
             let (size, n) = ([film.width, film.height], [scene.n_particles() as u32, n_chunks]);
-            Chunks::new(device, compiler, size, format, n, [lit, grouped, counted, textured, threshold, ellipsoids])
+            Chunks::new(
+                device,
+                compiler,
+                size,
+                format,
+                n,
+                [lit, grouped, counted, textured, threshold, ellipsoids],
+            )
         };
         let target = |name| Image::color_target(device, name, film.width, film.height, format);
         let scenery = || Scenery::new(device, compiler, scene, format, depth_only);
@@ -97,7 +113,9 @@ impl Drawing {
                 .then(|| Sprites::new(device, compiler, format, lit, variant))
                 .transpose()?,
             chunks: (n_chunks > 0).then(chunks).transpose()?,
-            tiling: has_tiles.then(|| Tiling::of_scene(device, compiler, scene, format)).transpose()?,
+            tiling: has_tiles
+                .then(|| Tiling::of_scene(device, compiler, scene, format))
+                .transpose()?,
             targets: match has_sprites || behind || shells {
                 true => Some([target("picture.even")?, target("picture.odd")?]),
                 false => None,
@@ -163,7 +181,9 @@ impl Drawing {
         packet: &Packet,
         s: &Settings,
     ) -> Result<()> {
-        let (Some(impostors), Some(targets)) = (&mut self.impostors, &mut self.targets) else { return Ok(()) };
+        let (Some(impostors), Some(targets)) = (&mut self.impostors, &mut self.targets) else {
+            return Ok(());
+        };
         let depth = self.scenery.as_mut().map(|scenery| &mut scenery.depth);
         let target = Target { color: &mut targets[self.i_picture], depth };
         impostors.record(rec, path, b, target, packet, s)
@@ -220,7 +240,9 @@ impl Drawing {
         let (i, depth) = (self.i_picture, self.scenery.as_mut().map(|scenery| &mut scenery.depth));
         let under = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match &mut self.shrunk {
-            Some(shrunk) => shrunk.record(rec, path, i, under.filter(|under| under.depth.is_some())),
+            Some(shrunk) => {
+                shrunk.record(rec, path, i, under.filter(|under| under.depth.is_some()))
+            }
             None => Ok(()),
         }
     }
@@ -234,11 +256,14 @@ impl Drawing {
         camera: &CameraRecord,
         s: &Settings,
     ) -> Result<bool> {
-        let (Some(scenery), Some(targets)) = (&mut self.scenery, &mut self.targets) else { return Ok(false) };
+        let (Some(scenery), Some(targets)) = (&mut self.scenery, &mut self.targets) else {
+            return Ok(false);
+        };
         scenery.record(rec, solids, b, &mut targets[self.i_picture], camera, s)
     }
 
-    /// Draws the first `n_drawn` of what is sorted into the picture itself, over the shell where there is one.
+    /// Draws the first `n_drawn` of what is sorted into the picture itself, over the shell where
+    /// there is one.
     pub fn record_blobs(
         &mut self,
         rec: &mut Recorder<'_>,
@@ -254,7 +279,9 @@ impl Drawing {
         let target = self.targets.as_mut().map(|targets| Target { color: &mut targets[i], depth });
         match path {
             DrawPath::Tiles => {
-                let Some(tiling) = &self.tiling else { return Err(Error::usage("no tiles were made")) };
+                let Some(tiling) = &self.tiling else {
+                    return Err(Error::usage("no tiles were made"));
+                };
                 let Settings { cutoff, threshold, saturated, .. } = *s;
                 let view = View { camera, cutoff, threshold, saturated };
                 let under = target.filter(|target| target.depth.is_some() || near.is_some());
@@ -266,7 +293,9 @@ impl Drawing {
                 let start = if is_under { Start::Load } else { Start::Clear };
                 let cuts = [s.cutoff, s.threshold];
                 match (&self.sprites, &mut self.chunks) {
-                    (Some(sprites), _) => sprites.record_from(rec, buffers, (target, start), camera, cuts, counts),
+                    (Some(sprites), _) => {
+                        sprites.record_from(rec, buffers, (target, start), camera, cuts, counts)
+                    }
                     (_, Some(chunks)) => {
                         let view = chunks::View { camera, cuts, saturated: s.saturated };
                         chunks.record(rec, buffers, (target, start), &view, counts)

@@ -1,5 +1,5 @@
-//! What of each group is drawn this frame: none where it cannot be in the picture, else as many as its distance and size
-//! ask for. Light knows nothing of it.
+//! What of each group is drawn this frame: none where it cannot be in the picture, else as many as
+//! its distance and size ask for. Light knows nothing of it.
 
 use glam::DVec3;
 
@@ -10,9 +10,14 @@ use crate::model::count::Drawn;
 use crate::model::scene::Scene;
 use crate::model::visibility::Frustum;
 
-/// A record for each of `groups`, as they have grown, and how many particles they name together. `culls`: leave out groups
-/// that cannot be in the picture.
-pub fn drawn(scene: &Scene, groups: &[Group], setting: &Setting, culls: bool) -> (Vec<DrawnRecord>, u32) {
+/// A record for each of `groups`, as they have grown, and how many particles they name together.
+/// `culls`: leave out groups that cannot be in the picture.
+pub fn drawn(
+    scene: &Scene,
+    groups: &[Group],
+    setting: &Setting,
+    culls: bool,
+) -> (Vec<DrawnRecord>, u32) {
     let frustum = Frustum::of(&scene.camera, &setting.pose, &scene.film, scene.widening());
     let eye = setting.pose.position;
     // Coordinates are relative to the lighting origin, the eye's too.
@@ -20,10 +25,12 @@ pub fn drawn(scene: &Scene, groups: &[Group], setting: &Setting, culls: bool) ->
     let mut n_drawn = 0;
     let of = |group: &Group| {
         let origin = scene.clouds[group.i_cloud].origin_at(setting.time_s) - eye;
-        // Of an ellipsoid what it reaches farther along some axis than along its shortest is added to the box.
+        // Of an ellipsoid what it reaches farther along some axis than along its shortest is added
+        // to the box.
         let reach = scene.draw.cutoff * group.sigma_bounds();
         let radius = reach.min_element();
-        let half = group.half_extent + DVec3::splat(group.gust_reach) + (reach - DVec3::splat(radius));
+        let half =
+            group.half_extent + DVec3::splat(group.gust_reach) + (reach - DVec3::splat(radius));
         let in_view = !culls || frustum.may_show(origin + group.center, half, radius, lengths);
         let drawn = match scene.draw.count {
             _ if !in_view => Drawn::NOTHING,

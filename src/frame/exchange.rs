@@ -1,4 +1,5 @@
-//! Who receives light from whom: the constant part of the second reflection's gather, made once a scene.
+//! Who receives light from whom: the constant part of the second reflection's gather, made once a
+//! scene.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
@@ -62,7 +63,8 @@ impl Exchange {
         let n_sources = lists.tree.n_nodes.len() as u64;
         let n_fluxes = n_sources * scene.lights.len() as u64;
         let counts = lists.tree.merges.iter().map(|m| m.len() as u32);
-        let heights = counts.scan(0, |first, n| Some((std::mem::replace(first, *first + n), n))).collect();
+        let heights =
+            counts.scan(0, |first, n| Some((std::mem::replace(first, *first + n), n))).collect();
         let places: Vec<u32> = (0..scene.n_facets() as u32).collect();
         let blocks = [&lists.diffuse[..], &lists.glossy[..]].concat();
         let n_rounds = n_rounds(scene, n_sources);
@@ -83,9 +85,19 @@ impl Exchange {
             nodes: made("second.nodes", &lists.tree.n_nodes, 1)?,
             merges: made("second.merges", &lists.tree.merges.concat(), 1)?,
             heights,
-            sources: Buffer::new::<SourceRecord>(device, "second.sources", n_sources, Place::Device)?,
+            sources: Buffer::new::<SourceRecord>(
+                device,
+                "second.sources",
+                n_sources,
+                Place::Device,
+            )?,
             fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
-            stencils: Buffer::new::<PackedRecord>(device, "second.stencils", n_fluxes, Place::Device)?,
+            stencils: Buffer::new::<PackedRecord>(
+                device,
+                "second.stencils",
+                n_fluxes,
+                Place::Device,
+            )?,
             reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
             rounds: made("second.rounds", &at_rest, 3)?,
             rounds_at_rest: made("second.rounds_at_rest", &at_rest, 3)?,
@@ -96,7 +108,10 @@ impl Exchange {
     }
 
     /// Blocks of receivers: their kind, the first and how many, where there are any.
-    pub fn blocks<'a>(&'a self, gathered: &'a [Receivers]) -> impl Iterator<Item = (Receivers, u32, u32)> + 'a {
+    pub fn blocks<'a>(
+        &'a self,
+        gathered: &'a [Receivers],
+    ) -> impl Iterator<Item = (Receivers, u32, u32)> + 'a {
         let of = |r: &Receivers| match r {
             Receivers::Diffuse => (*r, 0, self.n_diffuse_blocks),
             Receivers::Glossy => (*r, self.n_diffuse_blocks, self.n_glossy_blocks),
@@ -116,7 +131,12 @@ impl Exchange {
     }
 
     /// The gathering kernels' buffers, of which two differ.
-    pub fn bindings<'a>(&'a self, b: &'a Buffers, last: &'a Buffer, out: &'a Buffer) -> [&'a Buffer; 16] {
+    pub fn bindings<'a>(
+        &'a self,
+        b: &'a Buffers,
+        last: &'a Buffer,
+        out: &'a Buffer,
+    ) -> [&'a Buffer; 16] {
         [
             &self.blocks,
             &self.pairings,
@@ -138,12 +158,14 @@ impl Exchange {
     }
 }
 
-/// Turns that an invocation's loops may take together, nested ones counted each: llvmpipe ends every loop without a word
-/// when they are used up (LP_MAX_TGSI_LOOP_ITERATIONS), and a watchdog may be as strict.
+/// Turns that an invocation's loops may take together, nested ones counted each: llvmpipe ends
+/// every loop without a word when they are used up (LP_MAX_TGSI_LOOP_ITERATIONS), and a watchdog
+/// may be as strict.
 const LOOP_TURNS: u32 = 65_000;
 /// Lights that a gather keeps at hand, at most.
 const MOST_KEPT: usize = 4;
-/// Facets that a receiver sets aside before it looks at their cells: all at once, but where each may have thousands.
+/// Facets that a receiver sets aside before it looks at their cells: all at once, but where each
+/// may have thousands.
 const ASIDE: u32 = 8;
 /// A lobe narrower than this has as many.
 const NARROW: f64 = 0.03;
@@ -154,13 +176,22 @@ pub fn turns(scene: &Scene) -> Turns {
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len()).max().unwrap_or(0);
     let n_lights = scene.lights.len();
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps } else { 0 };
-    // A cell at its longest: turns.glsl's count of its loops, all occluders, and before every light all surfaces.
-    let of_cell = 16 + 5 * n_lights + n_occluders + n_lights * scene.surfaces.len() + march as usize;
+    // A cell at its longest: turns.glsl's count of its loops, all occluders, and before every light
+    // all surfaces.
+    let of_cell =
+        16 + 5 * n_lights + n_occluders + n_lights * scene.surfaces.len() + march as usize;
     let aside = if is_narrow(scene) { 1 } else { ASIDE };
-    // When no cell is quartered any more these are left: three of each level, and the other facets that were set aside.
-    let left = (aside + 3 * scene.lighting.pairs.levels + 1) * of_cell.min(LOOP_TURNS as usize) as u32;
+    // When no cell is quartered any more these are left: three of each level, and the other facets
+    // that were set aside.
+    let left =
+        (aside + 3 * scene.lighting.pairs.levels + 1) * of_cell.min(LOOP_TURNS as usize) as u32;
     let quarter = LOOP_TURNS.saturating_sub(left).max(LOOP_TURNS / 2);
-    Turns { quarter, batch: quarter / 2, aside, kept: if n_lights <= MOST_KEPT { n_lights as u32 } else { 0 } }
+    Turns {
+        quarter,
+        batch: quarter / 2,
+        aside,
+        kept: if n_lights <= MOST_KEPT { n_lights as u32 } else { 0 },
+    }
 }
 
 /// Whether some lobe is so narrow that a facet may have thousands of cells.
@@ -169,8 +200,9 @@ fn is_narrow(scene: &Scene) -> bool {
     (0..scene.n_regions()).any(|i| is_glossy(scene, i) && narrowest(i) < NARROW)
 }
 
-/// Most dispatches of a gather of `n_sources`: those in which no receiver has anything left to do have no workgroups. A
-/// source takes some ten turns as a whole and some hundred by its cells, and where lobes are narrow a dispatch each.
+/// Most dispatches of a gather of `n_sources`: those in which no receiver has anything left to do
+/// have no workgroups. A source takes some ten turns as a whole and some hundred by its cells, and
+/// where lobes are narrow a dispatch each.
 fn n_rounds(scene: &Scene, n_sources: u64) -> u32 {
     let of_sources = n_sources.saturating_mul(128).div_ceil(u64::from(turns(scene).batch));
     let of_lobes = if is_narrow(scene) { n_sources.min(64) } else { 0 };
@@ -193,7 +225,10 @@ pub fn gathers_from_tree(scene: &Scene) -> bool {
 pub fn region_sizes(scene: &Scene) -> Vec<u32> {
     let of_surfaces = scene.surfaces.iter().map(|s| s.n_facets() as u32);
     let of_terrains = scene.terrains.iter().map(|t| t.n_facets() as u32);
-    of_surfaces.chain(of_terrains).chain(scene.clouds.iter().map(|c| scene.n_cloud_facets(c) as u32)).collect()
+    of_surfaces
+        .chain(of_terrains)
+        .chain(scene.clouds.iter().map(|c| scene.n_cloud_facets(c) as u32))
+        .collect()
 }
 
 /// Whether a region's lobe is to be computed.
@@ -201,8 +236,9 @@ pub fn is_glossy(scene: &Scene, i_region: usize) -> bool {
     scene.lighting.bases > 1 && scene.region_material(i_region).is_glossy()
 }
 
-/// In the order of their numbers' bits reversed, so that every stretch of them is a fair sample of all: a device that deals
-/// out stretches (llvmpipe one a thread) would else wait for the one with the crowded surfaces.
+/// In the order of their numbers' bits reversed, so that every stretch of them is a fair sample of
+/// all: a device that deals out stretches (llvmpipe one a thread) would else wait for the one with
+/// the crowded surfaces.
 fn scattered(blocks: &[BlockRecord]) -> Vec<BlockRecord> {
     let mut order: Vec<u32> = (0..blocks.len() as u32).collect();
     order.sort_by_key(|i| i.reverse_bits());
@@ -212,13 +248,17 @@ fn scattered(blocks: &[BlockRecord]) -> Vec<BlockRecord> {
 impl Lists {
     fn of(scene: &Scene, block_len: u32, tree: bool) -> Lists {
         let sizes = region_sizes(scene);
-        let firsts: Vec<u32> = sizes.iter().scan(0, |first, n| Some(std::mem::replace(first, *first + n))).collect();
+        let firsts: Vec<u32> =
+            sizes.iter().scan(0, |first, n| Some(std::mem::replace(first, *first + n))).collect();
         let tree_of = if tree { Tree::push } else { Tree::push_flat };
         let mut lists = Lists::default();
         let roots: Vec<u32> = sizes.iter().map(|n| tree_of(&mut lists.tree, *n)).collect();
         let ends = roots.iter().skip(1).copied().chain([lists.tree.n_nodes.len() as u32]);
-        let sources: Vec<(u32, u32)> = roots.iter().zip(ends).map(|(root, end)| (*root, end - root)).collect();
-        for (i, from) in pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len()).iter().enumerate() {
+        let sources: Vec<(u32, u32)> =
+            roots.iter().zip(ends).map(|(root, end)| (*root, end - root)).collect();
+        for (i, from) in
+            pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len()).iter().enumerate()
+        {
             let i_pairing = lists.pairings.len() as u32;
             for pairing in from.iter().filter(|p| sizes[p.i_emitter] > 0) {
                 lists.push_pairing(pairing, sources[pairing.i_emitter]);
@@ -227,7 +267,12 @@ impl Lists {
             let blocks = if is_glossy(scene, i) { &mut lists.glossy } else { &mut lists.diffuse };
             for first in (0..sizes[i]).step_by(block_len as usize) {
                 let n_facets = block_len.min(sizes[i] - first);
-                blocks.push(BlockRecord { i_first: firsts[i] + first, n_facets, i_pairing, n_pairings });
+                blocks.push(BlockRecord {
+                    i_first: firsts[i] + first,
+                    n_facets,
+                    i_pairing,
+                    n_pairings,
+                });
             }
         }
         lists.diffuse = scattered(&lists.diffuse);
@@ -240,6 +285,12 @@ impl Lists {
         self.occluders.extend(pairing.occluders.iter().map(|i| *i as u32));
         let n_occluders = pairing.occluders.len() as u32;
         let i_region = pairing.i_emitter as u32;
-        self.pairings.push(PairingRecord { i_region, i_occluder, n_occluders, i_source, n_sources });
+        self.pairings.push(PairingRecord {
+            i_region,
+            i_occluder,
+            n_occluders,
+            i_source,
+            n_sources,
+        });
     }
 }

@@ -1,5 +1,5 @@
-//! What the host writes anew for a frame, on its way to the device: written into one of several staging buffers, so that
-//! frames in flight keep theirs, and copied by the frame's own commands.
+//! What the host writes anew for a frame, on its way to the device: written into one of several
+//! staging buffers, so that frames in flight keep theirs, and copied by the frame's own commands.
 
 use bytemuck::Pod;
 
@@ -21,7 +21,8 @@ pub struct Feed {
 impl Feed {
     /// Room for `n` records of type `T`.
     pub fn new<T: Pod>(device: &Device, name: &str, n: u64) -> Result<Feed> {
-        let staging = |k: usize| Buffer::new::<T>(device, &format!("{name}.upload{k}"), n, Place::Upload);
+        let staging =
+            |k: usize| Buffer::new::<T>(device, &format!("{name}.upload{k}"), n, Place::Upload);
         Ok(Feed {
             buffer: Buffer::new::<T>(device, name, n, Place::Device)?,
             staging: [staging(0)?, staging(1)?],
@@ -30,7 +31,8 @@ impl Feed {
         })
     }
 
-    /// Writes what the frame of `slot` is to see. The frame that last used the slot must have ended.
+    /// Writes what the frame of `slot` is to see. The frame that last used the slot must have
+    /// ended.
     pub fn write<T: Pod>(&mut self, slot: usize, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         self.is_new = bytes != self.last;

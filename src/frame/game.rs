@@ -1,4 +1,5 @@
-//! The game step: where camera, clouds and (where the scene says so) every particle are at a frame's time.
+//! The game step: where camera, clouds and (where the scene says so) every particle are at a
+//! frame's time.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -43,7 +44,8 @@ pub struct Game {
     viewpoint: Option<Viewpoint>,
 }
 
-/// Asked for at every step, on the thread that plays; the width of the view and the near plane are the scene's.
+/// Asked for at every step, on the thread that plays; the width of the view and the near plane are
+/// the scene's.
 pub type Viewpoint = Box<dyn Fn() -> Pose + Send>;
 
 /// What a frame's time says of the scene, before it becomes records: shared with the references.
@@ -67,12 +69,14 @@ impl Setting {
             Error::scene(
                 at,
                 format!(
-                    "has no direction at time {time_s} s; expected a target apart from the position, off the up axis"
+                    "has no direction at time {time_s} s; expected a target apart from the \
+                     position, off the up axis"
                 ),
             )
         })?;
-        let (low, high) =
-            scene.lighting_bounds(groups, time_s, DEPOSIT_CUT_SIGMA).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let (low, high) = scene
+            .lighting_bounds(groups, time_s, DEPOSIT_CUT_SIGMA)
+            .unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let light_origin = 0.5 * (low + high);
         let half = 0.5 * (high - low);
         let grid = scene.density_grid(groups, half);
@@ -81,20 +85,34 @@ impl Setting {
 }
 
 impl Game {
-    /// `rest` are all particles in order, given where the game thread is to move them (`simulate = "cpu"`).
+    /// `rest` are all particles in order, given where the game thread is to move them (`simulate =
+    /// "cpu"`).
     pub fn new(scene: Arc<Scene>, rest: Option<Vec<ParticleRecord>>) -> Game {
         let groups = scene.groups();
         let modes: Vec<Vec<Mode>> = scene.clouds.iter().map(|c| c.gust.modes(c.seed)).collect();
-        let count = |n: &mut u32, waves: &Vec<Mode>| Some(std::mem::replace(n, *n + waves.len() as u32));
+        let count =
+            |n: &mut u32, waves: &Vec<Mode>| Some(std::mem::replace(n, *n + waves.len() as u32));
         let i_modes = modes.iter().scan(0, count).collect();
         let basis = basis_of(&scene);
         let table = Arc::new(table(&scene, basis.as_ref(), scene.time.start_s));
         let n_bases = basis.as_ref().map_or(1, Basis::n_bases);
         let shape = is_edited(&scene).then(|| Shape::of(&scene, n_bases));
-        Game { scene, groups, modes, i_modes, basis, table, shape, rest, culls: true, viewpoint: None }
+        Game {
+            scene,
+            groups,
+            modes,
+            i_modes,
+            basis,
+            table,
+            shape,
+            rest,
+            culls: true,
+            viewpoint: None,
+        }
     }
 
-    /// Whether groups that cannot be in the picture are left out of it, as they are unless told otherwise.
+    /// Whether groups that cannot be in the picture are left out of it, as they are unless told
+    /// otherwise.
     pub fn culling(self, culls: bool) -> Game {
         Game { culls, ..self }
     }
@@ -129,7 +147,8 @@ impl Game {
     pub fn step_at(&mut self, i_frame: u32, time_s: f64) -> Result<Packet> {
         let begin = Instant::now();
         let _zone = info_span!("game step").entered();
-        let mut setting = info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
+        let mut setting =
+            info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
         if let Some(viewpoint) = &self.viewpoint {
             setting.pose = viewpoint();
         }
@@ -138,12 +157,12 @@ impl Game {
         let grown = self.scene.grown(&self.groups, time_s);
         // What a shell has must not depend on where the camera looks.
         let culls = self.culls && self.scene.draw.impostors == Impostors::Off;
-        let (drawn, n_drawn) = info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, culls));
+        let (drawn, n_drawn) =
+            info_span!("visibility").in_scope(|| drawn(&self.scene, &grown, &setting, culls));
         let lived = self.lived(time_s)?;
-        let placed = lived
-            .as_ref()
-            .or(self.rest.as_ref())
-            .map(|rest| info_span!("place particles").in_scope(|| self.place(rest, &grown, &origins, time_s)));
+        let placed = lived.as_ref().or(self.rest.as_ref()).map(|rest| {
+            info_span!("place particles").in_scope(|| self.place(rest, &grown, &origins, time_s))
+        });
         // The device moves nothing that is placed already.
         let (modes, discs) = match placed {
             Some(_) => (vec![], vec![]),
@@ -157,8 +176,14 @@ impl Game {
             i_frame,
             time_s,
             begin,
-            camera: CameraRecord::new(&self.scene.camera, &setting.pose, &self.scene.film, setting.light_origin),
-            groups: info_span!("groups").in_scope(|| grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect()),
+            camera: CameraRecord::new(
+                &self.scene.camera,
+                &setting.pose,
+                &self.scene.film,
+                setting.light_origin,
+            ),
+            groups: info_span!("groups")
+                .in_scope(|| grown.iter().map(|g| self.group(g, origins[g.i_cloud])).collect()),
             drawn,
             n_drawn,
             modes,
@@ -169,7 +194,12 @@ impl Game {
             coefficients: self.coefficients(time_s),
             bounds: self.bounds(&setting),
             regions: self.regions(time_s, setting.light_origin),
-            lights: self.scene.lights.iter().map(|l| LightRecord::new(l, setting.light_origin)).collect(),
+            lights: self
+                .scene
+                .lights
+                .iter()
+                .map(|l| LightRecord::new(l, setting.light_origin))
+                .collect(),
             grid: GridRecord::from(&setting.grid),
             heaviest,
             radius: setting.radius,
@@ -187,16 +217,21 @@ impl Game {
 
     /// Bounds every blob's mass: of those that somebody else moves as they are.
     fn heaviest(&self, groups: &[Group], lived: Option<&Vec<ParticleRecord>>) -> f64 {
-        let mass_of = |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * f64::from(p.aspect);
-        let moved =
-            lived.filter(|_| self.scene.has_movers()).map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
+        let mass_of =
+            |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * f64::from(p.aspect);
+        let moved = lived
+            .filter(|_| self.scene.has_movers())
+            .map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
         let scale = groups.iter().map(|g| g.scale.powi(3)).fold(1.0, f64::max);
         heaviest_blob(groups).max(scale * moved)
     }
 
     /// Of the sort's keys.
     fn sort_bits(&self, groups: &[Group], radius: f64) -> u32 {
-        let sigmas = groups.iter().filter(|g| g.n_particles > 0).map(|g| g.sigma_mean * g.aspects[0].min(1.0));
+        let sigmas = groups
+            .iter()
+            .filter(|g| g.n_particles > 0)
+            .map(|g| g.sigma_mean * g.aspects[0].min(1.0));
         self.scene.draw.sort_bits.of(radius, sigmas.fold(f64::INFINITY, f64::min))
     }
 
@@ -219,7 +254,11 @@ impl Game {
     fn bounds(&self, setting: &Setting) -> Vec<RegionBoundsRecord> {
         let bits = KeyBits::of(self.scene.n_regions() as u32);
         let of = |b| RegionBoundsRecord::new(b, setting.light_origin, bits);
-        self.scene.region_bounds(&self.groups, setting.time_s, DEPOSIT_CUT_SIGMA).into_iter().map(of).collect()
+        self.scene
+            .region_bounds(&self.groups, setting.time_s, DEPOSIT_CUT_SIGMA)
+            .into_iter()
+            .map(of)
+            .collect()
     }
 
     /// The regions and their materials, surfaces before ground, both before clouds.
@@ -234,11 +273,16 @@ impl Game {
             let material = scene.region_material(i);
             let brdf = material.at(time_s);
             let mut record = match scene.surfaces.get(i) {
-                Some(surface) => RegionRecord::surface(surface, light_origin, &brdf, i_lobe(i), i_facet),
+                Some(surface) => {
+                    RegionRecord::surface(surface, light_origin, &brdf, i_lobe(i), i_facet)
+                }
                 None => match scene.terrains.get(i - scene.surfaces.len()) {
-                    Some(terrain) => RegionRecord::terrain(terrain, light_origin, &brdf, i_lobe(i), i_facet),
+                    Some(terrain) => {
+                        RegionRecord::terrain(terrain, light_origin, &brdf, i_lobe(i), i_facet)
+                    }
                     None => {
-                        let n_facets = scene.n_cloud_facets(&scene.clouds[i - scene.n_solids()]) as u32;
+                        let n_facets =
+                            scene.n_cloud_facets(&scene.clouds[i - scene.n_solids()]) as u32;
                         RegionRecord::cloud(&brdf, i_lobe(i), i_facet, n_facets)
                     }
                 },
@@ -266,11 +310,15 @@ impl Game {
     /// C of every column of the tensors.
     fn coefficients(&self, time_s: f64) -> Vec<[f32; 4]> {
         let (Some(shape), scene) = (&self.shape, &self.scene) else { return vec![] };
-        let brdfs: Vec<Brdf> = (0..scene.n_regions()).map(|i| scene.region_material(i).at(time_s)).collect();
+        let brdfs: Vec<Brdf> =
+            (0..scene.n_regions()).map(|i| scene.region_material(i).at(time_s)).collect();
         let of = |ns: f64| self.basis.as_ref().map_or(vec![], |b| b.coefficients(ns));
         // Regions share materials.
-        let of_materials: Vec<Vec<f64>> =
-            scene.materials.iter().map(|m| if m.is_glossy() { of(m.at(time_s).ns) } else { vec![] }).collect();
+        let of_materials: Vec<Vec<f64>> = scene
+            .materials
+            .iter()
+            .map(|m| if m.is_glossy() { of(m.at(time_s).ns) } else { vec![] })
+            .collect();
         shape.coefficients(&brdfs, |i| of_materials[scene.region_i_material(i)].clone())
     }
 
@@ -281,7 +329,13 @@ impl Game {
     }
 
     /// Every particle at its group's place, in f64 until the last step.
-    fn place(&self, rest: &[ParticleRecord], groups: &[Group], origins: &[DVec3], time_s: f64) -> Vec<PlacedRecord> {
+    fn place(
+        &self,
+        rest: &[ParticleRecord],
+        groups: &[Group],
+        origins: &[DVec3],
+        time_s: f64,
+    ) -> Vec<PlacedRecord> {
         let waves: Vec<Waves> = self.modes.iter().map(|modes| Waves::at(modes, time_s)).collect();
         let mut placed = Vec::with_capacity(rest.len());
         for group in groups {
@@ -296,10 +350,18 @@ impl Game {
 }
 
 /// At most [`LANES`] particles of one group.
-fn place_some(some: &[ParticleRecord], group: &Group, offset: DVec3, waves: &Waves, placed: &mut Vec<PlacedRecord>) {
-    let rest: [DVec3; LANES] =
-        std::array::from_fn(|l| some.get(l).map_or(DVec3::ZERO, |p| group.scale * Vec3::from(p.position).as_dvec3()));
-    let along = |axis: usize| -> Lanes { std::array::from_fn(|l| rest[l][axis] + group.center[axis]) };
+fn place_some(
+    some: &[ParticleRecord],
+    group: &Group,
+    offset: DVec3,
+    waves: &Waves,
+    placed: &mut Vec<PlacedRecord>,
+) {
+    let rest: [DVec3; LANES] = std::array::from_fn(|l| {
+        some.get(l).map_or(DVec3::ZERO, |p| group.scale * Vec3::from(p.position).as_dvec3())
+    });
+    let along =
+        |axis: usize| -> Lanes { std::array::from_fn(|l| rest[l][axis] + group.center[axis]) };
     let [x, y, z] = waves.displace(&[along(0), along(1), along(2)]);
     placed.extend(some.iter().enumerate().map(|(l, p)| {
         let moved = rest[l] + offset + DVec3::new(x[l], y[l], z[l]);
@@ -311,7 +373,8 @@ fn place_some(some: &[ParticleRecord], group: &Group, offset: DVec3, waves: &Wav
 /// A row a material: its lobe as the basis has it; zeros where it has none. Then a row a vector.
 fn table(scene: &Scene, basis: Option<&Basis>, time_s: f64) -> Vec<f32> {
     let Some(basis) = basis else { return vec![] };
-    let lobe = |m: &Material| if m.is_glossy() { basis.lobe(m.at(time_s).ns) } else { vec![0.0; N_NODES] };
+    let lobe =
+        |m: &Material| if m.is_glossy() { basis.lobe(m.at(time_s).ns) } else { vec![0.0; N_NODES] };
     let rows = scene.materials.iter().map(lobe).chain(basis.vectors().iter().cloned());
     rows.flatten().map(|v| v as f32).collect()
 }

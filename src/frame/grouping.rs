@@ -36,16 +36,29 @@ pub fn is_grouped(scene: &Scene) -> bool {
 }
 
 impl Grouping {
-    pub fn new(device: &Device, compiler: &Compiler, commands: &mut Commands, scene: &Scene) -> Result<Grouping> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        commands: &mut Commands,
+        scene: &Scene,
+    ) -> Result<Grouping> {
         let (n, n_regions) = (scene.n_particles(), scene.n_regions());
-        let record = |(first, end): (u64, u64)| RunRecord { i_first: first as u32, n_particles: (end - first) as u32 };
+        let record = |(first, end): (u64, u64)| RunRecord {
+            i_first: first as u32,
+            n_particles: (end - first) as u32,
+        };
         let runs: Vec<RunRecord> = scene.facet_runs().into_iter().map(record).collect();
         let grouping = Grouping {
             morton: Morton::new(device, compiler)?,
             sort: Sort::new(device, compiler, n as u32)?,
             entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, Place::Device)?,
             order: Buffer::new::<u32>(device, "morton.order", n, Place::Device)?,
-            runs: Buffer::new::<RunRecord>(device, "facets.runs", runs.len() as u64, Place::Device)?,
+            runs: Buffer::new::<RunRecord>(
+                device,
+                "facets.runs",
+                runs.len() as u64,
+                Place::Device,
+            )?,
             bounds: Feed::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64)?,
             n_particles: n as u32,
             n_solid_facets: scene.n_solid_facets() as u32,
@@ -66,15 +79,33 @@ impl Grouping {
     }
 
     pub fn record_order(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
-        let buffers = [b.placed.buffer(), &b.i_group, &b.groups.buffer, &self.bounds.buffer, &self.entries];
+        let buffers =
+            [b.placed.buffer(), &b.i_group, &b.groups.buffer, &self.bounds.buffer, &self.entries];
         self.morton.record_particles(rec, buffers, self.n_particles, self.n_regions)?;
         self.sort.record(rec, &self.entries, self.n_particles, KEY_BITS)?;
         self.morton.record_order(rec, [&self.entries, &self.order], self.n_particles)
     }
 
-    pub fn record_facets(&self, rec: &mut Recorder<'_>, facets: &Facets, b: &Buffers, packet: &Packet) -> Result<()> {
-        let [placed, particles, i_group, groups] = [b.placed.buffer(), &b.particles, &b.i_group, &b.groups.buffer];
-        let buffers = [placed, particles, i_group, groups, &b.density, &self.order, &self.runs, &b.facets, &b.i_facet];
+    pub fn record_facets(
+        &self,
+        rec: &mut Recorder<'_>,
+        facets: &Facets,
+        b: &Buffers,
+        packet: &Packet,
+    ) -> Result<()> {
+        let [placed, particles, i_group, groups] =
+            [b.placed.buffer(), &b.particles, &b.i_group, &b.groups.buffer];
+        let buffers = [
+            placed,
+            particles,
+            i_group,
+            groups,
+            &b.density,
+            &self.order,
+            &self.runs,
+            &b.facets,
+            &b.i_facet,
+        ];
         facets.record_groups(rec, buffers, &packet.grid, self.n_runs, self.n_solid_facets)
     }
 }

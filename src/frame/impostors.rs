@@ -1,4 +1,5 @@
-//! What is far, drawn into a picture of its own and shown from there as long as that is near enough to the truth.
+//! What is far, drawn into a picture of its own and shown from there as long as that is near enough
+//! to the truth.
 
 use super::buffers::Buffers;
 use super::packet::Packet;
@@ -66,16 +67,24 @@ impl Impostors {
                     lit,
                     [false, grouped, counted, textured, threshold, ellipsoids],
                 )?,
-                image: Image::color_target(device, "impostors.drawn", width, height, FORMAT).map_err(|e| match e {
-                    Error::Limit { what } => Error::limit(format!("draw.impostors: {what}")),
-                    e => e,
-                })?,
-                texels: Buffer::new::<[f32; 4]>(device, "impostors.texels", n_texels, Place::Device)?,
+                image: Image::color_target(device, "impostors.drawn", width, height, FORMAT)
+                    .map_err(|e| match e {
+                        Error::Limit { what } => Error::limit(format!("draw.impostors: {what}")),
+                        e => e,
+                    })?,
+                texels: Buffer::new::<[f32; 4]>(
+                    device,
+                    "impostors.texels",
+                    n_texels,
+                    Place::Device,
+                )?,
             })
         };
         let path = scene.draw.path;
         let tiling = match path {
-            DrawPath::Tiles => Some(Tiling::of_size(device, compiler, scene, rules.shell_size, (FORMAT, false))?),
+            DrawPath::Tiles => {
+                Some(Tiling::of_size(device, compiler, scene, rules.shell_size, (FORMAT, false))?)
+            }
             _ => None,
         };
         let entries = |name| Buffer::new::<[u32; 2]>(device, name, n, Place::Device);
@@ -104,13 +113,15 @@ impl Impostors {
         plan.with_impostors(match self.now {
             Step::Nothing(why) => skip(why),
             Step::Made { why, .. } => Decision { run: true, reason: Reason::Made(why) },
-            Step::Reused { pixels, .. } => {
-                Decision { run: true, reason: Reason::Reused { milli_px: (1e3 * pixels).ceil() as u32 } }
-            }
+            Step::Reused { pixels, .. } => Decision {
+                run: true,
+                reason: Reason::Reused { milli_px: (1e3 * pixels).ceil() as u32 },
+            },
         })
     }
 
-    /// Entries of the blobs that are drawn over the shell; none where there is no shell, and all are.
+    /// Entries of the blobs that are drawn over the shell; none where there is no shell, and all
+    /// are.
     pub fn near(&self) -> Option<&Buffer> {
         match self.now {
             Step::Nothing(_) => None,
@@ -118,7 +129,8 @@ impl Impostors {
         }
     }
 
-    /// Parts what is sorted, draws what is far where the shell is made anew, and shows it in `target`.
+    /// Parts what is sorted, draws what is far where the shell is made anew, and shows it in
+    /// `target`.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,
@@ -136,7 +148,14 @@ impl Impostors {
         let lists = [&b.entries, &self.members, &self.far, &self.near];
         self.pass.record_part(rec, lists, packet.n_drawn, is_new.then_some(kept.last_key))?;
         if is_new {
-            self.record_shell(rec, path, b, &kept, (Amount::Known(packet.n_drawn), s.n_solid_facets), s)?;
+            self.record_shell(
+                rec,
+                path,
+                b,
+                &kept,
+                (Amount::Known(packet.n_drawn), s.n_solid_facets),
+                s,
+            )?;
         }
         let texels = match (&self.tiling, &self.sprites) {
             (Some(tiling), _) if path == DrawPath::Tiles => &tiling.pictures[0],
@@ -168,11 +187,23 @@ impl Impostors {
         let (cutoff, threshold) = (s.cutoff, s.threshold);
         match (path, &self.tiling, &mut self.sprites) {
             (DrawPath::Tiles, Some(tiling), _) => {
-                let view = View { camera: &kept.camera, cutoff, threshold, saturated: saturated(FilmFormat::Rgba32f) };
+                let view = View {
+                    camera: &kept.camera,
+                    cutoff,
+                    threshold,
+                    saturated: saturated(FilmFormat::Rgba32f),
+                };
                 tiling.record(rec, 0, None, buffers, &view, counts)
             }
             (_, _, Some(OfSprites { sprites, image, texels })) => {
-                sprites.record(rec, buffers, Target::color(image), &kept.camera, [cutoff, threshold], counts)?;
+                sprites.record(
+                    rec,
+                    buffers,
+                    Target::color(image),
+                    &kept.camera,
+                    [cutoff, threshold],
+                    counts,
+                )?;
                 rec.copy_image(image, texels);
                 Ok(())
             }

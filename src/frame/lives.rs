@@ -1,5 +1,5 @@
-//! The particles of discs, new in every frame: by the pass `live`, or by the game thread where it moves the particles; and those that
-//! somebody else moves, by the game thread alone.
+//! The particles of discs, new in every frame: by the pass `live`, or by the game thread where it
+//! moves the particles; and those that somebody else moves, by the game thread alone.
 
 use super::feed::{Feed, IN_FLIGHT};
 use super::packet::Packet;
@@ -39,15 +39,23 @@ pub fn disc_records(scene: &Scene, groups: &[Group], time_s: f64) -> Vec<DiscRec
     discs(scene).filter_map(of).collect()
 }
 
-/// All particles relative to their groups at `time_s`: those of discs computed, those that somebody else moves as they then are, the others
-/// as they are in `rest`.
-pub fn lived(scene: &Scene, groups: &[Group], rest: &[ParticleRecord], time_s: f64) -> Result<Vec<ParticleRecord>> {
+/// All particles relative to their groups at `time_s`: those of discs computed, those that somebody
+/// else moves as they then are, the others as they are in `rest`.
+pub fn lived(
+    scene: &Scene,
+    groups: &[Group],
+    rest: &[ParticleRecord],
+    time_s: f64,
+) -> Result<Vec<ParticleRecord>> {
     let mut lived = rest.to_vec();
     for group in groups {
         if let CloudSource::Moving(m) = &scene.clouds[group.i_cloud].source {
             let (particles, first) = (m.mover.at(time_s)?, group.i_first as usize);
             let records = &mut lived[first..first + group.n_particles as usize];
-            records.iter_mut().zip(particles.iter()).for_each(|(record, p)| *record = ParticleRecord::new(p, group));
+            records
+                .iter_mut()
+                .zip(particles.iter())
+                .for_each(|(record, p)| *record = ParticleRecord::new(p, group));
         }
     }
     for (i, cloud, disc) in discs(scene) {
@@ -55,7 +63,8 @@ pub fn lived(scene: &Scene, groups: &[Group], rest: &[ParticleRecord], time_s: f
         for group in groups.iter().filter(|g| g.i_cloud == i) {
             let first = group.i_first as usize;
             for (slot, record) in (0..).zip(&mut lived[first..first + group.n_particles as usize]) {
-                *record = ParticleRecord::new(&disc.particle(cloud.seed, cloud.wind, slot, turn), group);
+                *record =
+                    ParticleRecord::new(&disc.particle(cloud.seed, cloud.wind, slot, turn), group);
             }
         }
     }

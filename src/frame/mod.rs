@@ -1,5 +1,6 @@
-//! One frame: `game::step` makes an owned [`packet::Packet`], [`render::Renderer::step`] draws it. [`serial`] and
-//! [`parallel`] are two loops around these two; [`plan`] says what a frame can leave out.
+//! One frame: `game::step` makes an owned [`packet::Packet`], [`render::Renderer::step`] draws it.
+//! [`serial`] and [`parallel`] are two loops around these two; [`plan`] says what a frame can leave
+//! out.
 
 pub mod buffers;
 pub mod choice;
@@ -50,11 +51,13 @@ pub struct FrameTimes {
     pub record_ms: f64,
     /// Handing the commands to the driver.
     pub submit_ms: f64,
-    /// From the end of the submission, or from the end of the frame before where that was later, to the frame's end.
+    /// From the end of the submission, or from the end of the frame before where that was later, to
+    /// the frame's end.
     pub wait_ms: f64,
     /// From the start of the game step to the finished image.
     pub latency_ms: f64,
-    /// Frames that the device still had when this one was handed to it; 0 where it had nothing to do.
+    /// Frames that the device still had when this one was handed to it; 0 where it had nothing to
+    /// do.
     pub queue_depth: u32,
     /// Particles that were drawn: those of clouds in view, as many as `draw.count` asks for.
     pub n_drawn: u32,
@@ -106,7 +109,8 @@ impl Started {
         Started { i_frame, time_s, begin, game_ms, queue_depth, n_drawn }
     }
 
-    /// The times of a frame whose picture was finished at `end`; `last_end` is that of the frame before.
+    /// The times of a frame whose picture was finished at `end`; `last_end` is that of the frame
+    /// before.
     fn ended(self, done: Rendered, end: Instant, last_end: &mut Instant) -> FrameTimes {
         let frame_ms = ms(std::mem::replace(last_end, end), end);
         FrameTimes {

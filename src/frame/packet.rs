@@ -1,4 +1,5 @@
-//! All that the render step needs to know of one frame, and the only thing that crosses from game to render thread.
+//! All that the render step needs to know of one frame, and the only thing that crosses from game
+//! to render thread.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -28,7 +29,8 @@ pub struct Packet {
     pub modes: Vec<ModeRecord>,
     /// Discs at this time; none where the game thread moves the particles.
     pub discs: Vec<DiscRecord>,
-    /// Every particle relative to its group, where the game thread moves the particles and some are of discs.
+    /// Every particle relative to its group, where the game thread moves the particles and some are
+    /// of discs.
     pub lived: Option<Vec<ParticleRecord>>,
     /// Every particle's place, where the game thread moves the particles.
     pub placed: Option<Vec<PlacedRecord>>,
@@ -36,7 +38,8 @@ pub struct Packet {
     pub bounds: Vec<RegionBoundsRecord>,
     /// Surfaces, then clouds, with their materials at this time.
     pub regions: Vec<RegionRecord>,
-    /// The lobe of every material at this time as the basis has it, then the basis' vectors; N_NODES numbers each.
+    /// The lobe of every material at this time as the basis has it, then the basis' vectors;
+    /// N_NODES numbers each.
     pub table: Arc<Vec<f32>>,
     /// C of every column of the tensors at this time; empty where no material is edited.
     pub coefficients: Vec<[f32; 4]>,
@@ -48,7 +51,8 @@ pub struct Packet {
     pub radius: f64,
     /// Of the sort's keys: 16 or 32.
     pub sort_bits: u32,
-    /// Where each group's particles are, where what is far may be shown from a picture of it; else none.
+    /// Where each group's particles are, where what is far may be shown from a picture of it; else
+    /// none.
     pub extents: Vec<Extent>,
 }
 

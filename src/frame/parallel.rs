@@ -1,9 +1,10 @@
-//! Game step and render step side by side: a thread plays, one draws, one waits for the device. An owned packet a frame
-//! crosses, through bounded channels, and there is no lock that two of them take.
+//! Game step and render step side by side: a thread plays, one draws, one waits for the device. An
+//! owned packet a frame crosses, through bounded channels, and there is no lock that two of them
+//! take.
 //!
-//! A frame's game step may begin when the second frame before it has ended. So the device has the next frame at hand,
-//! recorded while it draws, wherever game step and recording take less than it does; and a picture is never older than two
-//! frames.
+//! A frame's game step may begin when the second frame before it has ended. So the device has the
+//! next frame at hand, recorded while it draws, wherever game step and recording take less than it
+//! does; and a picture is never older than two frames.
 
 use std::collections::VecDeque;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -30,8 +31,8 @@ enum Event {
     Failed(Error),
 }
 
-/// Room for all that can be told at once, so that nobody who tells has to wait: a packet and an end for each frame in
-/// flight, and how either thread ends.
+/// Room for all that can be told at once, so that nobody who tells has to wait: a packet and an end
+/// for each frame in flight, and how either thread ends.
 const EVENTS: usize = 2 * IN_FLIGHT + 2;
 
 /// Runs `frames`; `on_frame` sees each as it ends. An error or panic on either side ends both.
@@ -54,8 +55,14 @@ pub fn run(
             let _ = grant.send(());
         }
         // What is still owned here ends with this block, and with it both threads.
-        Drawing { renderer: &mut *renderer, grant, submit, started: VecDeque::new(), under_way: VecDeque::new() }
-            .run(&events, on_frame)
+        Drawing {
+            renderer: &mut *renderer,
+            grant,
+            submit,
+            started: VecDeque::new(),
+            under_way: VecDeque::new(),
+        }
+        .run(&events, on_frame)
     });
     renderer.drain();
     drawn
@@ -71,9 +78,13 @@ fn start<'scope>(
     let guarded = move || {
         if let Err(panic) = catch_unwind(AssertUnwindSafe(work)) {
             let text = panic.downcast_ref::<String>().cloned();
-            let text = text.or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned())).unwrap_or_default();
+            let text = text
+                .or_else(|| panic.downcast_ref::<&str>().map(|s| (*s).to_owned()))
+                .unwrap_or_default();
             // Nobody listens when the drawing thread has ended.
-            let _ = tell.send(Event::Failed(Error::Fault { what: format!("the {name} thread panicked: {text}") }));
+            let _ = tell.send(Event::Failed(Error::Fault {
+                what: format!("the {name} thread panicked: {text}"),
+            }));
         }
     };
     let started = Builder::new().name(name.into()).spawn_scoped(scope, guarded);
@@ -81,13 +92,20 @@ fn start<'scope>(
 }
 
 /// The game thread: a step for every grant.
-fn play(game: &mut Game, frames: impl Iterator<Item = u32>, granted: &Receiver<()>, tell: &SyncSender<Event>) {
+fn play(
+    game: &mut Game,
+    frames: impl Iterator<Item = u32>,
+    granted: &Receiver<()>,
+    tell: &SyncSender<Event>,
+) {
     for i_frame in frames {
         // The other side has ended where it grants nothing any more, or hears nothing.
         if granted.recv().is_err() {
             return;
         }
-        let event = game.step(i_frame).map_or_else(|e| Event::Played(Err(e)), |packet| Event::Packet(Box::new(packet)));
+        let event = game
+            .step(i_frame)
+            .map_or_else(|e| Event::Played(Err(e)), |packet| Event::Packet(Box::new(packet)));
         let is_last = matches!(event, Event::Played(_));
         if tell.send(event).is_err() || is_last {
             return;
@@ -131,7 +149,8 @@ impl Drawing<'_> {
                     }
                     self.started.push_back(started);
                     self.under_way.push_back(pending.clone());
-                    // There is room for every frame in flight; a waiting thread that is gone has told why.
+                    // There is room for every frame in flight; a waiting thread that is gone has
+                    // told why.
                     let _ = self.submit.send(pending);
                 }
                 Event::Ended(end) => {

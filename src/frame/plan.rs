@@ -1,5 +1,6 @@
-//! What a frame can leave out: a pure function of the last packet and the next. Skipping never changes a pixel: a pass
-//! is left out only where all that it reads is what it read the last time, to the bit.
+//! What a frame can leave out: a pure function of the last packet and the next. Skipping never
+//! changes a pixel: a pass is left out only where all that it reads is what it read the last time,
+//! to the bit.
 
 use std::fmt;
 
@@ -123,7 +124,8 @@ impl fmt::Display for Reason {
             }
             Reason::TooLarge { bytes, most } => write!(
                 f,
-                "T2 would take {bytes} bytes and this device has {most} for it: light is gathered at once, anew at every edit"
+                "T2 would take {bytes} bytes and this device has {most} for it: light is gathered \
+                 at once, anew at every edit"
             ),
         }
     }
@@ -153,7 +155,8 @@ impl Plan {
         self.decisions[pass as usize]
     }
 
-    /// Of the light nothing changed but where it is seen from: receivers without a lobe keep what they have.
+    /// Of the light nothing changed but where it is seen from: receivers without a lobe keep what
+    /// they have.
     pub fn view_only(&self) -> bool {
         self.view_only
     }
@@ -166,10 +169,15 @@ impl Plan {
     /// In which nothing runs.
     #[cfg(test)]
     pub fn of_nothing() -> Plan {
-        Plan { decisions: [skip("nothing is there"); Pass::ALL.len()], view_only: false, changed: None }
+        Plan {
+            decisions: [skip("nothing is there"); Pass::ALL.len()],
+            view_only: false,
+            changed: None,
+        }
     }
 
-    /// The same plan with another decision for `impostors`, which depends on more frames than the last.
+    /// The same plan with another decision for `impostors`, which depends on more frames than the
+    /// last.
     pub fn with_impostors(mut self, decision: Decision) -> Plan {
         self.decisions[Pass::Impostors as usize] = decision;
         self
@@ -214,7 +222,8 @@ pub struct Traits {
     pub shrunk: bool,
     /// False with `--no-skip`: all that a frame is made of is done anew.
     pub skip: bool,
-    /// Without `skip`: but not what no frame of a run can change, the particles of boxes and the pool of textures.
+    /// Without `skip`: but not what no frame of a run can change, the particles of boxes and the
+    /// pool of textures.
     pub keeps_made: bool,
     /// The particles of boxes and the pool of textures are there before the first frame.
     pub made: bool,
@@ -249,7 +258,12 @@ impl Traits {
 
     /// The same where `scene`, in which nothing is "auto", is drawn as its `draw` says.
     pub fn drawn_by(self, scene: &Scene) -> Traits {
-        Traits { culls: culls(scene), path: scene.draw.path, shrunk: scene.draw.resolution != Resolution::Full, ..self }
+        Traits {
+            culls: culls(scene),
+            path: scene.draw.path,
+            shrunk: scene.draw.resolution != Resolution::Full,
+            ..self
+        }
     }
 }
 
@@ -270,49 +284,74 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     let same = |f: &dyn Fn(&Packet, &Packet) -> bool| last.is_some_and(|l| f(l, next));
     let same_life = same(&|a, b| a.discs == b.discs && a.lived == b.lived);
     let still = same_life
-        && same(&|a, b| a.placed == b.placed && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes)));
+        && same(&|a, b| {
+            a.placed == b.placed
+                && (b.placed.is_some() || (a.groups == b.groups && a.modes == b.modes))
+        });
     let same_grid = still && same(&|a, b| a.grid == b.grid);
     let same_places = still && same(&|a, b| a.bounds == b.bounds);
-    let same_geometry =
-        same(&|a, b| a.regions.iter().map(RegionRecord::geometry).eq(b.regions.iter().map(RegionRecord::geometry)));
-    let same_facets =
-        same_grid && same_geometry && same(&|a, b| a.groups == b.groups) && (same_places || !traits.grouped);
+    let same_geometry = same(&|a, b| {
+        a.regions
+            .iter()
+            .map(RegionRecord::geometry)
+            .eq(b.regions.iter().map(RegionRecord::geometry))
+    });
+    let same_facets = same_grid
+        && same_geometry
+        && same(&|a, b| a.groups == b.groups)
+        && (same_places || !traits.grouped);
     let same_rays = same_facets && same(&|a, b| has_same_rays(a, b));
     // What has no lobe looks the same from everywhere.
     let same_eye = !traits.glossy || same(&|a, b| a.camera.eye == b.camera.eye);
     // A light that goes out leaves its tensors unread.
     let same_tensors = same_facets && same(&|a, b| shine_alike(&a.lights, &b.lights));
-    let same_materials = same(&|a, b| a.regions == b.regions && a.table == b.table && a.coefficients == b.coefficients);
+    let same_materials = same(&|a, b| {
+        a.regions == b.regions && a.table == b.table && a.coefficients == b.coefficients
+    });
     let same_light = same_facets && same_materials && same(&|a, b| a.lights == b.lights);
     // With tensors the first two reflections know neither energies nor materials.
     let kept = traits.tensors == Tensors::Kept;
     let same_response = if kept { same_tensors } else { same_light };
-    let unchanged = if kept { "facets and lights stand still" } else { "facets and lights are the same" };
+    let unchanged =
+        if kept { "facets and lights stand still" } else { "facets and lights are the same" };
     let same_drawn = same(&|a, b| a.drawn == b.drawn);
     // How dense they are does not order them.
-    let same_names =
-        same(&|a, b| a.drawn.iter().map(|d| (d.shift, d.end)).eq(b.drawn.iter().map(|d| (d.shift, d.end))));
+    let same_names = same(&|a, b| {
+        a.drawn.iter().map(|d| (d.shift, d.end)).eq(b.drawn.iter().map(|d| (d.shift, d.end)))
+    });
     let same_order = still
         && same_names
-        && same(&|a, b| a.camera.forward == b.camera.forward && (a.radius, a.sort_bits) == (b.radius, b.sort_bits));
+        && same(&|a, b| {
+            a.camera.forward == b.camera.forward
+                && (a.radius, a.sort_bits) == (b.radius, b.sort_bits)
+        });
     let same_view = same(&|a, b| a.camera == b.camera);
     // What is kept depends on all of the camera, and on how dense particles are.
     let same_kept = same_order && same_drawn && same_view;
     let same_picture = same_order && same_drawn && same_view && (same_light || !traits.lit);
 
     let unless = |same: bool, reason| if same { skip(reason) } else { RUN };
-    let lighting =
-        |same: bool, reason| if traits.lit { unless(same, reason) } else { skip("lighting.mode is \"none\"") };
+    let lighting = |same: bool, reason| {
+        if traits.lit { unless(same, reason) } else { skip("lighting.mode is \"none\"") }
+    };
     let drawing = |path: DrawPath, other| match traits.path == path {
         true => unless(same_picture, "the picture is the same"),
         false => skip(other),
     };
     let mut decisions = [
-        if traits.has_boxes { unless(is_made, "the boxes are the same") } else { skip("no boxes to fill") },
+        if traits.has_boxes {
+            unless(is_made, "the boxes are the same")
+        } else {
+            skip("no boxes to fill")
+        },
         if traits.has_discs { unless(same_life, "no time has passed") } else { skip("no discs") },
         unless(still, "nothing moved"),
         lighting(same_grid, "nothing moved"),
-        if traits.grouped { unless(same_places, "nothing moved") } else { skip("a facet a particle") },
+        if traits.grouped {
+            unless(same_places, "nothing moved")
+        } else {
+            skip("a facet a particle")
+        },
         lighting(same_facets, "nothing moved"),
         lighting(same_rays, "facets and lights stand still"),
         lighting(same_response && same_eye, unchanged),
@@ -324,7 +363,9 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         match traits.tensors {
             Tensors::Kept => lighting(same_light && same_eye, "light and materials are the same"),
             Tensors::Needless => skip("no material is edited: light is gathered at once"),
-            Tensors::TooLarge { bytes, most } => Decision { run: false, reason: Reason::TooLarge { bytes, most } },
+            Tensors::TooLarge { bytes, most } => {
+                Decision { run: false, reason: Reason::TooLarge { bytes, most } }
+            }
         },
         match traits.culls {
             true => unless(same_kept, "the same can be seen"),
@@ -336,8 +377,16 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
             false => unless(same_order, "the order cannot have changed"),
         },
         if traits.textured { unless(is_made, "the pool is the same") } else { skip("no textures") },
-        if traits.n_surfaces > 0 { unless(same_picture, "the picture is the same") } else { skip("no surfaces") },
-        if traits.n_terrains > 0 { unless(same_picture, "the picture is the same") } else { skip("no terrain") },
+        if traits.n_surfaces > 0 {
+            unless(same_picture, "the picture is the same")
+        } else {
+            skip("no surfaces")
+        },
+        if traits.n_terrains > 0 {
+            unless(same_picture, "the picture is the same")
+        } else {
+            skip("no terrain")
+        },
         match traits.impostors {
             false => skip("draw.impostors is \"off\""),
             true if !traits.skip => skip("nothing is used again with --no-skip"),
@@ -345,10 +394,22 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
         },
         drawing(DrawPath::Sprites, "draw.path is \"tiles\""),
         drawing(DrawPath::Tiles, "draw.path is \"sprites\""),
-        if traits.shrunk { unless(same_picture, "the picture is the same") } else { skip("draw.resolution is 1") },
+        if traits.shrunk {
+            unless(same_picture, "the picture is the same")
+        } else {
+            skip("draw.resolution is 1")
+        },
     ];
     if traits.n_particles == 0 {
-        let of_particles = [Pass::Generate, Pass::Live, Pass::Place, Pass::Grid, Pass::Morton, Pass::Cull, Pass::Sort];
+        let of_particles = [
+            Pass::Generate,
+            Pass::Live,
+            Pass::Place,
+            Pass::Grid,
+            Pass::Morton,
+            Pass::Cull,
+            Pass::Sort,
+        ];
         for pass in of_particles.into_iter().chain([Pass::Texture, Pass::Impostors]) {
             decisions[pass as usize] = skip("no particles");
         }
@@ -369,7 +430,8 @@ pub fn plan(traits: &Traits, last: Option<&Packet>, next: &Packet) -> Plan {
     Plan { decisions, view_only: same_response, changed }
 }
 
-/// Whether the ways from the facets to the lights, and what hides them, are the same; a light without energy has none.
+/// Whether the ways from the facets to the lights, and what hides them, are the same; a light
+/// without energy has none.
 fn has_same_rays(a: &Packet, b: &Packet) -> bool {
     let way = |l: &LightRecord| (l.toward, l.position, l.kind, l.energy != [0.0; 3]);
     let rectangle = |r: &RegionRecord| (r.kind, r.center, r.u, r.v, r.normal, r.n_u, r.n_v);
@@ -377,12 +439,13 @@ fn has_same_rays(a: &Packet, b: &Packet) -> bool {
         && a.regions.iter().map(rectangle).eq(b.regions.iter().map(rectangle))
 }
 
-/// Whether `next` reaches facets as `last` did but for its lights' energies. A light without energy may have left no
-/// tensor behind, so none may be lit anew.
+/// Whether `next` reaches facets as `last` did but for its lights' energies. A light without energy
+/// may have left no tensor behind, so none may be lit anew.
 fn shine_alike(last: &[LightRecord], next: &[LightRecord]) -> bool {
     let geometry = |l: &LightRecord| LightRecord { energy: [0.0; 3], ..*l };
     let dark = |l: &LightRecord| l.energy == [0.0; 3];
-    last.iter().map(geometry).eq(next.iter().map(geometry)) && last.iter().zip(next).all(|(a, b)| !dark(a) || dark(b))
+    last.iter().map(geometry).eq(next.iter().map(geometry))
+        && last.iter().zip(next).all(|(a, b)| !dark(a) || dark(b))
 }
 
 const RUN: Decision = Decision { run: true, reason: Reason::Of("needed") };

@@ -14,7 +14,9 @@ use crate::model::boxes::MAX_ATTEMPTS;
 /// The numbers of a picture as it lies in a target.
 pub(super) fn floats(format: TargetFormat, bytes: Vec<u8>) -> Vec<f32> {
     match format {
-        TargetFormat::Rgba8 | TargetFormat::Bgra8 => bytes.into_iter().map(|b| f32::from(b) / 255.0).collect(),
+        TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
+            bytes.into_iter().map(|b| f32::from(b) / 255.0).collect()
+        }
         TargetFormat::Rgba16f => {
             let halves: Vec<half::f16> = bytemuck::pod_collect_to_vec(&bytes);
             halves.into_iter().map(half::f16::to_f32).collect()
@@ -40,7 +42,8 @@ impl Renderer {
         readback.read(settings.n_bytes() as usize)
     }
 
-    /// Copies the picture of the last frame that ended, as it lies in the target: premultiplied linear RGBA, rows from the top.
+    /// Copies the picture of the last frame that ended, as it lies in the target: premultiplied
+    /// linear RGBA, rows from the top.
     pub fn record_picture(&mut self, rec: &mut Recorder<'_>, to: &Buffer) {
         self.drawing.record_read(rec, self.traits.path, self.i_ended_picture, to);
     }
@@ -55,19 +58,27 @@ impl Renderer {
         (self.settings.format, self.settings.n_bytes())
     }
 
-    /// Runs `generate` alone and gives the particles relative to their groups, and each one's status.
+    /// Runs `generate` alone and gives the particles relative to their groups, and each one's
+    /// status.
     pub fn generate_now(&mut self, device: &Device) -> Result<(Vec<ParticleRecord>, Vec<u32>)> {
         let n = self.settings.n_particles;
         let (generate, b) = (&self.generate, &self.buffers);
         if self.traits.has_boxes {
-            self.host
-                .run(|rec| generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS))?;
+            self.host.run(|rec| {
+                generate.record(
+                    rec,
+                    [&b.boxes, &b.i_group, &b.particles, &b.status],
+                    n,
+                    MAX_ATTEMPTS,
+                )
+            })?;
         }
         let particles = download(device, &mut self.host, &self.buffers.particles, n)?;
         Ok((particles, download(device, &mut self.host, &self.buffers.status, n)?))
     }
 
-    /// Each particle's status as `generate` left it; 0 where it is of no box. No frame may be in flight.
+    /// Each particle's status as `generate` left it; 0 where it is of no box. No frame may be in
+    /// flight.
     pub fn status(&mut self, device: &Device) -> Result<Vec<u32>> {
         self.check_alone()?;
         download(device, &mut self.host, &self.buffers.status, self.settings.n_particles)
@@ -79,10 +90,12 @@ impl Renderer {
         download(device, &mut self.host, &self.buffers.particles, self.settings.n_particles)
     }
 
-    /// What a pass that does nothing measures on the device, ns: median of several. None without timestamps.
+    /// What a pass that does nothing measures on the device, ns: median of several. None without
+    /// timestamps.
     pub fn empty_scope_ns(&mut self) -> Result<Option<f64>> {
         const N_SCOPES: usize = 15;
-        let scopes = self.host.run(|rec| (0..N_SCOPES).try_for_each(|_| rec.scope("empty", |_| Ok(()))))?;
+        let scopes =
+            self.host.run(|rec| (0..N_SCOPES).try_for_each(|_| rec.scope("empty", |_| Ok(()))))?;
         let mut ns: Vec<f64> = scopes.iter().map(|s| s.end_ns - s.begin_ns).collect();
         ns.sort_by(f64::total_cmp);
         Ok(ns.get(ns.len() / 2).copied())
@@ -93,13 +106,15 @@ impl Renderer {
         if self.in_flight.is_empty() { Ok(()) } else { Err(Error::usage("frames are in flight")) }
     }
 
-    /// Where the last frame had the particles, relative to its lighting origin. No frame may be in flight.
+    /// Where the last frame had the particles, relative to its lighting origin. No frame may be in
+    /// flight.
     pub fn placed(&mut self, device: &Device) -> Result<Vec<PlacedRecord>> {
         self.check_alone()?;
         download(device, &mut self.host, self.buffers.placed.buffer(), self.settings.n_particles)
     }
 
-    /// The last frame's facets and their light; only meaningful where the scene is lit. No frame may be in flight.
+    /// The last frame's facets and their light; only meaningful where the scene is lit. No frame
+    /// may be in flight.
     pub fn facets(&mut self, device: &Device) -> Result<(Vec<FacetRecord>, Vec<LitRecord>)> {
         self.check_alone()?;
         let n = self.settings.n_facets;

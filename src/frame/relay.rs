@@ -47,7 +47,8 @@ impl Relay {
     ) -> Result<Relay> {
         let shiny = (0..scene.n_regions()).any(|i| is_glossy(scene, i));
         let traits = [scene.n_particles() > 0, tree, shiny];
-        let second = Second::new(device, compiler, traits, turns(scene), &scene.lighting.sums.into())?;
+        let second =
+            Second::new(device, compiler, traits, turns(scene), &scene.lighting.sums.into())?;
         let exchange = Exchange::new(device, commands, scene, second.block_len(), tree)?;
         let lighting = &scene.lighting;
         Ok(Relay {
@@ -98,20 +99,32 @@ impl Relay {
             self.record_sources(rec, b)?;
         }
         for (receivers, i_first_block, n_blocks) in x.blocks(gathered) {
-            let rounds: Vec<GatherPush> = x.rounds().map(|of| self.push(packet, i_first_block, of)).collect();
+            let rounds: Vec<GatherPush> =
+                x.rounds().map(|of| self.push(packet, i_first_block, of)).collect();
             if let Some(tensor) = tensor {
                 tensor.record_second(rec, b, x, packet, &rounds, receivers, n_blocks)?;
                 continue;
             }
             x.start_rounds(rec);
             for push in &rounds {
-                self.second.record(rec, x.bindings(b, &x.nodes, &b.lit), push, receivers, n_blocks)?;
+                self.second.record(
+                    rec,
+                    x.bindings(b, &x.nodes, &b.lit),
+                    push,
+                    receivers,
+                    n_blocks,
+                )?;
             }
         }
         Ok(())
     }
 
-    fn push(&self, packet: &Packet, i_first_block: u32, [i_round, n_rounds]: [u32; 2]) -> GatherPush {
+    fn push(
+        &self,
+        packet: &Packet,
+        i_first_block: u32,
+        [i_round, n_rounds]: [u32; 2],
+    ) -> GatherPush {
         GatherPush {
             grid: packet.grid,
             eye: packet.camera.eye,
@@ -132,7 +145,11 @@ impl Relay {
     /// Facets as sources, then cluster by cluster.
     fn record_sources(&self, rec: &mut Recorder<'_>, b: &Buffers) -> Result<()> {
         let x = &self.exchange;
-        let push = SourcesPush { n_facets: self.n_facets, n_lights: self.n_lights, n_surfaces: self.n_surfaces };
+        let push = SourcesPush {
+            n_facets: self.n_facets,
+            n_lights: self.n_lights,
+            n_surfaces: self.n_surfaces,
+        };
         let buffers = [
             &b.facets,
             &b.lights.buffer,
@@ -166,8 +183,19 @@ impl Order {
         })
     }
 
-    fn record(&self, rec: &mut Recorder<'_>, b: &Buffers, order: &Buffer, n_facets: u32) -> Result<()> {
-        self.morton.record_facets(rec, [&b.facets, &self.bounds.buffer, &self.entries], n_facets, self.n_regions)?;
+    fn record(
+        &self,
+        rec: &mut Recorder<'_>,
+        b: &Buffers,
+        order: &Buffer,
+        n_facets: u32,
+    ) -> Result<()> {
+        self.morton.record_facets(
+            rec,
+            [&b.facets, &self.bounds.buffer, &self.entries],
+            n_facets,
+            self.n_regions,
+        )?;
         self.sort.record(rec, &self.entries, n_facets, 32)?;
         self.morton.record_order(rec, [&self.entries, order], n_facets)
     }

@@ -93,9 +93,15 @@ pub struct Rendered {
 }
 
 impl Renderer {
-    /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs. `skip`: leave out
-    /// what a frame does not need. What is "auto" changes nothing until it is chosen.
-    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, skip: bool) -> Result<Renderer> {
+    /// Checks the scene against the device's limits, then makes every pipeline and buffer it needs.
+    /// `skip`: leave out what a frame does not need. What is "auto" changes nothing until it is
+    /// chosen.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        skip: bool,
+    ) -> Result<Renderer> {
         let free = device.limits().device_memory_bytes - limits::check(scene, device.limits())?;
         let scene = &*scene.exact();
         let groups = scene.groups();
@@ -128,7 +134,12 @@ impl Renderer {
             grid: Grid::new(device, compiler, limits::n_cells_max(scene))?,
             facets: Facets::new(device, compiler, scene.has_ellipsoids())?,
             grouping,
-            transmit: Transmit::new(device, compiler, has_second(scene), &scene.lighting.sums.into())?,
+            transmit: Transmit::new(
+                device,
+                compiler,
+                has_second(scene),
+                &scene.lighting.sums.into(),
+            )?,
             first: First::new(device, compiler)?,
             second,
             tensor,
@@ -138,7 +149,12 @@ impl Renderer {
             buffers: Buffers::new(device, scene, &groups, host_places)?,
             drawing: Drawing::new(device, compiler, scene, settings.format)?,
             i_ended_picture: 0,
-            readback: Buffer::new::<u8>(device, "film.readback", settings.n_bytes(), Place::Readback)?,
+            readback: Buffer::new::<u8>(
+                device,
+                "film.readback",
+                settings.n_bytes(),
+                Place::Readback,
+            )?,
             settings,
             traits: Traits::of(scene, tensors, skip),
             last: None,
@@ -156,14 +172,18 @@ impl Renderer {
         self.end()
     }
 
-    /// Uploads, records and submits a frame, and gives what can be waited for. At most [`IN_FLIGHT`] frames may have begun
-    /// and not ended.
+    /// Uploads, records and submits a frame, and gives what can be waited for. At most
+    /// [`IN_FLIGHT`] frames may have begun and not ended.
     pub fn begin(&mut self, packet: Packet) -> Result<Pending> {
         if self.failed {
-            return Err(Error::usage("a frame has failed: what the device holds is not known any more"));
+            return Err(Error::usage(
+                "a frame has failed: what the device holds is not known any more",
+            ));
         }
         if self.in_flight.len() == IN_FLIGHT {
-            return Err(Error::usage(format!("{IN_FLIGHT} frames are in flight; one must end before the next begins")));
+            return Err(Error::usage(format!(
+                "{IN_FLIGHT} frames are in flight; one must end before the next begins"
+            )));
         }
         // Until all of it has gone well the device and what is remembered of it may differ.
         self.failed = true;
@@ -180,7 +200,11 @@ impl Renderer {
             self.drawing.decide(plan, &packet)
         });
         let slot = (self.n_begun % IN_FLIGHT as u64) as usize;
-        if plan.runs(Pass::Surfaces) || plan.runs(Pass::Terrain) || plan.runs(Pass::Sprites) || plan.runs(Pass::Tiles) {
+        if plan.runs(Pass::Surfaces)
+            || plan.runs(Pass::Terrain)
+            || plan.runs(Pass::Sprites)
+            || plan.runs(Pass::Tiles)
+        {
             self.drawing.turn();
         }
         info_span!("upload").in_scope(|| self.write(slot, &packet))?;
@@ -196,7 +220,8 @@ impl Renderer {
 
     /// Waits for the oldest frame in flight and gives what it tells.
     pub fn end(&mut self) -> Result<Rendered> {
-        let frame = self.in_flight.pop_front().ok_or_else(|| Error::usage("no frame is in flight"))?;
+        let frame =
+            self.in_flight.pop_front().ok_or_else(|| Error::usage("no frame is in flight"))?;
         self.failed = true;
         let passes = self.frames[frame.slot].wait()?;
         self.failed = false;
@@ -226,7 +251,8 @@ impl Renderer {
         self.traits.skip = skip;
     }
 
-    /// From the next frame on as if everything moved in each: what a run makes once is kept, all else is done anew.
+    /// From the next frame on as if everything moved in each: what a run makes once is kept, all
+    /// else is done anew.
     pub fn move_all(&mut self) {
         (self.traits.skip, self.traits.keeps_made) = (false, true);
     }
@@ -278,39 +304,78 @@ impl Renderer {
             second.iter().for_each(|s| s.record_feeds(rec, slot));
             tensor.iter().for_each(|t| t.record_feeds(rec, slot));
             pass(rec, plan, Pass::Generate, |rec| {
-                generate.record(rec, [&b.boxes, &b.i_group, &b.particles, &b.status], n, MAX_ATTEMPTS)
+                generate.record(
+                    rec,
+                    [&b.boxes, &b.i_group, &b.particles, &b.status],
+                    n,
+                    MAX_ATTEMPTS,
+                )
             })?;
-            pass(rec, plan, Pass::Live, |rec| lives.iter().try_for_each(|l| l.record(rec, slot, &b.particles)))?;
+            pass(rec, plan, Pass::Live, |rec| {
+                lives.iter().try_for_each(|l| l.record(rec, slot, &b.particles))
+            })?;
             pass(rec, plan, Pass::Place, |rec| match &b.placed {
                 Placed::ByHost(feed) => {
                     feed.record(rec, slot);
                     Ok(())
                 }
-                Placed::ByDevice(placed) => {
-                    place.record(rec, [&b.particles, &b.i_group, &b.groups.buffer, &b.modes.buffer, placed], n)
-                }
+                Placed::ByDevice(placed) => place.record(
+                    rec,
+                    [&b.particles, &b.i_group, &b.groups.buffer, &b.modes.buffer, placed],
+                    n,
+                ),
             })?;
             let placed = b.placed.buffer();
             pass(rec, plan, Pass::Grid, |rec| {
-                grid.record(rec, [placed, &b.particles, &b.density], &packet.grid, n, packet.heaviest)
+                grid.record(
+                    rec,
+                    [placed, &b.particles, &b.density],
+                    &packet.grid,
+                    n,
+                    packet.heaviest,
+                )
             })?;
-            pass(rec, plan, Pass::Morton, |rec| grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b)))?;
+            pass(rec, plan, Pass::Morton, |rec| {
+                grouping.as_ref().map_or(Ok(()), |g| g.record_order(rec, b))
+            })?;
             pass(rec, plan, Pass::Facets, |rec| {
                 match grouping {
                     Some(grouping) => grouping.record_facets(rec, facets, b, packet)?,
                     None => {
-                        let buffers = [placed, &b.particles, &b.i_group, &b.groups.buffer, &b.density, &b.facets];
+                        let buffers = [
+                            placed,
+                            &b.particles,
+                            &b.i_group,
+                            &b.groups.buffer,
+                            &b.density,
+                            &b.facets,
+                        ];
                         facets.record(rec, buffers, &packet.grid, n, s.n_solid_facets)?;
                     }
                 }
                 let n_surface_facets = s.n_surface_facets;
-                facets.record_surfaces(rec, [&b.regions.buffer, &b.i_region, &b.facets], n_surface_facets)?;
+                facets.record_surfaces(
+                    rec,
+                    [&b.regions.buffer, &b.i_region, &b.facets],
+                    n_surface_facets,
+                )?;
                 let n_ground = s.n_solid_facets - n_surface_facets;
-                facets.record_terrain(rec, [&b.regions.buffer, &b.ground, &b.facets], n_ground, n_surface_facets)
+                facets.record_terrain(
+                    rec,
+                    [&b.regions.buffer, &b.ground, &b.facets],
+                    n_ground,
+                    n_surface_facets,
+                )
             })?;
             pass(rec, plan, Pass::Transmit, |rec| {
-                let buffers =
-                    [&b.facets, &b.lights.buffer, &b.regions.buffer, &b.density, &b.transmittance, &b.through];
+                let buffers = [
+                    &b.facets,
+                    &b.lights.buffer,
+                    &b.regions.buffer,
+                    &b.density,
+                    &b.transmittance,
+                    &b.through,
+                ];
                 transmit.record(
                     rec,
                     buffers,
@@ -324,8 +389,19 @@ impl Renderer {
                 if let Some(tensor) = tensor {
                     return tensor.record_first(rec, b, packet, s);
                 }
-                let from = [&b.facets, &b.lights.buffer, &b.transmittance, &b.regions.buffer, &b.table.buffer, &b.lit];
-                let push = FirstPush { eye: packet.camera.eye, n_facets: s.n_facets, n_lights: s.n_lights };
+                let from = [
+                    &b.facets,
+                    &b.lights.buffer,
+                    &b.transmittance,
+                    &b.regions.buffer,
+                    &b.table.buffer,
+                    &b.lit,
+                ];
+                let push = FirstPush {
+                    eye: packet.camera.eye,
+                    n_facets: s.n_facets,
+                    n_lights: s.n_lights,
+                };
                 first.record(rec, from, &push)
             })?;
             pass(rec, plan, Pass::Second, |rec| match second {

@@ -1,4 +1,5 @@
-//! A player's scene with other boxes: only particles that follow from what has changed are generated.
+//! A player's scene with other boxes: only particles that follow from what has changed are
+//! generated.
 
 use std::sync::Arc;
 
@@ -19,8 +20,8 @@ use crate::model::scene::{Scene, Simulate};
 pub enum Reshaped {
     /// They are those that were there.
     InPlace,
-    /// Boxes have other numbers of particles, or there are more or fewer of them: made anew, and particles that are the
-    /// same were copied.
+    /// Boxes have other numbers of particles, or there are more or fewer of them: made anew, and
+    /// particles that are the same were copied.
     Anew,
 }
 
@@ -33,34 +34,50 @@ struct Kept {
 }
 
 impl Player {
-    /// Goes on with `scene`, which is as the player's but for boxes and seeds of clouds that are made from boxes; what its
-    /// `draw` says was settled when the player was made. `touched`: numbers of `scene`'s groups, rising, whose particles
-    /// follow from something that changed; all others are taken to be as they were relative to their boxes' centres. The
-    /// next frame is like a first one, but that nothing is generated in it; a [`Renderer::reset`] before it takes that
-    /// back. To be called between runs. An error leaves the player as it was, but where the device fails.
-    pub fn reshape(&mut self, bed: &Bed, scene: impl Into<Arc<Scene>>, touched: &[usize]) -> Result<Reshaped> {
+    /// Goes on with `scene`, which is as the player's but for boxes and seeds of clouds that are
+    /// made from boxes; what its `draw` says was settled when the player was made. `touched`:
+    /// numbers of `scene`'s groups, rising, whose particles follow from something that changed; all
+    /// others are taken to be as they were relative to their boxes' centres. The next frame is like
+    /// a first one, but that nothing is generated in it; a [`Renderer::reset`] before it takes that
+    /// back. To be called between runs. An error leaves the player as it was, but where the device
+    /// fails.
+    pub fn reshape(
+        &mut self,
+        bed: &Bed,
+        scene: impl Into<Arc<Scene>>,
+        touched: &[usize],
+    ) -> Result<Reshaped> {
         let mut scene: Arc<Scene> = scene.into();
         if scene.draw != self.scene.draw {
             Arc::make_mut(&mut scene).draw = self.scene.draw;
         }
         if !differs_in_boxes_alone(&self.scene, &scene) {
-            return Err(Error::usage("only boxes and seeds may differ from the scene that is played"));
+            return Err(Error::usage(
+                "only boxes and seeds may differ from the scene that is played",
+            ));
         }
         self.renderer.check_ready()?;
         let groups = scene.groups();
         if !touched.is_sorted() || touched.iter().any(|i| *i >= groups.len()) {
-            return Err(Error::usage(format!("expected rising numbers of groups below {}", groups.len())));
+            return Err(Error::usage(format!(
+                "expected rising numbers of groups below {}",
+                groups.len()
+            )));
         }
         limits::check(&scene, bed.device.limits())?;
         let old_groups = self.scene.groups();
         let is_same_size = old_groups.len() == groups.len()
-            && old_groups.iter().zip(&groups).all(|(a, b)| (a.i_cloud, a.n_particles) == (b.i_cloud, b.n_particles));
+            && old_groups
+                .iter()
+                .zip(&groups)
+                .all(|(a, b)| (a.i_cloud, a.n_particles) == (b.i_cloud, b.n_particles));
         let reshaped = if is_same_size && is_thin(&self.scene) == is_thin(&scene) {
             self.renderer.make_room(&bed.device, &scene)?;
             self.renderer.reshape(&bed.device, &scene, &groups, touched)?;
             Reshaped::InPlace
         } else {
-            let mut renderer = Renderer::new(&bed.device, bed.compiler(), &scene, self.renderer.traits.skip)?;
+            let mut renderer =
+                Renderer::new(&bed.device, bed.compiler(), &scene, self.renderer.traits.skip)?;
             renderer.traits.keeps_made = self.renderer.traits.keeps_made;
             let kept = kept((&self.scene.clouds, &old_groups), (&scene.clouds, &groups), touched);
             renderer.adopt(&mut self.renderer, &groups, (&kept, touched))?;
@@ -81,7 +98,9 @@ impl Renderer {
     /// No frame is in flight and none has failed.
     fn check_ready(&self) -> Result<()> {
         match self.failed {
-            true => Err(Error::usage("a frame has failed: what the device holds is not known any more")),
+            true => {
+                Err(Error::usage("a frame has failed: what the device holds is not known any more"))
+            }
             false => self.check_alone(),
         }
     }
@@ -97,7 +116,8 @@ impl Renderer {
         if n <= self.grid.room() {
             return Ok(());
         }
-        // A drag goes on as it began: twice as many, so that few of its steps come here; a cube has room for any.
+        // A drag goes on as it began: twice as many, so that few of its steps come here; a cube has
+        // room for any.
         let side = u64::from(scene.lighting.grid);
         let n = (2 * n).min(side * side * side).max(n);
         let density = Buffer::new::<f32>(device, "grid.density", n, Place::Device)?;
@@ -106,12 +126,23 @@ impl Renderer {
         Ok(())
     }
 
-    fn reshape(&mut self, device: &Device, scene: &Scene, groups: &[Group], touched: &[usize]) -> Result<()> {
+    fn reshape(
+        &mut self,
+        device: &Device,
+        scene: &Scene,
+        groups: &[Group],
+        touched: &[usize],
+    ) -> Result<()> {
         // Until all of it has gone well nobody knows whose particles lie there.
         self.failed = true;
         upload(device, &mut self.host, &box_records(scene, groups), &self.buffers.boxes)?;
         if self.traits.textured {
-            upload(device, &mut self.host, &textured_records(scene, groups), &self.buffers.textured)?;
+            upload(
+                device,
+                &mut self.host,
+                &textured_records(scene, groups),
+                &self.buffers.textured,
+            )?;
         }
         let is_made = self.is_made();
         if is_made {
@@ -121,8 +152,14 @@ impl Renderer {
         Ok(())
     }
 
-    /// Takes what is the same from another renderer's buffers, and generates the rest; nothing where that has none yet.
-    fn adopt(&mut self, from: &mut Renderer, groups: &[Group], (kept, touched): (&[Kept], &[usize])) -> Result<()> {
+    /// Takes what is the same from another renderer's buffers, and generates the rest; nothing
+    /// where that has none yet.
+    fn adopt(
+        &mut self,
+        from: &mut Renderer,
+        groups: &[Group],
+        (kept, touched): (&[Kept], &[usize]),
+    ) -> Result<()> {
         if !from.is_made() {
             return Ok(());
         }
@@ -149,7 +186,9 @@ impl Renderer {
         let (generate, b) = (&self.generate, &self.buffers);
         let buffers = [&b.boxes, &b.i_group, &b.particles, &b.status];
         let runs = runs(groups, touched);
-        self.host.run(|rec| runs.iter().try_for_each(|run| generate.record_run(rec, buffers, *run, MAX_ATTEMPTS)))?;
+        self.host.run(|rec| {
+            runs.iter().try_for_each(|run| generate.record_run(rec, buffers, *run, MAX_ATTEMPTS))
+        })?;
         Ok(())
     }
 
@@ -171,18 +210,31 @@ fn runs(groups: &[Group], touched: &[usize]) -> Vec<[u32; 2]> {
     runs
 }
 
-/// What particles of boxes `new` has of `old`: those of boxes with the same number in the same cloud that are not touched.
-fn kept((old, old_groups): (&[Cloud], &[Group]), (new, groups): (&[Cloud], &[Group]), touched: &[usize]) -> Vec<Kept> {
+/// What particles of boxes `new` has of `old`: those of boxes with the same number in the same
+/// cloud that are not touched.
+fn kept(
+    (old, old_groups): (&[Cloud], &[Group]),
+    (new, groups): (&[Cloud], &[Group]),
+    touched: &[usize],
+) -> Vec<Kept> {
     let mut kept: Vec<Kept> = vec![];
     let (mut i_there, mut i_here) = (0, 0);
     for (was, cloud) in old.iter().zip(new) {
         let (n_there, n_here) = (was.n_groups() as usize, cloud.n_groups() as usize);
         if matches!(cloud.source, CloudSource::Boxes { .. }) {
-            for i in (0..n_there.min(n_here)).filter(|i| touched.binary_search(&(i_here + i)).is_err()) {
+            for i in
+                (0..n_there.min(n_here)).filter(|i| touched.binary_search(&(i_here + i)).is_err())
+            {
                 let (there, here) = (&old_groups[i_there + i], &groups[i_here + i]);
-                let run = Kept { there: there.i_first, here: here.i_first, n: there.n_particles.min(here.n_particles) };
+                let run = Kept {
+                    there: there.i_first,
+                    here: here.i_first,
+                    n: there.n_particles.min(here.n_particles),
+                };
                 match kept.last_mut() {
-                    Some(k) if k.there + k.n == run.there && k.here + k.n == run.here => k.n += run.n,
+                    Some(k) if k.there + k.n == run.there && k.here + k.n == run.here => {
+                        k.n += run.n
+                    }
                     _ => kept.push(run),
                 }
             }
@@ -192,8 +244,8 @@ fn kept((old, old_groups): (&[Cloud], &[Group]), (new, groups): (&[Cloud], &[Gro
     kept
 }
 
-/// Whether all but boxes and seeds of clouds that are made from boxes is the same, and all of their `draw` that says
-/// what is drawn.
+/// Whether all but boxes and seeds of clouds that are made from boxes is the same, and all of their
+/// `draw` that says what is drawn.
 fn differs_in_boxes_alone(a: &Scene, b: &Scene) -> bool {
     let Scene {
         title: _,
@@ -210,8 +262,10 @@ fn differs_in_boxes_alone(a: &Scene, b: &Scene) -> bool {
         clouds,
         air,
     } = a;
-    (film, camera, time, lighting, draw, threads) == (&b.film, &b.camera, &b.time, &b.lighting, &b.draw, &b.threads)
-        && (lights, materials, surfaces, terrains, air) == (&b.lights, &b.materials, &b.surfaces, &b.terrains, &b.air)
+    (film, camera, time, lighting, draw, threads)
+        == (&b.film, &b.camera, &b.time, &b.lighting, &b.draw, &b.threads)
+        && (lights, materials, surfaces, terrains, air)
+            == (&b.lights, &b.materials, &b.surfaces, &b.terrains, &b.air)
         && clouds.len() == b.clouds.len()
         && clouds.iter().zip(&b.clouds).all(|(a, b)| is_same_but_for_boxes(a, b))
 }
@@ -221,7 +275,12 @@ fn is_same_but_for_boxes(a: &Cloud, b: &Cloud) -> bool {
     let same_source = match (source, &b.source) {
         (
             CloudSource::Boxes { boxes: _, form, optical_depth, radius_scale },
-            CloudSource::Boxes { boxes: _, form: b_form, optical_depth: b_depth, radius_scale: b_scale },
+            CloudSource::Boxes {
+                boxes: _,
+                form: b_form,
+                optical_depth: b_depth,
+                radius_scale: b_scale,
+            },
         ) => (form, optical_depth, radius_scale) == (b_form, b_depth, b_scale),
         (source, b_source) => source == b_source && *seed == b.seed,
     };

@@ -1,5 +1,5 @@
-//! When a shell is made, when it is shown again, and where it is cut (docs/model.md §11 "impostors"). What comes of it depends on
-//! the packets since the last reset alone.
+//! When a shell is made, when it is shown again, and where it is cut (docs/model.md §11
+//! "impostors"). What comes of it depends on the packets since the last reset alone.
 
 use glam::{DMat3, DVec2, DVec3, Vec3};
 
@@ -21,8 +21,8 @@ const LEAST_LIFE: u32 = 3;
 const N_CUTS: usize = 8;
 /// Layers of a pixel that showing a shell costs as much as.
 const SHOW_LAYERS: f64 = 4.0;
-/// Pixels of σ, of every group's mean, below which the cubic would take too much of them: a blob of 2 pixels keeps 0.99 of its
-/// height between four texels.
+/// Pixels of σ, of every group's mean, below which the cubic would take too much of them: a blob of
+/// 2 pixels keeps 0.99 of its height between four texels.
 const LEAST_SIGMA: f64 = 2.0;
 /// A cut is at no less than this many radii of the sprites beyond it.
 const LEAST_RADII: f64 = 2.0;
@@ -43,7 +43,12 @@ pub struct Rules {
 impl Rules {
     pub fn of(scene: &Scene) -> Rules {
         let size = [scene.film.width, scene.film.height];
-        Rules { size, shell_size: shell_size(size), cutoff: scene.draw.cutoff, error: scene.draw.impostor_error }
+        Rules {
+            size,
+            shell_size: shell_size(size),
+            cutoff: scene.draw.cutoff,
+            error: scene.draw.impostor_error,
+        }
     }
 }
 
@@ -94,7 +99,8 @@ impl Keeper {
         (self.last, self.kept) = (None, None);
     }
 
-    /// What `packet`'s frame shows. `changed`: what is other than in the last frame, but for the view.
+    /// What `packet`'s frame shows. `changed`: what is other than in the last frame, but for the
+    /// view.
     pub fn step(&mut self, packet: &Packet, changed: Option<&'static str>) -> Step {
         let now = view_of(&packet.camera);
         let last = self.last.replace(now);
@@ -111,7 +117,9 @@ impl Keeper {
             Some((_, Err(why))) => why,
             None => "there is none",
         };
-        let Some(last) = last else { return Step::Nothing("how fast the eye moves is not known yet") };
+        let Some(last) = last else {
+            return Step::Nothing("how fast the eye moves is not known yet");
+        };
         self.kept = self.best(packet, &last, &now);
         match self.kept {
             Some(kept) => Step::Made { kept, why },
@@ -124,14 +132,18 @@ impl Keeper {
         2.0 * view.tangents.x / f64::from(self.rules.size[0])
     }
 
-    /// Pixels that a shell is off by in `now`'s view and the least depth of its centres, or why it is not to be shown.
+    /// Pixels that a shell is off by in `now`'s view and the least depth of its centres, or why it
+    /// is not to be shown.
     fn usable(&self, kept: &Kept, now: &View, packet: &Packet) -> Result<(f64, f64), &'static str> {
         let pixels = self.off_by(&kept.shell, now)?;
         let far = &kept.shell.far;
         let ratio = kept.shell.predict(now).map_or(0.0, |p| p.depth_ratio);
         let nearest = ratio * far.nearest;
-        let mut surfaces =
-            packet.regions.iter().filter(|r| matches!(r.kind, REGION_SURFACE | REGION_TERRAIN)).peekable();
+        let mut surfaces = packet
+            .regions
+            .iter()
+            .filter(|r| matches!(r.kind, REGION_SURFACE | REGION_TERRAIN))
+            .peekable();
         if surfaces.peek().is_some() {
             let farthest = packet.extents.iter().map(|e| depths(e, now)[1]).fold(0.0, f64::max);
             if surfaces.any(|r| is_among(r, now, [nearest, farthest])) {
@@ -150,7 +162,11 @@ impl Keeper {
         if !matches!(pixels, p if p <= self.rules.error) {
             return Err("it would be off by more than draw.impostor_error");
         }
-        if shell.covers(now, FOOTPRINT * pixel) { Ok(pixels) } else { Err("the view leaves its picture") }
+        if shell.covers(now, FOOTPRINT * pixel) {
+            Ok(pixels)
+        } else {
+            Err("the view leaves its picture")
+        }
     }
 
     /// The shell that saves the most if the eye goes on as it came from `last` to `now`.
@@ -164,7 +180,8 @@ impl Keeper {
         for cut in cuts(&packet.extents, &costs, now) {
             let Some(kept) = self.shell(packet, now, cut) else { continue };
             let wide = View { tangents: kept.shell.view.tangents, ..*now };
-            let in_shell: Vec<f64> = packet.extents.iter().map(|e| self.cost(e, &wide, pixel)).collect();
+            let in_shell: Vec<f64> =
+                packet.extents.iter().map(|e| self.cost(e, &wide, pixel)).collect();
             let shown = (kept.bounds[1] - kept.bounds[0]) / pixel;
             let n = self.life(&kept, packet, last, now);
             let anew = sum(&in_shell, cut) / f64::from(n);
@@ -192,28 +209,38 @@ impl Keeper {
         AHEAD
     }
 
-    /// The shell of all that is farther than `cut`; none where that is too near, or a surface is among it.
+    /// The shell of all that is farther than `cut`; none where that is too near, or a surface is
+    /// among it.
     fn shell(&self, packet: &Packet, now: &View, cut: f64) -> Option<Kept> {
         let Rules { size, shell_size, cutoff, .. } = self.rules;
-        let beyond: Vec<(&Extent, [f64; 2])> =
-            packet.extents.iter().map(|e| (e, depths(e, now))).filter(|(_, d)| d[1] >= cut).collect();
+        let beyond: Vec<(&Extent, [f64; 2])> = packet
+            .extents
+            .iter()
+            .map(|e| (e, depths(e, now)))
+            .filter(|(_, d)| d[1] >= cut)
+            .collect();
         let sigma = beyond.iter().map(|(e, _)| e.sigma_max).fold(0.0, f64::max);
         let lengths = now.eye.abs().element_sum() + packet.radius;
-        let (last_key, quantum) = last_key(cut + now.eye.dot(now.forward), packet.radius, packet.sort_bits)?;
+        let (last_key, quantum) =
+            last_key(cut + now.eye.dot(now.forward), packet.radius, packet.sort_bits)?;
         let nearest = cut - quantum - ROUNDING * lengths;
-        let farthest = beyond.iter().map(|(_, d)| d[1]).fold(nearest, f64::max) + ROUNDING * lengths;
+        let farthest =
+            beyond.iter().map(|(_, d)| d[1]).fold(nearest, f64::max) + ROUNDING * lengths;
         let least = beyond.iter().map(|(e, d)| e.sigma_mean / d[1]).fold(f64::INFINITY, f64::min);
         if least < LEAST_SIGMA * self.pixel(now) {
             return None;
         }
         let far = Far { nearest, farthest, sigma, radius: cutoff * sigma };
         // The far set's sprites must be drawn whole, and stay so.
-        if nearest.is_nan() || nearest <= (LEAST_RADII * far.radius).max(2.0 * f64::from(packet.camera.near)) {
+        if nearest.is_nan()
+            || nearest <= (LEAST_RADII * far.radius).max(2.0 * f64::from(packet.camera.near))
+        {
             return None;
         }
         let wider = |k: usize| f64::from(shell_size[k]) / f64::from(size[k]);
         let tangents = now.tangents * DVec2::new(wider(0), wider(1));
-        let camera = CameraRecord { tan_x: tangents.x as f32, tan_y: tangents.y as f32, ..packet.camera };
+        let camera =
+            CameraRecord { tan_x: tangents.x as f32, tan_y: tangents.y as f32, ..packet.camera };
         let kept = Kept {
             shell: Shell { view: view_of(&camera), far },
             camera,
@@ -257,12 +284,16 @@ impl Keeper {
         let z = c.dot(now.forward).max(1e-3 * self.rules.cutoff * extent.sigma_mean);
         let reach = extent.half.length() + self.rules.cutoff * extent.sigma_max;
         let beside = |axis: DVec3, tan: f64| c.dot(axis).abs() - reach > tan * z.max(reach);
-        if c.dot(now.forward) < -reach || beside(now.right, now.tangents.x) || beside(now.up, now.tangents.y) {
+        if c.dot(now.forward) < -reach
+            || beside(now.right, now.tangents.x)
+            || beside(now.up, now.tangents.y)
+        {
             return 0.0;
         }
         let radius = self.rules.cutoff * extent.sigma_mean / z;
         let all = 4.0 * now.tangents.x * now.tangents.y;
-        f64::from(extent.n_particles) * (std::f64::consts::PI * radius * radius).min(all) / (pixel * pixel)
+        f64::from(extent.n_particles) * (std::f64::consts::PI * radius * radius).min(all)
+            / (pixel * pixel)
     }
 }
 
@@ -280,20 +311,26 @@ pub fn view_of(camera: &CameraRecord) -> View {
 
 /// Least and greatest view depth of a group's centres.
 fn depths(extent: &Extent, view: &View) -> [f64; 2] {
-    let (z, half) = ((extent.center - view.eye).dot(view.forward), view.forward.abs().dot(extent.half));
+    let (z, half) =
+        ((extent.center - view.eye).dot(view.forward), view.forward.abs().dot(extent.half));
     [z - half, z + half]
 }
 
 /// The share of a group that is farther than `cut`, as if it were spread evenly over its depths.
 fn share_beyond(extent: &Extent, view: &View, cut: f64) -> f64 {
     let [low, high] = depths(extent, view);
-    if high > low { ((high - cut) / (high - low)).clamp(0.0, 1.0) } else { f64::from(u8::from(low >= cut)) }
+    if high > low {
+        ((high - cut) / (high - low)).clamp(0.0, 1.0)
+    } else {
+        f64::from(u8::from(low >= cut))
+    }
 }
 
 /// Depths that part the groups into equal parts of their costs, and one before all of them.
 fn cuts(extents: &[Extent], costs: &[f64], view: &View) -> Vec<f64> {
     let of = |(e, cost): (&Extent, &f64)| ((e.center - view.eye).dot(view.forward), *cost);
-    let mut sorted: Vec<(f64, f64)> = extents.iter().zip(costs).map(of).filter(|(_, cost)| *cost > 0.0).collect();
+    let mut sorted: Vec<(f64, f64)> =
+        extents.iter().zip(costs).map(of).filter(|(_, cost)| *cost > 0.0).collect();
     sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
     let total: f64 = sorted.iter().map(|(_, cost)| cost).sum();
     let (mut cuts, mut sum) = (vec![], 0.0);
@@ -308,8 +345,8 @@ fn cuts(extents: &[Extent], costs: &[f64], view: &View) -> Vec<f64> {
     cuts
 }
 
-/// The last sort key of depths of at least `z` relative to the lighting origin, and how much less a depth of that key may be;
-/// none where no depth has one.
+/// The last sort key of depths of at least `z` relative to the lighting origin, and how much less a
+/// depth of that key may be; none where no depth has one.
 fn last_key(z: f64, radius: f64, sort_bits: u32) -> Option<(u32, f64)> {
     if sort_bits == 32 {
         let z = z as f32;

@@ -1,4 +1,5 @@
-//! Blobs drawn into a smaller picture, and what puts it over the full one (docs/model.md §11 "upsample").
+//! Blobs drawn into a smaller picture, and what puts it over the full one (docs/model.md §11
+//! "upsample").
 
 use super::buffers::Buffers;
 use super::drawing::Drawing;
@@ -17,7 +18,8 @@ use crate::passes::upsample::{Extents, Upsample};
 
 pub(super) struct Shrunk {
     small: SmallPicture,
-    /// A picture of its own, smaller, whose surfaces are black, let nothing through and are nowhere in its alpha.
+    /// A picture of its own, smaller, whose surfaces are black, let nothing through and are nowhere
+    /// in its alpha.
     pub drawing: Drawing,
     upsample: Upsample,
     /// The blobs alone.
@@ -29,7 +31,12 @@ pub(super) struct Shrunk {
 }
 
 impl Shrunk {
-    pub fn new(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Shrunk> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        format: TargetFormat,
+    ) -> Result<Shrunk> {
         let full = [scene.film.width, scene.film.height];
         let small = SmallPicture::of(full, scene.draw.resolution.divisor());
         let film = Film { width: small.size[0], height: small.size[1], ..scene.film };
@@ -39,8 +46,9 @@ impl Shrunk {
         let extents = Extents { full, small: small.size, offsets: small.offsets(), n: small.n };
         let n_full = u64::from(full[0]) * u64::from(full[1]);
         // Whole texels.
-        let texels =
-            |name, n: u64, bytes: u64| Buffer::new::<[u32; 4]>(device, name, (n * bytes).div_ceil(16), Place::Device);
+        let texels = |name, n: u64, bytes: u64| {
+            Buffer::new::<[u32; 4]>(device, name, (n * bytes).div_ceil(16), Place::Device)
+        };
         let pixel = format.bytes_per_pixel();
         let surfaces = || -> Result<[Buffer; 3]> {
             let under = texels("upsample.under", n_full, pixel)?;
@@ -62,7 +70,11 @@ impl Shrunk {
     pub fn camera(&self, camera: &CameraRecord) -> CameraRecord {
         let by = self.small.widening();
         let wider = |tan: f32, by: f64| (f64::from(tan) * by) as f32;
-        CameraRecord { tan_x: wider(camera.tan_x, by.x), tan_y: wider(camera.tan_y, by.y), ..*camera }
+        CameraRecord {
+            tan_x: wider(camera.tan_x, by.x),
+            tan_y: wider(camera.tan_y, by.y),
+            ..*camera
+        }
     }
 
     /// Columns and rows of the blobs' picture.
@@ -100,7 +112,8 @@ impl Shrunk {
         self.drawing.record_blobs(rec, path, b, (packet.n_drawn, &camera), s)
     }
 
-    /// Puts the blobs, as `path` has drawn them, into picture `i`, over the surfaces that were drawn on `under`.
+    /// Puts the blobs, as `path` has drawn them, into picture `i`, over the surfaces that were
+    /// drawn on `under`.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,

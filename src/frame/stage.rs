@@ -66,7 +66,11 @@ impl Bed {
     }
 
     /// The same on an instance that is there.
-    pub fn of_instance(instance: Arc<Instance>, choice: &DeviceChoice, sources: Sources) -> Result<Bed> {
+    pub fn of_instance(
+        instance: Arc<Instance>,
+        choice: &DeviceChoice,
+        sources: Sources,
+    ) -> Result<Bed> {
         let device = Device::open(&instance, choice.device.as_deref())?;
         if choice.poison {
             device.poison();
@@ -95,7 +99,8 @@ impl Bed {
         player(&self.device, &self.compiler, scene.into(), skip)
     }
 
-    /// Ends it, once all players are gone; an error where validation or the leak report had anything to say.
+    /// Ends it, once all players are gone; an error where validation or the leak report had
+    /// anything to say.
     pub fn close(self) -> Result<()> {
         let Bed { device, instance, .. } = self;
         drop(device);
@@ -119,7 +124,8 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// Opens a device and makes everything the scene needs on it. `skip`: leave out what a frame does not need.
+    /// Opens a device and makes everything the scene needs on it. `skip`: leave out what a frame
+    /// does not need.
     pub fn new(scene: impl Into<Arc<Scene>>, choice: &DeviceChoice, skip: bool) -> Result<Stage> {
         Stage::build(scene.into(), skip, Bed::open(choice)?)
     }
@@ -140,7 +146,11 @@ impl Stage {
     /// What every "auto" came to, as users are told, once.
     pub fn take_chosen(&mut self) -> Vec<String> {
         let choices = std::mem::take(&mut self.choices);
-        choices.iter().map(Choice::text).chain(self.impostor_choice.take().map(|c| c.text())).collect()
+        choices
+            .iter()
+            .map(Choice::text)
+            .chain(self.impostor_choice.take().map(|c| c.text()))
+            .collect()
     }
 
     /// Runs `frames` from a fresh start, on one thread or two; `on_frame` sees each as it ends.
@@ -153,7 +163,9 @@ impl Stage {
         self.renderer.reset();
         match threading {
             Threading::Serial => serial::run(&mut self.game, &mut self.renderer, frames, on_frame),
-            Threading::Parallel => parallel::run(&mut self.game, &mut self.renderer, frames, on_frame),
+            Threading::Parallel => {
+                parallel::run(&mut self.game, &mut self.renderer, frames, on_frame)
+            }
         }
     }
 
@@ -182,7 +194,9 @@ fn said(instance: &Instance) -> Result<()> {
     if said.is_empty() {
         return Ok(());
     }
-    Err(Error::Check { what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")) })
+    Err(Error::Check {
+        what: format!("{} validation messages or leaks:\n{}", said.len(), said.join("\n")),
+    })
 }
 
 fn player(device: &Device, compiler: &Compiler, scene: Arc<Scene>, skip: bool) -> Result<Player> {

@@ -1,5 +1,5 @@
-//! The tensors T1 and T2 of a scene whose materials are edited: how they are laid out, and the stage that fills and sums
-//! them (docs/model.md §11 "contract").
+//! The tensors T1 and T2 of a scene whose materials are edited: how they are laid out, and the
+//! stage that fills and sums them (docs/model.md §11 "contract").
 
 use super::buffers::{Buffers, upload};
 use super::exchange::{Exchange, is_glossy, region_sizes, turns};
@@ -83,7 +83,14 @@ impl Shape {
         }
         let n_rows = n_rows.next_multiple_of(u64::from(TILE));
         let has_second = scene.lighting.mode == LightingMode::TwoReflection;
-        Shape { blocks, n_bases, n_lights: scene.lights.len() as u32, n_rows, n_columns, has_second }
+        Shape {
+            blocks,
+            n_bases,
+            n_lights: scene.lights.len() as u32,
+            n_rows,
+            n_columns,
+            has_second,
+        }
     }
 
     pub fn n_first(&self) -> u64 {
@@ -96,9 +103,13 @@ impl Shape {
         self.n_first().checked_mul(n_columns)
     }
 
-    /// C by column: K_d of the region (channel by channel where there are three), then K_s c_b(n_s). `brdfs` by region;
-    /// `coefficients`: c_b of each.
-    pub fn coefficients(&self, brdfs: &[Brdf], coefficients: impl Fn(usize) -> Vec<f64>) -> Vec<[f32; 4]> {
+    /// C by column: K_d of the region (channel by channel where there are three), then K_s
+    /// c_b(n_s). `brdfs` by region; `coefficients`: c_b of each.
+    pub fn coefficients(
+        &self,
+        brdfs: &[Brdf],
+        coefficients: impl Fn(usize) -> Vec<f64>,
+    ) -> Vec<[f32; 4]> {
         let mut columns = Vec::with_capacity(self.n_columns as usize);
         for (i, (block, brdf)) in self.blocks.iter().zip(brdfs).enumerate() {
             let kd = brdf.kd.as_vec3();
@@ -115,18 +126,22 @@ impl Shape {
 }
 
 impl Shape {
-    /// By region (first, number) of its spans, then the spans: (first, number) of the columns of regions whose light can
-    /// reach it. T2 holds nothing elsewhere.
+    /// By region (first, number) of its spans, then the spans: (first, number) of the columns of
+    /// regions whose light can reach it. T2 holds nothing elsewhere.
     pub fn spans(&self, scene: &Scene) -> Vec<[u32; 2]> {
         let sizes = region_sizes(scene);
         let mut spans = vec![[0, 0]; sizes.len()];
         if !self.has_second {
             return spans;
         }
-        for (i, from) in pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len()).iter().enumerate() {
+        for (i, from) in
+            pairings(&scene.surfaces, scene.terrains.len() + scene.clouds.len()).iter().enumerate()
+        {
             let first = spans.len();
             // Nothing is written for an emitter without facets.
-            for block in from.iter().filter(|p| sizes[p.i_emitter] > 0).map(|p| self.blocks[p.i_emitter]) {
+            for block in
+                from.iter().filter(|p| sizes[p.i_emitter] > 0).map(|p| self.blocks[p.i_emitter])
+            {
                 let n = block.n_plain + block.n_vectors;
                 match spans[first..].last_mut() {
                     // Neighbours make one.
@@ -153,7 +168,9 @@ pub fn tensor_stage(
     }
     let shape = Shape::of(scene, basis_of(scene).map_or(1, |b| b.n_bases()));
     match limits::tensors(&shape, device.limits(), free) {
-        Tensors::Kept => Ok((Tensors::Kept, Some(TensorStage::new(device, compiler, commands, scene, shape)?))),
+        Tensors::Kept => {
+            Ok((Tensors::Kept, Some(TensorStage::new(device, compiler, commands, scene, shape)?)))
+        }
         other => Ok((other, None)),
     }
 }
@@ -182,13 +199,24 @@ impl TensorStage {
         shape: Shape,
     ) -> Result<TensorStage> {
         let second = match shape.has_second {
-            true => Some(SecondTensor::new(device, compiler, scene.n_particles() > 0, shape.n_bases, turns(scene))?),
+            true => Some(SecondTensor::new(
+                device,
+                compiler,
+                scene.n_particles() > 0,
+                shape.n_bases,
+                turns(scene),
+            )?),
             false => None,
         };
         // One that has no number does not fit either; the limits have been asked before.
         let n_second = shape.n_second().unwrap_or(u64::MAX);
         let from_whom = shape.spans(scene);
-        let spans = Buffer::new::<[u32; 2]>(device, "contract.spans", from_whom.len() as u64, Place::Device)?;
+        let spans = Buffer::new::<[u32; 2]>(
+            device,
+            "contract.spans",
+            from_whom.len() as u64,
+            Place::Device,
+        )?;
         upload(device, commands, &from_whom, &spans)?;
         Ok(TensorStage {
             spans,
@@ -197,7 +225,11 @@ impl TensorStage {
             contract: Contract::new(device, compiler, shape.n_bases, &scene.lighting.sums.into())?,
             t1: Buffer::new::<f32>(device, "first.t1", shape.n_first(), Place::Device)?,
             t2: Buffer::new::<f32>(device, "second.t2", n_second, Place::Device)?,
-            coefficients: Feed::new::<[f32; 4]>(device, "contract.coefficients", u64::from(shape.n_columns))?,
+            coefficients: Feed::new::<[f32; 4]>(
+                device,
+                "contract.coefficients",
+                u64::from(shape.n_columns),
+            )?,
             i_vectors: scene.materials.len() as u32,
             shape,
         })
@@ -226,12 +258,20 @@ impl TensorStage {
             n_rows: self.shape.n_rows as u32,
             i_vectors: self.i_vectors,
         };
-        let buffers =
-            [&b.facets, &b.lights.buffer, &b.transmittance, &b.regions.buffer, &b.table.buffer, &self.t1, &b.lit];
+        let buffers = [
+            &b.facets,
+            &b.lights.buffer,
+            &b.transmittance,
+            &b.regions.buffer,
+            &b.table.buffer,
+            &self.t1,
+            &b.lit,
+        ];
         self.first.record(rec, buffers, &push)
     }
 
-    /// A gather a light: one without energy costs nothing. `rounds`: what the gathers at once would be told.
+    /// A gather a light: one without energy costs nothing. `rounds`: what the gathers at once would
+    /// be told.
     #[allow(clippy::too_many_arguments, reason = "what a gather is made of")]
     pub(super) fn record_second(
         &self,
@@ -277,7 +317,12 @@ impl TensorStage {
         }
     }
 
-    pub(super) fn record_contract(&self, rec: &mut Recorder<'_>, b: &Buffers, s: &Settings) -> Result<()> {
+    pub(super) fn record_contract(
+        &self,
+        rec: &mut Recorder<'_>,
+        b: &Buffers,
+        s: &Settings,
+    ) -> Result<()> {
         let push = ContractPush {
             n_facets: s.n_facets,
             n_lights: s.n_lights,

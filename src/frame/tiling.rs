@@ -28,16 +28,29 @@ impl Tiling {
         variant: &Variant,
     ) -> Result<Tiling> {
         let tiles = Tiles::new(device, compiler, division, n_max, variant)?;
-        let bytes = u64::from(division.width) * u64::from(division.height) * variant.format.bytes_per_pixel();
+        let bytes = u64::from(division.width)
+            * u64::from(division.height)
+            * variant.format.bytes_per_pixel();
         let picture = |name| Buffer::new::<u8>(device, name, bytes, Place::Device);
         let sort = Sort::for_bits(device, compiler, tiles.capacity(), division.n_bits())?;
         Ok(Tiling { sort, tiles, pictures: [picture("tiles.even")?, picture("tiles.odd")?] })
     }
 
     /// For the pictures of `scene`.
-    pub fn of_scene(device: &Device, compiler: &Compiler, scene: &Scene, format: TargetFormat) -> Result<Tiling> {
+    pub fn of_scene(
+        device: &Device,
+        compiler: &Compiler,
+        scene: &Scene,
+        format: TargetFormat,
+    ) -> Result<Tiling> {
         let behind = scene.has_solids() || scene.draw.impostors != Impostors::Off;
-        Tiling::of_size(device, compiler, scene, [scene.film.width, scene.film.height], (format, behind))
+        Tiling::of_size(
+            device,
+            compiler,
+            scene,
+            [scene.film.width, scene.film.height],
+            (format, behind),
+        )
     }
 
     /// For pictures of the scene of another size; `behind`: over what has been drawn.
@@ -52,7 +65,8 @@ impl Tiling {
         let n_texels = (3 * scene.n_particles()).max(4 * scene.n_facets());
         if n_texels > device.limits().max_texels {
             return Err(Error::limit(format!(
-                "draw.path = \"tiles\": {n_texels} texels of particles or facets are wanted, this device takes {} at most \
+                "draw.path = \"tiles\": {n_texels} texels of particles or facets are wanted, this \
+                 device takes {} at most \
                  (maxTexelBufferElements); expected \"sprites\"",
                 device.limits().max_texels
             )));
@@ -62,8 +76,8 @@ impl Tiling {
         Tiling::new(device, compiler, division, scene.n_particles() as u32, &variant)
     }
 
-    /// Draws the first `n` of the sorted entries, the particles' facets from `i_first_facet` on, into picture `i`, over the drawn
-    /// surfaces where there are any. `buffers` as in `sprites`.
+    /// Draws the first `n` of the sorted entries, the particles' facets from `i_first_facet` on,
+    /// into picture `i`, over the drawn surfaces where there are any. `buffers` as in `sprites`.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -86,7 +100,8 @@ impl Tiling {
             tiles.record_pairs(rec, i_round, n, view)?;
             let [i_count, i_groups] = Tiles::i_extent(i_round);
             let pairs = Counts { buffer: &tiles.round, i_count, i_groups };
-            let sorted = self.sort.record_counted(rec, &tiles.entries, tiles.division.n_bits(), pairs)?;
+            let sorted =
+                self.sort.record_counted(rec, &tiles.entries, tiles.division.n_bits(), pairs)?;
             tiles.record_compose(rec, i_round, [sorted, picture, buffers[8]], view)?;
         }
         Ok(())
@@ -116,7 +131,8 @@ pub fn is_thin(scene: &Scene) -> bool {
     tau_most(scene) <= THIN
 }
 
-/// What may be left out behind a pixel: half a step of the format below 1, where a target shows no less.
+/// What may be left out behind a pixel: half a step of the format below 1, where a target shows no
+/// less.
 pub fn saturated(format: FilmFormat) -> f64 {
     0.5 * format.unit_roundoff()
 }
@@ -129,7 +145,11 @@ fn tau_most(scene: &Scene) -> f64 {
     let of = |g: &Group| {
         let growth = scene.clouds[g.i_cloud].growth.to.max(1.0);
         // One particle stands for all of its group at most.
-        let denser = if scene.draw.count.is_some_and(|c| c.conserve) { f64::from(g.n_particles) } else { 1.0 };
+        let denser = if scene.draw.count.is_some_and(|c| c.conserve) {
+            f64::from(g.n_particles)
+        } else {
+            1.0
+        };
         SQRT_TAU * g.kappa_max * g.sigma_widest() * growth * denser
     };
     scene.groups().iter().map(of).fold(0.0, f64::max)

@@ -1,7 +1,9 @@
-//! The device's clock beside the host's: readings of both at one moment (VK_KHR_calibrated_timestamps, or its
-//! predecessor of EXT), and the line through them that lays times of the device onto the host's clock.
+//! The device's clock beside the host's: readings of both at one moment
+//! (VK_KHR_calibrated_timestamps, or its predecessor of EXT), and the line through them that lays
+//! times of the device onto the host's clock.
 //!
-//! `Instant` is CLOCK_MONOTONIC on Linux, which is one of the extension's domains; elsewhere nothing is calibrated.
+//! `Instant` is CLOCK_MONOTONIC on Linux, which is one of the extension's domains; elsewhere
+//! nothing is calibrated.
 
 use std::ffi::CStr;
 use std::time::Instant;
@@ -34,23 +36,27 @@ pub struct ClockFit {
     /// Host nanoseconds a nanosecond of the device: 1 but for the drift of two oscillators.
     pub rate: f64,
     pub n_pairs: usize,
-    /// Greatest distance of a reading from the line and of a reading's two clocks from one another, added.
+    /// Greatest distance of a reading from the line and of a reading's two clocks from one another,
+    /// added.
     pub deviation_ns: f64,
 }
 
-/// Readings less than this apart say nothing of the clocks' rates: at deviations of some 10 µs, 1 in 10⁴.
+/// Readings less than this apart say nothing of the clocks' rates: at deviations of some 10 µs, 1
+/// in 10⁴.
 const LEAST_SPAN_NS: f64 = 1e8;
 
 impl ClockFit {
-    /// The least squares line through `pairs`. Where they lie too near to one another to tell the rates apart both clocks
-    /// are taken to run alike. None without a pair.
+    /// The least squares line through `pairs`. Where they lie too near to one another to tell the
+    /// rates apart both clocks are taken to run alike. None without a pair.
     pub fn of(pairs: &[ClockPair]) -> Option<ClockFit> {
         let epoch = pairs.iter().map(|pair| pair.host).min()?;
         let n = pairs.len() as f64;
-        let host = |pair: &ClockPair| pair.host.saturating_duration_since(epoch).as_secs_f64() * 1e9;
+        let host =
+            |pair: &ClockPair| pair.host.saturating_duration_since(epoch).as_secs_f64() * 1e9;
         // A device may have counted for months: the differences are what doubles hold well.
         let first_ns = pairs[0].device_ns;
-        let device_ns = first_ns + pairs.iter().map(|pair| pair.device_ns - first_ns).sum::<f64>() / n;
+        let device_ns =
+            first_ns + pairs.iter().map(|pair| pair.device_ns - first_ns).sum::<f64>() / n;
         let host_ns = pairs.iter().map(host).sum::<f64>() / n;
         let apart = |pair: &ClockPair| [pair.device_ns - device_ns, host(pair) - host_ns];
         let [mut xx, mut xy] = [0.0; 2];
@@ -69,7 +75,8 @@ impl ClockFit {
         Some(ClockFit { device_ns, host_ns, epoch, rate, n_pairs: pairs.len(), deviation_ns })
     }
 
-    /// Nanoseconds from `zero` to when the device's clock showed `device_ns`; before it they are negative.
+    /// Nanoseconds from `zero` to when the device's clock showed `device_ns`; before it they are
+    /// negative.
     pub fn ns_since(&self, zero: Instant, device_ns: f64) -> f64 {
         let from_epoch = |at: Instant| match at.checked_duration_since(self.epoch) {
             Some(after) => after.as_secs_f64() * 1e9,
@@ -98,26 +105,34 @@ pub(super) fn probe(instance: &Instance, physical: vk::PhysicalDevice) -> Option
         }
     };
     let domains = domains.ok()?;
-    [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC].iter().all(|d| domains.contains(d)).then_some(name)
+    [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC]
+        .iter()
+        .all(|d| domains.contains(d))
+        .then_some(name)
 }
 
 impl Device {
-    /// Both clocks, `n` times; empty where the device cannot ([`super::DeviceInfo::calibrated_timestamps`]).
+    /// Both clocks, `n` times; empty where the device cannot
+    /// ([`super::DeviceInfo::calibrated_timestamps`]).
     pub fn read_clocks(&self, n: usize) -> Result<Vec<ClockPair>> {
         let Some(name) = self.info().calibrated_timestamps else { return Ok(vec![]) };
         let (instance, raw) = (&self.shared().instance.raw, &self.shared().raw);
         let domain = |domain| vk::CalibratedTimestampInfoKHR::default().time_domain(domain);
-        let domains = [domain(vk::TimeDomainKHR::DEVICE), domain(vk::TimeDomainKHR::CLOCK_MONOTONIC)];
+        let domains =
+            [domain(vk::TimeDomainKHR::DEVICE), domain(vk::TimeDomainKHR::CLOCK_MONOTONIC)];
         let limits = self.limits();
         let read = || {
             let read = unsafe {
                 if name == khr::calibrated_timestamps::NAME {
-                    khr::calibrated_timestamps::Device::new(instance, raw).get_calibrated_timestamps(&domains)
+                    khr::calibrated_timestamps::Device::new(instance, raw)
+                        .get_calibrated_timestamps(&domains)
                 } else {
-                    ext::calibrated_timestamps::Device::new(instance, raw).get_calibrated_timestamps(&domains)
+                    ext::calibrated_timestamps::Device::new(instance, raw)
+                        .get_calibrated_timestamps(&domains)
                 }
             };
-            let (clocks, deviation_ns) = read.map_err(|e| Error::vulkan("vkGetCalibratedTimestamps", e))?;
+            let (clocks, deviation_ns) =
+                read.map_err(|e| Error::vulkan("vkGetCalibratedTimestamps", e))?;
             let (host, reading_ns) = instant_of(clocks[1]);
             let device_ns = limits.ticks_ns(clocks[0]);
             Ok(ClockPair { device_ns, host, deviation_ns: deviation_ns as f64 + reading_ns })
@@ -126,8 +141,9 @@ impl Device {
     }
 }
 
-/// When CLOCK_MONOTONIC showed `ns`, and how far off that may be: `Instant` does not say what it counts from, so it is read
-/// between two readings of the same clock, and where those lay nearest together of several.
+/// When CLOCK_MONOTONIC showed `ns`, and how far off that may be: `Instant` does not say what it
+/// counts from, so it is read between two readings of the same clock, and where those lay nearest
+/// together of several.
 #[cfg(target_os = "linux")]
 fn instant_of(ns: u64) -> (Instant, f64) {
     use std::time::Duration;
@@ -139,8 +155,9 @@ fn instant_of(ns: u64) -> (Instant, f64) {
     let read = |_| (monotonic_ns(), Instant::now(), monotonic_ns());
     let between = |(before, _, after): &(i128, Instant, i128)| after - before;
     let first = read(0);
-    let (before, now, after) =
-        (1..N_TRIES).map(read).fold(first, |best, next| if between(&next) < between(&best) { next } else { best });
+    let (before, now, after) = (1..N_TRIES)
+        .map(read)
+        .fold(first, |best, next| if between(&next) < between(&best) { next } else { best });
     let ago = (before + after) / 2 - i128::from(ns);
     let apart = Duration::from_nanos(u64::try_from(ago.unsigned_abs()).unwrap_or(u64::MAX));
     let at = if ago >= 0 { now.checked_sub(apart) } else { now.checked_add(apart) };
@@ -187,8 +204,10 @@ mod tests {
 
     #[test]
     fn what_the_readings_are_off_by_is_told() {
-        let fit = ClockFit::of(&pairs(Instant::now(), &[0.0, 0.001, 59.999, 60.0], 2000.0)).unwrap();
-        // 2 µs each way: the line goes between, and each lies 2 µs off it, and 50 ns by its own account.
+        let fit =
+            ClockFit::of(&pairs(Instant::now(), &[0.0, 0.001, 59.999, 60.0], 2000.0)).unwrap();
+        // 2 µs each way: the line goes between, and each lies 2 µs off it, and 50 ns by its own
+        // account.
         assert!((fit.deviation_ns - 2050.0).abs() < 5.0, "{fit:?}");
         assert!((fit.rate - 1.00002).abs() < 1e-9);
     }

@@ -26,7 +26,8 @@ pub struct DeviceInfo {
     pub limits: Limits,
     /// Whether it can show pictures in windows.
     pub has_swapchain: bool,
-    /// The extension by which the device's clock and the host's can be read at one moment, where there is one.
+    /// The extension by which the device's clock and the host's can be read at one moment, where
+    /// there is one.
     pub calibrated_timestamps: Option<&'static CStr>,
     pub(super) physical: vk::PhysicalDevice,
     pub(super) queue_family: u32,
@@ -66,7 +67,8 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Whether a workgroup of so many invocations can be sure to be one subgroup, and whose invocations know of each other.
+    /// Whether a workgroup of so many invocations can be sure to be one subgroup, and whose
+    /// invocations know of each other.
     pub fn is_one_subgroup(&self, n_invocations: u32) -> bool {
         self.subgroup_shuffle
             && self.subgroup_size == n_invocations
@@ -84,7 +86,8 @@ impl Limits {
     }
 }
 
-/// An open device. Dropping it reports every allocation that is still alive to the instance's messages.
+/// An open device. Dropping it reports every allocation that is still alive to the instance's
+/// messages.
 pub struct Device {
     shared: Arc<Shared>,
     info: DeviceInfo,
@@ -111,8 +114,8 @@ impl Device {
         Ok(physical.into_iter().enumerate().map(|(i, p)| describe(instance, i, p)).collect())
     }
 
-    /// Opens the device named by `choice` (an index, or part of a name), else the best one: discrete, then
-    /// integrated, virtual, CPU.
+    /// Opens the device named by `choice` (an index, or part of a name), else the best one:
+    /// discrete, then integrated, virtual, CPU.
     pub fn open(instance: &Arc<Instance>, choice: Option<&str>) -> Result<Device> {
         let info = Self::choose(Self::list(instance)?, choice)?;
         let raw = create(instance, &info)?;
@@ -132,7 +135,8 @@ impl Device {
             unsafe { raw.destroy_device(None) };
             Error::vulkan("creating the allocator", e)
         })?;
-        let debug = instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
+        let debug =
+            instance.has_debug_utils.then(|| ext::debug_utils::Device::new(&instance.raw, &raw));
         let shared = Arc::new(Shared {
             raw,
             queue: Mutex::new(queue),
@@ -148,31 +152,47 @@ impl Device {
 
     /// The device that [`Device::open`] would take of `devices`.
     pub fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
-        let names: Vec<String> = devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
+        let names: Vec<String> =
+            devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
         let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
         let unknown = |text: &str| {
-            Err(Error::usage(format!("--device \"{text}\": expected an index or a part of a name; found: {names}")))
+            Err(Error::usage(format!(
+                "--device \"{text}\": expected an index or a part of a name; found: {names}"
+            )))
         };
         let found = match choice.map(str::trim) {
             // Part of every name, and hardly meant: an unset variable in a script.
             Some("") => return unknown(""),
             None => {
                 let rank = |d: &DeviceInfo| {
-                    ["discrete", "integrated", "virtual", "cpu"].iter().position(|k| *k == d.kind).unwrap_or(9)
+                    ["discrete", "integrated", "virtual", "cpu"]
+                        .iter()
+                        .position(|k| *k == d.kind)
+                        .unwrap_or(9)
                 };
                 devices.into_iter().filter(|d| d.unusable.is_none()).min_by_key(rank)
             }
             Some(text) => {
                 // Names hold numbers too: "4090".
-                let index = text.parse().ok().and_then(|index: usize| devices.iter().position(|d| d.index == index));
-                let named = || devices.iter().position(|d| d.name.to_lowercase().contains(&text.to_lowercase()));
+                let index = text
+                    .parse()
+                    .ok()
+                    .and_then(|index: usize| devices.iter().position(|d| d.index == index));
+                let named = || {
+                    devices
+                        .iter()
+                        .position(|d| d.name.to_lowercase().contains(&text.to_lowercase()))
+                };
                 index.or_else(named).map(|i| devices[i].clone())
             }
         };
         match (found, choice) {
             (None, None) => Err(Error::vulkan(
                 "device choice",
-                format!("no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a software one"),
+                format!(
+                    "no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a \
+                     software one"
+                ),
             )),
             (None, Some(text)) => unknown(text),
             (Some(device), _) => match &device.unusable {
@@ -186,7 +206,8 @@ impl Device {
         &self.info
     }
 
-    /// From now on every buffer is made full of NaN, so that what is read before it is written shows.
+    /// From now on every buffer is made full of NaN, so that what is read before it is written
+    /// shows.
     pub fn poison(&self) {
         self.shared.poisons.store(true, Ordering::Relaxed);
     }
@@ -197,7 +218,8 @@ impl Device {
 
     pub(super) fn format_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
         let instance = &self.shared.instance.raw;
-        unsafe { instance.get_physical_device_format_properties(self.info.physical, format) }.optimal_tiling_features
+        unsafe { instance.get_physical_device_format_properties(self.info.physical, format) }
+            .optimal_tiling_features
     }
 
     #[cfg(feature = "window")]
@@ -221,7 +243,10 @@ impl Drop for Device {
         let _ = unsafe { self.shared.raw.device_wait_idle() };
         let report = self.shared.lock_allocator().generate_report();
         for leak in &report.allocations {
-            self.shared.instance.messages().push(format!("leak: {} ({} bytes)", leak.name, leak.size));
+            self.shared
+                .instance
+                .messages()
+                .push(format!("leak: {} ({} bytes)", leak.name, leak.size));
         }
     }
 }
@@ -240,7 +265,8 @@ impl Shared {
     pub fn name<H: vk::Handle>(&self, handle: H, name: &str) {
         let Some(debug) = &self.debug else { return };
         let Ok(name) = std::ffi::CString::new(name) else { return };
-        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        let info =
+            vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
         // A name that cannot be set is no reason to stop.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
     }
@@ -248,8 +274,8 @@ impl Shared {
 
 impl Drop for Shared {
     fn drop(&mut self) {
-        // SAFETY: the last owner; every resource held an Arc of this and is destroyed. The allocator frees its
-        // blocks through the device and so goes first.
+        // SAFETY: the last owner; every resource held an Arc of this and is destroyed. The
+        // allocator frees its blocks through the device and so goes first.
         unsafe {
             ManuallyDrop::drop(&mut self.allocator);
             self.raw.destroy_device(None);
@@ -259,8 +285,9 @@ impl Drop for Shared {
 
 fn create(instance: &Instance, info: &DeviceInfo) -> Result<ash::Device> {
     let priorities = [1.0];
-    let queues =
-        [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
+    let queues = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(info.queue_family)
+        .queue_priorities(&priorities)];
     let mut v12 = vk::PhysicalDeviceVulkan12Features::default().timeline_semaphore(true);
     // Demotion is what `discard` compiles to.
     let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
@@ -270,12 +297,17 @@ fn create(instance: &Instance, info: &DeviceInfo) -> Result<ash::Device> {
         .subgroup_size_control(true)
         .compute_full_subgroups(true);
     let swapchain = (instance.has_surfaces && info.has_swapchain).then_some(khr::swapchain::NAME);
-    let extensions: Vec<_> = info.calibrated_timestamps.into_iter().chain(swapchain).map(CStr::as_ptr).collect();
-    let create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
-    let features =
-        vk::PhysicalDeviceFeatures::default().shader_int64(info.limits.words_64).shader_float64(info.limits.floats_64);
+    let extensions: Vec<_> =
+        info.calibrated_timestamps.into_iter().chain(swapchain).map(CStr::as_ptr).collect();
+    let create = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_extension_names(&extensions);
+    let features = vk::PhysicalDeviceFeatures::default()
+        .shader_int64(info.limits.words_64)
+        .shader_float64(info.limits.floats_64);
     let create = create.enabled_features(&features).push_next(&mut v12).push_next(&mut v13);
-    unsafe { instance.raw.create_device(info.physical, &create, None) }.map_err(|e| Error::vulkan("vkCreateDevice", e))
+    unsafe { instance.raw.create_device(info.physical, &create, None) }
+        .map_err(|e| Error::vulkan("vkCreateDevice", e))
 }
 
 #[cfg(test)]
@@ -320,7 +352,9 @@ mod tests {
 
     #[test]
     fn a_device_is_chosen_by_index_or_name_or_kind() {
-        let devices = || vec![device(0, "llvmpipe (LLVM 15)", "cpu"), device(1, "GeForce RTX 4090", "discrete")];
+        let devices = || {
+            vec![device(0, "llvmpipe (LLVM 15)", "cpu"), device(1, "GeForce RTX 4090", "discrete")]
+        };
         let chosen = |choice| Device::choose(devices(), choice).map(|d| d.index);
         assert_eq!(chosen(None), Ok(1));
         assert_eq!(chosen(Some("0")), Ok(0));

@@ -1,5 +1,5 @@
-//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers; premultiplied "over" or
-//! "under", opaque with depth, or depth alone.
+//! A graphics pipeline without vertex buffers: the vertex shader pulls from storage buffers;
+//! premultiplied "over" or "under", opaque with depth, or depth alone.
 
 use std::sync::Arc;
 
@@ -37,7 +37,8 @@ pub enum Meet {
 }
 
 impl DrawPipeline {
-    /// `name.vert` and `name.frag`, drawn as triangle strips into a target of `format`, which they meet as `meet` says.
+    /// `name.vert` and `name.frag`, drawn as triangle strips into a target of `format`, which they
+    /// meet as `meet` says.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -56,14 +57,22 @@ impl DrawPipeline {
                 check_push(file, found, push)?;
             }
         }
-        let stages = [(&in_vert, vk::ShaderStageFlags::VERTEX), (&in_frag, vk::ShaderStageFlags::FRAGMENT)];
+        let stages =
+            [(&in_vert, vk::ShaderStageFlags::VERTEX), (&in_frag, vk::ShaderStageFlags::FRAGMENT)];
         let interface = Interface::new(device, name, &stages, push)?;
         let shared = device.shared().clone();
-        let modules = [Module::new(&shared, &vert_file, &vert)?, Module::new(&shared, &frag_file, &frag)?];
+        let modules =
+            [Module::new(&shared, &vert_file, &vert)?, Module::new(&shared, &frag_file, &frag)?];
         let formats = (format.raw(), depth_format(device));
         let raw = create(&interface, name, &modules, constants, formats, meet)?;
         shared.name(raw, name);
-        Ok(DrawPipeline { raw, interface, name: name.to_owned(), has_depth: meet != Meet::Over, shared })
+        Ok(DrawPipeline {
+            raw,
+            interface,
+            name: name.to_owned(),
+            has_depth: meet != Meet::Over,
+            shared,
+        })
     }
 }
 
@@ -88,19 +97,24 @@ fn create(
         let info = vk::PipelineShaderStageCreateInfo::default().stage(stage).module(module.raw);
         info.name(c"main").specialization_info(&specialization)
     };
-    let stages = [stage(vert, vk::ShaderStageFlags::VERTEX), stage(frag, vk::ShaderStageFlags::FRAGMENT)];
+    let stages =
+        [stage(vert, vk::ShaderStageFlags::VERTEX), stage(frag, vk::ShaderStageFlags::FRAGMENT)];
     let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
-    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_STRIP);
-    let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+        .topology(vk::PrimitiveTopology::TRIANGLE_STRIP);
+    let viewport =
+        vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-    let samples = vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let samples = vk::PipelineMultisampleStateCreateInfo::default()
+        .rasterization_samples(vk::SampleCountFlags::TYPE_1);
     let attachments = [blending(meet)];
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
     let depth = depth_test(meet);
     let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
     let formats = [color_format];
-    let mut rendering = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    let mut rendering =
+        vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
     if meet != Meet::Over {
         rendering = rendering.depth_attachment_format(depth_format);
     }
@@ -116,7 +130,9 @@ fn create(
         .dynamic_state(&dynamic)
         .layout(interface.layout)
         .push_next(&mut rendering);
-    let made = unsafe { interface.shared.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+    let made = unsafe {
+        interface.shared.raw.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None)
+    };
     Ok(made.map_err(|(_, e)| Error::vulkan(format!("vkCreateGraphicsPipelines {name}"), e))?[0])
 }
 

@@ -9,7 +9,8 @@ use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What the validation layers and the leak report said, in order. Tests and `--validation` fail on any.
+/// What the validation layers and the leak report said, in order. Tests and `--validation` fail on
+/// any.
 #[derive(Default)]
 pub struct Messages(Mutex<Vec<String>>);
 
@@ -36,35 +37,45 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// An instance of Vulkan 1.3. With `validation` the Khronos layer runs with synchronization validation, and
-    /// its absence is an error: a check that silently does not run is worse than none.
+    /// An instance of Vulkan 1.3. With `validation` the Khronos layer runs with synchronization
+    /// validation, and its absence is an error: a check that silently does not run is worse than
+    /// none.
     pub fn new(validation: bool) -> Result<Arc<Instance>> {
         Instance::with_extensions(validation, &[])
     }
 
-    /// The same that can show pictures in windows, by the extensions which the window system `wanted`.
+    /// The same that can show pictures in windows, by the extensions which the window system
+    /// `wanted`.
     pub(super) fn with_extensions(validation: bool, wanted: &[&CStr]) -> Result<Arc<Instance>> {
-        // SAFETY: the loader is a trusted system library; it is kept open as long as anything made from it.
+        // SAFETY: the loader is a trusted system library; it is kept open as long as anything made
+        // from it.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| {
-            Error::vulkan("loading libvulkan", format!("{e}; is the Vulkan loader installed? (tools/bootstrap)"))
+            Error::vulkan(
+                "loading libvulkan",
+                format!("{e}; is the Vulkan loader installed? (tools/bootstrap)"),
+            )
         })?;
         let messages = Arc::new(Messages::default());
         let layers = unsafe { entry.enumerate_instance_layer_properties() }
             .map_err(|e| Error::vulkan("vkEnumerateInstanceLayerProperties", e))?;
         let has_layer = layers.iter().any(|l| l.layer_name_as_c_str() == Ok(VALIDATION_LAYER));
         if validation && !has_layer {
-            let what =
-                "VK_LAYER_KHRONOS_validation is not installed (Debian: vulkan-validationlayers; tools/bootstrap)";
+            let what = "VK_LAYER_KHRONOS_validation is not installed (Debian: \
+                vulkan-validationlayers; tools/bootstrap)";
             return Err(Error::vulkan("validation", what));
         }
         let extensions = unsafe { entry.enumerate_instance_extension_properties(None) }
             .map_err(|e| Error::vulkan("vkEnumerateInstanceExtensionProperties", e))?;
-        let has_debug_utils =
-            validation || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
-        if let Some(missing) =
-            wanted.iter().find(|name| !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
+        let has_debug_utils = validation
+            || extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(ext::debug_utils::NAME));
+        if let Some(missing) = wanted
+            .iter()
+            .find(|name| !extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
         {
-            let what = format!("the Vulkan loader lacks {}: no driver here shows pictures", missing.to_string_lossy());
+            let what = format!(
+                "the Vulkan loader lacks {}: no driver here shows pictures",
+                missing.to_string_lossy()
+            );
             return Err(Error::vulkan("window extensions", what));
         }
         let mut names = wanted.to_vec();
@@ -72,7 +83,8 @@ impl Instance {
         let raw = create(&entry, validation, &names, &messages)?;
         let messenger = if validation {
             let debug = ext::debug_utils::Instance::new(&entry, &raw);
-            let made = unsafe { debug.create_debug_utils_messenger(&messenger_info(&messages), None) };
+            let made =
+                unsafe { debug.create_debug_utils_messenger(&messenger_info(&messages), None) };
             match made {
                 Ok(messenger) => Some((debug, messenger)),
                 Err(e) => {
@@ -130,7 +142,8 @@ fn create(
     unsafe { entry.create_instance(&info, None) }.map_err(|e| Error::vulkan("vkCreateInstance", e))
 }
 
-/// The messenger borrows `messages` by raw pointer; [`Instance`] keeps the Arc until the messenger is destroyed.
+/// The messenger borrows `messages` by raw pointer; [`Instance`] keeps the Arc until the messenger
+/// is destroyed.
 fn messenger_info(messages: &Arc<Messages>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
     use vk::DebugUtilsMessageSeverityFlagsEXT as Severity;
     use vk::DebugUtilsMessageTypeFlagsEXT as Type;
@@ -148,7 +161,8 @@ unsafe extern "system" fn on_message(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: Vulkan passes valid callback data; `user` is the Messages of an instance that is still alive.
+    // SAFETY: Vulkan passes valid callback data; `user` is the Messages of an instance that is
+    // still alive.
     unsafe {
         if let (Some(data), Some(messages)) = (data.as_ref(), user.cast::<Messages>().as_ref()) {
             let text = data.message_as_c_str().map_or("(no text)".into(), CStr::to_string_lossy);

@@ -47,8 +47,8 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    /// The kernel `room.thing` from `room_thing.comp` (`room` from `room.comp`). `push` are the host's push
-    /// constants in order; `constants` the specialization constants by id.
+    /// The kernel `room.thing` from `room_thing.comp` (`room` from `room.comp`). `push` are the
+    /// host's push constants in order; `constants` the specialization constants by id.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -73,7 +73,8 @@ impl Kernel {
         let found = reflect(&file, &words)?;
         check_push(&file, &found, push)?;
         check_limits(device, &file, &found)?;
-        let interface = Interface::new(device, name, &[(&found, vk::ShaderStageFlags::COMPUTE)], push)?;
+        let interface =
+            Interface::new(device, name, &[(&found, vk::ShaderStageFlags::COMPUTE)], push)?;
         let module = Module::new(&interface.shared, name, &words)?;
         let (entries, data) = specialization(constants);
         let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&data);
@@ -87,12 +88,17 @@ impl Kernel {
         let mut size = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default()
             .required_subgroup_size(device.limits().subgroup_size);
         let stage = match is_together && device.limits().subgroup_size_chosen {
-            true => stage.flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS).push_next(&mut size),
+            true => stage
+                .flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS)
+                .push_next(&mut size),
             false => stage,
         };
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(interface.layout)];
-        let made = unsafe { interface.shared.raw.create_compute_pipelines(vk::PipelineCache::null(), &info, None) };
-        let raw = made.map_err(|(_, e)| Error::vulkan(format!("vkCreateComputePipelines {name}"), e))?[0];
+        let made = unsafe {
+            interface.shared.raw.create_compute_pipelines(vk::PipelineCache::null(), &info, None)
+        };
+        let raw =
+            made.map_err(|(_, e)| Error::vulkan(format!("vkCreateComputePipelines {name}"), e))?[0];
         interface.shared.name(raw, name);
         drop(module);
         Ok(Kernel { raw, interface, name: name.to_owned(), local_size: found.local_size })
@@ -138,8 +144,10 @@ impl Interface {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         let set_layout = unsafe { shared.raw.create_descriptor_set_layout(&info, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateDescriptorSetLayout {name}"), e))?;
-        let push_bytes = push.last().map_or(0, |(_, offset, bytes)| offset + bytes).next_multiple_of(4);
-        let ranges = [vk::PushConstantRange::default().stage_flags(all_stages).size(push_bytes as u32)];
+        let push_bytes =
+            push.last().map_or(0, |(_, offset, bytes)| offset + bytes).next_multiple_of(4);
+        let ranges =
+            [vk::PushConstantRange::default().stage_flags(all_stages).size(push_bytes as u32)];
         let set_layouts = [set_layout];
         let mut info = vk::PipelineLayoutCreateInfo::default().set_layouts(&set_layouts);
         if push_bytes > 0 {
@@ -193,7 +201,9 @@ impl Drop for Module {
 }
 
 /// Map entries and data of 32-bit specialization constants.
-pub(super) fn specialization(constants: &[(u32, u32)]) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
+pub(super) fn specialization(
+    constants: &[(u32, u32)],
+) -> (Vec<vk::SpecializationMapEntry>, Vec<u8>) {
     let entry = |(i, (id, _)): (usize, &(u32, u32))| vk::SpecializationMapEntry {
         constant_id: *id,
         offset: 4 * i as u32,
@@ -208,13 +218,18 @@ pub(super) fn check_push(file: &str, found: &Reflection, push: &[Field]) -> Resu
     let fail = |what| Err(Error::Shader { name: file.to_owned(), what });
     let members = found.push.as_ref().map_or(&[][..], |s| &s.members[..]);
     if members.len() != push.len() {
-        return fail(format!("has {} push constants, the host writes {}", members.len(), push.len()));
+        return fail(format!(
+            "has {} push constants, the host writes {}",
+            members.len(),
+            push.len()
+        ));
     }
     for (m, (name, offset, bytes)) in members.iter().zip(push) {
         let same_name = m.name.is_empty() || m.name == *name;
         if !same_name || m.offset as usize != *offset || m.bytes as usize != *bytes {
             return fail(format!(
-                "push constant {} lies at byte {} ({} bytes), the host writes {name} at {offset} ({bytes} bytes)",
+                "push constant {} lies at byte {} ({} bytes), the host writes {name} at {offset} \
+                 ({bytes} bytes)",
                 m.name, m.offset, m.bytes
             ));
         }

@@ -1,5 +1,5 @@
-//! Buffers and images. Every one is named `room.thing`, and checked against the device's limits before it is
-//! allocated.
+//! Buffers and images. Every one is named `room.thing`, and checked against the device's limits
+//! before it is allocated.
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -26,8 +26,10 @@ pub enum Place {
 }
 
 /// What texels are: as words, so that every bit passes; and as floats. Every device reads both.
-const TEXELS: [(BindingKind, vk::Format); 2] =
-    [(BindingKind::Texels, vk::Format::R32G32B32A32_UINT), (BindingKind::Floats, vk::Format::R32_SFLOAT)];
+const TEXELS: [(BindingKind, vk::Format); 2] = [
+    (BindingKind::Texels, vk::Format::R32G32B32A32_UINT),
+    (BindingKind::Floats, vk::Format::R32_SFLOAT),
+];
 
 /// Of the largest texel.
 const TEXEL_BYTES: u64 = 16;
@@ -43,7 +45,8 @@ pub struct Buffer {
 }
 
 impl Buffer {
-    /// A storage buffer of `n` records of type `T`; at least one record, since Vulkan has no empty buffers.
+    /// A storage buffer of `n` records of type `T`; at least one record, since Vulkan has no empty
+    /// buffers.
     pub fn new<T: Pod>(device: &Device, name: &str, n: u64, place: Place) -> Result<Buffer> {
         let bytes = storage_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
         let shared = device.shared().clone();
@@ -53,7 +56,8 @@ impl Buffer {
             | vk::BufferUsageFlags::TRANSFER_DST
             | vk::BufferUsageFlags::INDIRECT_BUFFER;
         // Whole texels, so that the last words are read by them as well.
-        let info = vk::BufferCreateInfo::default().size(bytes.next_multiple_of(TEXEL_BYTES)).usage(usage);
+        let info =
+            vk::BufferCreateInfo::default().size(bytes.next_multiple_of(TEXEL_BYTES)).usage(usage);
         let raw = unsafe { shared.raw.create_buffer(&info, None) }
             .map_err(|e| Error::vulkan(format!("vkCreateBuffer {name}"), e))?;
         shared.name(raw, name);
@@ -64,7 +68,8 @@ impl Buffer {
             Place::Readback => MemoryLocation::GpuToCpu,
         };
         let views = [vk::BufferView::null(); 2];
-        let mut buffer = Buffer { raw, views, allocation: None, bytes, name: name.to_owned(), shared };
+        let mut buffer =
+            Buffer { raw, views, allocation: None, bytes, name: name.to_owned(), shared };
         let allocation = allocate(&buffer.shared, name, requirements, location, true)?;
         let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
         buffer.allocation = Some(allocation);
@@ -111,11 +116,14 @@ impl Buffer {
 
     /// As shaders read it by texels; null for records.
     pub(super) fn texels(&self, kind: BindingKind) -> Result<vk::BufferView> {
-        let Some(i) = TEXELS.iter().position(|(k, _)| *k == kind) else { return Ok(vk::BufferView::null()) };
+        let Some(i) = TEXELS.iter().position(|(k, _)| *k == kind) else {
+            return Ok(vk::BufferView::null());
+        };
         if self.views[i] == vk::BufferView::null() {
             let most = self.shared.limits.max_texels;
             return Err(Error::limit(format!(
-                "{}: {} bytes are to be read by {}, this device takes {most} such texels at most (maxTexelBufferElements)",
+                "{}: {} bytes are to be read by {}, this device takes {most} such texels at most \
+                 (maxTexelBufferElements)",
                 self.name,
                 self.bytes,
                 kind.texel_bytes()
@@ -155,7 +163,9 @@ impl Buffer {
     /// The first `n` records of a readback buffer. The GPU must have finished writing it.
     pub fn read<T: Pod>(&self, n: usize) -> Result<Vec<T>> {
         let mapped = self.allocation.as_ref().and_then(Allocation::mapped_slice);
-        match mapped.and_then(|m| m.get(..self.bytes as usize)?.get(..n.checked_mul(size_of::<T>())?)) {
+        match mapped
+            .and_then(|m| m.get(..self.bytes as usize)?.get(..n.checked_mul(size_of::<T>())?))
+        {
             // collect: the mapping's alignment is the allocator's, not T's.
             Some(bytes) => Ok(bytemuck::pod_collect_to_vec(bytes)),
             None => Err(Error::limit(format!(
@@ -168,7 +178,8 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: whoever drops a buffer has waited for the commands that use it, or drops those first, which wait.
+        // SAFETY: whoever drops a buffer has waited for the commands that use it, or drops those
+        // first, which wait.
         unsafe {
             for view in self.views {
                 self.shared.raw.destroy_buffer_view(view, None);
@@ -185,7 +196,8 @@ pub fn storage_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> 
     match n.max(1).checked_mul(record_bytes) {
         Some(bytes) if bytes <= most => Ok(bytes.next_multiple_of(4)),
         _ => Err(Error::limit(format!(
-            "{name}: {n} records of {record_bytes} bytes are wanted, this device takes {} at most (maxStorageBufferRange {}, memory {} bytes)",
+            "{name}: {n} records of {record_bytes} bytes are wanted, this device takes {} at most \
+             (maxStorageBufferRange {}, memory {} bytes)",
             most / record_bytes,
             limits.max_storage_buffer_bytes,
             limits.device_memory_bytes
@@ -237,7 +249,13 @@ impl TargetFormat {
 }
 
 impl Image {
-    pub fn color_target(device: &Device, name: &str, width: u32, height: u32, format: TargetFormat) -> Result<Image> {
+    pub fn color_target(
+        device: &Device,
+        name: &str,
+        width: u32,
+        height: u32,
+        format: TargetFormat,
+    ) -> Result<Image> {
         let extent = check_extent(device, name, width, height, format.bytes_per_pixel())?;
         check_blendable(device, format)?;
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
@@ -247,7 +265,8 @@ impl Image {
     /// Depth in the best format that the device has.
     pub fn depth(device: &Device, name: &str, width: u32, height: u32) -> Result<Image> {
         let extent = check_extent(device, name, width, height, DEPTH_BYTES_PER_PIXEL)?;
-        let usage = vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
+        let usage =
+            vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_SRC;
         Image::new(device, name, extent, depth_format(device), usage, vk::ImageAspectFlags::DEPTH)
     }
 
@@ -274,9 +293,20 @@ impl Image {
         shared.name(raw, name);
         let requirements = unsafe { shared.raw.get_image_memory_requirements(raw) };
         let (layout, view) = (vk::ImageLayout::UNDEFINED, vk::ImageView::null());
-        let range = vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1);
-        let mut image = Image { raw, view, layout, extent, range, allocation: None, is_borrowed: false, shared };
-        let allocation = allocate(&image.shared, name, requirements, MemoryLocation::GpuOnly, false)?;
+        let range =
+            vk::ImageSubresourceRange::default().aspect_mask(aspect).level_count(1).layer_count(1);
+        let mut image = Image {
+            raw,
+            view,
+            layout,
+            extent,
+            range,
+            allocation: None,
+            is_borrowed: false,
+            shared,
+        };
+        let allocation =
+            allocate(&image.shared, name, requirements, MemoryLocation::GpuOnly, false)?;
         let (memory, offset) = (unsafe { allocation.memory() }, allocation.offset());
         image.allocation = Some(allocation);
         unsafe { image.shared.raw.bind_image_memory(raw, memory, offset) }
@@ -294,10 +324,14 @@ impl Image {
         extent: vk::Extent2D,
         format: TargetFormat,
     ) -> Result<Image> {
-        let range =
-            vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
-        let (layout, view, shared) = (vk::ImageLayout::UNDEFINED, vk::ImageView::null(), shared.clone());
-        let mut image = Image { raw, view, layout, extent, range, allocation: None, is_borrowed: true, shared };
+        let range = vk::ImageSubresourceRange::default()
+            .aspect_mask(vk::ImageAspectFlags::COLOR)
+            .level_count(1)
+            .layer_count(1);
+        let (layout, view, shared) =
+            (vk::ImageLayout::UNDEFINED, vk::ImageView::null(), shared.clone());
+        let mut image =
+            Image { raw, view, layout, extent, range, allocation: None, is_borrowed: true, shared };
         image.make_view(name, format.raw())?;
         Ok(image)
     }
@@ -338,7 +372,13 @@ impl Drop for Image {
 }
 
 /// The extent, if the device takes an image of it.
-fn check_extent(device: &Device, name: &str, width: u32, height: u32, bytes_per_pixel: u64) -> Result<vk::Extent2D> {
+fn check_extent(
+    device: &Device,
+    name: &str,
+    width: u32,
+    height: u32,
+    bytes_per_pixel: u64,
+) -> Result<vk::Extent2D> {
     let limits = device.limits();
     let most = limits.max_image_extent;
     if width.max(height) > most {
@@ -349,7 +389,9 @@ fn check_extent(device: &Device, name: &str, width: u32, height: u32, bytes_per_
     let bytes = u64::from(width) * u64::from(height) * bytes_per_pixel;
     if bytes > limits.device_memory_bytes {
         let has = limits.device_memory_bytes;
-        return Err(Error::limit(format!("{name}: {bytes} bytes are wanted, this device has {has}")));
+        return Err(Error::limit(format!(
+            "{name}: {bytes} bytes are wanted, this device has {has}"
+        )));
     }
     Ok(vk::Extent2D { width, height })
 }
@@ -357,7 +399,8 @@ fn check_extent(device: &Device, name: &str, width: u32, height: u32, bytes_per_
 /// Of both formats that [`depth_format`] chooses from.
 pub const DEPTH_BYTES_PER_PIXEL: u64 = 4;
 
-/// Reversed depth wants a float, whose steps shrink with the distance. Vulkan promises that one of the two can be drawn to.
+/// Reversed depth wants a float, whose steps shrink with the distance. Vulkan promises that one of
+/// the two can be drawn to.
 pub(super) fn depth_format(device: &Device) -> vk::Format {
     let features = device.format_features(vk::Format::D32_SFLOAT);
     match features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
@@ -377,7 +420,9 @@ fn check_blendable(device: &Device, format: TargetFormat) -> Result<()> {
     if features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND) {
         return Ok(());
     }
-    Err(Error::limit(format!("this device cannot blend into {format:?}; expected film.format = \"rgba16f\"")))
+    Err(Error::limit(format!(
+        "this device cannot blend into {format:?}; expected film.format = \"rgba16f\""
+    )))
 }
 
 fn allocate(
@@ -394,10 +439,9 @@ fn allocate(
         linear,
         allocation_scheme: AllocationScheme::GpuAllocatorManaged,
     };
-    shared
-        .lock_allocator()
-        .allocate(&desc)
-        .map_err(|e| Error::limit(format!("{name}: {} bytes of device memory: {e}", requirements.size)))
+    shared.lock_allocator().allocate(&desc).map_err(|e| {
+        Error::limit(format!("{name}: {} bytes of device memory: {e}", requirements.size))
+    })
 }
 
 fn free(shared: &Shared, allocation: Option<Allocation>) {

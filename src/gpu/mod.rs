@@ -1,7 +1,8 @@
-//! Vulkan, and nothing of nimbus: instance, device, memory, shaders, kernels, command recording, timers.
+//! Vulkan, and nothing of nimbus: instance, device, memory, shaders, kernels, command recording,
+//! timers.
 //!
-//! Vulkan 1.3 core (synchronization2, dynamic rendering, timeline semaphores). What a shader reads and writes is
-//! reflected from its SPIR-V, and the recorder derives the barriers from that.
+//! Vulkan 1.3 core (synchronization2, dynamic rendering, timeline semaphores). What a shader reads
+//! and writes is reflected from its SPIR-V, and the recorder derives the barriers from that.
 
 pub mod calibration;
 pub mod device;

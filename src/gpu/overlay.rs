@@ -1,4 +1,5 @@
-//! Widgets over a window's picture: egui's triangles, drawn by its renderer for ash into the window's image.
+//! Widgets over a window's picture: egui's triangles, drawn by its renderer for ash into the
+//! window's image.
 
 use std::sync::Arc;
 
@@ -28,8 +29,13 @@ pub struct Widgets {
 }
 
 impl Widgets {
-    pub fn new(primitives: Vec<ClippedPrimitive>, pixels_per_point: f32, backdrop: Option<Backdrop>) -> Widgets {
-        let is_within = |p: &ClippedPrimitive| backdrop.is_some_and(|b| b.room.contains_rect(p.clip_rect));
+    pub fn new(
+        primitives: Vec<ClippedPrimitive>,
+        pixels_per_point: f32,
+        backdrop: Option<Backdrop>,
+    ) -> Widgets {
+        let is_within =
+            |p: &ClippedPrimitive| backdrop.is_some_and(|b| b.room.contains_rect(p.clip_rect));
         let (within, above) = primitives.into_iter().partition(is_within);
         Widgets { within, above, pixels_per_point, backdrop }
     }
@@ -50,10 +56,14 @@ impl Backdrop {
         // Beyond the picture's pixels casts stop at their ends.
         let px = |points: f32, most: u32| ((points * pixels_per_point).round() as u32).min(most);
         let (left, right) = (px(self.room.min.x, extent.width), px(self.room.max.x, extent.width));
-        let (top, bottom) = (px(self.room.min.y, extent.height), px(self.room.max.y, extent.height));
+        let (top, bottom) =
+            (px(self.room.min.y, extent.height), px(self.room.max.y, extent.height));
         let area = vk::Rect2D {
             offset: vk::Offset2D { x: left as i32, y: top as i32 },
-            extent: vk::Extent2D { width: right.checked_sub(left)?, height: bottom.checked_sub(top)? },
+            extent: vk::Extent2D {
+                width: right.checked_sub(left)?,
+                height: bottom.checked_sub(top)?,
+            },
         };
         (area.extent.width > 0 && area.extent.height > 0).then_some(area)
     }
@@ -95,18 +105,27 @@ impl Overlay {
             stencil_attachment_format: None,
         });
         // The image holds code values, and so do blended widgets.
-        let options = Options { in_flight_frames: DRAWS, srgb_framebuffer: false, ..Options::default() };
+        let options =
+            Options { in_flight_frames: DRAWS, srgb_framebuffer: false, ..Options::default() };
         let allocator = Arc::clone(&shared.allocator);
         let renderer = Renderer::with_gpu_allocator(allocator, shared.raw.clone(), mode, options);
         let renderer = Some(renderer.map_err(failed("making its renderer"))?);
-        let mut overlay = Overlay { renderer, pool: vk::CommandPool::null(), to_free: vec![], kept: None, shared };
-        let info = vk::CommandPoolCreateInfo::default().queue_family_index(overlay.shared.queue_family);
+        let mut overlay = Overlay {
+            renderer,
+            pool: vk::CommandPool::null(),
+            to_free: vec![],
+            kept: None,
+            shared,
+        };
+        let info =
+            vk::CommandPoolCreateInfo::default().queue_family_index(overlay.shared.queue_family);
         overlay.pool = unsafe { overlay.shared.raw.create_command_pool(&info, None) }
             .map_err(|e| Error::vulkan("vkCreateCommandPool window.widgets", e))?;
         Ok(overlay)
     }
 
-    /// Takes over what of its textures has changed. Waits for the device where anything has: hardly ever.
+    /// Takes over what of its textures has changed. Waits for the device where anything has: hardly
+    /// ever.
     pub fn set_textures(&mut self, mut changes: TexturesDelta) -> Result<()> {
         let Some(renderer) = &mut self.renderer else { return Ok(()) };
         if changes.is_empty() && self.to_free.is_empty() {
@@ -114,7 +133,8 @@ impl Overlay {
         }
         let queue = self.shared.lock_queue();
         // Pictures on their way may show what is replaced.
-        unsafe { self.shared.raw.queue_wait_idle(*queue) }.map_err(|e| Error::vulkan("vkQueueWaitIdle", e))?;
+        unsafe { self.shared.raw.queue_wait_idle(*queue) }
+            .map_err(|e| Error::vulkan("vkQueueWaitIdle", e))?;
         for id in self.to_free.drain(..) {
             renderer.free_texture(id).map_err(failed("freeing a texture"))?;
         }
@@ -132,18 +152,27 @@ impl Overlay {
         self.kept = None;
         if chain.takes_copies() {
             let [width, height] = chain.size();
-            let image = Image::color_target(device, "window.widgets", width, height, chain.format())?;
+            let image =
+                Image::color_target(device, "window.widgets", width, height, chain.format())?;
             self.kept = Some(Kept { image, of: None });
         }
         Ok(())
     }
 
     /// Draws over what is in `image`.
-    pub fn record(&mut self, rec: &mut Recorder<'_>, image: &mut Image, widgets: &Arc<Widgets>) -> Result<()> {
+    pub fn record(
+        &mut self,
+        rec: &mut Recorder<'_>,
+        image: &mut Image,
+        widgets: &Arc<Widgets>,
+    ) -> Result<()> {
         let Overlay { renderer: Some(renderer), kept, shared, .. } = self else { return Ok(()) };
         let scale = widgets.pixels_per_point;
         let area = widgets.backdrop.and_then(|b| Some((b.area(scale, image.extent)?, b.color)));
-        let mut draw = |rec: &mut Recorder<'_>, image: &mut Image, clear, primitives: &[ClippedPrimitive]| {
+        let mut draw = |rec: &mut Recorder<'_>,
+                        image: &mut Image,
+                        clear,
+                        primitives: &[ClippedPrimitive]| {
             rec.draw_over(image, |commands, extent| {
                 if let Some((area, color)) = clear {
                     fill(shared, commands, area, color);
@@ -159,7 +188,9 @@ impl Overlay {
                 }
                 rec.copy_part(&mut kept.image, image, place);
             }
-            _ if area.is_some() || !widgets.within.is_empty() => draw(rec, image, area, &widgets.within)?,
+            _ if area.is_some() || !widgets.within.is_empty() => {
+                draw(rec, image, area, &widgets.within)?
+            }
             _ => {}
         }
         if widgets.above.is_empty() { Ok(()) } else { draw(rec, image, None, &widgets.above) }

@@ -1,6 +1,7 @@
-//! The thread that shows. It asks the window system for images and gives them back to be seen. A driver may keep whoever shows
-//! a picture until the device is done with all that it was handed, also with what came after the picture: software ones do. Then
-//! the next submission waits for the queue, but neither the game step nor recording does.
+//! The thread that shows. It asks the window system for images and gives them back to be seen. A
+//! driver may keep whoever shows a picture until the device is done with all that it was handed,
+//! also with what came after the picture: software ones do. Then the next submission waits for the
+//! queue, but neither the game step nor recording does.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -14,12 +15,14 @@ use super::device::Shared;
 use super::recorder::Pending;
 use crate::error::{Error, Result};
 
-/// So many pictures may be on their way to the window: slots, each with a semaphore and commands of its own.
+/// So many pictures may be on their way to the window: slots, each with a semaphore and commands of
+/// its own.
 pub(super) const ON_THEIR_WAY: usize = 2;
 
 /// What the thread tells.
 pub(super) enum Told {
-    /// May be drawn into once the slot's semaphore is signalled. Commands of the slot have been done.
+    /// May be drawn into once the slot's semaphore is signalled. Commands of the slot have been
+    /// done.
     Image {
         i_image: usize,
         i_slot: usize,
@@ -96,13 +99,15 @@ enum End {
     Outdated,
 }
 
-/// The window system is asked for so long at once, so that what is drawn meanwhile does not wait longer.
+/// The window system is asked for so long at once, so that what is drawn meanwhile does not wait
+/// longer.
 const PATIENCE: Duration = Duration::from_millis(1);
 
 impl Chain {
     fn run(&self, drawn: &Receiver<Drawn>, tell: &SyncSender<Told>) -> Result<End> {
         // Slots without an image, and their last commands.
-        let mut idle: VecDeque<(usize, Option<Pending>)> = (0..ON_THEIR_WAY).map(|i| (i, None)).collect();
+        let mut idle: VecDeque<(usize, Option<Pending>)> =
+            (0..ON_THEIR_WAY).map(|i| (i, None)).collect();
         let mut wait = Duration::ZERO;
         loop {
             // What is drawn is shown before more is asked for.
@@ -147,7 +152,8 @@ impl Chain {
 
     fn acquire(&self, i_slot: usize) -> Result<Acquired> {
         let (timeout, ready) = (PATIENCE.as_nanos() as u64, self.ready[i_slot]);
-        match unsafe { self.loader.acquire_next_image(self.raw, timeout, ready, vk::Fence::null()) } {
+        match unsafe { self.loader.acquire_next_image(self.raw, timeout, ready, vk::Fence::null()) }
+        {
             // A picture that does not quite fit is shown all the same: its semaphore is signalled.
             Ok((i_image, _)) => Ok(Acquired::Image(i_image as usize)),
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(Acquired::Late),
@@ -159,7 +165,10 @@ impl Chain {
     /// False where the window is another by now.
     fn present(&self, i_image: usize) -> Result<bool> {
         let (drawn, chains, images) = ([self.drawn[i_image]], [self.raw], [i_image as u32]);
-        let info = vk::PresentInfoKHR::default().wait_semaphores(&drawn).swapchains(&chains).image_indices(&images);
+        let info = vk::PresentInfoKHR::default()
+            .wait_semaphores(&drawn)
+            .swapchains(&chains)
+            .image_indices(&images);
         let queue = self.shared.lock_queue();
         match unsafe { self.loader.queue_present(*queue, &info) } {
             Ok(is_suboptimal) => Ok(!is_suboptimal),

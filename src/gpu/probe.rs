@@ -9,7 +9,11 @@ use super::device::{DeviceInfo, Limits};
 use super::instance::Instance;
 
 /// What is known of a device without opening it.
-pub(super) fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> DeviceInfo {
+pub(super) fn describe(
+    instance: &Instance,
+    index: usize,
+    physical: vk::PhysicalDevice,
+) -> DeviceInfo {
     let calibrated_timestamps = calibration::probe(instance, physical);
     let has_swapchain = has_extension(instance, physical, khr::swapchain::NAME);
     let instance = &instance.raw;
@@ -40,8 +44,14 @@ pub(super) fn describe(instance: &Instance, index: usize, physical: vk::Physical
     DeviceInfo {
         index,
         name: text(&properties.device_name),
-        driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)).trim().to_owned(),
-        api_version: (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
+        driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info))
+            .trim()
+            .to_owned(),
+        api_version: (
+            vk::api_version_major(version),
+            vk::api_version_minor(version),
+            vk::api_version_patch(version),
+        ),
         kind: kind(properties.device_type),
         uuid: id.device_uuid.iter().map(|b| format!("{b:02x}")).collect(),
         unusable: unusable(instance, physical, version, family),
@@ -58,13 +68,21 @@ pub(super) fn describe(instance: &Instance, index: usize, physical: vk::Physical
                 .min(limits.max_framebuffer_height),
             device_memory_bytes: device_memory_bytes.unwrap_or(0),
             subgroup_size: subgroup.subgroup_size,
-            subgroup_arithmetic: subgroup.supported_operations.contains(vk::SubgroupFeatureFlags::ARITHMETIC)
+            subgroup_arithmetic: subgroup
+                .supported_operations
+                .contains(vk::SubgroupFeatureFlags::ARITHMETIC)
                 && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
             subgroup_shuffle: subgroup.supported_operations.contains(
-                vk::SubgroupFeatureFlags::BALLOT | vk::SubgroupFeatureFlags::VOTE | vk::SubgroupFeatureFlags::SHUFFLE,
-            ) && subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE),
+                vk::SubgroupFeatureFlags::BALLOT
+                    | vk::SubgroupFeatureFlags::VOTE
+                    | vk::SubgroupFeatureFlags::SHUFFLE,
+            ) && subgroup
+                .supported_stages
+                .contains(vk::ShaderStageFlags::COMPUTE),
             subgroup_size_fixed: sizes.min_subgroup_size == sizes.max_subgroup_size,
-            subgroup_size_chosen: sizes.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE),
+            subgroup_size_chosen: sizes
+                .required_subgroup_size_stages
+                .contains(vk::ShaderStageFlags::COMPUTE),
             words_64: features.shader_int64 == vk::TRUE,
             floats_64: features.shader_float64 == vk::TRUE,
             timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
@@ -101,11 +119,18 @@ fn unusable(
         (v13.subgroup_size_control, "subgroupSizeControl"),
         (v13.compute_full_subgroups, "computeFullSubgroups"),
     ];
-    needs.iter().find(|(has, _)| *has == vk::FALSE).map(|(_, name)| format!("feature {name} is missing"))
+    needs
+        .iter()
+        .find(|(has, _)| *has == vk::FALSE)
+        .map(|(_, name)| format!("feature {name} is missing"))
 }
 
 /// What cannot be listed is not there.
-pub(super) fn has_extension(instance: &Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
+pub(super) fn has_extension(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    name: &CStr,
+) -> bool {
     let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) };
     extensions.is_ok_and(|all| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
 }

@@ -1,5 +1,5 @@
-//! Recording and submitting commands. The recorder knows from reflection what each pipeline reads and writes, and
-//! puts a barrier exactly where a later use depends on an earlier one.
+//! Recording and submitting commands. The recorder knows from reflection what each pipeline reads
+//! and writes, and puts a barrier exactly where a later use depends on an earlier one.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,20 +15,23 @@ use super::reflect::BindingKind;
 use super::timer::{ScopeTime, Timer};
 use crate::error::{Error, Result};
 
-/// A submission that takes longer than an hour is taken for a hang. A hung GPU is lost to its driver's watchdog long
-/// before; a software device may honestly take minutes for a million large sprites.
+/// A submission that takes longer than an hour is taken for a hang. A hung GPU is lost to its
+/// driver's watchdog long before; a software device may honestly take minutes for a million large
+/// sprites.
 const TIMEOUT_NS: u64 = 3_600_000_000_000;
 const SETS_PER_POOL: u32 = 64;
 const MAX_SCOPES: u32 = 32;
 
-/// Whether the recorder places barriers. `Omitted` exists for the tests that prove that validation would notice.
+/// Whether the recorder places barriers. `Omitted` exists for the tests that prove that validation
+/// would notice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Barriers {
     Placed,
     Omitted,
 }
 
-/// One command buffer with all that a submission needs: descriptors, timestamps, a timeline semaphore.
+/// One command buffer with all that a submission needs: descriptors, timestamps, a timeline
+/// semaphore.
 pub struct Commands {
     pool: vk::CommandPool,
     pub(super) buffer: vk::CommandBuffer,
@@ -75,7 +78,8 @@ impl Commands {
         let fail = |call: &'static str| move |e| Error::vulkan(call, e);
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(shared.queue_family);
         let timer = Timer::new(device, name, MAX_SCOPES)?;
-        let pool = unsafe { shared.raw.create_command_pool(&info, None) }.map_err(fail("vkCreateCommandPool"))?;
+        let pool = unsafe { shared.raw.create_command_pool(&info, None) }
+            .map_err(fail("vkCreateCommandPool"))?;
         let (buffer, semaphore) = (vk::CommandBuffer::null(), vk::Semaphore::null());
         let mut commands = Commands {
             pool,
@@ -87,13 +91,15 @@ impl Commands {
             name: name.to_owned(),
             shared,
         };
-        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+        let info =
+            vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
         commands.buffer = unsafe { commands.shared.raw.allocate_command_buffers(&info) }
             .map_err(fail("vkAllocateCommandBuffers"))?[0];
-        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let mut kind =
+            vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
-        commands.semaphore =
-            unsafe { commands.shared.raw.create_semaphore(&info, None) }.map_err(fail("vkCreateSemaphore"))?;
+        commands.semaphore = unsafe { commands.shared.raw.create_semaphore(&info, None) }
+            .map_err(fail("vkCreateSemaphore"))?;
         commands.add_descriptor_pool()?;
         commands.shared.name(commands.semaphore, name);
         commands.shared.name(commands.buffer, name);
@@ -101,7 +107,11 @@ impl Commands {
     }
 
     /// Records anew what `f` asks for. The previous submission must have been waited for.
-    pub fn record(&mut self, barriers: Barriers, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
+    pub fn record(
+        &mut self,
+        barriers: Barriers,
+        f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
+    ) -> Result<()> {
         let _zone = info_span!("record").entered();
         let raw = self.shared.raw.clone();
         unsafe {
@@ -111,18 +121,22 @@ impl Commands {
             }
             raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
                 .map_err(|e| Error::vulkan("vkResetCommandPool", e))?;
-            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-            raw.begin_command_buffer(self.buffer, &begin).map_err(|e| Error::vulkan("vkBeginCommandBuffer", e))?;
+            let begin = vk::CommandBufferBeginInfo::default()
+                .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            raw.begin_command_buffer(self.buffer, &begin)
+                .map_err(|e| Error::vulkan("vkBeginCommandBuffer", e))?;
         }
         self.timer.reset(self.buffer);
         let mut recorder = Recorder { commands: self, uses: HashMap::new(), i_pool: 0, barriers };
-        // What earlier submissions wrote and read, which may still be under way: this alone orders them before this one.
-        // Synchronization validation of 1.3.239 does not look across submissions, so no test would notice if this line went.
+        // What earlier submissions wrote and read, which may still be under way: this alone orders
+        // them before this one. Synchronization validation of 1.3.239 does not look across
+        // submissions, so no test would notice if this line went.
         recorder.barrier(WRITES, STAGES, READS | WRITES);
         f(&mut recorder)?;
         recorder.commands.timer.copy(recorder.commands.buffer);
         recorder.make_visible_to_host();
-        unsafe { raw.end_command_buffer(self.buffer) }.map_err(|e| Error::vulkan("vkEndCommandBuffer", e))
+        unsafe { raw.end_command_buffer(self.buffer) }
+            .map_err(|e| Error::vulkan("vkEndCommandBuffer", e))
     }
 
     /// Starts the recorded commands; returns at once.
@@ -138,9 +152,13 @@ impl Commands {
     ) -> Result<Pending> {
         let _zone = info_span!("submit").entered();
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
-        let at = |semaphore, stages| vk::SemaphoreSubmitInfo::default().semaphore(semaphore).stage_mask(stages);
-        let waits: Vec<_> =
-            ready.map(|s| at(s, vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT)).into_iter().collect();
+        let at = |semaphore, stages| {
+            vk::SemaphoreSubmitInfo::default().semaphore(semaphore).stage_mask(stages)
+        };
+        let waits: Vec<_> = ready
+            .map(|s| at(s, vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT))
+            .into_iter()
+            .collect();
         let value = self.submitted + 1;
         let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.semaphore).value(value);
         let mut signals = vec![signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
@@ -149,8 +167,10 @@ impl Commands {
             .wait_semaphore_infos(&waits)
             .command_buffer_infos(&buffers)
             .signal_semaphore_infos(&signals)];
-        unsafe { self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null()) }
-            .map_err(|e| Error::vulkan(format!("vkQueueSubmit2 {}", self.name), e))?;
+        unsafe {
+            self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null())
+        }
+        .map_err(|e| Error::vulkan(format!("vkQueueSubmit2 {}", self.name), e))?;
         self.submitted = value;
         Ok(self.pending())
     }
@@ -171,16 +191,24 @@ impl Commands {
     }
 
     /// Records, submits and waits.
-    pub fn run(&mut self, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<Vec<ScopeTime>> {
+    pub fn run(
+        &mut self,
+        f: impl FnOnce(&mut Recorder<'_>) -> Result<()>,
+    ) -> Result<Vec<ScopeTime>> {
         self.record(Barriers::Placed, f)?;
         self.submit()?;
         self.wait()
     }
 
     fn add_descriptor_pool(&mut self) -> Result<()> {
-        let size = |ty, a_set: u32| vk::DescriptorPoolSize { ty, descriptor_count: a_set * SETS_PER_POOL };
-        let sizes = [size(vk::DescriptorType::STORAGE_BUFFER, 8), size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER, 2)];
-        let info = vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
+        let size =
+            |ty, a_set: u32| vk::DescriptorPoolSize { ty, descriptor_count: a_set * SETS_PER_POOL };
+        let sizes = [
+            size(vk::DescriptorType::STORAGE_BUFFER, 8),
+            size(vk::DescriptorType::UNIFORM_TEXEL_BUFFER, 2),
+        ];
+        let info =
+            vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
         let pool = unsafe { self.shared.raw.create_descriptor_pool(&info, None) }
             .map_err(|e| Error::vulkan("vkCreateDescriptorPool", e))?;
         self.descriptors.push(pool);
@@ -190,7 +218,8 @@ impl Commands {
 
 impl Drop for Commands {
     fn drop(&mut self) {
-        // A submission still under way (after an error) must end before its memory goes; a lost device ends it too.
+        // A submission still under way (after an error) must end before its memory goes; a lost
+        // device ends it too.
         let (semaphores, values) = ([self.semaphore], [self.submitted]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         unsafe {
@@ -248,7 +277,11 @@ pub struct Recorder<'a> {
 
 impl Recorder<'_> {
     /// Runs `f` between two timestamps under `name`.
-    pub fn scope(&mut self, name: &'static str, f: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+    pub fn scope(
+        &mut self,
+        name: &'static str,
+        f: impl FnOnce(&mut Self) -> Result<()>,
+    ) -> Result<()> {
         let _zone = info_span!("record", name).entered();
         let i = self.commands.timer.begin(self.commands.buffer, name);
         let done = f(self);
@@ -256,16 +289,23 @@ impl Recorder<'_> {
         done
     }
 
-    /// Runs `kernel` with one invocation a record (each.glsl), in rows of workgroups where the device takes fewer along x than
-    /// that are. `buffers` by binding number.
-    pub fn dispatch<P: Pod>(&mut self, kernel: &Kernel, buffers: &[&Buffer], push: &P, n_records: u32) -> Result<()> {
+    /// Runs `kernel` with one invocation a record (each.glsl), in rows of workgroups where the
+    /// device takes fewer along x than that are. `buffers` by binding number.
+    pub fn dispatch<P: Pod>(
+        &mut self,
+        kernel: &Kernel,
+        buffers: &[&Buffer],
+        push: &P,
+        n_records: u32,
+    ) -> Result<()> {
         let n_groups = n_records.div_ceil(kernel.local_size_x());
         // Every device takes 65 535 along y, too: more than any number of records needs.
         let n_rows = n_groups.div_ceil(self.commands.shared.limits.max_workgroups_x);
         self.dispatch_rows(kernel, buffers, push, [n_groups.div_ceil(n_rows.max(1)), n_rows])
     }
 
-    /// Runs `kernel` in `n_groups` workgroups, or as many as the device takes; it goes on from there by itself.
+    /// Runs `kernel` in `n_groups` workgroups, or as many as the device takes; it goes on from
+    /// there by itself.
     pub fn dispatch_groups<P: Pod>(
         &mut self,
         kernel: &Kernel,
@@ -287,12 +327,20 @@ impl Recorder<'_> {
         if x == 0 {
             return Ok(());
         }
-        self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
+        self.bind(
+            vk::PipelineBindPoint::COMPUTE,
+            kernel.raw,
+            &kernel.interface,
+            &kernel.name,
+            buffers,
+            push,
+        )?;
         unsafe { self.commands.shared.raw.cmd_dispatch(self.commands.buffer, x, y, 1) };
         Ok(())
     }
 
-    /// Runs `kernel` in as many workgroups as the three words from word `i` of `counts` say, written on the device.
+    /// Runs `kernel` in as many workgroups as the three words from word `i` of `counts` say,
+    /// written on the device.
     pub fn dispatch_counted<P: Pod>(
         &mut self,
         kernel: &Kernel,
@@ -301,42 +349,79 @@ impl Recorder<'_> {
         (counts, i): (&Buffer, u32),
     ) -> Result<()> {
         self.depend(&[(counts.raw, true, false)]);
-        self.bind(vk::PipelineBindPoint::COMPUTE, kernel.raw, &kernel.interface, &kernel.name, buffers, push)?;
+        self.bind(
+            vk::PipelineBindPoint::COMPUTE,
+            kernel.raw,
+            &kernel.interface,
+            &kernel.name,
+            buffers,
+            push,
+        )?;
         let offset = u64::from(i) * size_of::<u32>() as u64;
-        unsafe { self.commands.shared.raw.cmd_dispatch_indirect(self.commands.buffer, counts.raw, offset) };
+        unsafe {
+            self.commands.shared.raw.cmd_dispatch_indirect(self.commands.buffer, counts.raw, offset)
+        };
         Ok(())
     }
 
     /// Sets every 32-bit word of `buffer`.
     pub fn fill(&mut self, buffer: &Buffer, word: u32) {
         self.depend(&[(buffer.raw, false, true)]);
-        unsafe { self.commands.shared.raw.cmd_fill_buffer(self.commands.buffer, buffer.raw, 0, vk::WHOLE_SIZE, word) };
+        unsafe {
+            self.commands.shared.raw.cmd_fill_buffer(
+                self.commands.buffer,
+                buffer.raw,
+                0,
+                vk::WHOLE_SIZE,
+                word,
+            )
+        };
     }
 
     /// Writes `record`, of 65 536 bytes at most, to the start of `buffer`.
     pub fn update<T: Pod>(&mut self, buffer: &Buffer, record: &T) {
         self.depend(&[(buffer.raw, false, true)]);
         let bytes = bytemuck::bytes_of(record);
-        unsafe { self.commands.shared.raw.cmd_update_buffer(self.commands.buffer, buffer.raw, 0, bytes) };
+        unsafe {
+            self.commands.shared.raw.cmd_update_buffer(self.commands.buffer, buffer.raw, 0, bytes)
+        };
     }
 
     /// Copies the first bytes of `from` that fit into `to`.
     pub fn copy(&mut self, from: &Buffer, to: &Buffer) {
         self.depend(&[(from.raw, true, false), (to.raw, false, true)]);
         let region = [vk::BufferCopy::default().size(from.bytes().min(to.bytes()))];
-        unsafe { self.commands.shared.raw.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &region) };
+        unsafe {
+            self.commands.shared.raw.cmd_copy_buffer(
+                self.commands.buffer,
+                from.raw,
+                to.raw,
+                &region,
+            )
+        };
     }
 
-    /// Copies runs of bytes from one buffer to another: each by its beginning there and here, and its length.
+    /// Copies runs of bytes from one buffer to another: each by its beginning there and here, and
+    /// its length.
     pub fn copy_runs(&mut self, from: &Buffer, to: &Buffer, runs: &[[u64; 3]]) {
         let regions = runs.iter().filter(|[_, _, n]| *n > 0);
-        let regions: Vec<_> =
-            regions.map(|[src, dst, n]| vk::BufferCopy::default().src_offset(*src).dst_offset(*dst).size(*n)).collect();
+        let regions: Vec<_> = regions
+            .map(|[src, dst, n]| {
+                vk::BufferCopy::default().src_offset(*src).dst_offset(*dst).size(*n)
+            })
+            .collect();
         if regions.is_empty() {
             return;
         }
         self.depend(&[(from.raw, true, false), (to.raw, false, true)]);
-        unsafe { self.commands.shared.raw.cmd_copy_buffer(self.commands.buffer, from.raw, to.raw, &regions) };
+        unsafe {
+            self.commands.shared.raw.cmd_copy_buffer(
+                self.commands.buffer,
+                from.raw,
+                to.raw,
+                &regions,
+            )
+        };
     }
 
     pub(super) fn bind<P: Pod>(
@@ -350,7 +435,11 @@ impl Recorder<'_> {
     ) -> Result<()> {
         let mismatch = |what| Err(Error::Shader { name: name.to_owned(), what });
         if buffers.len() != interface.access.len() {
-            return mismatch(format!("has {} bindings, the host gives {}", interface.access.len(), buffers.len()));
+            return mismatch(format!(
+                "has {} bindings, the host gives {}",
+                interface.access.len(),
+                buffers.len()
+            ));
         }
         let bytes = bytemuck::bytes_of(push);
         if bytes.len() != interface.push_bytes {
@@ -360,15 +449,21 @@ impl Recorder<'_> {
                 bytes.len()
             ));
         }
-        let uses: Vec<_> = buffers.iter().zip(&interface.access).map(|(b, a)| (b.raw, a.reads, a.writes)).collect();
+        let uses: Vec<_> = buffers
+            .iter()
+            .zip(&interface.access)
+            .map(|(b, a)| (b.raw, a.reads, a.writes))
+            .collect();
         self.depend(&uses);
         let mut views = vec![];
         for (buffer, access) in buffers.iter().zip(&interface.access) {
             views.push([buffer.texels(access.kind)?]);
         }
         let set = self.descriptor_set(interface.set_layout)?;
-        let infos: Vec<_> =
-            buffers.iter().map(|b| [vk::DescriptorBufferInfo { buffer: b.raw, offset: 0, range: b.bytes() }]).collect();
+        let infos: Vec<_> = buffers
+            .iter()
+            .map(|b| [vk::DescriptorBufferInfo { buffer: b.raw, offset: 0, range: b.bytes() }])
+            .collect();
         let writes: Vec<_> = infos
             .iter()
             .zip(&views)
@@ -396,7 +491,8 @@ impl Recorder<'_> {
         Ok(())
     }
 
-    /// A set from the pools; a new pool when they are used up, which happens in the first frame or never.
+    /// A set from the pools; a new pool when they are used up, which happens in the first frame or
+    /// never.
     fn descriptor_set(&mut self, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
         loop {
             if self.i_pool == self.commands.descriptors.len() {
@@ -408,7 +504,9 @@ impl Recorder<'_> {
                 .set_layouts(&layouts);
             match unsafe { self.commands.shared.raw.allocate_descriptor_sets(&info) } {
                 Ok(sets) => return Ok(sets[0]),
-                Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) => self.i_pool += 1,
+                Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY | vk::Result::ERROR_FRAGMENTED_POOL) => {
+                    self.i_pool += 1
+                }
                 Err(e) => return Err(Error::vulkan("vkAllocateDescriptorSets", e)),
             }
         }
@@ -433,11 +531,18 @@ impl Recorder<'_> {
         }
     }
 
-    fn barrier(&self, src: vk::AccessFlags2, dst_stages: vk::PipelineStageFlags2, dst: vk::AccessFlags2) {
+    fn barrier(
+        &self,
+        src: vk::AccessFlags2,
+        dst_stages: vk::PipelineStageFlags2,
+        dst: vk::AccessFlags2,
+    ) {
         let barrier = vk::MemoryBarrier2::default().src_stage_mask(STAGES).src_access_mask(src);
         let barrier = [barrier.dst_stage_mask(dst_stages).dst_access_mask(dst)];
         let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
-        unsafe { self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+        unsafe {
+            self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency)
+        };
     }
 
     fn make_visible_to_host(&self) {

@@ -19,7 +19,8 @@ pub struct Target<'a> {
 #[derive(Clone, Copy)]
 pub enum Instances<'a> {
     Known(u32),
-    /// By the four words from this word of a buffer (vertices, instances, first vertex, first instance), written on the device.
+    /// By the four words from this word of a buffer (vertices, instances, first vertex, first
+    /// instance), written on the device.
     Counted(&'a Buffer, u32),
 }
 
@@ -44,7 +45,8 @@ impl<'a> Target<'a> {
 
 /// Fragment tests, where depth is read and written.
 const DEPTH_STAGES: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::from_raw(
-    vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS.as_raw() | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS.as_raw(),
+    vk::PipelineStageFlags2::EARLY_FRAGMENT_TESTS.as_raw()
+        | vk::PipelineStageFlags2::LATE_FRAGMENT_TESTS.as_raw(),
 );
 
 impl Recorder<'_> {
@@ -63,12 +65,16 @@ impl Recorder<'_> {
         self.transition(color, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
         let on_color = [attachment(color, start)];
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: color.extent };
-        let info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&on_color);
+        let info = vk::RenderingInfo::default()
+            .render_area(area)
+            .layer_count(1)
+            .color_attachments(&on_color);
         let on_depth;
         let info = match depth {
             Some(depth) => {
                 self.transition(depth, vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL);
-                on_depth = attachment(depth, if start == Start::ClearColor { Start::Load } else { start });
+                on_depth =
+                    attachment(depth, if start == Start::ClearColor { Start::Load } else { start });
                 info.depth_attachment(&on_depth)
             }
             None => info,
@@ -76,9 +82,17 @@ impl Recorder<'_> {
         if let Instances::Counted(counts, _) = instances {
             self.depend(&[(counts.raw, true, false)]);
         }
-        self.bind(vk::PipelineBindPoint::GRAPHICS, pipeline.raw, &pipeline.interface, &pipeline.name, buffers, push)?;
+        self.bind(
+            vk::PipelineBindPoint::GRAPHICS,
+            pipeline.raw,
+            &pipeline.interface,
+            &pipeline.name,
+            buffers,
+            push,
+        )?;
         let (width, height) = (color.extent.width as f32, color.extent.height as f32);
-        let viewport = vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
+        let viewport =
+            vk::Viewport { x: 0.0, y: 0.0, width, height, min_depth: 0.0, max_depth: 1.0 };
         let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
         unsafe {
             raw.cmd_begin_rendering(commands, &info);
@@ -105,14 +119,23 @@ impl Recorder<'_> {
             base_array_layer: 0,
             layer_count: 1,
         };
-        let region = [vk::BufferImageCopy::default().image_subresource(layers).image_extent(from.extent.into())];
+        let region = [vk::BufferImageCopy::default()
+            .image_subresource(layers)
+            .image_extent(from.extent.into())];
         let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
         unsafe {
-            self.commands.shared.raw.cmd_copy_image_to_buffer(self.commands.buffer, from.raw, layout, to.raw, &region)
+            self.commands.shared.raw.cmd_copy_image_to_buffer(
+                self.commands.buffer,
+                from.raw,
+                layout,
+                to.raw,
+                &region,
+            )
         };
     }
 
-    /// Has `draw` record draws of its own over what is in `image`; it is given the commands, and how much there is.
+    /// Has `draw` record draws of its own over what is in `image`; it is given the commands, and
+    /// how much there is.
     #[cfg(feature = "window")]
     pub(super) fn draw_over(
         &mut self,
@@ -122,7 +145,10 @@ impl Recorder<'_> {
         self.transition(image, vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL);
         let on_color = [attachment(image, Start::Load)];
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: image.extent };
-        let info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&on_color);
+        let info = vk::RenderingInfo::default()
+            .render_area(area)
+            .layer_count(1)
+            .color_attachments(&on_color);
         let (raw, commands) = (&self.commands.shared.raw, self.commands.buffer);
         unsafe { raw.cmd_begin_rendering(commands, &info) };
         let drawn = draw(commands, image.extent);
@@ -135,7 +161,9 @@ impl Recorder<'_> {
     pub(super) fn copy_part(&mut self, from: &mut Image, to: &mut Image, area: vk::Rect2D) {
         self.transition(from, vk::ImageLayout::TRANSFER_SRC_OPTIMAL);
         self.transition(to, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
-        let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+        let layers = vk::ImageSubresourceLayers::default()
+            .aspect_mask(vk::ImageAspectFlags::COLOR)
+            .layer_count(1);
         let at = vk::Offset3D { x: area.offset.x, y: area.offset.y, z: 0 };
         let region = [vk::ImageCopy::default()
             .src_subresource(layers)
@@ -155,9 +183,9 @@ impl Recorder<'_> {
         image.layout = vk::ImageLayout::UNDEFINED;
     }
 
-    /// Orders the coming use of `image` after the last one, also where the layout stays: two draws into one target.
-    /// Synchronization validation of 1.3.239 does not look at what dynamic rendering draws into, so no test would notice
-    /// if those stood without.
+    /// Orders the coming use of `image` after the last one, also where the layout stays: two draws
+    /// into one target. Synchronization validation of 1.3.239 does not look at what dynamic
+    /// rendering draws into, so no test would notice if those stood without.
     fn transition(&self, image: &mut Image, to: vk::ImageLayout) {
         let side = |layout| match layout {
             vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => (
@@ -166,7 +194,8 @@ impl Recorder<'_> {
             ),
             vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL => (
                 DEPTH_STAGES,
-                vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE,
+                vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_READ
+                    | vk::AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE,
             ),
             vk::ImageLayout::TRANSFER_SRC_OPTIMAL => {
                 (vk::PipelineStageFlags2::ALL_TRANSFER, vk::AccessFlags2::TRANSFER_READ)
@@ -178,7 +207,9 @@ impl Recorder<'_> {
         };
         // An image of a swapchain is waited for where it is drawn into.
         let (src_stage, src_access) = match image.layout {
-            vk::ImageLayout::UNDEFINED => (vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT, vk::AccessFlags2::NONE),
+            vk::ImageLayout::UNDEFINED => {
+                (vk::PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT, vk::AccessFlags2::NONE)
+            }
             layout => side(layout),
         };
         let (dst_stage, dst_access) = side(to);
@@ -193,7 +224,9 @@ impl Recorder<'_> {
             .subresource_range(image.range);
         let barriers = [barrier];
         let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
-        unsafe { self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+        unsafe {
+            self.commands.shared.raw.cmd_pipeline_barrier2(self.commands.buffer, &dependency)
+        };
         image.layout = to;
     }
 }
@@ -215,8 +248,12 @@ fn attachment(image: &Image, start: Start) -> vk::RenderingAttachmentInfo<'stati
 fn check(pipeline: &DrawPipeline, color: &Image, depth: Option<&Image>) -> Result<()> {
     let mismatch = |what| Err(Error::Shader { name: pipeline.name.clone(), what });
     match depth {
-        Some(_) if !pipeline.has_depth => mismatch("is not made for a target with depth".to_owned()),
-        None if pipeline.has_depth => mismatch("is made for a target with depth, the host gives none".to_owned()),
+        Some(_) if !pipeline.has_depth => {
+            mismatch("is not made for a target with depth".to_owned())
+        }
+        None if pipeline.has_depth => {
+            mismatch("is made for a target with depth, the host gives none".to_owned())
+        }
         Some(depth) if depth.extent != color.extent => {
             let ((w, h), (x, y)) = (color.size(), depth.size());
             mismatch(format!("draws {w}×{h} pixels, the host gives depth for {x}×{y}"))

@@ -1,4 +1,5 @@
-//! What a SPIR-V module says of itself: workgroup size, push constants, storage buffers and how it touches them.
+//! What a SPIR-V module says of itself: workgroup size, push constants, storage buffers and how it
+//! touches them.
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, Op, StorageClass};
@@ -72,7 +73,9 @@ pub fn reflect(name: &str, words: &[u32]) -> Result<Reflection> {
     let m = Reader { module: &module };
     let mut found = Reflection { local_size: m.local_size(), ..Reflection::default() };
     for variable in module.types_global_values.iter().filter(|i| i.class.opcode == Op::Variable) {
-        let (Some(id), Some(Operand::StorageClass(class))) = (variable.result_id, variable.operands.first()) else {
+        let (Some(id), Some(Operand::StorageClass(class))) =
+            (variable.result_id, variable.operands.first())
+        else {
             continue;
         };
         let pointee = variable.result_type.and_then(|t| m.pointee(t));
@@ -128,12 +131,15 @@ impl Reader<'_> {
             matches!(a.operands.get(1), Some(Operand::Decoration(Decoration::BuiltIn)))
                 && matches!(a.operands.get(2), Some(Operand::BuiltIn(BuiltIn::WorkgroupSize)))
         });
-        if let Some(composite) = builtin.and_then(|a| self.id(a, 0)).and_then(|id| self.definition(id)) {
+        if let Some(composite) =
+            builtin.and_then(|a| self.id(a, 0)).and_then(|id| self.definition(id))
+        {
             return [0, 1, 2].map(|k| self.id(composite, k).map_or(0, |id| self.constant(id)));
         }
         let modes = self.module.execution_modes.iter();
-        let sizes =
-            modes.filter(|m| matches!(m.operands.get(1), Some(Operand::ExecutionMode(ExecutionMode::LocalSize))));
+        let sizes = modes.filter(|m| {
+            matches!(m.operands.get(1), Some(Operand::ExecutionMode(ExecutionMode::LocalSize)))
+        });
         sizes.map(|m| [2, 3, 4].map(|k| self.literal(m, k))).next().unwrap_or([0; 3])
     }
 
@@ -146,7 +152,8 @@ impl Reader<'_> {
                 (Op::MemberDecorate, Some(m)) if self.literal(a, 1) == m => 2,
                 _ => return None,
             };
-            (self.id(a, 0) == Some(id) && a.operands.get(at) == Some(&wanted)).then(|| self.literal(a, at + 1))
+            (self.id(a, 0) == Some(id) && a.operands.get(at) == Some(&wanted))
+                .then(|| self.literal(a, at + 1))
         })
     }
 
@@ -204,24 +211,30 @@ impl Reader<'_> {
 
     fn binding(&self, id: u32, block: u32) -> Binding {
         let binding = self.decoration(id, None, Decoration::Binding).unwrap_or(0);
-        let has = |d| self.decoration(id, None, d).is_some() || self.decoration(block, Some(0), d).is_some();
+        let has = |d| {
+            self.decoration(id, None, d).is_some() || self.decoration(block, Some(0), d).is_some()
+        };
         let array = self.definition(block).and_then(|b| self.id(b, 0));
         let element = array.and_then(|a| self.definition(a)).and_then(|a| self.id(a, 0));
-        let is_struct = |id: &u32| self.definition(*id).is_some_and(|i| i.class.opcode == Op::TypeStruct);
+        let is_struct =
+            |id: &u32| self.definition(*id).is_some_and(|i| i.class.opcode == Op::TypeStruct);
         Binding {
             binding,
             kind: BindingKind::Storage,
             name: self.name(block, Some(0)),
             reads: !has(Decoration::NonReadable),
             writes: !has(Decoration::NonWritable),
-            stride: array.and_then(|a| self.decoration(a, None, Decoration::ArrayStride)).unwrap_or(0),
+            stride: array
+                .and_then(|a| self.decoration(a, None, Decoration::ArrayStride))
+                .unwrap_or(0),
             element: element.filter(is_struct).map(|e| self.structure(e)),
         }
     }
 
     /// An image of dimension "buffer"; what it samples as tells its texels.
     fn texels(&self, id: u32, image: u32) -> Binding {
-        let sampled = self.definition(image).and_then(|i| self.id(i, 0)).and_then(|t| self.definition(t));
+        let sampled =
+            self.definition(image).and_then(|i| self.id(i, 0)).and_then(|t| self.definition(t));
         let of_floats = sampled.is_some_and(|t| t.class.opcode == Op::TypeFloat);
         let kind = if of_floats { BindingKind::Floats } else { BindingKind::Texels };
         Binding {

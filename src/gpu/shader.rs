@@ -32,7 +32,10 @@ impl Sources {
         }
         if n_found == 0 {
             let names: Vec<&str> = self.0.keys().map(String::as_str).collect();
-            return Err(Error::io(dir, format!("holds none of nimbus's shaders ({})", names.join(", "))));
+            return Err(Error::io(
+                dir,
+                format!("holds none of nimbus's shaders ({})", names.join(", ")),
+            ));
         }
         Ok(self)
     }
@@ -79,8 +82,8 @@ pub struct Compiler {
     cache: Option<PathBuf>,
 }
 
-/// Where what can be made again is kept: `$NIMBUS_CACHE_DIR`, else `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`, each with
-/// `name` below it.
+/// Where what can be made again is kept: `$NIMBUS_CACHE_DIR`, else `$XDG_CACHE_HOME/nimbus`, else
+/// `~/.cache/nimbus`, each with `name` below it.
 pub fn cache_folder(name: &str) -> Option<PathBuf> {
     let var = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let base = var("NIMBUS_CACHE_DIR")
@@ -90,10 +93,11 @@ pub fn cache_folder(name: &str) -> Option<PathBuf> {
 }
 
 impl Compiler {
-    /// `cache` is a folder for SPIR-V, made when first needed; without one every shader is compiled anew.
+    /// `cache` is a folder for SPIR-V, made when first needed; without one every shader is compiled
+    /// anew.
     pub fn new(sources: Sources, cache: Option<PathBuf>) -> Result<Compiler> {
-        let raw =
-            shaderc::Compiler::new().map_err(|e| Error::Shader { name: "compiler".into(), what: e.to_string() })?;
+        let raw = shaderc::Compiler::new()
+            .map_err(|e| Error::Shader { name: "compiler".into(), what: e.to_string() })?;
         Ok(Compiler { raw, sources, cache })
     }
 
@@ -112,16 +116,26 @@ impl Compiler {
     }
 
     /// The same with `macros` defined.
-    pub fn compile_with(&self, file: &str, optimize: Optimize, macros: &[(&str, u32)]) -> Result<Vec<u32>> {
+    pub fn compile_with(
+        &self,
+        file: &str,
+        optimize: Optimize,
+        macros: &[(&str, u32)],
+    ) -> Result<Vec<u32>> {
         let fail = |what: String| Error::Shader { name: file.to_owned(), what };
-        let Some(text) = self.sources.0.get(file) else { return Err(fail("no such shader".into())) };
+        let Some(text) = self.sources.0.get(file) else {
+            return Err(fail("no such shader".into()));
+        };
         let kind = match file.rsplit('.').next() {
             Some("comp") => shaderc::ShaderKind::Compute,
             Some("vert") => shaderc::ShaderKind::Vertex,
             Some("frag") => shaderc::ShaderKind::Fragment,
             _ => return Err(fail("expected a file ending in .comp, .vert or .frag".into())),
         };
-        let cached = self.cache.as_ref().map(|dir| dir.join(format!("{}.spv", self.key(file, text, optimize, macros))));
+        let cached = self
+            .cache
+            .as_ref()
+            .map(|dir| dir.join(format!("{}.spv", self.key(file, text, optimize, macros))));
         if let Some(words) = cached.as_deref().and_then(read_cached) {
             return Ok(words);
         }
@@ -140,8 +154,10 @@ impl Compiler {
             let content = self.sources.0.get(&full).cloned().ok_or(format!("no include {full}"))?;
             Ok(shaderc::ResolvedInclude { resolved_name: full, content })
         });
-        let compiled =
-            self.raw.compile_into_spirv(text, kind, file, "main", Some(&options)).map_err(|e| fail(e.to_string()))?;
+        let compiled = self
+            .raw
+            .compile_into_spirv(text, kind, file, "main", Some(&options))
+            .map_err(|e| fail(e.to_string()))?;
         let words = compiled.as_binary().to_vec();
         if let Some(path) = cached {
             write_cached(&path, &words);
@@ -154,7 +170,10 @@ impl Compiler {
         let mut hash = Sha256::new();
         let (version, revision) = shaderc::get_spirv_version();
         let crate_version = "shaderc-rs 0.10";
-        hash.update(format!("{crate_version} {version} {revision} vulkan1.3 {optimize:?} {macros:?} {file}\0{text}\0"));
+        hash.update(format!(
+            "{crate_version} {version} {revision} vulkan1.3 {optimize:?} \
+            {macros:?} {file}\0{text}\0"
+        ));
         for (name, include) in self.sources.0.iter().filter(|(n, _)| n.starts_with("include/")) {
             hash.update(format!("{name}\0{include}\0"));
         }
@@ -180,7 +199,11 @@ fn read_cached(path: &Path) -> Option<Vec<u32>> {
 /// A cache that cannot be written costs time and nothing else, so failure is silent.
 fn write_cached(path: &Path, words: &[u32]) {
     let bytes: &[u8] = bytemuck::cast_slice(words);
-    let temporary = path.with_extension(format!("{}-{:?}.tmp", std::process::id(), std::thread::current().id()));
+    let temporary = path.with_extension(format!(
+        "{}-{:?}.tmp",
+        std::process::id(),
+        std::thread::current().id()
+    ));
     let write = || -> std::io::Result<()> {
         std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
         std::fs::write(&temporary, [Sha256::digest(bytes).as_slice(), bytes].concat())?;

@@ -22,8 +22,11 @@ pub enum PresentMode {
 }
 
 impl PresentMode {
-    pub const NAMES: [(&'static str, PresentMode); 3] =
-        [("fifo", PresentMode::Fifo), ("mailbox", PresentMode::Mailbox), ("immediate", PresentMode::Immediate)];
+    pub const NAMES: [(&'static str, PresentMode); 3] = [
+        ("fifo", PresentMode::Fifo),
+        ("mailbox", PresentMode::Mailbox),
+        ("immediate", PresentMode::Immediate),
+    ];
 
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize].0
@@ -53,14 +56,18 @@ impl Surface {
         display: RawDisplayHandle,
         window: RawWindowHandle,
     ) -> Result<(Arc<Instance>, Surface)> {
-        let wanted = ash_window::enumerate_required_extensions(display)
-            .map_err(|e| Error::vulkan("window extensions", format!("no Vulkan for this window system: {e}")))?;
+        let wanted = ash_window::enumerate_required_extensions(display).map_err(|e| {
+            Error::vulkan("window extensions", format!("no Vulkan for this window system: {e}"))
+        })?;
         // SAFETY: the list is of static C strings.
-        let names: Vec<_> = wanted.iter().map(|name| unsafe { std::ffi::CStr::from_ptr(*name) }).collect();
+        let names: Vec<_> =
+            wanted.iter().map(|name| unsafe { std::ffi::CStr::from_ptr(*name) }).collect();
         let instance = Instance::with_extensions(validation, &names)?;
         // SAFETY: both handles are those of a living window; whoever holds the surface keeps it.
-        let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
-            .map_err(|e| Error::vulkan("creating the window's surface", e))?;
+        let raw = unsafe {
+            ash_window::create_surface(&instance.entry, &instance.raw, display, window, None)
+        }
+        .map_err(|e| Error::vulkan("creating the window's surface", e))?;
         let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
         Ok((instance.clone(), Surface { raw, loader, _instance: instance }))
     }
@@ -68,19 +75,31 @@ impl Surface {
     /// Whether `device` can show pictures here; an error that says so where it cannot.
     pub fn check(&self, device: &Device) -> Result<()> {
         let family = device.shared().queue_family;
-        let can = unsafe { self.loader.get_physical_device_surface_support(device.physical(), family, self.raw) };
+        let can = unsafe {
+            self.loader.get_physical_device_surface_support(device.physical(), family, self.raw)
+        };
         match can {
             Ok(true) if device.info().has_swapchain => Ok(()),
-            Ok(_) => Err(Error::vulkan("window", format!("{} cannot show pictures in it", device.info().name))),
+            Ok(_) => Err(Error::vulkan(
+                "window",
+                format!("{} cannot show pictures in it", device.info().name),
+            )),
             Err(e) => Err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR", e)),
         }
     }
 
     /// The modes that `device` has here, of those that nimbus knows.
     pub fn modes(&self, device: &Device) -> Result<Vec<PresentMode>> {
-        let found = unsafe { self.loader.get_physical_device_surface_present_modes(device.physical(), self.raw) };
-        let found = found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfacePresentModesKHR", e))?;
-        Ok(PresentMode::NAMES.map(|(_, mode)| mode).into_iter().filter(|m| found.contains(&m.raw())).collect())
+        let found = unsafe {
+            self.loader.get_physical_device_surface_present_modes(device.physical(), self.raw)
+        };
+        let found =
+            found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfacePresentModesKHR", e))?;
+        Ok(PresentMode::NAMES
+            .map(|(_, mode)| mode)
+            .into_iter()
+            .filter(|m| found.contains(&m.raw()))
+            .collect())
     }
 
     pub(super) fn capabilities(&self, device: &Device) -> Result<vk::SurfaceCapabilitiesKHR> {
@@ -90,16 +109,17 @@ impl Surface {
 
     /// What of its formats holds bytes as they are shown.
     pub(super) fn format(&self, device: &Device) -> Result<TargetFormat> {
-        let found = unsafe { self.loader.get_physical_device_surface_formats(device.physical(), self.raw) };
+        let found =
+            unsafe { self.loader.get_physical_device_surface_formats(device.physical(), self.raw) };
         let found = found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfaceFormatsKHR", e))?;
         let has = |format: &TargetFormat| {
-            let of = |f: &vk::SurfaceFormatKHR| f.format == format.raw() && f.color_space == COLOR_SPACE;
+            let of =
+                |f: &vk::SurfaceFormatKHR| f.format == format.raw() && f.color_space == COLOR_SPACE;
             found.iter().any(of)
         };
-        [TargetFormat::Rgba8, TargetFormat::Bgra8]
-            .into_iter()
-            .find(has)
-            .ok_or_else(|| Error::vulkan("window", "it takes neither R8G8B8A8_UNORM nor B8G8R8A8_UNORM in sRGB"))
+        [TargetFormat::Rgba8, TargetFormat::Bgra8].into_iter().find(has).ok_or_else(|| {
+            Error::vulkan("window", "it takes neither R8G8B8A8_UNORM nor B8G8R8A8_UNORM in sRGB")
+        })
     }
 }
 

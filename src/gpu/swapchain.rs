@@ -19,7 +19,8 @@ pub enum Shown {
     Yes,
     /// The window system had no image to draw into for [`PATIENCE`]: nothing of the window is seen.
     Late,
-    /// The window is of another size by now, or nothing of it is seen: the swapchain is to be made anew.
+    /// The window is of another size by now, or nothing of it is seen: the swapchain is to be made
+    /// anew.
     Outdated,
 }
 
@@ -51,16 +52,22 @@ pub struct Swapchain {
 }
 
 impl Swapchain {
-    /// For `surface` as large as it is; `size` where the window system leaves that to us. None where nothing of the window is
-    /// seen: it is minimised. The one before must be gone.
-    pub fn new(device: &Device, surface: &Surface, size: [u32; 2], mode: PresentMode) -> Result<Option<Swapchain>> {
+    /// For `surface` as large as it is; `size` where the window system leaves that to us. None
+    /// where nothing of the window is seen: it is minimised. The one before must be gone.
+    pub fn new(
+        device: &Device,
+        surface: &Surface,
+        size: [u32; 2],
+        mode: PresentMode,
+    ) -> Result<Option<Swapchain>> {
         let capabilities = surface.capabilities(device)?;
         let extent = extent_of(&capabilities, size);
         if extent.width == 0 || extent.height == 0 {
             return Ok(None);
         }
         let format = surface.format(device)?;
-        let most = if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
+        let most =
+            if capabilities.max_image_count == 0 { u32::MAX } else { capabilities.max_image_count };
         let alpha = [vk::CompositeAlphaFlagsKHR::OPAQUE, vk::CompositeAlphaFlagsKHR::INHERIT]
             .into_iter()
             .find(|a| capabilities.supported_composite_alpha.contains(*a))
@@ -83,8 +90,8 @@ impl Swapchain {
             .clipped(true);
         let shared = device.shared().clone();
         let loader = khr::swapchain::Device::new(&shared.instance.raw, &shared.raw);
-        let raw =
-            unsafe { loader.create_swapchain(&info, None) }.map_err(|e| Error::vulkan("vkCreateSwapchainKHR", e))?;
+        let raw = unsafe { loader.create_swapchain(&info, None) }
+            .map_err(|e| Error::vulkan("vkCreateSwapchainKHR", e))?;
         let (commands, images, ready, drawn) = (vec![], vec![], vec![], vec![]);
         let mut chain = Swapchain {
             commands,
@@ -109,7 +116,13 @@ impl Swapchain {
         let images = unsafe { self.loader.get_swapchain_images(self.raw) }
             .map_err(|e| Error::vulkan("vkGetSwapchainImagesKHR", e))?;
         for raw in images {
-            self.images.push(Image::of_swapchain(&self.shared, "window.image", raw, extent, self.format)?);
+            self.images.push(Image::of_swapchain(
+                &self.shared,
+                "window.image",
+                raw,
+                extent,
+                self.format,
+            )?);
             self.drawn.push(self.semaphore("window.drawn")?);
         }
         for _ in 0..ON_THEIR_WAY {
@@ -127,7 +140,8 @@ impl Swapchain {
     }
 
     fn semaphore(&self, name: &str) -> Result<vk::Semaphore> {
-        let made = unsafe { self.shared.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
+        let made =
+            unsafe { self.shared.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
         let semaphore = made.map_err(|e| Error::vulkan("vkCreateSemaphore", e))?;
         self.shared.name(semaphore, name);
         Ok(semaphore)
@@ -147,9 +161,12 @@ impl Swapchain {
         self.images.first().map_or([0, 0], |image| image.size().into())
     }
 
-    /// Has `draw` fill all of an image, and has it shown. What `draw` records is with the device when this
-    /// returns, ahead of whatever is submitted next.
-    pub fn show(&mut self, draw: impl FnOnce(&mut Recorder<'_>, &mut Image) -> Result<()>) -> Result<Shown> {
+    /// Has `draw` fill all of an image, and has it shown. What `draw` records is with the device
+    /// when this returns, ahead of whatever is submitted next.
+    pub fn show(
+        &mut self,
+        draw: impl FnOnce(&mut Recorder<'_>, &mut Image) -> Result<()>,
+    ) -> Result<Shown> {
         let Some(presenter) = &self.presenter else { return Ok(Shown::Outdated) };
         let (i_image, i_slot) = match presenter.told.recv_timeout(PATIENCE) {
             Ok(Told::Image { i_image, i_slot }) => (i_image, i_slot),
@@ -187,13 +204,14 @@ impl Swapchain {
     pub fn wait(&self) -> Result<()> {
         let Some((done, is_handed_over)) = &self.last else { return Ok(()) };
         done.wait()?;
-        // Nothing is ever sent: the other end goes when it is, or with the thread that did not come to it. A window system that keeps the
-        // thread is not waited for longer than for an image.
+        // Nothing is ever sent: the other end goes when it is, or with the thread that did not come
+        // to it. A window system that keeps the thread is not waited for longer than for an image.
         let _ = is_handed_over.recv_timeout(PATIENCE);
         Ok(())
     }
 
-    /// Waits on the device for images that nobody drew into: a semaphore that is still to be signalled may not go.
+    /// Waits on the device for images that nobody drew into: a semaphore that is still to be
+    /// signalled may not go.
     fn take_back(&self, presenter: &Presenter) {
         let told = presenter.told.try_iter().filter_map(|told| match told {
             Told::Image { i_slot, .. } => Some(i_slot),
@@ -205,7 +223,9 @@ impl Swapchain {
                 .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
             let info = [vk::SubmitInfo2::default().wait_semaphore_infos(&wait)];
             // A lost device signals nothing any more.
-            let _ = unsafe { self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null()) };
+            let _ = unsafe {
+                self.shared.raw.queue_submit2(*self.shared.lock_queue(), &info, vk::Fence::null())
+            };
         }
     }
 }
@@ -216,7 +236,8 @@ impl Drop for Swapchain {
             presenter.end();
             self.take_back(&presenter);
         }
-        // SAFETY: all that was submitted or shown ends before what it uses; a lost device has ended it.
+        // SAFETY: all that was submitted or shown ends before what it uses; a lost device has ended
+        // it.
         unsafe {
             let _ = self.shared.raw.queue_wait_idle(*self.shared.lock_queue());
             self.commands.clear();
@@ -236,7 +257,10 @@ fn extent_of(capabilities: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> vk::E
         return current;
     }
     let (least, most) = (capabilities.min_image_extent, capabilities.max_image_extent);
-    vk::Extent2D { width: size[0].clamp(least.width, most.width), height: size[1].clamp(least.height, most.height) }
+    vk::Extent2D {
+        width: size[0].clamp(least.width, most.width),
+        height: size[1].clamp(least.height, most.height),
+    }
 }
 
 #[cfg(test)]

@@ -26,8 +26,8 @@ impl ScopeTime {
 /// A pool of timestamps, two a scope. On a queue without timestamps it records nothing.
 pub(super) struct Timer {
     pool: vk::QueryPool,
-    /// Where the submission itself copies them: to ask the pool is to wait for all later submissions on some drivers
-    /// (lavapipe waits for the whole device).
+    /// Where the submission itself copies them: to ask the pool is to wait for all later
+    /// submissions on some drivers (lavapipe waits for the whole device).
     ticks: Option<Buffer>,
     names: Vec<&'static str>,
     max_scopes: u32,
@@ -45,13 +45,15 @@ impl Timer {
             shared,
         };
         if device.limits().timestamp_valid_bits > 0 {
-            let info =
-                vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * max_scopes);
+            let info = vk::QueryPoolCreateInfo::default()
+                .query_type(vk::QueryType::TIMESTAMP)
+                .query_count(2 * max_scopes);
             timer.pool = unsafe { timer.shared.raw.create_query_pool(&info, None) }
                 .map_err(|e| Error::vulkan(format!("vkCreateQueryPool {name}"), e))?;
             timer.shared.name(timer.pool, name);
             let n = u64::from(2 * max_scopes);
-            timer.ticks = Some(Buffer::new::<u64>(device, &format!("{name}.ticks"), n, Place::Readback)?);
+            timer.ticks =
+                Some(Buffer::new::<u64>(device, &format!("{name}.ticks"), n, Place::Readback)?);
         }
         Ok(timer)
     }
@@ -59,7 +61,9 @@ impl Timer {
     pub fn reset(&mut self, commands: vk::CommandBuffer) {
         self.names.clear();
         if self.pool != vk::QueryPool::null() {
-            unsafe { self.shared.raw.cmd_reset_query_pool(commands, self.pool, 0, 2 * self.max_scopes) };
+            unsafe {
+                self.shared.raw.cmd_reset_query_pool(commands, self.pool, 0, 2 * self.max_scopes)
+            };
         }
     }
 
@@ -83,8 +87,8 @@ impl Timer {
     fn write(&self, commands: vk::CommandBuffer, query: u32) {
         let raw = &self.shared.raw;
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
-        // An execution barrier after each timestamp keeps the next pass out of the scope: without it some drivers
-        // (lavapipe) book a graphics pass to its neighbour.
+        // An execution barrier after each timestamp keeps the next pass out of the scope: without
+        // it some drivers (lavapipe) book a graphics pass to its neighbour.
         let barrier = [vk::MemoryBarrier2::default().src_stage_mask(all).dst_stage_mask(all)];
         let dependency = vk::DependencyInfo::default().memory_barriers(&barrier);
         unsafe {
@@ -93,18 +97,25 @@ impl Timer {
         }
     }
 
-    /// Copies the scopes' times to where `read` finds them; the last command of a submission but for its barrier.
+    /// Copies the scopes' times to where `read` finds them; the last command of a submission but
+    /// for its barrier.
     pub fn copy(&self, commands: vk::CommandBuffer) {
         let n = 2 * self.names.len() as u32;
         if let Some(ticks) = self.ticks.as_ref().filter(|_| n > 0) {
             let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-            unsafe { self.shared.raw.cmd_copy_query_pool_results(commands, self.pool, 0, n, ticks.raw, 0, 8, flags) };
+            unsafe {
+                self.shared
+                    .raw
+                    .cmd_copy_query_pool_results(commands, self.pool, 0, n, ticks.raw, 0, 8, flags)
+            };
         }
     }
 
     /// Times of a finished submission.
     pub fn read(&self) -> Result<Vec<ScopeTime>> {
-        let Some(ticks) = self.ticks.as_ref().filter(|_| !self.names.is_empty()) else { return Ok(vec![]) };
+        let Some(ticks) = self.ticks.as_ref().filter(|_| !self.names.is_empty()) else {
+            return Ok(vec![]);
+        };
         let ticks: Vec<u64> = ticks.read(2 * self.names.len())?;
         let limits = &self.shared.limits;
         let mask = limits.tick_mask();
@@ -113,7 +124,11 @@ impl Timer {
             // The counter wraps at its valid bits; a difference modulo them is right all the same.
             let length = end.wrapping_sub(begin) & mask;
             let begin_ns = limits.ticks_ns(begin);
-            ScopeTime { name, begin_ns, end_ns: begin_ns + length as f64 * limits.timestamp_period_ns }
+            ScopeTime {
+                name,
+                begin_ns,
+                end_ns: begin_ns + length as f64 * limits.timestamp_period_ns,
+            }
         });
         Ok(times.collect())
     }

@@ -1,5 +1,5 @@
-//! Results are written beside their place and moved into it, so that a reader, a crash or Ctrl-C meets either
-//! the old file or the new one whole; [`abandon`] is what Ctrl-C has to call for that.
+//! Results are written beside their place and moved into it, so that a reader, a crash or Ctrl-C
+//! meets either the old file or the new one whole; [`abandon`] is what Ctrl-C has to call for that.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
@@ -18,7 +18,8 @@ pub(super) fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
     IN_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what is half written, and lets no thread begin or finish a file any more: the process is to end at once.
+/// Removes what is half written, and lets no thread begin or finish a file any more: the process is
+/// to end at once.
 pub fn abandon() {
     let paths = in_progress();
     paths.iter().for_each(|path| remove(path));
@@ -31,7 +32,8 @@ fn remove(path: &Path) {
     let _ = if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) };
 }
 
-/// Writes `path` with `write`. When that fails or panics the old file stays, and nothing else is left behind.
+/// Writes `path` with `write`. When that fails or panics the old file stays, and nothing else is
+/// left behind.
 pub fn write_atomic<E: Display>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), E>,
@@ -73,17 +75,22 @@ impl Temporary {
         }
         let name = format!(".{}.{}.tmp", name.to_string_lossy(), unique());
         let create = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
-        Temporary::create(folder.join(name), create).map_err(|e| Error::io(path, format!("cannot be written: {e}")))
+        Temporary::create(folder.join(name), create)
+            .map_err(|e| Error::io(path, format!("cannot be written: {e}")))
     }
 
-    /// An empty folder in `parent` for what is to become, or stand in, the folder `name`. Unlike a file's its name is
-    /// not hidden: what a killed process leaves may hold results that were just replaced.
+    /// An empty folder in `parent` for what is to become, or stand in, the folder `name`. Unlike a
+    /// file's its name is not hidden: what a killed process leaves may hold results that were just
+    /// replaced.
     pub(super) fn folder(parent: &Path, name: &str) -> std::io::Result<Temporary> {
         let path = parent.join(format!("{name}.{}.nimbus.tmp", unique()));
         Temporary::create(path, |path| fs::create_dir(path)).map(|(temporary, ())| temporary)
     }
 
-    fn create<T>(path: PathBuf, create: impl FnOnce(&Path) -> std::io::Result<T>) -> std::io::Result<(Temporary, T)> {
+    fn create<T>(
+        path: PathBuf,
+        create: impl FnOnce(&Path) -> std::io::Result<T>,
+    ) -> std::io::Result<(Temporary, T)> {
         let mut paths = in_progress();
         // Nothing is removed that was there before.
         let made = create(&path)?;
@@ -118,7 +125,10 @@ mod tests {
     use super::*;
 
     fn names(folder: &Path) -> Vec<String> {
-        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect()
+        fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().to_string_lossy().into_owned())
+            .collect()
     }
 
     #[test]
@@ -126,23 +136,36 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.txt");
         write_atomic(&path, |w| w.write_all(b"old")).unwrap();
-        let error =
-            write_atomic(&path, |w| w.write_all(b"half").and(Err(std::io::Error::other("no more")))).unwrap_err();
+        let error = write_atomic(&path, |w| {
+            w.write_all(b"half").and(Err(std::io::Error::other("no more")))
+        })
+        .unwrap_err();
         assert_eq!(error, Error::io(&path, "no more"));
-        let panic = std::panic::catch_unwind(|| write_atomic::<String>(&path, |_| panic!("midway")));
+        let panic =
+            std::panic::catch_unwind(|| write_atomic::<String>(&path, |_| panic!("midway")));
         assert!(panic.is_err());
-        assert_eq!((fs::read(&path).unwrap(), names(dir.path())), (b"old".to_vec(), vec!["a.txt".to_owned()]));
+        assert_eq!(
+            (fs::read(&path).unwrap(), names(dir.path())),
+            (b"old".to_vec(), vec!["a.txt".to_owned()])
+        );
         write_atomic(&path, |w| w.write_all(b"new")).unwrap();
-        assert_eq!((fs::read(&path).unwrap(), names(dir.path())), (b"new".to_vec(), vec!["a.txt".to_owned()]));
+        assert_eq!(
+            (fs::read(&path).unwrap(), names(dir.path())),
+            (b"new".to_vec(), vec!["a.txt".to_owned()])
+        );
     }
 
     #[test]
     fn places_that_cannot_hold_a_file_are_refused_before_writing() {
         let dir = tempfile::tempdir().unwrap();
-        let refuse =
-            |path: &Path| write_atomic::<String>(path, |_| panic!("must not be called")).unwrap_err().to_string();
+        let refuse = |path: &Path| {
+            write_atomic::<String>(path, |_| panic!("must not be called")).unwrap_err().to_string()
+        };
         let missing = dir.path().join("gone");
-        assert!(refuse(&missing.join("a.txt")).ends_with(&format!("the folder {} does not exist", missing.display())));
+        assert!(
+            refuse(&missing.join("a.txt"))
+                .ends_with(&format!("the folder {} does not exist", missing.display()))
+        );
         assert!(refuse(dir.path()).ends_with("exists and is not a regular file"));
         assert!(refuse(Path::new("/")).ends_with("expected a file name"));
         assert_eq!(names(dir.path()).len(), 0);

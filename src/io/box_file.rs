@@ -13,7 +13,8 @@ use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
 use crate::model::boxes::CloudBox;
 
-const FIELDS: [&str; 8] = ["particles", "x extent", "y extent", "z extent", "x", "y", "z", "radius"];
+const FIELDS: [&str; 8] =
+    ["particles", "x extent", "y extent", "z extent", "x", "y", "z", "radius"];
 
 /// What a box file begins with.
 pub const FIRST: &str = "the number of particles";
@@ -22,7 +23,8 @@ pub fn read(path: &Path) -> Result<Vec<CloudBox>> {
     parse(&read_text(path, DATA_LIMIT, FIRST)?, path)
 }
 
-/// Boxes from text; `path` is for messages. Commas, spaces and tabs separate, blank lines are passed over.
+/// Boxes from text; `path` is for messages. Commas, spaces and tabs separate, blank lines are
+/// passed over.
 pub fn parse(text: &str, path: &Path) -> Result<Vec<CloudBox>> {
     let lines = text.lines().enumerate().map(|(i, line)| Line { number: i + 1, text: line, path });
     let mut lines = lines.filter(|line| !line.text.trim().is_empty());
@@ -30,7 +32,10 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<CloudBox>> {
     let (n_boxes, at_boxes) = header(lines.next(), "the number of boxes", text, path)?;
     let boxes = lines.map(|line| line.cloud_box()).collect::<Result<Vec<_>>>()?;
     if boxes.len() as u64 != n_boxes {
-        return Err(Error::scene(at_boxes, format!("the file says {n_boxes} boxes and has {}", boxes.len())));
+        return Err(Error::scene(
+            at_boxes,
+            format!("the file says {n_boxes} boxes and has {}", boxes.len()),
+        ));
     }
     let sum: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
     if sum != n_particles {
@@ -45,20 +50,23 @@ pub fn format(boxes: &[CloudBox]) -> String {
     let sum: u64 = boxes.iter().map(|b| u64::from(b.n_particles)).sum();
     let mut text = format!("{sum}\n{}\n", boxes.len());
     for b in boxes {
-        let numbers = [b.extent.to_array().as_slice(), &b.center.to_array(), &[b.radius_max]].concat();
+        let numbers =
+            [b.extent.to_array().as_slice(), &b.center.to_array(), &[b.radius_max]].concat();
         let numbers: Vec<String> = numbers.into_iter().map(shortest).collect();
         text += &format!("{}, {}\n", b.n_particles, numbers.join(", "));
     }
     text
 }
 
-/// [`format`], in place of what was there only once it is whole. More than [`parse`] is ever given is an
-/// [`Error::Limit`], and nothing is written.
+/// [`format`], in place of what was there only once it is whole. More than [`parse`] is ever given
+/// is an [`Error::Limit`], and nothing is written.
 pub fn write(path: &Path, boxes: &[CloudBox]) -> Result<()> {
     let text = format(boxes);
     if text.len() as u64 > DATA_LIMIT {
         let n_bytes = text.len();
-        return Err(Error::limit(format!("a box file has at most {DATA_LIMIT} bytes, and this one {n_bytes}")));
+        return Err(Error::limit(format!(
+            "a box file has at most {DATA_LIMIT} bytes, and this one {n_bytes}"
+        )));
     }
     // Through a link, or the link itself would be replaced.
     let place = path.canonicalize().unwrap_or_else(|_| path.to_owned());
@@ -91,16 +99,22 @@ type Field<'a> = (usize, &'a str);
 fn header(line: Option<Line>, meaning: &str, text: &str, path: &Path) -> Result<(u64, Place)> {
     let Some(line) = line else {
         let (number, column) = line_column(text, text.trim_end().len());
-        return Err(Error::scene(Place::line(path, number, column), format!("the file ends: expected {meaning}")));
+        return Err(Error::scene(
+            Place::line(path, number, column),
+            format!("the file ends: expected {meaning}"),
+        ));
     };
     let (fields, _) = line.fields()?;
     if let Some(extra) = fields.get(1) {
-        return Err(
-            line.fault(extra.0, format!("expected {meaning} alone on its line, found more: `{}`", shown(extra.1)))
-        );
+        return Err(line.fault(
+            extra.0,
+            format!("expected {meaning} alone on its line, found more: `{}`", shown(extra.1)),
+        ));
     }
     let (offset, word) = fields[0];
-    let n = word.parse().map_err(|_| line.fault(offset, format!("expected {meaning}, found `{}`", shown(word))))?;
+    let n = word
+        .parse()
+        .map_err(|_| line.fault(offset, format!("expected {meaning}, found `{}`", shown(word))))?;
     Ok((n, line.place(offset)))
 }
 
@@ -113,9 +127,9 @@ impl<'a> Line<'a> {
         Error::scene(self.place(offset), what)
     }
 
-    /// The words of a line that is not blank, at least one, and their number; of too many only the first too
-    /// many is kept, or a line of 64 MiB would take a GiB. An empty place between commas is an error, since
-    /// passing over it would shift every number after it.
+    /// The words of a line that is not blank, at least one, and their number; of too many only the
+    /// first too many is kept, or a line of 64 MiB would take a GiB. An empty place between commas
+    /// is an error, since passing over it would shift every number after it.
     fn fields(&self) -> Result<(Vec<Field<'a>>, usize)> {
         let mut fields = Vec::new();
         let mut n_fields = 0;
@@ -133,7 +147,8 @@ impl<'a> Line<'a> {
                 rest = offset + word.len();
             }
             if n_fields == before {
-                return Err(self.fault(start, "expected a number, found nothing beside the comma".to_owned()));
+                return Err(self
+                    .fault(start, "expected a number, found nothing beside the comma".to_owned()));
             }
             start += piece.len() + 1;
         }
@@ -144,22 +159,32 @@ impl<'a> Line<'a> {
         let (fields, n_fields) = self.fields()?;
         if n_fields != FIELDS.len() {
             // At the first one too many, or where the first missing one would stand.
-            let offset = fields.get(FIELDS.len()).map_or(self.text.trim_end().len(), |field| field.0);
+            let offset =
+                fields.get(FIELDS.len()).map_or(self.text.trim_end().len(), |field| field.0);
             let what = format!("expected 8 fields ({}), found {n_fields}", FIELDS.join(", "));
             return Err(self.fault(offset, what));
         }
-        let size = |i: usize, least: f64| self.bounded(FIELDS[i], fields[i], &|v| wrong_size(v, least));
+        let size =
+            |i: usize, least: f64| self.bounded(FIELDS[i], fields[i], &|v| wrong_size(v, least));
         let coordinate = |i: usize| self.bounded(FIELDS[i], fields[i], &wrong_coordinate);
         let (offset, word) = fields[0];
         let n_particles = word.parse().map_err(|_| {
             self.fault(
                 offset,
-                format!("particles: expected an integer from 0 to {}, found `{}`", u32::MAX, shown(word)),
+                format!(
+                    "particles: expected an integer from 0 to {}, found `{}`",
+                    u32::MAX,
+                    shown(word)
+                ),
             )
         })?;
         Ok(CloudBox {
             n_particles,
-            extent: DVec3::new(size(1, LEAST_EXTENT)?, size(2, LEAST_EXTENT)?, size(3, LEAST_EXTENT)?),
+            extent: DVec3::new(
+                size(1, LEAST_EXTENT)?,
+                size(2, LEAST_EXTENT)?,
+                size(3, LEAST_EXTENT)?,
+            ),
             center: DVec3::new(coordinate(4)?, coordinate(5)?, coordinate(6)?),
             // How small it may be depends on `radius_scale`.
             radius_max: size(7, 0.0)?,
@@ -167,21 +192,33 @@ impl<'a> Line<'a> {
     }
 
     /// A number in which `wrong` finds nothing; else it says what was expected.
-    fn bounded(&self, name: &str, field: Field, wrong: &dyn Fn(f64) -> Option<String>) -> Result<f64> {
+    fn bounded(
+        &self,
+        name: &str,
+        field: Field,
+        wrong: &dyn Fn(f64) -> Option<String>,
+    ) -> Result<f64> {
         let v = self.number(name, field)?;
         match wrong(v) {
             None => Ok(v),
-            Some(expected) => {
-                Err(self.fault(field.0, format!("{name}: expected {expected}, found `{}`", shown(field.1))))
-            }
+            Some(expected) => Err(self.fault(
+                field.0,
+                format!("{name}: expected {expected}, found `{}`", shown(field.1)),
+            )),
         }
     }
 
     fn number(&self, name: &str, (offset, word): Field) -> Result<f64> {
         match word.parse::<f64>() {
             Ok(v) if v.is_finite() => Ok(v),
-            Ok(_) => Err(self.fault(offset, format!("{name}: expected a finite number, found `{}`", shown(word)))),
-            Err(_) => Err(self.fault(offset, format!("{name}: expected a number, found `{}`", shown(word)))),
+            Ok(_) => Err(self.fault(
+                offset,
+                format!("{name}: expected a finite number, found `{}`", shown(word)),
+            )),
+            Err(_) => {
+                Err(self
+                    .fault(offset, format!("{name}: expected a number, found `{}`", shown(word))))
+            }
         }
     }
 }
@@ -196,8 +233,11 @@ mod tests {
 
     #[test]
     fn commas_blanks_line_ends_and_exponents_are_read() {
-        let boxes = parse("7\r\n2\r\n\r\n3,1,2,3,-4,5.5,6.12438e-007, 2\r\n4 1\t2  3 , 4 5 6,2\n\n \n", Path::new("b"))
-            .unwrap();
+        let boxes = parse(
+            "7\r\n2\r\n\r\n3,1,2,3,-4,5.5,6.12438e-007, 2\r\n4 1\t2  3 , 4 5 6,2\n\n \n",
+            Path::new("b"),
+        )
+        .unwrap();
         let first = CloudBox {
             n_particles: 3,
             extent: DVec3::new(1.0, 2.0, 3.0),
@@ -215,16 +255,30 @@ mod tests {
         for (found, expected) in [
             (
                 one("3, 1, 1, 1, 0, 0, 0"),
-                "3:20: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 7",
+                "3:20: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, \
+                 radius), found 7",
             ),
             (
                 one("3, 1, 1, 1, 0, 0, 0, 1, 5"),
-                "3:25: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 9",
+                "3:25: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, \
+                 radius), found 9",
             ),
-            (one("3, 1, -1, 1, 0, 0, 0, 1"), "3:7: y extent: expected 0 or a number from 1e-30 to 1e15, found `-1`"),
-            (one("3, 1, 1, 1, 0, 0, 0, -0.5"), "3:22: radius: expected a number from 0 to 1e15, found `-0.5`"),
-            (one("-3, 1, 1, 1, 0, 0, 0, 1"), "3:1: particles: expected an integer from 0 to 4294967295, found `-3`"),
-            (one("3.5, 1, 1, 1, 0, 0, 0, 1"), "3:1: particles: expected an integer from 0 to 4294967295, found `3.5`"),
+            (
+                one("3, 1, -1, 1, 0, 0, 0, 1"),
+                "3:7: y extent: expected 0 or a number from 1e-30 to 1e15, found `-1`",
+            ),
+            (
+                one("3, 1, 1, 1, 0, 0, 0, -0.5"),
+                "3:22: radius: expected a number from 0 to 1e15, found `-0.5`",
+            ),
+            (
+                one("-3, 1, 1, 1, 0, 0, 0, 1"),
+                "3:1: particles: expected an integer from 0 to 4294967295, found `-3`",
+            ),
+            (
+                one("3.5, 1, 1, 1, 0, 0, 0, 1"),
+                "3:1: particles: expected an integer from 0 to 4294967295, found `3.5`",
+            ),
             (
                 one("4294967296, 1, 1, 1, 0, 0, 0, 1"),
                 "3:1: particles: expected an integer from 0 to 4294967295, found `4294967296`",
@@ -239,21 +293,40 @@ mod tests {
                 one("3, 1e-31, 1, 1, 0, 0, 0, 1"),
                 "3:4: x extent: expected 0 or a number from 1e-30 to 1e15, found `1e-31`",
             ),
-            (one("3, 1, 1, 1, 0, -1e30, 0, 1"), "3:16: y: expected a number from -1e15 to 1e15, found `-1e30`"),
-            (one("3, 1, 1, 1, 0, 0, 0, 1e16"), "3:22: radius: expected a number from 0 to 1e15, found `1e16`"),
+            (
+                one("3, 1, 1, 1, 0, -1e30, 0, 1"),
+                "3:16: y: expected a number from -1e15 to 1e15, found `-1e30`",
+            ),
+            (
+                one("3, 1, 1, 1, 0, 0, 0, 1e16"),
+                "3:22: radius: expected a number from 0 to 1e15, found `1e16`",
+            ),
             (one("3, 1, 1, 1, 0, o, 0, 1"), "3:16: y: expected a number, found `o`"),
             (one("3, 1,, 1, 0, 0, 0, 1"), "3:6: expected a number, found nothing beside the comma"),
-            (one("3, 1, 1, 1, 0, 0, 0, 1,"), "3:24: expected a number, found nothing beside the comma"),
-            (one("ä, 1, 1, 1, 0, 0, 0, ö"), "3:1: particles: expected an integer from 0 to 4294967295, found `ä`"),
+            (
+                one("3, 1, 1, 1, 0, 0, 0, 1,"),
+                "3:24: expected a number, found nothing beside the comma",
+            ),
+            (
+                one("ä, 1, 1, 1, 0, 0, 0, ö"),
+                "3:1: particles: expected an integer from 0 to 4294967295, found `ä`",
+            ),
             (
                 message(&format!("3\n1\n{}", "1 ".repeat(99))),
-                "3:17: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, radius), found 99",
+                "3:17: expected 8 fields (particles, x extent, y extent, z extent, x, y, z, \
+                 radius), found 99",
             ),
-            (message("4\n1\n3, 1, 1, 1, 0, 0, 0, 1"), "1:1: the file says 4 particles and its boxes have 3"),
+            (
+                message("4\n1\n3, 1, 1, 1, 0, 0, 0, 1"),
+                "1:1: the file says 4 particles and its boxes have 3",
+            ),
             (message("3\n\n 2\n3, 1, 1, 1, 0, 0, 0, 1"), "3:2: the file says 2 boxes and has 1"),
             (message("3\n0\n3, 1, 1, 1, 0, 0, 0, 1"), "2:1: the file says 0 boxes and has 1"),
             (message("3\n"), "1:2: the file ends: expected the number of boxes"),
-            (message("3, 1\n1"), "1:4: expected the number of particles alone on its line, found more: `1`"),
+            (
+                message("3, 1\n1"),
+                "1:4: expected the number of particles alone on its line, found more: `1`",
+            ),
             (message("3\nx"), "2:1: expected the number of boxes, found `x`"),
             (message("-1\n0"), "1:1: expected the number of particles, found `-1`"),
         ] {
@@ -263,8 +336,23 @@ mod tests {
 
     #[test]
     fn wrong_is_what_the_reader_refuses() {
-        let good = CloudBox { n_particles: 1, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
-        let numbers = [0.0, -0.0, 1e-31, 1e-30, 1e-300, 3.0, -3.0, 1e15, -1e15, 1.1e15, 1e300, f64::NAN, f64::INFINITY];
+        let good =
+            CloudBox { n_particles: 1, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+        let numbers = [
+            0.0,
+            -0.0,
+            1e-31,
+            1e-30,
+            1e-300,
+            3.0,
+            -3.0,
+            1e15,
+            -1e15,
+            1.1e15,
+            1e300,
+            f64::NAN,
+            f64::INFINITY,
+        ];
         let mut n_wrong = 0;
         for v in numbers {
             for i in 0..7 {
@@ -276,7 +364,8 @@ mod tests {
                 }
                 let refused = parse(&format(&[b]), Path::new("b")).err().map(|e| e.to_string());
                 assert_eq!(wrong(&b).is_some(), refused.is_some(), "{b:?}");
-                let named = wrong(&b).is_none_or(|what| what.starts_with(&format!("{}: expected ", FIELDS[i + 1])));
+                let named = wrong(&b)
+                    .is_none_or(|what| what.starts_with(&format!("{}: expected ", FIELDS[i + 1])));
                 assert!(named, "{b:?}");
                 n_wrong += usize::from(refused.is_some());
             }
@@ -295,7 +384,10 @@ mod tests {
         let b = CloudBox { n_particles: 4, extent: DVec3::ONE, center: DVec3::X, radius_max: 2.0 };
         write(&link, &[b]).unwrap();
         assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
-        assert_eq!((read(&file).unwrap(), std::fs::read_dir(folder.path()).unwrap().count()), (vec![b], 2));
+        assert_eq!(
+            (read(&file).unwrap(), std::fs::read_dir(folder.path()).unwrap().count()),
+            (vec![b], 2)
+        );
     }
 
     #[test]
@@ -303,21 +395,24 @@ mod tests {
         // Knuth's MMIX generator, its high bits.
         let mut state = 1u64;
         let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             state >> 16
         };
         for n in 0..200 {
             let boxes: Vec<CloudBox> = (0..n % 7)
                 .map(|_| {
-                    // Every exponent that is allowed, and both signs: coordinates and radii from the subnormals on,
-                    // edges from their least.
+                    // Every exponent that is allowed, and both signs: coordinates and radii from
+                    // the subnormals on, edges from their least.
                     let mut number = |least: f64| loop {
                         let v = f64::from_bits(next() << 32 ^ next());
                         if wrong_size(v.abs(), least).is_none() {
                             return v;
                         }
                     };
-                    let mut vector = |least| DVec3::new(number(least), number(least), number(least));
+                    let mut vector =
+                        |least| DVec3::new(number(least), number(least), number(least));
                     let (extent, center) = (vector(LEAST_EXTENT).abs(), vector(0.0));
                     let radius_max = vector(0.0).x.abs();
                     CloudBox { n_particles: next() as u32, extent, center, radius_max }
@@ -326,7 +421,11 @@ mod tests {
             let text = format(&boxes);
             let again = parse(&text, Path::new("b")).unwrap();
             let bits = |b: &CloudBox| {
-                (b.n_particles, [b.extent, b.center].map(|v| v.to_array().map(f64::to_bits)), b.radius_max.to_bits())
+                (
+                    b.n_particles,
+                    [b.extent, b.center].map(|v| v.to_array().map(f64::to_bits)),
+                    b.radius_max.to_bits(),
+                )
             };
             assert!(boxes.iter().map(bits).eq(again.iter().map(bits)), "{text}");
             assert_eq!(format(&again), text);

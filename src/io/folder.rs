@@ -1,10 +1,12 @@
-//! Files that belong together, replaced together: a reader, or whoever looks after the process was killed at any moment,
-//! finds all old ones or all new ones, and whatever else lies in their folder where it lay.
+//! Files that belong together, replaced together: a reader, or whoever looks after the process was
+//! killed at any moment, finds all old ones or all new ones, and whatever else lies in their folder
+//! where it lay.
 //!
-//! A folder with the new files, and with hard links to everything else, is made beside the old one, and the two exchange
-//! their names in one step. Where that cannot be (see [`exchanged`]) the files are replaced one by one: there a kill
-//! within the few microseconds between the renames leaves the folder without its last file, never with files of two
-//! kinds that seem to be of one. Nothing here outlasts a power cut that the file system's own order of writes does not.
+//! A folder with the new files, and with hard links to everything else, is made beside the old one,
+//! and the two exchange their names in one step. Where that cannot be (see [`exchanged`]) the files
+//! are replaced one by one: there a kill within the few microseconds between the renames leaves the
+//! folder without its last file, never with files of two kinds that seem to be of one. Nothing here
+//! outlasts a power cut that the file system's own order of writes does not.
 
 use std::fs;
 use std::path::Path;
@@ -12,17 +14,22 @@ use std::path::Path;
 use super::atomic::{Temporary, in_progress};
 use crate::error::{Error, Result};
 
-/// Makes `folder` hold the `files` that `write` puts into the folder it is given, which may be asked for twice; those of
-/// `files` that it does not make are gone then. Readers look for the last of `files`, which it must make, first. When `write`
-/// fails the old files stay.
-pub fn replace_files(folder: &Path, files: &[&str], write: impl Fn(&Path) -> Result<()>) -> Result<()> {
+/// Makes `folder` hold the `files` that `write` puts into the folder it is given, which may be
+/// asked for twice; those of `files` that it does not make are gone then. Readers look for the last
+/// of `files`, which it must make, first. When `write` fails the old files stay.
+pub fn replace_files(
+    folder: &Path,
+    files: &[&str],
+    write: impl Fn(&Path) -> Result<()>,
+) -> Result<()> {
     if exchanged(folder, files, &write)? { Ok(()) } else { one_by_one(folder, files, &write) }
 }
 
 /// An error where no file can be made in `folder`.
 pub fn check_writable(folder: &Path) -> Result<()> {
     let made = Temporary::folder(folder, "results");
-    made.map(drop).map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
+    made.map(drop)
+        .map_err(|cause| Error::io(folder, format!("nothing can be written in it: {cause}")))
 }
 
 /// Takes the last file away, replaces the others, and puts the new last file there.
@@ -40,14 +47,18 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
     }
     for (i, name) in files.iter().enumerate() {
         if let Err(cause) = moved_or_removed(&staged.path.join(name), &folder.join(name)) {
-            // With no file replaced the old ones are whole again; else the old last one is kept where it is.
+            // With no file replaced the old ones are whole again; else the old last one is kept
+            // where it is.
             if i == 0 && had_one {
                 fs::rename(&aside, &last).map_err(failed)?;
                 return Err(failed(cause));
             }
             let kept = staged.path.display().to_string();
             staged.let_go(&mut paths);
-            return Err(Error::io(folder, format!("{cause}; what was not put there is kept in {kept}")));
+            return Err(Error::io(
+                folder,
+                format!("{cause}; what was not put there is kept in {kept}"),
+            ));
         }
     }
     Ok(())
@@ -70,17 +81,25 @@ fn exchanged(_: &Path, _: &[&str], _: &dyn Fn(&Path) -> Result<()>) -> Result<bo
 }
 
 /// Replaces the folder as a whole; false, with nothing changed, where that cannot be:
-/// - the file system knows no exchange or no hard links, or the folder is a mount point or a file system's root;
-/// - the parent may not be written, or folder or file belong to somebody else, who would lose them to us;
-/// - it holds folders, in which somebody may be at work, or this process, and most likely the shell that started it, stands
+/// - the file system knows no exchange or no hard links, or the folder is a mount point or a file
+///   system's root;
+/// - the parent may not be written, or folder or file belong to somebody else, who would lose them
+///   to us;
+/// - it holds folders, in which somebody may be at work, or this process, and most likely the shell
+///   that started it, stands
 ///   in it: it would vanish under their feet.
 #[cfg(target_os = "linux")]
 fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     // Not a link to it: that stays, and points to the new folder.
     let Ok(folder) = fs::canonicalize(folder) else { return moved_in(folder, write) };
-    let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else { return Ok(false) };
-    if std::env::current_dir().and_then(fs::canonicalize).is_ok_and(|here| here.starts_with(&folder)) {
+    let (Some(parent), Some(name)) = (folder.parent(), folder.file_name()) else {
+        return Ok(false);
+    };
+    if std::env::current_dir()
+        .and_then(fs::canonicalize)
+        .is_ok_and(|here| here.starts_with(&folder))
+    {
         return Ok(false);
     }
     let Ok(staged) = Temporary::folder(parent, &name.to_string_lossy()) else { return Ok(false) };
@@ -102,8 +121,11 @@ fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>)
 #[cfg(target_os = "linux")]
 fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> {
     let failed = |cause| Error::io(folder, cause);
-    let Some(name) = folder.file_name() else { return Err(Error::io(folder, "expected a folder's name")) };
-    let parent = folder.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
+    let Some(name) = folder.file_name() else {
+        return Err(Error::io(folder, "expected a folder's name"));
+    };
+    let parent =
+        folder.parent().filter(|parent| *parent != Path::new("")).unwrap_or(Path::new("."));
     let staged = Temporary::folder(parent, &name.to_string_lossy()).map_err(failed)?;
     write(&staged.path)?;
     let mut paths = in_progress();
@@ -121,8 +143,8 @@ mod beside {
     use std::os::unix::fs::MetadataExt;
     use std::path::Path;
 
-    /// Links everything in `from` but `left_out` into `to`; false where something cannot be linked as it is, a folder among
-    /// others.
+    /// Links everything in `from` but `left_out` into `to`; false where something cannot be linked
+    /// as it is, a folder among others.
     pub fn link_others(from: &Path, to: &Path, left_out: &[&str]) -> bool {
         let link = || -> io::Result<bool> {
             if !is_owned_alike(from, to)? {
@@ -151,16 +173,21 @@ mod beside {
         Ok(of(fs::metadata(a)?) == of(fs::metadata(b)?))
     }
 
-    /// Removes the folder `old`, whose place `new` has taken: `replaced` files, and what both hold. What came into the
-    /// old one since its files were linked goes over to the new. What cannot be removed stays, and the results are
-    /// there all the same.
+    /// Removes the folder `old`, whose place `new` has taken: `replaced` files, and what both hold.
+    /// What came into the old one since its files were linked goes over to the new. What cannot be
+    /// removed stays, and the results are there all the same.
     pub fn discard(old: &Path, new: &Path, replaced: &[&str]) {
         for entry in fs::read_dir(old).into_iter().flatten().flatten() {
             let (gone, kept) = (entry.path(), new.join(entry.file_name()));
             let is_replaced = replaced.iter().any(|name| entry.file_name() == *name);
-            let (Ok(of_gone), of_kept) = (gone.symlink_metadata(), kept.symlink_metadata()) else { continue };
-            let is_same = of_kept.as_ref().is_ok_and(|k| (k.dev(), k.ino()) == (of_gone.dev(), of_gone.ino()));
-            // What was saved to the old folder goes over, unless the new one got something newer of that name since.
+            let (Ok(of_gone), of_kept) = (gone.symlink_metadata(), kept.symlink_metadata()) else {
+                continue;
+            };
+            let is_same = of_kept
+                .as_ref()
+                .is_ok_and(|k| (k.dev(), k.ino()) == (of_gone.dev(), of_gone.ino()));
+            // What was saved to the old folder goes over, unless the new one got something newer of
+            // that name since.
             let saved = |about: &Metadata| about.modified().ok();
             let is_newer = of_kept.map_or(true, |kept| saved(&of_gone) >= saved(&kept));
             let _ = match (is_replaced || is_same, is_newer) {
@@ -197,7 +224,9 @@ mod tests {
                 found.push((name, format!("-> {}", target.display())));
             } else if path.is_dir() {
                 found.push((name.clone(), String::new()));
-                found.extend(tree(&path).into_iter().map(|(inner, text)| (format!("{name}/{inner}"), text)));
+                found.extend(
+                    tree(&path).into_iter().map(|(inner, text)| (format!("{name}/{inner}"), text)),
+                );
             } else {
                 found.push((name, fs::read_to_string(&path).unwrap()));
             }
@@ -254,7 +283,11 @@ mod tests {
             way(&folder, &write_both("new")).unwrap();
             assert_eq!(tree(&folder), expected("new"));
             assert_eq!(fs::metadata(&folder).unwrap().permissions().mode() & 0o7777, 0o2750);
-            assert_eq!(fs::metadata(folder.join("notes.txt")).unwrap().ino(), inode, "the file itself, not a copy");
+            assert_eq!(
+                fs::metadata(folder.join("notes.txt")).unwrap().ino(),
+                inode,
+                "the file itself, not a copy"
+            );
             assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "nothing is left beside it");
             way(&folder, &|f| write_both("half")(f).and(Err(Error::usage("no more")))).unwrap_err();
             assert_eq!(tree(&folder), expected("new"));

@@ -1,5 +1,5 @@
-//! Images: PNG for looking at, EXR for measuring. What is written are premultiplied linear RGBA pixels, row 0 the top;
-//! what is read stays what it is.
+//! Images: PNG for looking at, EXR for measuring. What is written are premultiplied linear RGBA
+//! pixels, row 0 the top; what is read stays what it is.
 
 use std::path::Path;
 
@@ -28,13 +28,16 @@ impl ImageKind {
         match extension.as_deref() {
             Some("png") => Ok(ImageKind::Png),
             Some("exr") => Ok(ImageKind::Exr),
-            _ => Err(Error::usage(format!("{}: expected a file name that ends in .png or .exr", path.display()))),
+            _ => Err(Error::usage(format!(
+                "{}: expected a file name that ends in .png or .exr",
+                path.display()
+            ))),
         }
     }
 }
 
-/// A picture as its file has it, row 0 the top: an EXR's numbers; a PNG's code values (of 8 or 16 bits) by the
-/// greatest.
+/// A picture as its file has it, row 0 the top: an EXR's numbers; a PNG's code values (of 8 or 16
+/// bits) by the greatest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image {
     pub kind: ImageKind,
@@ -54,8 +57,11 @@ pub fn read(path: &Path) -> Result<Image> {
     };
     let mut reader = image::ImageReader::open(path).map_err(|e| Error::io(path, e))?;
     reader.set_format(format);
-    let decoded = reader.decode().map_err(|e| Error::io(path, format!("cannot be read as a picture: {e}")))?;
-    let (width, height, has_alpha) = (decoded.width(), decoded.height(), decoded.color().has_alpha());
+    let decoded = reader
+        .decode()
+        .map_err(|e| Error::io(path, format!("cannot be read as a picture: {e}")))?;
+    let (width, height, has_alpha) =
+        (decoded.width(), decoded.height(), decoded.color().has_alpha());
     let rgba = match decoded.color() {
         ColorType::L8 | ColorType::La8 | ColorType::Rgb8 | ColorType::Rgba8 => {
             four(decoded.into_rgba8().as_raw(), |v| f64::from(*v) / f64::from(u8::MAX))
@@ -74,27 +80,45 @@ fn four<T>(values: &[T], number: impl Fn(&T) -> f64) -> Vec<[f64; 4]> {
 
 /// 8-bit sRGB as it is, three bytes a pixel. Panics where `rgb` is not width × height pixels.
 pub fn write_bytes(path: &Path, width: u32, height: u32, rgb: &[u8]) -> Result<()> {
-    write_atomic(path, |writer| PngEncoder::new(writer).write_image(rgb, width, height, ExtendedColorType::Rgb8))
+    write_atomic(path, |writer| {
+        PngEncoder::new(writer).write_image(rgb, width, height, ExtendedColorType::Rgb8)
+    })
 }
 
 /// 8-bit sRGB as the bytes of a PNG file. Panics where `rgb` is not width × height pixels.
 pub fn png_bytes(width: u32, height: u32, rgb: &[u8]) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let encoded = PngEncoder::new(&mut bytes).write_image(rgb, width, height, ExtendedColorType::Rgb8);
-    encoded.map_err(|cause| Error::Fault { what: format!("a picture could not be encoded: {cause}") })?;
+    let encoded =
+        PngEncoder::new(&mut bytes).write_image(rgb, width, height, ExtendedColorType::Rgb8);
+    encoded.map_err(|cause| Error::Fault {
+        what: format!("a picture could not be encoded: {cause}"),
+    })?;
     Ok(bytes)
 }
 
 /// The bytes of the file that [`write`] makes.
-pub fn encoded(kind: ImageKind, film: &Film, width: u32, height: u32, rgba: &[f32]) -> Result<Vec<u8>> {
+pub fn encoded(
+    kind: ImageKind,
+    film: &Film,
+    width: u32,
+    height: u32,
+    rgba: &[f32],
+) -> Result<Vec<u8>> {
     match kind {
         ImageKind::Png => png_bytes(width, height, &display_bytes(film, width, height, rgba)),
         ImageKind::Exr => {
             check_size(width, height, rgba);
             let mut bytes = std::io::Cursor::new(Vec::new());
             let encoder = OpenExrEncoder::new(&mut bytes);
-            let encoded = encoder.write_image(bytemuck::cast_slice(rgba), width, height, ExtendedColorType::Rgba32F);
-            encoded.map_err(|cause| Error::Fault { what: format!("a picture could not be encoded: {cause}") })?;
+            let encoded = encoder.write_image(
+                bytemuck::cast_slice(rgba),
+                width,
+                height,
+                ExtendedColorType::Rgba32F,
+            );
+            encoded.map_err(|cause| Error::Fault {
+                what: format!("a picture could not be encoded: {cause}"),
+            })?;
             Ok(bytes.into_inner())
         }
     }
@@ -158,21 +182,31 @@ mod tests {
         // The first row of Bayer's 8×8 matrix as printed everywhere.
         let row: Vec<usize> = (0..8).map(|x| (dither(x, 0) * 64.0 - 0.5) as usize).collect();
         assert_eq!(row, [0, 32, 8, 40, 2, 34, 10, 42]);
-        let mut all: Vec<usize> = (0..64).map(|i| (dither(i % 8, i / 8) * 64.0 - 0.5) as usize).collect();
+        let mut all: Vec<usize> =
+            (0..64).map(|i| (dither(i % 8, i / 8) * 64.0 - 0.5) as usize).collect();
         all.sort_unstable();
         assert!(all.into_iter().eq(0..64));
     }
 
     fn film(width: u32, height: u32) -> Film {
         let background = DVec3::new(0.1, 0.5, 0.9);
-        Film { width, height, format: FilmFormat::Rgba16f, background, exposure: 1.0, tone_map: ToneMap::Clip }
+        Film {
+            width,
+            height,
+            format: FilmFormat::Rgba16f,
+            background,
+            exposure: 1.0,
+            tone_map: ToneMap::Clip,
+        }
     }
 
     #[test]
     fn exr_keeps_every_bit_and_png_shows_the_composition() {
         let dir = tempfile::tempdir().unwrap();
         let (exr, png) = (dir.path().join("a.exr"), dir.path().join("a.PNG"));
-        let rgba: Vec<f32> = (0..5 * 3 * 4).map(|i| (i as f32 * 0.37).sin().abs() * 1e-3f32.powi(i % 5 - 2)).collect();
+        let rgba: Vec<f32> = (0..5 * 3 * 4)
+            .map(|i| (i as f32 * 0.37).sin().abs() * 1e-3f32.powi(i % 5 - 2))
+            .collect();
         write(&exr, &film(5, 3), 5, 3, &rgba).unwrap();
         let read = image::open(&exr).unwrap().into_rgba32f();
         assert_eq!((read.dimensions(), read.as_raw()), ((5, 3), &rgba));
@@ -199,9 +233,14 @@ mod tests {
         let shown = display_bytes(&film(8, 8), 8, 8, &empty);
         let exact = film(8, 8).display(DVec3::ZERO, 0.0) * 255.0;
         for channel in 0..3 {
-            let mean = shown.iter().skip(channel).step_by(3).map(|v| f64::from(*v)).sum::<f64>() / 64.0;
+            let mean =
+                shown.iter().skip(channel).step_by(3).map(|v| f64::from(*v)).sum::<f64>() / 64.0;
             // Thresholds are 1/64 apart and the mean counts those passed: right to half a step.
-            assert!((mean - exact[channel]).abs() <= 0.5 / 64.0 + 1e-9, "{mean} {}", exact[channel]);
+            assert!(
+                (mean - exact[channel]).abs() <= 0.5 / 64.0 + 1e-9,
+                "{mean} {}",
+                exact[channel]
+            );
         }
         let white: Vec<f32> = [2.0, 0.0, 1.0, 1.0].repeat(64);
         assert!(display_bytes(&film(8, 8), 8, 8, &white).chunks(3).all(|c| c == [255, 0, 255]));
@@ -217,7 +256,11 @@ mod tests {
         write(&path("a.exr"), &film(2, 1), 2, 1, &rgba).unwrap();
         let exr = read(&path("a.exr")).unwrap();
         assert_eq!((exr.kind, exr.width, exr.height, exr.has_alpha), (ImageKind::Exr, 2, 1, true));
-        assert!(exr.rgba[0] == [-1.5, 0.25, 1e6, 1.0] && exr.rgba[1][0].is_nan() && exr.rgba[1][3] == 0.5);
+        assert!(
+            exr.rgba[0] == [-1.5, 0.25, 1e6, 1.0]
+                && exr.rgba[1][0].is_nan()
+                && exr.rgba[1][3] == 0.5
+        );
 
         write_bytes(&path("a.png"), 2, 1, &[0, 51, 255, 102, 1, 2]).unwrap();
         let png = read(&path("a.png")).unwrap();
@@ -238,11 +281,17 @@ mod tests {
         write(&path("whole.exr"), &film(8, 8), 8, 8, &[0.5; 256]).unwrap();
         for kind in ["png", "exr"] {
             let bytes = std::fs::read(path(&format!("whole.{kind}"))).unwrap();
-            for (name, bytes) in [("cut", &bytes[..bytes.len() / 2]), ("text", b"not a picture"), ("empty", b"")] {
+            for (name, bytes) in
+                [("cut", &bytes[..bytes.len() / 2]), ("text", b"not a picture"), ("empty", b"")]
+            {
                 let file = path(&format!("{name}.{kind}"));
                 std::fs::write(&file, bytes).unwrap();
                 let error = read(&file).unwrap_err().to_string();
-                assert!(error.starts_with(&format!("{}: cannot be read as a picture: ", file.display())), "{error}");
+                assert!(
+                    error
+                        .starts_with(&format!("{}: cannot be read as a picture: ", file.display())),
+                    "{error}"
+                );
             }
         }
         assert!(read(&path("gone.exr")).unwrap_err().to_string().contains("gone.exr: "));
@@ -253,7 +302,10 @@ mod tests {
     fn other_extensions_are_a_usage_error() {
         for name in ["a.jpg", "a", ".png", "png"] {
             let error = write(Path::new(name), &film(1, 1), 1, 1, &[0.0; 4]).unwrap_err();
-            assert_eq!(error, Error::usage(format!("{name}: expected a file name that ends in .png or .exr")));
+            assert_eq!(
+                error,
+                Error::usage(format!("{name}: expected a file name that ends in .png or .exr"))
+            );
         }
     }
 

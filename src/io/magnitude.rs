@@ -1,9 +1,10 @@
-//! How great and how small an input's numbers may be, so that the f32 arithmetic on the device carries all that is
-//! made of them. f32's normal numbers run from 1.2e-38 to 3.4e38.
+//! How great and how small an input's numbers may be, so that the f32 arithmetic on the device
+//! carries all that is made of them. f32's normal numbers run from 1.2e-38 to 3.4e38.
 //!
-//! A number of at most 1e15 can be squared and summed over a vector (3e30), and a length can be multiplied with a
-//! wave number or divided by a distance of 1e-15 (1e30), with orders of magnitude left for constants. Three such
-//! factors are too many, so the one place that has a cube, a blob's mass κ (2π)^{3/2} σ³, is checked itself.
+//! A number of at most 1e15 can be squared and summed over a vector (3e30), and a length can be
+//! multiplied with a wave number or divided by a distance of 1e-15 (1e30), with orders of magnitude
+//! left for constants. Three such factors are too many, so the one place that has a cube, a blob's
+//! mass κ (2π)^{3/2} σ³, is checked itself.
 
 use glam::DVec3;
 
@@ -13,19 +14,23 @@ use crate::model::disc::Disc;
 
 /// Coordinates, lengths, times, κ, optical depths, irradiance, colours.
 pub const GREATEST: f64 = 1e15;
-/// Lengths that something is divided by: σ, wavelengths, the near distance. Its square is 1e-30, and 1e15 / 1e-15 is
-/// 1e30: both are normal numbers.
+/// Lengths that something is divided by: σ, wavelengths, the near distance. Its square is 1e-30,
+/// and 1e15 / 1e-15 is 1e30: both are normal numbers.
 pub const LEAST: f64 = 1e-15;
-/// Box edges are only multiplied with numbers that have 24 bits: 1e-30 · 2⁻²⁴ is 6e-38, still a normal number.
+/// Box edges are only multiplied with numbers that have 24 bits: 1e-30 · 2⁻²⁴ is 6e-38, still a
+/// normal number.
 pub const LEAST_EXTENT: f64 = 1e-30;
-/// κ σ and the mass κ (2π)^{3/2} σ³, and with both κ σ², which lies between them. κ and σ of 1e15 give κ σ = 1e30.
+/// κ σ and the mass κ (2π)^{3/2} σ³, and with both κ σ², which lies between them. κ and σ of 1e15
+/// give κ σ = 1e30.
 pub const GREATEST_PRODUCT: f64 = 1e37;
 /// A factor on an irradiance that colours are a factor on too: 1e15 · 1e15 · 1e6 is 1e36.
 pub const GREATEST_SHARE: f64 = 1e6;
 
-/// n_s: a lobe a thousandth of a degree wide. A narrower one has no number between two neighbouring directions in f32.
+/// n_s: a lobe a thousandth of a degree wide. A narrower one has no number between two neighbouring
+/// directions in f32.
 pub const GREATEST_EXPONENT: f64 = 1e6;
-/// Nearer to a point light than this the irradiance does not grow: 1e15 / (1e-9)² is 1e33, still a normal number.
+/// Nearer to a point light than this the irradiance does not grow: 1e15 / (1e-9)² is 1e33, still a
+/// normal number.
 pub const LEAST_LIGHT_RADIUS: f64 = 1e-9;
 
 /// Either sign.
@@ -35,7 +40,8 @@ pub const AMOUNT: Bounds = Bounds::Within(0.0, GREATEST);
 /// What is divided by.
 pub const DIVISOR: Bounds = Bounds::Within(LEAST, GREATEST);
 
-/// The fewest digits that read back as the same number; with an exponent where plain digits would run long.
+/// The fewest digits that read back as the same number; with an exponent where plain digits would
+/// run long.
 pub fn shortest(v: f64) -> String {
     let plain = v == 0.0 || (1e-4..1e9).contains(&v.abs());
     if plain { format!("{v}") } else { format!("{v:e}") }
@@ -43,10 +49,12 @@ pub fn shortest(v: f64) -> String {
 
 /// What is expected of a coordinate, where `v` is none.
 pub fn wrong_coordinate(v: f64) -> Option<String> {
-    (!is_carried(v)).then(|| format!("a number from {} to {}", shortest(-GREATEST), shortest(GREATEST)))
+    (!is_carried(v))
+        .then(|| format!("a number from {} to {}", shortest(-GREATEST), shortest(GREATEST)))
 }
 
-/// What is expected of a size, where `v` is none: 0, or a number from `least` (0 where any will do) on.
+/// What is expected of a size, where `v` is none: 0, or a number from `least` (0 where any will do)
+/// on.
 pub fn wrong_size(v: f64, least: f64) -> Option<String> {
     if v == 0.0 || (least..=GREATEST).contains(&v) {
         return None;
@@ -67,25 +75,33 @@ fn is_carried(v: f64) -> bool {
     v.abs() <= GREATEST
 }
 
-/// What of a cloud's particles the device could not carry although each number that was given is in its bounds;
-/// `lines` are those of a particle list.
+/// What of a cloud's particles the device could not carry although each number that was given is in
+/// its bounds; `lines` are those of a particle list.
 pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
     let groups = cloud.groups(0, 0);
     match &cloud.source {
         CloudSource::Boxes { boxes, radius_scale, .. } => {
             let scaled = boxes.iter().map(|b| b.radius_max * radius_scale).enumerate();
-            let is_vanishing = |i: usize, v: f64| boxes[i].radius_max > 0.0 && *radius_scale > 0.0 && v < LEAST;
+            let is_vanishing =
+                |i: usize, v: f64| boxes[i].radius_max > 0.0 && *radius_scale > 0.0 && v < LEAST;
             let wrong = scaled.filter(|(i, v)| *v > GREATEST || is_vanishing(*i, *v));
             // The largest where some are too large.
             if let Some((i, v)) = wrong.max_by(|a, b| a.1.total_cmp(&b.1)) {
                 let (low, high) = (shortest(LEAST), shortest(GREATEST));
-                let what = format!("expected 0 or a number from {low} to {high}, found {}", rounded(v));
+                let what =
+                    format!("expected 0 or a number from {low} to {high}, found {}", rounded(v));
                 return Some(format!("box {i}: radius times `radius_scale`: {what}"));
             }
             let kappa = "κ = optical_depth / (√(2π) σ)";
             too_great(&groups, kappa, GREATEST, &|g| g.kappa_max)
-                .or_else(|| too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &|g| g.mass_max))
-                .or_else(|| too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| g.kappa_max * g.sigma_widest()))
+                .or_else(|| {
+                    too_great(&groups, "κ (2π)^{3/2} σ³", GREATEST_PRODUCT, &|g| g.mass_max)
+                })
+                .or_else(|| {
+                    too_great(&groups, "κ σ", GREATEST_PRODUCT, &|g| {
+                        g.kappa_max * g.sigma_widest()
+                    })
+                })
         }
         CloudSource::Disc(disc) => groups.first().and_then(|group| disc_beyond(disc, group)),
         // Of a weather file whose numbers are those of air.
@@ -101,29 +117,37 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
             }
             let line = lines.get(i).map_or("?".to_owned(), usize::to_string);
             let (expected, found) = (shortest(GREATEST_PRODUCT), rounded(heaviest));
-            Some(format!("line {line}: κ (2π)^{{3/2}} σ³: expected at most {expected}, found {found}"))
+            Some(format!(
+                "line {line}: κ (2π)^{{3/2}} σ³: expected at most {expected}, found {found}"
+            ))
         }
     }
 }
 
-/// What of a cloud that is grown the device could not carry; between start and end lies nothing that is greater or smaller.
+/// What of a cloud that is grown the device could not carry; between start and end lies nothing
+/// that is greater or smaller.
 pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
     let to = cloud.growth.to;
     let groups: Vec<Group> = cloud.groups(0, 0).iter().map(|g| g.grown(to)).collect();
     let greatest = |of: &dyn Fn(&Group) -> f64| groups.iter().map(of).fold(0.0, f64::max);
     let places = greatest(&|g| (g.center.abs() + g.half_extent).max_element());
     let expected = |what: &str, most: f64, found: f64| {
-        (found > most).then(|| format!("{what}, grown: expected at most {}, found {}", shortest(most), rounded(found)))
+        (found > most).then(|| {
+            format!("{what}, grown: expected at most {}, found {}", shortest(most), rounded(found))
+        })
     };
     let least = least_sigma(cloud) * to;
     // As great as a cloud may be that does not grow.
     expected("places", 2.0 * GREATEST, places)
         .or_else(|| expected("σ", GREATEST, greatest(&|g| g.sigma_widest())))
         .or_else(|| expected("κ (2π)^{3/2} σ³", GREATEST_PRODUCT, greatest(&|g| g.mass_max)))
-        .or_else(|| expected("κ σ", GREATEST_PRODUCT, greatest(&|g| g.kappa_max * g.sigma_widest())))
+        .or_else(|| {
+            expected("κ σ", GREATEST_PRODUCT, greatest(&|g| g.kappa_max * g.sigma_widest()))
+        })
         .or_else(|| {
             let (low, found) = (shortest(LEAST * SIGMA_PER_RADIUS), rounded(least));
-            (least < LEAST * SIGMA_PER_RADIUS).then(|| format!("σ, shrunk: expected at least {low}, found {found}"))
+            (least < LEAST * SIGMA_PER_RADIUS)
+                .then(|| format!("σ, shrunk: expected at least {low}, found {found}"))
         })
         .filter(|_| !cloud.growth.is_none())
 }
@@ -144,7 +168,9 @@ fn disc_beyond(disc: &Disc, group: &Group) -> Option<String> {
     let lift = disc.condensation.map_or(0.0, |c| c.lift * disc.warmth);
     let wrong = |what: &str, most: f64, found: f64| {
         let expected = shortest(most);
-        (found > most).then(|| format!("its particles' {what}: expected at most {expected}, found {}", rounded(found)))
+        (found > most).then(|| {
+            format!("its particles' {what}: expected at most {expected}, found {}", rounded(found))
+        })
     };
     wrong("places", GREATEST, (group.center.abs() + group.half_extent).max_element())
         .or_else(|| wrong("σ", GREATEST, group.sigma_max))
@@ -155,10 +181,16 @@ fn disc_beyond(disc: &Disc, group: &Group) -> Option<String> {
         .or_else(|| wrong("warmth · base_lift", GREATEST_PRODUCT, lift))
 }
 
-fn too_great(groups: &[Group], what: &str, greatest: f64, of: &dyn Fn(&Group) -> f64) -> Option<String> {
+fn too_great(
+    groups: &[Group],
+    what: &str,
+    greatest: f64,
+    of: &dyn Fn(&Group) -> f64,
+) -> Option<String> {
     let (i, found) = groups.iter().map(of).enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let expected = shortest(greatest);
-    (found > greatest).then(|| format!("box {i}: {what}: expected at most {expected}, found {}", rounded(found)))
+    (found > greatest)
+        .then(|| format!("box {i}: {what}: expected at most {expected}, found {}", rounded(found)))
 }
 
 /// A computed number in a message: its last digits say nothing.
@@ -175,7 +207,9 @@ mod tests {
         let f = |v: f64| v as f32;
         assert!((f(GREATEST) * f(GREATEST) * 1e6).is_finite());
         assert!(f(GREATEST_PRODUCT).is_finite() && (f(GREATEST) / f(LEAST)).is_finite());
-        assert!((f(LEAST) * f(LEAST)).is_normal() && (f(LEAST_EXTENT) * 2f32.powi(-24)).is_normal());
+        assert!(
+            (f(LEAST) * f(LEAST)).is_normal() && (f(LEAST_EXTENT) * 2f32.powi(-24)).is_normal()
+        );
     }
 
     #[test]

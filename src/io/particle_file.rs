@@ -1,5 +1,5 @@
-//! Particle lists: CSV with the header `x,y,z,sigma,kappa[,sigma_y][,r,g,b]` in any order; `radius` may stand for
-//! sigma = radius / 3. With `sigma_y` sigma is that along x and z alone.
+//! Particle lists: CSV with the header `x,y,z,sigma,kappa[,sigma_y][,r,g,b]` in any order; `radius`
+//! may stand for sigma = radius / 3. With `sigma_y` sigma is that along x and z alone.
 
 use std::path::Path;
 
@@ -29,24 +29,30 @@ pub fn parse(text: &str, path: &Path) -> Result<Vec<Particle>> {
 /// The same, and the line of each particle.
 pub fn parse_with_lines(text: &str, path: &Path) -> Result<(Vec<Particle>, Vec<usize>)> {
     let file = File { text, path };
-    let mut reader = ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let mut reader =
+        ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
     let mut rows = reader.records();
     let mut next = || rows.find(|row| row.as_ref().map_or(true, |row| !is_blank(row))).transpose();
     let lost = |e: csv::Error| Error::scene(Place::file(path), format!("not readable as CSV: {e}"));
 
     let Some(header) = next().map_err(lost)? else {
-        return Err(Error::scene(Place::line(path, 1, 1), format!("the file is empty: expected {FIRST}")));
+        return Err(Error::scene(
+            Place::line(path, 1, 1),
+            format!("the file is empty: expected {FIRST}"),
+        ));
     };
     file.check_quotes(&header)?;
     let columns = Columns::find(&file, &header)?;
     let (mut particles, mut lines) = (Vec::new(), Vec::new());
-    // Counted on from row to row: from the start each time, a long file would take its length squared.
+    // Counted on from row to row: from the start each time, a long file would take its length
+    // squared.
     let (mut line, mut counted) = (1, 0);
     while let Some(row) = next().map_err(lost)? {
         file.check_quotes(&row)?;
         if row.len() != header.len() {
             let i = row.len().min(header.len());
-            let what = format!("expected {} fields as in the header, found {}", header.len(), row.len());
+            let what =
+                format!("expected {} fields as in the header, found {}", header.len(), row.len());
             return Err(Error::scene(file.place(&row, i), what));
         }
         particles.push(columns.particle(&file, &row)?);
@@ -68,7 +74,8 @@ struct File<'a> {
 }
 
 impl File<'_> {
-    /// A quote that is not closed takes in all lines up to the next one; no name or number has two lines.
+    /// A quote that is not closed takes in all lines up to the next one; no name or number has two
+    /// lines.
     fn check_quotes(&self, row: &StringRecord) -> Result<()> {
         match row.iter().position(|field| field.contains('\n')) {
             Some(i) => Err(Error::scene(self.place(row, i), "the quote is not closed on its line")),
@@ -123,12 +130,18 @@ impl Columns {
         let fault = |i: usize, what: String| Err(Error::scene(file.place(header, i), what));
         let names: Vec<&str> = header.iter().map(str::trim).collect();
         if names.iter().all(|name| name.parse::<f64>().is_ok()) {
-            return fault(0, "expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned());
+            return fault(
+                0,
+                "expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned(),
+            );
         }
         for (i, name) in names.iter().enumerate() {
             if !COLUMNS.contains(name) {
                 let meant = did_you_mean(name, &COLUMNS);
-                return fault(i, format!("unknown column `{}`{meant} (known: {})", shown(name), list(&COLUMNS)));
+                return fault(
+                    i,
+                    format!("unknown column `{}`{meant} (known: {})", shown(name), list(&COLUMNS)),
+                );
             }
             if names[..i].contains(name) {
                 return fault(i, format!("column `{name}` stands twice"));
@@ -136,22 +149,35 @@ impl Columns {
         }
         let find = |name: &str| names.iter().position(|n| *n == name);
         let need = |name: &str| {
-            find(name).ok_or_else(|| Error::scene(file.place(header, 0), format!("missing column `{name}`")))
+            find(name).ok_or_else(|| {
+                Error::scene(file.place(header, 0), format!("missing column `{name}`"))
+            })
         };
         let (sigma, sigma_factor) = match (find("sigma"), find("radius")) {
-            (Some(i), Some(j)) => return fault(i.max(j), "expected `sigma` or `radius`, found both".to_owned()),
+            (Some(i), Some(j)) => {
+                return fault(i.max(j), "expected `sigma` or `radius`, found both".to_owned());
+            }
             (Some(i), None) => (i, 1.0),
             (None, Some(j)) => (j, SIGMA_PER_RADIUS),
-            (None, None) => return fault(0, "missing column `sigma` (or `radius` = 3 sigma)".to_owned()),
+            (None, None) => {
+                return fault(0, "missing column `sigma` (or `radius` = 3 sigma)".to_owned());
+            }
         };
         let color = match [find("r"), find("g"), find("b")] {
             [None, None, None] => None,
             [Some(r), Some(g), Some(b)] => Some([r, g, b]),
             some => {
-                let missing: Vec<&str> =
-                    ["r", "g", "b"].into_iter().zip(some).filter(|(_, i)| i.is_none()).map(|(name, _)| name).collect();
+                let missing: Vec<&str> = ["r", "g", "b"]
+                    .into_iter()
+                    .zip(some)
+                    .filter(|(_, i)| i.is_none())
+                    .map(|(name, _)| name)
+                    .collect();
                 let i = some.into_iter().flatten().min().unwrap_or(0);
-                return fault(i, format!("expected all of `r`, `g`, `b` or none; missing {}", list(&missing)));
+                return fault(
+                    i,
+                    format!("expected all of `r`, `g`, `b` or none; missing {}", list(&missing)),
+                );
             }
         };
         Ok(Columns {
@@ -168,7 +194,10 @@ impl Columns {
         let number = |i: usize| {
             let word = row[i].trim();
             word.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(|| {
-                Error::scene(file.place(row, i), format!("expected a finite number, found `{}`", shown(word)))
+                Error::scene(
+                    file.place(row, i),
+                    format!("expected a finite number, found `{}`", shown(word)),
+                )
             })
         };
         let bounded = |i: usize, name: &str, wrong: &dyn Fn(f64) -> Option<String>| {
@@ -176,7 +205,8 @@ impl Columns {
             match wrong(v) {
                 None => Ok(v),
                 Some(expected) => {
-                    let what = format!("{name}: expected {expected}, found `{}`", shown(row[i].trim()));
+                    let what =
+                        format!("{name}: expected {expected}, found `{}`", shown(row[i].trim()));
                     Err(Error::scene(file.place(row, i), what))
                 }
             }
@@ -227,7 +257,13 @@ mod tests {
     fn columns_come_in_any_order_and_colour_is_optional() {
         let list = good("kappa, b,g,r, radius,z,y,x\n2,0.3,0.2,0.1,6,-3,2,1\n");
         let position = DVec3::new(1.0, 2.0, -3.0);
-        let expected = Particle { aspect: 1.0, position, sigma: 2.0, kappa: 2.0, color: DVec3::new(0.1, 0.2, 0.3) };
+        let expected = Particle {
+            aspect: 1.0,
+            position,
+            sigma: 2.0,
+            kappa: 2.0,
+            color: DVec3::new(0.1, 0.2, 0.3),
+        };
         assert_eq!(list, [expected]);
         let flat = good("x,y,z,sigma,sigma_y,kappa\n1,2,-3,2,0.5,2\n0,0,0,0,7,1\n");
         assert_eq!([flat[0].aspect, flat[1].aspect], [0.25, 1.0]);
@@ -243,29 +279,87 @@ mod tests {
         let known = "(known: `x`, `y`, `z`, `sigma`, `radius`, `sigma_y`, `kappa`, `r`, `g`, `b`)";
         let row = |row: &str| format!("x,y,z,sigma,kappa\n0,0,0,1,1\r\n\r\n{row}\n");
         for (text, expected) in [
-            ("x,y,z,sigma,kapa".to_owned(), format!("1:13: unknown column `kapa`; did you mean `kappa`? {known}")),
-            ("x,y,z,sigma,kappa,".to_owned(), format!("1:19: unknown column ``; did you mean `x`? {known}")),
+            (
+                "x,y,z,sigma,kapa".to_owned(),
+                format!(
+                    "1:13: unknown column `kapa`; did you mean \
+                `kappa`? {known}"
+                ),
+            ),
+            (
+                "x,y,z,sigma,kappa,".to_owned(),
+                format!(
+                    "1:19: unknown column ``; did you mean \
+                `x`? {known}"
+                ),
+            ),
             ("x, x,y,z,sigma,kappa".to_owned(), "1:4: column `x` stands twice".to_owned()),
             ("x,y,sigma,kappa".to_owned(), "1:1: missing column `z`".to_owned()),
-            ("x,y,z,kappa".to_owned(), "1:1: missing column `sigma` (or `radius` = 3 sigma)".to_owned()),
-            ("x,y,z,sigma,kappa,radius".to_owned(), "1:19: expected `sigma` or `radius`, found both".to_owned()),
-            ("x,y,z,sigma,kappa,r,b".to_owned(), "1:19: expected all of `r`, `g`, `b` or none; missing `g`".to_owned()),
-            ("\n1,2,3,4,5\n".to_owned(), "2:1: expected a header x,y,z,sigma,kappa[,r,g,b], found numbers".to_owned()),
+            (
+                "x,y,z,kappa".to_owned(),
+                "1:1: missing column `sigma` (or \
+                `radius` = 3 sigma)"
+                    .to_owned(),
+            ),
+            (
+                "x,y,z,sigma,kappa,radius".to_owned(),
+                "1:19: expected `sigma` or \
+                `radius`, found both"
+                    .to_owned(),
+            ),
+            (
+                "x,y,z,sigma,kappa,r,b".to_owned(),
+                "1:19: expected all of `r`, `g`, `b` or \
+                none; missing `g`"
+                    .to_owned(),
+            ),
+            (
+                "\n1,2,3,4,5\n".to_owned(),
+                "2:1: expected a header x,y,z,sigma,kappa[,r,g,b], \
+                found numbers"
+                    .to_owned(),
+            ),
             (row("0,0,0,1"), "4:8: expected 5 fields as in the header, found 4".to_owned()),
             (row("0,0,0,1,1,7"), "4:11: expected 5 fields as in the header, found 6".to_owned()),
             (
                 "x,y,z,sigma,sigma_y,kappa\n0,0,0,2,0.001,1".to_owned(),
-                "2:9: sigma_y: expected a number from 2.000e-3 to 2.000e3, a thousandth to a thousand times the other, found `0.001`"
+                "2:9: sigma_y: expected a number from 2.000e-3 to 2.000e3, a thousandth to a \
+                 thousand times the other, found `0.001`"
                     .to_owned(),
             ),
             (row("0,0,zero,1,1"), "4:5: expected a finite number, found `zero`".to_owned()),
             (row("0,0,,1,1"), "4:5: expected a finite number, found ``".to_owned()),
             (row("0,\"0\", inf,1,1"), "4:8: expected a finite number, found `inf`".to_owned()),
-            (row("0,0,0,-1,1"), "4:7: sigma: expected 0 or a number from 1e-15 to 1e15, found `-1`".to_owned()),
-            (row("0,0,0,1,-2"), "4:9: kappa: expected a number from 0 to 1e15, found `-2`".to_owned()),
-            (row("0,0,0,1e-300,1"), "4:7: sigma: expected 0 or a number from 1e-15 to 1e15, found `1e-300`".to_owned()),
-            (row("0,0,0,1,1e300"), "4:9: kappa: expected a number from 0 to 1e15, found `1e300`".to_owned()),
-            (row("0,1e30,0,1,1"), "4:3: y: expected a number from -1e15 to 1e15, found `1e30`".to_owned()),
+            (
+                row("0,0,0,-1,1"),
+                "4:7: sigma: expected 0 or a number from 1e-15 to \
+                1e15, found `-1`"
+                    .to_owned(),
+            ),
+            (
+                row("0,0,0,1,-2"),
+                "4:9: kappa: expected a number from 0 to \
+                1e15, found `-2`"
+                    .to_owned(),
+            ),
+            (
+                row("0,0,0,1e-300,1"),
+                "4:7: sigma: expected 0 or a number from 1e-15 to 1e15, \
+                found `1e-300`"
+                    .to_owned(),
+            ),
+            (
+                row("0,0,0,1,1e300"),
+                "4:9: kappa: expected a number from 0 to 1e15, \
+                found `1e300`"
+                    .to_owned(),
+            ),
+            (
+                row("0,1e30,0,1,1"),
+                "4:3: y: expected a number from -1e15 to 1e15, \
+                found `1e30`"
+                    .to_owned(),
+            ),
             (row("0,0,\"0,1,1"), "4:5: the quote is not closed on its line".to_owned()),
         ] {
             let error = parse(&text, Path::new("p.csv")).expect_err(&text).to_string();

@@ -10,7 +10,8 @@ use crate::model::air::Air;
 use crate::model::cloud::Cloud;
 use crate::model::moisture::{Parcel, Saturation, T0_K, Vapour};
 
-/// What the laws are made for, and more: colder, and Bolton's fit has little to do with water; hotter, and it boils.
+/// What the laws are made for, and more: colder, and Bolton's fit has little to do with water;
+/// hotter, and it boils.
 const CELSIUS: Bounds = Bounds::Within(-80.0, 60.0);
 /// More than e is at 60 °C, 200 hPa: else the air would be vapour alone.
 const HECTOPASCAL: Bounds = Bounds::Within(250.0, 2000.0);
@@ -20,7 +21,16 @@ const HUMIDITY: Bounds = Bounds::Within(0.001, 1.0);
 pub fn read_air(root: &mut Section) -> Result<Air> {
     let mut s = root.section("air")?;
     s.expect_keys(
-        &["temperature_c", "humidity", "dew_point_c", "pressure_hpa", "saturation", "ice", "metres_per_unit", "ground"],
+        &[
+            "temperature_c",
+            "humidity",
+            "dew_point_c",
+            "pressure_hpa",
+            "saturation",
+            "ice",
+            "metres_per_unit",
+            "ground",
+        ],
         &[],
     )?;
     let fair = Air::FAIR;
@@ -33,7 +43,8 @@ pub fn read_air(root: &mut Section) -> Result<Air> {
         true => read_dew_point(&mut s, law, t_k)?,
         false => s.f64("humidity", fair.parcel.humidity, HUMIDITY)?,
     };
-    let pressure_pa = 100.0 * s.f64("pressure_hpa", fair.parcel.pressure_pa / 100.0, HECTOPASCAL)?;
+    let pressure_pa =
+        100.0 * s.f64("pressure_hpa", fair.parcel.pressure_pa / 100.0, HECTOPASCAL)?;
     let air = Air {
         parcel: Parcel { t_k, pressure_pa, humidity },
         law,
@@ -42,7 +53,10 @@ pub fn read_air(root: &mut Section) -> Result<Air> {
     };
     let base = air.base();
     if base.abs() > GREATEST {
-        let what = format!("puts the clouds' bases at {base:.3e}: expected at most {}", shortest(GREATEST));
+        let what = format!(
+            "puts the clouds' bases at {base:.3e}: expected at most {}",
+            shortest(GREATEST)
+        );
         return Err(s.fault("metres_per_unit", what));
     }
     root.record("air", s.finish());
@@ -58,8 +72,12 @@ fn read_dew_point(s: &mut Section, law: Vapour, t_k: f64) -> Result<f64> {
     let humidity = law.relative_humidity(law.saturation(T0_K + dew_c), t_k);
     match humidity {
         f if (0.001..=1.0).contains(&f) => Ok(f),
-        f if f > 1.0 => Err(s.fault("dew_point_c", format!("expected at most the temperature, found {dew_c}"))),
-        f => Err(s.fault("dew_point_c", format!("makes a humidity of {f:.2e}: expected at least 0.001"))),
+        f if f > 1.0 => {
+            Err(s.fault("dew_point_c", format!("expected at most the temperature, found {dew_c}")))
+        }
+        f => Err(
+            s.fault("dew_point_c", format!("makes a humidity of {f:.2e}: expected at least 0.001"))
+        ),
     }
 }
 
@@ -81,7 +99,10 @@ pub fn read_base(s: &mut Section) -> Result<Base> {
         Some(Value::String(text)) if text == "lcl" => Base::Condensation,
         Some(value @ Value::String(_)) => {
             let found = value.describe();
-            return Err(s.fault("base", format!("expected {COORDINATE}, \"lcl\" or \"none\", found {found}")));
+            return Err(s.fault(
+                "base",
+                format!("expected {COORDINATE}, \"lcl\" or \"none\", found {found}"),
+            ));
         }
         Some(_) => return Ok(Base::At(s.f64("base", 0.0, COORDINATE)?)),
     };
@@ -99,7 +120,8 @@ impl Base {
     }
 }
 
-/// Moves `cloud` up or down, so that the lowest centres that its particles may have at time 0 are at `base`.
+/// Moves `cloud` up or down, so that the lowest centres that its particles may have at time 0 are
+/// at `base`.
 pub fn put_on_base(cloud: &mut Cloud, base: f64) {
     let groups = cloud.groups(0, 0);
     let lows = groups.iter().filter(|g| g.n_particles > 0).map(|g| g.center.y - g.half_extent.y);

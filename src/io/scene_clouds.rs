@@ -34,7 +34,10 @@ pub trait Files {
 
     /// A weather file, opened.
     fn weather(&self, path: &Path) -> Result<WeatherFile> {
-        Err(Error::Io { path: path.to_owned(), what: "weather files are read from the disk alone".to_owned() })
+        Err(Error::Io {
+            path: path.to_owned(),
+            what: "weather files are read from the disk alone".to_owned(),
+        })
     }
 }
 
@@ -81,7 +84,8 @@ macro_rules! with_cloud_keys {
 }
 
 const LIST_KEYS: &[&str] = with_cloud_keys!["from", "file"];
-const WEATHER_KEYS: &[&str] = with_cloud_keys!["from", "file", "step", "particles", "exaggeration", "speed", "ground"];
+const WEATHER_KEYS: &[&str] =
+    with_cloud_keys!["from", "file", "step", "particles", "exaggeration", "speed", "ground"];
 const BOX_KEYS: &[&str] = with_cloud_keys!["from", "file", "form", "optical_depth", "radius_scale"];
 
 #[derive(Clone, Copy)]
@@ -114,8 +118,8 @@ impl<'a> CloudReader<'a> {
         }
     }
 
-    /// The text of the file that `file` names, which begins with `first`. What the file system refuses is reported where the scene names
-    /// it; what is wrong inside stays where it is.
+    /// The text of the file that `file` names, which begins with `first`. What the file system
+    /// refuses is reported where the scene names it; what is wrong inside stays where it is.
     fn read_named(&mut self, s: &mut Section, first: &str) -> Result<(String, PathBuf)> {
         let path = self.folder.join(s.required_string("file")?);
         let text = self.files.text(&path, first).map_err(|e| match e {
@@ -172,7 +176,11 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             s.expect_keys(WEATHER_KEYS, &[])?;
             let file = reader.read_weather(s)?;
             let keys = scene_weather::read_keys(s, &file, reader.simulate)?;
-            reader.notes.extend(scene_weather::notes(&file).into_iter().map(|note| format!("cloud {i_cloud}: {note}")));
+            reader.notes.extend(
+                scene_weather::notes(&file)
+                    .into_iter()
+                    .map(|note| format!("cloud {i_cloud}: {note}")),
+            );
             let seed = reader.read_seed(s, i_cloud)?;
             if let Some(i_material) = ground_named(s, reader.materials)? {
                 let origin = s.vec3("position", DVec3::ZERO, COORDINATE)?;
@@ -203,19 +211,26 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
         growth: if is_disc { Growth::NONE } else { read_growth(s)? },
         texture: read_texture(s)?,
         i_material: material_named(s, reader.materials)?,
-        facing: s.choice("facing", if is_weather { "up" } else { "outward" }, &Facing::NAMES, &[])?,
+        facing: s.choice(
+            "facing",
+            if is_weather { "up" } else { "outward" },
+            &Facing::NAMES,
+            &[],
+        )?,
         seed: reader.read_seed(s, i_cloud)?,
     };
     let has_ground = reader.terrains.len() > n_terrains;
     if has_ground && (base.is_some() || cloud.growth != Growth::NONE) {
-        return Err(
-            s.fault("ground", "expected \"none\" where a `base` or `grow_to` takes the cloud away from its heights")
-        );
+        return Err(s.fault(
+            "ground",
+            "expected \"none\" where a `base` or `grow_to` takes the cloud away from its heights",
+        ));
     }
     if let Some(base) = base {
         put_on_base(&mut cloud, base);
         if !is_carried_place(cloud.position) {
-            let what = format!("puts the cloud's origin too far: expected at most {}", shortest(GREATEST));
+            let what =
+                format!("puts the cloud's origin too far: expected at most {}", shortest(GREATEST));
             return Err(s.fault("base", what));
         }
     }
@@ -231,7 +246,11 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
 fn read_texture(s: &mut Section) -> Result<Texture> {
     Ok(Texture {
         choice: s.choice("texture", "none", &Choice::NAMES, &[])?,
-        strength: s.f64("texture_strength", Texture::NONE.strength, Bounds::Within(0.0, GREATEST_STRENGTH))?,
+        strength: s.f64(
+            "texture_strength",
+            Texture::NONE.strength,
+            Bounds::Within(0.0, GREATEST_STRENGTH),
+        )?,
     })
 }
 
@@ -242,16 +261,18 @@ fn read_growth(s: &mut Section) -> Result<Growth> {
     })
 }
 
-/// Gives the clouds that are made from boxes `n` particles together, dealt to the boxes by their counts (largest remainder,
-/// of equal ones the first). κ changes against the count, so that the expected optical depth stays. An error says what is
-/// wrong with `n`.
+/// Gives the clouds that are made from boxes `n` particles together, dealt to the boxes by their
+/// counts (largest remainder, of equal ones the first). κ changes against the count, so that the
+/// expected optical depth stays. An error says what is wrong with `n`.
 pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
     let counts: Vec<u32> = clouds.iter_mut().flat_map(boxes_of).map(|b| b.n_particles).collect();
     let total: u128 = counts.iter().map(|n| u128::from(*n)).sum();
     if total == 0 {
         return Err("the scene has no cloud made from boxes that has particles".to_owned());
     }
-    let quota = |count: u32| (u128::from(n) * u128::from(count) / total, u128::from(n) * u128::from(count) % total);
+    let quota = |count: u32| {
+        (u128::from(n) * u128::from(count) / total, u128::from(n) * u128::from(count) % total)
+    };
     let mut shares: Vec<u32> = counts.iter().map(|count| quota(*count).0 as u32).collect();
     let mut by_remainder: Vec<usize> = (0..counts.len()).collect();
     // Stable: of equal ones the first.
@@ -307,9 +328,19 @@ mod tests {
     use super::*;
 
     fn cloud(counts: &[u32]) -> Cloud {
-        let b = |n: &u32| CloudBox { n_particles: *n, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+        let b = |n: &u32| CloudBox {
+            n_particles: *n,
+            extent: DVec3::ONE,
+            center: DVec3::ZERO,
+            radius_max: 1.0,
+        };
         let boxes = counts.iter().map(b).collect();
-        let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 1.0 };
+        let source = CloudSource::Boxes {
+            boxes,
+            form: Form::Centred,
+            optical_depth: 1.0,
+            radius_scale: 1.0,
+        };
         let (gust, growth) = (Gust::CALM, Growth::NONE);
         Cloud {
             facing: crate::model::cloud::Facing::Outward,
@@ -330,8 +361,11 @@ mod tests {
 
     #[test]
     fn particles_are_dealt_by_the_largest_remainder() {
-        let mut clouds =
-            [cloud(&[3, 0, 4]), Cloud { source: CloudSource::Particles(vec![]), ..cloud(&[]) }, cloud(&[3])];
+        let mut clouds = [
+            cloud(&[3, 0, 4]),
+            Cloud { source: CloudSource::Particles(vec![]), ..cloud(&[]) },
+            cloud(&[3]),
+        ];
         // 5 · (3, 0, 4, 3)/10 is 1.5, 0, 2, 1.5: one is left, and the first of the two has it.
         deal(&mut clouds, 5).unwrap();
         assert_eq!(counts(&mut clouds), [2, 0, 2, 1]);

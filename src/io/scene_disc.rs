@@ -76,7 +76,8 @@ fn read_condensation(s: &mut Section, air: &Air) -> Result<Option<Condensation>>
     let over = s.f64("base_over", 0.5, DIVISOR)?;
     let base = read_base(s)?;
     // Of clouds whose base is the air's the lift is, too.
-    let lift = s.f64("base_lift", if base == Base::Condensation { air.lift() } else { 0.0 }, AMOUNT)?;
+    let lift =
+        s.f64("base_lift", if base == Base::Condensation { air.lift() } else { 0.0 }, AMOUNT)?;
     // Of the scene; the law counts from the disc.
     let y = s.vec3("position", DVec3::ZERO, COORDINATE)?.y;
     Ok(base.height(air).map(|base| Condensation { base: base - y, over, lift }))

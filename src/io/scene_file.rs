@@ -29,8 +29,8 @@ pub struct LoadedScene {
     pub phases: Vec<Phase>,
     /// Every value the scene came to, defaults and `--set` included, under the scene file's keys.
     pub resolved: Json,
-    /// SHA-256 (hex) over the resolved scene, those of its phases, and the content of every file they name. Where the
-    /// files lie and how the TOML is laid out do not enter.
+    /// SHA-256 (hex) over the resolved scene, those of its phases, and the content of every file
+    /// they name. Where the files lie and how the TOML is laid out do not enter.
     pub hash: String,
     /// What is allowed but hardly meant, with its place.
     pub warnings: Vec<String>,
@@ -64,21 +64,27 @@ impl LoadedScene {
 }
 
 const ROOT_KEYS: &[&str] = &[
-    "title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material", "surface", "air", "cloud",
-    "phase",
+    "title", "film", "camera", "time", "lighting", "draw", "threads", "light", "material",
+    "surface", "air", "cloud", "phase",
 ];
 
-/// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud i has seed
-/// N + i, whatever the scene says.
+/// Reads the scene at `path` with `overrides` (`key.path=VALUE`) laid over it. With `seed` N cloud
+/// i has seed N + i, whatever the scene says.
 pub fn load(path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
     load_document(Document::read(path)?, path, overrides, seed, &OnDisk)
 }
 
-/// The same, and the files that it was read from, each once: the scene's own first, then those that it names, in their
-/// order, as far as it came. Also where it fails, so that somebody can wait until one of them is put right.
-pub fn load_and_name(path: &Path, overrides: &[String], seed: Option<u32>) -> (Result<LoadedScene>, Vec<PathBuf>) {
+/// The same, and the files that it was read from, each once: the scene's own first, then those that
+/// it names, in their order, as far as it came. Also where it fails, so that somebody can wait
+/// until one of them is put right.
+pub fn load_and_name(
+    path: &Path,
+    overrides: &[String],
+    seed: Option<u32>,
+) -> (Result<LoadedScene>, Vec<PathBuf>) {
     let named = Named { files: &OnDisk, paths: Mutex::new(vec![path.to_owned()]) };
-    let loaded = Document::read(path).and_then(|document| load_document(document, path, overrides, seed, &named));
+    let loaded = Document::read(path)
+        .and_then(|document| load_document(document, path, overrides, seed, &named));
     (loaded, named.paths.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
@@ -110,7 +116,12 @@ impl Files for Named<'_> {
 }
 
 /// The same of a text; `path` is what errors call it, and files that it names lie beside that.
-pub fn parse(text: String, path: &Path, overrides: &[String], seed: Option<u32>) -> Result<LoadedScene> {
+pub fn parse(
+    text: String,
+    path: &Path,
+    overrides: &[String],
+    seed: Option<u32>,
+) -> Result<LoadedScene> {
     parse_beside(text, path, overrides, seed, &OnDisk)
 }
 
@@ -139,8 +150,12 @@ fn load_document(
     let specs = scene_phases::read_phases(&document)?;
     if !specs.is_empty() {
         let n_frames: u64 = specs.iter().map(|s| u64::from(s.n_frames)).sum();
-        let too_many =
-            |_| Error::scene(Place::file(path), format!("the phases have {n_frames} frames: at most {}", u32::MAX));
+        let too_many = |_| {
+            Error::scene(
+                Place::file(path),
+                format!("the phases have {n_frames} frames: at most {}", u32::MAX),
+            )
+        };
         let n_frames = u32::try_from(n_frames).map_err(too_many)?;
         scene_phases::set_frames(&mut document, n_frames)?;
         scene_phases::set_frames(&mut file, n_frames)?;
@@ -169,7 +184,14 @@ fn load_document(
     if let (Json::Object(root), false) = (&mut resolved, specs.is_empty()) {
         root.insert("phase".to_owned(), specs.into_iter().map(|s| s.resolved).collect());
     }
-    Ok(LoadedScene { scene, phases, resolved, hash: hash(&hashed, &digests), warnings, path: path.to_owned() })
+    Ok(LoadedScene {
+        scene,
+        phases,
+        resolved,
+        hash: hash(&hashed, &digests),
+        warnings,
+        path: path.to_owned(),
+    })
 }
 
 /// A document's scene, and what is told of it.
@@ -181,7 +203,12 @@ struct Read {
     warnings: Vec<String>,
 }
 
-fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &dyn Files) -> Result<Read> {
+fn read_document(
+    document: &Document,
+    path: &Path,
+    seed: Option<u32>,
+    files: &dyn Files,
+) -> Result<Read> {
     let mut root = Section::root(document)?;
     root.expect_keys(ROOT_KEYS, &[])?;
     let title = root.string("title", "")?;
@@ -200,18 +227,27 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &dy
     let surfaces = scene_surfaces::read_surfaces(&mut root, &materials)?;
 
     let air = scene_air::read_air(&mut root)?;
-    let mut reader =
-        CloudReader::new(path.parent().unwrap_or(Path::new("")), (&materials, &air), seed, threads.simulate, files);
+    let mut reader = CloudReader::new(
+        path.parent().unwrap_or(Path::new("")),
+        (&materials, &air),
+        seed,
+        threads.simulate,
+        files,
+    );
     let mut clouds = Vec::new();
     let mut resolved_clouds = Vec::new();
     for (i, mut section) in root.sections("cloud")?.into_iter().enumerate() {
         let cloud = read_cloud(&mut section, i, &mut reader)?;
         // Origins run along straight lines, so the first and the last frame's are the farthest.
-        for (time_s, when) in [(time.start_s, "at the first frame"), (time.at(time.n_frames - 1), "at the last frame")]
-        {
+        for (time_s, when) in [
+            (time.start_s, "at the first frame"),
+            (time.at(time.n_frames - 1), "at the last frame"),
+        ] {
             if !is_carried_place(cloud.origin_at(time_s)) {
                 let expected = shortest(GREATEST);
-                let what = format!("carries the cloud's origin too far: expected at most {expected} {when}");
+                let what = format!(
+                    "carries the cloud's origin too far: expected at most {expected} {when}"
+                );
                 return Err(section.fault("wind", what));
             }
         }
@@ -258,7 +294,8 @@ fn read_document(document: &Document, path: &Path, seed: Option<u32>, files: &dy
     Ok(Read { scene, resolved: root.finish(), digests, warnings })
 }
 
-/// Digests have a fixed length and follow the JSON's closing brace, so that no two scenes run together.
+/// Digests have a fixed length and follow the JSON's closing brace, so that no two scenes run
+/// together.
 fn hash(resolved: &[String], digests: &[[u8; 32]]) -> String {
     let mut hasher = Sha256::new();
     for text in resolved {

@@ -3,7 +3,9 @@
 use glam::DVec3;
 use serde_json::json;
 
-use super::magnitude::{AMOUNT, COORDINATE, GREATEST, GREATEST_EXPONENT, GREATEST_SHARE, LEAST_LIGHT_RADIUS};
+use super::magnitude::{
+    AMOUNT, COORDINATE, GREATEST, GREATEST_EXPONENT, GREATEST_SHARE, LEAST_LIGHT_RADIUS,
+};
 use super::suggest::{did_you_mean, list_given, shown};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
@@ -57,7 +59,10 @@ pub fn read_lights(root: &mut Section) -> Result<Vec<Light>> {
             Kind::Sky => {
                 s.expect_keys(&["kind", "irradiance", "constant"], &[])?;
                 let irradiance = s.required_vec3("irradiance", AMOUNT)?;
-                Light::Sky { irradiance, constant: s.f64("constant", 0.15, Bounds::Within(0.0, GREATEST_SHARE))? }
+                Light::Sky {
+                    irradiance,
+                    constant: s.f64("constant", 0.15, Bounds::Within(0.0, GREATEST_SHARE))?,
+                }
             }
         });
         resolved.push(s.finish());
@@ -80,11 +85,15 @@ fn read_point(s: &mut Section) -> Result<Light> {
 }
 
 fn read_spot(s: &mut Section) -> Result<Light> {
-    s.expect_keys(&["kind", "position", "direction", "intensity", "inner_deg", "outer_deg", "radius"], &[])?;
+    s.expect_keys(
+        &["kind", "position", "direction", "intensity", "inner_deg", "outer_deg", "radius"],
+        &[],
+    )?;
     let outer = s.f64("outer_deg", 45.0, Bounds::Within(0.0, 180.0))?;
     let inner = s.f64("inner_deg", 0.0, Bounds::Within(0.0, 180.0))?;
     if inner > outer {
-        let what = format!("expected at most outer_deg = {outer} (both are half angles), found {inner}");
+        let what =
+            format!("expected at most outer_deg = {outer} (both are half angles), found {inner}");
         return Err(s.fault("inner_deg", what));
     }
     Ok(Light::Spot {
@@ -106,7 +115,10 @@ fn read_direction(s: &mut Section) -> Result<DVec3> {
 
 fn read_directional(s: &mut Section) -> Result<Light> {
     s.expect_keys(&["kind", "direction", "irradiance"], &[])?;
-    Ok(Light::Directional { direction: read_direction(s)?, irradiance: s.required_vec3("irradiance", AMOUNT)? })
+    Ok(Light::Directional {
+        direction: read_direction(s)?,
+        irradiance: s.required_vec3("irradiance", AMOUNT)?,
+    })
 }
 
 /// A directional light from where the sun stands; x is east and z south.
@@ -114,7 +126,10 @@ fn read_sun(s: &mut Section) -> Result<Light> {
     s.expect_keys(&["kind", "date", "latitude_deg", "longitude_deg", "irradiance"], &[])?;
     let date = s.required_string("date")?;
     let Some(time_s) = steps::parse(&date) else {
-        let what = format!("expected a time such as \"2005-08-28 18:00:00\" (UTC), found {}", shown(&date));
+        let what = format!(
+            "expected a time such as \"2005-08-28 18:00:00\" (UTC), found {}",
+            shown(&date)
+        );
         return Err(s.fault("date", what));
     };
     let latitude = s.f64("latitude_deg", 0.0, Bounds::Within(-90.0, 90.0))?.to_radians();
@@ -122,9 +137,15 @@ fn read_sun(s: &mut Section) -> Result<Light> {
     let toward = sun::toward(time_s, latitude, longitude);
     if toward.y <= 0.0 {
         let below = -toward.y.asin().to_degrees();
-        return Err(s.fault("date", format!("expected a time of day: the sun is {below:.1}° below the horizon then")));
+        return Err(s.fault(
+            "date",
+            format!("expected a time of day: the sun is {below:.1}° below the horizon then"),
+        ));
     }
-    Ok(Light::Directional { direction: -toward, irradiance: s.required_vec3("irradiance", AMOUNT)? })
+    Ok(Light::Directional {
+        direction: -toward,
+        irradiance: s.required_vec3("irradiance", AMOUNT)?,
+    })
 }
 
 pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<Vec<Material>> {
@@ -134,7 +155,9 @@ pub fn read_materials(root: &mut Section, warnings: &mut Vec<String>) -> Result<
         s.expect_keys(&["name", "kd", "ks", "ns", "path"], &[])?;
         let name = s.required_string("name")?;
         if let Some(i) = materials.iter().position(|m| m.name == name) {
-            return Err(s.fault("name", format!("`{}` is already the name of material {i}", shown(&name))));
+            return Err(
+                s.fault("name", format!("`{}` is already the name of material {i}", shown(&name)))
+            );
         }
         let keys = match s.has("path") {
             true => read_edits(&mut s)?,
@@ -160,11 +183,15 @@ fn read_brdf(s: &mut Section, otherwise: Brdf) -> Result<Brdf> {
     })
 }
 
-/// The keys of a material that is edited over time; what a key leaves out is as in the key before it.
+/// The keys of a material that is edited over time; what a key leaves out is as in the key before
+/// it.
 fn read_edits(s: &mut Section) -> Result<Vec<MaterialKey>> {
     for key in ["kd", "ks", "ns"] {
         if s.has(key) {
-            return Err(s.fault(key, "a material has either `kd`, `ks`, `ns` or a `path` of them, not both"));
+            return Err(s.fault(
+                key,
+                "a material has either `kd`, `ks`, `ns` or a `path` of them, not both",
+            ));
         }
     }
     let mut keys: Vec<MaterialKey> = Vec::new();
@@ -173,7 +200,9 @@ fn read_edits(s: &mut Section) -> Result<Vec<MaterialKey>> {
         item.expect_keys(&["time_s", "kd", "ks", "ns"], &[])?;
         let time_s = item.required_f64("time_s", COORDINATE)?;
         if let Some(before) = keys.last().map(|k| k.time_s).filter(|before| time_s <= *before) {
-            return Err(item.fault("time_s", format!("times must grow, found {time_s} after {before}")));
+            return Err(
+                item.fault("time_s", format!("times must grow, found {time_s} after {before}"))
+            );
         }
         let brdf = read_brdf(&mut item, keys.last().map_or(PLAIN, |k| k.brdf))?;
         keys.push(MaterialKey { time_s, brdf });
@@ -186,7 +215,8 @@ fn read_edits(s: &mut Section) -> Result<Vec<MaterialKey>> {
     Ok(keys)
 }
 
-/// The material that the key `material` names; without it the only one, else the one called "cloud".
+/// The material that the key `material` names; without it the only one, else the one called
+/// "cloud".
 pub fn material_named(s: &mut Section, materials: &[Material]) -> Result<usize> {
     let default = if materials.len() == 1 { &materials[0].name } else { "cloud" };
     let name = s.string("material", default)?;
@@ -206,9 +236,14 @@ fn numbered(s: &mut Section, key: &str, name: &str, materials: &[Material]) -> R
         let meant = if meant.is_empty() { ";".to_owned() } else { meant };
         match names.is_empty() {
             true => s.fault(key, format!("unknown material `{}`; the scene has none", shown(name))),
-            false => {
-                s.fault(key, format!("unknown material `{}`{meant} the scene has {}", shown(name), list_given(&names)))
-            }
+            false => s.fault(
+                key,
+                format!(
+                    "unknown material `{}`{meant} the scene has {}",
+                    shown(name),
+                    list_given(&names)
+                ),
+            ),
         }
     })
 }
@@ -218,7 +253,8 @@ fn warn(s: &Section, material: &Material, warnings: &mut Vec<String>) {
     let albedo = material.greatest_albedo();
     if albedo > 1.0 {
         warnings.push(format!(
-            "{at}: material `{name}` has K_d + 4 K_s = {albedo:.3}: above 1 it can reflect more light than it receives"
+            "{at}: material `{name}` has K_d + 4 K_s = {albedo:.3}: above 1 it can reflect more \
+             light than it receives"
         ));
     }
 }

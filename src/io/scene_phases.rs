@@ -1,5 +1,6 @@
-//! `[[phase]]`: parts of a run, one after the other, each with keys of the scene that it sets. A phase's scene is the file
-//! with the phase's `set` laid over it, and the command line's `--set` over both.
+//! `[[phase]]`: parts of a run, one after the other, each with keys of the scene that it sets. A
+//! phase's scene is the file with the phase's `set` laid over it, and the command line's `--set`
+//! over both.
 
 use serde_json::{Value as Json, json};
 
@@ -12,7 +13,8 @@ use crate::error::{Error, Result};
 /// What is the same in every phase.
 const NOT_IN_A_PHASE: [&str; 3] = ["title", "time", "phase"];
 
-/// Each is a scene of its own, made from the whole file: without end, they would take the file's length squared.
+/// Each is a scene of its own, made from the whole file: without end, they would take the file's
+/// length squared.
 const MAX_PHASES: usize = 256;
 
 /// One phase as the file has it.
@@ -35,8 +37,9 @@ impl PhaseSpec {
         for (path, node) in &self.sets {
             let segments: Vec<&str> = path.iter().map(String::as_str).collect();
             let at = document.source.place(node.origin);
-            put(&mut document.root, &segments, 0, node.clone())
-                .map_err(|what| Error::scene(at, format!("phase \"{}\": {what}", shown(&self.name))))?;
+            put(&mut document.root, &segments, 0, node.clone()).map_err(|what| {
+                Error::scene(at, format!("phase \"{}\": {what}", shown(&self.name)))
+            })?;
         }
         Ok(())
     }
@@ -48,13 +51,18 @@ pub fn read_phases(document: &Document) -> Result<Vec<PhaseSpec>> {
     let mut phases: Vec<PhaseSpec> = Vec::new();
     let sections = root.sections("phase")?;
     if sections.len() > MAX_PHASES {
-        return Err(root.fault("phase", format!("expected at most {MAX_PHASES} phases, found {}", sections.len())));
+        return Err(root.fault(
+            "phase",
+            format!("expected at most {MAX_PHASES} phases, found {}", sections.len()),
+        ));
     }
     for mut s in sections {
         s.expect_keys(&["name", "frames", "set"], &[])?;
         let name = s.required_string("name")?;
         if phases.iter().any(|p| p.name == name) {
-            return Err(s.fault("name", format!("\"{}\" is another phase's name already", shown(&name))));
+            return Err(
+                s.fault("name", format!("\"{}\" is another phase's name already", shown(&name)))
+            );
         }
         s.require("frames", &"a number of frames")?;
         let n_frames = s.u32("frames", 1, 1, u32::MAX)?;
@@ -62,10 +70,21 @@ pub fn read_phases(document: &Document) -> Result<Vec<PhaseSpec>> {
         match s.value("set").map(|node| &node.value) {
             None => {}
             Some(Value::Table(table)) => flatten(table, &mut vec![], &mut sets),
-            Some(other) => return Err(s.fault("set", format!("expected a table of keys, found {}", other.describe()))),
+            Some(other) => {
+                return Err(s.fault(
+                    "set",
+                    format!("expected a table of keys, found {}", other.describe()),
+                ));
+            }
         }
-        if let Some((path, node)) = sets.iter().find(|(path, _)| NOT_IN_A_PHASE.contains(&path[0].as_str())) {
-            let what = format!("`set.{}`: a phase cannot set {}", shown(&path.join(".")), list(&NOT_IN_A_PHASE));
+        if let Some((path, node)) =
+            sets.iter().find(|(path, _)| NOT_IN_A_PHASE.contains(&path[0].as_str()))
+        {
+            let what = format!(
+                "`set.{}`: a phase cannot set {}",
+                shown(&path.join(".")),
+                list(&NOT_IN_A_PHASE)
+            );
             return Err(Error::scene(document.source.place(node.origin), what));
         }
         let resolved = sets.iter().map(|(path, node)| (path.join("."), plain(&node.value)));
@@ -81,7 +100,9 @@ pub fn set_frames(document: &mut Document, n_frames: u32) -> Result<()> {
         if matches!(given.value, Value::Integer(n) if n == i128::from(n_frames)) {
             return Ok(());
         }
-        let what = format!("`time.frames`: the phases have {n_frames} frames in all: leave it out or say so");
+        let what = format!(
+            "`time.frames`: the phases have {n_frames} frames in all: leave it out or say so"
+        );
         return Err(Error::scene(document.source.place(given.origin), what));
     }
     let node = Node { origin: Origin::Default, value: Value::Integer(i128::from(n_frames)) };
@@ -111,8 +132,8 @@ fn plain(value: &Value) -> Json {
         Value::Boolean(b) => json!(b),
         Value::Datetime => json!("date-time"),
         Value::Array(items) => items.iter().map(|n| plain(&n.value)).collect(),
-        Value::Table(table) => {
-            Json::Object(table.iter().map(|(key, entry)| (key.clone(), plain(&entry.node.value))).collect())
-        }
+        Value::Table(table) => Json::Object(
+            table.iter().map(|(key, entry)| (key.clone(), plain(&entry.node.value))).collect(),
+        ),
     }
 }

@@ -14,7 +14,9 @@ use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
-use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs};
+use crate::model::scene::{
+    Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs,
+};
 use crate::model::scene::{MAX_CHUNKS, MAX_PAIR_LEVELS, Simulate, Threading, Threads, Time};
 use crate::model::sort_bits::SortBits;
 use crate::model::sums::{Precision, Summation, Sums};
@@ -51,7 +53,11 @@ pub fn read_camera(root: &mut Section) -> Result<Camera> {
     };
     if let Some(i) = camera.keys.iter().position(|key| camera.pose(key.time_s).is_none()) {
         let what = "the camera looks nowhere: position equals target, or the view runs along `up`";
-        return Err(if is_path { s.sections("path")?[i].fault("position", what) } else { s.fault("position", what) });
+        return Err(if is_path {
+            s.sections("path")?[i].fault("position", what)
+        } else {
+            s.fault("position", what)
+        });
     }
     root.record("camera", s.finish());
     Ok(camera)
@@ -65,7 +71,9 @@ fn read_fixed(s: &mut Section) -> Result<CameraKey> {
 fn read_path(s: &mut Section) -> Result<Vec<CameraKey>> {
     for key in ["position", "target"] {
         if s.has(key) {
-            return Err(s.fault(key, "a camera has either `position` and `target`, or a `path`, not both"));
+            return Err(
+                s.fault(key, "a camera has either `position` and `target`, or a `path`, not both")
+            );
         }
     }
     let mut keys: Vec<CameraKey> = Vec::new();
@@ -74,10 +82,16 @@ fn read_path(s: &mut Section) -> Result<Vec<CameraKey>> {
         item.expect_keys(&["time_s", "position", "target"], &[])?;
         let time_s = item.required_f64("time_s", COORDINATE)?;
         if let Some(before) = keys.last().map(|k| k.time_s).filter(|before| time_s <= *before) {
-            return Err(item.fault("time_s", format!("times must grow, found {time_s} after {before}")));
+            return Err(
+                item.fault("time_s", format!("times must grow, found {time_s} after {before}"))
+            );
         }
         let position = item.required_vec3("position", COORDINATE)?;
-        keys.push(CameraKey { time_s, position, target: item.required_vec3("target", COORDINATE)? });
+        keys.push(CameraKey {
+            time_s,
+            position,
+            target: item.required_vec3("target", COORDINATE)?,
+        });
         resolved.push(item.finish());
     }
     if keys.is_empty() {
@@ -97,14 +111,18 @@ pub fn read_time(root: &mut Section) -> Result<Time> {
     };
     let last_s = time.at(time.n_frames - 1);
     if last_s > GREATEST {
-        let what = format!("the last frame's time: expected at most {}, found {last_s:.3e}", shortest(GREATEST));
+        let what = format!(
+            "the last frame's time: expected at most {}, found {last_s:.3e}",
+            shortest(GREATEST)
+        );
         return Err(s.fault("step_s", what));
     }
     root.record("time", s.finish());
     Ok(time)
 }
 
-/// `exponents` are the n_s of the scene's materials: without a range of its own the basis is made for all of them.
+/// `exponents` are the n_s of the scene's materials: without a range of its own the basis is made
+/// for all of them.
 pub fn read_lighting(root: &mut Section, exponents: &[f64]) -> Result<Lighting> {
     let mut s = root.section("lighting")?;
     s.expect_keys(LIGHTING_KEYS, &[])?;
@@ -137,9 +155,12 @@ pub fn read_lighting(root: &mut Section, exponents: &[f64]) -> Result<Lighting> 
     if lighting.step < least {
         let (step, grid) = (lighting.step, lighting.grid);
         let limit = format!("a march takes {MAX_MARCH_STEPS} steps at most");
-        return Err(
-            s.fault("step", format!("expected at least {least:.4} cells where grid = {grid} ({limit}), found {step}"))
-        );
+        return Err(s.fault(
+            "step",
+            format!(
+                "expected at least {least:.4} cells where grid = {grid} ({limit}), found {step}"
+            ),
+        ));
     }
     root.record("lighting", s.finish());
     Ok(lighting)
@@ -163,14 +184,18 @@ const LIGHTING_KEYS: &[&str] = &[
     "precision",
 ];
 
-/// The range of n_s: as given, and then every lobe must lie in it; else [1, 256], or as wide as the materials need.
+/// The range of n_s: as given, and then every lobe must lie in it; else [1, 256], or as wide as the
+/// materials need.
 fn read_exponents(s: &mut Section, of_materials: &[f64]) -> Result<[f64; 2]> {
     let low = of_materials.iter().copied().fold(1.0, f64::min);
     let high = of_materials.iter().copied().fold(256.0, f64::max);
     let given = s.has("exponents");
     let range = s.numbers("exponents", [low, high], Bounds::Within(0.0, GREATEST_EXPONENT))?;
     if range[0] > range[1] {
-        return Err(s.fault("exponents", format!("expected [least, greatest], found [{}, {}]", range[0], range[1])));
+        return Err(s.fault(
+            "exponents",
+            format!("expected [least, greatest], found [{}, {}]", range[0], range[1]),
+        ));
     }
     let outside = of_materials.iter().find(|ns| !(range[0]..=range[1]).contains(*ns));
     if let Some(ns) = outside.filter(|_| given) {
@@ -189,19 +214,22 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let cutoff = s.f64("cutoff", 3.0, Bounds::Within(0.5, 8.0))?;
     let chunks = read_chunks(&mut s)?;
     if path == DrawPath::Tiles && !matches!(chunks, Chunks::Of(0) | Chunks::Auto) {
-        let what = "expected 0 where draw.path is \"tiles\", the default: only \"sprites\" are drawn in chunks";
+        let what = "expected 0 where draw.path is \"tiles\", the default: only \"sprites\" are \
+            drawn in chunks";
         return Err(s.fault("chunks", what.to_owned()));
     }
     let threshold = read_least(&mut s, "threshold", Bounds::From(0.0, 1.0))?;
     let cull = s.choice("cull", "on", &Cull::NAMES, &[])?;
     let smallest = read_least(&mut s, "smallest", Bounds::Within(0.0, 1000.0))?;
     if smallest != Least::NOTHING && cull == Cull::Off {
-        let found = if let Least::Of(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
+        let found =
+            if let Least::Of(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
         return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {found}")));
     }
     let sort_bits = read_sort_bits(&mut s)?;
     let resolution = read_resolution(&mut s)?;
-    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Least::NOTHING) {
+    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Least::NOTHING)
+    {
         let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
         return Err(s.fault("impostors", what.to_owned()));
     }
@@ -251,7 +279,8 @@ const DRAW_KEYS: &[&str] = &[
 
 /// Whether a key's value is "auto", which is written down then.
 fn is_auto(s: &mut Section, key: &str) -> bool {
-    let is_auto = s.value(key).is_some_and(|node| matches!(&node.value, Value::String(s) if s == "auto"));
+    let is_auto =
+        s.value(key).is_some_and(|node| matches!(&node.value, Value::String(s) if s == "auto"));
     if is_auto {
         s.record(key, json!("auto"));
     }
@@ -264,7 +293,10 @@ fn read_least(s: &mut Section, key: &str, bounds: Bounds) -> Result<Least> {
         return Ok(Least::Auto);
     }
     if let Some(text) = s.value(key).filter(|node| matches!(&node.value, Value::String(_))) {
-        return Err(s.fault(key, format!("expected {bounds} or \"auto\", found {}", text.value.describe())));
+        return Err(s.fault(
+            key,
+            format!("expected {bounds} or \"auto\", found {}", text.value.describe()),
+        ));
     }
     Ok(Least::Of(s.f64(key, 0.0, bounds)?))
 }
@@ -284,9 +316,10 @@ fn read_resolution(s: &mut Section) -> Result<Resolution> {
             s.record("resolution", json!(of));
             Ok(resolution)
         }
-        None => {
-            Err(s.fault("resolution", format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe())))
-        }
+        None => Err(s.fault(
+            "resolution",
+            format!("expected 1.0, 0.5, 0.25 or \"auto\", found {}", node.value.describe()),
+        )),
     }
 }
 

@@ -25,13 +25,19 @@ pub fn read_surfaces(root: &mut Section, materials: &[Material]) -> Result<Vec<S
         for (key, axis) in [("u", u), ("v", v)] {
             if !(LEAST..=GREATEST).contains(&axis.length()) {
                 let (least, greatest) = (shortest(LEAST), shortest(GREATEST));
-                let what = format!("expected a half axis {least} to {greatest} long, found {:.3e}", axis.length());
+                let what = format!(
+                    "expected a half axis {least} to {greatest} long, found {:.3e}",
+                    axis.length()
+                );
                 return Err(s.fault(key, what));
             }
         }
         let cosine = u.normalize().dot(v.normalize());
         if cosine.abs() > SQUARE {
-            let what = format!("expected a half axis perpendicular to `u`, found the cosine {cosine:.3e} between them");
+            let what = format!(
+                "expected a half axis perpendicular to `u`, found the cosine {cosine:.3e} \
+                 between them"
+            );
             return Err(s.fault("v", what));
         }
         let i_material = material_named(&mut s, materials)?;

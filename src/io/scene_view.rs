@@ -1,6 +1,6 @@
-//! A view saved as a scene: the file that it was opened from, with what was set since laid over its text. What was not
-//! set stays as it was written, comments and order included; names of files are made right for the folder that it is
-//! saved to.
+//! A view saved as a scene: the file that it was opened from, with what was set since laid over its
+//! text. What was not set stays as it was written, comments and order included; names of files are
+//! made right for the folder that it is saved to.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -14,8 +14,9 @@ use super::toml_override::is_word;
 use super::toml_tree::Document;
 use crate::error::{Error, Result};
 
-/// Writes to `to`, which must not exist, the scene at `from` with `overrides` (`key.path=VALUE`, as `--set` has them)
-/// and, with `seed` N, cloud i's seed N + i. Loaded without any it is the scene that `from` is with them.
+/// Writes to `to`, which must not exist, the scene at `from` with `overrides` (`key.path=VALUE`, as
+/// `--set` has them) and, with `seed` N, cloud i's seed N + i. Loaded without any it is the scene
+/// that `from` is with them.
 pub fn save(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) -> Result<()> {
     let text = text_of(from, to, overrides, seed)?;
     if to.symlink_metadata().is_ok() {
@@ -33,10 +34,12 @@ pub fn text_of(from: &Path, to: &Path, overrides: &[String], seed: Option<u32>) 
     document.default_to("material", DEFAULT_MATERIAL);
     document.apply(overrides)?;
     let fault = |what: String| Error::io(from, format!("cannot be saved otherwise: {what}"));
-    let mut edited: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| fault(e.message().to_owned()))?;
+    let mut edited: DocumentMut =
+        text.parse().map_err(|e: toml_edit::TomlError| fault(e.message().to_owned()))?;
     let seeds = seed.map_or(vec![], |seed| seeds(&edited, seed));
     for text in overrides.iter().chain(&seeds) {
-        let (path, value) = text.split_once('=').ok_or_else(|| fault(format!("{text} sets nothing")))?;
+        let (path, value) =
+            text.split_once('=').ok_or_else(|| fault(format!("{text} sets nothing")))?;
         let segments: Vec<&str> = path.split('.').map(str::trim).collect();
         set(&mut edited, &segments, &value_of(value.trim()).map_err(fault)?).map_err(fault)?;
     }
@@ -78,7 +81,8 @@ fn set(document: &mut DocumentMut, segments: &[&str], value: &Value) -> Done {
     for (name, default) in [("light", DEFAULT_LIGHTS), ("material", DEFAULT_MATERIAL)] {
         // What is set is of those that a scene without any has.
         if segments.len() > 1 && segments[0] == name && !document.contains_key(name) {
-            let default: DocumentMut = default.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
+            let default: DocumentMut =
+                default.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
             document.extend(default.iter().map(|(key, item)| (key.to_owned(), item.clone())));
         }
     }
@@ -97,10 +101,13 @@ fn set(document: &mut DocumentMut, segments: &[&str], value: &Value) -> Done {
 /// The tables of an array of tables, however it is written.
 fn items(array: Option<&mut Item>) -> Vec<&mut dyn TableLike> {
     match array {
-        Some(Item::ArrayOfTables(tables)) => tables.iter_mut().map(|t| t as &mut dyn TableLike).collect(),
-        Some(Item::Value(Value::Array(values))) => {
-            values.iter_mut().filter_map(|v| v.as_inline_table_mut().map(|t| t as &mut dyn TableLike)).collect()
+        Some(Item::ArrayOfTables(tables)) => {
+            tables.iter_mut().map(|t| t as &mut dyn TableLike).collect()
         }
+        Some(Item::Value(Value::Array(values))) => values
+            .iter_mut()
+            .filter_map(|v| v.as_inline_table_mut().map(|t| t as &mut dyn TableLike))
+            .collect(),
         _ => vec![],
     }
 }
@@ -150,7 +157,9 @@ fn put_in_value(old: &mut Value, segments: &[&str], value: &Value) -> Done {
 }
 
 fn put_in_table(table: &mut dyn TableLike, segments: &[&str], value: &Value) -> Done {
-    let Some((first, rest)) = segments.split_first() else { return Err("a table is no value".to_owned()) };
+    let Some((first, rest)) = segments.split_first() else {
+        return Err("a table is no value".to_owned());
+    };
     if let Some(item) = table.get_mut(first) {
         return put(item, rest, value);
     }
@@ -174,9 +183,14 @@ fn picked(segment: &str, n: usize) -> std::result::Result<Vec<usize>, String> {
     }
 }
 
-/// Changes what a phase sets (`item`, at `at` below its `set`) where it is what `segments` mean; true where the phase
-/// sets that for several items together, and `segments` mean one of them.
-fn over_phase(item: &mut Item, at: &[String], segments: &[&str], value: &Value) -> std::result::Result<bool, String> {
+/// Changes what a phase sets (`item`, at `at` below its `set`) where it is what `segments` mean;
+/// true where the phase sets that for several items together, and `segments` mean one of them.
+fn over_phase(
+    item: &mut Item,
+    at: &[String],
+    segments: &[&str],
+    value: &Value,
+) -> std::result::Result<bool, String> {
     let Some(table) = item.as_table_like_mut() else { return Ok(false) };
     let keys: Vec<String> = table.iter().map(|(key, _)| key.to_owned()).collect();
     let mut is_of_several = false;
@@ -213,13 +227,18 @@ fn folder_of(path: &Path) -> Result<PathBuf> {
         Some(folder) if folder != Path::new("") => folder,
         _ => Path::new("."),
     };
-    folder.canonicalize().map_err(|e| Error::io(path, format!("its folder {}: {e}", folder.display())))
+    folder
+        .canonicalize()
+        .map_err(|e| Error::io(path, format!("its folder {}: {e}", folder.display())))
 }
 
-/// Names of files relative to `old` become relative to `new`, in the scene and in what its phases set.
+/// Names of files relative to `old` become relative to `new`, in the scene and in what its phases
+/// set.
 fn move_files(document: &mut DocumentMut, old: &Path, new: &Path) -> Result<()> {
     let mut moved = |value: &mut Value| -> Result<()> {
-        let Some(name) = value.as_str().filter(|name| Path::new(name).is_relative()) else { return Ok(()) };
+        let Some(name) = value.as_str().filter(|name| Path::new(name).is_relative()) else {
+            return Ok(());
+        };
         let name = relative(&old.join(name), new)?;
         put_in_value(value, &[], &Value::from(name)).map_err(|what| Error::io(new, what))
     };
@@ -249,7 +268,11 @@ fn each_file(item: &mut Item, at: &mut Vec<String>, on: OnFile<'_>) -> Result<()
     }
 }
 
-fn each_file_of_table(table: &mut dyn TableLike, at: &mut Vec<String>, on: OnFile<'_>) -> Result<()> {
+fn each_file_of_table(
+    table: &mut dyn TableLike,
+    at: &mut Vec<String>,
+    on: OnFile<'_>,
+) -> Result<()> {
     table.iter_mut().try_for_each(|(key, item)| {
         let n_before = at.len();
         at.extend(key.get().split('.').map(str::to_owned));
@@ -273,12 +296,14 @@ fn each_file_of_value(value: &mut Value, at: &mut Vec<String>, on: OnFile<'_>) -
     }
 }
 
-/// The name of `file` as seen from the folder `from`, a true name; with slashes, which every system knows.
+/// The name of `file` as seen from the folder `from`, a true name; with slashes, which every system
+/// knows.
 fn relative(file: &Path, from: &Path) -> Result<String> {
     let fault = |what: String| Error::io(file, what);
     let name = file.file_name().ok_or_else(|| fault("expected a file name".to_owned()))?;
     let folder = folder_of(file)?;
-    let parts = |path: &Path| path.components().map(|c| c.as_os_str().to_owned()).collect::<Vec<_>>();
+    let parts =
+        |path: &Path| path.components().map(|c| c.as_os_str().to_owned()).collect::<Vec<_>>();
     let (folder_parts, from_parts) = (parts(&folder), parts(from));
     let n_shared = folder_parts.iter().zip(&from_parts).take_while(|(a, b)| a == b).count();
     let text = |part: &std::ffi::OsStr| part.to_str().map(str::to_owned);

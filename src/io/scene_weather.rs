@@ -39,13 +39,15 @@ pub fn read_keys(s: &mut Section, file: &WeatherFile, simulate: Simulate) -> Res
     let exaggeration = s.f64("exaggeration", 1.0, Bounds::Within(0.01, 100.0))?;
     let speed = s.f64("speed", 0.0, Bounds::Within(-GREATEST_SPEED, GREATEST_SPEED))?;
     if speed != 0.0 && simulate == Simulate::Gpu {
-        let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game thread that goes from step to step";
+        let what = "expected 0 where threads.simulate is \"gpu\", the default: it is the game \
+            thread that goes from step to step";
         return Err(s.fault("speed", what));
     }
     if speed != 0.0 && n_particles < 2 {
-        return Err(
-            s.fault("particles", "expected 2 or more where `speed` is not 0: blobs of two steps fade into each other")
-        );
+        return Err(s.fault(
+            "particles",
+            "expected 2 or more where `speed` is not 0: blobs of two steps fade into each other",
+        ));
     }
     Ok(WeatherKeys { i_step, n_particles, exaggeration, speed })
 }
@@ -61,37 +63,53 @@ pub fn terrain(
     let (columns, rows) = (file.shape.nx, file.shape.ny);
     if columns < 2 || rows < 2 {
         let what = format!(
-            "expected \"none\": the file has {columns} x {rows} columns, and ground lies between 2 x 2 at least"
+            "expected \"none\": the file has {columns} x {rows} columns, and ground lies between 2 \
+             x 2 at least"
         );
         return Err(s.fault("ground", what));
     }
     let Some((ground, heights)) = file.terrain(keys.i_step)? else {
         return Err(s.fault("ground", "expected \"none\": the file has no variable HGT"));
     };
-    let at = |(k, height): (usize, &f64)| DVec3::new(ground.east_m[k], height * keys.exaggeration, ground.south_m[k]);
-    let points = heights.iter().enumerate().map(at).map(|p| p.clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST)));
+    let at = |(k, height): (usize, &f64)| {
+        DVec3::new(ground.east_m[k], height * keys.exaggeration, ground.south_m[k])
+    };
+    let points = heights
+        .iter()
+        .enumerate()
+        .map(at)
+        .map(|p| p.clamp(DVec3::splat(-GREATEST), DVec3::splat(GREATEST)));
     let n = [columns as u32, rows as u32];
     Ok(Terrain { origin, points: Arc::new(points.collect()), n, i_material })
 }
 
 /// What whoever looks at the picture has to know of a cloud's file.
 pub fn notes(file: &WeatherFile) -> Vec<String> {
-    let diagnosed = || "the file has no cloud water: its clouds are diagnosed from relative humidity".to_owned();
+    let diagnosed = || {
+        "the file has no cloud water: its clouds are diagnosed from relative humidity".to_owned()
+    };
     (file.clouds == Clouds::Diagnosed).then(diagnosed).into_iter().collect()
 }
 
-/// The blobs of a step, relative to sea level in the domain's middle: metres, x east, y up, z south.
+/// The blobs of a step, relative to sea level in the domain's middle: metres, x east, y up, z
+/// south.
 pub fn particles(file: &WeatherFile, keys: &WeatherKeys, seed: u32) -> Result<Vec<Particle>> {
     let step = file.step(keys.i_step)?;
     let layout = Layout::new(&step.grid, &[&step.extinction], keys.n_particles as usize, seed);
     let blobs = layout.blobs(&step.grid, &step.extinction);
-    Ok(blobs.iter().filter(|b| b.kappa > 0.0).map(|blob| particle(blob, keys.exaggeration)).collect())
+    Ok(blobs
+        .iter()
+        .filter(|b| b.kappa > 0.0)
+        .map(|blob| particle(blob, keys.exaggeration))
+        .collect())
 }
 
-/// With heights so many times as great and κ as many times less: what a column takes of the light stays.
+/// With heights so many times as great and κ as many times less: what a column takes of the light
+/// stays.
 pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     let shape = DVec3::new(1.0, exaggeration, 1.0);
-    let aspect = (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT);
+    let aspect =
+        (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT);
     // Where the aspect is cut the mass stays.
     let kappa = blob.kappa * blob.sigma_z / (aspect * blob.sigma_xy);
     Particle {
@@ -126,14 +144,20 @@ mod tests {
 
     #[test]
     fn exaggerated_blobs_keep_their_mass_and_what_a_column_takes() {
-        let blob =
-            WeatherBlob { position: DVec3::new(7.0, 300.0, -2.0), sigma_xy: 4000.0, sigma_z: 100.0, kappa: 0.02 };
+        let blob = WeatherBlob {
+            position: DVec3::new(7.0, 300.0, -2.0),
+            sigma_xy: 4000.0,
+            sigma_z: 100.0,
+            kappa: 0.02,
+        };
         for (exaggeration, aspect) in [(1.0, 0.025), (10.0, 0.25), (0.01, 1e-3)] {
             let p = particle(&blob, exaggeration);
             assert!((p.aspect / aspect - 1.0).abs() < 1e-12, "{p:?}");
             assert!((p.position - DVec3::new(7.0, 300.0 * exaggeration, -2.0)).length() < 1e-9);
             // kappa sigma_y, and so the depth of the vertical through its centre.
-            assert!((p.kappa * p.aspect * p.sigma / (blob.kappa * blob.sigma_z) - 1.0).abs() < 1e-12);
+            assert!(
+                (p.kappa * p.aspect * p.sigma / (blob.kappa * blob.sigma_z) - 1.0).abs() < 1e-12
+            );
         }
     }
 }

@@ -1,6 +1,7 @@
 //! "did you mean": the known name nearest to a mistyped one; and words of an input in messages.
 
-/// The known name within a third of its length in edits (at least one, so that `x1` still finds `x`).
+/// The known name within a third of its length in edits (at least one, so that `x1` still finds
+/// `x`).
 pub fn nearest<'a>(typed: &str, known: &[&'a str]) -> Option<&'a str> {
     let typed = typed.to_lowercase();
     let scored = known.iter().map(|name| (edits(&typed, &name.to_lowercase()), *name));
@@ -13,7 +14,8 @@ pub fn did_you_mean(typed: &str, known: &[&str]) -> String {
     nearest(typed, known).map_or(String::new(), |name| format!("; did you mean `{}`?", shown(name)))
 }
 
-/// A word of an input in a message: cut where it is long, without characters that a terminal would obey.
+/// A word of an input in a message: cut where it is long, without characters that a terminal would
+/// obey.
 pub fn shown(word: &str) -> String {
     const LONGEST: usize = 80;
     let mut shown = String::new();
@@ -30,8 +32,13 @@ pub fn shown(word: &str) -> String {
 /// Names that an input gave, for a message: the first ones.
 pub fn list_given(names: &[&str]) -> String {
     const MOST: usize = 16;
-    let some: Vec<String> = names.iter().take(MOST).map(|name| format!("`{}`", shown(name))).collect();
-    let more = if names.len() > MOST { format!(" and {} more", names.len() - MOST) } else { String::new() };
+    let some: Vec<String> =
+        names.iter().take(MOST).map(|name| format!("`{}`", shown(name))).collect();
+    let more = if names.len() > MOST {
+        format!(" and {} more", names.len() - MOST)
+    } else {
+        String::new()
+    };
     some.join(", ") + &more
 }
 
@@ -40,8 +47,8 @@ pub fn list(names: &[&str]) -> String {
     names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
 }
 
-/// Levenshtein's distance, with a swap of neighbours as one edit. Names are short; a long one is cut, since it
-/// is near to nothing known anyway.
+/// Levenshtein's distance, with a swap of neighbours as one edit. Names are short; a long one is
+/// cut, since it is near to nothing known anyway.
 fn edits(a: &str, b: &str) -> usize {
     const LONGEST: usize = 64;
     let a: Vec<char> = a.chars().take(LONGEST).collect();

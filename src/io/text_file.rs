@@ -10,15 +10,17 @@ use crate::error::{Error, Place, Result};
 pub const SCENE_LIMIT: u64 = 4 << 20;
 /// Box files and particle lists: 64 MiB is about a million particles as text.
 pub const DATA_LIMIT: u64 = 64 << 20;
-/// Results as JSON: a study of ten thousand configurations. As a tree it takes up to a hundred times its text.
+/// Results as JSON: a study of ten thousand configurations. As a tree it takes up to a hundred
+/// times its text.
 pub const RECORD_LIMIT: u64 = 16 << 20;
 /// Results as tables: two million frames of 250 bytes.
 pub const TABLE_LIMIT: u64 = 512 << 20;
 
 const BYTE_ORDER_MARK: char = '\u{feff}';
 
-/// The text of `path`, whose kind begins with `first`. A byte-order mark is dropped. What the file system refuses is an [`Error::Io`]; content
-/// that is no text is an [`Error::Scene`] with its line and column.
+/// The text of `path`, whose kind begins with `first`. A byte-order mark is dropped. What the file
+/// system refuses is an [`Error::Io`]; content that is no text is an [`Error::Scene`] with its line
+/// and column.
 pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     let about = fs::metadata(path).map_err(|e| Error::io(path, plain(&e)))?;
     if about.is_dir() {
@@ -40,7 +42,10 @@ pub fn read_text(path: &Path, limit: u64, first: &str) -> Result<String> {
     }
     let text = decode(bytes, path)?;
     if text.trim().is_empty() {
-        return Err(Error::scene(Place::line(path, 1, 1), format!("the file is empty: expected {first}")));
+        return Err(Error::scene(
+            Place::line(path, 1, 1),
+            format!("the file is empty: expected {first}"),
+        ));
     }
     Ok(text)
 }
@@ -70,8 +75,8 @@ pub fn read_result(path: &Path, limit: u64) -> Result<String> {
 
 fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
     let at = |bytes: &[u8], offset: usize| {
-        // What stands before the offset may itself be no text; its line and column are then those of the
-        // replacement characters an editor would show.
+        // What stands before the offset may itself be no text; its line and column are then those
+        // of the replacement characters an editor would show.
         let (line, column) = line_column(&String::from_utf8_lossy(&bytes[..offset]), usize::MAX);
         Place::line(path, line, column)
     };
@@ -92,7 +97,11 @@ fn decode(bytes: Vec<u8>, path: &Path) -> Result<String> {
 }
 
 fn too_large(size: u64, limit: u64) -> String {
-    format!("too large: {} MiB ({size} bytes), the limit is {} MiB", size.div_ceil(1 << 20), limit >> 20)
+    format!(
+        "too large: {} MiB ({size} bytes), the limit is {} MiB",
+        size.div_ceil(1 << 20),
+        limit >> 20
+    )
 }
 
 /// The operating system's words without its error number, which tells a user nothing.

@@ -1,12 +1,13 @@
-//! Dotted keys without end. The TOML parser bounds the nesting of arrays and inline tables, but a key of
-//! 100 000 dots makes as many tables within tables, and merely dropping those overflows the stack.
+//! Dotted keys without end. The TOML parser bounds the nesting of arrays and inline tables, but a
+//! key of 100 000 dots makes as many tables within tables, and merely dropping those overflows the
+//! stack.
 
-/// Far more than the deepest key of a scene, `camera.path`, has. With the parser's own bound on inline tables
-/// (80, each with such a key) a tree stays below 1500 levels, some 100 KiB of stack.
+/// Far more than the deepest key of a scene, `camera.path`, has. With the parser's own bound on
+/// inline tables (80, each with such a key) a tree stays below 1500 levels, some 100 KiB of stack.
 pub const MAX_DOTS: usize = 16;
 
-/// Byte offset where a key has more than [`MAX_DOTS`] dots. Strings and comments are passed over; text that is
-/// no TOML gives some answer, and the parser the message.
+/// Byte offset where a key has more than [`MAX_DOTS`] dots. Strings and comments are passed over;
+/// text that is no TOML gives some answer, and the parser the message.
 pub fn too_deep(text: &str) -> Option<usize> {
     let bytes = text.as_bytes();
     let (mut i, mut n_dots) = (0, 0);
@@ -28,8 +29,8 @@ pub fn too_deep(text: &str) -> Option<usize> {
     None
 }
 
-/// Last byte of `mark` where it is next found after `start`; the end of a line ends a string that is not
-/// closed, so that what follows is looked at too.
+/// Last byte of `mark` where it is next found after `start`; the end of a line ends a string that
+/// is not closed, so that what follows is looked at too.
 fn end_of(bytes: &[u8], start: usize, mark: &[u8], has_escapes: bool) -> usize {
     let mut i = start + 1;
     while i < bytes.len() {
@@ -60,7 +61,13 @@ mod tests {
             assert_eq!(too_deep(&text), None, "{text}");
         }
         assert_eq!(too_deep(&format!("{}x = 1", "a.".repeat(MAX_DOTS))), None);
-        assert_eq!(too_deep(&format!("{}x = 1", "a.".repeat(MAX_DOTS + 1))), Some(2 * MAX_DOTS + 1));
-        assert_eq!(too_deep(&format!("'{dots}' = 1\nx = {{ {} }}", "'a' . ".repeat(40))), Some(107 + 6 + 6 * 16 + 4));
+        assert_eq!(
+            too_deep(&format!("{}x = 1", "a.".repeat(MAX_DOTS + 1))),
+            Some(2 * MAX_DOTS + 1)
+        );
+        assert_eq!(
+            too_deep(&format!("'{dots}' = 1\nx = {{ {} }}", "'a' . ".repeat(40))),
+            Some(107 + 6 + 6 * 16 + 4)
+        );
     }
 }

@@ -1,11 +1,14 @@
-//! `--set key.path=VALUE`: one value laid over a scene's tree. A path's segments are keys, or numbers where
-//! the tree has an array, or `*` for all of its items; a value is TOML, or a bare word, which shells make awkward to quote.
+//! `--set key.path=VALUE`: one value laid over a scene's tree. A path's segments are keys, or
+//! numbers where the tree has an array, or `*` for all of its items; a value is TOML, or a bare
+//! word, which shells make awkward to quote.
 
 use toml::de::DeValue;
 
 use super::suggest::shown;
 use super::toml_depth::{MAX_DOTS, too_deep};
-use super::toml_tree::{Document, Entry, Node, Origin, OutOfRange, TOO_DEEP, Table, Value, convert};
+use super::toml_tree::{
+    Document, Entry, Node, Origin, OutOfRange, TOO_DEEP, Table, Value, convert,
+};
 use crate::error::{Error, Result};
 
 impl Document {
@@ -15,9 +18,9 @@ impl Document {
             let origin = Origin::Override(self.source.overrides.len());
             self.source.overrides.push(text.clone());
             let fault = |what: String| Error::scene(self.source.place(origin), what);
-            let (path, value) = text
-                .split_once('=')
-                .ok_or_else(|| fault("expected key.path=VALUE, for example lighting.grid=32".to_owned()))?;
+            let (path, value) = text.split_once('=').ok_or_else(|| {
+                fault("expected key.path=VALUE, for example lighting.grid=32".to_owned())
+            })?;
             let segments: Vec<&str> = path.split('.').map(str::trim).collect();
             if segments.len() > MAX_DOTS + 1 || too_deep(value).is_some() {
                 return Err(fault(TOO_DEEP.to_owned()));
@@ -26,7 +29,8 @@ impl Document {
                 return Err(fault("expected key.path=VALUE, found an empty key".to_owned()));
             }
             let value = parse_value(value.trim(), origin).map_err(fault)?;
-            put(&mut self.root, &segments, 0, value).map_err(|what| Error::scene(self.source.place(origin), what))?;
+            put(&mut self.root, &segments, 0, value)
+                .map_err(|what| Error::scene(self.source.place(origin), what))?;
         }
         Ok(())
     }
@@ -43,13 +47,20 @@ fn parse_value(text: &str, origin: Origin) -> std::result::Result<Node, String> 
     }
 }
 
-/// Names and file names. Anything with TOML's own punctuation was meant as TOML and is reported as such.
+/// Names and file names. Anything with TOML's own punctuation was meant as TOML and is reported as
+/// such.
 pub(super) fn is_word(text: &str) -> bool {
-    text.chars().all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/' | '\\' | ' '))
+    text.chars()
+        .all(|c| c.is_alphanumeric() || matches!(c, '_' | '-' | '.' | ':' | '/' | '\\' | ' '))
 }
 
 /// Puts `value` at `segments[i..]` below `node`.
-pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> std::result::Result<(), String> {
+pub(super) fn put(
+    node: &mut Node,
+    segments: &[&str],
+    i: usize,
+    value: Node,
+) -> std::result::Result<(), String> {
     let Some(segment) = segments.get(i) else {
         *node = value;
         return Ok(());
@@ -65,7 +76,12 @@ pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> 
             let item = segment.parse().ok().and_then(|k: usize| list.get_mut(k));
             let item = item.ok_or_else(|| match n {
                 0 => format!("`{}` is empty", here()),
-                _ => format!("`{}`: expected a number from 0 to {}, or *, found `{}`", here(), n - 1, shown(segment)),
+                _ => format!(
+                    "`{}`: expected a number from 0 to {}, or *, found `{}`",
+                    here(),
+                    n - 1,
+                    shown(segment)
+                ),
             })?;
             put(item, segments, i + 1, value)
         }
@@ -73,13 +89,19 @@ pub(super) fn put(node: &mut Node, segments: &[&str], i: usize, value: Node) -> 
     }
 }
 
-fn put_in_table(table: &mut Table, segments: &[&str], i: usize, value: Node) -> std::result::Result<(), String> {
+fn put_in_table(
+    table: &mut Table,
+    segments: &[&str],
+    i: usize,
+    value: Node,
+) -> std::result::Result<(), String> {
     let origin = value.origin;
     if !table.contains_key(segments[i])
         && segments.get(i + 1).is_some_and(|next| *next == "*" || next.parse::<usize>().is_ok())
     {
         return Err(format!("the scene has no `{}`", shown(&segments[..=i].join("."))));
     }
-    let empty = || Entry { key_origin: origin, node: Node { origin, value: Value::Table(Table::new()) } };
+    let empty =
+        || Entry { key_origin: origin, node: Node { origin, value: Value::Table(Table::new()) } };
     put(&mut table.entry(segments[i].to_owned()).or_insert_with(empty).node, segments, i + 1, value)
 }

@@ -1,5 +1,5 @@
-//! Taking values out of one table of a scene: every value is checked when it is read, and what it came to,
-//! defaults included, is written down for the resolved scene.
+//! Taking values out of one table of a scene: every value is checked when it is read, and what it
+//! came to, defaults included, is written down for the resolved scene.
 
 use std::fmt;
 
@@ -39,9 +39,15 @@ impl fmt::Display for Bounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Bounds::Any => write!(f, "a finite number"),
-            Bounds::Within(low, high) => write!(f, "a number from {} to {}", shortest(*low), shortest(*high)),
-            Bounds::From(low, high) => write!(f, "a number from {} to below {}", shortest(*low), shortest(*high)),
-            Bounds::Between(low, high) => write!(f, "a number above {} and below {}", shortest(*low), shortest(*high)),
+            Bounds::Within(low, high) => {
+                write!(f, "a number from {} to {}", shortest(*low), shortest(*high))
+            }
+            Bounds::From(low, high) => {
+                write!(f, "a number from {} to below {}", shortest(*low), shortest(*high))
+            }
+            Bounds::Between(low, high) => {
+                write!(f, "a number above {} and below {}", shortest(*low), shortest(*high))
+            }
         }
     }
 }
@@ -68,17 +74,28 @@ impl<'a> Section<'a> {
             Some(Value::Table(table)) => Some(table),
             Some(other) => {
                 let at = source.place(node.map_or(Origin::Default, |n| n.origin));
-                return Err(Error::scene(at, format!("`{path}`: expected a table, found {}", other.describe())));
+                return Err(Error::scene(
+                    at,
+                    format!("`{path}`: expected a table, found {}", other.describe()),
+                ));
             }
         };
-        Ok(Section { source, path, origin: node.map(|n| n.origin), table, known: &[], resolved: Map::new() })
+        Ok(Section {
+            source,
+            path,
+            origin: node.map(|n| n.origin),
+            table,
+            known: &[],
+            resolved: Map::new(),
+        })
     }
 
-    /// Refuses every key that is not in `known`; those in `later` with the news that they are yet to come.
-    /// The first in file order is reported.
+    /// Refuses every key that is not in `known`; those in `later` with the news that they are yet
+    /// to come. The first in file order is reported.
     pub fn expect_keys(&mut self, known: &'static [&'static str], later: &[&str]) -> Result<()> {
         self.known = known;
-        let unknown = self.table.into_iter().flatten().filter(|(key, _)| !known.contains(&key.as_str()));
+        let unknown =
+            self.table.into_iter().flatten().filter(|(key, _)| !known.contains(&key.as_str()));
         let first = unknown.min_by_key(|(_, entry)| match entry.key_origin {
             Origin::File(offset) => (0, offset),
             Origin::Override(i) => (1, i),
@@ -96,8 +113,12 @@ impl<'a> Section<'a> {
 
     /// The resolved table.
     pub fn finish(self) -> Json {
-        // A key that is read but not declared could never be given: a fault of ours that any scene would show.
-        assert!(self.resolved.keys().all(|key| self.known.contains(&key.as_str())), "every key read is declared");
+        // A key that is read but not declared could never be given: a fault of ours that any scene
+        // would show.
+        assert!(
+            self.resolved.keys().all(|key| self.known.contains(&key.as_str())),
+            "every key read is declared"
+        );
         Json::Object(self.resolved)
     }
 
@@ -136,14 +157,24 @@ impl<'a> Section<'a> {
             None => return Ok(Vec::new()),
             Some(Value::Array(items)) => items,
             Some(Value::Table(_)) => {
-                return Err(self.fault(key, format!("expected an array of tables: write [[{key}]], not [{key}]")));
+                return Err(self.fault(
+                    key,
+                    format!("expected an array of tables: write [[{key}]], not [{key}]"),
+                ));
             }
             Some(other) => {
-                return Err(self.fault(key, format!("expected an array of tables, found {}", other.describe())));
+                return Err(self.fault(
+                    key,
+                    format!("expected an array of tables, found {}", other.describe()),
+                ));
             }
         };
         let name = |i: usize| format!("{}.{i}", self.name(key));
-        items.iter().enumerate().map(|(i, item)| Section::new(self.source, name(i), Some(item))).collect()
+        items
+            .iter()
+            .enumerate()
+            .map(|(i, item)| Section::new(self.source, name(i), Some(item)))
+            .collect()
     }
 
     pub fn f64(&mut self, key: &str, default: f64, bounds: Bounds) -> Result<f64> {
@@ -161,12 +192,15 @@ impl<'a> Section<'a> {
     }
 
     pub fn u32(&mut self, key: &str, default: u32, low: u32, high: u32) -> Result<u32> {
-        let wrong = |found: String| self.fault(key, format!("expected an integer from {low} to {high}, found {found}"));
+        let wrong = |found: String| {
+            self.fault(key, format!("expected an integer from {low} to {high}, found {found}"))
+        };
         let v = match self.get(key).map(|node| &node.value) {
             None => default,
-            Some(Value::Integer(i)) => {
-                u32::try_from(*i).ok().filter(|v| (low..=high).contains(v)).ok_or_else(|| wrong(i.to_string()))?
-            }
+            Some(Value::Integer(i)) => u32::try_from(*i)
+                .ok()
+                .filter(|v| (low..=high).contains(v))
+                .ok_or_else(|| wrong(i.to_string()))?,
             Some(other) => return Err(wrong(other.describe())),
         };
         self.record(key, json!(v));
@@ -177,7 +211,11 @@ impl<'a> Section<'a> {
         let v = match self.get(key).map(|node| &node.value) {
             None => default,
             Some(Value::Boolean(b)) => *b,
-            Some(other) => return Err(self.fault(key, format!("expected true or false, found {}", other.describe()))),
+            Some(other) => {
+                return Err(
+                    self.fault(key, format!("expected true or false, found {}", other.describe()))
+                );
+            }
         };
         self.record(key, json!(v));
         Ok(v)
@@ -188,7 +226,12 @@ impl<'a> Section<'a> {
     }
 
     /// As many numbers as the default has, each within `bounds`.
-    pub fn numbers<const N: usize>(&mut self, key: &str, default: [f64; N], bounds: Bounds) -> Result<[f64; N]> {
+    pub fn numbers<const N: usize>(
+        &mut self,
+        key: &str,
+        default: [f64; N],
+        bounds: Bounds,
+    ) -> Result<[f64; N]> {
         let mut v = default;
         if let Some(node) = self.get(key) {
             let items = self.items::<N>(key, node, "numbers")?;
@@ -201,17 +244,27 @@ impl<'a> Section<'a> {
     }
 
     /// Two integers from `low` to `high`.
-    pub fn u32_pair(&mut self, key: &str, default: [u32; 2], low: u32, high: u32) -> Result<[u32; 2]> {
+    pub fn u32_pair(
+        &mut self,
+        key: &str,
+        default: [u32; 2],
+        low: u32,
+        high: u32,
+    ) -> Result<[u32; 2]> {
         let mut v = default;
         if let Some(node) = self.get(key) {
             for (i, item) in self.items::<2>(key, node, "integers")?.iter().enumerate() {
                 let found = match &item.value {
-                    Value::Integer(found) => u32::try_from(*found).ok().filter(|n| (low..=high).contains(n)),
+                    Value::Integer(found) => {
+                        u32::try_from(*found).ok().filter(|n| (low..=high).contains(n))
+                    }
                     _ => None,
                 };
                 let wrong = || {
                     let (name, found) = (self.name(key), item.value.describe());
-                    let what = format!("`{name}.{i}`: expected an integer from {low} to {high}, found {found}");
+                    let what = format!(
+                        "`{name}.{i}`: expected an integer from {low} to {high}, found {found}"
+                    );
                     Error::scene(self.source.place(item.origin), what)
                 };
                 v[i] = found.ok_or_else(wrong)?;
@@ -225,7 +278,10 @@ impl<'a> Section<'a> {
         const WORDS: [&str; 4] = ["no", "one", "two", "three"];
         match &node.value {
             Value::Array(items) if items.len() == N => Ok(items),
-            other => Err(self.fault(key, format!("expected {} {of}, found {}", WORDS[N], other.describe()))),
+            other => {
+                Err(self
+                    .fault(key, format!("expected {} {of}, found {}", WORDS[N], other.describe())))
+            }
         }
     }
 
@@ -238,7 +294,11 @@ impl<'a> Section<'a> {
         let v = match self.get(key).map(|node| &node.value) {
             None => default.to_owned(),
             Some(Value::String(s)) => s.clone(),
-            Some(other) => return Err(self.fault(key, format!("expected a string, found {}", other.describe()))),
+            Some(other) => {
+                return Err(
+                    self.fault(key, format!("expected a string, found {}", other.describe()))
+                );
+            }
         };
         self.record(key, json!(v));
         Ok(v)
@@ -247,11 +307,21 @@ impl<'a> Section<'a> {
     pub fn required_string(&mut self, key: &str) -> Result<String> {
         self.require(key, &"a string")?;
         let v = self.string(key, "")?;
-        if v.is_empty() { Err(self.fault(key, "expected a string that is not empty")) } else { Ok(v) }
+        if v.is_empty() {
+            Err(self.fault(key, "expected a string that is not empty"))
+        } else {
+            Ok(v)
+        }
     }
 
     /// One of the names in `known`; one of `later` is told that it is yet to come.
-    pub fn choice<T: Copy>(&mut self, key: &str, default: &str, known: &[(&str, T)], later: &[&str]) -> Result<T> {
+    pub fn choice<T: Copy>(
+        &mut self,
+        key: &str,
+        default: &str,
+        known: &[(&str, T)],
+        later: &[&str],
+    ) -> Result<T> {
         let name = self.string(key, default)?;
         if let Some((_, value)) = known.iter().find(|(known, _)| *known == name) {
             return Ok(*value);
@@ -260,14 +330,27 @@ impl<'a> Section<'a> {
         Err(self.fault(
             key,
             if later.contains(&name.as_str()) {
-                format!("`{name}` belongs to a later version of nimbus; this one knows {}", list(&names))
+                format!(
+                    "`{name}` belongs to a later version of nimbus; this one knows {}",
+                    list(&names)
+                )
             } else {
-                format!("unknown value `{}`{} known here: {}", shown(&name), suggestion(&name, &names), list(&names))
+                format!(
+                    "unknown value `{}`{} known here: {}",
+                    shown(&name),
+                    suggestion(&name, &names),
+                    list(&names)
+                )
             },
         ))
     }
 
-    pub fn required_choice<T: Copy>(&mut self, key: &str, known: &[(&str, T)], later: &[&str]) -> Result<T> {
+    pub fn required_choice<T: Copy>(
+        &mut self,
+        key: &str,
+        known: &[(&str, T)],
+        later: &[&str],
+    ) -> Result<T> {
         let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
         self.require(key, &format!("one of {}", list(&names)))?;
         self.choice(key, "", known, later)
@@ -282,7 +365,8 @@ impl<'a> Section<'a> {
             };
             if !same {
                 let found = node.value.describe();
-                return Err(self.fault(key, format!("this version knows only {only} ({why}), found {found}")));
+                return Err(self
+                    .fault(key, format!("this version knows only {only} ({why}), found {found}")));
             }
         }
         self.record(key, only);
@@ -294,7 +378,10 @@ impl<'a> Section<'a> {
         if self.has(key) {
             return Ok(());
         }
-        Err(Error::scene(self.place(key), format!("missing key `{}`: expected {expected}", self.name(key))))
+        Err(Error::scene(
+            self.place(key),
+            format!("missing key `{}`: expected {expected}", self.name(key)),
+        ))
     }
 
     /// What was given for a key, whatever it is.
@@ -307,11 +394,17 @@ impl<'a> Section<'a> {
     }
 
     fn number(&self, node: &Node, name: &str, bounds: Bounds) -> Result<f64> {
-        let fault = |what: String| Error::scene(self.source.place(node.origin), format!("`{name}`: {what}"));
+        let fault = |what: String| {
+            Error::scene(self.source.place(node.origin), format!("`{name}`: {what}"))
+        };
         let Some(v) = node.value.as_f64() else {
             return Err(fault(format!("expected a number, found {}", node.value.describe())));
         };
-        if bounds.contains(v) { Ok(v) } else { Err(fault(format!("expected {bounds}, found {v:?}"))) }
+        if bounds.contains(v) {
+            Ok(v)
+        } else {
+            Err(fault(format!("expected {bounds}, found {v:?}")))
+        }
     }
 }
 

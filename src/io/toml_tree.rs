@@ -68,7 +68,11 @@ pub struct Entry {
 impl Document {
     pub fn read(path: &Path) -> Result<Document> {
         Document::parse(
-            text_file::read_text(path, text_file::SCENE_LIMIT, "a scene's tables, such as [camera] and [[cloud]]")?,
+            text_file::read_text(
+                path,
+                text_file::SCENE_LIMIT,
+                "a scene's tables, such as [camera] and [[cloud]]",
+            )?,
             path,
         )
     }
@@ -100,7 +104,8 @@ impl Document {
         })
     }
 
-    /// Gives the document `key` from `toml` (text of ours, which defines nothing else) if it has none.
+    /// Gives the document `key` from `toml` (text of ours, which defines nothing else) if it has
+    /// none.
     pub fn default_to(&mut self, key: &str, toml: &str) {
         let Value::Table(root) = &mut self.root.value else { return };
         if root.contains_key(key) {
@@ -119,7 +124,9 @@ impl Source {
                 let (line, column) = line_column(&self.text, offset);
                 Place::line(&self.path, line, column)
             }
-            Origin::Override(i) => Place { source: format!("--set {}", shown(&self.overrides[i])), line: 0, column: 0 },
+            Origin::Override(i) => {
+                Place { source: format!("--set {}", shown(&self.overrides[i])), line: 0, column: 0 }
+            }
             Origin::Default => Place::file(&self.path),
         }
     }
@@ -164,25 +171,32 @@ pub fn convert(
     let origin = origin_of(spanned.span().start);
     let value = match spanned.get_ref() {
         DeValue::String(s) => Value::String(s.to_string()),
-        DeValue::Integer(i) => {
-            Value::Integer(i128::from_str_radix(i.as_str(), i.radix()).map_err(|_| OutOfRange(origin))?)
-        }
-        // Text that toml took for a float and Rust does not would be a NaN, which every reader refuses.
+        DeValue::Integer(i) => Value::Integer(
+            i128::from_str_radix(i.as_str(), i.radix()).map_err(|_| OutOfRange(origin))?,
+        ),
+        // Text that toml took for a float and Rust does not would be a NaN, which every reader
+        // refuses.
         DeValue::Float(f) => Value::Float(f.as_str().parse().unwrap_or(f64::NAN)),
         DeValue::Boolean(b) => Value::Boolean(*b),
         DeValue::Datetime(_) => Value::Datetime,
-        DeValue::Array(list) => {
-            Value::Array(list.iter().map(|item| convert(item, origin_of)).collect::<std::result::Result<_, _>>()?)
-        }
+        DeValue::Array(list) => Value::Array(
+            list.iter()
+                .map(|item| convert(item, origin_of))
+                .collect::<std::result::Result<_, _>>()?,
+        ),
         DeValue::Table(table) => Value::Table(convert_table(table, origin_of)?),
     };
     Ok(Node { origin, value })
 }
 
-fn convert_table(table: &DeTable<'_>, origin_of: &dyn Fn(usize) -> Origin) -> std::result::Result<Table, OutOfRange> {
+fn convert_table(
+    table: &DeTable<'_>,
+    origin_of: &dyn Fn(usize) -> Origin,
+) -> std::result::Result<Table, OutOfRange> {
     let entry = |(key, value): (&Spanned<_>, &Spanned<DeValue<'_>>)| {
         let key: &Spanned<std::borrow::Cow<'_, str>> = key;
-        let entry = Entry { key_origin: origin_of(key.span().start), node: convert(value, origin_of)? };
+        let entry =
+            Entry { key_origin: origin_of(key.span().start), node: convert(value, origin_of)? };
         Ok((key.get_ref().to_string(), entry))
     };
     table.iter().map(entry).collect()

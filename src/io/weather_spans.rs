@@ -1,4 +1,5 @@
-//! What of a weather file is drawn between two steps: laid out once, read before it is wanted (docs/model.md §15 "Time").
+//! What of a weather file is drawn between two steps: laid out once, read before it is wanted
+//! (docs/model.md §15 "Time").
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -10,8 +11,8 @@ use crate::model::weather::interval::{Interval, Moment};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
 
-/// Files of so few steps have one layout for all of them. Of more, a layout stands for a step and its neighbours, and blobs of the
-/// two at hand fade into each other: each has half of the blobs.
+/// Files of so few steps have one layout for all of them. Of more, a layout stands for a step and
+/// its neighbours, and blobs of the two at hand fade into each other: each has half of the blobs.
 pub const MOST_TOGETHER: usize = 8;
 /// Spans that are kept: the one before, the one at hand and the next.
 const MOST_KEPT: usize = 3;
@@ -32,16 +33,22 @@ enum Fade {
 
 /// What is drawn from one step to the next.
 pub struct Span {
-    /// Blobs of the layouts of even and of odd steps; those of all in the first, where there is one layout.
+    /// Blobs of the layouts of even and of odd steps; those of all in the first, where there is one
+    /// layout.
     halves: [Option<(Interval, Fade)>; 2],
     /// Slots of the first half.
     n_first: usize,
 }
 
 impl Span {
-    /// In slot `i`, `weight` of the way to the second step; None in a slot that a layout does not need.
+    /// In slot `i`, `weight` of the way to the second step; None in a slot that a layout does not
+    /// need.
     pub fn blob(&self, i: usize, weight: f64) -> Option<WeatherBlob> {
-        let (half, i) = if i < self.n_first { (&self.halves[0], i) } else { (&self.halves[1], i - self.n_first) };
+        let (half, i) = if i < self.n_first {
+            (&self.halves[0], i)
+        } else {
+            (&self.halves[1], i - self.n_first)
+        };
         let (interval, fade) = half.as_ref().filter(|(interval, _)| i < interval.len())?;
         let blob = interval.blob(i, weight);
         let share = match fade {
@@ -119,10 +126,14 @@ impl Spans {
     /// That span, made now if nobody has yet; the next one is begun.
     pub fn get(&self, ends: Ends) -> Result<Arc<Span>> {
         let mut state = lock(&self.state);
-        let is_ready = state.under_way.as_ref().is_some_and(|(of, thread)| *of == ends || thread.is_finished());
+        let is_ready = state
+            .under_way
+            .as_ref()
+            .is_some_and(|(of, thread)| *of == ends || thread.is_finished());
         if let Some((of, thread)) = state.under_way.take_if(|_| is_ready) {
-            let made =
-                thread.join().unwrap_or_else(|_| Err(Error::Fault { what: "reading ahead panicked".to_owned() }));
+            let made = thread.join().unwrap_or_else(|_| {
+                Err(Error::Fault { what: "reading ahead panicked".to_owned() })
+            });
             match made {
                 Ok(span) => state.keep(of, span),
                 // What nobody has asked for may be wrong.
@@ -174,8 +185,9 @@ impl Source {
     fn make(&self, (i, j): Ends) -> Result<Span> {
         let first = self.step(i)?;
         let second = if i == j { None } else { Some(self.step(j)?) };
-        let laid_out =
-            |layout: &Layout| Interval::laid_out(layout, first.moment(), second.as_ref().map(|s| s.moment()));
+        let laid_out = |layout: &Layout| {
+            Interval::laid_out(layout, first.moment(), second.as_ref().map(|s| s.moment()))
+        };
         let mut halves = [None, None];
         match &self.layout {
             Some(layout) => halves[0] = Some((laid_out(layout), Fade::Always)),

@@ -1,4 +1,5 @@
-//! A weather file's particles at any time: from step to step by straight lines where steps are near enough (docs/model.md §15 "Time").
+//! A weather file's particles at any time: from step to step by straight lines where steps are near
+//! enough (docs/model.md §15 "Time").
 
 use std::fmt;
 use std::sync::Arc;
@@ -35,19 +36,28 @@ pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32) -> Result<Moving>
     moving_by(file, keys, seed, MOST_TOGETHER)
 }
 
-fn moving_by(file: WeatherFile, keys: WeatherKeys, seed: u32, most_together: usize) -> Result<Moving> {
+fn moving_by(
+    file: WeatherFile,
+    keys: WeatherKeys,
+    seed: u32,
+    most_together: usize,
+) -> Result<Moving> {
     let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
     let is_small = file.n_steps <= most_together;
-    let wanted = if is_small { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
+    let wanted =
+        if is_small { (0..file.n_steps).collect() } else { vec![keys.i_step, file.n_steps - 1] };
     let read: Vec<Step> = wanted.iter().map(|i| file.step(*i)).collect::<Result<_>>()?;
     let all: Vec<&[f64]> = read.iter().map(|s| s.extinction.as_slice()).collect();
-    let layout = is_small.then(|| Layout::new(&read[0].grid, &all, keys.n_particles as usize, seed));
+    let layout =
+        is_small.then(|| Layout::new(&read[0].grid, &all, keys.n_particles as usize, seed));
     let bounds = Bounds::of(&read, keys.exaggeration);
     let slots = (keys.n_particles as usize, seed);
     let spans = Spans::new(file, times_s.clone(), slots, layout, keys.speed < 0.0);
     let steps = Steps { spans, keys, times_s, bounds };
     let first = steps.at(0.0)?;
-    let mean = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).sum::<f64>() / first.len().max(1) as f64;
+    let mean = |of: &dyn Fn(&Particle) -> f64| {
+        first.iter().map(of).sum::<f64>() / first.len().max(1) as f64
+    };
     let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
     Ok(Moving {
         n_particles: keys.n_particles,
@@ -73,7 +83,8 @@ struct Bounds {
 }
 
 impl Bounds {
-    /// Of what was looked at, and some more height for what was not; heights `stretch` times as great.
+    /// Of what was looked at, and some more height for what was not; heights `stretch` times as
+    /// great.
     fn of(steps: &[Step], stretch: f64) -> Bounds {
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (mut widest, mut thickest) = (0f64, 0f64);
@@ -104,7 +115,8 @@ impl Bounds {
 
 impl Mover for Steps {
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
-        let file_s = self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.keys.speed * time_s;
+        let file_s =
+            self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.keys.speed * time_s;
         let at = between(&self.times_s, file_s).unwrap_or(Between { i: 0, j: 0, weight: 0.0 });
         // A span's first moment is the span's, too; what is before the first step is that step.
         let is_before = file_s < self.times_s.first().copied().unwrap_or(file_s);
@@ -124,7 +136,13 @@ impl Steps {
         let sigma = p.sigma.min(self.bounds.sigma);
         let aspect = p.aspect.min(self.bounds.sigma_y / sigma).max(LEAST_ASPECT);
         let thinner = mass(p.kappa, p.sigma) * p.aspect / (mass(1.0, sigma) * aspect);
-        Particle { position: p.position.clamp(self.bounds.low, self.bounds.high), sigma, aspect, kappa: thinner, ..p }
+        Particle {
+            position: p.position.clamp(self.bounds.low, self.bounds.high),
+            sigma,
+            aspect,
+            kappa: thinner,
+            ..p
+        }
     }
 
     /// In place of a particle that a layout does not need.
@@ -146,25 +164,28 @@ mod tests {
     use super::*;
     use crate::io::weather::wrf;
 
-    /// Of two layouts that fade into each other as of one: as much mass, within the bounds, and nobody jumps.
+    /// Of two layouts that fade into each other as of one: as much mass, within the bounds, and
+    /// nobody jumps.
     #[test]
     fn layouts_of_a_file_of_many_steps_fade_into_each_other() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/weather/supercell.nc");
         let keys = WeatherKeys { i_step: 0, n_particles: 2001, exaggeration: 2.0, speed: 60.0 };
-        let of = |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, most_together).unwrap();
+        let of =
+            |most_together| moving_by(wrf::open(&path).unwrap(), keys, 3, most_together).unwrap();
         let (many, few) = (of(0), of(MOST_TOGETHER));
-        let mass_of = |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
+        let mass_of =
+            |all: &[Particle]| all.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).sum::<f64>();
         // Steps of 120 s: at 0, 2 and 4 s.
         for t in [-1.0, 0.0, 0.7, 2.0, 3.1, 4.0, 9.0] {
             let (a, b) = (many.mover.at(t).unwrap(), few.mover.at(t).unwrap());
             assert_eq!((a.len(), b.len()), (2001, 2001));
             assert!((mass_of(&a) / mass_of(&b) - 1.0).abs() < 1e-9, "{t}");
-            let within = |p: &Particle| p.position.cmpge(many.low).all() && p.position.cmple(many.high).all();
-            assert!(
-                a.iter().all(|p| within(p)
-                    && p.sigma <= many.sigma_max
-                    && p.sigma * p.aspect <= many.sigma_y_max * 1.000001)
-            );
+            let within = |p: &Particle| {
+                p.position.cmpge(many.low).all() && p.position.cmple(many.high).all()
+            };
+            assert!(a.iter().all(|p| within(p)
+                && p.sigma <= many.sigma_max
+                && p.sigma * p.aspect <= many.sigma_y_max * 1.000001));
         }
         // Who is somewhere else a moment later has no mass there, before or after.
         for (t, is_all) in [(0.5, false), (2.0, false), (4.0, true)] {
@@ -172,8 +193,11 @@ mod tests {
             let whole = mass_of(&a);
             for (p, q) in a.iter().zip(b.iter()) {
                 let of = |p: &Particle| mass(p.kappa, p.sigma) * p.aspect;
-                let changed =
-                    if p.position.distance(q.position) > 1.0 { of(p).max(of(q)) } else { (of(p) - of(q)).abs() };
+                let changed = if p.position.distance(q.position) > 1.0 {
+                    of(p).max(of(q))
+                } else {
+                    (of(p) - of(q)).abs()
+                };
                 assert!(changed < 1e-4 * whole / 2001.0, "{t}: {p:?} {q:?}");
             }
             // Both halves are seen between steps, one at a step.

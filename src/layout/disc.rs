@@ -53,7 +53,8 @@ impl DiscRecord {
     /// `group`: the disc's, of a cloud of `seed` in `wind`.
     pub fn new(disc: &Disc, group: &Group, seed: u32, wind: DVec3, turn: Turn) -> Self {
         let condensation = disc.condensation;
-        let of = |f: fn(&crate::model::disc::Condensation) -> f64| condensation.as_ref().map_or(0.0, f);
+        let of =
+            |f: fn(&crate::model::disc::Condensation) -> f64| condensation.as_ref().map_or(0.0, f);
         DiscRecord {
             center: group.center.as_vec3().to_array(),
             radius: disc.radius as f32,

@@ -48,7 +48,8 @@ record! {
         n_unresolved: f32,
         /// I_i.
         indirect: [f32; 3],
-        /// Bound on what those pairs may change of L2's greatest channel; infinite where there is none: light lost, tensors.
+        /// Bound on what those pairs may change of L2's greatest channel; infinite where there is
+        /// none: light lost, tensors.
         unresolved: f32,
         first: [f32; 3],
         /// Sources that the driver's loops ended before; 0 in a result that can be trusted.
@@ -121,7 +122,13 @@ impl RegionRecord {
     }
 
     /// Ground; `origin` is the lighting origin.
-    pub fn terrain(terrain: &Terrain, origin: DVec3, brdf: &Brdf, i_lobe: u32, i_first_facet: u32) -> Self {
+    pub fn terrain(
+        terrain: &Terrain,
+        origin: DVec3,
+        brdf: &Brdf,
+        i_lobe: u32,
+        i_first_facet: u32,
+    ) -> Self {
         let (low, high) = terrain.extent();
         RegionRecord {
             kind: REGION_TERRAIN,
@@ -134,7 +141,13 @@ impl RegionRecord {
     }
 
     /// A surface; `origin` is the lighting origin.
-    pub fn surface(surface: &Surface, origin: DVec3, brdf: &Brdf, i_lobe: u32, i_first_facet: u32) -> Self {
+    pub fn surface(
+        surface: &Surface,
+        origin: DVec3,
+        brdf: &Brdf,
+        i_lobe: u32,
+        i_first_facet: u32,
+    ) -> Self {
         RegionRecord {
             kind: REGION_SURFACE,
             center: (surface.center - origin).as_vec3().to_array(),
@@ -160,7 +173,8 @@ record! {
     }
 }
 
-/// An extent below this share of the greatest coordinate is four roundings of an f32 there: no extent.
+/// An extent below this share of the greatest coordinate is four roundings of an f32 there: no
+/// extent.
 const LEAST_EXTENT: f64 = 1.0 / 4_194_304.0;
 
 impl RegionBoundsRecord {
@@ -169,7 +183,8 @@ impl RegionBoundsRecord {
         let (low, high) = (low - origin, high - origin);
         let least = LEAST_EXTENT * low.abs().max(high.abs()).max_element();
         let n_cells = f64::from(1u32 << bits.axis);
-        let scale = (high - low).to_array().map(|e| if e > least { (n_cells / e) as f32 } else { 0.0 });
+        let scale =
+            (high - low).to_array().map(|e| if e > least { (n_cells / e) as f32 } else { 0.0 });
         // So small a region that its cells are beyond f32 is a point.
         let scale = scale.map(|s| if s.is_finite() { s } else { 0.0 });
         RegionBoundsRecord { low: low.as_vec3().to_array(), unused: 0, scale, unused_too: 0 }

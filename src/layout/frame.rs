@@ -27,7 +27,8 @@ record! {
         position: [f32; 3],
         /// Nearer than this a point light does not grow brighter.
         radius: f32,
-        /// A spot's share is (cone_scale · cos + cone_offset) cut to [0, 1], squared; of other lights 1.
+        /// A spot's share is (cone_scale · cos + cone_offset) cut to [0, 1], squared; of other
+        /// lights 1.
         cone_scale: f32,
         cone_offset: f32,
         unused: [f32; 2],
@@ -38,18 +39,28 @@ impl LightRecord {
     /// `origin`: the lighting origin.
     pub fn new(light: &Light, origin: DVec3) -> Self {
         let f32s = |v: DVec3| v.as_vec3().to_array();
-        let record =
-            LightRecord { energy: f32s(light.energy()), cone_offset: 1.0, radius: 1.0, ..LightRecord::default() };
+        let record = LightRecord {
+            energy: f32s(light.energy()),
+            cone_offset: 1.0,
+            radius: 1.0,
+            ..LightRecord::default()
+        };
         match *light {
             Light::Directional { direction, .. } => {
                 LightRecord { toward: f32s(-direction), kind: LIGHT_DIRECTIONAL, ..record }
             }
-            Light::Sky { constant, .. } => {
-                LightRecord { toward: f32s(UP), kind: LIGHT_SKY, constant: constant as f32, ..record }
-            }
-            Light::Point { position, radius, .. } => {
-                LightRecord { position: f32s(position - origin), kind: LIGHT_POINT, radius: radius as f32, ..record }
-            }
+            Light::Sky { constant, .. } => LightRecord {
+                toward: f32s(UP),
+                kind: LIGHT_SKY,
+                constant: constant as f32,
+                ..record
+            },
+            Light::Point { position, radius, .. } => LightRecord {
+                position: f32s(position - origin),
+                kind: LIGHT_POINT,
+                radius: radius as f32,
+                ..record
+            },
             Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
                 let scale = 1.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA);
                 LightRecord {

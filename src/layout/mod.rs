@@ -1,5 +1,5 @@
-//! The f32 records that shaders read, from the f64 model. Declared once, here; a test reflects every shader and
-//! compares names, offsets and sizes.
+//! The f32 records that shaders read, from the f64 model. Declared once, here; a test reflects
+//! every shader and compares names, offsets and sizes.
 
 pub mod cull;
 pub mod disc;
@@ -10,8 +10,8 @@ pub mod second;
 pub mod sums;
 pub mod tiles;
 
-/// Declares a `repr(C)` record and lists its fields as (name, offset, bytes), for comparison with what the
-/// shaders declare.
+/// Declares a `repr(C)` record and lists its fields as (name, offset, bytes), for comparison with
+/// what the shaders declare.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! __record {

@@ -83,7 +83,9 @@ impl BoxRecord {
         BoxRecord {
             extent: b.extent.as_vec3().to_array(),
             radius_max: b.radius_max as f32,
-            sigma_factor: (radius_factor(law.form, b.radius_max) * law.radius_scale * SIGMA_PER_RADIUS) as f32,
+            sigma_factor: (radius_factor(law.form, b.radius_max)
+                * law.radius_scale
+                * SIGMA_PER_RADIUS) as f32,
             kappa: box_kappa(b, law.form, law.optical_depth, law.radius_scale) as f32,
             seed: law.seed,
             i_box,
@@ -117,7 +119,8 @@ record! {
         /// Cloud origin(t) + group centre, as it has grown, − lighting origin.
         offset: [f32; 3],
         i_region: u32,
-        /// What its facets look away from relative to the lighting origin: the cloud's centre, or far below that.
+        /// What its facets look away from relative to the lighting origin: the cloud's centre, or
+        /// far below that.
         cloud_center: [f32; 3],
         /// Mean σ of the group's particles, as they have grown.
         sigma_mean: f32,
@@ -133,9 +136,15 @@ record! {
 }
 
 impl GroupRecord {
-    /// `group`: as it has grown; `origin_from_light`: the cloud's origin at the frame's time minus the lighting origin, in
-    /// f64. `i_region`: the cloud's; `modes`: first gust mode of the cloud, and how many it has.
-    pub fn new(group: &Group, i_region: u32, origin_from_light: DVec3, (i_mode, n_modes): (u32, u32)) -> Self {
+    /// `group`: as it has grown; `origin_from_light`: the cloud's origin at the frame's time minus
+    /// the lighting origin, in f64. `i_region`: the cloud's; `modes`: first gust mode of the cloud,
+    /// and how many it has.
+    pub fn new(
+        group: &Group,
+        i_region: u32,
+        origin_from_light: DVec3,
+        (i_mode, n_modes): (u32, u32),
+    ) -> Self {
         GroupRecord {
             offset: (origin_from_light + group.center).as_vec3().to_array(),
             i_region,

@@ -3,16 +3,17 @@
 use crate::layout::record;
 
 record! {
-    /// Light on its way from a facet, or from a cluster of facets of one region. By fours, since a device that loads for
-    /// each invocation by itself pays by the load.
+    /// Light on its way from a facet, or from a cluster of facets of one region. By fours, since a
+    /// device that loads for each invocation by itself pays by the load.
     pub struct SourceRecord {
-        /// Position, a cluster's the mean of its facets' by their flux; and the radius from it that no point is beyond.
+        /// Position, a cluster's the mean of its facets' by their flux; and the radius from it that
+        /// no point is beyond.
         place: [f32; 4],
-        /// Σ A_i L1_i of the diffuse basis, linear RGB; and the nodes of its subtree, itself included: 1 for a facet, -1
-        /// for one that the rim of a light's shadow runs through.
+        /// Σ A_i L1_i of the diffuse basis, linear RGB; and the nodes of its subtree, itself
+        /// included: 1 for a facet, -1 for one that the rim of a light's shadow runs through.
         sent: [f32; 4],
-        /// Mean normal by flux, shorter than 1 where a cluster's normals differ; and the mean area of its facets, by area:
-        /// what bounds the form factor as the distance goes to 0.
+        /// Mean normal by flux, shorter than 1 where a cluster's normals differ; and the mean area
+        /// of its facets, by area: what bounds the form factor as the distance goes to 0.
         face: [f32; 4],
         /// Σ A_i; and second moments M about the position, by flux: xx, yy, zz.
         extent: [f32; 4],
@@ -22,7 +23,8 @@ record! {
 }
 
 record! {
-    /// Of one light at the 4 × 4 points of a surface's facet: shares of the greatest, 16 bits each, rows along v.
+    /// Of one light at the 4 × 4 points of a surface's facet: shares of the greatest, 16 bits each,
+    /// rows along v.
     pub struct PackedRecord {
         ab: [u32; 4],
         cd: [u32; 4],
@@ -30,7 +32,8 @@ record! {
 }
 
 record! {
-    /// Receivers that are gathered for together: consecutive places in the order of facets, all of one region.
+    /// Receivers that are gathered for together: consecutive places in the order of facets, all of
+    /// one region.
     pub struct BlockRecord {
         i_first: u32,
         n_facets: u32,

@@ -24,7 +24,10 @@ impl From<Sums> for SumMacros {
             Summation::Kahan => KAHAN,
             Summation::Pairwise => PAIRWISE,
         };
-        SumMacros([("SUMMATION", summation), ("DOUBLE", u32::from(sums.precision == Precision::F64))])
+        SumMacros([
+            ("SUMMATION", summation),
+            ("DOUBLE", u32::from(sums.precision == Precision::F64)),
+        ])
     }
 }
 

@@ -3,8 +3,8 @@
 use crate::layout::record;
 
 record! {
-    /// A blob on the screen: its optical depth at the ray (x, y, 1) is tau 2^-e, e = scale (δx² + δy² + (cx δy − cy δx)²)/
-    /// (1 + x² + y²), δ = (x, y) − (cx, cy) (docs/model.md §11 "tiles").
+    /// A blob on the screen: its optical depth at the ray (x, y, 1) is tau 2^-e, e = scale (δx² +
+    /// δy² + (cx δy − cy δx)²)/ (1 + x² + y²), δ = (x, y) − (cx, cy) (docs/model.md §11 "tiles").
     pub struct SplatRecord {
         /// Slopes.
         center: [f32; 2],

@@ -11,21 +11,27 @@ pub struct Interval {
     pub high: f64,
 }
 
-/// The percentile bootstrap (Efron 1979), deterministic in its seed. Neighbouring frames are alike, and resampling
-/// them one by one would give an interval that is too narrow; so runs of `block_len` neighbours are resampled
-/// together (circular block bootstrap, Politis and Romano 1992). A `block_len` of 1 is the ordinary bootstrap, right
-/// for values that do not depend on one another.
+/// The percentile bootstrap (Efron 1979), deterministic in its seed. Neighbouring frames are alike,
+/// and resampling them one by one would give an interval that is too narrow; so runs of `block_len`
+/// neighbours are resampled together (circular block bootstrap, Politis and Romano 1992). A
+/// `block_len` of 1 is the ordinary bootstrap, right for values that do not depend on one another.
 ///
-/// Its percentiles are then moved away from the estimate by two factors, both of which a bootstrap of k = n/ℓ blocks of ℓ
-/// lacks, and without which it holds the truth too rarely:
+/// Its percentiles are then moved away from the estimate by two factors, both of which a bootstrap
+/// of k = n/ℓ blocks of ℓ lacks, and without which it holds the truth too rarely:
 ///
-/// - √(k/(k − 1)). A resample's mean is that of k block means B drawn from all n circular ones, so that its variance is
-///   (1/k) · mean (B − x̄)². That mean square is taken about the sample's own mean, not the true one: mean (B − x̄)² =
-///   mean (B − μ)² − (x̄ − μ)², in expectation var B − var x̄. Where values further apart than ℓ depend little on one
-///   another, var B = k var x̄, and what comes out is (1/k)(k − 1) var x̄, too small by 1 − 1/k. A median is for many
+/// - √(k/(k − 1)). A resample's mean is that of k block means B drawn from all n circular ones, so
+///   that its variance is
+///   (1/k) · mean (B − x̄)². That mean square is taken about the sample's own mean, not the true
+///   one: mean (B − x̄)² =
+///   mean (B − μ)² − (x̄ − μ)², in expectation var B − var x̄. Where values further apart than ℓ
+///   depend little on one
+///   another, var B = k var x̄, and what comes out is (1/k)(k − 1) var x̄, too small by 1 − 1/k. A
+///   median is for many
 ///   values the mean of their influences, and inherits it.
-/// - t/z: the 97.5th percentile of Student's distribution by that of the normal one. The spread is itself estimated from k
-///   blocks, and dividing by an estimate of k − 1 degrees of freedom makes Student's t of a normal deviate. Several lists
+/// - t/z: the 97.5th percentile of Student's distribution by that of the normal one. The spread is
+///   itself estimated from k
+///   blocks, and dividing by an estimate of k − 1 degrees of freedom makes Student's t of a normal
+///   deviate. Several lists
 ///   bring the degrees of freedom of all, which is Welch's number where they vary alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bootstrap {
@@ -34,7 +40,8 @@ pub struct Bootstrap {
     pub seed: u64,
 }
 
-/// 2000 resamples leave 50 beyond each end of the interval, so that an end is known to about a tenth of its width.
+/// 2000 resamples leave 50 beyond each end of the interval, so that an end is known to about a
+/// tenth of its width.
 impl Default for Bootstrap {
     fn default() -> Self {
         Bootstrap { n_resamples: 2000, block_len: 1, seed: 0 }
@@ -45,9 +52,10 @@ const INTERVAL_LOW: f64 = 0.025;
 const INTERVAL_HIGH: f64 = 0.975;
 
 impl Bootstrap {
-    /// For frames in the order they ran, `n` of them: blocks of ⌈√n⌉. n^(1/3), which is best for faint correlation, is
-    /// too short for a strong one. Of runs with realistic frame times (lognormal with 3 % noise under a first-order
-    /// autoregression, one frame in twenty late) the interval of the ratio of medians held the truth, in % of 4000 trials:
+    /// For frames in the order they ran, `n` of them: blocks of ⌈√n⌉. n^(1/3), which is best for
+    /// faint correlation, is too short for a strong one. Of runs with realistic frame times
+    /// (lognormal with 3 % noise under a first-order autoregression, one frame in twenty late) the
+    /// interval of the ratio of medians held the truth, in % of 4000 trials:
     ///
     /// | n | ρ = 0 | 0.3 | 0.6 |
     /// |---|---|---|---|
@@ -62,10 +70,11 @@ impl Bootstrap {
         Bootstrap { block_len, ..Bootstrap::default() }
     }
 
-    /// Of any `statistic` of N lists of `n_rows`, each resampled on its own: it is handed the rows drawn from each,
-    /// which are as many as there are. Columns of one list stay together that way. None when no resample was asked for,
-    /// or the statistic is not finite for the lists themselves or for a single resample: what has no bound must not seem
-    /// to have one. None as well where a list is no longer than a block: all its resamples are itself.
+    /// Of any `statistic` of N lists of `n_rows`, each resampled on its own: it is handed the rows
+    /// drawn from each, which are as many as there are. Columns of one list stay together that way.
+    /// None when no resample was asked for, or the statistic is not finite for the lists themselves
+    /// or for a single resample: what has no bound must not seem to have one. None as well where a
+    /// list is no longer than a block: all its resamples are itself.
     pub fn interval<const N: usize>(
         &self,
         n_rows: [usize; N],
@@ -85,7 +94,8 @@ impl Bootstrap {
         if !estimate.is_finite() || estimates.iter().any(|e| !e.is_finite()) {
             return None;
         }
-        let (low, high) = (percentile(&estimates, INTERVAL_LOW)?, percentile(&estimates, INTERVAL_HIGH)?);
+        let (low, high) =
+            (percentile(&estimates, INTERVAL_LOW)?, percentile(&estimates, INTERVAL_HIGH)?);
         Some(Interval {
             estimate,
             low: estimate - widening * (estimate - low),
@@ -93,8 +103,8 @@ impl Bootstrap {
         })
     }
 
-    /// What the interval of lists of `n_rows` is widened by (see [`Bootstrap`]); of lists of different lengths by what the
-    /// shortest needs. None where one is no longer than a block.
+    /// What the interval of lists of `n_rows` is widened by (see [`Bootstrap`]); of lists of
+    /// different lengths by what the shortest needs. None where one is no longer than a block.
     fn widening(&self, n_rows: &[usize]) -> Option<f64> {
         let n_blocks = n_rows.iter().map(|&n| n as f64 / self.block_len.max(1) as f64);
         let least = n_blocks.clone().fold(f64::INFINITY, f64::min);
@@ -108,22 +118,25 @@ impl Bootstrap {
         self.interval([values.len()], |[rows]| median_of_rows(&values, rows))
     }
 
-    /// median(numerator) / median(denominator), each resampled on its own. None when either holds no finite value.
-    /// A denominator whose median is not above zero, as it is or in a resample, has no ratio: None as well.
+    /// median(numerator) / median(denominator), each resampled on its own. None when either holds
+    /// no finite value. A denominator whose median is not above zero, as it is or in a resample,
+    /// has no ratio: None as well.
     pub fn ratio_of_medians(&self, numerator: &[f64], denominator: &[f64]) -> Option<Interval> {
         let (numerator, denominator) = (finite(numerator), finite(denominator));
         let mut ratio = self.interval([numerator.len(), denominator.len()], |[top, bottom]| {
             let bottom = median_of_rows(&denominator, bottom);
             if bottom > 0.0 { median_of_rows(&numerator, top) / bottom } else { f64::NAN }
         })?;
-        // Of very few values the widened interval may reach below what any ratio of such values can be.
+        // Of very few values the widened interval may reach below what any ratio of such values can
+        // be.
         if numerator.iter().all(|value| *value >= 0.0) {
             ratio.low = ratio.low.max(0.0);
         }
         Some(ratio)
     }
 
-    /// `n` rows of 0 … n − 1, which are in the order of time: blocks are runs of it, and wrap around.
+    /// `n` rows of 0 … n − 1, which are in the order of time: blocks are runs of it, and wrap
+    /// around.
     fn draw(&self, n: usize, rows: &mut Vec<usize>, random: &mut SplitMix64) {
         let block_len = self.block_len.clamp(1, n);
         rows.clear();
@@ -135,8 +148,8 @@ impl Bootstrap {
     }
 }
 
-/// The 97.5th percentile of Student's distribution by that of the normal one: Abramowitz and Stegun 26.7.5, which is
-/// within 1 % from two degrees of freedom on and within 0.05 % from four.
+/// The 97.5th percentile of Student's distribution by that of the normal one: Abramowitz and Stegun
+/// 26.7.5, which is within 1 % from two degrees of freedom on and within 0.05 % from four.
 fn student_by_normal(degrees: f64) -> f64 {
     const Z: f64 = 1.959_963_984_540_054;
     let (z2, v) = (Z * Z, degrees);

@@ -1,22 +1,22 @@
-//! The host's monotonic clock, which all host times are taken with (`std::time::Instant`): what it costs and how fine
-//! it is, measured on this machine. A time shorter than a few resolutions or overheads says nothing, and the results
-//! carry both.
+//! The host's monotonic clock, which all host times are taken with (`std::time::Instant`): what it
+//! costs and how fine it is, measured on this machine. A time shorter than a few resolutions or
+//! overheads says nothing, and the results carry both.
 
 use std::hint::black_box;
 use std::time::Instant;
 
 /// Readings taken to find the resolution. 20 000 readings of 20–50 ns take about a millisecond.
 const N_RESOLUTION_READINGS: usize = 20_000;
-/// The overhead is the median over batches, so that a batch that was interrupted by the scheduler does not count,
-/// of the mean within a batch, so that the resolution does not show.
+/// The overhead is the median over batches, so that a batch that was interrupted by the scheduler
+/// does not count, of the mean within a batch, so that the resolution does not show.
 const N_OVERHEAD_BATCHES: usize = 101;
 const N_OVERHEAD_CALLS: u32 = 64;
 
 /// Both in nanoseconds.
 #[derive(Debug, Clone, Copy)]
 pub struct ClockQuality {
-    /// The smallest step ever seen between two readings: an upper bound of the tick, since a clock that is read more
-    /// slowly than it ticks cannot show its tick.
+    /// The smallest step ever seen between two readings: an upper bound of the tick, since a clock
+    /// that is read more slowly than it ticks cannot show its tick.
     pub resolution_ns: u64,
     /// What one reading costs. An interval between two readings holds about one of them.
     pub overhead_ns: f64,
@@ -26,7 +26,10 @@ impl ClockQuality {
     /// Takes a few milliseconds.
     pub fn measure() -> Self {
         let epoch = Instant::now();
-        ClockQuality { resolution_ns: measure_resolution_ns(epoch), overhead_ns: measure_overhead_ns(epoch) }
+        ClockQuality {
+            resolution_ns: measure_resolution_ns(epoch),
+            overhead_ns: measure_overhead_ns(epoch),
+        }
     }
 }
 
@@ -76,7 +79,8 @@ mod tests {
     fn the_clock_has_a_tick_and_a_cost() {
         let clock = ClockQuality::measure();
         assert!(clock.resolution_ns > 0);
-        // Any machine that can run Vulkan reads its clock within 100 µs; 0 would mean that nothing was measured.
+        // Any machine that can run Vulkan reads its clock within 100 µs; 0 would mean that nothing
+        // was measured.
         assert!(clock.overhead_ns > 0.0 && clock.overhead_ns < 1e5, "{} ns", clock.overhead_ns);
     }
 }

@@ -1,4 +1,5 @@
-//! "1 % low": three figures go by that name, and on the same frames they differ. All three, each by its own name.
+//! "1 % low": three figures go by that name, and on the same frames they differ. All three, each by
+//! its own name.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,20 +12,21 @@ const SLOW_SHARE: f64 = 0.01;
 /// Frame rates of the slowest frames, in frames a second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Lows {
-    /// "p99": 1000 by the 99th percentile of the frame times (`Summary::p99`, interpolated). Says nothing of how slow
-    /// the frames beyond it are.
+    /// "p99": 1000 by the 99th percentile of the frame times (`Summary::p99`, interpolated). Says
+    /// nothing of how slow the frames beyond it are.
     pub p99_fps: f64,
-    /// "Mean of slowest 1 %": 1000 by the mean of the ⌈n/100⌉ longest frame times, which is the longest alone up to
-    /// n = 100.
+    /// "Mean of slowest 1 %": 1000 by the mean of the ⌈n/100⌉ longest frame times, which is the
+    /// longest alone up to n = 100.
     pub slowest_mean_fps: f64,
-    /// "1 % of the time": 1000 by the frame time that the slowest frames reach, taken from the longest on, where they
-    /// first make up 1 % of the total time. Long frames weigh by their length (CapFrameX's "1 % low integral").
+    /// "1 % of the time": 1000 by the frame time that the slowest frames reach, taken from the
+    /// longest on, where they first make up 1 % of the total time. Long frames weigh by their
+    /// length (CapFrameX's "1 % low integral").
     pub slowest_time_fps: f64,
 }
 
 impl Lows {
-    /// `frame_ms` in ms, in any order; what is not finite is left out. None when nothing is left, or where a frame
-    /// took no time, which no clock measures.
+    /// `frame_ms` in ms, in any order; what is not finite is left out. None when nothing is left,
+    /// or where a frame took no time, which no clock measures.
     pub fn of(frame_ms: &[f64]) -> Option<Lows> {
         let sorted = sorted_finite(frame_ms);
         if sorted.first().is_none_or(|shortest| *shortest <= 0.0) {
@@ -44,7 +46,8 @@ pub fn fps(ms: f64) -> f64 {
     1000.0 / ms
 }
 
-/// The frame time at which the slowest frames first make up their share of the total. None for no frame.
+/// The frame time at which the slowest frames first make up their share of the total. None for no
+/// frame.
 fn reached_by_slowest(sorted: &[f64]) -> Option<f64> {
     let share = SLOW_SHARE * sorted.iter().sum::<f64>();
     let mut sum = 0.0;
@@ -68,7 +71,9 @@ mod tests {
     }
 
     fn assert_near(got: Lows, p99: f64, mean: f64, time: f64) {
-        for (got, want) in [(got.p99_fps, p99), (got.slowest_mean_fps, mean), (got.slowest_time_fps, time)] {
+        for (got, want) in
+            [(got.p99_fps, p99), (got.slowest_mean_fps, mean), (got.slowest_time_fps, time)]
+        {
             assert!((got - want).abs() < 1e-9 * want, "{got} for {want}");
         }
     }
@@ -78,14 +83,16 @@ mod tests {
         // 300 frames: 297 of 10 ms, 2 of 20 ms, one of 100 ms; in all 2970 + 40 + 100 = 3110 ms.
         let values = frames(&[(297, 10.0), (1, 100.0), (2, 20.0)]);
         // p99 lies at position 299 · 0.99 = 296.01: between the last 10 and the first 20, 10.1 ms.
-        // The 3 slowest have the mean (100 + 20 + 20)/3 = 140/3 ms. 1 % of the time is 31.1 ms, within the one of 100.
+        // The 3 slowest have the mean (100 + 20 + 20)/3 = 140/3 ms. 1 % of the time is 31.1 ms,
+        // within the one of 100.
         assert_near(Lows::of(&values).unwrap(), 1000.0 / 10.1, 3000.0 / 140.0, 10.0);
     }
 
     #[test]
     fn one_percent_of_the_time_goes_through_frames_until_it_is_full() {
-        // 1000 frames: 990 of 9, 8 of 11, 2 of 16 ms: 8910 + 88 + 32 = 9030, 1 % is 90.3: 32 + 5·11 = 87, one more
-        // reaches it, at 11 ms. The ten slowest have the mean (32 + 88)/10 = 12. p99 at position 989.01: 9 + 0.01·2 = 9.02.
+        // 1000 frames: 990 of 9, 8 of 11, 2 of 16 ms: 8910 + 88 + 32 = 9030, 1 % is 90.3: 32 + 5·11
+        // = 87, one more reaches it, at 11 ms. The ten slowest have the mean (32 + 88)/10 = 12. p99
+        // at position 989.01: 9 + 0.01·2 = 9.02.
         let values = frames(&[(2, 16.0), (990, 9.0), (8, 11.0)]);
         assert_near(Lows::of(&values).unwrap(), 1000.0 / 9.02, 1000.0 / 12.0, 1000.0 / 11.0);
         // Exactly full counts: 100 alike, the slowest is 1 % of the time.
@@ -95,8 +102,15 @@ mod tests {
     #[test]
     fn the_slowest_percent_is_rounded_up() {
         // 101 frames: the two slowest, (30 + 10)/2 = 20 ms; of 100 it is the one of 30 ms.
-        assert!((Lows::of(&frames(&[(100, 10.0), (1, 30.0)])).unwrap().slowest_mean_fps - 50.0).abs() < 1e-9);
-        assert!((Lows::of(&frames(&[(99, 10.0), (1, 30.0)])).unwrap().slowest_mean_fps - 1000.0 / 30.0).abs() < 1e-9);
+        assert!(
+            (Lows::of(&frames(&[(100, 10.0), (1, 30.0)])).unwrap().slowest_mean_fps - 50.0).abs()
+                < 1e-9
+        );
+        assert!(
+            (Lows::of(&frames(&[(99, 10.0), (1, 30.0)])).unwrap().slowest_mean_fps - 1000.0 / 30.0)
+                .abs()
+                < 1e-9
+        );
     }
 
     #[test]

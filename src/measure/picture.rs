@@ -1,12 +1,13 @@
-//! How far two pictures of one size are apart: errors of numbers in f64, SSIM of what an eye takes for structure
-//! ([`ssim`]), FLIP of what it would see flicker ([`flip`]). Pictures come as they are, linear or for display; who calls
-//! knows which.
+//! How far two pictures of one size are apart: errors of numbers in f64, SSIM of what an eye takes
+//! for structure ([`ssim`]), FLIP of what it would see flicker ([`flip`]). Pictures come as they
+//! are, linear or for display; who calls knows which.
 
 pub mod flip;
 pub mod map;
 pub mod ssim;
 
-/// ε of relMSE: below its root, a tenth, errors count by their size and not by the value's. As in Rousselle et al. 2011.
+/// ε of relMSE: below its root, a tenth, errors count by their size and not by the value's. As in
+/// Rousselle et al. 2011.
 pub const RELATIVE_EPSILON: f64 = 0.01;
 /// What PSNR is relative to: a display's white.
 pub const PEAK: f64 = 1.0;
@@ -56,7 +57,8 @@ mod tests {
 
     #[test]
     fn a_constant_offset_by_hand() {
-        // 0.1 everywhere: the mean square 0.01 is 20 dB below 1. Of a = 0.3 the relative square is 0.01/(0.09 + 0.01).
+        // 0.1 everywhere: the mean square 0.01 is 20 dB below 1. Of a = 0.3 the relative square is
+        // 0.01/(0.09 + 0.01).
         let e = errors((0..100).map(|_| (0.3, 0.4))).unwrap();
         assert!((e.rmse - 0.1).abs() < 1e-15 && (e.max_abs - 0.1).abs() < 1e-15);
         assert!((e.psnr_db - 20.0).abs() < 1e-12 && (e.rel_mse - 0.1).abs() < 1e-14);
@@ -67,17 +69,22 @@ mod tests {
 
     #[test]
     fn one_pixel_off_is_its_share() {
-        // One of 16 off by 2: RMSE 2/4, greatest 2, PSNR −10 log₁₀ ¼ = 6.0206 dB; relative 4/(0 + 0.01)/16 = 25.
+        // One of 16 off by 2: RMSE 2/4, greatest 2, PSNR −10 log₁₀ ¼ = 6.0206 dB; relative 4/(0 +
+        // 0.01)/16 = 25.
         let e = errors((0..16).map(|i| (0.0, if i == 3 { -2.0 } else { 0.0 }))).unwrap();
         assert_eq!((e.rmse, e.max_abs), (0.5, 2.0));
-        assert!((e.psnr_db - 6.020_599_913_279_624).abs() < 1e-12 && (e.rel_mse - 25.0).abs() < 1e-12);
+        assert!(
+            (e.psnr_db - 6.020_599_913_279_624).abs() < 1e-12 && (e.rel_mse - 25.0).abs() < 1e-12
+        );
     }
 
     #[test]
     fn the_cases_tell_wrong_metrics_apart() {
         // The two cases above, and what slips of the formulas would make of them.
-        let cases: [Vec<(f64, f64)>; 2] =
-            [vec![(0.3, 0.4); 100], (0..16).map(|i| (0.0, if i == 3 { -2.0 } else { 0.0 })).collect()];
+        let cases: [Vec<(f64, f64)>; 2] = [
+            vec![(0.3, 0.4); 100],
+            (0..16).map(|i| (0.0, if i == 3 { -2.0 } else { 0.0 })).collect(),
+        ];
         let mean = |of: &[(f64, f64)], f: &dyn Fn(f64, f64) -> f64| {
             of.iter().map(|(a, b)| f(*a, *b)).sum::<f64>() / of.len() as f64
         };
@@ -86,9 +93,13 @@ mod tests {
             ("mean difference", |e, m| (e.rmse, m(&|a, b| (b - a).abs()))),
             ("no root", |e, m| (e.rmse, m(&|a, b| (b - a).powi(2)))),
             ("greatest with its sign", |e, m| (e.max_abs, 16.0 * m(&|a, b| b - a))),
-            ("relative to b", |e, m| (e.rel_mse, m(&|a, b| (b - a).powi(2) / (b * b + RELATIVE_EPSILON)))),
+            ("relative to b", |e, m| {
+                (e.rel_mse, m(&|a, b| (b - a).powi(2) / (b * b + RELATIVE_EPSILON)))
+            }),
             ("no ε", |e, m| (e.rel_mse, m(&|a, b| (b - a).powi(2) / (a * a + 1e-12)))),
-            ("decibels of the root", |e, m| (e.psnr_db, -10.0 * m(&|a, b| (b - a).powi(2)).sqrt().log10())),
+            ("decibels of the root", |e, m| {
+                (e.psnr_db, -10.0 * m(&|a, b| (b - a).powi(2)).sqrt().log10())
+            }),
         ];
         for (what, of) in wrong {
             let is_told = cases.iter().any(|case| {
@@ -109,7 +120,11 @@ mod tests {
 
     #[test]
     fn pixels_that_are_no_numbers_are_counted_once() {
-        let bad = [[0.0, f64::NAN, f64::INFINITY, 1.0], [1e300, -1e300, 0.0, 1.0], [0.0, 0.0, 0.0, f64::NEG_INFINITY]];
+        let bad = [
+            [0.0, f64::NAN, f64::INFINITY, 1.0],
+            [1e300, -1e300, 0.0, 1.0],
+            [0.0, 0.0, 0.0, f64::NEG_INFINITY],
+        ];
         assert_eq!(n_not_finite(&bad), 2);
     }
 }

@@ -37,10 +37,17 @@ pub(crate) fn normal(random: &mut SplitMix64, n: usize) -> Vec<f64> {
     (0..n).map(|_| random.normal()).collect()
 }
 
-/// Frame times as a machine gives them: about `median`, lognormal with `sd` of the logarithm under a first-order
-/// autoregression with `rho`, and one in twenty late by an exponential tenth on top. (The median so lies 0.1 `sd` higher.)
+/// Frame times as a machine gives them: about `median`, lognormal with `sd` of the logarithm under
+/// a first-order autoregression with `rho`, and one in twenty late by an exponential tenth on top.
+/// (The median so lies 0.1 `sd` higher.)
 #[cfg(test)]
-pub(crate) fn frame_times(random: &mut SplitMix64, n: usize, median: f64, sd: f64, rho: f64) -> Vec<f64> {
+pub(crate) fn frame_times(
+    random: &mut SplitMix64,
+    n: usize,
+    median: f64,
+    sd: f64,
+    rho: f64,
+) -> Vec<f64> {
     const LATE_SHARE: f64 = 0.05;
     const LATE_BY: f64 = 0.1;
     let mut state = random.normal();

@@ -1,8 +1,9 @@
-//! What a list of times says. How sure that is: [`super::bootstrap`]; frame rates of the slowest: [`super::lows`].
+//! What a list of times says. How sure that is: [`super::bootstrap`]; frame rates of the slowest:
+//! [`super::lows`].
 //!
-//! Percentiles are linear interpolations between order statistics ("type 7" of Hyndman and Fan 1996, the default of
-//! NumPy and R): the p-th of n sorted values lies at position (n − 1) p counted from 0. Values that are not finite
-//! are counted and left out, never averaged in.
+//! Percentiles are linear interpolations between order statistics ("type 7" of Hyndman and Fan
+//! 1996, the default of NumPy and R): the p-th of n sorted values lies at position (n − 1) p
+//! counted from 0. Values that are not finite are counted and left out, never averaged in.
 
 use serde::{Deserialize, Serialize};
 
@@ -57,8 +58,8 @@ pub fn median(values: &[f64]) -> Option<f64> {
     percentile(values, 0.5)
 }
 
-/// The median by selection, which thousands of resamples need, and a sort would make slow. `values` is not empty and
-/// all finite; its order is lost.
+/// The median by selection, which thousands of resamples need, and a sort would make slow. `values`
+/// is not empty and all finite; its order is lost.
 pub(super) fn median_by_selection(values: &mut [f64]) -> f64 {
     let n = values.len();
     let (lower_part, &mut upper, _) = values.select_nth_unstable_by(n / 2, f64::total_cmp);
@@ -92,7 +93,8 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// Two passes: E[x²] − E[x]² loses every digit when the spread is small beside the mean, as frame times are.
+/// Two passes: E[x²] − E[x]² loses every digit when the spread is small beside the mean, as frame
+/// times are.
 fn standard_deviation(values: &[f64], mean: f64) -> f64 {
     let sum_of_squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
     if values.len() < 2 { f64::NAN } else { (sum_of_squares / (values.len() - 1) as f64).sqrt() }
@@ -111,7 +113,9 @@ mod tests {
         assert_eq!(summary.sd, Some((5.0_f64 / 3.0).sqrt()));
         // Positions 3p: 0.03, 0.15, 1.5, 2.85, 2.97. Half an ulp each way of the product.
         let expected = [1.03, 1.15, 2.5, 3.85, 3.97];
-        for (got, want) in [summary.p1, summary.p5, summary.p50, summary.p95, summary.p99].iter().zip(expected) {
+        for (got, want) in
+            [summary.p1, summary.p5, summary.p50, summary.p95, summary.p99].iter().zip(expected)
+        {
             assert!((got - want).abs() < 1e-15 * 4.0, "{got} for {want}");
         }
     }
@@ -119,7 +123,9 @@ mod tests {
     #[test]
     fn percentiles_of_zero_to_hundred_are_themselves() {
         let values: Vec<f64> = (0..=100).rev().map(f64::from).collect();
-        for (p, want) in [(0.0, 0.0), (0.01, 1.0), (0.5, 50.0), (0.95, 95.0), (0.99, 99.0), (1.0, 100.0)] {
+        for (p, want) in
+            [(0.0, 0.0), (0.01, 1.0), (0.5, 50.0), (0.95, 95.0), (0.99, 99.0), (1.0, 100.0)]
+        {
             assert!((percentile(&values, p).unwrap() - want).abs() < 1e-12);
         }
     }
@@ -149,9 +155,13 @@ mod tests {
     #[test]
     fn normal_percentiles_are_where_they_should_be() {
         let summary = Summary::of(&normal(&mut SplitMix64(3), 100_000)).unwrap();
-        // Five standard errors: sqrt(p (1 − p) / n) / density, 0.0040 at the median and 0.0118 at p1 and p99.
+        // Five standard errors: sqrt(p (1 − p) / n) / density, 0.0040 at the median and 0.0118 at
+        // p1 and p99.
         assert!(summary.p50.abs() < 5.0 * 0.0040);
-        assert!((summary.p99 - 2.3263).abs() < 5.0 * 0.0118 && (summary.p1 + 2.3263).abs() < 5.0 * 0.0118);
+        assert!(
+            (summary.p99 - 2.3263).abs() < 5.0 * 0.0118
+                && (summary.p1 + 2.3263).abs() < 5.0 * 0.0118
+        );
         // The standard error of a normal sample's sd is sd / sqrt(2n) = 0.0022.
         assert!(summary.sd.is_some_and(|sd| (sd - 1.0).abs() < 5.0 * 0.0022));
     }

@@ -1,8 +1,10 @@
-//! What every thread did when: the spans of the `tracing` crate, collected while a time line is asked for.
+//! What every thread did when: the spans of the `tracing` crate, collected while a time line is
+//! asked for.
 //!
-//! A span is a zone from when a thread enters it to when it leaves; zones of a thread so lie one in another or side by
-//! side. What is known of a zone is 24 bytes, and at most [`MAX_ZONES`] are kept, the first ones: a time line's begin is
-//! worth more than a torn end. How many came after that is counted.
+//! A span is a zone from when a thread enters it to when it leaves; zones of a thread so lie one in
+//! another or side by side. What is known of a zone is 24 bytes, and at most [`MAX_ZONES`] are
+//! kept, the first ones: a time line's begin is worth more than a torn end. How many came after
+//! that is counted.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -60,7 +62,13 @@ impl Default for Zones {
 
 impl Zones {
     fn at_most(max_zones: usize) -> Zones {
-        let nothing = Collected { epoch: Instant::now(), names: vec![], threads: vec![], zones: vec![], n_dropped: 0 };
+        let nothing = Collected {
+            epoch: Instant::now(),
+            names: vec![],
+            threads: vec![],
+            zones: vec![],
+            n_dropped: 0,
+        };
         Zones { collected: Arc::new(Mutex::new(nothing)), max_zones }
     }
 
@@ -139,8 +147,10 @@ impl<S: Subscriber + for<'a> LookupSpan<'a>> Layer<S> for Zones {
             collected.n_dropped += 1;
             return;
         }
-        let i_thread = index_of(&mut collected.threads, std::thread::current().name().unwrap_or("unnamed"));
-        let [begin_ns, end_ns] = [begin, end].map(|at| at.saturating_duration_since(collected.epoch).as_nanos() as u64);
+        let i_thread =
+            index_of(&mut collected.threads, std::thread::current().name().unwrap_or("unnamed"));
+        let [begin_ns, end_ns] =
+            [begin, end].map(|at| at.saturating_duration_since(collected.epoch).as_nanos() as u64);
         collected.zones.push(Zone { i_name, i_thread, begin_ns, end_ns });
     }
 }
@@ -184,8 +194,13 @@ mod tests {
             other.spawn(move || dispatcher::with_default(&dispatch, work)).unwrap().join().unwrap();
         });
         assert_eq!(found.names, ["step", "pass first", "pass second"]);
-        assert_eq!((found.threads.len(), found.threads[1].as_str(), found.n_dropped), (2, "other", 0));
-        let of = |i_thread| found.zones.iter().filter(move |zone| zone.i_thread == i_thread).collect::<Vec<_>>();
+        assert_eq!(
+            (found.threads.len(), found.threads[1].as_str(), found.n_dropped),
+            (2, "other", 0)
+        );
+        let of = |i_thread| {
+            found.zones.iter().filter(move |zone| zone.i_thread == i_thread).collect::<Vec<_>>()
+        };
         for zones in [of(0), of(1)] {
             // In the order in which they ended: the outer one last.
             let [first, second, step] = zones[..] else { panic!("{zones:?}") };

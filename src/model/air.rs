@@ -1,4 +1,5 @@
-//! The air that a scene's clouds form in: where a parcel from the ground becomes saturated (docs/model.md §4).
+//! The air that a scene's clouds form in: where a parcel from the ground becomes saturated
+//! (docs/model.md §4).
 
 use super::moisture::{Level, Parcel, Saturation, T0_K, Vapour};
 
@@ -31,12 +32,14 @@ impl Air {
         self.ground + self.condensation().height_m / self.metres_per_unit
     }
 
-    /// How much higher a parcel of the same vapour condenses that is warmer by a kelvin, scene units.
+    /// How much higher a parcel of the same vapour condenses that is warmer by a kelvin, scene
+    /// units.
     pub fn lift(&self) -> f64 {
         let t_k = self.parcel.t_k + 1.0;
         let humidity = self.law.relative_humidity(self.parcel.vapour_pa(self.law), t_k);
         let warmer = Parcel { t_k, humidity, ..self.parcel };
-        (warmer.condensation(self.law).height_m - self.condensation().height_m) / self.metres_per_unit
+        (warmer.condensation(self.law).height_m - self.condensation().height_m)
+            / self.metres_per_unit
     }
 }
 
@@ -46,7 +49,8 @@ mod tests {
 
     #[test]
     fn bases_are_in_the_scenes_units() {
-        // At 20 °C and 60 % the dew point is 12.0 °C; by the rule of 125 m a kelvin (Espy) the base is 1000 m up.
+        // At 20 °C and 60 % the dew point is 12.0 °C; by the rule of 125 m a kelvin (Espy) the base
+        // is 1000 m up.
         let air = Air { ground: -2.0, ..Air::FAIR };
         assert!((air.parcel.dew_point_k(air.law) - T0_K - 12.0).abs() < 0.05);
         assert!((air.condensation().height_m - 1000.0).abs() < 20.0, "{:?}", air.condensation());

@@ -1,6 +1,6 @@
-//! The BRDF basis, C (12): the diffuse lobe and the principal components of Blinn–Phong lobes (model.md §6).
-//! f = K_d·(1/π) + K_s Σ_b c_b(n_s) v_b(γ): basis 0 is 1/π and its coefficient is K_d itself; the lobes stand on the
-//! vectors alone.
+//! The BRDF basis, C (12): the diffuse lobe and the principal components of Blinn–Phong lobes
+//! (model.md §6). f = K_d·(1/π) + K_s Σ_b c_b(n_s) v_b(γ): basis 0 is 1/π and its coefficient is
+//! K_d itself; the lobes stand on the vectors alone.
 
 use nalgebra::{DMatrix, SVD};
 
@@ -9,33 +9,37 @@ use super::material::Brdf;
 /// How the lobes that the basis is made from are spread over the range of exponents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sampling {
-    /// Evenly in ln n_s, each lobe of unit norm. Over a range that begins below 1, evenly in ln(1 + n_s).
+    /// Evenly in ln n_s, each lobe of unit norm. Over a range that begins below 1, evenly in ln(1 +
+    /// n_s).
     Log,
     /// Evenly in n_s, each lobe as it is: C's own.
     Uniform,
 }
 
 impl Sampling {
-    pub const NAMES: [(&'static str, Sampling); 2] = [("log", Sampling::Log), ("uniform", Sampling::Uniform)];
+    pub const NAMES: [(&'static str, Sampling); 2] =
+        [("log", Sampling::Log), ("uniform", Sampling::Uniform)];
 }
 
 /// Most bases: the diffuse one and 31 of lobes.
 pub const MAX_BASES: u32 = 32;
 
-/// Nodes of a tabulated lobe, even in t = (1 − cos γ)^¼. A lobe is nearly exp(−n_s t⁴), whose second derivative by t is
-/// at most 3.83 √n_s of its peak, so linear interpolation is wrong by at most 3.83 √n_s/(8·1024²) of it: 4.6·10⁻⁵ at
-/// n_s = 10⁴, 4.6·10⁻⁴ at 10⁶. 1024 nodes would do as well; with 1025 the spacing is 2⁻¹⁰, and nodes are exact in f32.
+/// Nodes of a tabulated lobe, even in t = (1 − cos γ)^¼. A lobe is nearly exp(−n_s t⁴), whose
+/// second derivative by t is at most 3.83 √n_s of its peak, so linear interpolation is wrong by at
+/// most 3.83 √n_s/(8·1024²) of it: 4.6·10⁻⁵ at n_s = 10⁴, 4.6·10⁻⁴ at 10⁶. 1024 nodes would do as
+/// well; with 1025 the spacing is 2⁻¹⁰, and nodes are exact in f32.
 pub const N_NODES: usize = 1025;
 
 /// N_s of model.md §6: the lobes that the basis is made from.
 const N_SAMPLES: usize = 64;
 
-/// Exponents at which [`Basis::greatest_error`] looks. The error rises and falls about once a vector, 31 times at most,
-/// and 33 points a swing find its top to (π/66)²/2 = 0.1 % of it.
+/// Exponents at which [`Basis::greatest_error`] looks. The error rises and falls about once a
+/// vector, 31 times at most, and 33 points a swing find its top to (π/66)²/2 = 0.1 % of it.
 const N_PROBES: usize = 1024;
 
-/// Weights of the outermost nodes in Gregory's rule with three differences; the others have 1. Plain trapezoids would
-/// be wrong by 6·10⁻⁸ in the norm of n_s = 10⁶ and by 3·10⁻⁶ in that of n_s = 0.
+/// Weights of the outermost nodes in Gregory's rule with three differences; the others have 1.
+/// Plain trapezoids would be wrong by 6·10⁻⁸ in the norm of n_s = 10⁶ and by 3·10⁻⁶ in that of n_s
+/// = 0.
 const GREGORY: [f64; 4] = [251.0 / 720.0, 299.0 / 240.0, 211.0 / 240.0, 739.0 / 720.0];
 
 /// t at node `i`: from 0 (γ = 0) to 1 (γ = π/2).
@@ -48,7 +52,8 @@ pub fn node(i: usize) -> f64 {
     node_t(i).powi(4)
 }
 
-/// Linear interpolation in t of a table at w = 1 − cos γ, cut to [0, 1]. `table`: [`N_NODES`] values.
+/// Linear interpolation in t of a table at w = 1 − cos γ, cut to [0, 1]. `table`: [`N_NODES`]
+/// values.
 pub fn evaluate(table: &[f64], w: f64) -> f64 {
     let x = w.clamp(0.0, 1.0).sqrt().sqrt() * (N_NODES - 1) as f64;
     let i = (x as usize).min(N_NODES - 2);
@@ -68,12 +73,14 @@ pub struct Basis {
 }
 
 impl Basis {
-    /// `exponents`: least and greatest n_s, finite and not negative. `n_bases` = N_b counts the diffuse one.
+    /// `exponents`: least and greatest n_s, finite and not negative. `n_bases` = N_b counts the
+    /// diffuse one.
     pub fn new(exponents: [f64; 2], n_bases: u32, sampling: Sampling) -> Basis {
         let weights = quadrature();
         let lobes = samples(exponents, sampling, &weights);
         // The lobes are the columns: what §6 calls right-singular vectors are the left ones here.
-        let weighted = DMatrix::from_fn(N_NODES, lobes.len(), |i, k| weights[i].sqrt() * lobes[k][i]);
+        let weighted =
+            DMatrix::from_fn(N_NODES, lobes.len(), |i, k| weights[i].sqrt() * lobes[k][i]);
         let svd = SVD::new(weighted, false, true);
         let singular_values: Vec<f64> = svd.singular_values.iter().copied().collect();
         let least = singular_values[0] * N_NODES as f64 * f64::EPSILON;
@@ -82,7 +89,8 @@ impl Basis {
         let Some(shares) = svd.v_t else { unreachable!("the decomposition was asked for them") };
         let mut vectors: Vec<Vec<f64>> = Vec::with_capacity(n_vectors);
         for (b, singular_value) in singular_values.iter().enumerate().take(n_vectors) {
-            // A sum of the lobes' own values: smooth, and known where the weight is 0 (the first node and the last).
+            // A sum of the lobes' own values: smooth, and known where the weight is 0 (the first
+            // node and the last).
             let mut vector = vec![0.0; N_NODES];
             for (share, lobe) in shares.row(b).iter().zip(&lobes) {
                 add(&mut vector, share / singular_value, lobe);
@@ -103,7 +111,8 @@ impl Basis {
         self.n_asked
     }
 
-    /// The diffuse basis and the vectors that were kept: fewer than asked for where the lobes have no more that differ.
+    /// The diffuse basis and the vectors that were kept: fewer than asked for where the lobes have
+    /// no more that differ.
     pub fn n_bases(&self) -> u32 {
         self.vectors.len() as u32 + 1
     }
@@ -118,7 +127,8 @@ impl Basis {
         product(a, b, &self.weights)
     }
 
-    /// Of all lobes that the basis is made from, falling; the first `n_bases` − 1 are those of the vectors.
+    /// Of all lobes that the basis is made from, falling; the first `n_bases` − 1 are those of the
+    /// vectors.
     pub fn singular_values(&self) -> &[f64] {
         &self.singular_values
     }
@@ -149,7 +159,10 @@ impl Basis {
     /// The exponent of the range with the greatest error, and that error.
     pub fn worst(&self) -> (f64, f64) {
         let tried = even(self.exponents, N_PROBES, true).into_iter().map(|ns| (ns, self.error(ns)));
-        tried.fold((self.exponents[0], 0.0), |worst, next| if next.1 > worst.1 { next } else { worst })
+        tried.fold(
+            (self.exponents[0], 0.0),
+            |worst, next| if next.1 > worst.1 { next } else { worst },
+        )
     }
 
     /// `n` exponents over the range, ends included, even in ln(1 + n_s).
@@ -174,8 +187,12 @@ impl Basis {
 fn samples(exponents: [f64; 2], sampling: Sampling, weights: &[f64]) -> Vec<Vec<f64>> {
     let n = if exponents[0] == exponents[1] { 1 } else { N_SAMPLES };
     let mut lobes = match sampling {
-        Sampling::Uniform => return even_by(exponents, n, |ns| ns, |x| x).into_iter().map(lobe_table).collect(),
-        Sampling::Log => even(exponents, n, exponents[0] < 1.0).into_iter().map(lobe_table).collect::<Vec<_>>(),
+        Sampling::Uniform => {
+            return even_by(exponents, n, |ns| ns, |x| x).into_iter().map(lobe_table).collect();
+        }
+        Sampling::Log => {
+            even(exponents, n, exponents[0] < 1.0).into_iter().map(lobe_table).collect::<Vec<_>>()
+        }
     };
     for lobe in &mut lobes {
         let scale = norm(lobe, weights).recip();
@@ -184,14 +201,24 @@ fn samples(exponents: [f64; 2], sampling: Sampling, weights: &[f64]) -> Vec<Vec<
     lobes
 }
 
-/// Even in ln n_s, or (`from_zero`) in ln(1 + n_s): there the product of two lobes of unit norm, 1/cosh(½ ln((1 + a)/(1 +
-/// b))), depends on their distance alone, and n_s = 0 lies at a finite place.
+/// Even in ln n_s, or (`from_zero`) in ln(1 + n_s): there the product of two lobes of unit norm,
+/// 1/cosh(½ ln((1 + a)/(1 + b))), depends on their distance alone, and n_s = 0 lies at a finite
+/// place.
 fn even(exponents: [f64; 2], n: usize, from_zero: bool) -> Vec<f64> {
-    if from_zero { even_by(exponents, n, f64::ln_1p, f64::exp_m1) } else { even_by(exponents, n, f64::ln, f64::exp) }
+    if from_zero {
+        even_by(exponents, n, f64::ln_1p, f64::exp_m1)
+    } else {
+        even_by(exponents, n, f64::ln, f64::exp)
+    }
 }
 
 /// `n` values from `low` to `high`, both included to the bit, even under `law`.
-fn even_by([low, high]: [f64; 2], n: usize, law: fn(f64) -> f64, inverse: fn(f64) -> f64) -> Vec<f64> {
+fn even_by(
+    [low, high]: [f64; 2],
+    n: usize,
+    law: fn(f64) -> f64,
+    inverse: fn(f64) -> f64,
+) -> Vec<f64> {
     let (a, b) = (law(low), law(high));
     let at = |i: usize| match i {
         0 => low,
@@ -210,7 +237,8 @@ fn quadrature() -> Vec<f64> {
     let weight = |i: usize| {
         let t = node_t(i);
         let end = i.min(N_NODES - 1 - i);
-        GREGORY.get(end).copied().unwrap_or(1.0) * 16.0 * t.powi(3) * (1.0 - t.powi(4)) / (N_NODES - 1) as f64
+        GREGORY.get(end).copied().unwrap_or(1.0) * 16.0 * t.powi(3) * (1.0 - t.powi(4))
+            / (N_NODES - 1) as f64
     };
     (0..N_NODES).map(weight).collect()
 }
@@ -227,8 +255,9 @@ fn add(to: &mut [f64], share: f64, table: &[f64]) {
     to.iter_mut().zip(table).for_each(|(sum, value)| *sum += share * value);
 }
 
-/// Takes out of `vector` what lies along `others`, and gives it unit norm. Division by a small singular value has
-/// blown up roundings along the greater ones; the second round takes out what the first one's own rounding left.
+/// Takes out of `vector` what lies along `others`, and gives it unit norm. Division by a small
+/// singular value has blown up roundings along the greater ones; the second round takes out what
+/// the first one's own rounding left.
 fn orthonormalise(vector: &mut [f64], others: &[Vec<f64>], weights: &[f64]) {
     for _ in 0..2 {
         for other in others {
@@ -256,25 +285,41 @@ mod tests {
     fn samples_are_even_and_meet_the_ends_of_the_range() {
         assert_eq!(even_by([1.0, 4.0], 4, |x| x, |x| x), [1.0, 2.0, 3.0, 4.0]);
         let octaves = even([1.0, 64.0], 7, false);
-        assert!(octaves.iter().zip([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0]).all(|(a, b)| (a / b - 1.0).abs() < 1e-14));
+        assert!(
+            octaves
+                .iter()
+                .zip([1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0])
+                .all(|(a, b)| (a / b - 1.0).abs() < 1e-14)
+        );
         let from_zero = even([0.0, 63.0], 7, true);
-        assert!(from_zero.iter().zip([0.0, 1.0, 3.0, 7.0, 15.0, 31.0, 63.0]).all(|(a, b)| (a - b).abs() < 1e-12));
+        assert!(
+            from_zero
+                .iter()
+                .zip([0.0, 1.0, 3.0, 7.0, 15.0, 31.0, 63.0])
+                .all(|(a, b)| (a - b).abs() < 1e-12)
+        );
         assert_eq!((from_zero[0], from_zero[6]), (0.0, 63.0));
     }
 
     #[test]
     fn the_quadrature_knows_the_norms_of_lobes() {
         let weights = quadrature();
-        // ‖lobe‖² = ((n + 2)/2π)² · 4/(2n + 2). Gregory's next term is 3/160 h Δ⁴g: near t = 0 g = 16 t³ (1 − 2 n t⁴) of
-        // the peak's square, Δ⁴ t⁷ = 8400 h⁷ and the norm 2/n, together 2520 n² h⁸ of it. At t = 1 it is greatest for
-        // n = 1, g = 16·64 (1 − t)³ and steeper terms: some 10⁵ · 3/160 h⁵ = 2·10⁻¹².
+        // ‖lobe‖² = ((n + 2)/2π)² · 4/(2n + 2). Gregory's next term is 3/160 h Δ⁴g: near t = 0 g =
+        // 16 t³ (1 − 2 n t⁴) of the peak's square, Δ⁴ t⁷ = 8400 h⁷ and the norm 2/n, together 2520
+        // n² h⁸ of it. At t = 1 it is greatest for n = 1, g = 16·64 (1 − t)³ and steeper terms:
+        // some 10⁵ · 3/160 h⁵ = 2·10⁻¹².
         for ns in [0.0, 1.0, 2.0, 10.0, 1e3, 1e4, 1e5, 1e6] {
             let exact = ((ns + 2.0) / std::f64::consts::TAU).powi(2) * 4.0 / (2.0 * ns + 2.0);
             let measured = product(&lobe_table(ns), &lobe_table(ns), &weights);
             let bound = 5e-12 + 2520.0 * ns * ns * 1024f64.powi(-8);
-            assert!((measured / exact - 1.0).abs() < bound, "n_s = {ns}: {}", measured / exact - 1.0);
+            assert!(
+                (measured / exact - 1.0).abs() < bound,
+                "n_s = {ns}: {}",
+                measured / exact - 1.0
+            );
         }
-        // 1/cosh(½ ln((1 + a)/(1 + b))) for lobes of unit norm: a = 1, b = 7 gives 1/cosh(ln 2) = 0.8.
+        // 1/cosh(½ ln((1 + a)/(1 + b))) for lobes of unit norm: a = 1, b = 7 gives 1/cosh(ln 2) =
+        // 0.8.
         let (a, b) = (lobe_table(1.0), lobe_table(7.0));
         let cosine = product(&a, &b, &weights) / (norm(&a, &weights) * norm(&b, &weights));
         assert!((cosine - 0.8).abs() < 1e-9, "{cosine}");
@@ -282,7 +327,9 @@ mod tests {
 
     #[test]
     fn the_greatest_entry_becomes_positive_the_first_of_equal_ones() {
-        for (given, fixed) in [([1.0, -3.0, 2.0], [-1.0, 3.0, -2.0]), ([-2.0, 2.0, 0.0], [2.0, -2.0, 0.0])] {
+        for (given, fixed) in
+            [([1.0, -3.0, 2.0], [-1.0, 3.0, -2.0]), ([-2.0, 2.0, 0.0], [2.0, -2.0, 0.0])]
+        {
             let mut vector = given;
             fix_sign(&mut vector);
             assert_eq!(vector, fixed);

@@ -1,11 +1,13 @@
-//! A cloud's macrostructure as boxes: P, Table 1 and P (1)–(11). The rules that generation on the GPU and its
-//! reference share as *data*: the two forms, the radius law's constants, the bound on rejection.
+//! A cloud's macrostructure as boxes: P, Table 1 and P (1)–(11). The rules that generation on the
+//! GPU and its reference share as *data*: the two forms, the radius law's constants, the bound on
+//! rejection.
 
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
-/// Attempts before a particle is folded back into its box. P's Fig. 1 has no bound; a needle of a box accepts
-/// almost nothing, and 64 attempts of 50 % acceptance already fail only once in 2⁶⁴ particles.
+/// Attempts before a particle is folded back into its box. P's Fig. 1 has no bound; a needle of a
+/// box accepts almost nothing, and 64 attempts of 50 % acceptance already fail only once in 2⁶⁴
+/// particles.
 pub const MAX_ATTEMPTS: u32 = 64;
 
 /// One line of a box file.
@@ -30,7 +32,8 @@ pub enum Form {
 }
 
 impl Form {
-    pub const NAMES: [(&'static str, Form); 2] = [("centred", Form::Centred), ("printed", Form::Printed)];
+    pub const NAMES: [(&'static str, Form); 2] =
+        [("centred", Form::Centred), ("printed", Form::Printed)];
 }
 
 /// P (10)–(11) without scale: R + π/2 sin R.
@@ -38,8 +41,8 @@ pub fn radius_shape(r: f64) -> f64 {
     r + FRAC_PI_2 * r.sin()
 }
 
-/// Greatest value of [`radius_shape`] over [0, `radius_max`]. Interior maxima lie at R* + 2πk, cos R* = −2/π,
-/// and grow with k, so the last one inside and the right end are the only candidates.
+/// Greatest value of [`radius_shape`] over [0, `radius_max`]. Interior maxima lie at R* + 2πk, cos
+/// R* = −2/π, and grow with k, so the last one inside and the right end are the only candidates.
 pub fn radius_shape_max(radius_max: f64) -> f64 {
     let first = (-2.0 / PI).acos();
     let end = radius_shape(radius_max);
@@ -59,14 +62,16 @@ pub fn radius_factor(form: Form, radius_max: f64) -> f64 {
     }
 }
 
-/// Mean radius of a box's particles: the mean of `factor`·(R + π/2 sin R) over R uniform in [0, R_max].
+/// Mean radius of a box's particles: the mean of `factor`·(R + π/2 sin R) over R uniform in [0,
+/// R_max].
 pub fn mean_radius(form: Form, radius_max: f64) -> f64 {
     if radius_max <= 0.0 {
         return 0.0;
     }
     // 1 − cos R = 2 sin²(R/2) keeps its accuracy for small R.
     let half = (0.5 * radius_max).sin();
-    radius_factor(form, radius_max) * (0.5 * radius_max + FRAC_PI_2 * 2.0 * half * half / radius_max)
+    radius_factor(form, radius_max)
+        * (0.5 * radius_max + FRAC_PI_2 * 2.0 * half * half / radius_max)
 }
 
 /// Greatest radius a particle of the box can have.
@@ -81,8 +86,11 @@ mod tests {
     #[test]
     fn radius_maximum_by_scan() {
         for radius_max in [0.3, 1.0, 2.0, 2.26, 2.3, 3.0, 5.0, 8.0, 8.6, 20.0] {
-            let scan = (0..=200_000).map(|i| radius_shape(radius_max * f64::from(i) / 200_000.0)).fold(0.0, f64::max);
-            // The scan's step h misses a maximum by at most h²/2 · max|g''| = (R/2e5)²/2 · π/2 < 1e-8.
+            let scan = (0..=200_000)
+                .map(|i| radius_shape(radius_max * f64::from(i) / 200_000.0))
+                .fold(0.0, f64::max);
+            // The scan's step h misses a maximum by at most h²/2 · max|g''| = (R/2e5)²/2 · π/2 <
+            // 1e-8.
             assert!((radius_shape_max(radius_max) - scan).abs() < 1e-8, "{radius_max}");
         }
     }
@@ -102,7 +110,9 @@ mod tests {
         for form in [Form::Centred, Form::Printed] {
             for radius_max in [0.01, 2.0, 7.0] {
                 let n = 20_000;
-                let sum: f64 = (0..n).map(|i| radius_shape(radius_max * (f64::from(i) + 0.5) / f64::from(n))).sum();
+                let sum: f64 = (0..n)
+                    .map(|i| radius_shape(radius_max * (f64::from(i) + 0.5) / f64::from(n)))
+                    .sum();
                 let mean = radius_factor(form, radius_max) * sum / f64::from(n);
                 // Midpoint rule: R²/24n² · max|g''| relative to g: below 1e-7.
                 assert!((mean_radius(form, radius_max) / mean - 1.0).abs() < 1e-7);

@@ -1,5 +1,5 @@
-//! The camera: fixed, or a Catmull–Rom path. Every pixel's ray goes through its centre, row 0 is the top, the
-//! frustum is OpenGL's perspective.
+//! The camera: fixed, or a Catmull–Rom path. Every pixel's ray goes through its centre, row 0 is
+//! the top, the frustum is OpenGL's perspective.
 
 use glam::DVec3;
 
@@ -31,8 +31,9 @@ pub struct Pose {
 }
 
 impl Camera {
-    /// Pose at `time_s`; before the first and after the last key the camera stands still. `None` where the
-    /// camera looks nowhere: position equals target, the view runs along `up`, or a number is not finite.
+    /// Pose at `time_s`; before the first and after the last key the camera stands still. `None`
+    /// where the camera looks nowhere: position equals target, the view runs along `up`, or a
+    /// number is not finite.
     pub fn pose(&self, time_s: f64) -> Option<Pose> {
         let (position, target) = self.interpolate(time_s);
         let forward = (target - position).try_normalize()?;

@@ -23,8 +23,8 @@ pub struct Cloud {
     pub source: CloudSource,
     /// Of the cloud's own origin at time 0, in the scene.
     pub position: DVec3,
-    /// Scene units per second; the cloud's origin at time t is position + wind·t. A disc stands still, and the wind carries its
-    /// particles from where they were born.
+    /// Scene units per second; the cloud's origin at time t is position + wind·t. A disc stands
+    /// still, and the wind carries its particles from where they were born.
     pub wind: DVec3,
     pub gust: Gust,
     pub growth: Growth,
@@ -35,7 +35,8 @@ pub struct Cloud {
     pub seed: u32,
 }
 
-/// Which way a cloud's facets look where the density around them has no direction (docs/model.md §11 "facets").
+/// Which way a cloud's facets look where the density around them has no direction (docs/model.md
+/// §11 "facets").
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Facing {
     /// Away from the cloud's centre.
@@ -45,17 +46,18 @@ pub enum Facing {
 }
 
 impl Facing {
-    pub const NAMES: [(&'static str, Facing); 2] = [("outward", Facing::Outward), ("up", Facing::Up)];
+    pub const NAMES: [(&'static str, Facing); 2] =
+        [("outward", Facing::Outward), ("up", Facing::Up)];
 }
 
-/// So far below a cloud lies what its facets look away from where they look up: directions differ by the cloud's extent over
-/// that.
+/// So far below a cloud lies what its facets look away from where they look up: directions differ
+/// by the cloud's extent over that.
 const FAR_BELOW: f64 = 1e9;
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum CloudSource {
-    /// P (1)–(11). `optical_depth` is through the centre of a blob of the box's mean radius; `radius_scale`
-    /// multiplies the file's radii.
+    /// P (1)–(11). `optical_depth` is through the centre of a blob of the box's mean radius;
+    /// `radius_scale` multiplies the file's radii.
     Boxes { boxes: Vec<CloudBox>, form: Form, optical_depth: f64, radius_scale: f64 },
     /// A list of blobs as given.
     Particles(Vec<Particle>),
@@ -75,12 +77,13 @@ pub struct Particle {
     pub aspect: f64,
     /// Peak extinction per unit length.
     pub kappa: f64,
-    /// Linear RGB: radiance where the lighting mode is "none", a factor on the material's K_d otherwise.
+    /// Linear RGB: radiance where the lighting mode is "none", a factor on the material's K_d
+    /// otherwise.
     pub color: DVec3,
 }
 
-/// A run of consecutive particles that share an origin, so that their f32 positions keep their accuracy
-/// wherever the origin lies: a box, or a whole particle list.
+/// A run of consecutive particles that share an origin, so that their f32 positions keep their
+/// accuracy wherever the origin lies: a box, or a whole particle list.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Group {
     pub i_cloud: usize,
@@ -121,7 +124,8 @@ impl Cloud {
         if matches!(self.source, CloudSource::Disc(_)) { DVec3::ZERO } else { self.wind }
     }
 
-    /// The cloud's own centre, relative to its origin: the mean of its groups' centres by particle count.
+    /// The cloud's own centre, relative to its origin: the mean of its groups' centres by particle
+    /// count.
     pub fn center(&self) -> DVec3 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => {
@@ -130,7 +134,9 @@ impl Cloud {
                 if n > 0.0 { sum / n } else { DVec3::ZERO }
             }
             CloudSource::Particles(list) if list.is_empty() => DVec3::ZERO,
-            CloudSource::Particles(list) => list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64,
+            CloudSource::Particles(list) => {
+                list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64
+            }
             CloudSource::Disc(disc) => disc.center(self.wind),
             CloudSource::Moving(m) => 0.5 * (m.low + m.high),
         }
@@ -140,13 +146,17 @@ impl Cloud {
     pub fn facing_from(&self) -> DVec3 {
         match self.facing {
             Facing::Outward => self.center(),
-            Facing::Up => self.center() - FAR_BELOW.max(self.center().abs().max_element()) * DVec3::Y,
+            Facing::Up => {
+                self.center() - FAR_BELOW.max(self.center().abs().max_element()) * DVec3::Y
+            }
         }
     }
 
     pub fn n_particles(&self) -> u64 {
         match &self.source {
-            CloudSource::Boxes { boxes, .. } => boxes.iter().map(|b| u64::from(b.n_particles)).sum(),
+            CloudSource::Boxes { boxes, .. } => {
+                boxes.iter().map(|b| u64::from(b.n_particles)).sum()
+            }
             CloudSource::Particles(list) => list.len() as u64,
             CloudSource::Disc(disc) => u64::from(disc.n_particles),
             CloudSource::Moving(m) => u64::from(m.n_particles),
@@ -160,15 +170,17 @@ impl Cloud {
         }
     }
 
-    /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups, so that a
-    /// group's number is its box's number.
+    /// The cloud's groups, particle numbers counted from `i_first`. Empty boxes give empty groups,
+    /// so that a group's number is its box's number.
     pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
-        let (cloud_center, facing_from, gust_reach) = (self.center(), self.facing_from(), self.gust.reach());
+        let (cloud_center, facing_from, gust_reach) =
+            (self.center(), self.facing_from(), self.gust.reach());
         match &self.source {
             CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
                 .iter()
                 .map(|b| {
-                    let sigma_max = greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
+                    let sigma_max =
+                        greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
                     let kappa = box_kappa(b, *form, *optical_depth, *radius_scale);
                     let group = Group {
                         i_cloud,
@@ -181,25 +193,43 @@ impl Cloud {
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_y_max: sigma_max,
-                        sigma_mean: mean_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS,
+                        sigma_mean: mean_radius(*form, b.radius_max)
+                            * radius_scale
+                            * SIGMA_PER_RADIUS,
                         aspects: [1.0; 3],
                         kappa_max: kappa,
                         mass_max: mass(kappa, sigma_max),
                         gust_reach,
                     };
-                    // Of more particles than can be numbered only the bounds are of use: such a scene is refused.
+                    // Of more particles than can be numbered only the bounds are of use: such a
+                    // scene is refused.
                     i_first = i_first.wrapping_add(b.n_particles);
                     group
                 })
                 .collect(),
             CloudSource::Particles(list) => {
-                vec![Group { cloud_center, facing_from, gust_reach, ..list_group(list, i_cloud, i_first) }]
+                vec![Group {
+                    cloud_center,
+                    facing_from,
+                    gust_reach,
+                    ..list_group(list, i_cloud, i_first)
+                }]
             }
             CloudSource::Disc(disc) => {
-                vec![Group { cloud_center, facing_from, gust_reach, ..disc_group(disc, self.wind, i_cloud, i_first) }]
+                vec![Group {
+                    cloud_center,
+                    facing_from,
+                    gust_reach,
+                    ..disc_group(disc, self.wind, i_cloud, i_first)
+                }]
             }
             CloudSource::Moving(m) => {
-                vec![Group { cloud_center, facing_from, gust_reach, ..moving_group(m, i_cloud, i_first) }]
+                vec![Group {
+                    cloud_center,
+                    facing_from,
+                    gust_reach,
+                    ..moving_group(m, i_cloud, i_first)
+                }]
             }
         }
     }
@@ -221,8 +251,9 @@ impl Group {
         self.n_particles > 0 && self.aspects != [1.0; 3]
     }
 
-    /// The group in its cloud grown to `scale`: every place x is at c + s (x − c), c the cloud's centre, every length s times
-    /// as long, κ the same. To the bit as it was where nothing has grown.
+    /// The group in its cloud grown to `scale`: every place x is at c + s (x − c), c the cloud's
+    /// centre, every length s times as long, κ the same. To the bit as it was where nothing has
+    /// grown.
     pub fn grown(&self, scale: f64) -> Group {
         if scale == 1.0 {
             return *self;
@@ -240,13 +271,15 @@ impl Group {
     }
 }
 
-/// κ of a box's blobs: √(2π) κ σ̄ = optical_depth at the mean radius (model.md §1). 0 where blobs have no size.
+/// κ of a box's blobs: √(2π) κ σ̄ = optical_depth at the mean radius (model.md §1). 0 where blobs
+/// have no size.
 pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64) -> f64 {
     let sigma = mean_radius(form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
     if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
-/// The `n_runs` (at most `n`) runs [first, end) that n places are divided into: [⌊g n/G⌋, ⌊(g+1) n/G⌋).
+/// The `n_runs` (at most `n`) runs [first, end) that n places are divided into: [⌊g n/G⌋, ⌊(g+1)
+/// n/G⌋).
 pub fn runs(n: u64, n_runs: u64) -> impl Iterator<Item = (u64, u64)> {
     // Both counts fit u32.
     let bound = move |g: u64| g * n / n_runs;
@@ -344,7 +377,8 @@ mod tests {
 
     #[test]
     fn kappa_gives_the_optical_depth_at_the_mean_radius() {
-        let b = CloudBox { n_particles: 5, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.2 };
+        let b =
+            CloudBox { n_particles: 5, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.2 };
         let kappa = box_kappa(&b, Form::Centred, 1.5, 0.6);
         let sigma = mean_radius(Form::Centred, 2.2) * 0.6 / 3.0;
         assert!((SQRT_TAU * kappa * sigma - 1.5).abs() < 1e-14);
@@ -361,7 +395,8 @@ mod tests {
 
     #[test]
     fn groups_count_on_and_keep_empty_boxes() {
-        let b = |n| CloudBox { n_particles: n, extent: DVec3::ONE, center: DVec3::X, radius_max: 1.0 };
+        let b =
+            |n| CloudBox { n_particles: n, extent: DVec3::ONE, center: DVec3::X, radius_max: 1.0 };
         let source = CloudSource::Boxes {
             boxes: vec![b(3), b(0), b(4)],
             form: Form::Centred,
@@ -388,8 +423,13 @@ mod tests {
 
     #[test]
     fn a_grown_group_is_similar_about_the_clouds_centre() {
-        let blob =
-            |x: f64, sigma| Particle { aspect: 1.0, position: DVec3::X * x, sigma, kappa: 2.0, color: DVec3::ONE };
+        let blob = |x: f64, sigma| Particle {
+            aspect: 1.0,
+            position: DVec3::X * x,
+            sigma,
+            kappa: 2.0,
+            color: DVec3::ONE,
+        };
         // Mean position 2, bounds from 0 to 5.
         let source = CloudSource::Particles(vec![blob(0.0, 1.0), blob(1.0, 0.5), blob(5.0, 0.75)]);
         let (gust, growth) = (Gust::CALM, Growth { to: 3.0, time_s: 1.0 });
@@ -410,14 +450,23 @@ mod tests {
         // The least and greatest x: 2 + 3 (0 − 2) and 2 + 3 (5 − 2).
         assert_eq!((grown.center - grown.half_extent).x, -4.0);
         assert_eq!((grown.center + grown.half_extent).x, 11.0);
-        assert_eq!((grown.sigma_max, grown.sigma_mean, grown.kappa_max, grown.scale), (3.0, 2.25, 2.0, 3.0));
+        assert_eq!(
+            (grown.sigma_max, grown.sigma_mean, grown.kappa_max, grown.scale),
+            (3.0, 2.25, 2.0, 3.0)
+        );
         assert!((grown.mass_max / mass(2.0, 3.0) - 1.0).abs() < 1e-15);
         assert_eq!(group.grown(1.0), group);
     }
 
     #[test]
     fn the_heaviest_blob_is_a_blob_and_not_two_maxima() {
-        let blob = |sigma, kappa| Particle { aspect: 1.0, position: DVec3::ZERO, sigma, kappa, color: DVec3::ONE };
+        let blob = |sigma, kappa| Particle {
+            aspect: 1.0,
+            position: DVec3::ZERO,
+            sigma,
+            kappa,
+            color: DVec3::ONE,
+        };
         let source = CloudSource::Particles(vec![blob(1.0, 2.0), blob(1e-3, 1e9)]);
         let (gust, growth) = (Gust::CALM, Growth::NONE);
         let cloud = Cloud {

@@ -1,7 +1,9 @@
-//! How many of a cloud's particles are drawn, by its distance and size: C (4)–(6), docs/model.md §3.
+//! How many of a cloud's particles are drawn, by its distance and size: C (4)–(6), docs/model.md
+//! §3.
 
-/// Of a group of which fewer than this of a particle would be drawn nothing is: at 14 a, some 3900 d₀, and farther. Keeps
-/// every factor within f32; with `conserve` less than this share of the group's optical depth goes at once.
+/// Of a group of which fewer than this of a particle would be drawn nothing is: at 14 a, some 3900
+/// d₀, and farther. Keeps every factor within f32; with `conserve` less than this share of the
+/// group's optical depth goes at once.
 pub const LEAST_DRAWN: f64 = 1.0 / 1_048_576.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +37,8 @@ impl Drawn {
 }
 
 impl Count {
-    /// x/N: the share of a cloud's particles that is drawn at `distance` of a cloud of `scale` r/r₀; at most 1.
+    /// x/N: the share of a cloud's particles that is drawn at `distance` of a cloud of `scale`
+    /// r/r₀; at most 1.
     pub fn share(&self, scale: f64, distance: f64) -> f64 {
         let nearer = if self.normalised { self.d0 } else { 0.0 };
         let share = scale.powi(3) * ((nearer - distance) / (self.a * self.d0)).exp();
@@ -49,8 +52,8 @@ impl Count {
         if x.is_nan() || x < LEAST_DRAWN {
             return Drawn::NOTHING;
         }
-        // One particle stands for all at most: below one it fades with x, where it would otherwise stay as dense as all of
-        // them until it vanished.
+        // One particle stands for all at most: below one it fades with x, where it would otherwise
+        // stay as dense as all of them until it vanished.
         let kappa_scale = if self.conserve { (1.0 / share).min(f64::from(n)) } else { 1.0 };
         let n = (x.ceil() as u32).min(n);
         Drawn { n, kappa_scale, last_weight: x - f64::from(n - 1) }
@@ -86,7 +89,11 @@ mod tests {
                 continue;
             }
             let sum = f64::from(drawn.n - 1) + drawn.last_weight;
-            assert!((sum - 37.0 * share).abs() < 1e-13 && drawn.last_weight > 0.0 && drawn.last_weight <= 1.0);
+            assert!(
+                (sum - 37.0 * share).abs() < 1e-13
+                    && drawn.last_weight > 0.0
+                    && drawn.last_weight <= 1.0
+            );
             // Below one particle what it stands for fades.
             let of_all = if sum < 1.0 { sum } else { 1.0 };
             assert!((sum * drawn.kappa_scale - 37.0 * of_all).abs() < 1e-12, "{k}");

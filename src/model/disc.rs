@@ -1,5 +1,5 @@
-//! Particles from a disc, and their life: C §2.3, docs/model.md §2. A particle's state is a closed form of (seed, slot, time),
-//! so that any frame can be computed alone.
+//! Particles from a disc, and their life: C §2.3, docs/model.md §2. A particle's state is a closed
+//! form of (seed, slot, time), so that any frame can be computed alone.
 
 use glam::DVec3;
 
@@ -12,7 +12,8 @@ pub const GREATEST_SPREAD: f64 = 0.9;
 /// Least share of a life that fading in or out takes: shorter, and particles would pop.
 pub const LEAST_FADE: f64 = 0.01;
 
-/// Second word of the Philox key and last of the counter; boxes use their number and 0, gusts and textures their own.
+/// Second word of the Philox key and last of the counter; boxes use their number and 0, gusts and
+/// textures their own.
 const STREAM: u32 = 0x6469_7363;
 
 /// 2³²: steps of a period.
@@ -54,7 +55,8 @@ pub struct Condensation {
     pub lift: f64,
 }
 
-/// The law of a cloud's particles. Lengths in scene units, times in s, temperatures as excess over the air's in K.
+/// The law of a cloud's particles. Lengths in scene units, times in s, temperatures as excess over
+/// the air's in K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Disc {
     /// Slots: particles at a time.
@@ -98,7 +100,8 @@ pub struct Turn {
 }
 
 impl Disc {
-    /// No steps of time are lost: the remainder of a division is exact in f64, however large the time.
+    /// No steps of time are lost: the remainder of a division is exact in f64, however large the
+    /// time.
     pub fn turn_at(&self, time_s: f64) -> Turn {
         let age = time_s.rem_euclid(self.period_s);
         let phase = (age / self.period_s * STEPS).floor();
@@ -128,7 +131,8 @@ impl Disc {
         self.buoyancy * self.warmth * (1.0 + self.warmth_spread) * self.covered(self.period_s)
     }
 
-    /// Bounds (low, high) of all particles' positions over the whole of their lives, relative to the disc's centre.
+    /// Bounds (low, high) of all particles' positions over the whole of their lives, relative to
+    /// the disc's centre.
     pub fn bounds(&self, wind: DVec3) -> (DVec3, DVec3) {
         let drift = wind * self.period_s;
         let reach = self.radius + self.outflow * self.covered(self.period_s);
@@ -136,7 +140,8 @@ impl Disc {
         (low - DVec3::new(reach, 0.0, reach), high + DVec3::new(reach, self.rise_max(), reach))
     }
 
-    /// Where a particle of mean warmth from the disc's centre is at half the mean lifetime, relative to that centre.
+    /// Where a particle of mean warmth from the disc's centre is at half the mean lifetime,
+    /// relative to that centre.
     pub fn center(&self, wind: DVec3) -> DVec3 {
         let age = 0.5 * self.mean_life_s();
         wind * age + DVec3::Y * (self.buoyancy * self.warmth * self.covered(age))
@@ -173,26 +178,37 @@ impl Disc {
         // The places of a van der Corput sequence: any first slots are spread evenly over all ages.
         let (phase, is_next) = turn.phase.overflowing_add(slot.reverse_bits());
         let generation = turn.generation.wrapping_add(u32::from(is_next));
-        let words = |k: u32| philox4x32_10([seed, STREAM], [slot, generation, k, STREAM]).map(uniform);
+        let words =
+            |k: u32| philox4x32_10([seed, STREAM], [slot, generation, k, STREAM]).map(uniform);
         let ([u1, u2, u3, u4], [u5, u6, u7, _]) = (words(0), words(1));
 
         let share = 1.0 - self.life_spread * u5;
         let spent = (f64::from(phase) / STEPS).min(share);
         let age = spent * self.period_s;
         let covered = self.covered(age);
-        let warm = self.warmth * (1.0 + self.warmth_spread * (2.0 * u4 - 1.0)) * (1.0 - self.core * u1);
+        let warm =
+            self.warmth * (1.0 + self.warmth_spread * (2.0 * u4 - 1.0)) * (1.0 - self.core * u1);
         let rise = self.buoyancy * warm * covered;
-        let position =
-            on_disc(self.radius, u1, u2) + wind * age + DVec3::Y * rise + on_disc(self.outflow, u6, u7) * covered;
+        let position = on_disc(self.radius, u1, u2)
+            + wind * age
+            + DVec3::Y * rise
+            + on_disc(self.outflow, u6, u7) * covered;
         let born = self.sigma * (1.0 + self.sigma_spread * (2.0 * u3 - 1.0));
         let sigma = born + self.growth() * rise;
-        let fades = smooth(spent / share / self.fade_in) * smooth((1.0 - spent / share) / self.fade_out);
+        let fades =
+            smooth(spent / share / self.fade_in) * smooth((1.0 - spent / share) / self.fade_out);
         let condensed = self.condensation.map_or(1.0, |c| {
             let warmth_left = warm * (1.0 - covered / self.cooling_s);
             smooth((position.y - c.base - c.lift * warmth_left) / c.over)
         });
         let diluted = (born / sigma).powi(self.dilution.exponent() as i32);
-        Particle { aspect: 1.0, position, sigma, kappa: self.kappa() * diluted * fades * condensed, color: DVec3::ONE }
+        Particle {
+            aspect: 1.0,
+            position,
+            sigma,
+            kappa: self.kappa() * diluted * fades * condensed,
+            color: DVec3::ONE,
+        }
     }
 }
 
@@ -288,7 +304,14 @@ mod tests {
 
     #[test]
     fn bounds_hold_all_of_many_lives() {
-        let disc = Disc { life_spread: 0.5, sigma_spread: 0.4, warmth_spread: 1.0, core: 0.5, outflow: 0.3, ..DISC };
+        let disc = Disc {
+            life_spread: 0.5,
+            sigma_spread: 0.4,
+            warmth_spread: 1.0,
+            core: 0.5,
+            outflow: 0.3,
+            ..DISC
+        };
         let (low, high) = disc.bounds(WIND);
         let (mut least, mut greatest) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for i in 0..40_000u32 {
@@ -299,6 +322,9 @@ mod tests {
             (least, greatest) = (least.min(p.position), greatest.max(p.position));
         }
         // And are no wider than they must: nearly all of them is used.
-        assert!((greatest - least).cmpge(0.8 * (high - low)).all(), "{least} {greatest} {low} {high}");
+        assert!(
+            (greatest - least).cmpge(0.8 * (high - low)).all(),
+            "{least} {greatest} {low} {high}"
+        );
     }
 }

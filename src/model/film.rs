@@ -11,11 +11,14 @@ pub enum FilmFormat {
 }
 
 impl FilmFormat {
-    pub const NAMES: [(&'static str, FilmFormat); 3] =
-        [("rgba8", FilmFormat::Rgba8), ("rgba16f", FilmFormat::Rgba16f), ("rgba32f", FilmFormat::Rgba32f)];
+    pub const NAMES: [(&'static str, FilmFormat); 3] = [
+        ("rgba8", FilmFormat::Rgba8),
+        ("rgba16f", FilmFormat::Rgba16f),
+        ("rgba32f", FilmFormat::Rgba32f),
+    ];
 
-    /// Unit round-off of one stored channel: half of the spacing of numbers in [1, 2), which shrinks with them; of rgba8
-    /// half of its step, whatever the number.
+    /// Unit round-off of one stored channel: half of the spacing of numbers in [1, 2), which
+    /// shrinks with them; of rgba8 half of its step, whatever the number.
     pub fn unit_roundoff(self) -> f64 {
         match self {
             FilmFormat::Rgba8 => 0.5 / 255.0,
@@ -34,7 +37,8 @@ pub enum ToneMap {
 }
 
 impl ToneMap {
-    pub const NAMES: [(&'static str, ToneMap); 2] = [("neutral", ToneMap::Neutral), ("clip", ToneMap::Clip)];
+    pub const NAMES: [(&'static str, ToneMap); 2] =
+        [("neutral", ToneMap::Neutral), ("clip", ToneMap::Clip)];
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,8 +65,8 @@ impl Film {
     }
 }
 
-/// Khronos PBR Neutral tone mapper, with its published constants, without the Fresnel offset (that undoes the
-/// 4 % of a dielectric's specular reflection, which a cloud does not have).
+/// Khronos PBR Neutral tone mapper, with its published constants, without the Fresnel offset (that
+/// undoes the 4 % of a dielectric's specular reflection, which a cloud does not have).
 fn neutral(color: DVec3) -> DVec3 {
     const START_COMPRESSION: f64 = 0.8;
     const DESATURATION: f64 = 0.15;
@@ -86,12 +90,14 @@ pub fn srgb_encode(linear: f64) -> f64 {
     if v <= 0.003_130_8 { 12.92 * v } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// What is added before rounding down: (B + ½)/64 with Bayer's 8×8 matrix B, between 0 and 1 and ½ on average,
-/// so it rounds to nearest with ±½ of a code value of ordered noise. A cloud is all soft gradients: rounded
-/// alone, steps of one code value show as bands. Ordered and not random, so that equal pixels give equal files;
-/// the same for all three channels, so that grey stays grey; and exact code values stay what they are.
+/// What is added before rounding down: (B + ½)/64 with Bayer's 8×8 matrix B, between 0 and 1 and ½
+/// on average, so it rounds to nearest with ±½ of a code value of ordered noise. A cloud is all
+/// soft gradients: rounded alone, steps of one code value show as bands. Ordered and not random, so
+/// that equal pixels give equal files; the same for all three channels, so that grey stays grey;
+/// and exact code values stay what they are.
 pub fn dither(x: usize, y: usize) -> f64 {
-    // Bits of x ^ y and y interleaved, the lowest first and the greatest weight: Bayer's recursion unrolled.
+    // Bits of x ^ y and y interleaved, the lowest first and the greatest weight: Bayer's recursion
+    // unrolled.
     let (a, b) = ((x ^ y) & 7, y & 7);
     let bayer = (0..3).fold(0, |sum, i| sum << 2 | (a >> i & 1) << 1 | (b >> i & 1));
     (bayer as f64 + 0.5) / 64.0
@@ -103,7 +109,14 @@ mod tests {
 
     fn film(tone_map: ToneMap) -> Film {
         let background = DVec3::new(0.2, 0.4, 0.6);
-        Film { width: 1, height: 1, format: FilmFormat::Rgba16f, background, exposure: 1.0, tone_map }
+        Film {
+            width: 1,
+            height: 1,
+            format: FilmFormat::Rgba16f,
+            background,
+            exposure: 1.0,
+            tone_map,
+        }
     }
 
     #[test]
@@ -126,7 +139,8 @@ mod tests {
     #[test]
     fn neutral_is_the_identity_below_its_knee_and_monotone_above() {
         assert_eq!(neutral(DVec3::splat(0.79)), DVec3::splat(0.79));
-        let peaks: Vec<f64> = (0..100).map(|i| neutral(DVec3::splat(0.8 + 0.1 * f64::from(i))).x).collect();
+        let peaks: Vec<f64> =
+            (0..100).map(|i| neutral(DVec3::splat(0.8 + 0.1 * f64::from(i))).x).collect();
         assert!(peaks.windows(2).all(|w| w[0] < w[1]) && peaks[99] < 1.0);
     }
 

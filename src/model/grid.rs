@@ -1,21 +1,23 @@
-//! The density grid of model.md §8: cells over everything that attenuates light, positions relative to the lighting origin. Cells are
-//! cubes where blobs are balls, and as flat as they are on the mean elsewhere (docs/model.md §14).
+//! The density grid of model.md §8: cells over everything that attenuates light, positions relative
+//! to the lighting origin. Cells are cubes where blobs are balls, and as flat as they are on the
+//! mean elsewhere (docs/model.md §14).
 
 use glam::{DVec3, UVec3};
 
-/// Blobs are deposited within this many σ of their centre along each axis, and what lies outside is given to
-/// the rest so that mass is kept: 1 − erf(3/√2) = 0.27 % an axis moves by at most 3σ.
+/// Blobs are deposited within this many σ of their centre along each axis, and what lies outside is
+/// given to the rest so that mass is kept: 1 − erf(3/√2) = 0.27 % an axis moves by at most 3σ.
 pub const DEPOSIT_CUT_SIGMA: f64 = 3.0;
 
-/// Cells of margin around the bounds, so that trilinear sampling at the bounds never leaves the grid.
+/// Cells of margin around the bounds, so that trilinear sampling at the bounds never leaves the
+/// grid.
 pub const MARGIN_CELLS: u32 = 2;
 
-/// Greatest number of cells along an axis, the deposit kernel's shared memory: 3 axes of this many weights
-/// are 6 KiB of the 16 KiB every Vulkan device has.
+/// Greatest number of cells along an axis, the deposit kernel's shared memory: 3 axes of this many
+/// weights are 6 KiB of the 16 KiB every Vulkan device has.
 pub const MAX_CELLS: u32 = 512;
 
-/// Most steps of one march toward a light. A scene whose step is finer than its grid's diagonal in this many is refused,
-/// so that no march is ever cut short.
+/// Most steps of one march toward a light. A scene whose step is finer than its grid's diagonal in
+/// this many is refused, so that no march is ever cut short.
 pub const MAX_MARCH_STEPS: u32 = 4096;
 
 /// The finest march step, in cells, of a grid of `n` cells a side.
@@ -35,7 +37,8 @@ pub struct GridSpec {
 }
 
 impl GridSpec {
-    /// The grid of cubes whose longest axis has `n` cells, margin included, and covers `low`..`high`.
+    /// The grid of cubes whose longest axis has `n` cells, margin included, and covers
+    /// `low`..`high`.
     pub fn fit(low: DVec3, high: DVec3, n: u32) -> GridSpec {
         GridSpec::fit_cells(low, high, n, 1.0)
     }
@@ -72,7 +75,8 @@ impl GridSpec {
         self.cell.powi(3) * self.aspect
     }
 
-    /// Cells' widths that a unit along `d` passes: 1/cell where cells are cubes and `d` is a unit vector.
+    /// Cells' widths that a unit along `d` passes: 1/cell where cells are cubes and `d` is a unit
+    /// vector.
     pub fn cells_along(&self, d: DVec3) -> f64 {
         (d / self.edges()).length()
     }
@@ -88,7 +92,10 @@ mod tests {
         let grid = GridSpec::fit(low, high, 64);
         assert_eq!(grid.n_cells, UVec3::new(64, 19, 8));
         let margin = f64::from(MARGIN_CELLS) * grid.cell - 1e-9;
-        assert!((low - grid.low).min_element() >= margin && (grid.high() - high).min_element() >= margin);
+        assert!(
+            (low - grid.low).min_element() >= margin
+                && (grid.high() - high).min_element() >= margin
+        );
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! How a cloud grows (docs/model.md §13): as a similarity about its own centre, in closed form of time.
+//! How a cloud grows (docs/model.md §13): as a similarity about its own centre, in closed form of
+//! time.
 
 /// Beyond these a cloud's particles would be no blobs of the scene any more, but specks or skies.
 pub const LEAST_SCALE: f64 = 1e-3;

@@ -1,5 +1,5 @@
-//! Gusts: a frozen-spectrum kinematic turbulence that stirs a cloud's particles (docs/model.md §12; Kraichnan 1970,
-//! Fung et al. 1992). Closed form of time, so any frame can be computed alone.
+//! Gusts: a frozen-spectrum kinematic turbulence that stirs a cloud's particles (docs/model.md §12;
+//! Kraichnan 1970, Fung et al. 1992). Closed form of time, so any frame can be computed alone.
 
 use std::f64::consts::TAU;
 
@@ -44,8 +44,9 @@ impl Gust {
         self.amplitude == 0.0
     }
 
-    /// The waves of a cloud's gusts: none where it is calm. Wave numbers are spaced evenly in log k; displacements fall
-    /// as 1/k and frequencies rise as k^{2/3}, as a Kolmogorov spectrum's velocities k^{−1/3} ask for.
+    /// The waves of a cloud's gusts: none where it is calm. Wave numbers are spaced evenly in log
+    /// k; displacements fall as 1/k and frequencies rise as k^{2/3}, as a Kolmogorov spectrum's
+    /// velocities k^{−1/3} ask for.
     pub fn modes(&self, seed: u32) -> Vec<Mode> {
         if self.is_calm() {
             return vec![];
@@ -124,7 +125,8 @@ mod tests {
             assert!(d.length() <= GUST.reach() + 1e-12);
             sum += d.length_squared();
         }
-        // Few modes dominate, so the mean square of n samples scatters by about 1/√n of itself: 5 sigma are 4 %.
+        // Few modes dominate, so the mean square of n samples scatters by about 1/√n of itself: 5
+        // sigma are 4 %.
         assert!((sum / f64::from(n) / 0.09 - 1.0).abs() < 0.04, "{}", sum / f64::from(n));
     }
 
@@ -134,10 +136,16 @@ mod tests {
             let gust = Gust { n_waves, ..GUST };
             let modes = gust.modes(7);
             let power: f64 = modes.iter().map(|m| 0.5 * m.a.length_squared()).sum();
-            assert!(modes.len() == n_waves as usize && (power - 0.09).abs() < 1e-12, "{n_waves}: {power}");
+            assert!(
+                modes.len() == n_waves as usize && (power - 0.09).abs() < 1e-12,
+                "{n_waves}: {power}"
+            );
             assert!((modes[0].k.length() - TAU / 4.0).abs() < 1e-12);
             let narrowest = modes[n_waves as usize - 1].k.length() / modes[0].k.length();
-            assert!((narrowest - if n_waves == 1 { 1.0 } else { 8.0 }).abs() < 1e-12, "{narrowest}");
+            assert!(
+                (narrowest - if n_waves == 1 { 1.0 } else { 8.0 }).abs() < 1e-12,
+                "{narrowest}"
+            );
         }
     }
 

@@ -1,6 +1,7 @@
-//! The gusts' displacement for several particles at once: d(x, t) = Σ a sin(k·x + ω t + φ) (docs/model.md §12), wave by
-//! wave for [`LANES`] particles side by side, with a sine that has no branch and no call, so that the compiler makes vector
-//! instructions of it. Multiplications and additions are never fused: every machine gives the same bytes.
+//! The gusts' displacement for several particles at once: d(x, t) = Σ a sin(k·x + ω t + φ)
+//! (docs/model.md §12), wave by wave for [`LANES`] particles side by side, with a sine that has no
+//! branch and no call, so that the compiler makes vector instructions of it. Multiplications and
+//! additions are never fused: every machine gives the same bytes.
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -14,9 +15,10 @@ pub const LANES: usize = 8;
 /// One coordinate of [`LANES`] particles.
 pub type Lanes = [f64; LANES];
 
-/// Bound on |sine(x) − sin x|, |x| ≤ [`SINE_REACH`], u = 2⁻⁵³: the reduction rounds once, at most u, since k π₁ and
-/// x − k π₁ are exact and k π₂ below 1.3e-4; the series' first missing term is (π/2)²¹/21! = 2.6e-16; in r + (r s) p the
-/// product, at most 0.571, has six roundings and the sum one: 4.5 u. Together 8.7e-16; the rest is `f64::sin`'s own ulp.
+/// Bound on |sine(x) − sin x|, |x| ≤ [`SINE_REACH`], u = 2⁻⁵³: the reduction rounds once, at most
+/// u, since k π₁ and x − k π₁ are exact and k π₂ below 1.3e-4; the series' first missing term is
+/// (π/2)²¹/21! = 2.6e-16; in r + (r s) p the product, at most 0.571, has six roundings and the sum
+/// one: 4.5 u. Together 8.7e-16; the rest is `f64::sin`'s own ulp.
 pub const SINE_ERROR: f64 = 1e-15;
 
 /// The sine's reduction is exact for |k| ≤ 2²⁰ half turns: π₁ has 33 bits.
@@ -76,16 +78,22 @@ pub struct Waves {
 impl Waves {
     /// `modes` at `time_s`.
     pub fn at(modes: &[Mode], time_s: f64) -> Waves {
-        let wave = |m: &Mode| Wave { k: m.k.to_array(), phase: m.phase_at(time_s), a: m.a.to_array() };
-        Waves { waves: modes.iter().map(wave).collect(), k_max: modes.iter().map(|m| m.k.length()).fold(0.0, f64::max) }
+        let wave =
+            |m: &Mode| Wave { k: m.k.to_array(), phase: m.phase_at(time_s), a: m.a.to_array() };
+        Waves {
+            waves: modes.iter().map(wave).collect(),
+            k_max: modes.iter().map(|m| m.k.length()).fold(0.0, f64::max),
+        }
     }
 
-    /// Displacements (along x, along y, along z) of the particles at rest at `x`, relative to their cloud's origin.
+    /// Displacements (along x, along y, along z) of the particles at rest at `x`, relative to their
+    /// cloud's origin.
     pub fn displace(&self, x: &[Lanes; 3]) -> [Lanes; 3] {
         if self.waves.is_empty() {
             return [[0.0; LANES]; 3];
         }
-        let farthest = (0..LANES).map(|l| x[0][l].abs() + x[1][l].abs() + x[2][l].abs()).fold(0.0, f64::max);
+        let farthest =
+            (0..LANES).map(|l| x[0][l].abs() + x[1][l].abs() + x[2][l].abs()).fold(0.0, f64::max);
         let is_number = x.iter().flatten().all(|v| v.is_finite());
         if is_number && self.k_max * farthest + TAU <= SINE_REACH {
             return in_reach(&self.waves, x);
@@ -143,7 +151,8 @@ mod tests {
     use super::*;
     use crate::model::gust::Gust;
 
-    /// Greatest |sine(x) − sin x| over arguments evenly spaced from `low` to `high`, and around half turns.
+    /// Greatest |sine(x) − sin x| over arguments evenly spaced from `low` to `high`, and around
+    /// half turns.
     fn worst(low: f64, high: f64, n: u32) -> f64 {
         let at = |i: u32| low + (high - low) * f64::from(i) / f64::from(n);
         let half_turn = |i: u32| (at(i) / std::f64::consts::PI).round() * std::f64::consts::PI;
@@ -155,21 +164,25 @@ mod tests {
 
     #[test]
     fn the_sine_is_within_its_bound_all_over_its_reach() {
-        let ranges = [(-4.0, 4.0), (-100.0, 100.0), (1e3, 2e3), (1e5, 1.001e5), (-SINE_REACH, SINE_REACH)];
+        let ranges =
+            [(-4.0, 4.0), (-100.0, 100.0), (1e3, 2e3), (1e5, 1.001e5), (-SINE_REACH, SINE_REACH)];
         for (low, high) in ranges.into_iter().chain([(0.9999 * SINE_REACH, SINE_REACH)]) {
             let error = worst(low, high, 400_000);
             assert!(error <= SINE_ERROR, "{low} to {high}: {error:e}");
             println!("{low} to {high}: {error:e}");
         }
         assert_eq!((sine(0.0), sine(1e-300)), (0.0, 1e-300));
-        // The bound is no wider than it need be: a term of the series or a part of π that was missing would be seen.
+        // The bound is no wider than it need be: a term of the series or a part of π that was
+        // missing would be seen.
         assert!(worst(-SINE_REACH, SINE_REACH, 400_000) > 0.1 * SINE_ERROR);
     }
 
     /// Some particles about `center`.
     fn lanes(center: f64, spread: f64, seed: usize) -> [Lanes; 3] {
         let of = |axis: usize| {
-            std::array::from_fn(|l| center + spread * ((seed * 24 + axis * 8 + l) as f64 * 0.618_034).fract())
+            std::array::from_fn(|l| {
+                center + spread * ((seed * 24 + axis * 8 + l) as f64 * 0.618_034).fract()
+            })
         };
         [of(0), of(1), of(2)]
     }

@@ -1,10 +1,10 @@
-//! A picture of what is far, seen again from elsewhere: where it shows what, and how far off that may be (docs/model.md
-//! §11 "impostors").
+//! A picture of what is far, seen again from elsewhere: where it shows what, and how far off that
+//! may be (docs/model.md §11 "impostors").
 
 use glam::{DMat3, DVec2, DVec3};
 
-/// A view depth over what it was when the shell was made; below it no bound is given. Shells that are used again have ratios
-/// near 1, since a bound of pixels leaves the eye no long way.
+/// A view depth over what it was when the shell was made; below it no bound is given. Shells that
+/// are used again have ratios near 1, since a bound of pixels leaves the eye no long way.
 pub const LEAST_DEPTH_RATIO: f64 = 0.9;
 
 /// Where a picture is taken from; slopes are those of rays along (right, up, forward).
@@ -90,7 +90,8 @@ impl Shell {
     /// Whether all that `now` sees lies in the shell's picture, `margin` slopes within its edges.
     pub fn covers(&self, now: &View, margin: f64) -> bool {
         let to_shell = self.homography(now);
-        // A straight line stays one where no ray of the view runs along the shell's plane or away from it.
+        // A straight line stays one where no ray of the view runs along the shell's plane or away
+        // from it.
         let within = |corner: DVec2| {
             let at = to_shell * corner.extend(1.0);
             let most = self.view.tangents - margin;
@@ -100,8 +101,8 @@ impl Shell {
             && now.corners().into_iter().all(within)
     }
 
-    /// What the shell's picture may be off by in `now`'s view; `None` where no bound is known: the eye comes near to what is
-    /// far, or turns away.
+    /// What the shell's picture may be off by in `now`'s view; `None` where no bound is known: the
+    /// eye comes near to what is far, or turns away.
     pub fn predict(&self, now: &View) -> Option<Predicted> {
         let Far { nearest, farthest, sigma, radius } = self.far;
         let (then, t, w) = (&self.view, now.eye - self.view.eye, self.inverse_depth());
@@ -111,8 +112,10 @@ impl Shell {
         let beside = |tan: f64| tan + radius / depth * (1.0 + tan * tan).sqrt();
         let [tan_x, tan_y] = now.tangents.to_array().map(beside);
         let turned = |axis: DVec3| axis.dot(then.forward);
-        let most = turned(now.forward) + tan_x * turned(now.right).abs() + tan_y * turned(now.up).abs();
-        let least = turned(now.forward) - tan_x * turned(now.right).abs() - tan_y * turned(now.up).abs();
+        let most =
+            turned(now.forward) + tan_x * turned(now.right).abs() + tan_y * turned(now.up).abs();
+        let least =
+            turned(now.forward) - tan_x * turned(now.right).abs() - tan_y * turned(now.up).abs();
         let left = 1.0 - w * t.dot(then.forward);
         if !(least > 0.0 && left > 0.0) {
             return None;
@@ -124,11 +127,18 @@ impl Shell {
         if depth_ratio.is_nan() || depth_ratio < LEAST_DEPTH_RATIO {
             return None;
         }
-        let across = DVec2::new(t.dot(now.right).abs() + tan_x * along, t.dot(now.up).abs() + tan_y * along).length();
+        let across =
+            DVec2::new(t.dot(now.right).abs() + tan_x * along, t.dot(now.up).abs() + tan_y * along)
+                .length();
         let shift = spread * across / depth_ratio;
         let slant = (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt();
         let stretch = plane * spread * along;
         let growth = stretch * slant + shift + (1.0 + stretch) * w * across;
-        Some(Predicted { shift, growth, sigma: sigma * slant / (nearest * depth_ratio), depth_ratio })
+        Some(Predicted {
+            shift,
+            growth,
+            sigma: sigma * slant / (nearest * depth_ratio),
+            depth_ratio,
+        })
     }
 }

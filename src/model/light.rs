@@ -1,4 +1,5 @@
-//! Lights: C's I(x, y, z, θ, φ, λ) as directional, point and spot lights, and the sky beside them (model.md §7, §8).
+//! Lights: C's I(x, y, z, θ, φ, λ) as directional, point and spot lights, and the sky beside them
+//! (model.md §7, §8).
 
 use glam::DVec3;
 
@@ -6,18 +7,29 @@ use glam::DVec3;
 pub enum Light {
     /// Parallel light: `direction` of travel (unit), irradiance on a plane across it.
     Directional { direction: DVec3, irradiance: DVec3 },
-    /// Intensity (power per solid angle) alike in every direction. Nearer than `radius` the irradiance does not grow.
+    /// Intensity (power per solid angle) alike in every direction. Nearer than `radius` the
+    /// irradiance does not grow.
     Point { position: DVec3, intensity: DVec3, radius: f64 },
-    /// A point light inside a cone about `direction` (unit): full inside the inner angle, nothing outside the outer.
-    Spot { position: DVec3, direction: DVec3, intensity: DVec3, radius: f64, cos_inner: f64, cos_outer: f64 },
-    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant; reflected by the diffuse basis alone.
+    /// A point light inside a cone about `direction` (unit): full inside the inner angle, nothing
+    /// outside the outer.
+    Spot {
+        position: DVec3,
+        direction: DVec3,
+        intensity: DVec3,
+        radius: f64,
+        cos_inner: f64,
+        cos_outer: f64,
+    },
+    /// Irradiance E (½ + ½ n·up) e^{−(1−g)τ toward up} + E·constant; reflected by the diffuse basis
+    /// alone.
     Sky { irradiance: DVec3, constant: f64 },
 }
 
 /// The sky's up, whatever the camera's.
 pub const UP: DVec3 = DVec3::Y;
 
-/// Least difference of a spot's cosines, as KHR_lights_punctual has it: the edge of a cone without penumbra.
+/// Least difference of a spot's cosines, as KHR_lights_punctual has it: the edge of a cone without
+/// penumbra.
 pub const LEAST_PENUMBRA: f64 = 1e-3;
 
 /// How a light reaches a point where nothing is in its way.
@@ -27,7 +39,8 @@ pub struct Arrival {
     pub toward: DVec3,
     /// How far the light is; infinite for directional lights and the sky.
     pub distance: f64,
-    /// Irradiance across `toward`, as a share of the light's energy: 1, or 1/d² times the cone's share.
+    /// Irradiance across `toward`, as a share of the light's energy: 1, or 1/d² times the cone's
+    /// share.
     pub falloff: f64,
 }
 
@@ -56,8 +69,8 @@ impl Light {
         }
     }
 
-    /// Irradiance on a facet of normal `n` as a share of the light's energy, the transmittance toward it being
-    /// `transmittance`.
+    /// Irradiance on a facet of normal `n` as a share of the light's energy, the transmittance
+    /// toward it being `transmittance`.
     pub fn share(&self, n: DVec3, arrival: &Arrival, transmittance: f64) -> f64 {
         match self {
             Light::Sky { constant, .. } => transmittance * (0.5 + 0.5 * n.dot(UP)) + constant,
@@ -65,7 +78,8 @@ impl Light {
         }
     }
 
-    /// Irradiance of directional lights and the sky, intensity of point and spot lights; linear RGB.
+    /// Irradiance of directional lights and the sky, intensity of point and spot lights; linear
+    /// RGB.
     pub fn energy(&self) -> DVec3 {
         match *self {
             Light::Directional { irradiance, .. } | Light::Sky { irradiance, .. } => irradiance,

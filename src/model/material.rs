@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-/// A material, which a scene may edit over time: keys in growing time, straight lines between them, constant before
-/// the first and after the last. A material that is never edited has one key.
+/// A material, which a scene may edit over time: keys in growing time, straight lines between them,
+/// constant before the first and after the last. A material that is never edited has one key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     pub name: String,
@@ -51,22 +51,26 @@ impl Material {
 
     /// Least and greatest n_s over time.
     pub fn exponents(&self) -> [f64; 2] {
-        let of = |pick: fn(f64, f64) -> f64| self.keys.iter().map(|k| k.brdf.ns).fold(self.keys[0].brdf.ns, pick);
+        let of = |pick: fn(f64, f64) -> f64| {
+            self.keys.iter().map(|k| k.brdf.ns).fold(self.keys[0].brdf.ns, pick)
+        };
         [of(f64::min), of(f64::max)]
     }
 
-    /// The greatest K_d + 4 K_s over channels and time: above 1 the material can reflect more than it receives
-    /// (model.md §5: with γ from the half vector the lobe's albedo tends to 4 K_s cos²θ).
+    /// The greatest K_d + 4 K_s over channels and time: above 1 the material can reflect more than
+    /// it receives (model.md §5: with γ from the half vector the lobe's albedo tends to 4 K_s
+    /// cos²θ).
     pub fn greatest_albedo(&self) -> f64 {
         self.keys.iter().map(|k| (k.brdf.kd + 4.0 * k.brdf.ks).max_element()).fold(0.0, f64::max)
     }
 }
 
 impl Brdf {
-    /// The lobe (n_s+2)/(2π) cos^{n_s} γ at 1 − cos γ = `w`: exp(n ln cos γ), ln cos γ = ln1p(−w), never the power of a
-    /// number near 1.
+    /// The lobe (n_s+2)/(2π) cos^{n_s} γ at 1 − cos γ = `w`: exp(n ln cos γ), ln cos γ = ln1p(−w),
+    /// never the power of a number near 1.
     pub fn lobe(ns: f64, w: f64) -> f64 {
-        let power = if w >= 1.0 { if ns > 0.0 { 0.0 } else { 1.0 } } else { (ns * (-w).ln_1p()).exp() };
+        let power =
+            if w >= 1.0 { if ns > 0.0 { 0.0 } else { 1.0 } } else { (ns * (-w).ln_1p()).exp() };
         (ns + 2.0) / std::f64::consts::TAU * power
     }
 }
@@ -84,10 +88,21 @@ mod tests {
         let key = |time_s, brdf| MaterialKey { time_s, brdf };
         let keys = vec![key(1.0, brdf(0.5, 0.0, 8.0)), key(3.0, brdf(0.7, 0.2, 16.0))];
         let material = Material { name: "m".into(), keys };
-        assert_eq!((material.at(0.0), material.at(9.0)), (brdf(0.5, 0.0, 8.0), brdf(0.7, 0.2, 16.0)));
+        assert_eq!(
+            (material.at(0.0), material.at(9.0)),
+            (brdf(0.5, 0.0, 8.0), brdf(0.7, 0.2, 16.0))
+        );
         let middle = material.at(2.0);
-        assert!((middle.kd.x - 0.6).abs() < 1e-15 && (middle.ks.x - 0.1).abs() < 1e-15 && middle.ns == 12.0);
-        assert!(material.is_edited() && material.is_glossy() && (material.greatest_albedo() - 1.5).abs() < 1e-15);
+        assert!(
+            (middle.kd.x - 0.6).abs() < 1e-15
+                && (middle.ks.x - 0.1).abs() < 1e-15
+                && middle.ns == 12.0
+        );
+        assert!(
+            material.is_edited()
+                && material.is_glossy()
+                && (material.greatest_albedo() - 1.5).abs() < 1e-15
+        );
     }
 
     #[test]

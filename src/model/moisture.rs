@@ -1,4 +1,5 @@
-//! Saturation, relative humidity and the height at which a lifted parcel is saturated: C (1)–(3), docs/model.md §4.
+//! Saturation, relative humidity and the height at which a lifted parcel is saturated: C (1)–(3),
+//! docs/model.md §4.
 
 use std::fmt;
 
@@ -9,7 +10,8 @@ pub const T0_K: f64 = 273.15;
 pub const R_VAPOUR: f64 = 461.5;
 /// Latent heat of evaporation where it is taken to be constant, J/kg.
 pub const LATENT_HEAT: f64 = 2.5e6;
-/// Latent heat at [`T0_K`] where it falls with temperature, J/kg, and by how much a kelvin, J/(kg K).
+/// Latent heat at [`T0_K`] where it falls with temperature, J/kg, and by how much a kelvin, J/(kg
+/// K).
 pub const LATENT_HEAT_T0: f64 = 2.501e6;
 pub const LATENT_HEAT_FALL: f64 = 2361.0;
 /// Latent heat of sublimation, J/kg: it hardly depends on temperature.
@@ -27,13 +29,17 @@ pub enum Saturation {
 }
 
 impl Saturation {
-    pub const NAMES: [(&'static str, Saturation); 3] =
-        [("constant", Saturation::Constant), ("linear", Saturation::Linear), ("bolton", Saturation::Bolton)];
+    pub const NAMES: [(&'static str, Saturation); 3] = [
+        ("constant", Saturation::Constant),
+        ("linear", Saturation::Linear),
+        ("bolton", Saturation::Bolton),
+    ];
 }
 
 impl fmt::Display for Saturation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let name = Saturation::NAMES.iter().find(|(_, of)| of == self).map_or("", |(name, _)| *name);
+        let name =
+            Saturation::NAMES.iter().find(|(_, of)| of == self).map_or("", |(name, _)| *name);
         f.write_str(name)
     }
 }
@@ -54,10 +60,13 @@ impl Vapour {
         }
         match self.saturation {
             _ if t_k.is_nan() => f64::NAN,
-            Saturation::Constant | Saturation::Linear if self.ice && t_k < T0_K => clapeyron(SUBLIMATION_HEAT, t_k),
+            Saturation::Constant | Saturation::Linear if self.ice && t_k < T0_K => {
+                clapeyron(SUBLIMATION_HEAT, t_k)
+            }
             Saturation::Constant => clapeyron(LATENT_HEAT, t_k),
             Saturation::Linear => {
-                // L is cut where it has fallen to 0, some 1332 K, far beyond water's critical point: E stays from there on.
+                // L is cut where it has fallen to 0, some 1332 K, far beyond water's critical
+                // point: E stays from there on.
                 let t = t_k.min(T0_K + LATENT_HEAT_T0 / LATENT_HEAT_FALL);
                 let at_0 = LATENT_HEAT_T0 + LATENT_HEAT_FALL * T0_K;
                 clapeyron(at_0, t) - LATENT_HEAT_FALL / R_VAPOUR * log_ratio(t, T0_K)
@@ -73,8 +82,8 @@ impl Vapour {
         E0_PA * self.log_saturation(t_k).exp()
     }
 
-    /// f = e/E, `vapour_pa` the vapour's pressure e: above 1 where the air holds more than it can, 0 of dry air at every
-    /// temperature, and infinite of moist air where E is 0.
+    /// f = e/E, `vapour_pa` the vapour's pressure e: above 1 where the air holds more than it can,
+    /// 0 of dry air at every temperature, and infinite of moist air where E is 0.
     pub fn relative_humidity(self, vapour_pa: f64, t_k: f64) -> f64 {
         if vapour_pa == 0.0 {
             return 0.0;
@@ -119,8 +128,13 @@ pub struct Gases {
 }
 
 /// c_p as Bolton (1980) and Emanuel (1994) have it.
-pub const GASES: Gases =
-    Gases { r_dry: 287.04, r_vapour: R_VAPOUR, cp_dry: 1005.7, cp_vapour: 1870.0, gravity: 9.806_65 };
+pub const GASES: Gases = Gases {
+    r_dry: 287.04,
+    r_vapour: R_VAPOUR,
+    cp_dry: 1005.7,
+    cp_vapour: 1870.0,
+    gravity: 9.806_65,
+};
 
 /// Air at the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -148,7 +162,10 @@ impl Parcel {
 
     /// The temperature at which it is saturated at its own pressure.
     pub fn dew_point_k(&self, law: Vapour) -> f64 {
-        saturated_at(|t| self.humidity.ln() + law.log_saturation(self.t_k) - law.log_saturation(t), self.t_k)
+        saturated_at(
+            |t| self.humidity.ln() + law.log_saturation(self.t_k) - law.log_saturation(t),
+            self.t_k,
+        )
     }
 
     /// The lifted condensation level.
@@ -157,7 +174,12 @@ impl Parcel {
     }
 
     /// The same for any E(T), given as ln(E/E₀), of air of `vapour_pa` and other constants.
-    pub fn condensation_by(&self, log_saturation: &dyn Fn(f64) -> f64, vapour_pa: f64, gases: &Gases) -> Level {
+    pub fn condensation_by(
+        &self,
+        log_saturation: &dyn Fn(f64) -> f64,
+        vapour_pa: f64,
+        gases: &Gases,
+    ) -> Level {
         // Mass of vapour in a mass of air; it stays, and with it e/p.
         let share = gases.r_dry / gases.r_vapour;
         let q = share * vapour_pa / (self.pressure_pa - (1.0 - share) * vapour_pa);
@@ -165,7 +187,8 @@ impl Parcel {
         let r = (1.0 - q) * gases.r_dry + q * gases.r_vapour;
         // p ∝ T^{c_p/R}.
         let excess = |t: f64| {
-            self.humidity.ln() + cp / r * log_ratio(t, self.t_k) + log_saturation(self.t_k) - log_saturation(t)
+            self.humidity.ln() + cp / r * log_ratio(t, self.t_k) + log_saturation(self.t_k)
+                - log_saturation(t)
         };
         let t_k = saturated_at(excess, self.t_k);
         let pressure_pa = self.pressure_pa * (cp / r * log_ratio(t_k, self.t_k)).exp();
@@ -173,7 +196,8 @@ impl Parcel {
     }
 }
 
-/// The greatest T up to `t_k` with `log_humidity`(T) ≥ 0, which rises as T falls: halved until two neighbouring numbers are left.
+/// The greatest T up to `t_k` with `log_humidity`(T) ≥ 0, which rises as T falls: halved until two
+/// neighbouring numbers are left.
 fn saturated_at(log_humidity: impl Fn(f64) -> f64, t_k: f64) -> f64 {
     if log_humidity(t_k) >= 0.0 {
         return t_k;
@@ -210,25 +234,35 @@ mod tests {
                 assert_eq!(Vapour { saturation, ice }.saturation(T0_K), E0_PA);
             }
         }
-        // L/R_v = 5417.118 K; at 20 °C 1/273.15 − 1/293.15 = 2.497662e-4, e^1.353013 = 3.86906: 2364.8 Pa.
-        assert!((CONSTANT.saturation(293.15) - 2364.8).abs() < 0.2, "{}", CONSTANT.saturation(293.15));
-        // (L₀ + 2361 T₀)/R_v = 6816.746 K times the same, less 5.115926 ln(293.15/273.15) = 0.361511: e^1.341081 = 3.82318.
+        // L/R_v = 5417.118 K; at 20 °C 1/273.15 − 1/293.15 = 2.497662e-4, e^1.353013 = 3.86906:
+        // 2364.8 Pa.
+        assert!(
+            (CONSTANT.saturation(293.15) - 2364.8).abs() < 0.2,
+            "{}",
+            CONSTANT.saturation(293.15)
+        );
+        // (L₀ + 2361 T₀)/R_v = 6816.746 K times the same, less 5.115926 ln(293.15/273.15) =
+        // 0.361511: e^1.341081 = 3.82318.
         assert!((LINEAR.saturation(293.15) - 2336.7).abs() < 0.2, "{}", LINEAR.saturation(293.15));
         // 17.67 · 20/263.5 = 1.341176, e^… = 3.82354.
         assert!((BOLTON.saturation(293.15) - 2336.9).abs() < 0.2, "{}", BOLTON.saturation(293.15));
         // Cooling at constant e raises f (the paper says the opposite).
-        assert!(CONSTANT.relative_humidity(1000.0, 280.0) > CONSTANT.relative_humidity(1000.0, 290.0));
+        assert!(
+            CONSTANT.relative_humidity(1000.0, 280.0) > CONSTANT.relative_humidity(1000.0, 290.0)
+        );
         assert!((LINEAR.relative_humidity(LINEAR.saturation(285.0), 285.0) - 1.0).abs() < 1e-14);
     }
 
-    /// Murphy & Koop (2005), eq. 10 and 7: within 0.05 % of what is measured, over water and over ice.
+    /// Murphy & Koop (2005), eq. 10 and 7: within 0.05 % of what is measured, over water and over
+    /// ice.
     fn murphy_koop(t: f64, ice: bool) -> f64 {
         let ln = t.ln();
         if ice {
             return (9.550426 - 5723.265 / t + 3.53068 * ln - 0.00728332 * t).exp();
         }
         let low = 54.842763 - 6763.22 / t - 4.210 * ln + 0.000367 * t;
-        (low + (0.0415 * (t - 218.8)).tanh() * (53.878 - 1331.22 / t - 9.44523 * ln + 0.014025 * t)).exp()
+        (low + (0.0415 * (t - 218.8)).tanh() * (53.878 - 1331.22 / t - 9.44523 * ln + 0.014025 * t))
+            .exp()
     }
 
     #[test]
@@ -237,10 +271,19 @@ mod tests {
             let t = T0_K + f64::from(k);
             let off = |law: Vapour, ice| (law.saturation(t) / murphy_koop(t, ice) - 1.0).abs();
             // E₀ itself is 0.02 % off.
-            assert!(off(BOLTON, false) < 0.005 && off(LINEAR, false) < 0.006 && off(CONSTANT, false) < 0.085, "{k}");
+            assert!(
+                off(BOLTON, false) < 0.005
+                    && off(LINEAR, false) < 0.006
+                    && off(CONSTANT, false) < 0.085,
+                "{k}"
+            );
             if k < 0 {
                 let ice = |saturation| Vapour { saturation, ice: true };
-                assert!(off(ice(Saturation::Bolton), true) < 0.005 && off(ice(Saturation::Linear), true) < 0.01, "{k}");
+                assert!(
+                    off(ice(Saturation::Bolton), true) < 0.005
+                        && off(ice(Saturation::Linear), true) < 0.01,
+                    "{k}"
+                );
                 // Over ice the air holds less: 1 % less a kelvin.
                 assert!(ice(Saturation::Bolton).saturation(t) < BOLTON.saturation(t));
             }
@@ -249,10 +292,15 @@ mod tests {
 
     #[test]
     fn a_lifted_parcel_condenses_where_romps_says() {
-        // Romps (2017), "Exact Expression for the Lifting Condensation Level", his constants and the heights that his code is
-        // published with.
-        let gases =
-            Gases { r_dry: 287.04, r_vapour: 461.0, cp_dry: 719.0 + 287.04, cp_vapour: 1418.0 + 461.0, gravity: 9.81 };
+        // Romps (2017), "Exact Expression for the Lifting Condensation Level", his constants and
+        // the heights that his code is published with.
+        let gases = Gases {
+            r_dry: 287.04,
+            r_vapour: 461.0,
+            cp_dry: 719.0 + 287.04,
+            cp_vapour: 1418.0 + 461.0,
+            gravity: 9.81,
+        };
         let log = |t: f64| {
             (1879.0 - 4119.0) / 461.0 * (t / 273.16).ln()
                 + (2.3740e6 - (1418.0 - 4119.0) * 273.16) / 461.0 * (1.0 / 273.16 - 1.0 / t)
@@ -274,8 +322,10 @@ mod tests {
                 let off = level.t_k - bolton_level_k(parcel.t_k, humidity);
                 assert!(off.abs() < 0.2, "{t} °C, {humidity}: {off}");
                 // It is saturated there, and its potential temperature is what it was.
-                let f = BOLTON
-                    .relative_humidity(parcel.vapour_pa(BOLTON) * level.pressure_pa / parcel.pressure_pa, level.t_k);
+                let f = BOLTON.relative_humidity(
+                    parcel.vapour_pa(BOLTON) * level.pressure_pa / parcel.pressure_pa,
+                    level.t_k,
+                );
                 assert!((f - 1.0).abs() < 1e-12, "{f}");
             }
         }
@@ -293,7 +343,10 @@ mod tests {
         for law in [CONSTANT, LINEAR, BOLTON] {
             for humidity in [1e-3, 1e-12, 1e-300] {
                 let level = Parcel { t_k: 300.0, pressure_pa: 1e5, humidity }.condensation(law);
-                assert!(level.t_k > 0.0 && level.height_m > 5000.0 && level.height_m < 31_000.0, "{level:?}");
+                assert!(
+                    level.t_k > 0.0 && level.height_m > 5000.0 && level.height_m < 31_000.0,
+                    "{level:?}"
+                );
             }
         }
     }

@@ -1,4 +1,5 @@
-//! Particles that somebody else moves: those of a weather file, between its steps (docs/model.md §15 "Time").
+//! Particles that somebody else moves: those of a weather file, between its steps (docs/model.md
+//! §15 "Time").
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -10,7 +11,8 @@ use crate::error::Result;
 
 /// Who moves them.
 pub trait Mover: Debug + Send + Sync {
-    /// All particles at `time_s`, relative to the cloud's position: always as many, and within the bounds that [`Moving`] says.
+    /// All particles at `time_s`, relative to the cloud's position: always as many, and within the
+    /// bounds that [`Moving`] says.
     ///
     /// # Errors
     /// What cannot be read.

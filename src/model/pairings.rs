@@ -1,5 +1,5 @@
-//! Which regions can send light to which, and which surfaces may stand between them: what a gather can leave out for
-//! whole regions, because surfaces do not move (model.md §7).
+//! Which regions can send light to which, and which surfaces may stand between them: what a gather
+//! can leave out for whole regions, because surfaces do not move (model.md §7).
 
 use glam::DVec3;
 
@@ -13,11 +13,12 @@ pub struct Pairing {
     pub occluders: Vec<usize>,
 }
 
-/// Within this share of its reach a corner lies in a plane: rounding of typed digits must not decide. The GPU's own
-/// tolerance (2⁻²⁰) is larger, so nothing is left out that it would see.
+/// Within this share of its reach a corner lies in a plane: rounding of typed digits must not
+/// decide. The GPU's own tolerance (2⁻²⁰) is larger, so nothing is left out that it would see.
 const IN_PLANE: f64 = 1e-9;
 
-/// For every region, surfaces before the `n_others` (ground and clouds, which face every way), the regions whose light can reach it.
+/// For every region, surfaces before the `n_others` (ground and clouds, which face every way), the
+/// regions whose light can reach it.
 pub fn pairings(surfaces: &[Surface], n_others: usize) -> Vec<Vec<Pairing>> {
     let n = surfaces.len() + n_others;
     let of = |i: usize| (0..n).filter_map(|k| pairing(surfaces, i, k)).collect();
@@ -47,13 +48,21 @@ fn pairing(surfaces: &[Surface], i_receiver: usize, i_emitter: usize) -> Option<
 /// Least and greatest signed distance of `s`'s corners from the plane of `plane`, 0 within it.
 fn sides(plane: &Surface, s: &Surface) -> (f64, f64) {
     let n = plane.normal();
-    let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| s.center + x * s.u + y * s.v);
+    let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+        .map(|(x, y)| s.center + x * s.u + y * s.v);
     let distances = corners.map(|p| {
         let o = p - plane.center;
         let e = n.dot(o);
-        if e.abs() > IN_PLANE * (o.abs().element_sum() + plane.u.length() + plane.v.length()) { e } else { 0.0 }
+        if e.abs() > IN_PLANE * (o.abs().element_sum() + plane.u.length() + plane.v.length()) {
+            e
+        } else {
+            0.0
+        }
     });
-    (distances.into_iter().fold(f64::INFINITY, f64::min), distances.into_iter().fold(f64::NEG_INFINITY, f64::max))
+    (
+        distances.into_iter().fold(f64::INFINITY, f64::min),
+        distances.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    )
 }
 
 /// Whether some of `s` lies before `plane`'s front side.
@@ -96,8 +105,9 @@ mod tests {
         let below = surface([0.0, -1.0, 0.0], DVec3::Z, DVec3::X);
         let aside = surface([9.0, 1.0, 0.0], DVec3::Z, DVec3::X);
         let found = pairings(&[floor, ceiling, shelf, below, aside], 0);
-        // Floor (up) and ceiling (down) see each other, the shelf (up) only the ceiling; of what is below, the floor
-        // hides all but its rim, and it faces the floor's back, which sends nothing.
+        // Floor (up) and ceiling (down) see each other, the shelf (up) only the ceiling; of what is
+        // below, the floor hides all but its rim, and it faces the floor's back, which sends
+        // nothing.
         assert_eq!(emitters(&found[0]), [(1, &[2][..])]);
         assert_eq!(emitters(&found[2]), [(1, &[][..])]);
         let of_ceiling = emitters(&found[1]);

@@ -1,11 +1,12 @@
-//! The smaller picture that blobs may be drawn into, and how its pixels lie under those of the full one
-//! (docs/model.md §11 "upsample").
+//! The smaller picture that blobs may be drawn into, and how its pixels lie under those of the full
+//! one (docs/model.md §11 "upsample").
 
 use glam::DVec2;
 
 /// Taps of the interpolation along an axis.
 pub const N_TAPS: u32 = 6;
-/// Columns and rows of a smaller picture are a multiple of this, so that its rows begin with a whole texel.
+/// Columns and rows of a smaller picture are a multiple of this, so that its rows begin with a
+/// whole texel.
 pub const ALIGNED: u32 = 4;
 /// Depths that differ by no more than this share of the nearer one are those of one surface.
 pub const ALIKE: f64 = 1.0 / 16.0;
@@ -45,7 +46,8 @@ impl Resolution {
     }
 }
 
-/// A smaller picture about the same centre, with a margin, so that every full pixel has all of its taps.
+/// A smaller picture about the same centre, with a margin, so that every full pixel has all of its
+/// taps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SmallPicture {
     pub full: [u32; 2],
@@ -90,8 +92,8 @@ mod tests {
                 // The first tap is two before the pixel's own, the last one three after it.
                 assert!(o / (2 * n) >= 2, "{width}/{n}");
                 assert!((o + 2 * (width - 1)) / (2 * n) + 3 < size, "{width}/{n}");
-                // The first and the last pixel lie as far from the middle of the small picture, whose first pixel's
-                // centre is half a pixel from its edge.
+                // The first and the last pixel lie as far from the middle of the small picture,
+                // whose first pixel's centre is half a pixel from its edge.
                 let at = |p: u32| f64::from(o + 2 * p) / f64::from(2 * n) + 0.5;
                 assert_eq!(at(0) + at(width - 1), f64::from(size), "{width}/{n}");
                 assert!(size % ALIGNED == 0 && size < width.div_ceil(n) + N_TAPS + ALIGNED);

@@ -1,4 +1,5 @@
-//! A scene: everything a run is made of, checked and complete (defaults filled in, references resolved).
+//! A scene: everything a run is made of, checked and complete (defaults filled in, references
+//! resolved).
 
 use std::borrow::Cow;
 
@@ -53,7 +54,8 @@ impl Time {
 
     /// The last frame at or before `time_s`; the first for all that comes before it.
     pub fn frame_at(&self, time_s: f64) -> u32 {
-        // A cast to an integer stops at its ends. Where time stands still every frame is at the same time.
+        // A cast to an integer stops at its ends. Where time stands still every frame is at the
+        // same time.
         if self.step_s > 0.0 { ((time_s - self.start_s) / self.step_s) as u32 } else { 0 }
     }
 }
@@ -69,8 +71,11 @@ pub enum LightingMode {
 }
 
 impl LightingMode {
-    pub const NAMES: [(&'static str, LightingMode); 3] =
-        [("none", LightingMode::None), ("first", LightingMode::First), ("two-reflection", LightingMode::TwoReflection)];
+    pub const NAMES: [(&'static str, LightingMode); 3] = [
+        ("none", LightingMode::None),
+        ("first", LightingMode::First),
+        ("two-reflection", LightingMode::TwoReflection),
+    ];
 }
 
 /// How the second reflection is gathered.
@@ -166,7 +171,8 @@ pub enum Cull {
 }
 
 impl Cull {
-    pub const NAMES: [(&'static str, Cull); 3] = [("on", Cull::On), ("off", Cull::Off), ("auto", Cull::Auto)];
+    pub const NAMES: [(&'static str, Cull); 3] =
+        [("on", Cull::On), ("off", Cull::Off), ("auto", Cull::Auto)];
 }
 
 /// Most chunks that sprites are drawn in.
@@ -175,7 +181,8 @@ pub const MAX_CHUNKS: u32 = 256;
 /// In what order sprites are drawn, and what becomes of pixels that are full.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Chunks {
-    /// So many, near to far, and after each the pixels that let nothing more through are left out; 0: far to near, all of it.
+    /// So many, near to far, and after each the pixels that let nothing more through are left out;
+    /// 0: far to near, all of it.
     Of(u32),
     /// Whichever is the fastest at the scene's first frame.
     Auto,
@@ -189,7 +196,8 @@ pub struct Draw {
     pub impostor_error: f64,
     /// Of the picture that they are drawn into.
     pub resolution: Resolution,
-    /// What "auto" takes, all together, differs from the picture without by no more than this, root mean square.
+    /// What "auto" takes, all together, differs from the picture without by no more than this, root
+    /// mean square.
     pub error: f64,
     /// Of path "sprites".
     pub chunks: Chunks,
@@ -219,8 +227,16 @@ impl Draw {
             cull: if self.cull == Cull::Auto { Cull::On } else { self.cull },
             threshold: least(self.threshold),
             smallest: least(self.smallest),
-            resolution: if self.resolution == Resolution::Auto { Resolution::Full } else { self.resolution },
-            impostors: if self.impostors == Impostors::Auto { Impostors::Off } else { self.impostors },
+            resolution: if self.resolution == Resolution::Auto {
+                Resolution::Full
+            } else {
+                self.resolution
+            },
+            impostors: if self.impostors == Impostors::Auto {
+                Impostors::Off
+            } else {
+                self.impostors
+            },
             ..self
         }
     }
@@ -250,7 +266,8 @@ pub enum Simulate {
 }
 
 impl Simulate {
-    pub const NAMES: [(&'static str, Simulate); 2] = [("gpu", Simulate::Gpu), ("cpu", Simulate::Cpu)];
+    pub const NAMES: [(&'static str, Simulate); 2] =
+        [("gpu", Simulate::Gpu), ("cpu", Simulate::Cpu)];
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -263,7 +280,11 @@ impl Scene {
     /// With what changes nothing in place of every "auto" of its drawing.
     pub fn exact(&self) -> Cow<'_, Scene> {
         let draw = self.draw.exact();
-        if draw == self.draw { Cow::Borrowed(self) } else { Cow::Owned(Scene { draw, ..self.clone() }) }
+        if draw == self.draw {
+            Cow::Borrowed(self)
+        } else {
+            Cow::Owned(Scene { draw, ..self.clone() })
+        }
     }
 
     /// Particles of all clouds.
@@ -271,8 +292,8 @@ impl Scene {
         self.clouds.iter().map(Cloud::n_particles).sum()
     }
 
-    /// Groups of all clouds in order; the particles are numbered through. Counts must fit u32, which the
-    /// limits of every device see to.
+    /// Groups of all clouds in order; the particles are numbered through. Counts must fit u32,
+    /// which the limits of every device see to.
     pub fn groups(&self) -> Vec<Group> {
         let mut groups: Vec<Group> = Vec::new();
         let mut i_first = 0u32;
@@ -283,7 +304,8 @@ impl Scene {
         groups
     }
 
-    /// What the half widths of the camera's view grow by, at most, where blobs are drawn into a smaller picture.
+    /// What the half widths of the camera's view grow by, at most, where blobs are drawn into a
+    /// smaller picture.
     pub fn widening(&self) -> DVec2 {
         match self.draw.resolution.divisor() {
             1 => DVec2::ONE,
@@ -311,8 +333,9 @@ impl Scene {
         GridSpec::fit_cells(-half, half, self.lighting.grid, Scene::cell_aspect(groups, 2.0 * half))
     }
 
-    /// Heights of the density grid's cells over their widths: 1 where all blobs of `groups` are balls; else as flat as they are on the
-    /// mean, or as all of the bounds (their extent given) is, whichever is flatter.
+    /// Heights of the density grid's cells over their widths: 1 where all blobs of `groups` are
+    /// balls; else as flat as they are on the mean, or as all of the bounds (their extent given)
+    /// is, whichever is flatter.
     fn cell_aspect(groups: &[Group], extent: DVec3) -> f64 {
         if !groups.iter().any(Group::has_ellipsoids) {
             return 1.0;
@@ -364,8 +387,8 @@ impl Scene {
         self.clouds.iter().any(|c| self.n_cloud_facets(c) < c.n_particles())
     }
 
-    /// Of each of the clouds' facets the run (first, end) of its particles' places in Morton order, all clouds' places
-    /// numbered through as their particles are.
+    /// Of each of the clouds' facets the run (first, end) of its particles' places in Morton order,
+    /// all clouds' places numbered through as their particles are.
     pub fn facet_runs(&self) -> Vec<(u64, u64)> {
         let mut i_first = 0;
         let of_cloud = |c: &Cloud| {
@@ -390,15 +413,23 @@ impl Scene {
     pub fn region_i_material(&self, i: usize) -> usize {
         let of_surface = self.surfaces.get(i).map(|s| s.i_material);
         let of_terrain = || self.terrains.get(i - self.surfaces.len()).map(|t| t.i_material);
-        of_surface.or_else(of_terrain).unwrap_or_else(|| self.clouds[i - self.n_solids()].i_material)
+        of_surface
+            .or_else(of_terrain)
+            .unwrap_or_else(|| self.clouds[i - self.n_solids()].i_material)
     }
 
     pub fn region_material(&self, i: usize) -> &Material {
         &self.materials[self.region_i_material(i)]
     }
 
-    /// Bounds (low, high) of the clouds, as [`Scene::bounds`] has them; without particles, of surfaces and ground.
-    pub fn lighting_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
+    /// Bounds (low, high) of the clouds, as [`Scene::bounds`] has them; without particles, of
+    /// surfaces and ground.
+    pub fn lighting_bounds(
+        &self,
+        groups: &[Group],
+        time_s: f64,
+        n_sigma: f64,
+    ) -> Option<(DVec3, DVec3)> {
         let of_solids = || self.solid_bounds().reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         self.bounds(groups, time_s, n_sigma).or_else(of_solids)
     }
@@ -407,23 +438,34 @@ impl Scene {
         self.surfaces.iter().map(Surface::bounds).chain(self.terrains.iter().map(Terrain::bounds))
     }
 
-    /// Bounds (low, high) of every region at `time_s`: of a surface or ground its own, of a cloud as [`Scene::bounds`] has
-    /// them, its origin where it has no particles.
-    pub fn region_bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Vec<(DVec3, DVec3)> {
-        let mut of_clouds: Vec<_> = self.clouds.iter().map(|c| (c.origin_at(time_s), None)).collect();
+    /// Bounds (low, high) of every region at `time_s`: of a surface or ground its own, of a cloud
+    /// as [`Scene::bounds`] has them, its origin where it has no particles.
+    pub fn region_bounds(
+        &self,
+        groups: &[Group],
+        time_s: f64,
+        n_sigma: f64,
+    ) -> Vec<(DVec3, DVec3)> {
+        let mut of_clouds: Vec<_> =
+            self.clouds.iter().map(|c| (c.origin_at(time_s), None)).collect();
         for group in groups.iter().filter(|g| g.n_particles > 0) {
             let (low, high) = self.group_bounds(group, time_s, n_sigma);
             let of_cloud = &mut of_clouds[group.i_cloud].1;
             let (l, h) = of_cloud.unwrap_or((low, high));
             *of_cloud = Some((low.min(l), high.max(h)));
         }
-        let of_clouds = of_clouds.into_iter().map(|(origin, bounds)| bounds.unwrap_or((origin, origin)));
+        let of_clouds =
+            of_clouds.into_iter().map(|(origin, bounds)| bounds.unwrap_or((origin, origin)));
         self.solid_bounds().chain(of_clouds).collect()
     }
 
-    /// Bounds (low, high) of all particles at `time_s`, blobs included out to `n_sigma` σ; `None` without particles.
+    /// Bounds (low, high) of all particles at `time_s`, blobs included out to `n_sigma` σ; `None`
+    /// without particles.
     pub fn bounds(&self, groups: &[Group], time_s: f64, n_sigma: f64) -> Option<(DVec3, DVec3)> {
-        let boxes = groups.iter().filter(|g| g.n_particles > 0).map(|g| self.group_bounds(g, time_s, n_sigma));
+        let boxes = groups
+            .iter()
+            .filter(|g| g.n_particles > 0)
+            .map(|g| self.group_bounds(g, time_s, n_sigma));
         boxes.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
@@ -431,7 +473,8 @@ impl Scene {
         let cloud = &self.clouds[group.i_cloud];
         let group = group.grown(cloud.growth.at(time_s));
         let center = cloud.origin_at(time_s) + group.center;
-        let reach = group.half_extent + n_sigma * group.sigma_bounds() + DVec3::splat(group.gust_reach);
+        let reach =
+            group.half_extent + n_sigma * group.sigma_bounds() + DVec3::splat(group.gust_reach);
         (center - reach, center + reach)
     }
 }

@@ -9,8 +9,8 @@ pub enum SortBits {
     Wide,
 }
 
-/// Keys of 16 bits do where a step of theirs is no more than this share of σ: which of two blobs whose centres lie so close is
-/// the nearer one, sprites only say by convention.
+/// Keys of 16 bits do where a step of theirs is no more than this share of σ: which of two blobs
+/// whose centres lie so close is the nearer one, sprites only say by convention.
 const SORT_STEP: f64 = 1.0 / 64.0;
 
 impl SortBits {

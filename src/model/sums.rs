@@ -13,8 +13,11 @@ pub enum Summation {
 }
 
 impl Summation {
-    pub const NAMES: [(&'static str, Summation); 3] =
-        [("plain", Summation::Plain), ("kahan", Summation::Kahan), ("pairwise", Summation::Pairwise)];
+    pub const NAMES: [(&'static str, Summation); 3] = [
+        ("plain", Summation::Plain),
+        ("kahan", Summation::Kahan),
+        ("pairwise", Summation::Pairwise),
+    ];
 }
 
 /// In which numbers.
@@ -27,7 +30,8 @@ pub enum Precision {
 }
 
 impl Precision {
-    pub const NAMES: [(&'static str, Precision); 2] = [("f32", Precision::F32), ("f64", Precision::F64)];
+    pub const NAMES: [(&'static str, Precision); 2] =
+        [("f32", Precision::F32), ("f64", Precision::F64)];
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

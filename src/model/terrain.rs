@@ -1,12 +1,12 @@
-//! Ground under clouds: heights over columns, a point a column, drawn as triangles between them and lit at them
-//! (docs/model.md §16).
+//! Ground under clouds: heights over columns, a point a column, drawn as triangles between them and
+//! lit at them (docs/model.md §16).
 
 use std::sync::Arc;
 
 use glam::DVec3;
 
-/// Rows of points, each seen from above to the left of the next where one looks along a row: u along a row, v from row to row,
-/// u × v up.
+/// Rows of points, each seen from above to the left of the next where one looks along a row: u
+/// along a row, v from row to row, u × v up.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Terrain {
     /// In the scene.
@@ -29,8 +29,9 @@ pub struct TerrainFacet {
     pub area: f64,
 }
 
-/// The two halves of a cell by their corners' numbers (0: low u, low v; 1: high u; 2: high v; 3: both): a corner, the one along u
-/// from it or back, the one along v or back. The first's corner and the second's lie across, so both have one front.
+/// The two halves of a cell by their corners' numbers (0: low u, low v; 1: high u; 2: high v; 3:
+/// both): a corner, the one along u from it or back, the one along v or back. The first's corner
+/// and the second's lie across, so both have one front.
 pub const HALVES: [[usize; 3]; 2] = [[0, 1, 2], [3, 2, 1]];
 
 impl Terrain {
@@ -51,7 +52,8 @@ impl Terrain {
         [low, low + 1, low + n_u, low + n_u + 1]
     }
 
-    /// The facet of point `i`: its normal and area by the differences to its neighbours on both sides, at the edges to the one.
+    /// The facet of point `i`: its normal and area by the differences to its neighbours on both
+    /// sides, at the edges to the one.
     pub fn facet(&self, i: u32) -> TerrainFacet {
         let [n_u, n_v] = self.n;
         let (column, row) = (i % n_u, i / n_u);
@@ -61,7 +63,11 @@ impl Terrain {
         let u = 0.5 * (at(east, row) - at(west, row));
         let v = 0.5 * (at(column, north) - at(column, south));
         let across = u.cross(v);
-        TerrainFacet { position: at(column, row), normal: across.normalize_or(DVec3::Y), area: across.length() }
+        TerrainFacet {
+            position: at(column, row),
+            normal: across.normalize_or(DVec3::Y),
+            area: across.length(),
+        }
     }
 
     pub fn facets(&self) -> impl Iterator<Item = TerrainFacet> + '_ {
@@ -89,7 +95,12 @@ mod tests {
     fn terrain(h: impl Fn(f64, f64) -> f64) -> Terrain {
         let at = |k: u32| (f64::from(k % 3), 2.0 * f64::from(k / 3));
         let points = (0..12).map(at).map(|(x, north)| DVec3::new(x, h(x, north), -north)).collect();
-        Terrain { origin: DVec3::new(10.0, 0.0, 0.0), points: Arc::new(points), n: [3, 4], i_material: 0 }
+        Terrain {
+            origin: DVec3::new(10.0, 0.0, 0.0),
+            points: Arc::new(points),
+            n: [3, 4],
+            i_material: 0,
+        }
     }
 
     #[test]
@@ -97,16 +108,26 @@ mod tests {
         let flat = terrain(|_, _| 5.0);
         assert!(flat.facets().all(|f| f.normal == DVec3::Y && f.position.y == 5.0));
         // 2 by 6: middles 1 x 2, edges half of it, corners a quarter.
-        assert_eq!(flat.facets().map(|f| f.area).collect::<Vec<_>>()[..6], [0.5, 1.0, 0.5, 1.0, 2.0, 1.0]);
+        assert_eq!(
+            flat.facets().map(|f| f.area).collect::<Vec<_>>()[..6],
+            [0.5, 1.0, 0.5, 1.0, 2.0, 1.0]
+        );
         assert_eq!(flat.facets().map(|f| f.area).sum::<f64>(), 12.0);
         // Rising eastward by 3/4: normal (−3, 4, 0)/5, area times 5/4.
         let slope = terrain(|x, _| 0.75 * x);
         for (f, g) in slope.facets().zip(flat.facets()) {
-            assert!((f.normal - DVec3::new(-0.6, 0.8, 0.0)).length() < 1e-15 && (f.area - 1.25 * g.area).abs() < 1e-15);
+            assert!(
+                (f.normal - DVec3::new(-0.6, 0.8, 0.0)).length() < 1e-15
+                    && (f.area - 1.25 * g.area).abs() < 1e-15
+            );
         }
         // And northward by 1: (0, 1, 1)/√2.
         let north = terrain(|_, north| north);
-        assert!(north.facets().all(|f| (f.normal - DVec3::new(0.0, 0.5f64.sqrt(), 0.5f64.sqrt())).length() < 1e-15));
+        assert!(
+            north.facets().all(|f| (f.normal - DVec3::new(0.0, 0.5f64.sqrt(), 0.5f64.sqrt()))
+                .length()
+                < 1e-15)
+        );
         assert_eq!(slope.bounds(), (DVec3::new(10.0, 0.0, -6.0), DVec3::new(12.0, 1.5, 0.0)));
     }
 
@@ -125,7 +146,8 @@ mod tests {
     #[test]
     fn a_wall_between_neighbours_is_no_trouble() {
         // All points of a row at one place: no area, and no NaN.
-        let t = Terrain { points: Arc::new(vec![DVec3::ZERO; 4]), n: [2, 2], ..terrain(|_, _| 0.0) };
+        let t =
+            Terrain { points: Arc::new(vec![DVec3::ZERO; 4]), n: [2, 2], ..terrain(|_, _| 0.0) };
         assert!(t.facets().all(|f| f.normal == DVec3::Y && f.area == 0.0));
     }
 }

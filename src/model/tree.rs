@@ -1,13 +1,16 @@
-//! The tree of clusters over the facets of a region: its form follows from their number alone, so that it is laid out
-//! once a scene, and only what the nodes hold follows from the frame (model.md §7, "tree").
+//! The tree of clusters over the facets of a region: its form follows from their number alone, so
+//! that it is laid out once a scene, and only what the nodes hold follows from the frame (model.md
+//! §7, "tree").
 
-/// Children of a node. Four are a quadrant each on a surface in Morton order; a cloud's octants are two heights.
+/// Children of a node. Four are a quadrant each on a surface in Morton order; a cloud's octants are
+/// two heights.
 pub const FAN: u32 = 4;
 
 /// Nodes in the order of a depth-first walk, a node before its children.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Tree {
-    /// Nodes of each one's subtree, itself included: where the walk goes on that does not enter it. 1 is a facet.
+    /// Nodes of each one's subtree, itself included: where the walk goes on that does not enter it.
+    /// 1 is a facet.
     pub n_nodes: Vec<u32>,
     /// Node of each place in the order of facets.
     pub leaves: Vec<u32>,
@@ -41,7 +44,8 @@ impl Tree {
             self.leaves.push(i as u32);
             return 0;
         }
-        // Children are full but for the last: runs of a power of FAN places, that a power of two's quadrants fit.
+        // Children are full but for the last: runs of a power of FAN places, that a power of two's
+        // quadrants fit.
         let mut run = 1;
         while run < n.div_ceil(FAN) {
             run *= FAN;

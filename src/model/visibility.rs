@@ -1,14 +1,16 @@
-//! What of a scene can be in the picture at all (docs/model.md §11 "visibility"). Errs towards "yes".
+//! What of a scene can be in the picture at all (docs/model.md §11 "visibility"). Errs towards
+//! "yes".
 
 use glam::{DVec2, DVec3};
 
 use super::camera::{Camera, Pose};
 use super::film::Film;
 
-/// The quads of sprites are this much larger than the sprites (sprites.vert's GROWTH); what is farther off draws nothing.
+/// The quads of sprites are this much larger than the sprites (sprites.vert's GROWTH); what is
+/// farther off draws nothing.
 const GROWTH: f64 = 1e-4;
-/// What f32 may make of a length on its way from placed particle to pixel, over the lengths it is made of: some twenty
-/// roundings of 2⁻²⁴; a dozen times that.
+/// What f32 may make of a length on its way from placed particle to pixel, over the lengths it is
+/// made of: some twenty roundings of 2⁻²⁴; a dozen times that.
 const ROUNDING: f64 = 1.0 / 65536.0;
 
 /// What the camera sees.
@@ -16,8 +18,8 @@ const ROUNDING: f64 = 1.0 / 65536.0;
 pub struct Frustum {
     forward: DVec3,
     near: f64,
-    /// Functions of an offset from the eye that are all positive within the frustum, and all negative within its mirror
-    /// image behind the eye.
+    /// Functions of an offset from the eye that are all positive within the frustum, and all
+    /// negative within its mirror image behind the eye.
     inward: [DVec3; 5],
 }
 
@@ -25,14 +27,15 @@ impl Frustum {
     /// `widening`: factors on the view's width and height.
     pub fn of(camera: &Camera, pose: &Pose, film: &Film, widening: DVec2) -> Frustum {
         let tan_y = (0.5 * camera.fov_y_rad).tan();
-        let tan = widening * DVec2::new(tan_y * f64::from(film.width) / f64::from(film.height), tan_y);
+        let tan =
+            widening * DVec2::new(tan_y * f64::from(film.width) / f64::from(film.height), tan_y);
         let (f, right, up) = (pose.forward, pose.right, pose.up);
         let inward = [f, tan.x * f - right, tan.x * f + right, tan.y * f - up, tan.y * f + up];
         Frustum { forward: f, near: camera.near, inward }
     }
 
-    /// Whether sprites of at most `radius`, whose centres lie within `center` ± `half` (from the eye), may draw a pixel.
-    /// `lengths`: of the coordinates that f32 has of them.
+    /// Whether sprites of at most `radius`, whose centres lie within `center` ± `half` (from the
+    /// eye), may draw a pixel. `lengths`: of the coordinates that f32 has of them.
     pub fn may_show(&self, center: DVec3, half: DVec3, radius: f64, lengths: f64) -> bool {
         let slack = ROUNDING * (lengths + center.abs().element_sum() + half.element_sum());
         let across = |n: DVec3| n.abs().dot(half);
@@ -57,17 +60,32 @@ mod tests {
     /// From the origin along −z, 90° up and 106° across: half a width of 4/3 of the depth.
     fn frustum() -> Frustum {
         let key = CameraKey { time_s: 0.0, position: DVec3::ZERO, target: DVec3::NEG_Z };
-        let camera = Camera { keys: vec![key], up: DVec3::Y, fov_y_rad: std::f64::consts::FRAC_PI_2, near: 0.5 };
+        let camera = Camera {
+            keys: vec![key],
+            up: DVec3::Y,
+            fov_y_rad: std::f64::consts::FRAC_PI_2,
+            near: 0.5,
+        };
         let (format, tone_map) = (FilmFormat::Rgba16f, ToneMap::Clip);
-        let film = Film { width: 400, height: 300, format, background: DVec3::ZERO, exposure: 1.0, tone_map };
+        let film = Film {
+            width: 400,
+            height: 300,
+            format,
+            background: DVec3::ZERO,
+            exposure: 1.0,
+            tone_map,
+        };
         Frustum::of(&camera, &camera.pose(0.0).unwrap(), &film, DVec2::ONE)
     }
 
     #[test]
     fn what_lies_beside_or_before_the_near_plane_is_left_out() {
-        let shows = |x: f64, y: f64, z: f64| frustum().may_show(DVec3::new(x, y, -z), DVec3::splat(0.5), 0.25, 0.0);
+        let shows = |x: f64, y: f64, z: f64| {
+            frustum().may_show(DVec3::new(x, y, -z), DVec3::splat(0.5), 0.25, 0.0)
+        };
         assert!(shows(0.0, 0.0, 10.0) && shows(13.0, 0.0, 10.0) && shows(0.0, -10.0, 10.0));
-        // Of a box at depth 9.5 to 10.5 the right side's plane is 4/3 · 10.5 = 14 off; x − 0.5 − 0.25 · 5/3 > 14.
+        // Of a box at depth 9.5 to 10.5 the right side's plane is 4/3 · 10.5 = 14 off; x − 0.5 −
+        // 0.25 · 5/3 > 14.
         assert!(shows(14.9, 0.0, 10.0) && !shows(14.95, 0.0, 10.0) && !shows(-14.95, 0.0, 10.0));
         // 10.5 + 0.5 + 0.25 √2.
         assert!(shows(0.0, 11.3, 10.0) && !shows(0.0, 11.4, 10.0) && !shows(0.0, -11.4, 10.0));
@@ -77,8 +95,11 @@ mod tests {
 
     #[test]
     fn sprites_that_reach_behind_the_eye_are_seen_by_lines_of_either_sign() {
-        let shows = |x: f64, z: f64, radius: f64| frustum().may_show(DVec3::new(x, 0.0, -z), DVec3::ZERO, radius, 0.0);
-        // Around the eye; and beside it, so large that lines that go down before the eye meet it behind.
+        let shows = |x: f64, z: f64, radius: f64| {
+            frustum().may_show(DVec3::new(x, 0.0, -z), DVec3::ZERO, radius, 0.0)
+        };
+        // Around the eye; and beside it, so large that lines that go down before the eye meet it
+        // behind.
         assert!(shows(3.0, 1.0, 4.0) && shows(30.0, 1.0, 29.0));
         // Beside the eye and of no reach.
         assert!(!shows(30.0, 1.0, 2.0) && !shows(-30.0, 1.0, 2.0));

@@ -1,13 +1,17 @@
-//! chunks: what `sprites` draws near to far, a chunk at a time; pixels that are full leave the rest out. Its time stands under `sprites`.
+//! chunks: what `sprites` draws near to far, a chunk at a time; pixels that are full leave the rest
+//! out. Its time stands under `sprites`.
 //!
-//! In: sorted entries, far to near, and their number; the picture that chunks are composed in (four floats a pixel). Out: the
-//! entries near to far, by chunk, and each chunk's draw; depth 1 where the picture lets less through than may be left out;
-//! and the picture over what stands behind, premultiplied linear RGBA in the film's format. Law: docs/model.md §11 "chunks".
-//! Error: of f32 at each layer, of the film's format once, and what is left out behind a full pixel.
+//! In: sorted entries, far to near, and their number; the picture that chunks are composed in (four
+//! floats a pixel). Out: the entries near to far, by chunk, and each chunk's draw; depth 1 where
+//! the picture lets less through than may be left out; and the picture over what stands behind,
+//! premultiplied linear RGBA in the film's format. Law: docs/model.md §11 "chunks". Error: of f32
+//! at each layer, of the film's format once, and what is left out behind a full pixel.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target,
+};
 use crate::layout::record;
 
 record! {
@@ -18,7 +22,8 @@ record! {
     pub struct Push { width: u32, saturated: f32 }
 }
 
-/// What chunks are composed in: with fewer bits thin layers would leave no trace in a pixel that is nearly full.
+/// What chunks are composed in: with fewer bits thin layers would leave no trace in a pixel that is
+/// nearly full.
 pub const FORMAT: TargetFormat = TargetFormat::Rgba32f;
 
 pub struct Chunks {
@@ -32,13 +37,27 @@ impl Chunks {
     pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat) -> Result<Chunks> {
         Ok(Chunks {
             order: Kernel::new(device, compiler, "chunks.order", OrderPush::FIELDS, &[])?,
-            pick: DrawPipeline::new(device, compiler, "chunks", Push::FIELDS, &[(0, 1)], (FORMAT, Meet::Hide))?,
-            show: DrawPipeline::new(device, compiler, "chunks", Push::FIELDS, &[(0, 0)], (format, Meet::Over))?,
+            pick: DrawPipeline::new(
+                device,
+                compiler,
+                "chunks",
+                Push::FIELDS,
+                &[(0, 1)],
+                (FORMAT, Meet::Hide),
+            )?,
+            show: DrawPipeline::new(
+                device,
+                compiler,
+                "chunks",
+                Push::FIELDS,
+                &[(0, 0)],
+                (format, Meet::Over),
+            )?,
         })
     }
 
-    /// Orders what `kept` (KeptRecord) counts of `entries` near to far into `nearest`, `stride` places a chunk, and writes each
-    /// chunk's draw (four words) to `draws`.
+    /// Orders what `kept` (KeptRecord) counts of `entries` near to far into `nearest`, `stride`
+    /// places a chunk, and writes each chunk's draw (four words) to `draws`.
     pub fn record_order(
         &self,
         rec: &mut Recorder<'_>,
@@ -46,10 +65,16 @@ impl Chunks {
         [n_chunks, stride]: [u32; 2],
     ) -> Result<()> {
         // Of `n_chunks` times `stride` at most.
-        rec.dispatch(&self.order, &buffers, &OrderPush { n_chunks, stride }, n_chunks.max(n_chunks * stride))
+        rec.dispatch(
+            &self.order,
+            &buffers,
+            &OrderPush { n_chunks, stride },
+            n_chunks.max(n_chunks * stride),
+        )
     }
 
-    /// Sets the depth of `target`, of which `composed` is a copy, to 1 where less than `saturated` is let through.
+    /// Sets the depth of `target`, of which `composed` is a copy, to 1 where less than `saturated`
+    /// is let through.
     pub fn record_pick(
         &self,
         rec: &mut Recorder<'_>,

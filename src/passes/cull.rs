@@ -1,8 +1,9 @@
 //! cull: of the drawn particles those that can show in a pixel.
 //!
-//! In: placed particles, particles (κ), group of each, what is drawn of the groups, the camera. Out: (key, particle) of the kept
-//! ones in ascending index, and their number. Law: near plane, optical depth, silhouette's rectangle, smallest size. Source:
-//! docs/model.md §11 "cull". Error: none that a pixel shows; with a smallest size, what is left out for it is bounded there.
+//! In: placed particles, particles (κ), group of each, what is drawn of the groups, the camera.
+//! Out: (key, particle) of the kept ones in ascending index, and their number. Law: near plane,
+//! optical depth, silhouette's rectangle, smallest size. Source: docs/model.md §11 "cull". Error:
+//! none that a pixel shows; with a smallest size, what is left out for it is bounded there.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
@@ -76,7 +77,8 @@ pub struct Cull {
 }
 
 impl Cull {
-    /// Room for `n_max` particles. `weighted`: κ has factors; `threshold`: there is one; `ellipsoids`: not all are balls.
+    /// Room for `n_max` particles. `weighted`: κ has factors; `threshold`: there is one;
+    /// `ellipsoids`: not all are balls.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -87,21 +89,34 @@ impl Cull {
         let invocations = device.limits().subgroup_size.clamp(8, 32);
         let together = device.limits().is_one_subgroup(invocations);
         let macros = [("TILE_INVOCATIONS", invocations), ("ONE_SUBGROUP", u32::from(together))];
-        let constants = [(3, u32::from(weighted)), (5, u32::from(threshold)), (6, u32::from(ellipsoids))];
+        let constants =
+            [(3, u32::from(weighted)), (5, u32::from(threshold)), (6, u32::from(ellipsoids))];
         let n_tiles = u64::from(n_max.div_ceil(TILE));
         Ok(Cull {
-            test: Kernel::with_macros(device, compiler, "cull.test", TestPush::FIELDS, &constants, &macros)?,
+            test: Kernel::with_macros(
+                device,
+                compiler,
+                "cull.test",
+                TestPush::FIELDS,
+                &constants,
+                &macros,
+            )?,
             scan: Kernel::new(device, compiler, "cull.scan", ScanPush::FIELDS, &[])?,
             write: Kernel::new(device, compiler, "cull.write", WritePush::FIELDS, &[])?,
-            masks: Buffer::new::<[u32; 2]>(device, "cull.masks", n_tiles * u64::from(WORDS), Place::Device)?,
+            masks: Buffer::new::<[u32; 2]>(
+                device,
+                "cull.masks",
+                n_tiles * u64::from(WORDS),
+                Place::Device,
+            )?,
             totals: Buffer::new::<u32>(device, "cull.totals", n_tiles, Place::Device)?,
             max_groups: device.limits().max_workgroups_x,
         })
     }
 
-    /// Of the drawn ones of the first `n_particles` of `placed` (PlacedRecord) those that can show go to `entries`
-    /// ([key, particle]), and their number to `kept` (KeptRecord). `particles`: ParticleRecord; `i_group`: u32 by particle;
-    /// `drawn`: DrawnRecord.
+    /// Of the drawn ones of the first `n_particles` of `placed` (PlacedRecord) those that can show
+    /// go to `entries` ([key, particle]), and their number to `kept` (KeptRecord). `particles`:
+    /// ParticleRecord; `i_group`: u32 by particle; `drawn`: DrawnRecord.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -119,8 +134,14 @@ impl Cull {
         // A scene without extent has one depth: any finite factor gives one key.
         let steps_per_depth = if radius > 0.0 { (65536.0 / (2.0 * radius)) as f32 } else { 0.0 };
         let forward = view.camera.forward;
-        let write = WritePush { forward, n_particles, depth_high: radius as f32, steps_per_depth, n_bits };
-        rec.dispatch(&self.write, &[placed, &self.masks, &self.totals, entries], &write, n_particles)
+        let write =
+            WritePush { forward, n_particles, depth_high: radius as f32, steps_per_depth, n_bits };
+        rec.dispatch(
+            &self.write,
+            &[placed, &self.masks, &self.totals, entries],
+            &write,
+            n_particles,
+        )
     }
 }
 

@@ -1,8 +1,9 @@
 //! grid: the blobs' extinction on cells, cubes where blobs are balls.
 //!
-//! In: placed particles, their κ. Out: density (extinction per unit length), cell (x, y, z) at x + n_x (y + n_y z).
-//! Law: mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a weight's 2.5e-6 (erf's formula 3e-7,
-//! the rest its rounding) at the most, some 1e-6 measured, and half a quantum of the fixed-point sum a deposit.
+//! In: placed particles, their κ. Out: density (extinction per unit length), cell (x, y, z) at x +
+//! n_x (y + n_y z). Law: mass-conserving separable deposit. Source: docs/model.md §8, §11. Error: a
+//! weight's 2.5e-6 (erf's formula 3e-7, the rest its rounding) at the most, some 1e-6 measured, and
+//! half a quantum of the fixed-point sum a deposit.
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
@@ -17,8 +18,8 @@ record! {
     pub struct ResolvePush { n_cells: u32, density_per_quantum: f32 }
 }
 
-/// Quanta of the heaviest particle's mass: 2³¹ in one cell fits a 32-bit word with room for rounding up, and 2³³ such
-/// particles fit the 64-bit sum.
+/// Quanta of the heaviest particle's mass: 2³¹ in one cell fits a 32-bit word with room for
+/// rounding up, and 2³³ such particles fit the 64-bit sum.
 const QUANTA_OF_HEAVIEST: f64 = 2_147_483_648.0;
 
 pub struct Grid {
@@ -32,7 +33,8 @@ pub struct Grid {
 impl Grid {
     /// Room for `n_cells` cells.
     pub fn new(device: &Device, compiler: &Compiler, n_cells: u64) -> Result<Grid> {
-        // A workgroup of one subgroup needs no waiting at its barriers, and a blob's few cells fill it.
+        // A workgroup of one subgroup needs no waiting at its barriers, and a blob's few cells fill
+        // it.
         let width = device.limits().subgroup_size.clamp(8, 64);
         Ok(Grid {
             deposit: Kernel::with_macros(
@@ -61,8 +63,8 @@ impl Grid {
         Ok(())
     }
 
-    /// `placed`: PlacedRecord; `particles`: ParticleRecord; `density`: f32 by cell. `heaviest` is at least the greatest
-    /// mass κ (2π)^{3/2} σ³ of any particle.
+    /// `placed`: PlacedRecord; `particles`: ParticleRecord; `density`: f32 by cell. `heaviest` is
+    /// at least the greatest mass κ (2π)^{3/2} σ³ of any particle.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -80,11 +82,17 @@ impl Grid {
         }
         rec.fill(&self.sums, 0);
         let quanta_per_mass = if heaviest > 0.0 { QUANTA_OF_HEAVIEST / heaviest } else { 0.0 };
-        let push = DepositPush { grid: *grid, n_particles, quanta_per_mass: quanta_per_mass as f32 };
+        let push =
+            DepositPush { grid: *grid, n_particles, quanta_per_mass: quanta_per_mass as f32 };
         rec.dispatch_groups(&self.deposit, &[placed, particles, &self.sums], &push, n_particles)?;
         let n_cells = grid.n_cells.iter().product();
         let volume = f64::from(grid.cell).powi(3) * f64::from(grid.aspect);
         let density_per_quantum = (heaviest / QUANTA_OF_HEAVIEST / volume) as f32;
-        rec.dispatch(&self.resolve, &[&self.sums, density], &ResolvePush { n_cells, density_per_quantum }, n_cells)
+        rec.dispatch(
+            &self.resolve,
+            &[&self.sums, density],
+            &ResolvePush { n_cells, density_per_quantum },
+            n_cells,
+        )
     }
 }

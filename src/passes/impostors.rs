@@ -1,15 +1,19 @@
-//! impostors: what is far, drawn once into a picture (a shell), shown again from where the eye is now.
+//! impostors: what is far, drawn once into a picture (a shell), shown again from where the eye is
+//! now.
 //!
-//! In: sorted entries, a shell's picture (four floats a texel), and how pixels lie in it. Out: entries of what is far and of what
-//! is near; the shell under the near blobs, premultiplied linear RGBA in the film's format. Law: a homography by the plane of
-//! one depth, Catmull and Rom's cubic. Source: Harris & Lastra 2001, docs/model.md §11. Error: places to 1e-6 of the picture's
-//! extent, and the target's rounding; what it shows of the truth is predicted by `model::impostor`.
+//! In: sorted entries, a shell's picture (four floats a texel), and how pixels lie in it. Out:
+//! entries of what is far and of what is near; the shell under the near blobs, premultiplied linear
+//! RGBA in the film's format. Law: a homography by the plane of one depth, Catmull and Rom's cubic.
+//! Source: Harris & Lastra 2001, docs/model.md §11. Error: places to 1e-6 of the picture's extent,
+//! and the target's rounding; what it shows of the truth is predicted by `model::impostor`.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target,
+};
 use crate::layout::record;
 
 record! {
@@ -44,7 +48,8 @@ pub struct Shown {
     pub tangents: [DVec2; 2],
     /// The shell's texels.
     pub size: [u32; 2],
-    /// The slopes that it shows anything at, least and greatest; rounded outward by whoever gives them.
+    /// The slopes that it shows anything at, least and greatest; rounded outward by whoever gives
+    /// them.
     pub bounds: [DVec2; 2],
     /// near/z of what stands for all of it; surfaces that are nearer hide it.
     pub depth: f32,
@@ -52,16 +57,29 @@ pub struct Shown {
 
 impl Impostors {
     /// `behind`: surfaces have been drawn, with depth.
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, behind: bool) -> Result<Impostors> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        behind: bool,
+    ) -> Result<Impostors> {
         let meet = if behind { Meet::OverNearer } else { Meet::Over };
         Ok(Impostors {
             part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS, &[])?,
-            show: DrawPipeline::new(device, compiler, "impostors", Push::FIELDS, &[], (format, meet))?,
+            show: DrawPipeline::new(
+                device,
+                compiler,
+                "impostors",
+                Push::FIELDS,
+                &[],
+                (format, meet),
+            )?,
         })
     }
 
-    /// Parts the first `n_entries` of `entries` ([key, particle]) into `far` and `near`, by `members` (u32 a particle), which is
-    /// made anew where `last_key` says the last key of what is far.
+    /// Parts the first `n_entries` of `entries` ([key, particle]) into `far` and `near`, by
+    /// `members` (u32 a particle), which is made anew where `last_key` says the last key of what is
+    /// far.
     pub fn record_part(
         &self,
         rec: &mut Recorder<'_>,
@@ -73,13 +91,24 @@ impl Impostors {
             // Who is not drawn is not in it.
             rec.fill(members, 0);
         }
-        let push =
-            PartPush { n_entries, last_key: last_key.unwrap_or(0), is_new: u32::from(last_key.is_some()), unused: 0 };
+        let push = PartPush {
+            n_entries,
+            last_key: last_key.unwrap_or(0),
+            is_new: u32::from(last_key.is_some()),
+            unused: 0,
+        };
         rec.dispatch(&self.part, &[entries, members, far, near], &push, n_entries)
     }
 
-    /// Draws `shell` (four floats a texel, rows from the top) into `target`, over the surfaces where it has depth.
-    pub fn record_show(&self, rec: &mut Recorder<'_>, shell: &Buffer, target: Target<'_>, shown: &Shown) -> Result<()> {
+    /// Draws `shell` (four floats a texel, rows from the top) into `target`, over the surfaces
+    /// where it has depth.
+    pub fn record_show(
+        &self,
+        rec: &mut Recorder<'_>,
+        shell: &Buffer,
+        target: Target<'_>,
+        shown: &Shown,
+    ) -> Result<()> {
         let (width, height) = target.color.size();
         let push = push(shown, [width, height]);
         let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
@@ -87,7 +116,8 @@ impl Impostors {
     }
 }
 
-/// The homography between pixels: both counted from the middles of their pictures, so that f32 holds them best.
+/// The homography between pixels: both counted from the middles of their pictures, so that f32
+/// holds them best.
 fn push(shown: &Shown, [width, height]: [u32; 2]) -> Push {
     let middle = 0.5 * DVec2::new(width.into(), height.into());
     let [view, shell] = shown.tangents;
@@ -97,7 +127,8 @@ fn push(shown: &Shown, [width, height]: [u32; 2]) -> Push {
     let of = (texels * shown.to_shell * slopes).transpose();
     // Rows count downward, in slopes and on the screen.
     let down = DVec2::new(1.0, -1.0);
-    let on_screen = shown.bounds.map(|slopes| (down * slopes / view).clamp(DVec2::NEG_ONE, DVec2::ONE));
+    let on_screen =
+        shown.bounds.map(|slopes| (down * slopes / view).clamp(DVec2::NEG_ONE, DVec2::ONE));
     let (low, high) = (on_screen[0].min(on_screen[1]), on_screen[0].max(on_screen[1]));
     let f32s = |v: DVec3| v.as_vec3().to_array();
     Push {

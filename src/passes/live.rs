@@ -1,8 +1,9 @@
 //! live: the particles of discs at a frame's time.
 //!
-//! In: a disc's law and the time. Out: its particles relative to their group's centre, with σ and κ as old as they are.
-//! Law: docs/model.md §2, in closed form of (seed, slot, time). Source: C §2.3. Error: tests/pass_live.rs derives the bound on
-//! position, σ and κ by what each operation rounds; generations and births are integers and the same as in f64.
+//! In: a disc's law and the time. Out: its particles relative to their group's centre, with σ and κ
+//! as old as they are. Law: docs/model.md §2, in closed form of (seed, slot, time). Source: C §2.3.
+//! Error: tests/pass_live.rs derives the bound on position, σ and κ by what each operation rounds;
+//! generations and births are integers and the same as in f64.
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
@@ -21,7 +22,8 @@ impl Live {
         Ok(Live { kernel: Kernel::new(device, compiler, "live", Push::FIELDS, &[])? })
     }
 
-    /// `discs`: DiscRecord; `particles`: ParticleRecord. Disc `i_disc` has `n_particles`, which lie where its record says.
+    /// `discs`: DiscRecord; `particles`: ParticleRecord. Disc `i_disc` has `n_particles`, which lie
+    /// where its record says.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

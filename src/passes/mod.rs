@@ -1,5 +1,6 @@
-//! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label and its column in the
-//! results share one name. `new` allocates and can fail; `record` only records. No pass knows another.
+//! The GPU's stages, one a room: the pass, its shaders, its reference, its test, its timer label
+//! and its column in the results share one name. `new` allocates and can fail; `record` only
+//! records. No pass knows another.
 
 pub mod chunks;
 pub mod contract;

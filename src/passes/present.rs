@@ -1,14 +1,17 @@
 //! present: a finished picture as a display shows it, in a window's image.
 //!
-//! In: a picture's pixels as they lie in its target, and a second one's that it may be compared with. Out: sRGB code
-//! values, 8 bits; black where there is no picture. Law: over the background, times the exposure, tone map, sRGB,
-//! ordered dither: what is written as PNG; or the two side by side, or how far they are apart. Source: docs/model.md
-//! §11 "present". Error: 8e-6 of the greatest value, so that a code value is another where the exact one is that close
-//! to the next; of a difference besides 11 roundings of what it is of.
+//! In: a picture's pixels as they lie in its target, and a second one's that it may be compared
+//! with. Out: sRGB code values, 8 bits; black where there is no picture. Law: over the background,
+//! times the exposure, tone map, sRGB, ordered dither: what is written as PNG; or the two side by
+//! side, or how far they are apart. Source: docs/model.md §11 "present". Error: 8e-6 of the
+//! greatest value, so that a code value is another where the exact one is that close to the next;
+//! of a difference besides 11 roundings of what it is of.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Image, Instances, Meet, Recorder, Start, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, DrawPipeline, Image, Instances, Meet, Recorder, Start, Target,
+};
 use crate::layout::record;
 
 record! {
@@ -31,9 +34,11 @@ pub struct Present {
 /// What is shown of two pictures, A and B.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Compare {
-    /// A left of this column of the picture, B right of it, a line in it. A column outside leaves one of them alone.
+    /// A left of this column of the picture, B right of it, a line in it. A column outside leaves
+    /// one of them alone.
     Split { column: i32 },
-    /// The difference of what is shown, before the tone map, times this; black where they are the same.
+    /// The difference of what is shown, before the tone map, times this; black where they are the
+    /// same.
     Difference { gain: f32 },
     /// B alone.
     Second,
@@ -57,18 +62,30 @@ pub struct Shown {
 
 impl Present {
     /// Of pictures in format `from`, into images of format `to`.
-    pub fn new(device: &Device, compiler: &Compiler, from: TargetFormat, to: TargetFormat) -> Result<Present> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        from: TargetFormat,
+        to: TargetFormat,
+    ) -> Result<Present> {
         let kind = match from {
             TargetFormat::Rgba8 | TargetFormat::Bgra8 => 0,
             TargetFormat::Rgba16f => 1,
             TargetFormat::Rgba32f => 2,
         };
-        let pipeline = DrawPipeline::new(device, compiler, "present", Push::FIELDS, &[(0, kind)], (to, Meet::Over))?;
+        let pipeline = DrawPipeline::new(
+            device,
+            compiler,
+            "present",
+            Push::FIELDS,
+            &[(0, kind)],
+            (to, Meet::Over),
+        )?;
         Ok(Present { pipeline })
     }
 
-    /// Draws `pictures`, A and B, into all of `into`. They have one format and one size; where nothing is compared, the
-    /// same twice.
+    /// Draws `pictures`, A and B, into all of `into`. They have one format and one size; where
+    /// nothing is compared, the same twice.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -85,6 +102,13 @@ impl Present {
         };
         let tone_map = u32::from(!is_neutral);
         let push = Push { background, exposure, size, corner, tone_map, compare, split, gain };
-        rec.draw(&self.pipeline, Target::color(into), Start::Overwrite, &pictures, &push, Instances::Known(1))
+        rec.draw(
+            &self.pipeline,
+            Target::color(into),
+            Start::Overwrite,
+            &pictures,
+            &push,
+            Instances::Known(1),
+        )
     }
 }

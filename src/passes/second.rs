@@ -1,8 +1,8 @@
 //! second: the second reflection on every facet, gathered from all others.
 //!
-//! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid. Out: I_i and L2 in
-//! `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16), docs/model.md §7, §11; of the
-//! sum's error "sums" there.
+//! In: facets, regions, lights, the facets' shares of them, the table of lobes, the density grid.
+//! Out: I_i and L2 in `lit`. Law: L2_j = Σ L1_i f_j V cos cos A/(d² + A/π). Source: C (16),
+//! docs/model.md §7, §11; of the sum's error "sums" there.
 
 use bytemuck::Pod;
 
@@ -80,9 +80,9 @@ pub enum Receivers {
 }
 
 impl Second {
-    /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are the nodes of a tree;
-    /// `shiny`: some region has a lobe.
-    /// `turns`: of a dispatch. `sums`: how a receiver's sums over its senders are formed.
+    /// `has_clouds`: light between facets is attenuated by the density grid; `tree`: sources are
+    /// the nodes of a tree; `shiny`: some region has a lobe. `turns`: of a dispatch. `sums`: how a
+    /// receiver's sums over its senders are formed.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -115,22 +115,34 @@ impl Second {
         self.block
     }
 
-    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance` and `through`: f32 [facet][light]; `regions`: RegionRecord; `order`: u32,
-    /// the facet of each place; `leaves`: u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4]
-    /// [source][light].
-    pub fn record_sources(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 10], push: &SourcesPush) -> Result<()> {
+    /// `facets`: FacetRecord; `lights`: LightRecord; `transmittance` and `through`: f32
+    /// [facet][light]; `regions`: RegionRecord; `order`: u32, the facet of each place; `leaves`:
+    /// u32, the source of each place; `sources`: SourceRecord; `fluxes`: [f32; 4] [source][light].
+    pub fn record_sources(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 10],
+        push: &SourcesPush,
+    ) -> Result<()> {
         rec.dispatch(&self.sources, &buffers, push, push.n_facets)
     }
 
-    /// The clusters of one height. `merges`: u32, nodes by height; `nodes`: NodeRecord; `sources` and `fluxes` as above.
-    pub fn record_merge(&self, rec: &mut Recorder<'_>, buffers: [&Buffer; 4], push: &MergePush) -> Result<()> {
+    /// The clusters of one height. `merges`: u32, nodes by height; `nodes`: NodeRecord; `sources`
+    /// and `fluxes` as above.
+    pub fn record_merge(
+        &self,
+        rec: &mut Recorder<'_>,
+        buffers: [&Buffer; 4],
+        push: &MergePush,
+    ) -> Result<()> {
         rec.dispatch(&self.merge, &buffers, push, push.n_merges)
     }
 
-    /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32; `facets`, `regions`,
-    /// `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row; `density`: f32; `nodes`: NodeRecord;
-    /// `lit`: LitRecord; `reached`: u32 by facet; `stencils`: PackedRecord [source][light]; `rounds`: [u32; 3], the
-    /// workgroups of each round. A gather takes several dispatches, its rounds.
+    /// `blocks`: BlockRecord; `pairings`: PairingRecord; `occluders`: u32, surfaces; `order`: u32;
+    /// `facets`, `regions`, `lights`, `sources`, `fluxes` as above; `table`: f32, a lobe a row;
+    /// `density`: f32; `nodes`: NodeRecord; `lit`: LitRecord; `reached`: u32 by facet; `stencils`:
+    /// PackedRecord [source][light]; `rounds`: [u32; 3], the workgroups of each round. A gather
+    /// takes several dispatches, its rounds.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -165,8 +177,8 @@ record! {
     }
 }
 
-/// T2: the second reflection by light, basis of the receiver and column of the emitters, for `contract` to sum
-/// (docs/model.md §11 "contract").
+/// T2: the second reflection by light, basis of the receiver and column of the emitters, for
+/// `contract` to sum (docs/model.md §11 "contract").
 pub struct SecondTensor {
     /// For receivers without a lobe, and with.
     gather: [Kernel; 2],
@@ -184,15 +196,16 @@ impl SecondTensor {
         let width = block_len(device);
         let gather = |glossy: u32| {
             let march = u32::from(has_clouds);
-            let macros = [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases)];
+            let macros =
+                [("WORKGROUP", width), ("MARCH", march), ("GLOSSY", glossy), ("N_BASES", n_bases)];
             let macros = [&macros[..], &turns.macros(device)].concat();
             Kernel::with_macros(device, compiler, "second.tensor", TensorPush::FIELDS, &[], &macros)
         };
         Ok(SecondTensor { gather: [gather(0)?, gather(1)?] })
     }
 
-    /// Buffers as [`Second::record`] has them; `table` with the vectors of the basis from row `i_vectors` on; `t2`: f32
-    /// [light][row / 64][column][row % 64] (contract's TILE).
+    /// Buffers as [`Second::record`] has them; `table` with the vectors of the basis from row
+    /// `i_vectors` on; `t2`: f32 [light][row / 64][column][row % 64] (contract's TILE).
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

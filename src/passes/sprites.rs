@@ -1,13 +1,17 @@
 //! sprites: the particles as thin Gaussian sprites, blended far to near.
 //!
-//! In: sorted entries, placed particles, particles (κ, colour), lit facets, what is drawn of each group, its texture, the pool of
-//! textures, the depth of surfaces drawn before. Out:
-//! premultiplied linear RGBA in the film's format. Of groups that are drawn in part, what is drawn of them, and weights on κ. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray. Source: P §Rendering, docs/model.md
-//! §9, §11. Error: α to a few 1e-6 relative, and the target's rounding at each layer.
+//! In: sorted entries, placed particles, particles (κ, colour), lit facets, what is drawn of each
+//! group, its texture, the pool of textures, the depth of surfaces drawn before. Out: premultiplied
+//! linear RGBA in the film's format. Of groups that are drawn in part, what is drawn of them, and
+//! weights on κ. Law: α = 1 − exp(−√(2π) κ σ e^{−b²/2σ²}), b the distance to the pixel's ray.
+//! Source: P §Rendering, docs/model.md §9, §11. Error: α to a few 1e-6 relative, and the target's
+//! rounding at each layer.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Amount, Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target};
+use crate::gpu::{
+    Amount, Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target,
+};
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
@@ -29,9 +33,10 @@ pub struct Chunk<'a> {
 }
 
 impl Sprites {
-    /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces have been drawn, with
-    /// depth; else the target is cleared. `grouped`: facets stand for several particles. `weighted`: κ has factors.
-    /// `textured`: some groups have textures. `threshold`: there is one. `ellipsoids`: not all are balls.
+    /// `lit`: colours come from the facets' radiance; else from the particles. `behind`: surfaces
+    /// have been drawn, with depth; else the target is cleared. `grouped`: facets stand for several
+    /// particles. `weighted`: κ has factors. `textured`: some groups have textures. `threshold`:
+    /// there is one. `ellipsoids`: not all are balls.
     pub fn new(
         device: &Device,
         compiler: &Compiler,
@@ -39,9 +44,17 @@ impl Sprites {
         lit: bool,
         [behind, grouped, weighted, textured, threshold, ellipsoids]: [bool; 6],
     ) -> Result<Sprites> {
-        let constants = constants([lit, behind, grouped, weighted, textured, threshold, ellipsoids]);
+        let constants =
+            constants([lit, behind, grouped, weighted, textured, threshold, ellipsoids]);
         let meet = if behind { Meet::OverNearer } else { Meet::Over };
-        let pipeline = DrawPipeline::new(device, compiler, "sprites", Push::FIELDS, &constants, (format, meet))?;
+        let pipeline = DrawPipeline::new(
+            device,
+            compiler,
+            "sprites",
+            Push::FIELDS,
+            &constants,
+            (format, meet),
+        )?;
         Ok(Sprites { pipeline })
     }
 
@@ -53,15 +66,24 @@ impl Sprites {
         [lit, grouped, weighted, textured, threshold, ellipsoids]: [bool; 6],
     ) -> Result<Sprites> {
         let constants = constants([lit, true, grouped, weighted, textured, threshold, ellipsoids]);
-        let pipeline =
-            DrawPipeline::new(device, compiler, "sprites", Push::FIELDS, &constants, (format, Meet::UnderNearer))?;
+        let pipeline = DrawPipeline::new(
+            device,
+            compiler,
+            "sprites",
+            Push::FIELDS,
+            &constants,
+            (format, Meet::UnderNearer),
+        )?;
         Ok(Sprites { pipeline })
     }
 
-    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`: LitRecord, the particles'
-    /// from `i_first_facet` on; `i_facet`: u32 by particle, read where facets are grouped; `i_group`: u32 by particle, and
-    /// `drawn`: DrawnRecord, read where κ has factors; `textured`: TexturedRecord, and `pool`: [u32; 4], read where some have textures. A sprite ends at `cutoff` σ, and where its optical depth falls under `threshold`. `target` has depth where surfaces have been drawn.
-    /// `n_drawn`: entries; the device's count is a KeptRecord.
+    /// `entries`: [key, particle]; `placed`: PlacedRecord; `particles`: ParticleRecord; `lit`:
+    /// LitRecord, the particles' from `i_first_facet` on; `i_facet`: u32 by particle, read where
+    /// facets are grouped; `i_group`: u32 by particle, and `drawn`: DrawnRecord, read where κ has
+    /// factors; `textured`: TexturedRecord, and `pool`: [u32; 4], read where some have textures. A
+    /// sprite ends at `cutoff` σ, and where its optical depth falls under `threshold`. `target` has
+    /// depth where surfaces have been drawn. `n_drawn`: entries; the device's count is a
+    /// KeptRecord.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -106,7 +128,14 @@ impl Sprites {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let inv_threshold = (1.0 / threshold) as f32;
-        let push = Push { camera: *camera, pixel, cutoff: cutoff as f32, i_first_facet, inv_threshold, i_first };
+        let push = Push {
+            camera: *camera,
+            pixel,
+            cutoff: cutoff as f32,
+            i_first_facet,
+            inv_threshold,
+            i_first,
+        };
         rec.draw(&self.pipeline, target, start, &buffers, &push, instances)
     }
 }

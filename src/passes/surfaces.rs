@@ -1,12 +1,15 @@
 //! surfaces: the scene's rectangles, opaque, with depth, under the sprites.
 //!
-//! In: regions, lit facets. Out: linear RGBA in the film's format, and depth near/z. Law: where the pixel's ray meets the
-//! rectangle, L1 + L2 interpolated between the facets' centres; the back is black. Source: docs/model.md §9, §11. Error:
-//! the place to 1e-6 of the rectangle's distance over the cosine, depth likewise, and the target's rounding.
+//! In: regions, lit facets. Out: linear RGBA in the film's format, and depth near/z. Law: where the
+//! pixel's ray meets the rectangle, L1 + L2 interpolated between the facets' centres; the back is
+//! black. Source: docs/model.md §9, §11. Error: the place to 1e-6 of the rectangle's distance over
+//! the cosine, depth likewise, and the target's rounding.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target,
+};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
@@ -20,15 +23,26 @@ pub struct Surfaces {
 
 impl Surfaces {
     /// `depth_only`: of no colour and no alpha.
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, depth_only: bool) -> Result<Surfaces> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        depth_only: bool,
+    ) -> Result<Surfaces> {
         let constants = [(0, u32::from(depth_only))];
-        let pipeline =
-            DrawPipeline::new(device, compiler, "surfaces", Push::FIELDS, &constants, (format, Meet::Replace))?;
+        let pipeline = DrawPipeline::new(
+            device,
+            compiler,
+            "surfaces",
+            Push::FIELDS,
+            &constants,
+            (format, Meet::Replace),
+        )?;
         Ok(Surfaces { pipeline })
     }
 
-    /// Clears `target`, which has depth, and draws the first `n_surfaces` regions. `regions`: RegionRecord; `lit`:
-    /// LitRecord by facet.
+    /// Clears `target`, which has depth, and draws the first `n_surfaces` regions. `regions`:
+    /// RegionRecord; `lit`: LitRecord by facet.
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,
@@ -40,6 +54,13 @@ impl Surfaces {
         let (width, height) = target.color.size();
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let push = Push { camera: *camera, pixel, unused: [0.0; 2] };
-        rec.draw(&self.pipeline, target, Start::Clear, &buffers, &push, Instances::Known(n_surfaces))
+        rec.draw(
+            &self.pipeline,
+            target,
+            Start::Clear,
+            &buffers,
+            &push,
+            Instances::Known(n_surfaces),
+        )
     }
 }

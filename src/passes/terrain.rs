@@ -1,13 +1,16 @@
 //! terrain: the ground, opaque, with depth, under the blobs.
 //!
-//! In: regions, the ground's points, lit facets. Out: linear RGBA in the film's format, and depth near/z. Law: where the pixel's
-//! ray meets the nearest triangle between three points, L1 + L2 interpolated linearly between them; from below it is black. Source:
-//! docs/model.md §16. Error: the place to 1e-6 of the distance over the cosine; which triangle is seen at an edge to 1/16 of a
-//! pixel, as exactly as Vulkan promises vertices to be placed; and the target's rounding.
+//! In: regions, the ground's points, lit facets. Out: linear RGBA in the film's format, and depth
+//! near/z. Law: where the pixel's ray meets the nearest triangle between three points, L1 + L2
+//! interpolated linearly between them; from below it is black. Source: docs/model.md §16. Error:
+//! the place to 1e-6 of the distance over the cosine; which triangle is seen at an edge to 1/16 of
+//! a pixel, as exactly as Vulkan promises vertices to be placed; and the target's rounding.
 
 use crate::error::Result;
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target};
+use crate::gpu::{
+    Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target,
+};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
@@ -30,15 +33,26 @@ pub struct Piece {
 
 impl Terrain {
     /// `depth_only`: of no colour and no alpha.
-    pub fn new(device: &Device, compiler: &Compiler, format: TargetFormat, depth_only: bool) -> Result<Terrain> {
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        format: TargetFormat,
+        depth_only: bool,
+    ) -> Result<Terrain> {
         let constants = [(0, u32::from(depth_only))];
-        let pipeline =
-            DrawPipeline::new(device, compiler, "terrain", Push::FIELDS, &constants, (format, Meet::Replace))?;
+        let pipeline = DrawPipeline::new(
+            device,
+            compiler,
+            "terrain",
+            Push::FIELDS,
+            &constants,
+            (format, Meet::Replace),
+        )?;
         Ok(Terrain { pipeline })
     }
 
-    /// Draws `piece` into `target`, which has depth, from `start`. Buffers: regions (RegionRecord), points of all grounds
-    /// relative to their origins (FacetRecord), light by facet (LitRecord).
+    /// Draws `piece` into `target`, which has depth, from `start`. Buffers: regions (RegionRecord),
+    /// points of all grounds relative to their origins (FacetRecord), light by facet (LitRecord).
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

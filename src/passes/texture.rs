@@ -1,9 +1,10 @@
 //! texture: the pool of fields that textured sprites are drawn with.
 //!
-//! In: a seed. Out: the pool: by field, level and texel n at the texel's four corners, of its level and of the one above,
-//! 16 bits each. Law: waves of random phase, |F| ∝ |k|^−1.7, by an inverse fast Fourier transform. Source: P's pool of
-//! textures, docs/model.md §9, §11 "texture". Error: 1.3e-3 of n's unit root mean square at the most, 2e-5 root mean square,
-//! and half a quantum of 2⁻¹².
+//! In: a seed. Out: the pool: by field, level and texel n at the texel's four corners, of its level
+//! and of the one above, 16 bits each. Law: waves of random phase, |F| ∝ |k|^−1.7, by an inverse
+//! fast Fourier transform. Source: P's pool of textures, docs/model.md §9, §11 "texture". Error:
+//! 1.3e-3 of n's unit root mean square at the most, 2e-5 root mean square, and half a quantum of
+//! 2⁻¹².
 
 use crate::error::Result;
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
@@ -38,9 +39,21 @@ impl Texture {
         let macros = [("WORKGROUP", device.limits().subgroup_size.clamp(8, 64))];
         let name = "texture.transform";
         Ok(Texture {
-            transform: Kernel::with_macros(device, compiler, name, TransformPush::FIELDS, &[], &macros)?,
+            transform: Kernel::with_macros(
+                device,
+                compiler,
+                name,
+                TransformPush::FIELDS,
+                &[],
+                &macros,
+            )?,
             pack: Kernel::new(device, compiler, "texture.pack", PackPush::FIELDS, &[])?,
-            work: Buffer::new::<[f32; 2]>(device, "texture.work", u64::from(POOL_TEXELS / 2), Place::Device)?,
+            work: Buffer::new::<[f32; 2]>(
+                device,
+                "texture.work",
+                u64::from(POOL_TEXELS / 2),
+                Place::Device,
+            )?,
         })
     }
 
@@ -50,6 +63,11 @@ impl Texture {
             let push = TransformPush { seed, along_columns };
             rec.dispatch_groups(&self.transform, &[&self.work], &push, N_FIELDS / 2 * N_ROWS)?;
         }
-        rec.dispatch(&self.pack, &[&self.work, pool], &PackPush { n_texels: POOL_TEXELS }, POOL_TEXELS)
+        rec.dispatch(
+            &self.pack,
+            &[&self.work, pool],
+            &PackPush { n_texels: POOL_TEXELS },
+            POOL_TEXELS,
+        )
     }
 }

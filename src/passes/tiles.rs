@@ -1,9 +1,9 @@
 //! tiles: the blobs as splats, composed in compute, a tile of pixels a workgroup.
 //!
-//! In: drawn particles far to near, their places, facets' light. Out: the picture in a buffer, rows from the top, in the
-//! film's format. Law: that of `sprites` (docs/model.md §9, §11 "sprites", "tiles"), composed near to far in f32 and rounded
-//! once. Error: f32's in each layer and the format's once; what lies behind a pixel that lets less than `saturated` through
-//! is left out.
+//! In: drawn particles far to near, their places, facets' light. Out: the picture in a buffer, rows
+//! from the top, in the film's format. Law: that of `sprites` (docs/model.md §9, §11 "sprites",
+//! "tiles"), composed near to far in f32 and rounded once. Error: f32's in each layer and the
+//! format's once; what lies behind a pixel that lets less than `saturated` through is left out.
 
 mod division;
 
@@ -79,14 +79,15 @@ record! {
 
 /// Splats of a block; the shaders' BLOCK.
 pub const BLOCK: u32 = 256;
-/// Blocks of a round. A tile's loops take up to 0.8 turns a splat, and llvmpipe ends all loops of an invocation after 65 535.
+/// Blocks of a round. A tile's loops take up to 0.8 turns a splat, and llvmpipe ends all loops of
+/// an invocation after 65 535.
 const MOST_BLOCKS: u32 = 256;
 /// Words of a round.
 const ROUND_WORDS: u32 = (size_of::<RoundRecord>() / 4) as u32;
 /// Blocks: workgroups along x that every device has.
 const MOST: u32 = 65_535;
-/// Most pairs that there is room for at once; the sort goes through its tiles of 1024 twice in one invocation, and
-/// llvmpipe's loops take 65 535 turns.
+/// Most pairs that there is room for at once; the sort goes through its tiles of 1024 twice in one
+/// invocation, and llvmpipe's loops take 65 535 turns.
 const MOST_PAIRS: u64 = 1 << 24;
 pub const THIN: f64 = 0.125; // The optical depth of a thin scene's deepest blob, at most.
 
@@ -164,14 +165,16 @@ pub struct Tiles {
     depths: Buffer,
 }
 
-/// Pairs of a bin and a splat that there is room for at once: of most scenes all. Never less than two blocks may have.
+/// Pairs of a bin and a splat that there is room for at once: of most scenes all. Never less than
+/// two blocks may have.
 fn capacity(n_splats: u32, division: &Division, limits: &Limits, most: Option<u64>) -> u64 {
     let two_blocks = 2 * u64::from(BLOCK) * u64::from(division.n_bins);
     let all = u64::from(n_splats) * u64::from(division.n_bins);
     let room = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes / 16) / 8;
     let most = most.unwrap_or(MOST_PAIRS);
     // All of them, where there is no room for what one round hands to the next.
-    let least = if has_room_between_rounds(division, limits) { (all / 4).max(1 << 20) } else { all };
+    let least =
+        if has_room_between_rounds(division, limits) { (all / 4).max(1 << 20) } else { all };
     least.min(all).min(room).min(most).max(two_blocks)
 }
 
@@ -180,8 +183,8 @@ fn has_room_between_rounds(division: &Division, limits: &Limits) -> bool {
     16 * division.n_pixels() <= limits.max_storage_buffer_bytes
 }
 
-/// Tiles that a workgroup draws where they have few pairs. A processor has few workgroups at once, and beginning one costs it as
-/// much as a tile; a GPU wants them all.
+/// Tiles that a workgroup draws where they have few pairs. A processor has few workgroups at once,
+/// and beginning one costs it as much as a tile; a GPU wants them all.
 fn most_tiles(device: &Device) -> u32 {
     if device.info().kind == "cpu" { TILES_ACROSS * TILES_ACROSS } else { 1 }
 }
@@ -199,35 +202,48 @@ impl Tiles {
         if n_blocks > MOST {
             let most = u64::from(MOST) * u64::from(BLOCK);
             return Err(Error::limit(format!(
-                "draw.path = \"tiles\" draws {most} particles at most, the scene has {n_max}; expected \"sprites\""
+                "draw.path = \"tiles\" draws {most} particles at most, the scene has {n_max}; \
+                 expected \"sprites\""
             )));
         }
         let capacity = capacity(n_max, &division, device.limits(), variant.most_pairs);
-        // Every round but the last has less room left than a block may need, or as many blocks as a round may have.
+        // Every round but the last has less room left than a block may need, or as many blocks as a
+        // round may have.
         let worst = u64::from(n_max) * u64::from(division.n_bins);
-        let by_pairs = worst.div_ceil(capacity - u64::from(BLOCK) * u64::from(division.n_bins)) as u32;
-        let n_rounds = if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
+        let by_pairs =
+            worst.div_ceil(capacity - u64::from(BLOCK) * u64::from(division.n_bins)) as u32;
+        let n_rounds =
+            if worst <= capacity { 1 } else { by_pairs } + n_blocks.div_ceil(MOST_BLOCKS) - 1;
         if n_rounds > 1 && !has_room_between_rounds(&division, device.limits()) {
             return Err(Error::limit(format!(
-                "draw.path = \"tiles\", the default: a picture of {}×{} is drawn in rounds where the scene has {n_max} particles, and 16 bytes a \
-                 pixel between them are more than this device's {} (maxStorageBufferRange); expected draw.path = \"sprites\"",
+                "draw.path = \"tiles\", the default: a picture of {}×{} is drawn in rounds where \
+                 the scene has {n_max} particles, and 16 bytes a \
+                 pixel between them are more than this device's {} (maxStorageBufferRange); \
+                 expected draw.path = \"sprites\"",
                 division.width,
                 division.height,
                 device.limits().max_storage_buffer_bytes
             )));
         }
-        let constants = [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
-            .map(|(k, v)| (k, u32::from(v)));
+        let constants =
+            [(0, variant.lit), (2, variant.grouped), (3, variant.weighted), (4, variant.textured)]
+                .map(|(k, v)| (k, u32::from(v)));
         let threshold = u32::from(variant.threshold);
         let of_pairs = [(5, threshold), (6, u32::from(variant.ellipsoids))];
         let of_splat = [&constants[..], &of_pairs].concat();
         let behind = if variant.behind { 1 + u32::from(has_depth24(device)) } else { 0 };
         let pixel_words = (variant.format.bytes_per_pixel() / 4) as u32;
-        let together = if division.width.is_multiple_of(4 / pixel_words) { 4 / pixel_words } else { 1 };
+        let together =
+            if division.width.is_multiple_of(4 / pixel_words) { 4 / pixel_words } else { 1 };
         let macros = [
             ("INVOCATIONS", division.invocations),
             ("ROWS", division.tile[1]),
-            ("ONE_SUBGROUP", u32::from(!variant.portable && device.limits().is_one_subgroup(division.invocations))),
+            (
+                "ONE_SUBGROUP",
+                u32::from(
+                    !variant.portable && device.limits().is_one_subgroup(division.invocations),
+                ),
+            ),
             ("THIN", u32::from(variant.tau_most <= THIN && !variant.textured)),
             ("TEXTURED", u32::from(variant.textured)),
             ("ELLIPSOIDS", u32::from(variant.ellipsoids)),
@@ -241,13 +257,21 @@ impl Tiles {
             let macros = [&macros[..], &[("ROUNDS", rounds)]].concat();
             Kernel::with_macros(device, compiler, "tiles", Push::FIELDS, &[], &macros)
         };
-        let buffer = |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
+        let buffer =
+            |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
         let n_state = if n_rounds > 1 { division.n_pixels() } else { 1 };
-        let [n_sheets, n_conics] =
-            [variant.textured, variant.ellipsoids].map(|are| if are { u64::from(n_max) } else { 1 });
+        let [n_sheets, n_conics] = [variant.textured, variant.ellipsoids]
+            .map(|are| if are { u64::from(n_max) } else { 1 });
         let n_under = if variant.behind { division.n_pixels() } else { 1 };
         Ok(Tiles {
-            splat: Kernel::with_macros(device, compiler, "tiles.splat", SplatPush::FIELDS, &of_splat, &macros[..3])?,
+            splat: Kernel::with_macros(
+                device,
+                compiler,
+                "tiles.splat",
+                SplatPush::FIELDS,
+                &of_splat,
+                &macros[..3],
+            )?,
             rounds: Kernel::new(device, compiler, "tiles.rounds", RoundsPush::FIELDS, &[])?,
             clear: Kernel::new(device, compiler, "tiles.clear", ClearPush::FIELDS, &[])?,
             pairs: Kernel::new(device, compiler, "tiles.pairs", PairsPush::FIELDS, &of_pairs)?,
@@ -269,13 +293,28 @@ impl Tiles {
             max_groups: device.limits().max_workgroups_x,
             most_tiles: variant.most_tiles.unwrap_or(most_tiles(device)),
             known: Buffer::new::<KeptRecord>(device, "tiles.known", 1, Place::Device)?,
-            splats: Buffer::new::<SplatRecord>(device, "tiles.splats", u64::from(n_max), Place::Device)?,
-            sheets: Buffer::new::<SplatSheetRecord>(device, "tiles.sheets", n_sheets, Place::Device)?,
+            splats: Buffer::new::<SplatRecord>(
+                device,
+                "tiles.splats",
+                u64::from(n_max),
+                Place::Device,
+            )?,
+            sheets: Buffer::new::<SplatSheetRecord>(
+                device,
+                "tiles.sheets",
+                n_sheets,
+                Place::Device,
+            )?,
             conics: buffer("tiles.conics", n_conics, 4)?,
             reaches: buffer("tiles.reaches", n_max.into(), 2)?,
             before: buffer("tiles.before", n_max.into(), 1)?,
             blocks: buffer("tiles.blocks", n_blocks.into(), 1)?,
-            round: Buffer::new::<RoundRecord>(device, "tiles.rounds", n_rounds.into(), Place::Device)?,
+            round: Buffer::new::<RoundRecord>(
+                device,
+                "tiles.rounds",
+                n_rounds.into(),
+                Place::Device,
+            )?,
             entries: buffer("tiles.entries", capacity, 2)?,
             found: buffer("tiles.ranges", division.n_tiles(), 4)?,
             state: buffer("tiles.state", n_state, 4)?,
@@ -297,8 +336,9 @@ impl Tiles {
         }
     }
 
-    /// The splats of the first `n_splats` of the sorted entries, and the rounds they are drawn in; `sort_tile`: entries that a
-    /// workgroup of the sort takes. `buffers` as in `sprites`; the device's count is a KeptRecord.
+    /// The splats of the first `n_splats` of the sorted entries, and the rounds they are drawn in;
+    /// `sort_tile`: entries that a workgroup of the sort takes. `buffers` as in `sprites`; the
+    /// device's count is a KeptRecord.
     pub fn record_splats(
         &self,
         rec: &mut Recorder<'_>,
@@ -327,7 +367,8 @@ impl Tiles {
         let kept = self.kept(n_splats);
         let Tiles { splats, reaches, before, blocks, sheets, conics, .. } = self;
         let from = [entries, placed, particles, lit, i_facet, i_group, drawn, textured];
-        let buffers = [&from[..], &[splats, reaches, before, blocks, sheets, kept, conics]].concat();
+        let buffers =
+            [&from[..], &[splats, reaches, before, blocks, sheets, kept, conics]].concat();
         rec.dispatch_counted(&self.splat, &buffers, &push, (kept, KeptRecord::I_SPLAT))?;
         let push = RoundsPush {
             n_rounds: self.n_rounds,
@@ -374,17 +415,26 @@ impl Tiles {
         let tangents = [view.camera.tan_x, view.camera.tan_y];
         let (cut, inv_threshold) = (cut(view.cutoff), inverse(view.threshold));
         let push = PairsPush { tangents, tile, n_bins_x, i_round, cut, inv_threshold };
-        let buffers =
-            [&self.reaches, &self.before, &self.blocks, &self.round, &self.entries, &self.splats, self.kept(n_splats)];
+        let buffers = [
+            &self.reaches,
+            &self.before,
+            &self.blocks,
+            &self.round,
+            &self.entries,
+            &self.splats,
+            self.kept(n_splats),
+        ];
         rec.dispatch_counted(&self.pairs, &buffers, &push, (&self.round, ROUND_WORDS * i_round + 4))
     }
 
-    /// The words of `round` that hold round `i`'s number of pairs, and, three of them, workgroups that sort them.
+    /// The words of `round` that hold round `i`'s number of pairs, and, three of them, workgroups
+    /// that sort them.
     pub fn i_extent(i_round: u32) -> [u32; 2] {
         [ROUND_WORDS * i_round + 3, ROUND_WORDS * i_round]
     }
 
-    /// Composes what `sorted`, round `i`'s pairs by bin, names into `picture`; `pool`: the textures.
+    /// Composes what `sorted`, round `i`'s pairs by bin, names into `picture`; `pool`: the
+    /// textures.
     pub fn record_compose(
         &self,
         rec: &mut Recorder<'_>,
@@ -393,7 +443,12 @@ impl Tiles {
         view: &View<'_>,
     ) -> Result<()> {
         let Division { width, height, n_bins_x, n_bins, .. } = self.division;
-        let push = RangesPush { n_bins, i_round, max_groups: self.max_groups, most_tiles: self.most_tiles };
+        let push = RangesPush {
+            n_bins,
+            i_round,
+            max_groups: self.max_groups,
+            most_tiles: self.most_tiles,
+        };
         let bins = (&self.round, ROUND_WORDS * i_round + 8);
         rec.dispatch_counted(&self.ranges, &[sorted, &self.round, &self.found], &push, bins)?;
         let push = Push {
@@ -428,18 +483,27 @@ impl Tiles {
             rec.dispatch_counted(&self.alone, buffers, &push, (&self.round, 16))?;
         }
         match &self.compose {
-            Some(compose) => rec.dispatch_counted(compose, buffers, &push, (&self.round, ROUND_WORDS * i_round + 12)),
+            Some(compose) => rec.dispatch_counted(
+                compose,
+                buffers,
+                &push,
+                (&self.round, ROUND_WORDS * i_round + 12),
+            ),
             None => Ok(()),
         }
     }
 
     /// Slopes of a pixel's sides.
     fn pixel(&self, camera: &CameraRecord) -> [f32; 2] {
-        [2.0 * camera.tan_x / self.division.width as f32, 2.0 * camera.tan_y / self.division.height as f32]
+        [
+            2.0 * camera.tan_x / self.division.width as f32,
+            2.0 * camera.tan_y / self.division.height as f32,
+        ]
     }
 }
 
-/// b²/(2 σ²) at the cutoff, in powers of two: at most 46, at 8 σ; the shader's power of two goes to 125.
+/// b²/(2 σ²) at the cutoff, in powers of two: at most 46, at 8 σ; the shader's power of two goes to
+/// 125.
 fn cut(cutoff: f64) -> f32 {
     (0.5 * cutoff * cutoff * std::f64::consts::LOG2_E) as f32
 }

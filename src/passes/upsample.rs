@@ -1,9 +1,10 @@
 //! upsample: the blobs' smaller picture over the full one.
 //!
-//! In: the blobs alone in a smaller picture, and where there are surfaces their picture and the depth that both kinds of
-//! pixels see. Out: the picture in a buffer, rows from the top, in the film's format. Law: Lagrange's polynomials of degree
-//! five through 6 × 6 small pixels, of fewer beside edges of depth, premultiplied "over" (docs/model.md §11 "upsample"). Error:
-//! f32's, some forty roundings of what the weights' magnitudes sum to, and the format's once.
+//! In: the blobs alone in a smaller picture, and where there are surfaces their picture and the
+//! depth that both kinds of pixels see. Out: the picture in a buffer, rows from the top, in the
+//! film's format. Law: Lagrange's polynomials of degree five through 6 × 6 small pixels, of fewer
+//! beside edges of depth, premultiplied "over" (docs/model.md §11 "upsample"). Error: f32's, some
+//! forty roundings of what the weights' magnitudes sum to, and the format's once.
 
 use crate::error::Result;
 use crate::gpu::memory::{TargetFormat, has_depth24};
@@ -52,7 +53,8 @@ impl Upsample {
         format: TargetFormat,
         behind: bool,
     ) -> Result<Upsample> {
-        let Extents { full: [width, height], small: [small_width, small_height], offsets, n } = *extents;
+        let Extents { full: [width, height], small: [small_width, small_height], offsets, n } =
+            *extents;
         let [offset_x, offset_y] = offsets;
         let pixel_words = (format.bytes_per_pixel() / 4) as u32;
         let together = 4 / pixel_words;
@@ -72,13 +74,24 @@ impl Upsample {
         let n_small = u64::from(small_width) * u64::from(small_height);
         let last_texel = (n_small * format.bytes_per_pixel() / 16) as u32 - 1;
         // Rows by twos that lie between the same small ones: o + 2 y from a multiple of four on.
-        let n_pairs = if height > 0 { (offset_y + 2 * (height - 1)) / 4 - offset_y / 4 + 1 } else { 0 };
-        let push = Push { width, height, small_width, small_height, offset_x, offset_y, n_runs, n_pairs, last_texel };
+        let n_pairs =
+            if height > 0 { (offset_y + 2 * (height - 1)) / 4 - offset_y / 4 + 1 } else { 0 };
+        let push = Push {
+            width,
+            height,
+            small_width,
+            small_height,
+            offset_x,
+            offset_y,
+            n_runs,
+            n_pairs,
+            last_texel,
+        };
         Ok(Upsample { kernel, push, n_invocations: n_runs * n_pairs, behind })
     }
 
-    /// `small`: the blobs; `picture`: what becomes of them; with surfaces `under`: theirs, [near/z of the small pixels, of
-    /// the full ones].
+    /// `small`: the blobs; `picture`: what becomes of them; with surfaces `under`: theirs, [near/z
+    /// of the small pixels, of the full ones].
     pub fn record(
         &self,
         rec: &mut Recorder<'_>,

@@ -1,6 +1,7 @@
-//! The light of reflections integrated over the areas of surfaces, model.md §11 "area reference": the truth that a sum
-//! over pairs of facets is measured against. In: surfaces with a material each, lights, blobs, facets of clouds. Out:
-//! radiance toward the eye and irradiance, RGB, with an error.
+//! The light of reflections integrated over the areas of surfaces, model.md §11 "area reference":
+//! the truth that a sum over pairs of facets is measured against. In: surfaces with a material
+//! each, lights, blobs, facets of clouds. Out: radiance toward the eye and irradiance, RGB, with an
+//! error.
 
 pub mod adaptive;
 pub mod clip;
@@ -93,10 +94,19 @@ impl<'a> Scenery<'a> {
     ) -> Self {
         let rects: Vec<Rect> = surfaces.iter().map(Rect::of).collect();
         let brdfs = brdfs.to_vec();
-        let mut scenery =
-            Scenery { lights, blobs, forward, discs, rects, brdfs, pieces: Vec::new(), disc_radiance: Vec::new() };
+        let mut scenery = Scenery {
+            lights,
+            blobs,
+            forward,
+            discs,
+            rects,
+            brdfs,
+            pieces: Vec::new(),
+            disc_radiance: Vec::new(),
+        };
         scenery.pieces = (0..scenery.rects.len()).map(|i| scenery.lit_pieces(i)).collect();
-        scenery.disc_radiance = (0..discs.len()).map(|i| scenery.first(&scenery.on_disc(i), discs[i].normal)).collect();
+        scenery.disc_radiance =
+            (0..discs.len()).map(|i| scenery.first(&scenery.on_disc(i), discs[i].normal)).collect();
         scenery
     }
 
@@ -158,7 +168,15 @@ impl<'a> Scenery<'a> {
     /// L1 toward the unit vector `toward`; from behind its diffuse part.
     pub fn first(&self, at: &Receiver, toward: DVec3) -> DVec3 {
         let reflected = |light: &Light| {
-            reflected(&at.brdf, at.normal, at.position, light, self.in_light(at.position, light), toward).0
+            reflected(
+                &at.brdf,
+                at.normal,
+                at.position,
+                light,
+                self.in_light(at.position, light),
+                toward,
+            )
+            .0
         };
         self.lights.iter().map(reflected).sum()
     }
@@ -172,8 +190,15 @@ impl<'a> Scenery<'a> {
         self.lights.iter().map(of).sum()
     }
 
-    /// L1 toward `toward` and I_d at `x` on surface `i_surface`, in a piece that the lights `lit` reach.
-    fn first_on_piece(&self, i_surface: usize, lit: &[(usize, Reach)], x: DVec3, toward: DVec3) -> Sample {
+    /// L1 toward `toward` and I_d at `x` on surface `i_surface`, in a piece that the lights `lit`
+    /// reach.
+    fn first_on_piece(
+        &self,
+        i_surface: usize,
+        lit: &[(usize, Reach)],
+        x: DVec3,
+        toward: DVec3,
+    ) -> Sample {
         let (brdf, normal) = (&self.brdfs[i_surface], self.rects[i_surface].normal);
         let mut sum = NOTHING;
         for &(i_light, reach) in lit {
@@ -264,7 +289,8 @@ fn part(polygon: Polygon, shadows: &[[Line; 5]]) -> (Vec<Polygon>, Vec<Polygon>)
     (shaded, open)
 }
 
-/// C (11): f for light from the unit vector `from` reflected along `toward`, both before the front side.
+/// C (11): f for light from the unit vector `from` reflected along `toward`, both before the front
+/// side.
 pub fn reflectance(brdf: &Brdf, normal: DVec3, from: DVec3, toward: DVec3) -> DVec3 {
     let diffuse = brdf.kd * FRAC_1_PI;
     if brdf.ks == DVec3::ZERO || normal.dot(from) <= 0.0 || normal.dot(toward) <= 0.0 {
@@ -276,10 +302,21 @@ pub fn reflectance(brdf: &Brdf, normal: DVec3, from: DVec3, toward: DVec3) -> DV
 }
 
 /// L1 and I_d that one light makes at `p`; the sky has no direction that a lobe could reflect.
-fn reflected(brdf: &Brdf, normal: DVec3, p: DVec3, light: &Light, v: f64, toward: DVec3) -> (DVec3, DVec3) {
+fn reflected(
+    brdf: &Brdf,
+    normal: DVec3,
+    p: DVec3,
+    light: &Light,
+    v: f64,
+    toward: DVec3,
+) -> (DVec3, DVec3) {
     let arrival = light.arrival(p);
     let e = light.energy() * light.share(normal, &arrival, v);
-    let f = if light.is_sky() { brdf.kd * FRAC_1_PI } else { reflectance(brdf, normal, arrival.toward, toward) };
+    let f = if light.is_sky() {
+        brdf.kd * FRAC_1_PI
+    } else {
+        reflectance(brdf, normal, arrival.toward, toward)
+    };
     (e * f, e)
 }
 
@@ -325,7 +362,8 @@ fn kernel(at: &Receiver, rect: &Rect, point: DVec3) -> f64 {
     if j <= 0.0 || i <= 0.0 { 0.0 } else { i * j / (d2 * d2) * rect.u.length() * rect.v.length() }
 }
 
-/// The form factor from an element at `p` with unit normal `normal` to the front of `surface`, and its error.
+/// The form factor from an element at `p` with unit normal `normal` to the front of `surface`, and
+/// its error.
 pub fn form_factor(surface: &Surface, p: DVec3, normal: DVec3, accuracy: &Accuracy) -> (f64, f64) {
     // A lamp of uniform radiance 1: white under a sky that lights everything with π.
     let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];

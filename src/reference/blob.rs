@@ -1,11 +1,12 @@
-//! One Gaussian blob of extinction, model.md §14: a ball, or an ellipsoid with an axis along y. What a line through it meets, and
-//! between which slopes it is seen, in f64.
+//! One Gaussian blob of extinction, model.md §14: a ball, or an ellipsoid with an axis along y.
+//! What a line through it meets, and between which slopes it is seen, in f64.
 
 use glam::{DMat2, DVec2, DVec3};
 
 use crate::model::cloud::SQRT_TAU;
 
-/// ρ(x) = κ exp(−|M (x − p)|²/2σ²), M = diag(1, 1/a, 1), its position relative to the lighting origin.
+/// ρ(x) = κ exp(−|M (x − p)|²/2σ²), M = diag(1, 1/a, 1), its position relative to the lighting
+/// origin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Blob {
     pub position: DVec3,
@@ -71,17 +72,20 @@ impl Blob {
         Line { off, depth: SQRT_TAU * self.kappa * self.sigma * (d.length() / ray.length()) }
     }
 
-    /// Between which slopes along `side` over those along `forward`, unit vectors, lines through the eye can meet the blob out to `reach`
-    /// σ; `c` is its place from there. All where it reaches beside the eye, or is behind.
+    /// Between which slopes along `side` over those along `forward`, unit vectors, lines through
+    /// the eye can meet the blob out to `reach` σ; `c` is its place from there. All where it
+    /// reaches beside the eye, or is behind.
     pub fn slopes(&self, c: DVec3, [side, forward]: [DVec3; 2], reach: f64) -> (f64, f64) {
         let at = DVec2::new(c.dot(side), c.dot(forward));
         if self.aspect == 1.0 {
             return disc_slopes(at, reach * self.sigma);
         }
-        // Of the planes n·x = 0 those touch it that have (n·c)² = nᵀ S n, S its matrix: n = (1, −slope).
+        // Of the planes n·x = 0 those touch it that have (n·c)² = nᵀ S n, S its matrix: n = (1,
+        // −slope).
         let r = reach * self.sigma;
         let [s, f] = [side, forward].map(|axis| r * axis * self.axes());
-        let shape = DMat2::from_cols(DVec2::new(s.dot(s), s.dot(f)), DVec2::new(s.dot(f), f.dot(f)));
+        let shape =
+            DMat2::from_cols(DVec2::new(s.dot(s), s.dot(f)), DVec2::new(s.dot(f), f.dot(f)));
         let (x, z) = (at.x, at.y);
         let a = z * z - shape.col(1).y;
         if !(a > 0.0 && z > 0.0) {
@@ -141,7 +145,10 @@ mod tests {
             assert!(line.depth <= blob.deepest() * (1.0 + 1e-15));
         }
         // Along y it is a times as deep as across.
-        assert!((blob(0.1).along(DVec3::ZERO, DVec3::Y * 7.0).depth / (0.1 * SQRT_TAU) - 1.0).abs() < 1e-15);
+        assert!(
+            (blob(0.1).along(DVec3::ZERO, DVec3::Y * 7.0).depth / (0.1 * SQRT_TAU) - 1.0).abs()
+                < 1e-15
+        );
         assert_eq!(blob(0.1).along(DVec3::ZERO, DVec3::X).depth, SQRT_TAU);
     }
 
@@ -152,7 +159,8 @@ mod tests {
             let (blob, c) = (blob(aspect), 40.0 * axes[1] + 7.0 * axes[0] + DVec3::Z);
             let (low, high) = blob.slopes(c, axes, 3.0);
             for (slope, name) in [(low, "low"), (high, "high")] {
-                // Of all lines with that slope, whatever their third one, the nearest passes at 3 σ.
+                // Of all lines with that slope, whatever their third one, the nearest passes at 3
+                // σ.
                 let ray = |third: f64| axes[1] + slope * axes[0] + third * DVec3::Z;
                 let off = (-40_000..40_000)
                     .map(|k| blob.along(c, ray(2.5e-5 * f64::from(k))).off)

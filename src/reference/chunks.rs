@@ -1,13 +1,15 @@
-//! chunks, model.md §11 "chunks": thin blobs composed near to far by blending under what is there, in f64, and a bound
-//! on what a device may differ that blends in f32 and shows the result in the film's format. In: blobs and eye relative
-//! to O, an order far to near. Out: as `sprites`, of which it is the same picture.
+//! chunks, model.md §11 "chunks": thin blobs composed near to far by blending under what is there,
+//! in f64, and a bound on what a device may differ that blends in f32 and shows the result in the
+//! film's format. In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of
+//! which it is the same picture.
 
 use glam::DVec3;
 
 use super::sprites::Behind;
 use super::tiles::{Composed, Composition, U, render_by};
 
-/// C ← C + (1 − A) α L, A ← A + (1 − A) α: the device keeps A, so what passes is off by a share of 1 and not of itself.
+/// C ← C + (1 − A) α L, A ← A + (1 − A) α: the device keeps A, so what passes is off by a share of
+/// 1 and not of itself.
 fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
     let here = pixel.passed * alpha;
     let inherited = pixel.off_passed * (alpha + off) + pixel.passed * off;
@@ -19,18 +21,24 @@ fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
     pixel.color += here * radiance;
     pixel.off_color += 2.0 * U * (pixel.color.abs() + pixel.off_color);
     pixel.passed -= here;
-    pixel.off_passed = pixel.off_passed * (1.0 - alpha).abs() + pixel.off_passed * off + (pixel.passed + here) * off;
-    pixel.off_passed += 4.0 * U * (here + off_here) + 2.0 * U * (1.0 - pixel.passed + pixel.off_passed);
+    pixel.off_passed = pixel.off_passed * (1.0 - alpha).abs()
+        + pixel.off_passed * off
+        + (pixel.passed + here) * off;
+    pixel.off_passed +=
+        4.0 * U * (here + off_here) + 2.0 * U * (1.0 - pixel.passed + pixel.off_passed);
 }
 
 /// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
 pub fn render_over(of: &Composition<'_>, behind: &[Behind]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
     let (values, mut bounds) = render_by(of, behind, under);
-    // It is blended over what stands behind in no fewer bits than the film's: source and factor are rounded, too.
+    // It is blended over what stands behind in no fewer bits than the film's: source and factor are
+    // rounded, too.
     let r = &of.rounding;
     for ((bound, value), under) in bounds.iter_mut().zip(&values).zip(behind) {
         for k in 0..4 {
-            bound[k] += 2.0 * r.unit * (value[k].abs() + 3.0 * under.color[k].abs()).max(r.least_normal) + 2.0 * r.step;
+            bound[k] +=
+                2.0 * r.unit * (value[k].abs() + 3.0 * under.color[k].abs()).max(r.least_normal)
+                    + 2.0 * r.step;
         }
     }
     (values, bounds)
@@ -57,13 +65,30 @@ mod tests {
     };
 
     fn layer(z: f64, tau: f64) -> Blob {
-        Blob { aspect: 1.0, position: DVec3::new(0.0, 0.0, -z), sigma: 0.5, kappa: tau / (SQRT_TAU * 0.5) }
+        Blob {
+            aspect: 1.0,
+            position: DVec3::new(0.0, 0.0, -z),
+            sigma: 0.5,
+            kappa: tau / (SQRT_TAU * 0.5),
+        }
     }
 
-    fn drawn(blobs: &[Blob], colors: &[DVec3], rounding: Rounding, behind: Behind) -> ([f64; 4], [f64; 4]) {
+    fn drawn(
+        blobs: &[Blob],
+        colors: &[DVec3],
+        rounding: Rounding,
+        behind: Behind,
+    ) -> ([f64; 4], [f64; 4]) {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
-        let of =
-            Composition { view: &VIEW, blobs, radiance: colors, order: &order, factor: None, rounding, saturated: 0.0 };
+        let of = Composition {
+            view: &VIEW,
+            blobs,
+            radiance: colors,
+            order: &order,
+            factor: None,
+            rounding,
+            saturated: 0.0,
+        };
         let (values, bounds) = render_over(&of, &[behind]);
         (values[0], bounds[0])
     }
@@ -71,7 +96,8 @@ mod tests {
     #[test]
     fn two_layers_by_hand_and_far_to_near() {
         // τ = ln 2 and ln 4: opacities 1/2 (near, red) and 3/4 (far, green), over blue.
-        let (blobs, colors) = ([layer(4.0, 4f64.ln()), layer(2.0, 2f64.ln())], [DVec3::Y, DVec3::X]);
+        let (blobs, colors) =
+            ([layer(4.0, 4f64.ln()), layer(2.0, 2f64.ln())], [DVec3::Y, DVec3::X]);
         let behind = Behind { color: [0.0, 0.0, 1.0, 1.0], ..Behind::NOTHING };
         let (value, bound) = drawn(&blobs, &colors, Rounding::NONE, behind);
         for (v, by_hand) in value.iter().zip([0.5, 0.375, 0.125, 1.0]) {
@@ -82,14 +108,15 @@ mod tests {
         assert!(value.iter().zip(other[0]).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 
-    /// The recurrence in f32, rounded correctly at each step, lies within the bound, and a factor of ten below what
-    /// would be wide.
+    /// The recurrence in f32, rounded correctly at each step, lies within the bound, and a factor
+    /// of ten below what would be wide.
     #[test]
     fn f32_stays_within_the_bound() {
         let n = 4000;
         let taus: Vec<f64> = (0..n).map(|i| 1e-3 * (1.0 + f64::from(i % 7))).collect();
         let blobs: Vec<Blob> = taus.iter().rev().map(|tau| layer(3.0, *tau)).collect();
-        let (value, bound) = drawn(&blobs, &vec![DVec3::ONE; n as usize], Rounding::NONE, Behind::NOTHING);
+        let (value, bound) =
+            drawn(&blobs, &vec![DVec3::ONE; n as usize], Rounding::NONE, Behind::NOTHING);
         let (mut c, mut a) = (0f32, 0f32);
         for tau in &taus {
             let alpha = (-libm::expm1(-tau)) as f32;

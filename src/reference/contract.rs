@@ -1,6 +1,6 @@
-//! The sums of C (13)–(16) over the tensors: model.md §7 and §11 "contract".
-//! In: T1 [light][row], T2 [light][column][row], the lights' energies, the columns' coefficients. Out: I_d and I_i
-//! (W m⁻²), L1 and L2 (W m⁻² sr⁻¹), RGB a facet.
+//! The sums of C (13)–(16) over the tensors: model.md §7 and §11 "contract". In: T1 [light][row],
+//! T2 [light][column][row], the lights' energies, the columns' coefficients. Out: I_d and I_i (W
+//! m⁻²), L1 and L2 (W m⁻² sr⁻¹), RGB a facet.
 
 use std::f64::consts::PI;
 
@@ -15,8 +15,8 @@ pub struct Tensors<'a> {
     pub n_columns: usize,
 }
 
-/// A facet as a receiver: its row for the diffuse basis, how many rows on the next basis lies, c_0 = K_d times the
-/// facet's colour, and c_b of its lobe.
+/// A facet as a receiver: its row for the diffuse basis, how many rows on the next basis lies, c_0
+/// = K_d times the facet's colour, and c_b of its lobe.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Receiver {
     pub row: usize,
@@ -33,21 +33,35 @@ pub struct Reflected {
     pub second: DVec3,
 }
 
-/// `columns`: C, K_d or one channel of it, then K_s c_b(n_s), of every region. At least as many as T2 has.
-pub fn contract(tensors: &Tensors<'_>, energies: &[DVec3], columns: &[DVec3], receiver: &Receiver) -> Reflected {
+/// `columns`: C, K_d or one channel of it, then K_s c_b(n_s), of every region. At least as many as
+/// T2 has.
+pub fn contract(
+    tensors: &Tensors<'_>,
+    energies: &[DVec3],
+    columns: &[DVec3],
+    receiver: &Receiver,
+) -> Reflected {
     let Tensors { t1, t2, n_rows, n_columns } = *tensors;
-    let first = |row: usize| -> DVec3 { energies.iter().enumerate().map(|(l, e)| *e * t1[l * n_rows + row]).sum() };
+    let first = |row: usize| -> DVec3 {
+        energies.iter().enumerate().map(|(l, e)| *e * t1[l * n_rows + row]).sum()
+    };
     let second = |row: usize| -> DVec3 {
-        let of_light =
-            |l: usize| -> DVec3 { (0..n_columns).map(|c| columns[c] * t2[(l * n_columns + c) * n_rows + row]).sum() };
+        let of_light = |l: usize| -> DVec3 {
+            (0..n_columns).map(|c| columns[c] * t2[(l * n_columns + c) * n_rows + row]).sum()
+        };
         energies.iter().enumerate().map(|(l, e)| *e * of_light(l)).sum()
     };
     let c = std::iter::once(&receiver.albedo).chain(&receiver.lobe);
     let rows = (0..).map(|b: usize| receiver.row + b * receiver.stride);
-    let (l1, l2) = c
-        .zip(rows)
-        .fold((DVec3::ZERO, DVec3::ZERO), |(l1, l2), (c, row)| (l1 + *c * first(row), l2 + *c * second(row)));
-    Reflected { direct: PI * first(receiver.row), indirect: PI * second(receiver.row), first: l1, second: l2 }
+    let (l1, l2) = c.zip(rows).fold((DVec3::ZERO, DVec3::ZERO), |(l1, l2), (c, row)| {
+        (l1 + *c * first(row), l2 + *c * second(row))
+    });
+    Reflected {
+        direct: PI * first(receiver.row),
+        indirect: PI * second(receiver.row),
+        first: l1,
+        second: l2,
+    }
 }
 
 #[cfg(test)]
@@ -56,8 +70,8 @@ mod tests {
 
     #[test]
     fn a_lambertian_pair_gives_what_c_15_and_16_give_by_hand() {
-        // One light of energy 2 on two facets with g = ½: T1 = g/π. The emitter (K_d = ½) sends A g/π through a form
-        // factor V cos cos/(d² + A/π) = ¼ with A = 2: T2[0] = (1/π)·¼·2·½/π.
+        // One light of energy 2 on two facets with g = ½: T1 = g/π. The emitter (K_d = ½) sends A
+        // g/π through a form factor V cos cos/(d² + A/π) = ¼ with A = 2: T2[0] = (1/π)·¼·2·½/π.
         let (g, form, area) = (0.5, 0.25, 2.0);
         let t1 = [g / PI, g / PI];
         let t2 = [0.0, form * area * g / PI / PI];
@@ -74,12 +88,17 @@ mod tests {
 
     #[test]
     fn channels_lights_and_bases_find_their_places() {
-        // Two lights, a lobe of one vector (rows 0 and 1), three columns: red, green, blue of one region.
+        // Two lights, a lobe of one vector (rows 0 and 1), three columns: red, green, blue of one
+        // region.
         let t1 = [1.0, 10.0, 2.0, 20.0];
         let t2: Vec<f64> = (0..12).map(f64::from).collect();
         let tensors = Tensors { t1: &t1, t2: &t2, n_rows: 2, n_columns: 3 };
-        let receiver =
-            Receiver { row: 0, stride: 1, albedo: DVec3::new(1.0, 0.0, 0.0), lobe: vec![DVec3::new(0.0, 1.0, 0.0)] };
+        let receiver = Receiver {
+            row: 0,
+            stride: 1,
+            albedo: DVec3::new(1.0, 0.0, 0.0),
+            lobe: vec![DVec3::new(0.0, 1.0, 0.0)],
+        };
         let energies = [DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.0, 0.0, 1.0)];
         let lit = contract(&tensors, &energies, &DVec3::AXES, &receiver);
         assert_eq!(lit.direct, PI * DVec3::new(3.0, 1.0, 2.0));

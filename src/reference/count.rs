@@ -1,14 +1,17 @@
-//! How many of a cloud's particles are drawn, C (4)–(6), and what each of them counts for: model.md §3.
+//! How many of a cloud's particles are drawn, C (4)–(6), and what each of them counts for: model.md
+//! §3.
 
-/// n/n₀ as C prints it: (r/r₀)³ (1 − α), α = 1 − e^{p/a}, p = −d/d₀; over its value at d₀ and r₀ where `normalised`.
+/// n/n₀ as C prints it: (r/r₀)³ (1 − α), α = 1 − e^{p/a}, p = −d/d₀; over its value at d₀ and r₀
+/// where `normalised`.
 pub fn printed(d_over_d0: f64, r_over_r0: f64, a: f64, normalised: bool) -> f64 {
     let kept = |d: f64| 1.0 + libm::expm1(-d / a);
     let share = r_over_r0 * r_over_r0 * r_over_r0 * kept(d_over_d0);
     if normalised { share / kept(1.0) } else { share }
 }
 
-/// Factor on the κ of each of a group's `n` particles where n/n₀ = `share`: 1 for whole ones, the rest for the last, 0 for
-/// those that are not drawn; all over the share where `conserve`, and none more than n.
+/// Factor on the κ of each of a group's `n` particles where n/n₀ = `share`: 1 for whole ones, the
+/// rest for the last, 0 for those that are not drawn; all over the share where `conserve`, and none
+/// more than n.
 pub fn weights(n: u32, share: f64, conserve: bool) -> Vec<f64> {
     let share = share.min(1.0);
     let x = f64::from(n) * share;

@@ -22,7 +22,8 @@ pub struct Slack {
     pub depth: f64,
     /// Of ln(τ₀/t).
     pub log: f64,
-    /// How much of its reach a silhouette may be taken to be larger, and by how many pixels its rectangle.
+    /// How much of its reach a silhouette may be taken to be larger, and by how many pixels its
+    /// rectangle.
     pub growth: f64,
     pub pixels: f64,
 }
@@ -42,14 +43,18 @@ pub fn fate(view: &View, blob: &Blob, slack: &Slack) -> Fate {
     }
 }
 
-/// Whether `blob` can show where every decision is moved by `slack` toward "yes". A comparison with what is no number
-/// is "no".
+/// Whether `blob` can show where every decision is moved by `slack` toward "yes". A comparison with
+/// what is no number is "no".
 fn shows(view: &View, blob: &Blob, slack: &Slack) -> bool {
     let c = blob.position - view.pose.position;
     let (depth, off) = (c.dot(view.pose.forward), slack.depth * c.length());
     let (above, off_size) = view.above_smallest(blob, c, slack.depth);
     let cut = view.cut(blob.deepest()) + if view.threshold > 0.0 { slack.log } else { 0.0 };
-    if !(depth + off >= view.near && blob.kappa * blob.sigma > 0.0 && cut > 0.0 && above + off_size >= 0.0) {
+    if !(depth + off >= view.near
+        && blob.kappa * blob.sigma > 0.0
+        && cut > 0.0
+        && above + off_size >= 0.0)
+    {
         return false;
     }
     let reach = (1.0 + slack.growth) * (2.0 * cut.min(0.5 * view.cutoff * view.cutoff)).sqrt();
@@ -86,7 +91,11 @@ mod tests {
     };
 
     fn of(x: f64, y: f64, z: f64, sigma: f64) -> Fate {
-        fate(&VIEW, &Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma, kappa: 1.0 }, &Slack::NONE)
+        fate(
+            &VIEW,
+            &Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma, kappa: 1.0 },
+            &Slack::NONE,
+        )
     }
 
     #[test]
@@ -95,9 +104,15 @@ mod tests {
         assert_eq!((of(0.0, 0.0, 10.0, 0.1), of(2.5, -2.5, 10.0, 0.1)), (Fate::Left, Fate::Kept));
         // Reaches from 0 to the centres at ±¼: asin(3σ/10) = atan ¼, 3σ = 10/√17.
         let sigma = 10.0 / 17f64.sqrt() / 3.0;
-        assert_eq!((of(0.0, 0.0, 10.0, 0.999 * sigma), of(0.0, 0.0, 10.0, 1.001 * sigma)), (Fate::Left, Fate::Kept));
+        assert_eq!(
+            (of(0.0, 0.0, 10.0, 0.999 * sigma), of(0.0, 0.0, 10.0, 1.001 * sigma)),
+            (Fate::Left, Fate::Kept)
+        );
         // Beside the picture, before the near plane, behind the eye, around it.
-        assert_eq!([of(9.0, 2.5, 10.0, 0.1), of(0.1, 0.1, 0.4, 0.1), of(2.5, 2.5, -10.0, 9.0)], [Fate::Left; 3]);
+        assert_eq!(
+            [of(9.0, 2.5, 10.0, 0.1), of(0.1, 0.1, 0.4, 0.1), of(2.5, 2.5, -10.0, 9.0)],
+            [Fate::Left; 3]
+        );
         assert_eq!([of(0.1, 0.0, 0.5, 1.0), of(30.0, 0.0, 1.0, 11.0)], [Fate::Kept; 2]);
         assert_eq!([of(f64::NAN, 0.0, 10.0, 1.0), of(2.5, 2.5, 10.0, 0.0)], [Fate::Left; 2]);
         assert_eq!(of(2.5, 2.5, 10.0, f64::INFINITY), Fate::Kept);
@@ -105,7 +120,8 @@ mod tests {
 
     #[test]
     fn what_is_too_thin_or_too_small_is_left_and_near_decisions_are_open() {
-        let blob = Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
+        let blob =
+            Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
         let of = |view: View, slack: f64| {
             fate(&view, &blob, &Slack { depth: slack, log: slack, growth: slack, pixels: slack })
         };

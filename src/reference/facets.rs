@@ -1,6 +1,7 @@
-//! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, or one a run of particles in Morton order taken as
-//! one blob; on the blob's shell, its normal from the density around it where that has a direction, else away from the cloud's centre.
-//! In: the density grid and the placed blobs. Out: positions relative to O, unit normals, areas in scene units².
+//! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, or one a run of
+//! particles in Morton order taken as one blob; on the blob's shell, its normal from the density
+//! around it where that has a direction, else away from the cloud's centre. In: the density grid
+//! and the placed blobs. Out: positions relative to O, unit normals, areas in scene units².
 
 use std::f64::consts::PI;
 
@@ -12,11 +13,13 @@ use super::grid::{density, sample};
 use crate::model::cloud::{LEAST_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
-/// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard deviation s = 2σ to degree 5.
+/// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard
+/// deviation s = 2σ to degree 5.
 pub const GRADIENT_RADIUS_SIGMA: f64 = 4.472_135_954_999_58;
 /// A facet's distance from its blob's centre, in σ.
 pub const SHELL_SIGMA: f64 = 1.5;
-/// Conditioning q below which only the cloud's centre decides, and above which only the gradient does.
+/// Conditioning q below which only the cloud's centre decides, and above which only the gradient
+/// does.
 pub const CONDITIONING: (f64, f64) = (0.02, 0.10);
 /// Weights of the 14-point quadrature of degree 5 on the sphere: 6/15 + 8·3/40 = 1.
 const AXIS_WEIGHT: f64 = 1.0 / 15.0;
@@ -46,8 +49,9 @@ pub fn directions() -> [(DVec3, f64); 14] {
     })
 }
 
-/// G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S = Σ w ρ(p + 2√5 σ A d); A = diag(1, a, 1)
-/// makes of the sphere the blob's own shape, and the gradient is one in the space where that is a ball (§14).
+/// G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S
+/// = Σ w ρ(p + 2√5 σ A d); A = diag(1, a, 1) makes of the sphere the blob's own shape, and the
+/// gradient is one in the space where that is a ball (§14).
 pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
     gradient_of(|x| sample(spec, cells, x), p, sigma, aspect)
 }
@@ -62,7 +66,13 @@ fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64
 }
 
 /// Unit normal and conditioning q of a blob at `p` in a cloud about `center`.
-pub fn normal(spec: &GridSpec, cells: &[f64], p: DVec3, [sigma, aspect]: [f64; 2], center: DVec3) -> (DVec3, f64) {
+pub fn normal(
+    spec: &GridSpec,
+    cells: &[f64],
+    p: DVec3,
+    [sigma, aspect]: [f64; 2],
+    center: DVec3,
+) -> (DVec3, f64) {
     toward_less(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
 }
 
@@ -82,8 +92,9 @@ pub fn smoothstep(ends: (f64, f64), x: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
-/// π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w, w the mean of an ellipsoid's areas, seen from all directions, over that of a ball of R: by
-/// Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p = 1.6075, within 1.1 % of a quarter of its surface.
+/// π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w, w the mean of an ellipsoid's areas, seen from
+/// all directions, over that of a ball of R: by Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p =
+/// 1.6075, within 1.1 % of a quarter of its surface.
 pub fn area(blob: &Blob) -> f64 {
     const P: f64 = 1.6075;
     let radius = blob.sigma / SIGMA_PER_RADIUS;
@@ -98,8 +109,8 @@ fn shell(p: DVec3, [sigma, aspect]: [f64; 2], n: DVec3) -> DVec3 {
     p + SHELL_SIGMA * sigma / n.dot(to).sqrt() * to
 }
 
-/// One facet a blob. `sigma_means[j]` is the mean σ of blob j's group, which bounds the scale of its facet from below;
-/// `regions[j]` its cloud; `cloud_centers` are relative to O.
+/// One facet a blob. `sigma_means[j]` is the mean σ of blob j's group, which bounds the scale of
+/// its facet from below; `regions[j]` its cloud; `cloud_centers` are relative to O.
 pub fn facets(
     spec: &GridSpec,
     cells: &[f64],
@@ -116,9 +127,16 @@ pub fn facets(
     blobs.iter().enumerate().map(facet).collect()
 }
 
-/// One facet a blob, its normal from the blobs' own density Σ κ e^{−|x − p|²/2σ²} in place of a grid's.
-pub fn closed(blobs: &[Blob], sigma_means: &[f64], regions: &[u32], cloud_centers: &[DVec3]) -> Vec<Facet> {
-    let of = |p: DVec3, [sigma, aspect]: [f64; 2]| gradient_of(|x| density(blobs, x), p, sigma, aspect);
+/// One facet a blob, its normal from the blobs' own density Σ κ e^{−|x − p|²/2σ²} in place of a
+/// grid's.
+pub fn closed(
+    blobs: &[Blob],
+    sigma_means: &[f64],
+    regions: &[u32],
+    cloud_centers: &[DVec3],
+) -> Vec<Facet> {
+    let of =
+        |p: DVec3, [sigma, aspect]: [f64; 2]| gradient_of(|x| density(blobs, x), p, sigma, aspect);
     each(blobs.len(), |i| {
         let (blob, center) = (&blobs[i], cloud_centers[regions[i] as usize]);
         facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
@@ -133,11 +151,19 @@ fn facet_of(
     gradient: impl Fn(DVec3, [f64; 2]) -> (DVec3, f64),
 ) -> Facet {
     let shape = [scale, blob.aspect];
-    let (normal, conditioning) = toward_less(gradient(blob.position, shape), blob.aspect, blob.position, center);
-    Facet { position: shell(blob.position, shape, normal), normal, area: area(blob), region, conditioning }
+    let (normal, conditioning) =
+        toward_less(gradient(blob.position, shape), blob.aspect, blob.position, center);
+    Facet {
+        position: shell(blob.position, shape, normal),
+        normal,
+        area: area(blob),
+        region,
+        conditioning,
+    }
 }
 
-/// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for [`facets`].
+/// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for
+/// [`facets`].
 #[derive(Debug, Clone, Copy)]
 pub struct Members<'a> {
     pub blobs: &'a [Blob],
@@ -151,7 +177,8 @@ pub struct Members<'a> {
 pub struct Bunch {
     /// p̄ = Σ m p/Σ m, m = κσ³a.
     pub position: DVec3,
-    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m); where some blobs are ellipsoids √(Σ m (σ² + (x² + z²)/2)/Σ m) of p − p̄.
+    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m); where some blobs are ellipsoids √(Σ m (σ² + (x² +
+    /// z²)/2)/Σ m) of p − p̄.
     pub sigma: f64,
     /// √(Σ m (a²σ² + y²)/Σ m) over that, or 1.
     pub aspect: f64,
@@ -178,7 +205,11 @@ pub fn bunch(m: &Members<'_>, run: &[u32], ellipsoids: bool) -> Bunch {
     let by_area = weights(areas.iter().copied());
     let position: DVec3 = run.iter().zip(&by_mass).map(|(i, w)| *w * at(i).position).sum();
     let spread = |of: &dyn Fn(Blob, DVec3) -> f64| {
-        run.iter().zip(&by_mass).map(|(i, w)| w * of(at(i), at(i).position - position)).sum::<f64>().sqrt()
+        run.iter()
+            .zip(&by_mass)
+            .map(|(i, w)| w * of(at(i), at(i).position - position))
+            .sum::<f64>()
+            .sqrt()
     };
     let (sigma, aspect) = match (run, ellipsoids) {
         ([one], _) => (at(one).sigma, at(one).aspect),
@@ -186,7 +217,14 @@ pub fn bunch(m: &Members<'_>, run: &[u32], ellipsoids: bool) -> Bunch {
         (_, true) => {
             let wide = spread(&|b, d| b.sigma.powi(2) + 0.5 * (d.x * d.x + d.z * d.z));
             let high = spread(&|b, d| (b.aspect * b.sigma).powi(2) + d.y * d.y);
-            (wide, if wide > 0.0 { (high / wide).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT) } else { 1.0 })
+            (
+                wide,
+                if wide > 0.0 {
+                    (high / wide).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT)
+                } else {
+                    1.0
+                },
+            )
         }
     };
     Bunch {
@@ -212,9 +250,20 @@ pub fn grouped(
     let of = |&(first, end): &(u64, u64)| {
         let run = &order[first as usize..end as usize];
         let b = bunch(members, run, ellipsoids);
-        let (shape, region) = ([b.sigma.max(b.sigma_mean), b.aspect], members.regions[run[0] as usize]);
-        let (normal, conditioning) = normal(spec, cells, b.position, shape, cloud_centers[region as usize]);
-        (Facet { position: shell(b.position, shape, normal), normal, area: b.area, region, conditioning }, b.color)
+        let (shape, region) =
+            ([b.sigma.max(b.sigma_mean), b.aspect], members.regions[run[0] as usize]);
+        let (normal, conditioning) =
+            normal(spec, cells, b.position, shape, cloud_centers[region as usize]);
+        (
+            Facet {
+                position: shell(b.position, shape, normal),
+                normal,
+                area: b.area,
+                region,
+                conditioning,
+            },
+            b.color,
+        )
     };
     runs.iter().map(of).collect()
 }
@@ -225,7 +274,8 @@ mod tests {
     use crate::reference::grid::deposit;
     use glam::UVec3;
 
-    const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
+    const SPEC: GridSpec =
+        GridSpec { aspect: 1.0, n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
 
     fn ball() -> Vec<f64> {
         deposit(&SPEC, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
@@ -233,7 +283,8 @@ mod tests {
 
     #[test]
     fn the_directions_are_a_quadrature_of_degree_5() {
-        let mean = |f: &dyn Fn(DVec3) -> f64| directions().iter().map(|&(d, w)| w * f(d)).sum::<f64>();
+        let mean =
+            |f: &dyn Fn(DVec3) -> f64| directions().iter().map(|&(d, w)| w * f(d)).sum::<f64>();
         // Moments over the unit sphere: 1, 1/3, 1/5, 1/15; odd ones vanish.
         for (value, expected) in [
             (mean(&|_| 1.0), 1.0),
@@ -250,7 +301,8 @@ mod tests {
 
     #[test]
     fn of_a_linear_density_the_gradient_is_exact() {
-        // ρ = 3 + 0.2 x − 0.1 z at the cell centres, which trilinear sampling keeps: G = (r/3)∇ρ, S = ρ(p).
+        // ρ = 3 + 0.2 x − 0.1 z at the cell centres, which trilinear sampling keeps: G = (r/3)∇ρ, S
+        // = ρ(p).
         let at = |i: usize, axis: u32| -4.9 + 0.2 * (i / 50usize.pow(axis) % 50) as f64;
         let cells: Vec<f64> = (0..125_000).map(|i| 3.0 + 0.2 * at(i, 0) - 0.1 * at(i, 2)).collect();
         let p = DVec3::new(0.33, -0.71, 0.52);
@@ -263,24 +315,32 @@ mod tests {
     #[test]
     fn normals_of_a_ball_point_outward_wherever_the_cloud_is_centred() {
         let cells = ball();
-        for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)] {
+        for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)]
+        {
             let (n, q) = normal(&SPEC, &cells, p, [0.4, 1.0], DVec3::new(3.0, 3.0, -3.0));
-            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction is off by what the deposit's
-            // cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below one degree.
-            assert!(q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(), "{p} {n} {q}");
+            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction is off by what
+            // the deposit's cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below
+            // one degree.
+            assert!(
+                q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(),
+                "{p} {n} {q}"
+            );
         }
     }
 
     #[test]
     fn in_closed_form_a_ball_has_the_gradient_of_its_gaussian() {
-        // Of one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and exactly so by symmetry on an
-        // axis. Far from all blobs only the cloud's centre is left.
+        // Of one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and
+        // exactly so by symmetry on an axis. Far from all blobs only the cloud's centre is left.
         let blobs = [
             Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
             Blob { aspect: 1.0, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
         ];
         let facets = closed(&blobs, &[0.4, 0.4], &[0, 0], &[DVec3::new(0.0, 9.0, 0.0)]);
-        assert!((facets[1].normal - DVec3::X).length() < 1e-12 && facets[1].conditioning > CONDITIONING.1);
+        assert!(
+            (facets[1].normal - DVec3::X).length() < 1e-12
+                && facets[1].conditioning > CONDITIONING.1
+        );
         assert!((facets[1].position - DVec3::X * 1.6).length() < 1e-12);
         // At its own centre nothing points anywhere: away from the cloud's.
         assert!((facets[0].normal + DVec3::Y).length() < 1e-12);
@@ -294,9 +354,11 @@ mod tests {
     #[test]
     fn normals_blend_without_a_jump() {
         let cells = ball();
-        let at = |k: i32| normal(&SPEC, &cells, DVec3::X * 1e-3 * f64::from(k), [0.3, 1.0], DVec3::NEG_Y * 20.0);
-        // q grows by some (2√5·0.3/3)/1.2² = 0.31 a unit, t by at most 1.5/0.08 times that, and the normal turns from +y
-        // to ±x by at most twice dt: 1.2e-2 a step of 1e-3.
+        let at = |k: i32| {
+            normal(&SPEC, &cells, DVec3::X * 1e-3 * f64::from(k), [0.3, 1.0], DVec3::NEG_Y * 20.0)
+        };
+        // q grows by some (2√5·0.3/3)/1.2² = 0.31 a unit, t by at most 1.5/0.08 times that, and the
+        // normal turns from +y to ±x by at most twice dt: 1.2e-2 a step of 1e-3.
         for k in -1500..1500 {
             assert!((at(k + 1).0 - at(k).0).length() < 2e-2, "{k}");
         }
@@ -311,8 +373,18 @@ mod tests {
     fn a_facet_lies_on_its_shell_and_without_direction_faces_up() {
         let blob = Blob { aspect: 1.0, position: DVec3::ONE, sigma: 0.5, kappa: 2.0 };
         let empty = vec![0.0; 125_000];
-        let facets = facets(&SPEC, &empty, &[blob, blob], &[0.0; 2], &[1, 0], &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE]);
-        assert_eq!((facets[0].normal, facets[0].conditioning, facets[0].region), (DVec3::Y, 0.0, 1));
+        let facets = facets(
+            &SPEC,
+            &empty,
+            &[blob, blob],
+            &[0.0; 2],
+            &[1, 0],
+            &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE],
+        );
+        assert_eq!(
+            (facets[0].normal, facets[0].conditioning, facets[0].region),
+            (DVec3::Y, 0.0, 1)
+        );
         assert_eq!(facets[0].position, DVec3::new(1.0, 1.75, 1.0));
         assert_eq!((facets[1].normal, facets[1].position.z), (DVec3::NEG_Z, 0.25));
         // τ₀ = √(2π); π·1.5²·(1 − e^{−2.5066…}) = 6.49216….
@@ -321,20 +393,32 @@ mod tests {
 
     #[test]
     fn a_run_is_one_blob_of_its_members() {
-        let blob = |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::X * x, sigma, kappa };
+        let blob =
+            |x: f64, sigma, kappa| Blob { aspect: 1.0, position: DVec3::X * x, sigma, kappa };
         // Masses 2·1³ and 1·2³, 1 to 4: p̄ = 4, σ_g² = ((1 + 16/3) + 4 (4 + 1/3))/5 = 71/15.
-        let blobs = [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
+        let blobs =
+            [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
         let colors = [DVec3::X, DVec3::Y, DVec3::ZERO, DVec3::ONE];
-        let members = Members { blobs: &blobs, sigma_means: &[1.0, 6.0, 2.0, 4.0], regions: &[0; 4], colors: &colors };
+        let members = Members {
+            blobs: &blobs,
+            sigma_means: &[1.0, 6.0, 2.0, 4.0],
+            regions: &[0; 4],
+            colors: &colors,
+        };
         let b = bunch(&members, &[0, 1], false);
-        assert!((b.position - DVec3::X * 4.0).length() < 1e-14 && (b.sigma_mean - 5.0).abs() < 1e-14);
+        assert!(
+            (b.position - DVec3::X * 4.0).length() < 1e-14 && (b.sigma_mean - 5.0).abs() < 1e-14
+        );
         assert!((b.sigma.powi(2) - 71.0 / 15.0).abs() < 1e-14);
         let (a0, a1) = (area(&blobs[0]), area(&blobs[1]));
         assert!((b.area - a0 - a1).abs() < 1e-13);
         assert!((b.color - DVec3::new(a0, a1, 0.0) / (a0 + a1)).length() < 1e-15);
         // Neither of the last two has mass or area: they count alike.
         let b = bunch(&members, &[2, 3], false);
-        assert_eq!((b.position, b.sigma_mean, b.area, b.color), (DVec3::X * 2.0, 3.0, 0.0, DVec3::splat(0.5)));
+        assert_eq!(
+            (b.position, b.sigma_mean, b.area, b.color),
+            (DVec3::X * 2.0, 3.0, 0.0, DVec3::splat(0.5))
+        );
         // (0 + 1)/2 + 1/3.
         assert!((b.sigma.powi(2) - 5.0 / 6.0).abs() < 1e-15);
     }
@@ -342,17 +426,27 @@ mod tests {
     #[test]
     fn runs_of_one_are_the_particles_facets() {
         let cells = ball();
-        let blob = |x: f64| Blob { aspect: 1.0, position: DVec3::new(x, 0.4, -0.3), sigma: 0.3 + 0.1 * x, kappa: 1.0 };
-        let (blobs, means, regions) = ([blob(0.5), blob(-1.0), blob(2.0)], [0.1, 0.4, 0.2], [0, 1, 1]);
+        let blob = |x: f64| Blob {
+            aspect: 1.0,
+            position: DVec3::new(x, 0.4, -0.3),
+            sigma: 0.3 + 0.1 * x,
+            kappa: 1.0,
+        };
+        let (blobs, means, regions) =
+            ([blob(0.5), blob(-1.0), blob(2.0)], [0.1, 0.4, 0.2], [0, 1, 1]);
         let centers = [DVec3::Y, DVec3::Z];
         let colors = [DVec3::X; 3];
-        let members = Members { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
+        let members =
+            Members { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
         let single = facets(&SPEC, &cells, &blobs, &means, &regions, &centers);
-        let of_runs = grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);
+        let of_runs =
+            grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);
         for ((facet, color), i) in of_runs.into_iter().zip([0, 2, 1]) {
             // √σ² is σ to an ulp.
             assert!((facet.position - single[i].position).length() < 1e-14 && color == DVec3::X);
-            assert!((facet.normal - single[i].normal).length() < 1e-13 && facet.area == single[i].area);
+            assert!(
+                (facet.normal - single[i].normal).length() < 1e-13 && facet.area == single[i].area
+            );
             assert_eq!(facet.region, single[i].region);
         }
     }

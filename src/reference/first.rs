@@ -1,5 +1,6 @@
-//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first".
-//! In: positions and normals, transmittance [facet × light], lights relative to O. Out: irradiance (W m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
+//! The first reflection, C (15) and §2.5 (2), diffuse basis only: model.md §7 and §11 "first". In:
+//! positions and normals, transmittance [facet × light], lights relative to O. Out: irradiance (W
+//! m⁻²) and radiance L1 (W m⁻² sr⁻¹), RGB a facet.
 
 use std::f64::consts::PI;
 
@@ -9,23 +10,38 @@ use crate::model::basis;
 use crate::model::light::Light;
 
 /// I_d,j = Σ_l E_l f_l(n_j, V(j, l)).
-pub fn irradiance(positions: &[DVec3], normals: &[DVec3], transmittance: &[f64], lights: &[Light]) -> Vec<DVec3> {
+pub fn irradiance(
+    positions: &[DVec3],
+    normals: &[DVec3],
+    transmittance: &[f64],
+    lights: &[Light],
+) -> Vec<DVec3> {
     let at = |(j, (&p, &n)): (usize, (&DVec3, &DVec3))| {
         let of = &transmittance[j * lights.len()..][..lights.len()];
-        lights.iter().zip(of).map(|(light, &v)| light.energy() * light.share(n, &light.arrival(p), v)).sum()
+        lights
+            .iter()
+            .zip(of)
+            .map(|(light, &v)| light.energy() * light.share(n, &light.arrival(p), v))
+            .sum()
     };
     positions.iter().zip(normals).enumerate().map(at).collect()
 }
 
 /// L1_j = K_d c_j I_d,j/π: `kd` by region, `colors` by facet (1 for boxes and surfaces).
-pub fn radiance(irradiance: &[DVec3], regions: &[u32], kd: &[DVec3], colors: &[DVec3]) -> Vec<DVec3> {
-    let of = |((&e, &region), &color): ((&DVec3, &u32), &DVec3)| kd[region as usize] * color * e / PI;
+pub fn radiance(
+    irradiance: &[DVec3],
+    regions: &[u32],
+    kd: &[DVec3],
+    colors: &[DVec3],
+) -> Vec<DVec3> {
+    let of =
+        |((&e, &region), &color): ((&DVec3, &u32), &DVec3)| kd[region as usize] * color * e / PI;
     irradiance.iter().zip(regions).zip(colors).map(of).collect()
 }
 
-/// One row after the other of T1 for a facet: g/π, then g v_b(γ) for every vector of the basis ([`basis::evaluate`]'s
-/// tables), γ between the normal and the half vector of `toward` the light and `outgoing`; 0 for the sky, and where the
-/// eye is behind the facet (model.md §11 "contract").
+/// One row after the other of T1 for a facet: g/π, then g v_b(γ) for every vector of the basis
+/// ([`basis::evaluate`]'s tables), γ between the normal and the half vector of `toward` the light
+/// and `outgoing`; 0 for the sky, and where the eye is behind the facet (model.md §11 "contract").
 pub fn responses(
     light: &Light,
     g: f64,
@@ -72,7 +88,12 @@ mod tests {
     #[test]
     fn lights_add_and_regions_and_colors_choose_the_albedo() {
         let sky = Light::Sky { irradiance: DVec3::splat(PI), constant: 0.0 };
-        let e = irradiance(&[DVec3::ZERO; 2], &[DVec3::Y, DVec3::NEG_Y], &[1.0, 0.5, 1.0, 1.0], &[SUN, sky]);
+        let e = irradiance(
+            &[DVec3::ZERO; 2],
+            &[DVec3::Y, DVec3::NEG_Y],
+            &[1.0, 0.5, 1.0, 1.0],
+            &[SUN, sky],
+        );
         assert_eq!(e, [DVec3::splat(1.5 * PI), DVec3::ZERO]);
         let kd = [DVec3::ZERO, DVec3::new(1.0, 0.5, 0.0)];
         let l = radiance(&e, &[1, 0], &kd, &[DVec3::new(1.0, 0.5, 1.0), DVec3::ONE]);
@@ -80,7 +101,11 @@ mod tests {
     }
     #[test]
     fn a_point_light_is_as_near_as_the_facet_has_it() {
-        let light = Light::Point { position: DVec3::new(0.0, 3.0, 0.0), intensity: DVec3::splat(PI), radius: 1e-3 };
+        let light = Light::Point {
+            position: DVec3::new(0.0, 3.0, 0.0),
+            intensity: DVec3::splat(PI),
+            radius: 1e-3,
+        };
         // 2 above the first facet, and 5 from the second, 3 up and 4 aside: I/d² · 3/5.
         let positions = [DVec3::Y, DVec3::new(4.0, 0.0, 0.0)];
         let e = irradiance(&positions, &[DVec3::Y; 2], &[0.5, 1.0], &[light]);
@@ -92,16 +117,21 @@ mod tests {
 
     #[test]
     fn responses_are_the_bases_at_their_angle_and_nothing_from_the_sky_or_to_behind() {
-        // v_1 = t over its nodes. Light straight above, eye at 60° from it: the half vector lies at γ = 30°.
+        // v_1 = t over its nodes. Light straight above, eye at 60° from it: the half vector lies at
+        // γ = 30°.
         let ramp: Vec<f64> = (0..basis::N_NODES).map(basis::node_t).collect();
         let sin60 = 3f64.sqrt() / 2.0;
         let normal = DVec3::Y;
         let toward_eye = |cos: f64, sin: f64| DVec3::new(sin, cos, 0.0);
-        let of =
-            |light: &Light, outgoing| responses(light, 0.5, normal, DVec3::Y, outgoing, std::slice::from_ref(&ramp));
+        let of = |light: &Light, outgoing| {
+            responses(light, 0.5, normal, DVec3::Y, outgoing, std::slice::from_ref(&ramp))
+        };
         let before = of(&SUN, toward_eye(0.5, sin60));
         let gap = 1.0 - sin60;
-        assert!((before[0] - 0.5 / PI).abs() < 1e-15 && (before[1] - 0.5 * gap.powf(0.25)).abs() < 1e-15);
+        assert!(
+            (before[0] - 0.5 / PI).abs() < 1e-15
+                && (before[1] - 0.5 * gap.powf(0.25)).abs() < 1e-15
+        );
         assert_eq!(of(&SUN, toward_eye(-0.5, sin60)), [0.5 / PI, 0.0]);
         let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
         assert_eq!(of(&sky, toward_eye(0.5, sin60)), [0.5 / PI, 0.0]);

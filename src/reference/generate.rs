@@ -1,6 +1,7 @@
-//! Particles from boxes: P (1)–(11) and Fig. 1, both forms, as model.md §1 and §11 "generate" spell them out.
-//! In: a box, its number within its cloud, the cloud's seed. Out: positions relative to the box's centre (scene
-//! units), radii before `radius_scale`, σ and κ after it. `rounding.rs` bounds what an f32 evaluation may differ.
+//! Particles from boxes: P (1)–(11) and Fig. 1, both forms, as model.md §1 and §11 "generate" spell
+//! them out. In: a box, its number within its cloud, the cloud's seed. Out: positions relative to
+//! the box's centre (scene units), radii before `radius_scale`, σ and κ after it. `rounding.rs`
+//! bounds what an f32 evaluation may differ.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -22,8 +23,8 @@ pub struct Generated {
     /// Attempts made, the kept one included; 0 where a particle was given and not generated.
     pub n_attempts: u32,
     pub folded: bool,
-    /// How far the closest of the particle's accept/reject decisions was from turning out the other way: over the
-    /// attempts the least [`decision_margin`]. Infinite where nothing was decided.
+    /// How far the closest of the particle's accept/reject decisions was from turning out the other
+    /// way: over the attempts the least [`decision_margin`]. Infinite where nothing was decided.
     pub margin: f64,
 }
 
@@ -50,7 +51,8 @@ impl Acceptance {
     }
 }
 
-/// u₁…u₄ of one attempt: the words of Philox(key = (seed, box), counter = (particle, attempt, 0, 0)).
+/// u₁…u₄ of one attempt: the words of Philox(key = (seed, box), counter = (particle, attempt, 0,
+/// 0)).
 pub fn uniforms(seed: u32, i_box: u32, i_particle: u32, attempt: u32) -> [f64; 4] {
     philox4x32_10([seed, i_box], [i_particle, attempt, 0, 0]).map(uniform)
 }
@@ -83,11 +85,13 @@ pub fn is_inside(v: DVec3, half: DVec3) -> bool {
     v.abs().cmple(half).all()
 }
 
-/// How far the decision on offset `v` is from its opposite: inside, the distance to the nearest face; outside,
-/// the farthest that any axis sticks out, because all those that do would have to move in.
+/// How far the decision on offset `v` is from its opposite: inside, the distance to the nearest
+/// face; outside, the farthest that any axis sticks out, because all those that do would have to
+/// move in.
 pub fn decision_margin(v: DVec3, half: DVec3) -> f64 {
     let out = v.abs() - half;
-    // The same expression serves both: inside, every entry is negative and the largest is the nearest face.
+    // The same expression serves both: inside, every entry is negative and the largest is the
+    // nearest face.
     out.max_element().abs()
 }
 
@@ -156,7 +160,9 @@ pub fn generate_box(
     optical_depth: f64,
     radius_scale: f64,
 ) -> Vec<Generated> {
-    (0..b.n_particles).map(|i| generate_particle(b, i_box, seed, form, optical_depth, radius_scale, i)).collect()
+    (0..b.n_particles)
+        .map(|i| generate_particle(b, i_box, seed, form, optical_depth, radius_scale, i))
+        .collect()
 }
 
 /// All particles of a cloud in the order of its groups; of a disc those of time 0.
@@ -165,7 +171,9 @@ pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
         CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
             .iter()
             .zip(0u32..)
-            .flat_map(|(b, i_box)| generate_box(b, i_box, cloud.seed, *form, *optical_depth, *radius_scale))
+            .flat_map(|(b, i_box)| {
+                generate_box(b, i_box, cloud.seed, *form, *optical_depth, *radius_scale)
+            })
             .collect(),
         CloudSource::Particles(list) => {
             let groups = cloud.groups(0, 0);

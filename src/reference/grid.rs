@@ -1,6 +1,7 @@
-//! The density grid, model.md §8 and §11 "grid", "sample": blobs' mass deposited conservatively into
-//! cells, sampled trilinearly; and the closed form of the optical depth that the grid approximates.
-//! Densities are extinction per unit length; cell (x, y, z) is at index x + n_x (y + n_y z).
+//! The density grid, model.md §8 and §11 "grid", "sample": blobs' mass deposited conservatively
+//! into cells, sampled trilinearly; and the closed form of the optical depth that the grid
+//! approximates. Densities are extinction per unit length; cell (x, y, z) is at index x + n_x (y +
+//! n_y z).
 
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::ops::RangeInclusive;
@@ -11,7 +12,8 @@ use libm::{erf, erfc};
 use super::Blob;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 
-/// Density of every cell. A blob none of whose cells exist, or with σ = 0 or κ = 0, deposits nothing.
+/// Density of every cell. A blob none of whose cells exist, or with σ = 0 or κ = 0, deposits
+/// nothing.
 pub fn deposit(spec: &GridSpec, blobs: &[Blob]) -> Vec<f64> {
     let n = spec.n_cells.as_usizevec3();
     let mut cells = vec![0.0; n.x * n.y * n.z];
@@ -38,7 +40,10 @@ pub fn n_deposited(spec: &GridSpec, blobs: &[Blob]) -> f64 {
     let n = spec.n_cells.as_usizevec3();
     let of_blob = |blob: &Blob| {
         let (sigma, edges) = (blob.sigma * blob.axes(), spec.edges());
-        let axis = |i: usize| reached(blob.position[i], sigma[i], spec.low[i], edges[i], n[i]).map_or(0, |r| r.count());
+        let axis = |i: usize| {
+            reached(blob.position[i], sigma[i], spec.low[i], edges[i], n[i])
+                .map_or(0, |r| r.count())
+        };
         axis(0) as f64 * axis(1) as f64 * axis(2) as f64
     };
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
@@ -55,9 +60,9 @@ fn reached(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> Option<RangeInc
 /// erf(3/√2): the share of a Gaussian within the cut, by which the weights are normalised.
 const WITHIN_CUT: f64 = 0.997_300_203_936_739_8;
 
-/// First cell and weights of one axis: the share of every existing cell in the Gaussian cut at ±3σ and normalised.
-/// They sum to 1, less what lies outside the grid, and change continuously with `p`. Empty where no cell exists
-/// within the cut, or `p` is not a number.
+/// First cell and weights of one axis: the share of every existing cell in the Gaussian cut at ±3σ
+/// and normalised. They sum to 1, less what lies outside the grid, and change continuously with
+/// `p`. Empty where no cell exists within the cut, or `p` is not a number.
 pub fn axis_weights(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> (usize, Vec<f64>) {
     let Some(cells) = reached(p, sigma, low, cell, n) else { return (0, Vec::new()) };
     let edge = |i: usize| (low + cell * i as f64 - p) / sigma;
@@ -66,7 +71,8 @@ pub fn axis_weights(p: f64, sigma: f64, low: f64, cell: f64, n: usize) -> (usize
     (*cells.start(), cells.map(weight).collect())
 }
 
-/// Share of the unit normal distribution in [a, b]: ½[erf(b/√2) − erf(a/√2)], in its tails through erfc.
+/// Share of the unit normal distribution in [a, b]: ½[erf(b/√2) − erf(a/√2)], in its tails through
+/// erfc.
 fn normal_share(a: f64, b: f64) -> f64 {
     let (s, t) = (a * FRAC_1_SQRT_2, b * FRAC_1_SQRT_2);
     let twice = if a > 0.0 {
@@ -108,13 +114,13 @@ pub fn density(blobs: &[Blob], x: DVec3) -> f64 {
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
 }
 
-/// (Distance/σ)² from which a blob does not count: e^{−50} of its peak are left, which the sum of 10⁶ such does not show
-/// beside a rounding of 2⁻⁵³.
+/// (Distance/σ)² from which a blob does not count: e^{−50} of its peak are left, which the sum of
+/// 10⁶ such does not show beside a rounding of 2⁻⁵³.
 const UNSEEN: f64 = 100.0;
 
-/// Optical depth through all blobs along p + s d, s in [0, `length`], d unit; `length` may be infinite. Closed
-/// form (model.md §8): κσ√(π/2) e^{−b²/2σ²} [erf((length − s₀)/√2σ) + erf(s₀/√2σ)], s₀ the foot of the centre
-/// on the line and b its distance.
+/// Optical depth through all blobs along p + s d, s in [0, `length`], d unit; `length` may be
+/// infinite. Closed form (model.md §8): κσ√(π/2) e^{−b²/2σ²} [erf((length − s₀)/√2σ) +
+/// erf(s₀/√2σ)], s₀ the foot of the centre on the line and b its distance.
 pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f64 {
     let of_blob = |blob: &Blob| {
         let c = blob.position - p;
@@ -124,7 +130,8 @@ pub fn optical_depth_exact(blobs: &[Blob], p: DVec3, d: DVec3, length: f64) -> f
         }
         let white = blob.whiten(d);
         // The foot of the centre, and σ, along the line.
-        let (foot, sigma) = (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
+        let (foot, sigma) =
+            (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         line.tau() * normal_share(-foot / sigma, (length - foot) / sigma)
     };
     blobs.iter().filter(|b| b.sigma > 0.0 && b.kappa > 0.0).map(of_blob).sum()
@@ -148,9 +155,16 @@ mod tests {
     #[test]
     fn cells_that_blobs_meet_by_hand() {
         let spec = spec(20, 0.5, -5.0);
-        let at = |x: f64, sigma: f64, kappa: f64| Blob { aspect: 1.0, position: DVec3::splat(x), sigma, kappa };
-        // ±1.5 about 0.1: cells 7 to 13 along each axis. About the corner at 5: 17 to 19. Beyond it: none.
-        let blobs = [at(0.1, 0.5, 1.0), at(5.0, 0.5, 1.0), at(7.0, 0.5, 1.0), at(f64::NAN, 0.5, 1.0)];
+        let at = |x: f64, sigma: f64, kappa: f64| Blob {
+            aspect: 1.0,
+            position: DVec3::splat(x),
+            sigma,
+            kappa,
+        };
+        // ±1.5 about 0.1: cells 7 to 13 along each axis. About the corner at 5: 17 to 19. Beyond
+        // it: none.
+        let blobs =
+            [at(0.1, 0.5, 1.0), at(5.0, 0.5, 1.0), at(7.0, 0.5, 1.0), at(f64::NAN, 0.5, 1.0)];
         let counts = blobs.map(|blob| n_deposited(&spec, &[blob]));
         assert_eq!(counts, [343.0, 27.0, 0.0, 0.0]);
         assert_eq!(n_deposited(&spec, &blobs), 370.0);
@@ -165,7 +179,8 @@ mod tests {
     #[test]
     fn deposit_keeps_mass_and_superposes() {
         let spec = spec(20, 0.5, -5.0);
-        // Small, large, cut by the grid's border, without size, without extinction, outside, not a number.
+        // Small, large, cut by the grid's border, without size, without extinction, outside, not a
+        // number.
         let blobs = [
             blob(0.1, 0.02, 3.0),
             blob(-1.0, 1.3, 0.7),
@@ -177,7 +192,8 @@ mod tests {
         ];
         let all = deposit(&spec, &blobs);
         let total = all.iter().sum::<f64>() * spec.cell_volume();
-        // Of the third the grid keeps what lies below x = 5, an eighth of σ beyond its centre: Φ within the cut.
+        // Of the third the grid keeps what lies below x = 5, an eighth of σ beyond its centre: Φ
+        // within the cut.
         let inside = 0.5 + 0.5 * erf(0.125 * FRAC_1_SQRT_2) / erf(3.0 * FRAC_1_SQRT_2);
         let expected = blobs[0].mass() + blobs[1].mass() + inside * blobs[2].mass();
         // 8000 cells, each a few roundings of 1e-16 of its own value.
@@ -185,7 +201,11 @@ mod tests {
         let first = deposit(&spec, &blobs[..1]);
         let second = deposit(&spec, &blobs[1..]);
         // The same terms in another order.
-        assert!(all.iter().zip(first.iter().zip(&second)).all(|(c, (a, b))| (c - (a + b)).abs() <= 1e-15 * c));
+        assert!(
+            all.iter()
+                .zip(first.iter().zip(&second))
+                .all(|(c, (a, b))| (c - (a + b)).abs() <= 1e-15 * c)
+        );
     }
 
     #[test]
@@ -197,19 +217,30 @@ mod tests {
         assert_eq!(cells.iter().filter(|&&c| c > 0.0).count(), 1);
         let (first, weights) = axis_weights(2.0, 0.1, 0.0, 1.0, 4);
         // The constant's and the quotient's rounding.
-        assert!(first == 1 && weights.len() == 2 && weights.iter().all(|w| (w - 0.5).abs() < 1e-15));
+        assert!(
+            first == 1 && weights.len() == 2 && weights.iter().all(|w| (w - 0.5).abs() < 1e-15)
+        );
     }
 
     #[test]
     fn weights_are_shares_of_the_normal_distribution() {
-        // Cells of one σ about p: the published shares 34.134 %, 13.591 %, 2.140 % over their sum 99.730 %.
+        // Cells of one σ about p: the published shares 34.134 %, 13.591 %, 2.140 % over their sum
+        // 99.730 %.
         let (first, w) = axis_weights(5.0 + 1e-9, 1.0 - 1e-9, 0.0, 1.0, 10);
         assert_eq!((first, w.len()), (2, 6));
-        for (w, share) in w.iter().zip([0.021_400_2, 0.135_905_1, 0.341_344_7, 0.341_344_7, 0.135_905_1, 0.021_400_2]) {
+        for (w, share) in w.iter().zip([
+            0.021_400_2,
+            0.135_905_1,
+            0.341_344_7,
+            0.341_344_7,
+            0.135_905_1,
+            0.021_400_2,
+        ]) {
             // The shares are given to 1e-7, the cells moved by 1e-9.
             assert!((w - share / 0.997_300_2).abs() < 2e-7);
         }
-        // In the far tail the share keeps its relative accuracy: Q(8) − Q(9) = 6.2209605743e-16 − 1.1286e-19.
+        // In the far tail the share keeps its relative accuracy: Q(8) − Q(9) = 6.2209605743e-16 −
+        // 1.1286e-19.
         assert!((normal_share(8.0, 9.0) / 6.219_831_7e-16 - 1.0).abs() < 1e-6);
         assert_eq!(normal_share(8.0, 9.0), normal_share(-9.0, -8.0));
     }
@@ -217,7 +248,8 @@ mod tests {
     #[test]
     fn weights_sum_to_one_and_change_continuously() {
         assert!((WITHIN_CUT - erf(3.0 * FRAC_1_SQRT_2)).abs() < 1e-15);
-        // Through a whole cell in steps of 1e-4: a weight's slope is at most the density's maximum over σ, twice.
+        // Through a whole cell in steps of 1e-4: a weight's slope is at most the density's maximum
+        // over σ, twice.
         let all = |k: i32| {
             let (first, weights) = axis_weights(9.5 + 1e-4 * f64::from(k), 0.9, 0.0, 1.0, 20);
             let mut cells = vec![0.0; 20];
@@ -227,13 +259,20 @@ mod tests {
         for k in 0..10_000 {
             let (here, next) = (all(k), all(k + 1));
             assert!((here.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-            assert!(here.iter().zip(&next).all(|(a, b)| (a - b).abs() <= 2.0 * 1e-4 / (0.9 * SQRT_TAU)));
+            assert!(
+                here.iter().zip(&next).all(|(a, b)| (a - b).abs() <= 2.0 * 1e-4 / (0.9 * SQRT_TAU))
+            );
         }
     }
 
     #[test]
     fn samples_are_trilinear_and_end_at_the_last_centre() {
-        let spec = GridSpec { aspect: 1.0, n_cells: UVec3::new(2, 3, 1), cell: 2.0, low: DVec3::new(-1.0, 0.0, 0.0) };
+        let spec = GridSpec {
+            aspect: 1.0,
+            n_cells: UVec3::new(2, 3, 1),
+            cell: 2.0,
+            low: DVec3::new(-1.0, 0.0, 0.0),
+        };
         // Cell values x + 10 y at centres x = 0, 2; y = 1, 3, 5; z = 1.
         let cells = [0.0, 1.0, 10.0, 11.0, 20.0, 21.0];
         let at = |x, y, z| sample(&spec, &cells, DVec3::new(x, y, z));
@@ -254,7 +293,10 @@ mod tests {
         same(tau(b.position - 40.0 * DVec3::X, DVec3::X, f64::INFINITY), through);
         same(tau(b.position, DVec3::Y, f64::INFINITY), 0.5 * through);
         // Offset by 2σ: e^{−2}; a segment of ±σ: erf(1/√2) = 0.682689492137086.
-        same(tau(b.position + DVec3::new(-40.0, 1.0, 0.0), DVec3::X, 80.0), through * (-2f64).exp());
+        same(
+            tau(b.position + DVec3::new(-40.0, 1.0, 0.0), DVec3::X, 80.0),
+            through * (-2f64).exp(),
+        );
         same(tau(b.position - 0.5 * DVec3::Z, DVec3::Z, 1.0), through * 0.682_689_492_137_086);
         let none = Blob { sigma: 0.0, ..b };
         same(optical_depth_exact(&[b, none, b], b.position, DVec3::Y, f64::INFINITY), through);
@@ -267,21 +309,28 @@ mod tests {
             let cell = sigma / f64::from(cells_per_sigma);
             // The blob sits on the centre of the middle cell, at every resolution.
             let n = 2 * 4 * cells_per_sigma + 1;
-            let spec =
-                GridSpec { aspect: 1.0, n_cells: UVec3::splat(n), cell, low: DVec3::splat(-0.5 * cell * f64::from(n)) };
+            let spec = GridSpec {
+                aspect: 1.0,
+                n_cells: UVec3::splat(n),
+                cell,
+                low: DVec3::splat(-0.5 * cell * f64::from(n)),
+            };
             let blob = Blob { aspect: 1.0, position: DVec3::ZERO, sigma, kappa };
             let cells = deposit(&spec, &[blob]);
             let start = DVec3::X * spec.low.x;
             let tau = transmit::optical_depth(&spec, &cells, start, DVec3::X, f64::INFINITY, 0.5);
-            // What the cut gives to the rest is no error of h: model.md's 0.54 %, on the two axes across the line.
+            // What the cut gives to the rest is no error of h: model.md's 0.54 %, on the two axes
+            // across the line.
             let kept = erf(3.0 / 2f64.sqrt());
             // The whole line: what its own axis cuts off is within the grid too.
-            let exact = optical_depth_exact(&[blob], 10.0 * start, DVec3::X, f64::INFINITY) / (kept * kept);
+            let exact =
+                optical_depth_exact(&[blob], 10.0 * start, DVec3::X, f64::INFINITY) / (kept * kept);
             tau / exact - 1.0
         };
         let errors = [2, 4, 8, 16].map(error);
         println!("relative errors of τ at h = σ/2, /4, /8, /16: {errors:?}");
-        // A cell's mean of exp(−y²/2σ²) about its maximum is 1 − h²/24σ², on two axes: −h²/12σ², next term (h/σ)⁴/500.
+        // A cell's mean of exp(−y²/2σ²) about its maximum is 1 − h²/24σ², on two axes: −h²/12σ²,
+        // next term (h/σ)⁴/500.
         assert!((errors[3] * 12.0 * 256.0 + 1.0).abs() < 0.01);
         for pair in errors.windows(2) {
             assert!((pair[0] / pair[1] - 4.0).abs() < 0.1);
@@ -291,7 +340,8 @@ mod tests {
     #[test]
     fn far_from_the_grid_there_is_no_density() {
         let spec = GridSpec::fit(DVec3::splat(-3.0), DVec3::splat(3.0), 32);
-        let cells = deposit(&spec, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
+        let cells =
+            deposit(&spec, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.0, kappa: 1.0 }]);
         let density = cells.iter().sum::<f64>() * spec.cell.powi(3);
         assert!((density / SQRT_TAU.powi(3) - 1.0).abs() < 1e-12);
         assert_eq!(sample(&spec, &cells, DVec3::splat(9.0)), 0.0);

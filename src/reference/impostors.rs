@@ -1,6 +1,6 @@
-//! A shell's picture seen from elsewhere, model.md §11 "impostors": where it shows a point, resampling, and which of the sorted
-//! particles are in it.
-//! In: pictures as [C_r, C_g, C_b, A], rows from the top; sorted entries. Out: the same.
+//! A shell's picture seen from elsewhere, model.md §11 "impostors": where it shows a point,
+//! resampling, and which of the sorted particles are in it. In: pictures as [C_r, C_g, C_b, A],
+//! rows from the top; sorted entries. Out: the same.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -12,9 +12,11 @@ pub fn seen(view: &View, point: DVec3) -> DVec2 {
     DVec2::new(c.dot(view.right), c.dot(view.up)) / c.dot(view.forward)
 }
 
-/// Slopes at which `shell`'s picture shows a point to `now`: by the ray from where it was made to the plane.
+/// Slopes at which `shell`'s picture shows a point to `now`: by the ray from where it was made to
+/// the plane.
 pub fn shown(shell: &Shell, now: &View, point: DVec3) -> DVec2 {
-    let on_plane = shell.view.eye + shell.view.ray(seen(&shell.view, point)) / shell.inverse_depth();
+    let on_plane =
+        shell.view.eye + shell.view.ray(seen(&shell.view, point)) / shell.inverse_depth();
     seen(now, on_plane)
 }
 
@@ -27,26 +29,35 @@ pub struct Picture<'a> {
     pub texels: &'a [[f64; 4]],
 }
 
-/// Weights of the four texels around a place a share `t` beyond the second of them: Catmull and Rom's cubic.
+/// Weights of the four texels around a place a share `t` beyond the second of them: Catmull and
+/// Rom's cubic.
 pub fn weights(t: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
-    [0.5 * (-t + 2.0 * t2 - t3), 1.0 + 0.5 * (-5.0 * t2 + 3.0 * t3), 0.5 * (t + 4.0 * t2 - 3.0 * t3), 0.5 * (t3 - t2)]
+    [
+        0.5 * (-t + 2.0 * t2 - t3),
+        1.0 + 0.5 * (-5.0 * t2 + 3.0 * t3),
+        0.5 * (t + 4.0 * t2 - 3.0 * t3),
+        0.5 * (t3 - t2),
+    ]
 }
 
-/// What a place of the picture holds, and what it may be off by where the place is off by `place` texels and each sum by a
-/// share `rounding` of its terms. Texels are counted from the first one's centre; places beyond the edges are taken as at them.
+/// What a place of the picture holds, and what it may be off by where the place is off by `place`
+/// texels and each sum by a share `rounding` of its terms. Texels are counted from the first one's
+/// centre; places beyond the edges are taken as at them.
 pub fn sample(picture: &Picture<'_>, at: DVec2, place: f64, rounding: f64) -> ([f64; 4], [f64; 4]) {
     let last = DVec2::new(f64::from(picture.width), f64::from(picture.height)) - 1.0;
     let at = at.clamp(DVec2::ZERO, last);
     let low = at.floor();
     let [across, down] = [weights(at.x - low.x), weights(at.y - low.y)];
-    let index = |v: f64, k: usize, n: u32| (v + k as f64 - 1.0).clamp(0.0, f64::from(n) - 1.0) as usize;
+    let index =
+        |v: f64, k: usize, n: u32| (v + k as f64 - 1.0).clamp(0.0, f64::from(n) - 1.0) as usize;
     let (mut sum, mut size) = ([0.0; 4], [0f64; 4]);
     let (mut least, mut most) = ([f64::INFINITY; 4], [f64::NEG_INFINITY; 4]);
     // One texel more on every side: which four are met may be decided by rounding.
     for j in 0..6 {
         for i in 0..6 {
-            let [x, y] = [index(low.x - 1.0, i, picture.width), index(low.y - 1.0, j, picture.height)];
+            let [x, y] =
+                [index(low.x - 1.0, i, picture.width), index(low.y - 1.0, j, picture.height)];
             let texel = picture.texels[y * picture.width as usize + x];
             for k in 0..4 {
                 (least[k], most[k]) = (least[k].min(texel[k]), most[k].max(texel[k]));
@@ -58,34 +69,45 @@ pub fn sample(picture: &Picture<'_>, at: DVec2, place: f64, rounding: f64) -> ([
             }
         }
     }
-    let bound = std::array::from_fn(|k| 2.0 * STEEPEST * place * (most[k] - least[k]) + rounding * size[k]);
-    let clamped = std::array::from_fn(|k| sum[k].clamp(0.0, if k == 3 { 1.0 } else { f64::INFINITY }));
+    let bound =
+        std::array::from_fn(|k| 2.0 * STEEPEST * place * (most[k] - least[k]) + rounding * size[k]);
+    let clamped =
+        std::array::from_fn(|k| sum[k].clamp(0.0, if k == 3 { 1.0 } else { f64::INFINITY }));
     (clamped, bound)
 }
 
-/// What the cubic changes along one axis over a texel, at most, per difference of the greatest and the least of the texels it
-/// meets: half of Σ|w'|, where the weights' slopes sum to nothing. Σ|w'| is 1 at the texels and 3 between two of them;
-/// times 1.25, the most that Σ|w| of the other axis comes to.
+/// What the cubic changes along one axis over a texel, at most, per difference of the greatest and
+/// the least of the texels it meets: half of Σ|w'|, where the weights' slopes sum to nothing. Σ|w'|
+/// is 1 at the texels and 3 between two of them; times 1.25, the most that Σ|w| of the other axis
+/// comes to.
 const STEEPEST: f64 = 0.5 * 3.0 * 1.25;
 
-/// From pixel centres of a picture of `size` with `tangents` to places in `shell`'s picture, in texels from the first one's
-/// centre, by the homography of slopes.
-pub fn place_of(to_shell: &DMat3, size: [u32; 2], tangents: DVec2, shell: &Picture<'_>, pixel: [u32; 2]) -> DVec2 {
+/// From pixel centres of a picture of `size` with `tangents` to places in `shell`'s picture, in
+/// texels from the first one's centre, by the homography of slopes.
+pub fn place_of(
+    to_shell: &DMat3,
+    size: [u32; 2],
+    tangents: DVec2,
+    shell: &Picture<'_>,
+    pixel: [u32; 2],
+) -> DVec2 {
     let share = |k: usize| 2.0 * (f64::from(pixel[k]) + 0.5) / f64::from(size[k]) - 1.0;
     let at = *to_shell * DVec3::new(share(0) * tangents.x, -share(1) * tangents.y, 1.0);
     let (x, y) = (at.x / at.z / shell.tangents.x, -at.y / at.z / shell.tangents.y);
     0.5 * DVec2::new((x + 1.0) * f64::from(shell.width), (y + 1.0) * f64::from(shell.height)) - 0.5
 }
 
-/// Of the sorted entries [key, particle] those that are far, and those that are near: in the places of the others stands no
-/// particle. `members`: by particle whether it is in the shell; made anew from the keys where `cut` says the last that is.
+/// Of the sorted entries [key, particle] those that are far, and those that are near: in the places
+/// of the others stands no particle. `members`: by particle whether it is in the shell; made anew
+/// from the keys where `cut` says the last that is.
 pub fn part(entries: &[[u32; 2]], members: &mut [u32], cut: Option<u32>) -> [Vec<[u32; 2]>; 2] {
     if let Some(cut) = cut {
         members.fill(0);
         entries.iter().filter(|e| e[0] <= cut).for_each(|e| members[e[1] as usize] = 1);
     }
     let of = |far: bool| {
-        let keep = |e: &[u32; 2]| if (members[e[1] as usize] == 1) == far { *e } else { [e[0], u32::MAX] };
+        let keep =
+            |e: &[u32; 2]| if (members[e[1] as usize] == 1) == far { *e } else { [e[0], u32::MAX] };
         entries.iter().map(keep).collect()
     };
     [of(true), of(false)]

@@ -56,7 +56,12 @@ mod tests {
     fn layers_are_counted_where_blobs_lie() {
         // 9 by 7 pixels; a blob in the middle, one to the lower right, one behind the eye.
         let view = View { width: 9, height: 7, ..VIEW };
-        let at = |x: f64, y: f64, z: f64| Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma: 0.05, kappa: 1.0 };
+        let at = |x: f64, y: f64, z: f64| Blob {
+            aspect: 1.0,
+            position: DVec3::new(x, y, -z),
+            sigma: 0.05,
+            kappa: 1.0,
+        };
         let blobs = [at(0.0, 0.0, 4.0), at(0.9, -0.9, 4.0), at(0.0, 0.0, -4.0)];
         let counts = n_layers(&view, &blobs, 3.0);
         let rectangle = |b: &Blob| view.rectangle(b, b.position, 3.0);

@@ -1,5 +1,5 @@
-//! Particles of discs and their life, model.md §2, in f64: written from the page. In: a cloud and a time. Out: its particles
-//! relative to their group's centre.
+//! Particles of discs and their life, model.md §2, in f64: written from the page. In: a cloud and a
+//! time. Out: its particles relative to their group's centre.
 
 use glam::DVec3;
 
@@ -11,7 +11,8 @@ use crate::model::philox::{philox4x32_10, uniform};
 /// "disc".
 const STREAM: u32 = u32::from_be_bytes(*b"disc");
 
-/// What a time comes to in a slot: which of its particles lives, and the share of the period since its birth.
+/// What a time comes to in a slot: which of its particles lives, and the share of the period since
+/// its birth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Age {
     pub generation: u32,
@@ -20,7 +21,8 @@ pub struct Age {
 
 /// Of slot `i`: t/L in units of 2⁻³², whole periods apart, with the slot's own phase added.
 pub fn age(period_s: f64, time_s: f64, i: u32) -> Age {
-    // With the remainder from the division itself, which is exact, in integers wide enough for both.
+    // With the remainder from the division itself, which is exact, in integers wide enough for
+    // both.
     let rest = time_s.rem_euclid(period_s);
     let whole = ((time_s - rest) / period_s).round() as i128;
     let ticks = (whole << 32) + (rest / period_s * 2f64.powi(32)).floor() as i128;
@@ -57,7 +59,8 @@ pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> Alive 
     let lifetime = disc.period_s * (1.0 - disc.life_spread * u5);
     let a = (age.share * disc.period_s).min(lifetime);
     let birth = disc.radius * u1.sqrt() * DVec3::new((turn * u2).cos(), 0.0, (turn * u2).sin());
-    let warmth_born = disc.warmth * (1.0 + disc.warmth_spread * (2.0 * u4 - 1.0)) * (1.0 - disc.core * u1);
+    let warmth_born =
+        disc.warmth * (1.0 + disc.warmth_spread * (2.0 * u4 - 1.0)) * (1.0 - disc.core * u1);
     let speed = disc.outflow * u6.sqrt() * DVec3::new((turn * u7).cos(), 0.0, (turn * u7).sin())
         + disc.buoyancy * warmth_born * DVec3::Y;
     let t = disc.cooling_s;
@@ -79,7 +82,16 @@ pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> Alive 
         None => 1.0,
     };
     let kappa = kappa_0 * diluted * faded * condensed;
-    Alive { age, u: [u1, u2, u3, u4, u5, u6, u7], birth, position, sigmas: [born, sigma], warmth, lived, kappa }
+    Alive {
+        age,
+        u: [u1, u2, u3, u4, u5, u6, u7],
+        birth,
+        position,
+        sigmas: [born, sigma],
+        warmth,
+        lived,
+        kappa,
+    }
 }
 
 fn smoothstep(v: f64) -> f64 {
@@ -92,8 +104,8 @@ fn smoothstep(v: f64) -> f64 {
     }
 }
 
-/// All particles of a cloud in the order of its groups, at `time_s`, which is that of discs and of what is moved alone. What cannot be
-/// read has no particles: whoever asks has read it before.
+/// All particles of a cloud in the order of its groups, at `time_s`, which is that of discs and of
+/// what is moved alone. What cannot be read has no particles: whoever asks has read it before.
 pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
     let groups = cloud.groups(0, 0);
     let disc = match &cloud.source {

@@ -1,7 +1,8 @@
-//! The f64 twin of every GPU pass, one room a pass, written from the mathematics (model.md), never from a shader.
+//! The f64 twin of every GPU pass, one room a pass, written from the mathematics (model.md), never
+//! from a shader.
 //!
-//! Each room is plain functions over slices and takes its stage's inputs as arguments, so that a test can feed
-//! it exactly what the GPU had and so measure one stage alone.
+//! Each room is plain functions over slices and takes its stage's inputs as arguments, so that a
+//! test can feed it exactly what the GPU had and so measure one stage alone.
 
 pub mod area;
 pub mod blob;

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 use super::sort;
 
-/// Bits of the region and of each axis in a key of 32 bits: what numbers `n_regions` regions, and a third of the rest,
-/// at most 10.
+/// Bits of the region and of each axis in a key of 32 bits: what numbers `n_regions` regions, and a
+/// third of the rest, at most 10.
 pub fn key_bits(n_regions: u32) -> (u32, u32) {
     let region = (0..32).find(|b| 1u64 << b >= u64::from(n_regions)).unwrap_or(32);
     (region, ((32 - region) / 3).min(10))
@@ -50,8 +50,11 @@ mod tests {
 
     #[test]
     fn bits_are_shared_out() {
-        // By hand: 2 regions 1 bit, 31/3 = 10; 8 regions 3 bits, 29/3 = 9; 5 regions as 8; 2^20 leave 12/3 = 4.
-        for (n, bits) in [(0, (0, 10)), (1, (0, 10)), (2, (1, 10)), (3, (2, 10)), (5, (3, 9)), (8, (3, 9))] {
+        // By hand: 2 regions 1 bit, 31/3 = 10; 8 regions 3 bits, 29/3 = 9; 5 regions as 8; 2^20
+        // leave 12/3 = 4.
+        for (n, bits) in
+            [(0, (0, 10)), (1, (0, 10)), (2, (1, 10)), (3, (2, 10)), (5, (3, 9)), (8, (3, 9))]
+        {
             assert_eq!(key_bits(n), bits, "{n}");
         }
         assert_eq!((key_bits(1 << 20), key_bits(u32::MAX)), ((20, 4), (32, 0)));
@@ -70,14 +73,19 @@ mod tests {
     fn cells_are_cut_to_the_bounds() {
         let bounds = (DVec3::new(-1.0, 2.0, 5.0), DVec3::new(1.0, 6.0, 5.0));
         assert_eq!(coordinates(DVec3::new(0.0, 3.0, 9.0), bounds, 3), [4.0, 2.0, 0.0]);
-        assert_eq!([0.0, 0.99, 7.5, 8.0, 1e30, -1.0, f64::NAN].map(|x| cell(x, 3)), [0, 0, 7, 7, 7, 0, 0]);
+        assert_eq!(
+            [0.0, 0.99, 7.5, 8.0, 1e30, -1.0, f64::NAN].map(|x| cell(x, 3)),
+            [0, 0, 7, 7, 7, 0, 0]
+        );
     }
 
     #[test]
     fn an_order_visits_the_octants_one_after_the_other() {
         let bounds = [(DVec3::ZERO, DVec3::splat(2.0)), (DVec3::ZERO, DVec3::ONE)];
-        let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
-        // The eight octants' corners backwards, then one of the next region that no octant may follow.
+        let corner =
+            |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2));
+        // The eight octants' corners backwards, then one of the next region that no octant may
+        // follow.
         let positions: Vec<DVec3> = (0..8).rev().map(corner).chain([DVec3::ZERO]).collect();
         let regions = [0, 0, 0, 0, 0, 0, 0, 0, 1];
         assert_eq!(order(&positions, &regions, &bounds), [7, 6, 5, 4, 3, 2, 1, 0, 8]);

@@ -1,12 +1,13 @@
-//! Whether a surface's rectangle hides one point from another, or a light from a point: model.md §11 "transmit".
+//! Whether a surface's rectangle hides one point from another, or a light from a point: model.md
+//! §11 "transmit".
 
 use glam::DVec3;
 
 use crate::model::light::Light;
 use crate::model::surface::Surface;
 
-/// A point nearer to a rectangle's plane than this share of its distance (the sum of the offset's components) from the
-/// centre lies in it: 16 roundings of f32, in which such a point is given.
+/// A point nearer to a rectangle's plane than this share of its distance (the sum of the offset's
+/// components) from the centre lies in it: 16 roundings of f32, in which such a point is given.
 pub const IN_PLANE: f64 = 1.0 / 1_048_576.0;
 
 /// A surface's rectangle, relative to the lighting origin.
@@ -34,7 +35,8 @@ impl Rectangle {
         if e.abs() > IN_PLANE * o.abs().element_sum() { e } else { 0.0 }
     }
 
-    /// Whether it lies between `p` and `q`, from whichever side. What lies in its plane is not hidden.
+    /// Whether it lies between `p` and `q`, from whichever side. What lies in its plane is not
+    /// hidden.
     pub fn hides(&self, p: DVec3, q: DVec3) -> bool {
         let (a, b) = (self.side(p), self.side(q));
         a * b.signum() < 0.0 && b != 0.0 && self.holds(p + (q - p) * (a / (a - b)))
@@ -49,7 +51,8 @@ impl Rectangle {
     /// Whether `x`, a point of its plane, is within its edges.
     fn holds(&self, x: DVec3) -> bool {
         let o = x - self.center;
-        o.dot(self.u).abs() <= self.u.length_squared() && o.dot(self.v).abs() <= self.v.length_squared()
+        o.dot(self.u).abs() <= self.u.length_squared()
+            && o.dot(self.v).abs() <= self.v.length_squared()
     }
 }
 
@@ -86,7 +89,10 @@ mod tests {
         // Both above; ending below; past the edge at x = 3, of which the edge itself still hides.
         assert!(!t.hides(above + DVec3::Y, above) && !t.hides(below, DVec3::new(2.0, 1.9, 3.0)));
         let under = |x: f64| DVec3::new(x, 1.0, 3.0);
-        assert!(t.hides(under(3.0), under(3.0) + 2.0 * DVec3::Y) && t.hides(under(2.0), DVec3::new(4.0, 3.0, 4.0)));
+        assert!(
+            t.hides(under(3.0), under(3.0) + 2.0 * DVec3::Y)
+                && t.hides(under(2.0), DVec3::new(4.0, 3.0, 4.0))
+        );
         assert!(!t.hides(under(3.0 + 1e-9), under(3.0 + 1e-9) + 2.0 * DVec3::Y));
     }
 
@@ -94,9 +100,16 @@ mod tests {
     fn a_table_shades_what_the_light_passes_through_it_to() {
         let t = table();
         let below = DVec3::new(1.0, -5.0, 3.0);
-        assert!(t.shades(below, DVec3::Y) && !t.shades(below, DVec3::NEG_Y) && !t.shades(below, DVec3::X));
+        assert!(
+            t.shades(below, DVec3::Y)
+                && !t.shades(below, DVec3::NEG_Y)
+                && !t.shades(below, DVec3::X)
+        );
         // 7 up and 2 aside is the edge, in exact numbers.
-        assert!(t.shades(below, DVec3::new(2.0, 7.0, 0.0)) && !t.shades(below, DVec3::new(2.0, 6.9, 0.0)));
+        assert!(
+            t.shades(below, DVec3::new(2.0, 7.0, 0.0))
+                && !t.shades(below, DVec3::new(2.0, 6.9, 0.0))
+        );
         assert!(t.shades(below + 10.0 * DVec3::Y, DVec3::NEG_Y));
     }
 
@@ -115,11 +128,17 @@ mod tests {
 
     #[test]
     fn the_facet_s_own_rectangle_does_not_count() {
-        let lamp = Light::Point { position: DVec3::new(1.0, 9.0, 3.0), intensity: DVec3::ONE, radius: 1e-3 };
+        let lamp = Light::Point {
+            position: DVec3::new(1.0, 9.0, 3.0),
+            intensity: DVec3::ONE,
+            radius: 1e-3,
+        };
         let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
         let below = DVec3::new(1.0, 0.0, 3.0);
         for light in [lamp, sky] {
-            assert!(!is_clear(&[table()], 1, below, &light) && is_clear(&[table()], 0, below, &light));
+            assert!(
+                !is_clear(&[table()], 1, below, &light) && is_clear(&[table()], 0, below, &light)
+            );
             assert!(is_clear(&[], 0, below, &light));
         }
     }

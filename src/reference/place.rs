@@ -1,5 +1,5 @@
-//! From group-relative positions to positions relative to the lighting origin O: model.md §11 "Frames of
-//! reference", §12, §13. All in f64; the GPU rounds the offset once and the sum once.
+//! From group-relative positions to positions relative to the lighting origin O: model.md §11
+//! "Frames of reference", §12, §13. All in f64; the GPU rounds the offset once and the sum once.
 
 use glam::DVec3;
 
@@ -23,9 +23,18 @@ fn grown_centers(groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<DVec3> 
 }
 
 /// What is relative to the groups, as the clouds have grown: positions and σ times s.
-pub fn grown(generated: &[Generated], groups: &[Group], clouds: &[Cloud], time_s: f64) -> Vec<Generated> {
+pub fn grown(
+    generated: &[Generated],
+    groups: &[Group],
+    clouds: &[Cloud],
+    time_s: f64,
+) -> Vec<Generated> {
     let scales = by_particle(groups, |g| scale(&clouds[g.i_cloud], time_s));
-    let of = |(g, s): (&Generated, f64)| Generated { position: s * g.position, sigma: s * g.sigma, ..*g };
+    let of = |(g, s): (&Generated, f64)| Generated {
+        position: s * g.position,
+        sigma: s * g.sigma,
+        ..*g
+    };
     generated.iter().zip(scales).map(of).collect()
 }
 
@@ -41,15 +50,21 @@ fn by_particle<T: Clone>(groups: &[Group], of: impl Fn(&Group) -> T) -> impl Ite
 /// Offset of every group's particles: cloud origin(t) + group centre, as it has grown, − O.
 pub fn offsets(groups: &[Group], clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
     let centers = grown_centers(groups, clouds, time_s);
-    groups.iter().zip(centers).map(|(g, center)| clouds[g.i_cloud].origin_at(time_s) + center - origin).collect()
+    groups
+        .iter()
+        .zip(centers)
+        .map(|(g, center)| clouds[g.i_cloud].origin_at(time_s) + center - origin)
+        .collect()
 }
 
-/// Centre of every cloud relative to O at `time_s`: what the facets' fallback normal points away from.
+/// Centre of every cloud relative to O at `time_s`: what the facets' fallback normal points away
+/// from.
 pub fn cloud_centers(clouds: &[Cloud], time_s: f64, origin: DVec3) -> Vec<DVec3> {
     clouds.iter().map(|c| c.origin_at(time_s) + c.facing_from() - origin).collect()
 }
 
-/// Placed positions (of grown ones): particle k of group g at positions[g.i_first + k] + offsets[g].
+/// Placed positions (of grown ones): particle k of group g at positions[g.i_first + k] +
+/// offsets[g].
 pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DVec3> {
     let mut placed = positions.to_vec();
     for (group, offset) in groups.iter().zip(offsets) {
@@ -61,9 +76,16 @@ pub fn place(positions: &[DVec3], groups: &[Group], offsets: &[DVec3]) -> Vec<DV
     placed
 }
 
-/// Adds the gusts of model.md §12 to placed positions: d(x, t) = Σ a sin(k·x + ω t + φ), x the particle at rest relative
-/// to its cloud's origin, as the cloud has grown. `rest` are the group-relative positions, grown.
-pub fn add_gusts(placed: &mut [DVec3], rest: &[DVec3], groups: &[Group], clouds: &[Cloud], time_s: f64) {
+/// Adds the gusts of model.md §12 to placed positions: d(x, t) = Σ a sin(k·x + ω t + φ), x the
+/// particle at rest relative to its cloud's origin, as the cloud has grown. `rest` are the
+/// group-relative positions, grown.
+pub fn add_gusts(
+    placed: &mut [DVec3],
+    rest: &[DVec3],
+    groups: &[Group],
+    clouds: &[Cloud],
+    time_s: f64,
+) {
     for (group, center) in groups.iter().zip(grown_centers(groups, clouds, time_s)) {
         let cloud = &clouds[group.i_cloud];
         let modes = cloud.gust.modes(cloud.seed);
@@ -77,9 +99,9 @@ pub fn add_gusts(placed: &mut [DVec3], rest: &[DVec3], groups: &[Group], clouds:
     }
 }
 
-/// Bound, axis by axis, on |f32 − f64| of a placed position: the position's own error, the offset rounded to f32
-/// once (u|offset|), and the sum rounded once. That last rounding is of the *computed* sum, which lies within the two
-/// first errors of `placed`.
+/// Bound, axis by axis, on |f32 − f64| of a placed position: the position's own error, the offset
+/// rounded to f32 once (u|offset|), and the sum rounded once. That last rounding is of the
+/// *computed* sum, which lies within the two first errors of `placed`.
 pub fn placed_bound(position_bound: DVec3, offset: DVec3, placed: DVec3, u: f64) -> DVec3 {
     let inherited = position_bound + u * offset.abs();
     inherited + u * (placed.abs() + inherited)
@@ -109,7 +131,13 @@ mod tests {
 
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
-        let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 1.0, kappa: 1.0, color: DVec3::ONE };
+        let particle = |x| Particle {
+            aspect: 1.0,
+            position: DVec3::X * x,
+            sigma: 1.0,
+            kappa: 1.0,
+            color: DVec3::ONE,
+        };
         let cloud = |list, y, wind| Cloud {
             facing: crate::model::cloud::Facing::Outward,
             source: CloudSource::Particles(list),
@@ -121,15 +149,22 @@ mod tests {
             i_material: 0,
             seed: 0,
         };
-        let clouds =
-            [cloud(vec![particle(2.0), particle(6.0)], 1.0, DVec3::Z), cloud(vec![particle(1e9)], 0.0, DVec3::ZERO)];
-        let groups: Vec<Group> =
-            clouds.iter().zip([0, 2]).enumerate().flat_map(|(i, (c, first))| c.groups(i, first)).collect();
+        let clouds = [
+            cloud(vec![particle(2.0), particle(6.0)], 1.0, DVec3::Z),
+            cloud(vec![particle(1e9)], 0.0, DVec3::ZERO),
+        ];
+        let groups: Vec<Group> = clouds
+            .iter()
+            .zip([0, 2])
+            .enumerate()
+            .flat_map(|(i, (c, first))| c.groups(i, first))
+            .collect();
         let origin = DVec3::new(1.0, 1.0, 1.0);
         let offsets = offsets(&groups, &clouds, 10.0, origin);
         // Bounds of the first list: x from 2 to 6, centre 4; 10 s of wind along z.
         assert_eq!(offsets, [DVec3::new(3.0, 0.0, 9.0), DVec3::new(1e9 - 1.0, -1.0, -1.0)]);
-        let generated: Vec<Generated> = clouds.iter().flat_map(super::super::generate::cloud).collect();
+        let generated: Vec<Generated> =
+            clouds.iter().flat_map(super::super::generate::cloud).collect();
         let relative: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
         assert_eq!(relative, [DVec3::X * -2.0, DVec3::X * 2.0, DVec3::ZERO]);
         let placed = place(&relative, &groups, &offsets);
@@ -139,12 +174,21 @@ mod tests {
         let bound = placed_bound(DVec3::ONE, DVec3::splat(-4.0), DVec3::splat(10.0), 0.125);
         assert_eq!(bound, DVec3::splat(1.5 + 11.5 / 8.0));
         assert_eq!(cloud_centers(&clouds, 10.0, origin)[0], offsets[0]);
-        assert_eq!(blobs(&generated, &placed)[1], Blob { aspect: 1.0, position: placed[1], sigma: 1.0, kappa: 1.0 });
+        assert_eq!(
+            blobs(&generated, &placed)[1],
+            Blob { aspect: 1.0, position: placed[1], sigma: 1.0, kappa: 1.0 }
+        );
     }
 
     #[test]
     fn a_cloud_grows_about_its_own_centre() {
-        let particle = |x| Particle { aspect: 1.0, position: DVec3::X * x, sigma: 0.5, kappa: 1.0, color: DVec3::ONE };
+        let particle = |x| Particle {
+            aspect: 1.0,
+            position: DVec3::X * x,
+            sigma: 0.5,
+            kappa: 1.0,
+            color: DVec3::ONE,
+        };
         let cloud = Cloud {
             facing: crate::model::cloud::Facing::Outward,
             source: CloudSource::Particles(vec![particle(0.0), particle(0.0), particle(6.0)]),
@@ -157,7 +201,8 @@ mod tests {
             seed: 0,
         };
         let (groups, clouds) = (cloud.groups(0, 0), [cloud.clone()]);
-        // After 1 s half the way from 1 to 3 is grown; about x = 2 the list lies from −2 to 10 then.
+        // After 1 s half the way from 1 to 3 is grown; about x = 2 the list lies from −2 to 10
+        // then.
         assert!((scale(&cloud, 1.0) - 2.0).abs() < 1e-15 && scale(&cloud, -1.0) == 1.0);
         let given = super::super::generate::cloud(&cloud);
         let grown = grown(&given, &groups, &clouds, 1.0);

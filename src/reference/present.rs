@@ -1,6 +1,6 @@
-//! A picture as a display shows it, model.md §11 "present". In: premultiplied linear RGBA. Out: sRGB code values before
-//! they are rounded down: 255 times what `Film::display` gives, plus the dither. Of two pictures: either, a line
-//! between them, or how far they are apart.
+//! A picture as a display shows it, model.md §11 "present". In: premultiplied linear RGBA. Out:
+//! sRGB code values before they are rounded down: 255 times what `Film::display` gives, plus the
+//! dither. Of two pictures: either, a line between them, or how far they are apart.
 
 use std::cmp::Ordering;
 
@@ -25,7 +25,13 @@ pub fn code_values(film: &Film, x: usize, y: usize, pixel: DVec4) -> DVec3 {
 }
 
 /// Of the two pixels `[a, b]` in column `x` and row `y`, `compared`; A alone where nothing is.
-pub fn compared_values(film: &Film, compared: Option<Compared>, x: usize, y: usize, [a, b]: [DVec4; 2]) -> DVec3 {
+pub fn compared_values(
+    film: &Film,
+    compared: Option<Compared>,
+    x: usize,
+    y: usize,
+    [a, b]: [DVec4; 2],
+) -> DVec3 {
     match compared {
         None => code_values(film, x, y, a),
         Some(Compared::Second) => code_values(film, x, y, b),
@@ -60,8 +66,8 @@ mod tests {
             exposure: 2.0,
             tone_map: ToneMap::Clip,
         };
-        // 2 (0.05 + 0.1 · 0.5) = 0.2: sRGB 1.055 · 0.2^{1/2.4} − 0.055 = 0.484529; 123.555; the first threshold is
-        // 1/128.
+        // 2 (0.05 + 0.1 · 0.5) = 0.2: sRGB 1.055 · 0.2^{1/2.4} − 0.055 = 0.484529; 123.555; the
+        // first threshold is 1/128.
         let value = code_values(&film, 0, 0, DVec4::new(0.05, 0.05, 0.05, 0.9));
         assert!((value - DVec3::splat(123.5549 + 0.0078)).length() < 1e-3, "{value}");
         // Black under nothing, and what is too bright.
@@ -81,7 +87,8 @@ mod tests {
         };
         let (a, b) = (DVec4::new(0.05, 0.05, 0.05, 0.9), DVec4::new(0.02, 0.3, 0.05, 0.8));
         let value = |compared, x, y| compared_values(&film, compared, x, y, [a, b]);
-        // Over the background 0.10 and (0.12, 0.4, 0.15); twice, and times 2: 0.08, 1.2 (cut at 1), 0.2.
+        // Over the background 0.10 and (0.12, 0.4, 0.15); twice, and times 2: 0.08, 1.2 (cut at 1),
+        // 0.2.
         let far = value(Some(Compared::Difference(2.0)), 0, 0);
         // sRGB of 0.08: 1.055 · 0.08^{1/2.4} − 0.055 = 0.313304, of 0.2: 0.484529.
         let expected = DVec3::new(79.8926, 255.0, 123.5549) + DVec3::splat(0.5 / 64.0);

@@ -1,10 +1,11 @@
-//! What an f32 evaluation of P (1)–(11) may differ from the f64 one: a running error analysis, each particle at
-//! its own values. The assumptions on the f32 side, which the shader must keep:
-//! +, −, × are correctly rounded (unit round-off u = 2⁻²⁴; a fused multiply-add only rounds less), multiplying
-//! by a power of two is exact, constants and extents are rounded to f32 once, the uniforms are exact (24 bits),
-//! and a sine's absolute error is at most [`SINE_ERROR`] at an argument that reduction has moved by at most
-//! [`REDUCTION_ERROR`]·u·|argument|. A division errs by at most [`DIVISION_ERROR`]·u. Underflow is left out:
-//! what is divided is only floored, so it costs less than 2⁻¹²⁰.
+//! What an f32 evaluation of P (1)–(11) may differ from the f64 one: a running error analysis, each
+//! particle at its own values. The assumptions on the f32 side, which the shader must keep: +, −, ×
+//! are correctly rounded (unit round-off u = 2⁻²⁴; a fused multiply-add only rounds less),
+//! multiplying by a power of two is exact, constants and extents are rounded to f32 once, the
+//! uniforms are exact (24 bits), and a sine's absolute error is at most [`SINE_ERROR`] at an
+//! argument that reduction has moved by at most [`REDUCTION_ERROR`]·u·|argument|. A division errs
+//! by at most [`DIVISION_ERROR`]·u. Underflow is left out: what is divided is only floored, so it
+//! costs less than 2⁻¹²⁰.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -30,11 +31,13 @@ pub const REDUCTION_ERROR: f64 = 2.0;
 pub const DIVISION_ERROR: f64 = 5.0;
 
 /// |formula − erf| of Abramowitz and Stegun 7.1.28, and on top of it what f32 makes of the formula at `x`: a running
-/// bound over Horner's scheme, four squarings (which double a relative error), a division of 2.5 ulp = 5 u, and a
+/// bound over Horner's scheme, four squarings (which double a relative error), a division of 2.5
+/// ulp = 5 u, and a
 /// subtraction.
 pub fn erf_bound(x: f64) -> f64 {
     const FORMULA: f64 = 3e-7;
-    const COEFFICIENTS: [f64; 6] = [0.0705230784, 0.0422820123, 0.0092705272, 0.0001520143, 0.0002765672, 0.0000430638];
+    const COEFFICIENTS: [f64; 6] =
+        [0.0705230784, 0.0422820123, 0.0092705272, 0.0001520143, 0.0002765672, 0.0000430638];
     let (u, a) = (U_F32, x.abs());
     let (mut s, mut error) = (0.0, 0.0);
     for c in COEFFICIENTS.into_iter().rev() {
@@ -71,8 +74,8 @@ impl Rounded {
         Rounded { value, error: u * value.abs() }
     }
 
-    /// An operation's result `value`, its inputs' errors giving `inherited`: the rounding is of the *computed*
-    /// number, whose magnitude is at most |value| + inherited.
+    /// An operation's result `value`, its inputs' errors giving `inherited`: the rounding is of the
+    /// *computed* number, whose magnitude is at most |value| + inherited.
     fn operation(value: f64, inherited: f64, u: f64) -> Rounded {
         Rounded { value, error: inherited + u * (value.abs() + inherited) }
     }
@@ -83,7 +86,8 @@ impl Rounded {
 
     /// |ab − a'b'| ≤ |a|δb + |b|δa + δaδb.
     fn times(self, b: Rounded, u: f64) -> Rounded {
-        let inherited = self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
+        let inherited =
+            self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
         Rounded::operation(self.value * b.value, inherited, u)
     }
 
@@ -101,11 +105,11 @@ impl Rounded {
     }
 }
 
-/// Bound, axis by axis, on |f32 − f64| of the offset P (1)–(7) that the uniforms `u123` propose; `u` is the
-/// unit round-off ([`U_F32`]).
+/// Bound, axis by axis, on |f32 − f64| of the offset P (1)–(7) that the uniforms `u123` propose;
+/// `u` is the unit round-off ([`U_F32`]).
 pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec3 {
-    // P (1)–(3). 2u₁ − 1 is a multiple of 2⁻²³ in [−1, 1): exact. L carries its own rounding, the product one
-    // more: δX = 2u|X|.
+    // P (1)–(3). 2u₁ − 1 is a multiple of 2⁻²³ in [−1, 1): exact. L carries its own rounding, the
+    // product one more: δX = 2u|X|.
     let spread = |v: f64, length: f64| {
         let share = match form {
             Form::Printed => v,
@@ -113,13 +117,14 @@ pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec
         };
         Rounded::exact(share).times(Rounded::once(length, u), u)
     };
-    let (x, y, z) = (spread(u123[0], extent.x), spread(u123[1], extent.y), spread(u123[2], extent.z));
+    let (x, y, z) =
+        (spread(u123[0], extent.x), spread(u123[1], extent.y), spread(u123[2], extent.z));
     let (pi, half_pi) = (Rounded::once(PI, u), Rounded::once(FRAC_PI_2, u));
     // P (4): δP = π/2 δsin + 2u|P|, δsin = |cos(Y/2)|(δY/2 + 2u|Y/2|) + SINE_ERROR.
     let phase = |v: Rounded| half_pi.times(v.halved().sine(u), u);
     let (p_x, p_y, p_z) = (phase(y), phase(x), phase(z));
-    // P (5): the argument t = P_x Z/2 has δt = |Z/2|δP_x + |P_x/2|δZ + u|t|, and P_x' = P_x + π sin t has
-    // δP_x' = δP_x + πδsin t + 2u|π sin t| + u|P_x'|. The second line starts from δP_x'.
+    // P (5): the argument t = P_x Z/2 has δt = |Z/2|δP_x + |P_x/2|δZ + u|t|, and P_x' = P_x + π sin
+    // t has δP_x' = δP_x + πδsin t + 2u|π sin t| + u|P_x'|. The second line starts from δP_x'.
     let swirl = |p: Rounded| pi.times(p.times(z, u).halved().sine(u), u);
     let p_x = p_x.plus(swirl(p_x), u);
     let p_y = p_y.plus(swirl(p_x), u);
@@ -131,7 +136,8 @@ pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec
     }
 }
 
-/// Bound on |f32 − f64| of the radius P (8)–(11) at `u4`; the factor of the centred form is rounded to f32 once.
+/// Bound on |f32 − f64| of the radius P (8)–(11) at `u4`; the factor of the centred form is rounded
+/// to f32 once.
 pub fn radius_bound(form: Form, radius_max: f64, u4: f64, u: f64) -> f64 {
     // δR = 2u|R| as for X above; R' = R + π/2 sin R; factor·R'.
     let r = Rounded::exact(u4).times(Rounded::once(radius_max, u), u);
@@ -150,11 +156,12 @@ pub fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
         return 0.0;
     }
     let k = ((v + half) / (4.0 * half)).floor().abs();
-    // The result is v − 4kh or 2h − v + 4kh, so it inherits δv and (2 + 4k)δh, δh = uh. Roundings: a; the product
-    // 4hk; the difference, below 4h; the last one, below 2h.
+    // The result is v − 4kh or 2h − v + 4kh, so it inherits δv and (2 + 4k)δh, δh = uh. Roundings:
+    // a; the product 4hk; the difference, below 4h; the last one, below 2h.
     let roundings = (v.abs() + half) + 4.0 * half * k + 4.0 * half + 2.0 * half;
-    // A quotient off by DIVISION_ERROR errs in its floor only that near to a multiple of 4h. There w leaves [0, 4h) by
-    // as much, the result is cut to the face, and the true one lies as far inside.
+    // A quotient off by DIVISION_ERROR errs in its floor only that near to a multiple of 4h. There
+    // w leaves [0, 4h) by as much, the result is cut to the face, and the true one lies as far
+    // inside.
     let roundings = roundings + DIVISION_ERROR * (k + 1.0) * 4.0 * half;
     // The computed a and k may lie one error further out: (1 + 4u) on every term covers it.
     (error + u * ((2.0 + 4.0 * k) * half + roundings)) * (1.0 + 4.0 * u)
@@ -166,13 +173,20 @@ pub struct ParticleBound {
     pub position: DVec3,
     /// Of the radius before `radius_scale`.
     pub radius: f64,
-    /// Whether the f32 evaluation must accept and reject the very attempts that the f64 one does. Where it is
-    /// false the attempts may differ, and position and radius then bound nothing.
+    /// Whether the f32 evaluation must accept and reject the very attempts that the f64 one does.
+    /// Where it is false the attempts may differ, and position and radius then bound nothing.
     pub decided: bool,
 }
 
 /// The bounds of particle `i_particle` as `generate::generate_particle` makes it.
-pub fn particle_bound(b: &CloudBox, i_box: u32, seed: u32, form: Form, i_particle: u32, u: f64) -> ParticleBound {
+pub fn particle_bound(
+    b: &CloudBox,
+    i_box: u32,
+    seed: u32,
+    form: Form,
+    i_particle: u32,
+    u: f64,
+) -> ParticleBound {
     let half = 0.5 * b.extent;
     let mut decided = true;
     for attempt in 0..MAX_ATTEMPTS {
@@ -190,23 +204,29 @@ pub fn particle_bound(b: &CloudBox, i_box: u32, seed: u32, form: Form, i_particl
         decided &= !is_inside(v.abs() - reach, half);
         if attempt + 1 == MAX_ATTEMPTS {
             let fold = |i: usize| fold_bound(v[i], half[i], error[i], u);
-            return ParticleBound { position: DVec3::new(fold(0), fold(1), fold(2)), radius, decided };
+            return ParticleBound {
+                position: DVec3::new(fold(0), fold(1), fold(2)),
+                radius,
+                decided,
+            };
         }
     }
     unreachable!("MAX_ATTEMPTS is not 0")
 }
 
-/// Terms of a block of a pairwise sum, and partial sums of its counter, of which the last takes all beyond.
+/// Terms of a block of a pairwise sum, and partial sums of its counter, of which the last takes all
+/// beyond.
 const BLOCK: u64 = 8;
 const LAST_PART: u32 = 11;
 
-/// Bound on what a sum of `n` f32 numbers, formed as `sums` says and rounded to f32, may be off by, as a share of the sum of
-/// their magnitudes (model.md §11 "sums").
+/// Bound on what a sum of `n` f32 numbers, formed as `sums` says and rounded to f32, may be off by,
+/// as a share of the sum of their magnitudes (model.md §11 "sums").
 pub fn sum_error(sums: Sums, n: u64) -> f64 {
     let of = |u: f64| match sums.summation {
         Summation::Plain => roundings(n.saturating_sub(1), u),
         Summation::Kahan => {
-            // y_k = (x_k + c_{k-1})(1 + η_k), and s_k + c_k = s_{k-1} + y_k exactly. With |c_k| ≤ uM, M the greatest
+            // y_k = (x_k + c_{k-1})(1 + η_k), and s_k + c_k = s_{k-1} + y_k exactly. With |c_k| ≤
+            // uM, M the greatest
             // |s_k + c_k|: M ≤ (1 + u) S + n u² M, and s_n is off by |c_n| + Σ|η_k|(|x_k| + |c_{k-1}|) ≤ uM + uS + n u² M.
             let lost = n as f64 * u * u;
             u + (u + lost) * (1.0 + u) / (1.0 - lost)
@@ -228,8 +248,8 @@ fn roundings(n: u64, u: f64) -> f64 {
 
 /// Additions that round and that a term of a pairwise sum passes, at most.
 fn pairwise_depth(n: u64) -> u64 {
-    // A block's first term is added to nothing. Then as many as the number of blocks has bits: k to get into part k, and the
-    // others when all parts are added up, the least first.
+    // A block's first term is added to nothing. Then as many as the number of blocks has bits: k to
+    // get into part k, and the others when all parts are added up, the least first.
     let n_blocks = n / BLOCK;
     let n_last = n_blocks >> LAST_PART;
     let n_bits = u64::from(u64::BITS - n_blocks.leading_zeros());
@@ -252,7 +272,10 @@ mod tests {
         assert!((of(Summation::Kahan, Precision::F32, 4096) - 2.0).abs() < 1e-3);
         // 512 blocks: a number of 10 bits.
         assert!((of(Summation::Pairwise, Precision::F32, 4096) - 17.0).abs() < 1e-3);
-        assert_eq!([3, 8, 16, 4096, 8 * 2047, 8 * 2048, 8 * 6000].map(pairwise_depth), [2, 7, 9, 17, 18, 19, 20]);
+        assert_eq!(
+            [3, 8, 16, 4096, 8 * 2047, 8 * 2048, 8 * 6000].map(pairwise_depth),
+            [2, 7, 9, 17, 18, 19, 20]
+        );
         for summation in [Summation::Plain, Summation::Kahan, Summation::Pairwise] {
             assert!((of(summation, Precision::F64, 4096) - 1.0).abs() < 1e-4);
         }

@@ -1,6 +1,7 @@
-//! The second reflection, C (16), from every pair of facets: model.md §7 and §11 "second". In: facets, regions, lights and
-//! their transmittances, the density grid, all relative to O. Out, a receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye,
-//! RGB, and what an f32 evaluation of the same may differ.
+//! The second reflection, C (16), from every pair of facets: model.md §7 and §11 "second". In:
+//! facets, regions, lights and their transmittances, the density grid, all relative to O. Out, a
+//! receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye, RGB, and what an f32 evaluation of the
+//! same may differ.
 
 mod closely;
 mod doubt;
@@ -36,13 +37,14 @@ use crate::model::scene::Pairs;
 
 /// Lobes are met within this many of their widths.
 const LOBE_REACH: f64 = 4.0;
-/// Widths of a lobe, times pair_size, that a facet may be wide; and a cell, which meets lobes in its quarters.
+/// Widths of a lobe, times pair_size, that a facet may be wide; and a cell, which meets lobes in
+/// its quarters.
 const LOBE_STEP: f64 = 3.0;
 const CELL_STEP: f64 = 4.5;
 /// Of a width over its distance, what the half vector turns from centre to corner.
 const TURN: f64 = 0.75;
-/// Facets that a shadow's rim runs through are looked at closely where wider than this share of pair_size; where both the
-/// receiver's view and a light's is torn, than this.
+/// Facets that a shadow's rim runs through are looked at closely where wider than this share of
+/// pair_size; where both the receiver's view and a light's is torn, than this.
 const RIM: f64 = 0.25;
 const BOTH_RIMS: f64 = 0.125;
 /// Wider facets are discs.
@@ -54,8 +56,8 @@ const ROUNDINGS: f64 = 16.0;
 /// Nearer a place's rounding turns the way anywhere.
 const LEAST_DISTANCE: f64 = 1e-12;
 
-/// Of an optical depth: samples of a density that may double within a cell, at places off by their rounding in cells, and
-/// deposited in f32's rounding by some hundreds of blobs.
+/// Of an optical depth: samples of a density that may double within a cell, at places off by their
+/// rounding in cells, and deposited in f32's rounding by some hundreds of blobs.
 const MARCH: f64 = 256.0;
 
 /// Facets of one material: a surface with its rectangle, or a cloud.
@@ -75,7 +77,8 @@ pub struct Facet {
     pub color: DVec3,
 }
 
-/// All that a gather needs. `transmittance`: of the lights, [facet × light]; `through`: what clouds alone leave.
+/// All that a gather needs. `transmittance`: of the lights, [facet × light]; `through`: what clouds
+/// alone leave.
 pub struct Exchange<'a> {
     pub facets: &'a [Facet],
     pub regions: &'a [Region],
@@ -89,7 +92,8 @@ pub struct Exchange<'a> {
     pub step: f64,
     pub pairs: Pairs,
     pub eye: DVec3,
-    /// Which surfaces send light to which, and which may stand between them: no others hide one from the other.
+    /// Which surfaces send light to which, and which may stand between them: no others hide one
+    /// from the other.
     pub pairings: &'a [Vec<Pairing>],
     /// The greatest coordinate, whose rounding positions have.
     pub reach: f64,
@@ -106,7 +110,9 @@ struct View<'a> {
 impl Exchange<'_> {
     /// I_i and L2 of facet `j` from `senders`.
     pub fn gather(&self, j: usize, senders: &[Sender]) -> Gathered {
-        let of_region = |e: usize| (0..self.facets.len()).filter(move |&i| i != j && self.facets[i].i_region == e);
+        let of_region = |e: usize| {
+            (0..self.facets.len()).filter(move |&i| i != j && self.facets[i].i_region == e)
+        };
         self.received(j, senders, |view, e| of_region(e).map(|i| view.of_facet(i)).collect())
     }
 
@@ -121,14 +127,17 @@ impl Exchange<'_> {
         let before = (0..self.regions.len()).map(|e| self.before(receiver, e)).collect();
         let view = View { exchange: self, receiver, before, senders };
         let from = |e: &usize| self.is_pair(receiver.i_region, *e);
-        let of = |e: usize| Gathered::by(self.is_hidden(receiver, e), Gathered::default, || gathered(&view, e));
+        let of = |e: usize| {
+            Gathered::by(self.is_hidden(receiver, e), Gathered::default, || gathered(&view, e))
+        };
         let mut sum: Gathered = (0..self.regions.len()).filter(from).map(of).collect();
         let region = &self.regions[receiver.i_region];
         let albedo = region.brdf.kd * receiver.color * FRAC_1_PI;
         let front = (self.eye - receiver.position).dot(receiver.normal) > 0.0;
         let ks = if front { region.brdf.ks } else { DVec3::ZERO };
         sum.second = albedo * sum.indirect + ks * sum.glossy;
-        // Their sums pass as many roundings as there are terms: a hundredth of the bound already in `error` at most.
+        // Their sums pass as many roundings as there are terms: a hundredth of the bound already in
+        // `error` at most.
         sum.indirect_error = sum.error[0];
         sum.second_error = albedo * sum.error[0] + ks * sum.error[1];
         sum
@@ -147,7 +156,8 @@ impl Exchange<'_> {
     /// Rectangles but those of two regions.
     fn others(&self, a: usize, b: usize) -> impl Iterator<Item = (usize, &Rectangle)> {
         let all = self.regions.iter().enumerate();
-        all.filter(move |(k, _)| *k != a && *k != b).filter_map(|(k, r)| Some((k, r.rectangle.as_ref()?)))
+        all.filter(move |(k, _)| *k != a && *k != b)
+            .filter_map(|(k, r)| Some((k, r.rectangle.as_ref()?)))
     }
 
     /// The rectangles that may hide some of region `e` from `receiver`, of a cloud all.
@@ -167,7 +177,8 @@ impl Exchange<'_> {
         let occluders = self.pairing(receiver.i_region, e).map_or(&[][..], |p| &p.occluders);
         let rectangle = |k: usize| self.regions[k].rectangle.as_ref();
         let all = occluders.iter().filter_map(|k| rectangle(*k).zip(rectangle(e)));
-        all.map(|(r, e)| hides_all(r, e, receiver.position, self.slack())).fold(Decision::NO, Decision::or)
+        all.map(|(r, e)| hides_all(r, e, receiver.position, self.slack()))
+            .fold(Decision::NO, Decision::or)
     }
 
     /// What the distance of a place from a plane is known to.
@@ -196,18 +207,23 @@ impl Exchange<'_> {
         Ball { at: self.facets[i].position, radius, slack: self.slack() }
     }
 
-    /// e^{−(1−g)τ} between two points, of which `q` is off by `moved`: equal steps over what lies in the grid's box.
+    /// e^{−(1−g)τ} between two points, of which `q` is off by `moved`: equal steps over what lies
+    /// in the grid's box.
     fn through(&self, p: DVec3, q: DVec3, moved: f64) -> Known {
         let d = q - p;
-        let Some((enter, leave)) = crossing(self.spec, p, d, 1.0).filter(|_| self.forward < 1.0) else {
+        let Some((enter, leave)) = crossing(self.spec, p, d, 1.0).filter(|_| self.forward < 1.0)
+        else {
             return Known::ONE;
         };
         let length = (leave - enter) * d.length();
         let turn = self.turn(d.length());
-        let off =
-            MARCH * turn + 2.0 * moved * (1.0 / self.spec.edges().min_element() + 1.0 / d.length().max(LEAST_DISTANCE));
+        let off = MARCH * turn
+            + 2.0
+                * moved
+                * (1.0 / self.spec.edges().min_element() + 1.0 / d.length().max(LEAST_DISTANCE));
         let by = |n: u32| {
-            let at = |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
+            let at =
+                |k: u32| p + d * (enter + (leave - enter) * (f64::from(k) + 0.5) / f64::from(n));
             let sum: f64 = (0..n).map(|k| sample(self.spec, self.cells, at(k))).sum();
             let depth = (1.0 - self.forward) * sum * length / f64::from(n);
             Known { value: (-depth).exp(), error: (-depth).exp() * depth * off }
@@ -216,7 +232,8 @@ impl Exchange<'_> {
         let step = self.step / self.spec.cells_along(d.normalize_or(DVec3::X));
         let steps = |length: f64| ((length / step).ceil() as u32).clamp(1, self.pairs.steps);
         let (n, slack) = (steps(length), self.slack() + moved + length * ROUNDINGS * U);
-        let others = [steps(length - slack), steps(length + slack)].into_iter().filter(|other| *other != n);
+        let others =
+            [steps(length - slack), steps(length + slack)].into_iter().filter(|other| *other != n);
         others.fold(by(n), |known, other| known.or(by(other)))
     }
 }
@@ -227,30 +244,45 @@ impl View<'_> {
         let o = q - self.receiver.position;
         let n_i = self.exchange.facets[i].normal;
         let turn = self.exchange.turn(o.length());
-        Way { n_j: self.receiver.normal, n_i, way: o.normalize_or_zero(), d2: o.length_squared(), turn }
+        Way {
+            n_j: self.receiver.normal,
+            n_i,
+            way: o.normalize_or_zero(),
+            d2: o.length_squared(),
+            turn,
+        }
     }
 
     /// What facet `i` sends, as a whole or by its cells.
     fn of_facet(&self, i: usize) -> Gathered {
         let (x, q) = (self.exchange, self.exchange.facets[i].position);
         let way = self.way(i, q);
-        let Some((u, v)) = x.axes(i) else { return self.whole(i, &way, way.disc_form(x.facets[i].area)) };
+        let Some((u, v)) = x.axes(i) else {
+            return self.whole(i, &way, way.disc_form(x.facets[i].area));
+        };
         let side = 2.0 * u.length().max(v.length());
         let b = side / way.d2.sqrt();
         let b = Known { value: b, error: b * ROUNDINGS * way.turn };
         let form = way.part_form(u, v);
         let above = |share: f64| Decision::above(b.value, share * x.pairs.size, b.error);
-        let wide = self.faces(&way, side).and(above(1.0).or(self.facet_meets_lobe(i, &way, q, b, LOBE_STEP)));
+        let wide = self
+            .faces(&way, side)
+            .and(above(1.0).or(self.facet_meets_lobe(i, &way, q, b, LOBE_STEP)));
         let sends = |rim: f64| form.is_positive().and(above(rim));
         let (sender, ball, i_region) = (&self.senders[i], x.ball(i), x.facets[i].i_region);
-        let torn = if sends(BOTH_RIMS).is_possible() { self.is_torn(i_region, &ball) } else { Decision::NO };
+        let torn = if sends(BOTH_RIMS).is_possible() {
+            self.is_torn(i_region, &ball)
+        } else {
+            Decision::NO
+        };
         // What of a light is torn matters where something of the facet is seen.
         let light = if sender.torn.is_possible() && sends(RIM).is_possible() {
             sender.torn.and(self.seen_of_ball(i_region, &ball).is_positive())
         } else {
             Decision::NO
         };
-        let by_rims = sends(RIM).and(torn.or(light)).or(sends(BOTH_RIMS).and(torn.and(sender.torn)));
+        let by_rims =
+            sends(RIM).and(torn.or(light)).or(sends(BOTH_RIMS).and(torn.and(sender.torn)));
         let cell = Cell { level: 0, at: DVec2::ZERO };
         Gathered::by(wide.or(by_rims), || self.cell(i, &cell, sender), || self.whole(i, &way, form))
     }
@@ -271,8 +303,8 @@ impl View<'_> {
         self.meets_lobe(x.facets[i].i_region, angles, way, b, step * x.pairs.size)
     }
 
-    /// A lobe is met by what is `b` wide, and wider than `limit` widths of it: the emitter's by one of the lights that
-    /// shine there, each with its angle; the receiver's.
+    /// A lobe is met by what is `b` wide, and wider than `limit` widths of it: the emitter's by one
+    /// of the lights that shine there, each with its angle; the receiver's.
     fn meets_lobe(
         &self,
         i_region: usize,
@@ -290,8 +322,10 @@ impl View<'_> {
         let receiver = &self.exchange.regions[self.receiver.i_region];
         let mut found = Decision::NO;
         if source.lobe.is_some() {
-            found =
-                lights.by_ref().map(|(shines, angle)| shines.and(met(source.brdf.ns, angle))).fold(found, Decision::or);
+            found = lights
+                .by_ref()
+                .map(|(shines, angle)| shines.and(met(source.brdf.ns, angle)))
+                .fold(found, Decision::or);
         }
         if receiver.lobe.is_some() {
             found = found.or(met(receiver.brdf.ns, self.eye_angle(way)));
@@ -316,8 +350,9 @@ impl View<'_> {
     /// Π (1 − h_r) of a ball on a region.
     fn seen_of_ball(&self, i_region: usize, ball: &Ball) -> Known {
         let from = Source::At(self.receiver.position);
-        let seen =
-            |(r, counts): &(&Rectangle, Decision)| shadow(r, from, ball).share.where_or(*counts, Known::NOTHING).rest();
+        let seen = |(r, counts): &(&Rectangle, Decision)| {
+            shadow(r, from, ball).share.where_or(*counts, Known::NOTHING).rest()
+        };
         self.before[i_region].iter().map(seen).fold(Known::ONE, Known::times)
     }
 
@@ -330,7 +365,13 @@ impl View<'_> {
         let (q, p) = (x.facets[i].position, self.receiver.position);
         let seen = self.seen_of_ball(x.facets[i].i_region, &x.ball(i));
         let g: Vec<Known> = self.senders[i].lights.iter().map(|l| l.mean).collect();
-        self.sent(i, way, q, &g, form.times(seen).times(x.through(p, q, 0.0)).scaled(x.facets[i].area))
+        self.sent(
+            i,
+            way,
+            q,
+            &g,
+            form.times(seen).times(x.through(p, q, 0.0)).scaled(x.facets[i].area),
+        )
     }
 
     /// What facet `i` sends from `q` under shares `g` of the lights, times `by`.
@@ -339,9 +380,16 @@ impl View<'_> {
     }
 
     /// A radiance and its error times `by`, along the way.
-    fn arrives(&self, way: &Way, (radiance, radiance_error): (DVec3, DVec3), by: Known) -> Gathered {
+    fn arrives(
+        &self,
+        way: &Way,
+        (radiance, radiance_error): (DVec3, DVec3),
+        by: Known,
+    ) -> Gathered {
         let e = radiance * by.value;
-        let error = radiance.abs() * by.error + radiance_error * (by.value + by.error) + e.abs() * (ROUNDINGS * U);
+        let error = radiance.abs() * by.error
+            + radiance_error * (by.value + by.error)
+            + e.abs() * (ROUNDINGS * U);
         let taken = match &self.exchange.regions[self.receiver.i_region].lobe {
             Some(table) => lobe(table, self.eye_angle(way)),
             None => Known::NOTHING,

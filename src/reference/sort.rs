@@ -1,8 +1,10 @@
-//! Sort keys by view depth and the stable order they give, model.md §11 "sort": ascending key is far to near.
+//! Sort keys by view depth and the stable order they give, model.md §11 "sort": ascending key is
+//! far to near.
 
 use glam::DVec3;
 
-/// View depth relative to O: z = f·placed, so that a camera that moves without turning keeps the order.
+/// View depth relative to O: z = f·placed, so that a camera that moves without turning keeps the
+/// order.
 pub fn depths(forward: DVec3, positions: &[DVec3]) -> Vec<f64> {
     positions.iter().map(|p| forward.dot(*p)).collect()
 }
@@ -18,8 +20,8 @@ pub fn key32(z: f32) -> u32 {
     !monotone(z)
 }
 
-/// 16-bit key: floor((z_hi − z)·65536/(z_hi − z_lo)) clamped to 0…65535, where z_hi and z_lo are ± the bounding
-/// sphere's `radius`.
+/// 16-bit key: floor((z_hi − z)·65536/(z_hi − z_lo)) clamped to 0…65535, where z_hi and z_lo are ±
+/// the bounding sphere's `radius`.
 pub fn key16(z: f64, radius: f64) -> u32 {
     // `as` saturates, and sends NaN (of z, or 0/0 of a sphere without radius) to 0.
     (((radius - z) * 65536.0 / (2.0 * radius)).floor() as u32).min(65535)
@@ -38,13 +40,16 @@ mod tests {
 
     #[test]
     fn keys_of_32_bits_run_against_depth() {
-        let far_to_near = [f32::INFINITY, 3.0, 1.0, 1e-40, 0.0, -0.0, -1e-40, -1.0, -3.0, f32::NEG_INFINITY];
+        let far_to_near =
+            [f32::INFINITY, 3.0, 1.0, 1e-40, 0.0, -0.0, -1e-40, -1.0, -3.0, f32::NEG_INFINITY];
         assert!(far_to_near.windows(2).all(|z| key32(z[0]) < key32(z[1])));
         // By hand: +0 has no bits, m = 2³¹, key = 2³¹ − 1; 1.0 is 0x3f80_0000.
         assert_eq!((key32(0.0), key32(1.0)), (0x7fff_ffff, 0x407f_ffff));
         // −1.0 is 0xbf80_0000, m = ~bits, the key is the bits again.
         assert_eq!(key32(-1.0), 0xbf80_0000);
-        assert!(key32(f32::NAN) < key32(f32::INFINITY) && key32(-f32::NAN) > key32(f32::NEG_INFINITY));
+        assert!(
+            key32(f32::NAN) < key32(f32::INFINITY) && key32(-f32::NAN) > key32(f32::NEG_INFINITY)
+        );
     }
 
     #[test]

@@ -1,6 +1,6 @@
-//! Drawing, model.md §9 and §11 "sprites": thin blobs composed far to near with premultiplied "over", in f64;
-//! beside it a bound on what a target of few bits may differ.
-//! In: blobs and eye relative to O, an order. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top.
+//! Drawing, model.md §9 and §11 "sprites": thin blobs composed far to near with premultiplied
+//! "over", in f64; beside it a bound on what a target of few bits may differ. In: blobs and eye
+//! relative to O, an order. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top.
 
 use glam::{DVec2, DVec3};
 
@@ -24,7 +24,8 @@ pub struct View {
     pub threshold: f64,
     /// Blobs whose σ is narrower than so many pixels are left out; 0: none.
     pub smallest: f64,
-    /// Where in a pixel its ray goes through: off its centre, to the right and down, pixels within ±½.
+    /// Where in a pixel its ray goes through: off its centre, to the right and down, pixels within
+    /// ±½.
     pub shift: DVec2,
 }
 
@@ -35,12 +36,13 @@ pub struct Rounding {
     pub unit: f64,
     /// Least normal number of the target: below it the error no longer shrinks with the value.
     pub least_normal: f64,
-    /// Of a target that holds 0 to 1 in equal steps, one of them; 0 of floats. What it blends is cut to that range.
+    /// Of a target that holds 0 to 1 in equal steps, one of them; 0 of floats. What it blends is
+    /// cut to that range.
     pub step: f64,
     /// Relative error of each α.
     pub alpha: f64,
-    /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there (so a relative error
-    /// of b). Nearer to the cut a sprite may end or not.
+    /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there
+    /// (so a relative error of b). Nearer to the cut a sprite may end or not.
     pub edge: f64,
     /// What a view depth may be off, as a share of the distance, where it decides on a size.
     pub depth: f64,
@@ -59,7 +61,8 @@ pub struct Behind {
 }
 
 impl Behind {
-    pub const NOTHING: Behind = Behind { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
+    pub const NOTHING: Behind =
+        Behind { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
 }
 
 impl Rounding {
@@ -78,7 +81,8 @@ impl Rounding {
         (2.0 + self.edge) * self.edge * cut.max(1.0)
     }
 
-    pub const NONE: Rounding = Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
+    pub const NONE: Rounding =
+        Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
 
     /// What the target holds of an opaque colour.
     pub fn stored(&self, behind: Behind) -> Behind {
@@ -97,22 +101,24 @@ impl View {
         (tan * f64::from(self.width) / f64::from(self.height), tan)
     }
 
-    /// b²/2σ² where a sprite ends whose centre has the optical depth `tau` (model.md §11 "threshold"); where it is not
-    /// above 0 nothing is drawn.
+    /// b²/2σ² where a sprite ends whose centre has the optical depth `tau` (model.md §11
+    /// "threshold"); where it is not above 0 nothing is drawn.
     pub fn cut(&self, tau: f64) -> f64 {
-        // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves out.
+        // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves
+        // out.
         (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
     }
 
-    /// How much wider than the smallest one, over the eye's offset `c` from it, a blob's σ is: where that is below 0
-    /// nothing of it is drawn (model.md §11 "cull"). And how far a GPU's answer may lie from it, `depth` as in
-    /// [`Rounding`].
+    /// How much wider than the smallest one, over the eye's offset `c` from it, a blob's σ is:
+    /// where that is below 0 nothing of it is drawn (model.md §11 "cull"). And how far a GPU's
+    /// answer may lie from it, `depth` as in [`Rounding`].
     pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
         let width = self.smallest * self.pixel();
         (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())
     }
 
-    /// Direction through pixel (column `i`, row `j` from the top), at its centre but for `shift`; its view depth is 1.
+    /// Direction through pixel (column `i`, row `j` from the top), at its centre but for `shift`;
+    /// its view depth is 1.
     pub fn ray(&self, i: u32, j: u32) -> DVec3 {
         let (slope_x, slope_y) = self.half_slopes();
         let x = 2.0 * (f64::from(i) + 0.5 + self.shift.x) / f64::from(self.width) - 1.0;
@@ -122,7 +128,8 @@ impl View {
 
     /// Slopes of the way `offset` from the eye.
     pub fn slopes_of(&self, offset: DVec3) -> DVec2 {
-        DVec2::new(offset.dot(self.pose.right), offset.dot(self.pose.up)) / offset.dot(self.pose.forward)
+        DVec2::new(offset.dot(self.pose.right), offset.dot(self.pose.up))
+            / offset.dot(self.pose.forward)
     }
 
     /// Difference of slopes from a pixel to the next.
@@ -130,15 +137,16 @@ impl View {
         2.0 * self.half_slopes().1 / f64::from(self.height)
     }
 
-    /// Columns and rows (from, to; to excluded) outside which no ray meets `blob`, `c` off the eye, out to `reach` σ.
-    /// May be too large, never too small.
+    /// Columns and rows (from, to; to excluded) outside which no ray meets `blob`, `c` off the eye,
+    /// out to `reach` σ. May be too large, never too small.
     pub(super) fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let (slope_x, slope_y) = self.half_slopes();
-        let [x, y] = [self.pose.right, self.pose.up].map(|side| blob.slopes(c, [side, self.pose.forward], reach));
+        let [x, y] = [self.pose.right, self.pose.up]
+            .map(|side| blob.slopes(c, [side, self.pose.forward], reach));
         let pixels = |(low, high): (f64, f64), slope: f64, n: u32| {
             let at = |s: f64| 0.5 * (s / slope + 1.0) * f64::from(n);
-            // One pixel to either side, of which a shift takes up to half, for the rounding of the tangents; `as`
-            // saturates, and min keeps it inside.
+            // One pixel to either side, of which a shift takes up to half, for the rounding of the
+            // tangents; `as` saturates, and min keeps it inside.
             let from = ((at(low) - 1.0).floor() as u32).min(n);
             (from, ((at(high) + 1.0).ceil() as u32).clamp(from, n))
         };
@@ -163,7 +171,8 @@ impl From<&Behind> for Layered {
 }
 
 impl Layered {
-    /// C ← αL + (1−α)C, A ← α + (1−α)A, in true numbers; the target has `off` instead of α and rounds the result.
+    /// C ← αL + (1−α)C, A ← α + (1−α)A, in true numbers; the target has `off` instead of α and
+    /// rounds the result.
     fn over(&mut self, alpha: f64, off: f64, radiance: DVec3, r: &Rounding) {
         let source = [radiance.x, radiance.y, radiance.z, 1.0];
         for ((v, e), s) in self.value.iter_mut().zip(&mut self.bound).zip(source) {
@@ -180,14 +189,22 @@ impl Layered {
     }
 }
 
-/// The same of a target of equal steps, which cuts source and result to [0, 1]; value and bound. It may blend in its
-/// own few bits (Vulkan, "Blending": no less precise than the target): source, factor, product and sum are then each
-/// rounded to a step, half a step off where rounding is correct.
-fn over_steps([value, bound]: [f64; 2], source: f64, alpha: f64, off: f64, r: &Rounding) -> [f64; 2] {
+/// The same of a target of equal steps, which cuts source and result to [0, 1]; value and bound. It
+/// may blend in its own few bits (Vulkan, "Blending": no less precise than the target): source,
+/// factor, product and sum are then each rounded to a step, half a step off where rounding is
+/// correct.
+fn over_steps(
+    [value, bound]: [f64; 2],
+    source: f64,
+    alpha: f64,
+    off: f64,
+    r: &Rounding,
+) -> [f64; 2] {
     // No difference of source and target as in floats: a source that is cut does not follow α.
     let inherited = (1.0 - alpha) * bound + off * (source.abs() + value.abs() + bound);
     let new = ((alpha * source).clamp(0.0, 1.0) + (1.0 - alpha) * value).clamp(0.0, 1.0);
-    let bound = inherited + 2.0 * r.step + 2.0 * r.unit * (alpha * source.abs() + value + inherited);
+    let bound =
+        inherited + 2.0 * r.step + 2.0 * r.unit * (alpha * source.abs() + value + inherited);
     // Both lie in [0, 1]; what has no bound keeps none.
     [new, if bound.is_finite() { bound.min(1.0) } else { bound }]
 }
@@ -197,7 +214,8 @@ pub fn render(view: &View, blobs: &[Blob], radiance: &[DVec3], order: &[u32]) ->
     render_with_bound(view, blobs, radiance, order, &Rounding::NONE).0
 }
 
-/// The picture, and per channel a bound on what a target that rounds as `rounding` says may differ from it.
+/// The picture, and per channel a bound on what a target that rounds as `rounding` says may differ
+/// from it.
 pub fn render_with_bound(
     view: &View,
     blobs: &[Blob],
@@ -221,7 +239,8 @@ pub fn render_over(
     render_textured(view, behind, blobs, radiance, order, rounding, None)
 }
 
-/// Factor on τ of blob j where the ray's slopes from the eye are those of its centre and a difference.
+/// Factor on τ of blob j where the ray's slopes from the eye are those of its centre and a
+/// difference.
 pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
 
 /// The same with a factor on each blob's τ.
@@ -243,7 +262,14 @@ pub fn render_textured(
                 for &j in order {
                     let j = j as usize;
                     let of_blob = |delta: DVec2| factor.map_or(1.0, |f| f(j, delta));
-                    draw(view, &blobs[j], radiance[j], &of_blob, (&mut *band, i * n_rows), rounding);
+                    draw(
+                        view,
+                        &blobs[j],
+                        radiance[j],
+                        &of_blob,
+                        (&mut *band, i * n_rows),
+                        rounding,
+                    );
                 }
             });
         }
@@ -254,7 +280,8 @@ pub fn render_textured(
 /// Bands of rows that are drawn side by side; the result does not depend on it.
 const N_THREADS: u32 = 2;
 
-/// Blobs, their radiance, in which order they are drawn (far to near), and the factor on the τ of each.
+/// Blobs, their radiance, in which order they are drawn (far to near), and the factor on the τ of
+/// each.
 #[derive(Clone, Copy)]
 pub struct Layers<'a> {
     pub blobs: &'a [Blob],
@@ -276,8 +303,8 @@ pub struct Raster<'a> {
     pub at: &'a [[u32; 2]],
 }
 
-/// The values of [`render_textured`] at the pixels of `raster` alone, over `behind`, one each. `on_row` hears how many
-/// rows of cells there are each time that one more is done.
+/// The values of [`render_textured`] at the pixels of `raster` alone, over `behind`, one each.
+/// `on_row` hears how many rows of cells there are each time that one more is done.
 pub fn render_at(
     view: &View,
     raster: &Raster<'_>,
@@ -285,7 +312,8 @@ pub fn render_at(
     layers: &Layers<'_>,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<[f64; 4]> {
-    let met = |&j: &u32| Some((j as usize, Met::new(view, &layers.blobs[j as usize], &Rounding::NONE)?));
+    let met =
+        |&j: &u32| Some((j as usize, Met::new(view, &layers.blobs[j as usize], &Rounding::NONE)?));
     let met: Vec<(usize, Met)> = layers.order.iter().filter_map(met).collect();
     let Raster { first: [left, top], cell, at, .. } = *raster;
     let n_columns = raster.n_columns as usize;
@@ -295,12 +323,13 @@ pub fn render_at(
         let mut pixels: Vec<Layered> = behind[here.clone()].iter().map(Layered::from).collect();
         let (first, end) = (top + i as u32 * cell, top + (i as u32 + 1) * cell);
         for (j, met) in met.iter().filter(|(_, met)| met.rows.0 < end && met.rows.1 > first) {
-            let [from, to] = [met.columns.0, met.columns.1].map(|column| column.saturating_sub(left));
+            let [from, to] =
+                [met.columns.0, met.columns.1].map(|column| column.saturating_sub(left));
             let (from, to) = (from / cell, to.div_ceil(cell));
             for (k, pixel) in pixels.iter_mut().enumerate().take(to as usize).skip(from as usize) {
                 let [column, row] = at[here.start + k];
-                let is_met =
-                    (met.columns.0..met.columns.1).contains(&column) && (met.rows.0..met.rows.1).contains(&row);
+                let is_met = (met.columns.0..met.columns.1).contains(&column)
+                    && (met.rows.0..met.rows.1).contains(&row);
                 if is_met {
                     let of_blob = |delta: DVec2| layers.factor.map_or(1.0, |f| f(*j, delta));
                     met.lay(
@@ -319,7 +348,8 @@ pub fn render_at(
     rows.into_iter().flatten().map(|p| p.value).collect()
 }
 
-/// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference of slopes.
+/// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference
+/// of slopes.
 fn draw(
     view: &View,
     blob: &Blob,
@@ -388,16 +418,22 @@ impl Met {
         let slack = r.slack(cut);
         let alpha = alpha(factor(delta) * line.tau());
         let (behind, behind_bound) = pixel.behind;
-        // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies. The depth of what
-        // stands behind decides likewise.
+        // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies.
+        // The depth of what stands behind decides likewise.
         let beyond = 0.5 * line.off.powi(2) - cut;
         let (on_edge, at_behind) = (beyond.abs() <= slack, (depth - behind).abs() < behind_bound);
         let is_in = beyond <= 0.0 && cut > 0.0;
         if (!is_in && !on_edge) || (depth > behind && !at_behind) {
             return;
         }
-        let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-        pixel.over(if is_in && depth <= behind && above >= 0.0 { alpha } else { 0.0 }, off, radiance, r);
+        let off =
+            if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+        pixel.over(
+            if is_in && depth <= behind && above >= 0.0 { alpha } else { 0.0 },
+            off,
+            radiance,
+            r,
+        );
     }
 }
 
@@ -426,20 +462,24 @@ mod tests {
 
     #[test]
     fn what_stands_behind_shows_through_and_hides() {
-        // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at depth 4.
+        // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at
+        // depth 4.
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
         let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let (blobs, colors) = ([at(2.0), at(4.0)], [DVec3::X, DVec3::Y]);
         let over = |depth: f64, depth_bound: f64| {
-            let behind = Behind { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..Behind::NOTHING };
-            let (value, bound) = render_over(&VIEW, &[behind], &blobs, &colors, &[1, 0], &Rounding::NONE);
+            let behind =
+                Behind { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..Behind::NOTHING };
+            let (value, bound) =
+                render_over(&VIEW, &[behind], &blobs, &colors, &[1, 0], &Rounding::NONE);
             (value[0], bound[0])
         };
         let is = |a: [f64; 4], b: [f64; 4]| (0..4).all(|k| (a[k] - b[k]).abs() < 1e-15);
         assert!(is(over(5.0, 0.0).0, [0.5, 0.25, 0.25, 1.0]));
         assert!(is(over(3.0, 0.0).0, [0.5, 0.0, 0.5, 1.0]));
         assert!(is(over(1.0, 0.0).0, [0.0, 0.0, 1.0, 1.0]));
-        // Equal depth is drawn; where that is uncertain, the bound covers both: (0.5, 0.25, 0.25) and (0.5, 0, 0.5).
+        // Equal depth is drawn; where that is uncertain, the bound covers both: (0.5, 0.25, 0.25)
+        // and (0.5, 0, 0.5).
         assert!(is(over(4.0, 0.0).0, [0.5, 0.25, 0.25, 1.0]) && is(over(4.0, 0.0).1, [0.0; 4]));
         assert!(is(over(4.0, 1e-9).1, [0.0, 0.25, 0.25, 0.0]));
         let (value, bound) = over(4.0 - 1e-10, 1e-9);

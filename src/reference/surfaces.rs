@@ -1,6 +1,6 @@
-//! Drawing of surfaces, model.md §9 and §11 "surfaces": opaque rectangles, the nearest in every pixel, in f64.
-//! In: rectangles and eye relative to O, radiance of every facet (W m⁻² sr⁻¹, RGB). Out: [width × height] of colour and
-//! view depth, row 0 at the top.
+//! Drawing of surfaces, model.md §9 and §11 "surfaces": opaque rectangles, the nearest in every
+//! pixel, in f64. In: rectangles and eye relative to O, radiance of every facet (W m⁻² sr⁻¹, RGB).
+//! Out: [width × height] of colour and view depth, row 0 at the top.
 
 use glam::DVec3;
 
@@ -19,7 +19,8 @@ pub struct Hit {
     pub is_front: bool,
 }
 
-/// Where the line eye + z·ray meets the plane of `surface`, whatever s and t; nowhere on a line along the plane.
+/// Where the line eye + z·ray meets the plane of `surface`, whatever s and t; nowhere on a line
+/// along the plane.
 pub fn meet(surface: &Surface, eye: DVec3, ray: DVec3) -> Option<Hit> {
     let normal = surface.normal();
     let (from_eye, slope) = (surface.center - eye, normal.dot(ray));
@@ -28,7 +29,8 @@ pub fn meet(surface: &Surface, eye: DVec3, ray: DVec3) -> Option<Hit> {
         return None;
     }
     let p = depth * ray - from_eye;
-    // Axes typed with a few digits are not quite perpendicular: s and t solve s u + t v = p all the same.
+    // Axes typed with a few digits are not quite perpendicular: s and t solve s u + t v = p all the
+    // same.
     let (s, t) = (p.cross(surface.v).dot(normal), surface.u.cross(p).dot(normal));
     let area = surface.u.cross(surface.v).dot(normal);
     Some(Hit { depth, s: s / area, t: t / area, is_front: slope < 0.0 })
@@ -40,8 +42,8 @@ pub fn hit(surface: &Surface, view: &View, ray: DVec3) -> Option<Hit> {
     (hit.depth >= view.near && hit.s.abs() <= 1.0 && hit.t.abs() <= 1.0).then_some(hit)
 }
 
-/// Radiance at `hit` of a surface whose facets have `facets`: bilinear between their centres, constant beyond the
-/// outermost; black behind.
+/// Radiance at `hit` of a surface whose facets have `facets`: bilinear between their centres,
+/// constant beyond the outermost; black behind.
 pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
     if !hit.is_front {
         return DVec3::ZERO;
@@ -74,9 +76,11 @@ pub fn render_at(
     at.map(|[i, j]| pixel(view, surfaces, facets, view.ray(i, j))).collect()
 }
 
-/// Which surface is seen along `ray`, and where: the nearest hit, and of equally near ones the last.
+/// Which surface is seen along `ray`, and where: the nearest hit, and of equally near ones the
+/// last.
 pub fn seen(view: &View, surfaces: &[Surface], ray: DVec3) -> Option<(usize, Hit)> {
-    let hits = surfaces.iter().enumerate().filter_map(|(i, s)| hit(s, view, ray).map(|hit| (i, hit)));
+    let hits =
+        surfaces.iter().enumerate().filter_map(|(i, s)| hit(s, view, ray).map(|hit| (i, hit)));
     hits.reduce(|nearest, next| if next.1.depth <= nearest.1.depth { next } else { nearest })
 }
 
@@ -93,7 +97,8 @@ mod tests {
     use super::*;
     use crate::model::camera::Pose;
 
-    /// Eye at the origin, looking along −z; three by three pixels of 90 degrees: slopes −2/3, 0, 2/3.
+    /// Eye at the origin, looking along −z; three by three pixels of 90 degrees: slopes −2/3, 0,
+    /// 2/3.
     const VIEW: View = View {
         width: 3,
         height: 3,
@@ -118,11 +123,23 @@ mod tests {
         assert_eq!(found, Hit { depth: 2.0, s: 0.5, t: -0.25, is_front: true });
         // Turned: the axes swapped, the same place seen from behind.
         let turned = Surface { u: DVec3::Y, v: DVec3::X, ..wall(2.0, [1, 1]) };
-        assert_eq!(hit(&turned, &VIEW, ray), Some(Hit { depth: 2.0, s: -0.25, t: 0.5, is_front: false }));
+        assert_eq!(
+            hit(&turned, &VIEW, ray),
+            Some(Hit { depth: 2.0, s: -0.25, t: 0.5, is_front: false })
+        );
         // A floor 1 below the eye, from 1 behind it to 3 before it: the ray reaches it at depth 8.
-        let floor = Surface { center: DVec3::new(0.0, -1.0, -1.0), v: 2.0 * DVec3::NEG_Z, ..wall(0.0, [1, 1]) };
+        let floor = Surface {
+            center: DVec3::new(0.0, -1.0, -1.0),
+            v: 2.0 * DVec3::NEG_Z,
+            ..wall(0.0, [1, 1])
+        };
         let beside = meet(&floor, DVec3::ZERO, ray).unwrap();
-        assert!(beside.depth == 8.0 && beside.s == 2.0 && beside.is_front && hit(&floor, &VIEW, ray).is_none());
+        assert!(
+            beside.depth == 8.0
+                && beside.s == 2.0
+                && beside.is_front
+                && hit(&floor, &VIEW, ray).is_none()
+        );
         let steep = hit(&floor, &VIEW, DVec3::new(0.25, -0.5, -1.0)).unwrap();
         assert_eq!((steep.depth, steep.s, steep.t), (2.0, 0.5, 0.5));
         // Beyond the edge, before the near plane, behind the eye, along the plane.
@@ -136,25 +153,34 @@ mod tests {
     fn radiance_is_bilinear_between_centres_and_constant_beyond() {
         let surface = wall(1.0, [3, 2]);
         // Centres at s = −2/3, 0, 2/3 and t = ∓1/2.
-        let facets: Vec<DVec3> = (0..6).map(|i| DVec3::new(f64::from(i), f64::from(i * i), 1.0)).collect();
-        let at = |s: f64, t: f64| radiance(&surface, &facets, &Hit { depth: 1.0, s, t, is_front: true });
+        let facets: Vec<DVec3> =
+            (0..6).map(|i| DVec3::new(f64::from(i), f64::from(i * i), 1.0)).collect();
+        let at =
+            |s: f64, t: f64| radiance(&surface, &facets, &Hit { depth: 1.0, s, t, is_front: true });
         let is = |a: DVec3, b: [f64; 3]| (a - DVec3::from(b)).length() < 1e-13;
         assert!(is(at(0.0, -0.5), [1.0, 1.0, 1.0]) && is(at(2.0 / 3.0, 0.5), [5.0, 25.0, 1.0]));
-        // A quarter from facet 1 to facet 2; half way up: between 1 and 4; the middle of 0, 1, 3, 4.
+        // A quarter from facet 1 to facet 2; half way up: between 1 and 4; the middle of 0, 1, 3,
+        // 4.
         assert!(is(at(1.0 / 6.0, -0.5), [1.25, 1.75, 1.0]));
         assert!(is(at(0.0, 0.0), [2.5, 8.5, 1.0]));
         assert!(is(at(-1.0 / 3.0, 0.0), [2.0, 6.5, 1.0]));
-        for (s, t, i) in [(-1.0, -1.0, 0), (-0.8, -0.6, 0), (1.0, -0.7, 2), (1.0, 1.0, 5), (-1.0, 0.5, 3)] {
+        for (s, t, i) in
+            [(-1.0, -1.0, 0), (-0.8, -0.6, 0), (1.0, -0.7, 2), (1.0, 1.0, 5), (-1.0, 0.5, 3)]
+        {
             assert!(is(at(s, t), facets[i].to_array()), "{s} {t}");
         }
         let back = Hit { depth: 1.0, s: 0.0, t: 0.0, is_front: false };
         assert_eq!(radiance(&surface, &facets, &back), DVec3::ZERO);
-        assert_eq!(radiance(&wall(1.0, [1, 1]), &facets[4..5], &Hit { is_front: true, ..back }), facets[4]);
+        assert_eq!(
+            radiance(&wall(1.0, [1, 1]), &facets[4..5], &Hit { is_front: true, ..back }),
+            facets[4]
+        );
     }
 
     #[test]
     fn the_nearest_is_seen_and_of_equals_the_last() {
-        // At depth 1.2 a wall reaches slopes up to 1/1.2 = 0.83: all pixels. At depth 2: 0.5, the middle one only.
+        // At depth 1.2 a wall reaches slopes up to 1/1.2 = 0.83: all pixels. At depth 2: 0.5, the
+        // middle one only.
         let colors = [DVec3::X, DVec3::Y, DVec3::Z];
         let see = |walls: &[Surface]| -> Vec<[f64; 4]> {
             render(&VIEW, walls, &colors[..walls.len()]).iter().map(|p| p.color).collect()

@@ -1,6 +1,6 @@
-//! Ground, model.md §16: its facets, and its picture: opaque triangles between its points, the nearest in every pixel,
-//! in f64. In: points and eye relative to O, radiance of every point (W m⁻² sr⁻¹, RGB). Out: colour and view depth
-//! where it is seen.
+//! Ground, model.md §16: its facets, and its picture: opaque triangles between its points, the
+//! nearest in every pixel, in f64. In: points and eye relative to O, radiance of every point (W m⁻²
+//! sr⁻¹, RGB). Out: colour and view depth where it is seen.
 
 use glam::{DVec2, DVec3};
 
@@ -35,17 +35,27 @@ pub struct Half {
 impl Half {
     pub fn new(points: [DVec3; 3], radiance: [DVec3; 3]) -> Half {
         let [center, along, across] = points;
-        let plane = Surface { center, u: along - center, v: across - center, i_material: 0, subdivide: [1, 1] };
+        let plane = Surface {
+            center,
+            u: along - center,
+            v: across - center,
+            i_material: 0,
+            subdivide: [1, 1],
+        };
         Half { plane, radiance }
     }
 
-    /// Those of `terrain`, whose points are where `terrain.origin` puts them; `radiance` by its points.
+    /// Those of `terrain`, whose points are where `terrain.origin` puts them; `radiance` by its
+    /// points.
     pub fn of<'a>(terrain: &'a Terrain, radiance: &'a [DVec3]) -> impl Iterator<Item = Half> + 'a {
         let of_cell = move |i: u64| {
             let corners = terrain.corners(i as u32);
             HALVES.map(|half| {
                 let numbers = half.map(|k| corners[k]);
-                Half::new(numbers.map(|k| terrain.origin + terrain.points[k]), numbers.map(|k| radiance[k]))
+                Half::new(
+                    numbers.map(|k| terrain.origin + terrain.points[k]),
+                    numbers.map(|k| radiance[k]),
+                )
             })
         };
         (0..terrain.n_cells()).flat_map(of_cell)
@@ -65,7 +75,8 @@ impl Half {
     /// Where the ray through a pixel meets it, from the near plane on.
     pub fn hit(&self, view: &View, ray: DVec3) -> Option<Hit> {
         let hit = self.meet(view.pose.position, ray)?;
-        (hit.depth >= view.near && hit.s >= 0.0 && hit.t >= 0.0 && hit.s + hit.t <= 1.0).then_some(hit)
+        (hit.depth >= view.near && hit.s >= 0.0 && hit.t >= 0.0 && hit.s + hit.t <= 1.0)
+            .then_some(hit)
     }
 
     /// Radiance at `hit`: linear between the points; black from below.
@@ -82,11 +93,12 @@ impl Half {
         self.hit(view, ray).map(|hit| self.shown(&hit))
     }
 
-    /// What is seen in a pixel that a rasteriser counts among its own though the ray may pass by it: where the ray
-    /// meets its plane, no farther out than it reaches.
+    /// What is seen in a pixel that a rasteriser counts among its own though the ray may pass by
+    /// it: where the ray meets its plane, no farther out than it reaches.
     pub fn given(&self, view: &View, ray: DVec3) -> Option<Hit> {
         let hit = self.meet(view.pose.position, ray)?;
-        let depths = self.points().map(|p| (p - view.pose.position).dot(view.pose.forward).max(view.near));
+        let depths =
+            self.points().map(|p| (p - view.pose.position).dot(view.pose.forward).max(view.near));
         let least = depths.into_iter().fold(f64::INFINITY, f64::min);
         let depth = hit.depth.clamp(least, depths.into_iter().fold(least, f64::max));
         let s = hit.s.clamp(0.0, 1.0);
@@ -99,7 +111,8 @@ impl Half {
         Behind { color, depth: hit.depth, ..Behind::NOTHING }
     }
 
-    /// Columns and rows of pixels that may see it: (first, end) of each, `margin` pixels more on every side.
+    /// Columns and rows of pixels that may see it: (first, end) of each, `margin` pixels more on
+    /// every side.
     pub fn pixels(&self, view: &View, margin: f64) -> [(u32, u32); 2] {
         let size = [view.width, view.height];
         let mut low = DVec2::INFINITY;
@@ -111,14 +124,20 @@ impl Half {
                 // What the near plane cuts may be anywhere.
                 return size.map(|n| (0, n));
             }
-            let half = DVec2::new(view.pixel() * 0.5 * f64::from(size[0]), view.pixel() * 0.5 * f64::from(size[1]));
+            let half = DVec2::new(
+                view.pixel() * 0.5 * f64::from(size[0]),
+                view.pixel() * 0.5 * f64::from(size[1]),
+            );
             let slope = DVec2::new(from_eye.dot(view.pose.right), -from_eye.dot(view.pose.up)) / z;
             let at = (slope + half) / view.pixel() - view.shift;
             (low, high) = (low.min(at), high.max(at));
         }
         let range = |low: f64, high: f64, n: u32| {
             let first = (low - 0.5 - margin).ceil().clamp(0.0, f64::from(n)) as u32;
-            (first, ((high - 0.5 + margin).floor() + 1.0).clamp(f64::from(first), f64::from(n)) as u32)
+            (
+                first,
+                ((high - 0.5 + margin).floor() + 1.0).clamp(f64::from(first), f64::from(n)) as u32,
+            )
         };
         [range(low.x, high.x, size[0]), range(low.y, high.y, size[1])]
     }
@@ -127,9 +146,14 @@ impl Half {
 /// Columns and rows of a picture: (first, end) of each.
 pub type Window = [(u32, u32); 2];
 
-/// Lays over `picture`, the pixels of `window` row by row, what is nearer of `terrain`, whose points are where its
-/// origin puts them; `radiance` by its points.
-pub fn render_over((picture, window): (&mut [Behind], Window), view: &View, terrain: &Terrain, radiance: &[DVec3]) {
+/// Lays over `picture`, the pixels of `window` row by row, what is nearer of `terrain`, whose
+/// points are where its origin puts them; `radiance` by its points.
+pub fn render_over(
+    (picture, window): (&mut [Behind], Window),
+    view: &View,
+    terrain: &Terrain,
+    radiance: &[DVec3],
+) {
     let [(first_column, end_column), (first_row, end_row)] = window;
     /// Rounding of a corner's place in pixels must not leave a pixel out; the hit decides.
     const MARGIN: f64 = 1e-6;
@@ -139,7 +163,9 @@ pub fn render_over((picture, window): (&mut [Behind], Window), view: &View, terr
             for i in left.max(first_column)..right.min(end_column) {
                 let place = (j - first_row) * (end_column - first_column) + i - first_column;
                 let pixel = &mut picture[place as usize];
-                if let Some(seen) = half.seen(view, view.ray(i, j)).filter(|seen| seen.depth <= pixel.depth) {
+                if let Some(seen) =
+                    half.seen(view, view.ray(i, j)).filter(|seen| seen.depth <= pixel.depth)
+                {
                     *pixel = seen;
                 }
             }
@@ -154,7 +180,8 @@ mod tests {
     use super::*;
     use crate::model::camera::Pose;
 
-    /// From a height of 2, straight down; north is up in the picture: 3 by 3 pixels of 90 degrees, slopes −2/3, 0, 2/3.
+    /// From a height of 2, straight down; north is up in the picture: 3 by 3 pixels of 90 degrees,
+    /// slopes −2/3, 0, 2/3.
     fn from_above() -> View {
         View {
             width: 3,
@@ -176,8 +203,15 @@ mod tests {
 
     /// 2 by 2 cells from −2 to 2, heights of the nine points from the south-west on.
     fn terrain(heights: [f64; 9]) -> Terrain {
-        let at = |k: usize| DVec3::new(2.0 * (k % 3) as f64 - 2.0, heights[k], 2.0 - 2.0 * (k / 3) as f64);
-        Terrain { origin: DVec3::ZERO, points: Arc::new((0..9).map(at).collect()), n: [3, 3], i_material: 0 }
+        let at = |k: usize| {
+            DVec3::new(2.0 * (k % 3) as f64 - 2.0, heights[k], 2.0 - 2.0 * (k / 3) as f64)
+        };
+        Terrain {
+            origin: DVec3::ZERO,
+            points: Arc::new((0..9).map(at).collect()),
+            n: [3, 3],
+            i_material: 0,
+        }
     }
 
     fn picture(view: &View, terrain: &Terrain, radiance: &[DVec3]) -> Vec<Behind> {
@@ -188,13 +222,16 @@ mod tests {
 
     #[test]
     fn a_plain_is_seen_where_it_lies() {
-        // At depth 2 the rays reach x, north = −4/3, 0, 4/3; radiance there: r = x, g = north, both + 2.
+        // At depth 2 the rays reach x, north = −4/3, 0, 4/3; radiance there: r = x, g = north, both
+        // + 2.
         let flat = terrain([0.0; 9]);
-        let radiance: Vec<DVec3> =
-            (0..9).map(|k| DVec3::new(2.0 * f64::from(k % 3), 2.0 * f64::from(k / 3), 1.0)).collect();
+        let radiance: Vec<DVec3> = (0..9)
+            .map(|k| DVec3::new(2.0 * f64::from(k % 3), 2.0 * f64::from(k / 3), 1.0))
+            .collect();
         let seen = picture(&from_above(), &flat, &radiance);
         for (k, pixel) in seen.iter().enumerate() {
-            let (x, north) = (4.0 / 3.0 * (k % 3) as f64 - 4.0 / 3.0, 4.0 / 3.0 - 4.0 / 3.0 * (k / 3) as f64);
+            let (x, north) =
+                (4.0 / 3.0 * (k % 3) as f64 - 4.0 / 3.0, 4.0 / 3.0 - 4.0 / 3.0 * (k / 3) as f64);
             let [r, g, b, a] = pixel.color;
             assert!((r - 2.0 - x).abs() < 1e-13 && (g - 2.0 - north).abs() < 1e-13, "{k}: {r} {g}");
             assert!((b - 1.0).abs() < 1e-15 && a == 1.0 && (pixel.depth - 2.0).abs() < 1e-14);
@@ -203,15 +240,19 @@ mod tests {
 
     #[test]
     fn a_hill_is_nearer_and_hides() {
-        // The middle raised by 1: the middle ray meets it at depth 1; that through (2/3, 0) meets the triangle of
-        // height 1 − x/2 at z with 2 − z = 1 − z/3: z = 3/2.
+        // The middle raised by 1: the middle ray meets it at depth 1; that through (2/3, 0) meets
+        // the triangle of height 1 − x/2 at z with 2 − z = 1 − z/3: z = 3/2.
         let mut heights = [0.0; 9];
         heights[4] = 1.0;
         let hill = terrain(heights);
         let mut radiance = vec![DVec3::ZERO; 9];
         radiance[4] = DVec3::new(4.0, 0.0, 0.0);
         let seen = picture(&from_above(), &hill, &radiance);
-        assert!((seen[4].depth - 1.0).abs() < 1e-14 && (seen[5].depth - 1.5).abs() < 1e-14, "{:?}", seen[5]);
+        assert!(
+            (seen[4].depth - 1.0).abs() < 1e-14 && (seen[5].depth - 1.5).abs() < 1e-14,
+            "{:?}",
+            seen[5]
+        );
         // At x = 1 half of the middle's radiance.
         assert!((seen[4].color[0] - 4.0).abs() < 1e-13 && (seen[5].color[0] - 2.0).abs() < 1e-13);
         // What was nearer stays, what was farther goes.
@@ -226,7 +267,8 @@ mod tests {
         let flat = terrain([0.0; 9]);
         let bright = vec![DVec3::ONE; 9];
         let mut below = from_above();
-        (below.pose.position.y, below.pose.forward, below.pose.right) = (-2.0, DVec3::Y, DVec3::NEG_X);
+        (below.pose.position.y, below.pose.forward, below.pose.right) =
+            (-2.0, DVec3::Y, DVec3::NEG_X);
         assert!(picture(&below, &flat, &bright).iter().all(|p| p.color == [0.0, 0.0, 0.0, 1.0]));
         let near = View { near: 2.5, ..from_above() };
         assert!(picture(&near, &flat, &bright).iter().all(|p| p.color == [0.0; 4]));

@@ -1,6 +1,6 @@
-//! The pool of textures and what a splat shows of it: model.md §9, §11 "texture". The fields by their sums of waves, term by
-//! term, not by a fast transform.
-//! In: a seed; a particle. Out: n at every texel of every level; ln of the factor on τ.
+//! The pool of textures and what a splat shows of it: model.md §9, §11 "texture". The fields by
+//! their sums of waves, term by term, not by a fast transform. In: a seed; a particle. Out: n at
+//! every texel of every level; ln of the factor on τ.
 
 use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
@@ -76,10 +76,11 @@ pub fn sum_of_amplitudes() -> f64 {
 }
 
 /// [`mean_squares`] of every level.
-static MEAN_SQUARES: LazyLock<[[f64; 3]; N_LEVELS]> = LazyLock::new(|| std::array::from_fn(mean_squares));
+static MEAN_SQUARES: LazyLock<[[f64; 3]; N_LEVELS]> =
+    LazyLock::new(|| std::array::from_fn(mean_squares));
 
-/// By level the mean squares ⟨n_l²⟩, ⟨n_l n_{l+1}⟩ and ⟨n_{l+1}²⟩ over all places, as bilinear interpolation has them: the
-/// closed form for a wave e^{iθj} between nodes j, by axis.
+/// By level the mean squares ⟨n_l²⟩, ⟨n_l n_{l+1}⟩ and ⟨n_{l+1}²⟩ over all places, as bilinear
+/// interpolation has them: the closed form for a wave e^{iθj} between nodes j, by axis.
 pub fn mean_squares(l: usize) -> [f64; 3] {
     let amplitude = amplitude();
     let mut sums = [0.0; 3];
@@ -89,7 +90,8 @@ pub fn mean_squares(l: usize) -> [f64; 3] {
         let over = |f: &dyn Fn(f64) -> f64| energy * f(cosines[0]) * f(cosines[1]);
         sums[0] += over(&|c| (2.0 + c) / 3.0);
         if l + 1 < N_LEVELS && is_wave(k, most(l + 1)) {
-            // Every other node of n_{l+1} lies midway between its neighbours: there the wave is cos θ times as high.
+            // Every other node of n_{l+1} lies midway between its neighbours: there the wave is cos
+            // θ times as high.
             sums[1] += over(&|c| (1.0 + c) * (2.0 + c) / 6.0);
             sums[2] += over(&|c| (1.0 + 2.0 * c * c) / 3.0);
         }
@@ -109,13 +111,15 @@ impl Pool {
     pub fn new(seed: u32) -> Pool {
         let mut fields = Vec::new();
         for pair in 0..N_FIELDS / 2 {
-            let levels: Vec<[Vec<f64>; 2]> = (0..N_LEVELS).map(|l| pair_of_fields(seed, pair, l)).collect();
+            let levels: Vec<[Vec<f64>; 2]> =
+                (0..N_LEVELS).map(|l| pair_of_fields(seed, pair, l)).collect();
             for part in 0..2 {
                 let own = |l: usize| levels.get(l).map(|of| of[part].as_slice());
                 let level = |l: usize| Level {
                     side: side(l),
                     own: levels[l][part].clone(),
-                    above: own(l + 1).map_or(vec![0.0; side(l).pow(2)], |n| doubled(n, side(l + 1))),
+                    above: own(l + 1)
+                        .map_or(vec![0.0; side(l).pow(2)], |n| doubled(n, side(l + 1))),
                 };
                 fields.push((0..N_LEVELS).map(level).collect());
             }
@@ -123,8 +127,8 @@ impl Pool {
         Pool(fields)
     }
 
-    /// As shaders read it: by field, level and texel the texel's four corners, n_l in the first two words, n_{l+1} in the
-    /// others, each in 16 bits.
+    /// As shaders read it: by field, level and texel the texel's four corners, n_l in the first two
+    /// words, n_{l+1} in the others, each in 16 bits.
     pub fn words(&self) -> Vec<[u32; 4]> {
         let quanta = |n: f64| (n / QUANTUM).clamp(-MOST_QUANTA, MOST_QUANTA).round() as i16 as u16;
         let both = |a: f64, b: f64| u32::from(quanta(a)) | u32::from(quanta(b)) << 16;
@@ -154,7 +158,8 @@ impl Pool {
     }
 }
 
-/// Level `l` of the two fields: n(i, j) = Σ_k F(k) e^{2πi(k_x i + k_y j)/side}, first over k_x, then over k_y.
+/// Level `l` of the two fields: n(i, j) = Σ_k F(k) e^{2πi(k_x i + k_y j)/side}, first over k_x,
+/// then over k_y.
 fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     let (n, most, amplitude) = (side(l), most(l), amplitude());
     let roots: Vec<(f64, f64)> = (0..n).map(|j| (TAU * j as f64 / n as f64).sin_cos()).collect();
@@ -165,7 +170,8 @@ fn pair_of_fields(seed: u32, pair: u32, l: usize) -> [Vec<f64>; 2] {
     for (row, y) in rows.iter_mut().zip(-most..) {
         for x in (-most..=most).filter(|x| is_wave((*x, y), most)) {
             let height = amplitude * shape((x, y));
-            let spectrum = phases(seed, (x, y), pair).map(|phase| (height * phase.cos(), height * phase.sin()));
+            let spectrum = phases(seed, (x, y), pair)
+                .map(|phase| (height * phase.cos(), height * phase.sin()));
             for (i, sums) in row.iter_mut().enumerate() {
                 let (sine, cosine) = root(x, i);
                 for (sum, (re, im)) in sums.iter_mut().zip(spectrum) {
@@ -239,16 +245,26 @@ impl Sheet {
         let words = philox4x32_10([of.seed, of.i_box], [i, 0, 0, STREAM]);
         let [u, v, w, _] = words.map(uniform);
         // Texels of level 0 in a pixel.
-        let dense = (SIDE as f64 / PERIOD_SIGMA * z_in_sigma * pixel).clamp(1.0, (1 << N_LEVELS) as f64);
+        let dense =
+            (SIDE as f64 / PERIOD_SIGMA * z_in_sigma * pixel).clamp(1.0, (1 << N_LEVELS) as f64);
         let level = (0..N_LEVELS).rev().find(|l| dense >= (1 << l) as f64).unwrap_or(0);
         let fade = (dense / (1 << level) as f64 - 1.0).min(1.0);
         let (angle, shift) = (TAU * u - PI, DVec2::new(v, w));
-        Sheet { i_field: of.i_field as usize, strength: of.strength, level, fade, angle, shift, z_in_sigma }
+        Sheet {
+            i_field: of.i_field as usize,
+            strength: of.strength,
+            level,
+            fade,
+            angle,
+            shift,
+            z_in_sigma,
+        }
     }
 
     /// In texels of the level, where the slopes are `delta` from the centre's.
     pub fn place(&self, delta: DVec2) -> DVec2 {
-        let periods = DVec2::from_angle(self.angle).rotate(delta * self.z_in_sigma / PERIOD_SIGMA) + self.shift;
+        let periods = DVec2::from_angle(self.angle).rotate(delta * self.z_in_sigma / PERIOD_SIGMA)
+            + self.shift;
         periods * side(self.level) as f64
     }
 
@@ -278,12 +294,14 @@ mod tests {
 
     #[test]
     fn the_coarsest_level_by_hand() {
-        // Four waves, (±2, 0) and (0, ±2), a quarter turn from node to node: α = 2/3 along the axis, 1 across.
+        // Four waves, (±2, 0) and (0, ±2), a quarter turn from node to node: α = 2/3 along the
+        // axis, 1 across.
         assert_eq!(waves(2).count(), 4);
         let energy = amplitude().powi(2) * 4f64.powf(-1.7);
         assert!((mean_squares(5)[0] - 4.0 * energy * 2.0 / 3.0).abs() < 1e-15);
         assert_eq!(mean_squares(5)[1..], [0.0, 0.0]);
-        // On level 4 they turn by an eighth, cos ϑ = √½: (2 + √½)/3, (1 + √½)(2 + √½)/6, (1 + 2·½)/3.
+        // On level 4 they turn by an eighth, cos ϑ = √½: (2 + √½)/3, (1 + √½)(2 + √½)/6, (1 +
+        // 2·½)/3.
         let root = std::f64::consts::FRAC_1_SQRT_2;
         let [_, both, above] = mean_squares(4);
         assert!((both - 4.0 * energy * (1.0 + root) * (2.0 + root) / 6.0).abs() < 1e-15);

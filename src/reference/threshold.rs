@@ -1,5 +1,6 @@
-//! What a threshold and a smallest size leave out of a picture, model.md §11 "threshold" and "cull", in f64.
-//! In: blobs and eye relative to O. Out: of every pixel the layers that are cut, and their optical depth.
+//! What a threshold and a smallest size leave out of a picture, model.md §11 "threshold" and
+//! "cull", in f64. In: blobs and eye relative to O. Out: of every pixel the layers that are cut,
+//! and their optical depth.
 
 use super::Blob;
 use super::sprites::{Behind, Factor, View};
@@ -14,8 +15,8 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// A pixel's channel changes by at most this share of the greatest difference between two radiances that it can
-    /// meet.
+    /// A pixel's channel changes by at most this share of the greatest difference between two
+    /// radiances that it can meet.
     pub fn share(&self) -> f64 {
         -libm::expm1(-self.tau)
     }
@@ -73,20 +74,42 @@ mod tests {
 
     #[test]
     fn what_lies_between_the_threshold_and_the_cutoff_is_counted() {
-        let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
+        let pose =
+            Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         // Three pixels at slopes −1, 0 and 1.
         let (fov_y_rad, smallest) = (2.0 * 0.5f64.atan(), 0.0);
         let (shift, threshold) = (DVec2::ZERO, 0.1);
-        let view = View { width: 3, height: 1, pose, fov_y_rad, near: 0.5, cutoff: 3.0, threshold, smallest, shift };
+        let view = View {
+            width: 3,
+            height: 1,
+            pose,
+            fov_y_rad,
+            near: 0.5,
+            cutoff: 3.0,
+            threshold,
+            smallest,
+            shift,
+        };
         // From a centre at depth 2 the outer rays pass at b = √2: b²/2σ² = 1 at σ = 1.
-        let blob = |tau: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * 2.0, sigma: 1.0, kappa: tau / SQRT_TAU };
-        let of = |blobs: &[Blob], depth: f64| cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None);
+        let blob = |tau: f64| Blob {
+            aspect: 1.0,
+            position: DVec3::NEG_Z * 2.0,
+            sigma: 1.0,
+            kappa: tau / SQRT_TAU,
+        };
+        let of = |blobs: &[Blob], depth: f64| {
+            cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None)
+        };
         let nothing = Cut::default();
         // τ = 0.2/e there: below the threshold. 0.3/e: not. 0.09: nowhere above it.
-        let [left, middle, right] = of(&[blob(0.2), blob(0.3), blob(0.09)], 9.0)[..] else { panic!("three pixels") };
+        let [left, middle, right] = of(&[blob(0.2), blob(0.3), blob(0.09)], 9.0)[..] else {
+            panic!("three pixels")
+        };
         assert_eq!((left.n_layers, middle.n_layers, right.n_layers), (2, 1, 2));
         assert!(
-            (left.tau - 0.29 / std::f64::consts::E).abs() < 1e-15 && left == right && (middle.tau - 0.09).abs() < 1e-15
+            (left.tau - 0.29 / std::f64::consts::E).abs() < 1e-15
+                && left == right
+                && (middle.tau - 0.09).abs() < 1e-15
         );
         assert!((left.share() - (1.0 - (-left.tau).exp())).abs() < 1e-15);
         assert!(left.share() < left.share_of_layers(0.1) && left.most(nothing) == left);
@@ -94,7 +117,10 @@ mod tests {
         // Pixels are one slope wide, σ = 1 at depth 2 half of one.
         let of = |smallest: f64| {
             let view = View { threshold: 0.0, smallest, ..view };
-            cut(&view, &[Behind::NOTHING; 3], &[blob(0.2)], None).iter().map(|c| c.n_layers).sum::<u32>()
+            cut(&view, &[Behind::NOTHING; 3], &[blob(0.2)], None)
+                .iter()
+                .map(|c| c.n_layers)
+                .sum::<u32>()
         };
         assert_eq!([of(0.0), of(0.499), of(0.501)], [0, 0, 3]);
     }

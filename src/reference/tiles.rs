@@ -1,5 +1,6 @@
-//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in that order may
-//! differ. In: blobs and eye relative to O, an order far to near. Out: as `sprites`, of which it is the same picture.
+//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in
+//! that order may differ. In: blobs and eye relative to O, an order far to near. Out: as `sprites`,
+//! of which it is the same picture.
 
 use glam::DVec3;
 
@@ -17,7 +18,8 @@ pub(super) struct Composed {
     pub off_passed: f64,
 }
 
-/// Puts a layer of true opacity, on the device within the second number of the device's, under what is composed.
+/// Puts a layer of true opacity, on the device within the second number of the device's, under what
+/// is composed.
 pub(super) type Layer = fn(&mut Composed, f64, f64, DVec3);
 
 impl Composed {
@@ -31,7 +33,8 @@ impl Composed {
         self.off_color += radiance.abs() * off_here;
         self.color += here * radiance;
         // here L and the sum with it.
-        self.off_color += U * (here + off_here) * radiance.abs() + U * (self.color.abs() + self.off_color);
+        self.off_color +=
+            U * (here + off_here) * radiance.abs() + U * (self.color.abs() + self.off_color);
         self.passed -= here;
         // A + T a: what A is off by goes on times 1 - a; the sum is rounded as what it is.
         self.off_passed = self.off_passed * ((1.0 - alpha).abs() + off)
@@ -42,7 +45,13 @@ impl Composed {
     }
 
     /// Over what stands behind: the pixel, and its bound. `most`: the brightest radiance there is.
-    fn over(&self, under: &Behind, r: &Rounding, saturated: f64, most: f64) -> ([f64; 4], [f64; 4]) {
+    fn over(
+        &self,
+        under: &Behind,
+        r: &Rounding,
+        saturated: f64,
+        most: f64,
+    ) -> ([f64; 4], [f64; 4]) {
         // What is left out behind a tile none of whose pixels lets `saturated` through.
         let skipped = if self.passed - self.off_passed < saturated { saturated } else { 0.0 };
         let channel = |k: usize| {
@@ -52,8 +61,10 @@ impl Composed {
             };
             let value = front + self.passed * under.color[k];
             let passed_most = self.passed + self.off_passed + U;
-            let inherited =
-                off + self.off_passed * under.color[k].abs() + passed_most * under.bound[k] + skipped * most;
+            let inherited = off
+                + self.off_passed * under.color[k].abs()
+                + passed_most * under.bound[k]
+                + skipped * most;
             let inherited = inherited + 2.0 * U * (value.abs() + inherited);
             if r.step > 0.0 {
                 // Cut to its range at the end alone, to one of the two steps beside it.
@@ -74,7 +85,8 @@ pub struct Composition<'a> {
     pub radiance: &'a [DVec3],
     pub order: &'a [u32],
     pub factor: Option<Factor<'a>>,
-    /// How the device may depart: opacities by `alpha` of themselves, edges by `edge`, the target by `unit`.
+    /// How the device may depart: opacities by `alpha` of themselves, edges by `edge`, the target
+    /// by `unit`.
     pub rounding: Rounding,
     /// What lies behind less than this may be left out.
     pub saturated: f64,
@@ -86,8 +98,13 @@ pub fn render_over(of: &Composition<'_>, behind: &[Behind]) -> (Vec<[f64; 4]>, V
 }
 
 /// The same where a device composes by another form of the law, with errors of its own.
-pub(super) fn render_by(of: &Composition<'_>, behind: &[Behind], layer: Layer) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    let (view, most) = (of.view, of.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
+pub(super) fn render_by(
+    of: &Composition<'_>,
+    behind: &[Behind],
+    layer: Layer,
+) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+    let (view, most) =
+        (of.view, of.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
     let pixel = |(i_pixel, under): (usize, &Behind)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
         compose(of, view.ray(i, j), under, layer).over(under, &of.rounding, of.saturated, most)
@@ -97,7 +114,8 @@ pub(super) fn render_by(of: &Composition<'_>, behind: &[Behind], layer: Layer) -
 
 fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind, layer: Layer) -> Composed {
     let Composition { view, blobs, radiance, order, factor, rounding: r, .. } = of;
-    let mut pixel = Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
+    let mut pixel =
+        Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
     for &k in order.iter().rev() {
         let (blob, k) = (&blobs[k as usize], k as usize);
         let c = blob.position - view.pose.position;
@@ -121,7 +139,8 @@ fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind, layer: Layer) -> Co
         let delta = view.slopes_of(ray) - view.slopes_of(c);
         let factor = factor.map_or(1.0, |f| f(k, delta));
         let alpha = alpha(factor * line.tau());
-        let off = if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+        let off =
+            if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
         let drawn = if is_in && depth <= under.depth && above >= 0.0 { alpha } else { 0.0 };
         layer(&mut pixel, drawn, off, radiance[k]);
     }
@@ -137,7 +156,8 @@ mod tests {
 
     #[test]
     fn near_to_far_is_the_picture_of_far_to_near() {
-        let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
+        let pose =
+            Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
         let view = View {
             width: 3,
             height: 2,
@@ -155,7 +175,8 @@ mod tests {
             sigma: 0.5,
             kappa: tau / (SQRT_TAU * 0.5),
         };
-        let (blobs, colors) = ([at(0.1, 2.0, 0.7), at(-0.2, 4.0, 3.0)], [DVec3::X, DVec3::new(0.2, 1.0, 2.0)]);
+        let (blobs, colors) =
+            ([at(0.1, 2.0, 0.7), at(-0.2, 4.0, 3.0)], [DVec3::X, DVec3::new(0.2, 1.0, 2.0)]);
         let under = Behind { color: [0.0, 0.0, 1.0, 1.0], depth: 3.0, ..Behind::NOTHING };
         for under in [Behind::NOTHING, Behind { depth: 9.0, ..under }, under] {
             let behind = [under; 6];
@@ -170,7 +191,8 @@ mod tests {
                 saturated: 0.0,
             };
             let (near_first, bound) = render_over(&of, &behind);
-            let (far_first, _) = sprites::render_over(&view, &behind, &blobs, &colors, &[1, 0], &none);
+            let (far_first, _) =
+                sprites::render_over(&view, &behind, &blobs, &colors, &[1, 0], &none);
             for (a, b) in near_first.concat().iter().zip(far_first.concat()) {
                 assert!((a - b).abs() < 1e-15, "{a} {b}");
             }

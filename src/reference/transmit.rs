@@ -1,6 +1,6 @@
-//! How much of every light arrives at every facet: past the surfaces and through the density grid, model.md §8 and §11
-//! "transmit". In: grid, rectangles, facets and lights, all relative to O. Out: [facet × light], light fastest;
-//! dimensionless.
+//! How much of every light arrives at every facet: past the surfaces and through the density grid,
+//! model.md §8 and §11 "transmit". In: grid, rectangles, facets and lights, all relative to O. Out:
+//! [facet × light], light fastest; dimensionless.
 
 use glam::DVec3;
 
@@ -9,8 +9,8 @@ use super::occlude::{Rectangle, is_clear};
 use crate::model::grid::GridSpec;
 use crate::model::light::Light;
 
-/// Greatest number of march steps, 8 a cell along the longest axis of the largest grid: no `step` knob hangs a GPU.
-/// A march that would need more ends after this many.
+/// Greatest number of march steps, 8 a cell along the longest axis of the largest grid: no `step`
+/// knob hangs a GPU. A march that would need more ends after this many.
 pub const MAX_STEPS: u32 = 4096;
 
 /// What light can meet on its way, and how it is marched through.
@@ -33,8 +33,8 @@ pub struct Receiver {
     pub i_region: u32,
 }
 
-/// From where to where the way from `p` along unit `d`, `distance` long, leads through the grid's box, faces included;
-/// `None` where it misses the box.
+/// From where to where the way from `p` along unit `d`, `distance` long, leads through the grid's
+/// box, faces included; `None` where it misses the box.
 pub fn crossing(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64) -> Option<(f64, f64)> {
     let (low, high) = (spec.low, spec.high());
     let (mut enter, mut leave) = (0f64, distance);
@@ -56,9 +56,17 @@ pub fn n_steps(length: f64, step: f64) -> u32 {
     ((length / step).ceil() as u32).clamp(1, MAX_STEPS)
 }
 
-/// τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`: steps of `step` cells from where the way enters the grid's
-/// box, the last one shorter, so that τ is continuous in the length; x_k is the middle of step k.
-pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, distance: f64, step: f64) -> f64 {
+/// τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`: steps of `step` cells from where the
+/// way enters the grid's box, the last one shorter, so that τ is continuous in the length; x_k is
+/// the middle of step k.
+pub fn optical_depth(
+    spec: &GridSpec,
+    cells: &[f64],
+    p: DVec3,
+    d: DVec3,
+    distance: f64,
+    step: f64,
+) -> f64 {
     let Some((enter, leave)) = crossing(spec, p, d, distance) else { return 0.0 };
     let (length, step) = (leave - enter, step / spec.cells_along(d));
     let of_step = |k: u32| {
@@ -71,7 +79,8 @@ pub fn optical_depth(spec: &GridSpec, cells: &[f64], p: DVec3, d: DVec3, distanc
 
 /// Samples of the grid that [`optical_depth`] takes.
 pub fn n_samples(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64, step: f64) -> u32 {
-    crossing(spec, p, d, distance).map_or(0, |(enter, leave)| n_steps(leave - enter, step / spec.cells_along(d)))
+    crossing(spec, p, d, distance)
+        .map_or(0, |(enter, leave)| n_steps(leave - enter, step / spec.cells_along(d)))
 }
 
 impl Obstacles<'_> {
@@ -86,7 +95,8 @@ impl Obstacles<'_> {
         is_clear(self.rectangles, receiver.i_region, p, light)
     }
 
-    /// V = [nothing hides the way] e^{−(1−g)τ} of every facet toward every light; 0 toward lights without energy.
+    /// V = [nothing hides the way] e^{−(1−g)τ} of every facet toward every light; 0 toward lights
+    /// without energy.
     pub fn transmittance(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
         let one = |r: &Receiver, light: &Light| {
             let is_lit = light.energy() != DVec3::ZERO && self.is_clear(r, r.position, light);
@@ -98,7 +108,11 @@ impl Obstacles<'_> {
     /// What clouds alone let through, [receiver × light]; 0 of a light without energy.
     pub fn through(&self, receivers: &[Receiver], lights: &[Light]) -> Vec<f64> {
         let one = |r: &Receiver, light: &Light| {
-            if light.energy() == DVec3::ZERO { 0.0 } else { self.through_the_cloud(r.position, light) }
+            if light.energy() == DVec3::ZERO {
+                0.0
+            } else {
+                self.through_the_cloud(r.position, light)
+            }
         };
         receivers.iter().flat_map(|r| lights.iter().map(move |l| one(r, l))).collect()
     }
@@ -110,12 +124,15 @@ mod tests {
     use glam::UVec3;
 
     /// 8 × 4 × 4 cells of edge ½, low corner at the origin.
-    const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::new(8, 4, 4), cell: 0.5, low: DVec3::ZERO };
+    const SPEC: GridSpec =
+        GridSpec { aspect: 1.0, n_cells: UVec3::new(8, 4, 4), cell: 0.5, low: DVec3::ZERO };
     const SUN: Light = Light::Directional { direction: DVec3::NEG_X, irradiance: DVec3::ONE };
 
     fn transmittance(cells: &[f64], positions: &[DVec3], light: Light, forward: f64) -> Vec<f64> {
-        let receivers: Vec<_> = positions.iter().map(|&position| Receiver { position, i_region: 0 }).collect();
-        Obstacles { spec: &SPEC, cells, rectangles: &[], step: 0.5, forward }.transmittance(&receivers, &[light])
+        let receivers: Vec<_> =
+            positions.iter().map(|&position| Receiver { position, i_region: 0 }).collect();
+        Obstacles { spec: &SPEC, cells, rectangles: &[], step: 0.5, forward }
+            .transmittance(&receivers, &[light])
     }
 
     #[test]
@@ -132,8 +149,9 @@ mod tests {
     fn through_a_uniform_block_transmittance_is_an_exponential() {
         let cells = vec![1.5; 128];
         let p = DVec3::new(0.25, 1.0, 1.0);
-        // From the first cell's centre to the last one's: L = 3.5; the half cell beyond lies outside the hull
-        // of the centres and holds nothing. Midpoints of half cells meet every face exactly.
+        // From the first cell's centre to the last one's: L = 3.5; the half cell beyond lies
+        // outside the hull of the centres and holds nothing. Midpoints of half cells meet every
+        // face exactly.
         let v = |forward| transmittance(&cells, &[p], SUN, forward)[0];
         for forward in [0.0, 0.85] {
             assert!((v(forward) / (-(1.0 - forward) * 1.5 * 3.5f64).exp() - 1.0).abs() < 1e-14);
@@ -144,12 +162,16 @@ mod tests {
     #[test]
     fn rays_that_leave_at_once_or_miss_the_box_meet_nothing() {
         let cells = vec![1.5; 128];
-        let leaving = [DVec3::new(4.0, 1.0, 1.0), DVec3::new(4.1, 1.0, 1.0), DVec3::new(-1.0, 2.1, 1.0)];
+        let leaving =
+            [DVec3::new(4.0, 1.0, 1.0), DVec3::new(4.1, 1.0, 1.0), DVec3::new(-1.0, 2.1, 1.0)];
         assert_eq!(transmittance(&cells, &leaving, SUN, 0.0), [1.0; 3]);
         assert_eq!(crossing(&SPEC, DVec3::ONE, DVec3::ZERO, f64::INFINITY), None);
         // Along a face it is inside, beyond its corner it is not.
         assert_eq!(crossing(&SPEC, DVec3::ZERO, DVec3::X, f64::INFINITY), Some((0.0, 4.0)));
-        assert_eq!(crossing(&SPEC, DVec3::new(-1.0, 3.5, 1.0), DVec3::new(0.6, -0.8, 0.0), 9.0), Some((1.875, 4.375)));
+        assert_eq!(
+            crossing(&SPEC, DVec3::new(-1.0, 3.5, 1.0), DVec3::new(0.6, -0.8, 0.0), 9.0),
+            Some((1.875, 4.375))
+        );
         assert_eq!(crossing(&SPEC, DVec3::new(-1.0, 1.0, 1.0), DVec3::X, 0.9), None);
     }
 
@@ -160,8 +182,11 @@ mod tests {
             let position = DVec3::new(x, 1.0, 1.0);
             Light::Point { position, intensity: DVec3::ONE, radius: 1e-3 }
         };
-        let v = |from: f64, light: Light| transmittance(&cells, &[DVec3::new(from, 1.0, 1.0)], light, 0.0)[0];
-        // From the hull of the centres at ¼ on: to a lamp at 3, and back; to a lamp before the box; through all of it.
+        let v = |from: f64, light: Light| {
+            transmittance(&cells, &[DVec3::new(from, 1.0, 1.0)], light, 0.0)[0]
+        };
+        // From the hull of the centres at ¼ on: to a lamp at 3, and back; to a lamp before the box;
+        // through all of it.
         assert!((v(-2.0, lamp(3.0)) / (-2.75f64).exp() - 1.0).abs() < 1e-14);
         assert!((v(3.0, lamp(-2.0)) / (-2.75f64).exp() - 1.0).abs() < 1e-14);
         assert!((v(1.0, lamp(3.0)) / (-2.0f64).exp() - 1.0).abs() < 1e-14);
@@ -172,13 +197,24 @@ mod tests {
     #[test]
     fn rectangles_hide_and_clouds_dim() {
         use crate::model::surface::Surface;
-        let surface =
-            |center, subdivide| Surface { center, u: 2.0 * DVec3::Z, v: 2.0 * DVec3::X, i_material: 0, subdivide };
+        let surface = |center, subdivide| Surface {
+            center,
+            u: 2.0 * DVec3::Z,
+            v: 2.0 * DVec3::X,
+            i_material: 0,
+            subdivide,
+        };
         // A floor of one facet, and above it a lid over x −3…1, z −2…2.
         let floor = Rectangle::new(&surface(DVec3::NEG_Y, [1, 1]), DVec3::ZERO);
         let lid = Rectangle::new(&surface(DVec3::new(-1.0, 5.0, 0.0), [2, 2]), DVec3::ZERO);
         let (cells, rectangles) = (vec![1.0; 128], [floor, lid]);
-        let all = Obstacles { spec: &SPEC, cells: &cells, rectangles: &rectangles, step: 0.5, forward: 0.5 };
+        let all = Obstacles {
+            spec: &SPEC,
+            cells: &cells,
+            rectangles: &rectangles,
+            step: 0.5,
+            forward: 0.5,
+        };
         let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
         let dark = Light::Sky { irradiance: DVec3::ZERO, constant: 0.0 };
         let at = |x: f64, y: f64, i_region| Receiver { position: DVec3::new(x, y, 1.0), i_region };
@@ -197,8 +233,10 @@ mod tests {
         let sky = Light::Sky { irradiance: DVec3::ONE, constant: 0.0 };
         let p = [DVec3::new(0.25, 1.0, 1.0), DVec3::new(2.25, 1.0, 1.0)];
         let receivers = p.map(|position| Receiver { position, i_region: 0 });
-        let all = Obstacles { spec: &SPEC, cells: &[1.0; 128], rectangles: &[], step: 0.5, forward: 0.0 };
-        // +x: 3.5 and 1.5; +y: from 1 to the last centre at 1.75. Sums of exact halves and quarters.
+        let all =
+            Obstacles { spec: &SPEC, cells: &[1.0; 128], rectangles: &[], step: 0.5, forward: 0.0 };
+        // +x: 3.5 and 1.5; +y: from 1 to the last centre at 1.75. Sums of exact halves and
+        // quarters.
         let expected = [3.5f64, 0.75, 1.5, 0.75].map(|tau| (-tau).exp());
         assert_eq!(all.transmittance(&receivers, &[SUN, sky]), expected);
         let leave = crossing(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0), f64::INFINITY);
@@ -209,17 +247,23 @@ mod tests {
 
     #[test]
     fn the_last_step_is_shorter_and_the_depth_continuous() {
-        // ρ = x between the centres of the first and the last cell: the midpoint rule is exact on whole steps.
+        // ρ = x between the centres of the first and the last cell: the midpoint rule is exact on
+        // whole steps.
         let cells: Vec<f64> = (0..128).map(|i| 0.25 + 0.5 * f64::from(i % 8)).collect();
-        let tau = |x: f64| optical_depth(&SPEC, &cells, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0);
-        // By hand, steps of ½ from 2.8: midpoints 3.05, 3.55; the last from 3.8 to 4 is 0.2 long, its midpoint at
-        // 3.9 beyond the last centre. From 2.1 the last lies at 3.6…4, its midpoint 3.8 outside too.
+        let tau = |x: f64| {
+            optical_depth(&SPEC, &cells, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0)
+        };
+        // By hand, steps of ½ from 2.8: midpoints 3.05, 3.55; the last from 3.8 to 4 is 0.2 long,
+        // its midpoint at 3.9 beyond the last centre. From 2.1 the last lies at 3.6…4, its midpoint
+        // 3.8 outside too.
         assert!((tau(2.8) - 0.5 * (3.05 + 3.55)).abs() < 1e-14);
         assert!((tau(2.1) - 0.5 * (2.35 + 2.85 + 3.35)).abs() < 1e-14);
-        // Where a ray's length passes a whole number of steps, the step that comes in has length 0. With an empty
-        // margin, as a scene's grid has it, the density is continuous too.
+        // Where a ray's length passes a whole number of steps, the step that comes in has length 0.
+        // With an empty margin, as a scene's grid has it, the density is continuous too.
         let margin: Vec<f64> = (0..128).map(|i| if i % 8 == 7 { 0.0 } else { cells[i] }).collect();
-        let tau = |x: f64| optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0);
+        let tau = |x: f64| {
+            optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0)
+        };
         assert!(tau(2.5) > 0.0 && (tau(2.5 - 1e-9) - tau(2.5 + 1e-9)).abs() < 1e-7);
         // In a grid the march ends after MAX_STEPS.
         let short = optical_depth(&SPEC, &[1.0; 128], DVec3::ONE, DVec3::X, f64::INFINITY, 1e-4);

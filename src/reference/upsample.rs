@@ -1,6 +1,7 @@
-//! The blobs' smaller picture put over the full one, model.md §11 "upsample", in f64.
-//! In: the small picture, of blobs alone; where there are surfaces their picture, and near/z of what small and full pixels
-//! see. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top, and what the terms of each sum to in magnitude.
+//! The blobs' smaller picture put over the full one, model.md §11 "upsample", in f64. In: the small
+//! picture, of blobs alone; where there are surfaces their picture, and near/z of what small and
+//! full pixels see. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top, and what the
+//! terms of each sum to in magnitude.
 
 use crate::model::resolution::{ALIKE, SmallPicture};
 
@@ -38,7 +39,12 @@ pub fn render(small: &SmallPicture, blobs: &[[f64; 4]], under: Option<&Under<'_>
 }
 
 /// The same where depths are of one surface up to another share.
-pub fn render_alike(small: &SmallPicture, blobs: &[[f64; 4]], under: Option<&Under<'_>>, alike: f64) -> Vec<Summed> {
+pub fn render_alike(
+    small: &SmallPicture,
+    blobs: &[[f64; 4]],
+    under: Option<&Under<'_>>,
+    alike: f64,
+) -> Vec<Summed> {
     let rows = (0..small.full[1]).flat_map(|j| (0..small.full[0]).map(move |i| [i, j]));
     rows.map(|pixel| {
         let (mut sum, mut of_terms) = interpolated(small, blobs, under, pixel, alike);
@@ -123,8 +129,13 @@ fn summed(blobs: &[[f64; 4]], taps: &[(usize, f64)]) -> Summed {
 mod tests {
     use super::*;
 
-    fn by_hand(depths: [f64; 2], small_depth: &dyn Fn(u32) -> f64, value: &dyn Fn(u32) -> f64) -> Vec<f64> {
-        // Two full pixels; 2 n = 4, o = 1 + 8·2 − 2 − 2 = 13: the pixels lie at 13/4 and 15/4 of 8 columns.
+    fn by_hand(
+        depths: [f64; 2],
+        small_depth: &dyn Fn(u32) -> f64,
+        value: &dyn Fn(u32) -> f64,
+    ) -> Vec<f64> {
+        // Two full pixels; 2 n = 4, o = 1 + 8·2 − 2 − 2 = 13: the pixels lie at 13/4 and 15/4 of 8
+        // columns.
         let small = SmallPicture::of([2, 1], 2);
         assert_eq!((small.size, small.offsets()), ([8, 8], [13, 14]));
         let columns = || (0..64).map(|i| i % 8);
@@ -145,14 +156,16 @@ mod tests {
 
     #[test]
     fn polynomials_of_degree_five_are_met() {
-        let f = |x: f64| 0.5 + 0.1 * (x - 3.5) - 0.02 * (x - 3.5).powi(3) + 0.003 * (x - 3.5).powi(5);
+        let f =
+            |x: f64| 0.5 + 0.1 * (x - 3.5) - 0.02 * (x - 3.5).powi(3) + 0.003 * (x - 3.5).powi(5);
         let got = by_hand([0.5; 2], &|_| 0.5, &|x| f(f64::from(x)));
         assert!((got[0] - f(3.25)).abs() < 1e-14 && (got[1] - f(3.75)).abs() < 1e-14, "{got:?}");
     }
 
     #[test]
     fn edges_of_depth_part_what_is_interpolated() {
-        // Columns 0 to 3 stand at near/z = 0.5, the others at 0.2; so do the pixels: each has its own side's value.
+        // Columns 0 to 3 stand at near/z = 0.5, the others at 0.2; so do the pixels: each has its
+        // own side's value.
         let step = |low: f64, high: f64| move |x: u32| if x < 4 { low } else { high };
         let got = by_hand([0.5, 0.2], &step(0.5, 0.2), &step(0.9, 0.1));
         assert!((got[0] - 0.9).abs() < 1e-15 && (got[1] - 0.1).abs() < 1e-15, "{got:?}");
@@ -160,7 +173,8 @@ mod tests {
         let far = |x: u32| if x < 6 { 0.5 } else { 0.1 };
         let got = by_hand([0.5, 0.5], &far, &|x| 0.1 * f64::from(x));
         assert!((got[0] - 0.325).abs() < 1e-15 && (got[1] - 0.375).abs() < 1e-15, "{got:?}");
-        // Nothing of 3 and 4 is alike: the nearest that is, column 2 of the first pixel and column 5 of the second.
+        // Nothing of 3 and 4 is alike: the nearest that is, column 2 of the first pixel and column
+        // 5 of the second.
         let gap = |x: u32| if x == 3 || x == 4 { 0.9 } else { 0.3 };
         let got = by_hand([0.3, 0.3], &gap, &|x| 0.1 * f64::from(x));
         assert!((got[0] - 0.2).abs() < 1e-15 && (got[1] - 0.5).abs() < 1e-15, "{got:?}");

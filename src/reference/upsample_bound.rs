@@ -1,11 +1,14 @@
-//! What a pixel may change where blobs are drawn into a smaller picture, model.md §11 "upsample": Lagrange's remainder with
-//! the sixth derivatives bounded by majorant power series, and the steps where blobs end.
+//! What a pixel may change where blobs are drawn into a smaller picture, model.md §11 "upsample":
+//! Lagrange's remainder with the sixth derivatives bounded by majorant power series, and the steps
+//! where blobs end.
 
-/// Of the interpolation along one axis: the greatest |Π (t − k)| of its six taps, and Σ |w| of its weights, both at t = ½.
+/// Of the interpolation along one axis: the greatest |Π (t − k)| of its six taps, and Σ |w| of its
+/// weights, both at t = ½.
 const PRODUCT: f64 = 225.0 / 64.0;
 const LEBESGUE: f64 = 356.0 / 256.0;
 /// h_k/k! for k from 1 to 6, h_k the greatest |He_k(x) e^{−x²/2}|, rounded up.
-const GAUSSIAN: [f64; 6] = [0.606_531, 0.5, 1.380_2 / 6.0, 3.0 / 24.0, 5.783_5 / 120.0, 15.0 / 720.0];
+const GAUSSIAN: [f64; 6] =
+    [0.606_531, 0.5, 1.380_2 / 6.0, 3.0 / 24.0, 5.783_5 / 120.0, 15.0 / 720.0];
 
 /// A blob as a pixel's taps see it: its greatest optical depth, and σ in small pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,8 +19,9 @@ pub struct Seen {
     pub crosses: bool,
 }
 
-/// The most that a channel of radiances up to `brightest` (1 for alpha) may differ from the full picture, where `seen` are
-/// the blobs that the pixel or one of its taps is covered by; `edge` is e^{−cutoff²/2}.
+/// The most that a channel of radiances up to `brightest` (1 for alpha) may differ from the full
+/// picture, where `seen` are the blobs that the pixel or one of its taps is covered by; `edge` is
+/// e^{−cutoff²/2}.
 pub fn bound(seen: &[Seen], edge: f64, brightest: f64) -> f64 {
     let mut q = [0.0; 7];
     let (mut depth, mut steps) = (0.0, 0.0);
@@ -60,7 +64,10 @@ mod tests {
     fn one_thin_blob_by_hand() {
         // To first order in τ: 2.390625 · 3.515625 · τ · 15/720 / σ⁶ with σ = 2.
         let of = bound(&[Seen { tau: 1e-9, sigma: 2.0, crosses: false }], 0.0, 1.0);
-        assert!((of / (1e-9 * 2.390_625 * 3.515_625 * 15.0 / 720.0 / 64.0) - 1.0).abs() < 1e-6, "{of:e}");
+        assert!(
+            (of / (1e-9 * 2.390_625 * 3.515_625 * 15.0 / 720.0 / 64.0) - 1.0).abs() < 1e-6,
+            "{of:e}"
+        );
         // A step alone: 1 + Λ² = 2.9338… of τ e^{−4.5}.
         let of = bound(&[Seen { tau: 1e-9, sigma: 1e9, crosses: true }], (-4.5f64).exp(), 2.0);
         let expected = 2.0 * (1.0 + LEBESGUE * LEBESGUE) * 1e-9 * (-4.5f64).exp();
@@ -78,7 +85,8 @@ mod tests {
     impl Blob {
         /// τ at a place, 0 beyond 3 σ.
         fn tau_at(&self, x: f64, y: f64) -> f64 {
-            let e = ((x - self.at[0]).powi(2) + (y - self.at[1]).powi(2)) / (2.0 * self.sigma * self.sigma);
+            let e = ((x - self.at[0]).powi(2) + (y - self.at[1]).powi(2))
+                / (2.0 * self.sigma * self.sigma);
             if e <= 4.5 { self.tau * (-e).exp() } else { 0.0 }
         }
     }
@@ -99,10 +107,13 @@ mod tests {
         let full = [40, 30];
         let mut state = 7u64;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
-        for (n_blobs, tau_most, n, least) in [(1, 0.1, 2, 3.0), (30, 0.1, 2, 2.0), (30, 0.1, 4, 5.0), (8, 1.5, 2, 3.0)]
+        for (n_blobs, tau_most, n, least) in
+            [(1, 0.1, 2, 3.0), (30, 0.1, 2, 2.0), (30, 0.1, 4, 5.0), (8, 1.5, 2, 3.0)]
         {
             let small = SmallPicture::of(full, n);
             let blobs: Vec<Blob> = (0..n_blobs)
@@ -114,7 +125,8 @@ mod tests {
                 })
                 .collect();
             let place = |k: u32, axis: usize| {
-                (f64::from(k) + 0.5 - 0.5 * f64::from(small.size[axis])) * f64::from(n) + 0.5 * f64::from(full[axis])
+                (f64::from(k) + 0.5 - 0.5 * f64::from(small.size[axis])) * f64::from(n)
+                    + 0.5 * f64::from(full[axis])
             };
             let [w, h] = small.size;
             let picture: Vec<[f64; 4]> =
@@ -131,17 +143,27 @@ mod tests {
                     .filter_map(|b| {
                         let n_in = places.iter().filter(|(x, y)| b.tau_at(*x, *y) > 0.0).count();
                         let sigma = b.sigma / f64::from(n);
-                        (n_in > 0).then_some(Seen { tau: b.tau, sigma, crosses: n_in < places.len() })
+                        (n_in > 0).then_some(Seen {
+                            tau: b.tau,
+                            sigma,
+                            crosses: n_in < places.len(),
+                        })
                     })
                     .collect();
                 let truth = composed(&blobs, x, y);
                 for k in [0, 3] {
-                    let (error, most) = ((value[k] - truth[k]).abs(), bound(&seen, (-4.5f64).exp(), 1.0));
-                    assert!(error <= most + 1e-14, "{n_blobs} blobs, 1/{n}, pixel {i} {j}: {error:e} > {most:e}");
+                    let (error, most) =
+                        ((value[k] - truth[k]).abs(), bound(&seen, (-4.5f64).exp(), 1.0));
+                    assert!(
+                        error <= most + 1e-14,
+                        "{n_blobs} blobs, 1/{n}, pixel {i} {j}: {error:e} > {most:e}"
+                    );
                     greatest = if most > 0.0 { greatest.max(error / most) } else { greatest };
                 }
             }
-            println!("{n_blobs} blobs of tau up to {tau_most}, 1/{n}: greatest error/bound {greatest:.3}");
+            println!(
+                "{n_blobs} blobs of tau up to {tau_most}, 1/{n}: greatest error/bound {greatest:.3}"
+            );
             // No bound that nothing comes near: one blob's edge does.
             assert!(n_blobs > 1 || greatest > 0.05);
         }

@@ -1,6 +1,7 @@
-//! The volume that sprites stand for, model.md §11 "volume": emission and absorption of overlapping Gaussian blobs along
-//! every pixel's ray, in f64, with an error estimate.
-//! In: blobs and eye relative to O, a radiance a blob, what stands behind. Out: [C_r, C_g, C_b, A] a pixel, row 0 at the top.
+//! The volume that sprites stand for, model.md §11 "volume": emission and absorption of overlapping
+//! Gaussian blobs along every pixel's ray, in f64, with an error estimate. In: blobs and eye
+//! relative to O, a radiance a blob, what stands behind. Out: [C_r, C_g, C_b, A] a pixel, row 0 at
+//! the top.
 
 mod piece;
 #[cfg(test)]
@@ -35,11 +36,11 @@ struct Passed {
     to: f64,
 }
 
-/// Optical depth that all blobs together may have where they are taken to have ended: each its share, on either side or
-/// wherever its line passes.
+/// Optical depth that all blobs together may have where they are taken to have ended: each its
+/// share, on either side or wherever its line passes.
 const OMITTED: f64 = 1e-12;
-/// What this changes of a picture, by its greatest radiance: a blob's share on either side, once as light and once as
-/// shadow; and the rounding of sums of erfs, which is of the same order.
+/// What this changes of a picture, by its greatest radiance: a blob's share on either side, once as
+/// light and once as shadow; and the rounding of sums of erfs, which is of the same order.
 const OMITTED_ERROR: f64 = 8.0 * OMITTED;
 /// Of the greatest radiance: the error that a pixel's pieces share.
 const ACCURACY: f64 = 1e-6;
@@ -80,7 +81,8 @@ impl<'a> Volume<'a> {
     /// Some pixels of row `j`: their columns, and what is behind each.
     pub fn of_row(&self, j: u32, columns: impl Iterator<Item = (u32, Behind)>) -> Vec<Pixel> {
         let inside = |(from, to): (u32, u32), i: u32| (from..to).contains(&i);
-        let of_row: Vec<usize> = (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
+        let of_row: Vec<usize> =
+            (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
         let mut march = March::default();
         let pixel = |(i, behind): (u32, Behind)| {
             let ray = self.view.ray(i, j);
@@ -97,7 +99,8 @@ impl<'a> Volume<'a> {
         let c = blob.position - self.view.pose.position;
         let depth = blob.along(c, ray).tau();
         let white = blob.whiten(ray);
-        let (center, width) = (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
+        let (center, width) =
+            (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         let reach = reach(depth, self.omitted) * width;
         let (from, to) = ((center - reach).max(self.view.near), (center + reach).min(end));
         (from < to).then_some(Passed { center, width, depth, radiance: self.radiance[k], from, to })
@@ -111,12 +114,15 @@ impl<'a> Volume<'a> {
         let brightest = behind.color.iter().fold(self.brightest, |most, v| most.max(v.abs()));
         // 1 − T (1 − A_s), without losing a thin cloud's digits.
         let alpha = -libm::expm1(-tau) + through * a;
-        Pixel { color: [shown.x, shown.y, shown.z, alpha], error: error + OMITTED_ERROR * brightest }
+        Pixel {
+            color: [shown.x, shown.y, shown.z, alpha],
+            error: error + OMITTED_ERROR * brightest,
+        }
     }
 }
 
-/// From how many σ on a blob of optical depth `depth` has less than `omitted` left; 0 where it never has more (or is no
-/// blob). The tail beyond x is below e^{−x²/2}/2 of the whole.
+/// From how many σ on a blob of optical depth `depth` has less than `omitted` left; 0 where it
+/// never has more (or is no blob). The tail beyond x is below e^{−x²/2}/2 of the whole.
 fn reach(depth: f64, omitted: f64) -> f64 {
     if depth > omitted { (2.0 * (depth / omitted).ln()).sqrt() } else { 0.0 }
 }
@@ -125,5 +131,8 @@ fn reach(depth: f64, omitted: f64) -> f64 {
 pub fn render(view: &View, behind: &[Behind], blobs: &[Blob], radiance: &[DVec3]) -> Vec<Pixel> {
     let volume = Volume::new(view, blobs, radiance);
     let width = view.width as usize;
-    super::area::mean::each(view.height as usize, |j| volume.row(j as u32, &behind[j * width..][..width])).concat()
+    super::area::mean::each(view.height as usize, |j| {
+        volume.row(j as u32, &behind[j * width..][..width])
+    })
+    .concat()
 }

@@ -1,5 +1,5 @@
-//! What pictures are measured by: `--against thin|volume|model|reflections=K`. Each takes away what the one before it
-//! still shares with the device's picture.
+//! What pictures are measured by: `--against thin|volume|model|reflections=K`. Each takes away what
+//! the one before it still shares with the device's picture.
 
 use std::fmt;
 use std::str::FromStr;
@@ -24,13 +24,13 @@ use crate::reference::volume::{Pixel, Volume};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Against {
-    /// Light as the scene has it computed, but in f64 and with areas integrated; sorted thin sprites, all of them and
-    /// uncut.
+    /// Light as the scene has it computed, but in f64 and with areas integrated; sorted thin
+    /// sprites, all of them and uncut.
     Thin,
     /// The same light; the integral over the overlapping blobs.
     Volume,
-    /// Light by the model itself ([`super::model_light`]); the integral over the overlapping blobs, and surfaces lit
-    /// pixel by pixel.
+    /// Light by the model itself ([`super::model_light`]); the integral over the overlapping blobs,
+    /// and surfaces lit pixel by pixel.
     Model,
     /// The model with this many reflections in place of the scene's.
     Reflections(u32),
@@ -45,7 +45,8 @@ impl FromStr for Against {
     fn from_str(text: &str) -> std::result::Result<Against, String> {
         let wrong = || {
             format!(
-                "expected thin, volume, model or reflections=K with K from 1 to {MOST_REFLECTIONS}, found \"{text}\""
+                "expected thin, volume, model or reflections=K with K from 1 to \
+                 {MOST_REFLECTIONS}, found \"{text}\""
             )
         };
         match text {
@@ -54,7 +55,9 @@ impl FromStr for Against {
             "model" => Ok(Against::Model),
             _ => {
                 let k = text.strip_prefix("reflections=").and_then(|k| k.parse().ok());
-                k.filter(|k| (1..=MOST_REFLECTIONS).contains(k)).map(Against::Reflections).ok_or_else(wrong)
+                k.filter(|k| (1..=MOST_REFLECTIONS).contains(k))
+                    .map(Against::Reflections)
+                    .ok_or_else(wrong)
             }
         }
     }
@@ -113,14 +116,21 @@ impl Against {
         picture::check(scene, time_s, drawing)?;
         if matches!(self, Against::Reflections(_)) && scene.lighting.mode == LightingMode::None {
             return Err(Error::usage(format!(
-                "{self}: nothing reflects where lighting.mode is \"none\"; expected thin, volume or model"
+                "{self}: nothing reflects where lighting.mode is \"none\"; expected thin, \
+                 volume or model"
             )));
         }
         Ok(())
     }
 
     /// The picture of `scene` at `time_s`, at `pixels`.
-    pub fn reference(self, scene: &Scene, time_s: f64, pixels: &Pixels, listener: Listener) -> Result<Reference> {
+    pub fn reference(
+        self,
+        scene: &Scene,
+        time_s: f64,
+        pixels: &Pixels,
+        listener: Listener,
+    ) -> Result<Reference> {
         let begin = Instant::now();
         self.check(scene, time_s)?;
         let scene = &Against::of_scene(scene);
@@ -133,7 +143,8 @@ impl Against {
         };
         let drawn = match self {
             Against::Thin | Against::Volume => {
-                let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
+                let truth =
+                    Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
                 let drawing = if self == Against::Thin { Drawing::Thin } else { Drawing::Volume };
                 of_scene_light(scene, &truth, drawing, pixels, Sample::CENTER, listener)
             }
@@ -215,7 +226,10 @@ pub(super) fn of_scene_light(
     if drawing == Drawing::Thin {
         let brightest = radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max);
         let doubts = vec![of_quadrature(of_light + ROUNDING * brightest); pixels.at.len()];
-        return Drawn { rgba: thin(scene, truth, &view, (&behind, &radiance), pixels, listener), doubts };
+        return Drawn {
+            rgba: thin(scene, truth, &view, (&behind, &radiance), pixels, listener),
+            doubts,
+        };
     }
     let found = volume(&Volume::new(&view, &truth.blobs, &radiance), pixels, &behind, listener);
     let doubts = found.iter().map(|p| of_quadrature(p.error + of_light)).collect();
@@ -233,7 +247,9 @@ fn thin(
 ) -> Vec<[f64; 4]> {
     let (blobs, order) = picture::drawn(scene, truth);
     let textured = picture::sheets(scene, truth, view);
-    let factor = |j: usize, delta: DVec2| textured.as_ref().map_or(1.0, |(pool, sheets)| sheets[j].factor(pool, delta));
+    let factor = |j: usize, delta: DVec2| {
+        textured.as_ref().map_or(1.0, |(pool, sheets)| sheets[j].factor(pool, delta))
+    };
     let factor: Option<Factor> = if textured.is_some() { Some(&factor) } else { None };
     let layers = Layers { blobs: &blobs, radiance, order: &order, factor };
     let on_row = |n: usize| listener(Work::Drawing, n);
@@ -243,7 +259,12 @@ fn thin(
 }
 
 /// The volume at `pixels`, whose surfaces are `behind`.
-pub(super) fn volume(volume: &Volume<'_>, pixels: &Pixels, behind: &[Behind], listener: Listener) -> Vec<Pixel> {
+pub(super) fn volume(
+    volume: &Volume<'_>,
+    pixels: &Pixels,
+    behind: &[Behind],
+    listener: Listener,
+) -> Vec<Pixel> {
     // Pixels of a row share what they look through.
     let mut order: Vec<usize> = (0..pixels.at.len()).collect();
     order.sort_by_key(|&k| pixels.at[k][1]);
@@ -254,7 +275,8 @@ pub(super) fn volume(volume: &Volume<'_>, pixels: &Pixels, behind: &[Behind], li
         listener(Work::Drawing, rows.len());
         row
     });
-    let mut found: Vec<(usize, Pixel)> = order.iter().copied().zip(of_rows.into_iter().flatten()).collect();
+    let mut found: Vec<(usize, Pixel)> =
+        order.iter().copied().zip(of_rows.into_iter().flatten()).collect();
     found.sort_by_key(|(k, _)| *k);
     found.into_iter().map(|(_, pixel)| pixel).collect()
 }
@@ -268,9 +290,20 @@ mod tests {
         for text in ["thin", "volume", "model", "reflections=1", "reflections=64"] {
             assert_eq!(text.parse::<Against>().unwrap().to_string(), text);
         }
-        for text in ["", "Thin", "reflections", "reflections=", "reflections=0", "reflections=65", "reflections=-1"] {
+        for text in [
+            "",
+            "Thin",
+            "reflections",
+            "reflections=",
+            "reflections=0",
+            "reflections=65",
+            "reflections=-1",
+        ] {
             let error = text.parse::<Against>().unwrap_err();
-            assert!(error.contains("reflections=K") && error.ends_with(&format!("found \"{text}\"")), "{error}");
+            assert!(
+                error.contains("reflections=K") && error.ends_with(&format!("found \"{text}\"")),
+                "{error}"
+            );
         }
     }
 }

@@ -21,7 +21,8 @@ pub struct AirRow {
     pub base_m: f64,
     pub base_c: f64,
     pub base_hpa: f64,
-    /// Scene units: that height, and by how much it is higher for a parcel that is warmer by a kelvin.
+    /// Scene units: that height, and by how much it is higher for a parcel that is warmer by a
+    /// kelvin.
     pub base: f64,
     pub lift: f64,
 }

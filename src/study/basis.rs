@@ -19,7 +19,8 @@ const N_BETWEEN_KEYS: u32 = 8;
 /// All that `nimbus inspect --basis --json` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BasisReport {
-    /// N_b of the scene, and how many bases its range of exponents has: fewer where its lobes differ too little.
+    /// N_b of the scene, and how many bases its range of exponents has: fewer where its lobes
+    /// differ too little.
     pub asked: u32,
     pub kept: u32,
     pub sampling: &'static str,
@@ -40,7 +41,8 @@ pub struct ValueRow {
 /// How far the basis misses the lobe of an exponent.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ErrorRow {
-    /// `range`: one of a set over the range; `worst`: the range's worst; `material`: the worst of a material over time.
+    /// `range`: one of a set over the range; `worst`: the range's worst; `material`: the worst of a
+    /// material over time.
     pub of: &'static str,
     pub material: Option<String>,
     pub ns: f64,
@@ -72,7 +74,11 @@ pub fn report(scene: &Scene) -> BasisReport {
         sampling: name(scene.lighting.sampling),
         exponents: basis.exponents(),
         singular_values: values
-            .map(|(i, s)| ValueRow { basis: i + 1, singular_value: *s, kept: i < basis.vectors().len() })
+            .map(|(i, s)| ValueRow {
+                basis: i + 1,
+                singular_value: *s,
+                kept: i < basis.vectors().len(),
+            })
             .collect(),
         errors: errors(&basis, &scene.materials),
         table: table(&basis),
@@ -84,11 +90,15 @@ pub fn note(report: &BasisReport) -> Option<String> {
     let [low, high] = report.exponents;
     let (asked, kept) = (report.asked, report.kept);
     (kept < asked).then(|| {
-        format!("{asked} bases asked for, {kept} kept: the lobes of n_s from {low} to {high} have no more that differ")
+        format!(
+            "{asked} bases asked for, {kept} kept: the lobes of n_s from {low} to {high} have \
+            no more that differ"
+        )
     })
 }
 
-/// A line for every glossy material that the scene's basis misses by more than one in a hundred at some time.
+/// A line for every glossy material that the scene's basis misses by more than one in a hundred at
+/// some time.
 pub fn basis_warnings(scene: &Scene) -> Vec<String> {
     let is_lit = scene.lighting.mode != LightingMode::None;
     if !is_lit || !scene.materials.iter().any(Material::is_glossy) {
@@ -103,10 +113,12 @@ fn warning(basis: &Basis, material: &Material, (ns, error): (f64, f64)) -> Strin
     let name = &material.name;
     match basis.n_bases() {
         1 => format!(
-            "material `{name}`: lighting.bases = 1 is the diffuse basis alone and leaves out its lobe; raise it"
+            "material `{name}`: lighting.bases = 1 is the diffuse basis alone and leaves out its \
+             lobe; raise it"
         ),
         n => format!(
-            "material `{name}`: {n} bases represent n_s = {} only to {:.2} %; raise lighting.bases or narrow \
+            "material `{name}`: {n} bases represent n_s = {} only to {:.2} %; raise lighting.bases \
+             or narrow \
              lighting.exponents",
             (ns * 100.0).round() / 100.0,
             error * 100.0
@@ -118,7 +130,8 @@ fn errors(basis: &Basis, materials: &[Material]) -> Vec<ErrorRow> {
     let of_range = |(ns, error)| ErrorRow { of: "range", material: None, ns, error };
     let mut shown = basis.spread(N_SHOWN);
     shown.dedup();
-    let mut rows: Vec<ErrorRow> = shown.into_iter().map(|ns| of_range((ns, basis.error(ns)))).collect();
+    let mut rows: Vec<ErrorRow> =
+        shown.into_iter().map(|ns| of_range((ns, basis.error(ns)))).collect();
     rows.push(ErrorRow { of: "worst", ..of_range(basis.worst()) });
     rows.extend(materials.iter().filter_map(|m| {
         let (ns, error) = worst_of(basis, m)?;
@@ -127,11 +140,13 @@ fn errors(basis: &Basis, materials: &[Material]) -> Vec<ErrorRow> {
     rows
 }
 
-/// The exponent, of those that the material has while it has a lobe, that the basis misses most, and by how much.
+/// The exponent, of those that the material has while it has a lobe, that the basis misses most,
+/// and by how much.
 fn worst_of(basis: &Basis, material: &Material) -> Option<(f64, f64)> {
     let has_lobe = |k: &MaterialKey| k.brdf.ks != DVec3::ZERO;
     let at_keys = material.keys.iter().filter(|k| has_lobe(k)).map(|k| k.brdf.ns);
-    let moving = material.keys.windows(2).filter(|k| k[0].brdf.ns != k[1].brdf.ns && k.iter().any(has_lobe));
+    let moving =
+        material.keys.windows(2).filter(|k| k[0].brdf.ns != k[1].brdf.ns && k.iter().any(has_lobe));
     let between = moving.flat_map(|k| {
         let part = |i: u32| f64::from(i) / f64::from(N_BETWEEN_KEYS + 1);
         (1..=N_BETWEEN_KEYS).map(move |i| k[0].brdf.ns + part(i) * (k[1].brdf.ns - k[0].brdf.ns))
@@ -183,9 +198,12 @@ mod tests {
         let basis = Basis::new([1.0, 256.0], 4, Sampling::Log);
         assert_eq!(worst_of(&basis, &material(&[(0.0, 0.0, 256.0)])), None);
         assert_eq!(worst_of(&basis, &material(&[(0.0, 0.1, 9.0)])), Some((9.0, basis.error(9.0))));
-        let (ns, error) = worst_of(&basis, &material(&[(0.0, 0.1, 1.0), (1.0, 0.1, 256.0)])).expect("a lobe");
+        let (ns, error) =
+            worst_of(&basis, &material(&[(0.0, 0.1, 1.0), (1.0, 0.1, 256.0)])).expect("a lobe");
         let of_ends = basis.error(1.0).max(basis.error(256.0));
-        assert!(error >= of_ends && error == basis.error(ns) && error <= basis.greatest_error() * 1.001);
+        assert!(
+            error >= of_ends && error == basis.error(ns) && error <= basis.greatest_error() * 1.001
+        );
         // The lobe is gone before the exponent moves.
         let fades = material(&[(0.0, 0.1, 9.0), (1.0, 0.0, 9.0), (2.0, 0.0, 256.0)]);
         assert_eq!(worst_of(&basis, &fades), Some((9.0, basis.error(9.0))));
@@ -195,10 +213,14 @@ mod tests {
     fn warnings_say_how_far_and_what_to_do() {
         let basis = Basis::new([1.0, 10000.0], 8, Sampling::Log);
         let text = warning(&basis, &material(&[(0.0, 0.1, 1e4)]), (1e4, 0.048));
-        let expected = "material `m`: 8 bases represent n_s = 10000 only to 4.80 %; raise lighting.bases or narrow \
+        let expected = "material `m`: 8 bases represent n_s = 10000 only to 4.80 %; raise \
+            lighting.bases or narrow \
                         lighting.exponents";
         assert_eq!(text, expected);
         let alone = Basis::new([1.0, 10000.0], 1, Sampling::Log);
-        assert!(warning(&alone, &material(&[(0.0, 0.1, 1e4)]), (1e4, 1.0)).contains("leaves out its lobe"));
+        assert!(
+            warning(&alone, &material(&[(0.0, 0.1, 1e4)]), (1e4, 1.0))
+                .contains("leaves out its lobe")
+        );
     }
 }

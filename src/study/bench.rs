@@ -86,10 +86,14 @@ pub struct Ran {
     pub failure: Option<Error>,
 }
 
-/// Cases and loops in the order A B, B A, A B, …: whatever drifts over the run (heat, neighbours) falls on all alike.
+/// Cases and loops in the order A B, B A, A B, …: whatever drifts over the run (heat, neighbours)
+/// falls on all alike.
 pub fn block_order(cases: &[Case], n_rounds: u32) -> Vec<(usize, Loop)> {
-    let in_order: Vec<(usize, Loop)> =
-        cases.iter().enumerate().flat_map(|(i, c)| c.loops.iter().map(move |of| (i, *of))).collect();
+    let in_order: Vec<(usize, Loop)> = cases
+        .iter()
+        .enumerate()
+        .flat_map(|(i, c)| c.loops.iter().map(move |of| (i, *of)))
+        .collect();
     let of_round = |i: u32| {
         let mut order = in_order.clone();
         if i % 2 == 1 {
@@ -106,9 +110,15 @@ pub fn n_frames_total(cases: &[Case], plan: &BenchPlan) -> u64 {
     u64::from(plan.n_rounds) * cases.iter().map(of).sum::<u64>()
 }
 
-/// Runs the plan on `stage`, which holds the first case; `tick` is called after every frame, for progress. Ends early, and
-/// cleanly, once `stop` is set.
-pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, tick: &mut dyn FnMut()) -> Ran {
+/// Runs the plan on `stage`, which holds the first case; `tick` is called after every frame, for
+/// progress. Ends early, and cleanly, once `stop` is set.
+pub fn run(
+    stage: Stage,
+    cases: &[Case],
+    plan: &BenchPlan,
+    stop: &AtomicBool,
+    tick: &mut dyn FnMut(),
+) -> Ran {
     let mut ran = Ran { stage: Some(stage), outcome: Outcome::default(), failure: None };
     let order = block_order(cases, plan.n_rounds);
     let mut i_staged = 0;
@@ -119,15 +129,36 @@ pub fn run(stage: Stage, cases: &[Case], plan: &BenchPlan, stop: &AtomicBool, ti
         let is_staged = std::mem::replace(&mut i_staged, i_case) == i_case;
         let is_last = !order[i_block as usize + 1..].iter().any(|(i, _)| *i == i_case);
         let mut block = || -> Result<()> {
-            let stage = ran.stage.take().ok_or_else(|| Error::usage("the stage before this block has failed"))?;
-            let stage = if is_staged { stage } else { stage.again(with_taken(&case.scene, taken[i_case]), of.skip)? };
+            let stage = ran
+                .stage
+                .take()
+                .ok_or_else(|| Error::usage("the stage before this block has failed"))?;
+            let stage = if is_staged {
+                stage
+            } else {
+                stage.again(with_taken(&case.scene, taken[i_case]), of.skip)?
+            };
             let stage = ran.stage.insert(stage);
             taken[i_case] = Some(stage.scene.draw);
-            ran.outcome.chosen.extend(stage.take_chosen().iter().map(|text| named(cases, case, text)));
-            run_block(stage, &mut ran.outcome, [i_case, i_block as usize], (case, of), plan, stop, tick)?;
+            ran.outcome
+                .chosen
+                .extend(stage.take_chosen().iter().map(|text| named(cases, case, text)));
+            run_block(
+                stage,
+                &mut ran.outcome,
+                [i_case, i_block as usize],
+                (case, of),
+                plan,
+                stop,
+                tick,
+            )?;
             if is_last {
-                ran.outcome.notes.extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
-                ran.outcome.counts.insert(i_case, Counts::of(&mut stage.renderer, &stage.device, &stage.scene)?);
+                ran.outcome
+                    .notes
+                    .extend(light_notes(stage)?.iter().map(|note| named(cases, case, note)));
+                ran.outcome
+                    .counts
+                    .insert(i_case, Counts::of(&mut stage.renderer, &stage.device, &stage.scene)?);
                 // Of a block that was cut short the last frame is another one.
                 if plan.pictures && !stop.load(Ordering::Relaxed) {
                     ran.outcome.pictures.push(shown(i_case, case, &mut stage.renderer)?);
@@ -171,7 +202,9 @@ fn run_block(
 ) -> Result<()> {
     // A frame's number has 32 bits, and so has the warm-up's.
     if case.i_first.checked_add(case.n_frames).is_none() {
-        return Err(Error::usage("the frames of a block, counted from the scene's first, exceed 32 bits"));
+        return Err(Error::usage(
+            "the frames of a block, counted from the scene's first, exceed 32 bits",
+        ));
     }
     stage.set_skip(of.skip);
     let samples = &mut outcome.samples;
@@ -185,13 +218,15 @@ fn run_block(
     };
     stage.run(of.threading, frames_of(case, plan.n_warm_up), on_frame)?;
     // Of a block that was cut short the last frame is another one.
-    let image_hash = if stop.load(Ordering::Relaxed) { None } else { Some(image_hash(&mut stage.renderer)?) };
+    let image_hash =
+        if stop.load(Ordering::Relaxed) { None } else { Some(image_hash(&mut stage.renderer)?) };
     outcome.blocks.push(Block { i_case, of, image_hash });
     Ok(())
 }
 
-/// The frames of a block: those that are timed, and before them those that lead up to them. Where there are none time runs
-/// backwards first: n, n − 1, …, 1, 0, 1, …, so that what is done in a frame is what is done in any.
+/// The frames of a block: those that are timed, and before them those that lead up to them. Where
+/// there are none time runs backwards first: n, n − 1, …, 1, 0, 1, …, so that what is done in a
+/// frame is what is done in any.
 fn frames_of(case: &Case, n_warm_up: u32) -> impl Iterator<Item = u32> + Send + use<> {
     let first = i64::from(case.i_first) - i64::from(n_warm_up);
     let end = i64::from(case.i_first) + i64::from(case.n_frames);
@@ -245,7 +280,10 @@ mod tests {
         let two = [loaded(6), loaded(5)].concat();
         let there = ["0serial", "0parallel", "0serial no-skip", "1serial", "1parallel"];
         let back = there.iter().rev();
-        assert_eq!(names(&two, 2).trim_end(), there.iter().chain(back).copied().collect::<Vec<_>>().join(" "));
+        assert_eq!(
+            names(&two, 2).trim_end(),
+            there.iter().chain(back).copied().collect::<Vec<_>>().join(" ")
+        );
         let plan = BenchPlan { n_warm_up: 2, n_rounds: 2, hash_frames: false, pictures: false };
         assert_eq!(n_frames_total(&two, &plan), 2 * (3 * 8 + 2 * 7));
     }

@@ -1,5 +1,5 @@
-//! Parts of one bench, each with its first case, timed one by one and maybe on several nodes: as the bench that they
-//! are parts of.
+//! Parts of one bench, each with its first case, timed one by one and maybe on several nodes: as
+//! the bench that they are parts of.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -19,7 +19,8 @@ use crate::io::text_file::{TABLE_LIMIT, read_result};
 /// What `run.json` says of a part.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PartRecord {
-    /// Its cases, by their place in `cases`: `end` is not one. The first case of all was timed with them.
+    /// Its cases, by their place in `cases`: `end` is not one. The first case of all was timed with
+    /// them.
     pub first: usize,
     pub end: usize,
     pub node: String,
@@ -83,11 +84,17 @@ impl Part {
         let (pass_names, rows) = read_rows(&read_result(&path, TABLE_LIMIT)?, &path)?;
         let (n, wanted) = (run.cases.len(), numbers(&range).len());
         if n != wanted {
-            let what = format!("{n} cases; cases {}..{} are {wanted} with the first", range.start, range.end);
+            let what = format!(
+                "{n} cases; cases {}..{} are {wanted} with the first",
+                range.start, range.end
+            );
             return Err(Error::io(folder, what));
         }
         if let Some(row) = rows.iter().find(|row| !is_of_its_block(row, &run)) {
-            return Err(Error::io(&path, format!("a row is not of block {} as run.json names it", row.block)));
+            return Err(Error::io(
+                &path,
+                format!("a row is not of block {} as run.json names it", row.block),
+            ));
         }
         Ok(Part { name, node, range, run, pass_names, rows, pictures: names_in(folder) })
     }
@@ -104,7 +111,11 @@ impl Part {
             node: self.node.clone(),
             date: self.run.date.clone(),
             clocks: self.run.clocks,
-            base: self.run.cases.first().map_or_else(Vec::new, |case| case.modes.iter().map(of).collect()),
+            base: self
+                .run
+                .cases
+                .first()
+                .map_or_else(Vec::new, |case| case.modes.iter().map(of).collect()),
         }
     }
 }
@@ -115,22 +126,22 @@ fn is_of_its_block(row: &FrameRow, run: &Run) -> bool {
             (case.phase.as_deref().unwrap_or_default(), super::cases::sweep_text(&case.sweep))
                 == (&row.phase[..], row.sweep.clone())
         };
-        (&block.threading, block.skip) == (&row.threading, row.skip) && run.cases.get(block.case).is_some_and(is_case)
+        (&block.threading, block.skip) == (&row.threading, row.skip)
+            && run.cases.get(block.case).is_some_and(is_case)
     })
 }
 
-/// What differs between parts that has to be the same: times of two devices, drivers or builds are no bench's. That
-/// shaders and arguments are the same is known by whoever had the parts made.
+/// What differs between parts that has to be the same: times of two devices, drivers or builds are
+/// no bench's. That shaders and arguments are the same is known by whoever had the parts made.
 pub fn differences(parts: &[Part]) -> Vec<String> {
     let Some(first) = parts.first() else { return vec!["there is no part".to_owned()] };
     let mut all = BTreeSet::new();
     for part in &parts[1..] {
-        let said = identity(first).into_iter().zip(identity(part)).filter(|(ours, theirs)| ours != theirs);
-        all.extend(
-            said.map(|((what, ours), (_, theirs))| {
-                format!("{what}: {ours} of {}, {theirs} of {}", first.name, part.name)
-            }),
-        );
+        let said =
+            identity(first).into_iter().zip(identity(part)).filter(|(ours, theirs)| ours != theirs);
+        all.extend(said.map(|((what, ours), (_, theirs))| {
+            format!("{what}: {ours} of {}, {theirs} of {}", first.name, part.name)
+        }));
     }
     let mut next = 0;
     for Part { name, range, .. } in parts {
@@ -144,14 +155,22 @@ pub fn differences(parts: &[Part]) -> Vec<String> {
 
 /// All that has to be the same, in words.
 fn identity(part: &Part) -> Vec<(&'static str, String)> {
-    let Run { nimbus, revision, scene_hash, device, cpu, environment, command, cases, .. } = &part.run;
+    let Run { nimbus, revision, scene_hash, device, cpu, environment, command, cases, .. } =
+        &part.run;
     let base = cases.first();
     let of_base = |text: &dyn Fn(&Case) -> String| base.map_or_else(|| "none".to_owned(), text);
-    let each = |c: &Case, text: &dyn Fn(&Mode) -> String| c.modes.iter().map(text).collect::<Vec<_>>().join("; ");
+    let each = |c: &Case, text: &dyn Fn(&Mode) -> String| {
+        c.modes.iter().map(text).collect::<Vec<_>>().join("; ")
+    };
     let is_asked = |option: &str| command.iter().any(|word| word == option).to_string();
     let loops = |c: &Case| {
         each(c, &|m| {
-            format!("{}, particles by the {}, {} frames", loop_name(&m.threading, m.skip), m.simulate, m.frames)
+            format!(
+                "{}, particles by the {}, {} frames",
+                loop_name(&m.threading, m.skip),
+                m.simulate,
+                m.frames
+            )
         })
     };
     let of_modes = |of: fn(&Mode) -> usize| {
@@ -159,7 +178,11 @@ fn identity(part: &Part) -> Vec<(&'static str, String)> {
         all.iter().map(usize::to_string).collect::<Vec<_>>().join(" and ")
     };
     let last_frames = |c: &Case| {
-        each(c, &|m| m.image_hash.as_deref().map_or_else(|| "unknown".to_owned(), |h| h.chars().take(12).collect()))
+        each(c, &|m| {
+            m.image_hash
+                .as_deref()
+                .map_or_else(|| "unknown".to_owned(), |h| h.chars().take(12).collect())
+        })
     };
     vec![
         ("version", nimbus.clone()),
@@ -186,8 +209,8 @@ fn loop_name(threading: &str, skip: bool) -> String {
     if skip { threading.to_owned() } else { format!("{threading} no-skip") }
 }
 
-/// All of them as one bench, with all cases in order and the first as the first part timed it; blocks follow each other
-/// part by part. `parts` do not differ; none of no part.
+/// All of them as one bench, with all cases in order and the first as the first part timed it;
+/// blocks follow each other part by part. `parts` do not differ; none of no part.
 pub fn join(parts: &[Part]) -> Option<Joined> {
     let first = parts.first()?;
     let n_cases: usize = parts.iter().map(|part| part.range.len()).sum();
@@ -202,7 +225,8 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
     let (mut rows, mut pictures) = (Vec::new(), Vec::new());
     for (i_part, part) in parts.iter().enumerate() {
         let numbers = numbers(&part.range);
-        // Places of its cases in the whole. The first of all is every part's, and stays as the first one had it.
+        // Places of its cases in the whole. The first of all is every part's, and stays as the
+        // first one had it.
         let place = |i: usize| numbers.get(i).copied().filter(|_| i > 0 || i_part == 0);
         let mut block_places = Vec::new();
         for block in &part.run.block_order {
@@ -211,9 +235,18 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
             run.block_order.extend(case.map(|case| Block { case, ..block.clone() }));
         }
         rows.extend(part.rows.iter().filter_map(|row| {
-            block_places.get(row.block).copied().flatten().map(|block| FrameRow { block, ..row.clone() })
+            block_places
+                .get(row.block)
+                .copied()
+                .flatten()
+                .map(|block| FrameRow { block, ..row.clone() })
         }));
-        run.chosen.extend(chosen(&part.run, n_cases).into_iter().filter(|(i, _)| place(*i).is_some()).map(|(_, t)| t));
+        run.chosen.extend(
+            chosen(&part.run, n_cases)
+                .into_iter()
+                .filter(|(i, _)| place(*i).is_some())
+                .map(|(_, t)| t),
+        );
         for (i, case) in part.run.cases.iter().enumerate() {
             let (Some(k), from) = (place(i), picture_file(i)) else { continue };
             run.cases.push(case.clone());
@@ -225,7 +258,8 @@ pub fn join(parts: &[Part]) -> Option<Joined> {
     Some(Joined { run, pass_names: first.pass_names.clone(), rows, pictures })
 }
 
-/// What each "auto" came to, with the number of its case: a run of several cases says its name before it.
+/// What each "auto" came to, with the number of its case: a run of several cases says its name
+/// before it.
 fn chosen(run: &Run, n_cases: usize) -> Vec<(usize, String)> {
     let names: Vec<String> = run.cases.iter().map(Case::name).collect();
     if let ([name], true) = (&names[..], n_cases > 1) {
@@ -234,20 +268,29 @@ fn chosen(run: &Run, n_cases: usize) -> Vec<(usize, String)> {
     let of = |text: &String| {
         let is_of = |name: &str| text.strip_prefix(name).is_some_and(|rest| rest.starts_with(": "));
         // A name may begin as another one does.
-        let of = names.iter().enumerate().filter(|(_, name)| is_of(name)).max_by_key(|(_, name)| name.len());
+        let of = names
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| is_of(name))
+            .max_by_key(|(_, name)| name.len());
         (of.map_or(0, |(i, _)| i), text.clone())
     };
     run.chosen.iter().map(of).collect()
 }
 
-/// By how much the nodes differ: the greatest median frame time of the first case by the least over all parts, loop by
-/// loop. None of a loop that fewer than two parts have times of.
+/// By how much the nodes differ: the greatest median frame time of the first case by the least over
+/// all parts, loop by loop. None of a loop that fewer than two parts have times of.
 pub fn base_spread(parts: &[PartRecord]) -> Vec<(String, f64)> {
     let Some(first) = parts.first() else { return Vec::new() };
     let of = |base: &BaseTime| {
-        let is_same = |other: &&BaseTime| (&other.threading, other.skip) == (&base.threading, base.skip);
-        let all = parts.iter().filter_map(|part| part.base.iter().find(is_same)?.p50_ms).filter(|ms| *ms > 0.0);
-        let (least, greatest, n) = all.fold((f64::INFINITY, 0.0_f64, 0), |(l, g, n), ms| (l.min(ms), g.max(ms), n + 1));
+        let is_same =
+            |other: &&BaseTime| (&other.threading, other.skip) == (&base.threading, base.skip);
+        let all = parts
+            .iter()
+            .filter_map(|part| part.base.iter().find(is_same)?.p50_ms)
+            .filter(|ms| *ms > 0.0);
+        let (least, greatest, n) =
+            all.fold((f64::INFINITY, 0.0_f64, 0), |(l, g, n), ms| (l.min(ms), g.max(ms), n + 1));
         (n > 1).then(|| (base.name(), greatest / least))
     };
     first.base.iter().filter_map(of).collect()

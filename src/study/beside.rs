@@ -56,7 +56,10 @@ impl Beside {
 /// Files in a folder that have such a name.
 pub fn names_in(folder: &Path) -> Vec<String> {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    entries.filter_map(|entry| entry.file_name().into_string().ok()).filter(|name| is_ours(name)).collect()
+    entries
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .filter(|name| is_ours(name))
+        .collect()
 }
 
 fn is_ours(name: &str) -> bool {
@@ -64,7 +67,10 @@ fn is_ours(name: &str) -> bool {
         let number = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
         number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
     };
-    name == PASSES_CHART || name == "frames.svg" || numbered("frames-", ".svg") || numbered("case-", ".png")
+    name == PASSES_CHART
+        || name == "frames.svg"
+        || numbered("frames-", ".svg")
+        || numbered("case-", ".png")
 }
 
 #[cfg(test)]
@@ -73,12 +79,24 @@ mod tests {
 
     #[test]
     fn only_our_own_names_are_ours() {
-        for name in [PASSES_CHART, &frames_chart(0, 1), &frames_chart(12, 20), &picture_file(0), &picture_file(137)] {
+        for name in [
+            PASSES_CHART,
+            &frames_chart(0, 1),
+            &frames_chart(12, 20),
+            &picture_file(0),
+            &picture_file(137),
+        ] {
             assert!(is_ours(name), "{name}");
         }
-        for name in
-            ["case-.png", "case-a.png", "case-1.png.bak", "picture-1.png", "my-frames.svg", "frames-1x.svg", "a.png"]
-        {
+        for name in [
+            "case-.png",
+            "case-a.png",
+            "case-1.png.bak",
+            "picture-1.png",
+            "my-frames.svg",
+            "frames-1x.svg",
+            "a.png",
+        ] {
             assert!(!is_ours(name), "{name}");
         }
     }

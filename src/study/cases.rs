@@ -83,7 +83,8 @@ impl Axis {
         if key.trim().is_empty() || values.iter().any(String::is_empty) {
             return Err(wrong(if key.trim().is_empty() { "no key" } else { "an empty value" }));
         }
-        if let Some((_, twice)) = values.iter().enumerate().find(|(i, v)| values[..*i].contains(v)) {
+        if let Some((_, twice)) = values.iter().enumerate().find(|(i, v)| values[..*i].contains(v))
+        {
             return Err(wrong(&format!("{twice} twice")));
         }
         Ok(Axis { key: key.trim().to_owned(), values })
@@ -98,16 +99,20 @@ pub fn overrides(point: &[Setting]) -> Result<Vec<String>> {
             all.push(format!("{key}={value}"));
             continue;
         }
-        let sides = value.split_once('x').filter(|(w, h)| [w, h].iter().all(|n| n.parse::<u32>().is_ok()));
+        let sides =
+            value.split_once('x').filter(|(w, h)| [w, h].iter().all(|n| n.parse::<u32>().is_ok()));
         let (width, height) = sides.ok_or_else(|| {
-            Error::usage(format!("--sweep size: expected WIDTHxHEIGHT such as 800x600, found \"{value}\""))
+            Error::usage(format!(
+                "--sweep size: expected WIDTHxHEIGHT such as 800x600, found \"{value}\""
+            ))
         })?;
         all.extend([format!("film.width={width}"), format!("film.height={height}")]);
     }
     Ok(all)
 }
 
-/// Every point of the sweep, the last axis varying fastest; one point without settings where there is no axis.
+/// Every point of the sweep, the last axis varying fastest; one point without settings where there
+/// is no axis.
 pub fn points(axes: &[Axis]) -> Vec<Vec<Setting>> {
     let mut points = vec![vec![]];
     for axis in axes {
@@ -123,9 +128,9 @@ pub fn points(axes: &[Axis]) -> Vec<Vec<Setting>> {
     points
 }
 
-/// A case for each phase of `loaded`, which is the scene at `sweep`. `n_frames`: in place of those of scene and phases. A
-/// phase, or point of a sweep, that says `threads.mode` is run in that loop and no other; where `saved` frames that skip
-/// nothing are timed as well.
+/// A case for each phase of `loaded`, which is the scene at `sweep`. `n_frames`: in place of those
+/// of scene and phases. A phase, or point of a sweep, that says `threads.mode` is run in that loop
+/// and no other; where `saved` frames that skip nothing are timed as well.
 pub fn cases(
     loaded: LoadedScene,
     sweep: &[Setting],
@@ -135,7 +140,8 @@ pub fn cases(
 ) -> Vec<Case> {
     let loops = |scene: &Scene, own: bool| {
         let modes = if own { vec![scene.threads.mode] } else { modes.to_vec() };
-        let mut loops: Vec<Loop> = modes.iter().map(|&threading| Loop { threading, skip }).collect();
+        let mut loops: Vec<Loop> =
+            modes.iter().map(|&threading| Loop { threading, skip }).collect();
         if skip && saved {
             // Of the first one's kind, so that nothing but skipping differs.
             loops.push(Loop { skip: false, ..loops[0] });
@@ -210,7 +216,9 @@ mod tests {
         assert_eq!(axis("size=800x600,1024x768"), is("size", "800x600|1024x768"));
         assert_eq!(axis("cloud.0.wind=[1,0,0],[2,0,0]"), is("cloud.0.wind", "[1,0,0]|[2,0,0]"));
         assert_eq!(axis("title='a,b',\"c]\""), is("title", "'a,b'|\"c]\""));
-        for (wrong, what) in [("a", "no `=`"), ("=1", "no key"), ("a=1,", "an empty value"), ("a=1,1", "1 twice")] {
+        for (wrong, what) in
+            [("a", "no `=`"), ("=1", "no key"), ("a=1,", "an empty value"), ("a=1,1", "1 twice")]
+        {
             assert!(axis(wrong).unwrap_err().to_string().contains(what), "{wrong}");
         }
     }

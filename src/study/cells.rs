@@ -1,4 +1,5 @@
-//! How often cells of the density grid are written and read: what a frame's light takes, before any of it is made.
+//! How often cells of the density grid are written and read: what a frame's light takes, before any
+//! of it is made.
 
 use super::truth::Truth;
 use crate::model::light::Light;
@@ -33,11 +34,18 @@ fn n_marched(scene: &Scene, truth: &Truth) -> f64 {
     let of_light = |light: &Light| {
         let samples = |blob: &Blob| {
             let way = light.arrival(blob.position);
-            f64::from(n_samples(&truth.setting.grid, blob.position, way.toward, way.distance, scene.lighting.step))
+            f64::from(n_samples(
+                &truth.setting.grid,
+                blob.position,
+                way.toward,
+                way.distance,
+                scene.lighting.step,
+            ))
         };
         truth.blobs.iter().map(samples).sum::<f64>()
     };
-    let n_samples: f64 = scene.lights.iter().map(|light| of_light(&light.relative_to(origin))).sum();
+    let n_samples: f64 =
+        scene.lights.iter().map(|light| of_light(&light.relative_to(origin))).sum();
     n_samples / truth.blobs.len() as f64 * scene.n_facets() as f64
 }
 
@@ -65,7 +73,10 @@ mod tests {
         let (one, _) = visits(|scene| scene.lights = vec![sun(scene)]);
         let (two, _) = visits(|scene| scene.lights = vec![sun(scene); 2]);
         assert_eq!((one.filled, two.filled), (none.filled, none.filled));
-        assert!(one.marched > 0.0 && (two.marched / one.marched - 2.0).abs() < 1e-12, "{one:?} {two:?}");
+        assert!(
+            one.marched > 0.0 && (two.marched / one.marched - 2.0).abs() < 1e-12,
+            "{one:?} {two:?}"
+        );
         // Steps twice as long are half as many, but for the last of each way.
         let (few, _) = visits(|scene| {
             scene.lights = vec![sun(scene)];
@@ -75,7 +86,10 @@ mod tests {
         assert!((few.marched - 0.5 * one.marched).abs() <= 0.5 * n_ways, "{few:?} {one:?}");
         // No way is longer than the grid's diagonal.
         let (step, diagonal) = (0.5, grid.n_cells.as_dvec3().length());
-        assert!(one.marched > n_ways && one.marched <= n_ways * (diagonal / step + 1.0), "{one:?} {n_ways}");
+        assert!(
+            one.marched > n_ways && one.marched <= n_ways * (diagonal / step + 1.0),
+            "{one:?} {n_ways}"
+        );
     }
 
     #[test]

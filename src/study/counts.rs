@@ -1,5 +1,5 @@
-//! What of a frame is odd, counted: what is no finite number, at the end of what a format holds, folded back, negative, left out.
-//! Zero is counted as zero.
+//! What of a frame is odd, counted: what is no finite number, at the end of what a format holds,
+//! folded back, negative, left out. Zero is counted as zero.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,19 +13,22 @@ use crate::passes::generate::FOLDED;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
-    /// Numbers of the picture, four a pixel; those that are NaN or infinite; and colours at the end of what the format holds
-    /// (1 of "rgba8", 65504 of "rgba16f"), which may have been cut to it.
+    /// Numbers of the picture, four a pixel; those that are NaN or infinite; and colours at the end
+    /// of what the format holds (1 of "rgba8", 65504 of "rgba16f"), which may have been cut to it.
     pub values: u64,
     pub not_finite: u64,
     pub saturated: u64,
-    /// Particles of boxes, and those that no attempt found a place for, so that they were folded back into their box.
+    /// Particles of boxes, and those that no attempt found a place for, so that they were folded
+    /// back into their box.
     pub particles: u64,
     pub folded: u64,
-    /// Lit facets; those with light that is NaN or infinite, and with radiance below 0 (a basis that is cut off).
+    /// Lit facets; those with light that is NaN or infinite, and with radiance below 0 (a basis
+    /// that is cut off).
     pub facets: u64,
     pub facets_not_finite: u64,
     pub facets_negative: u64,
-    /// Pairs of facets that stayed wider than `lighting.pair_size` asks for, and sources that the driver's loops ended before.
+    /// Pairs of facets that stayed wider than `lighting.pair_size` asks for, and sources that the
+    /// driver's loops ended before.
     pub pairs_unresolved: u64,
     pub sources_lost: u64,
 }
@@ -54,7 +57,8 @@ impl Counts {
             FilmFormat::Rgba16f => HALF_MAX,
             FilmFormat::Rgba32f => f32::MAX,
         };
-        let count = |is_odd: &dyn Fn(f32) -> bool| rgba.iter().filter(|v| is_odd(**v)).count() as u64;
+        let count =
+            |is_odd: &dyn Fn(f32) -> bool| rgba.iter().filter(|v| is_odd(**v)).count() as u64;
         // Alpha is 1 where it should be.
         let colours = rgba.chunks_exact(4).flat_map(|p| &p[..3]);
         Counts {
@@ -88,7 +92,11 @@ impl Counts {
         if self.facets > 0 {
             parts.push(format!(
                 "of {} lit facets {} not finite, {} negative; {} pairs unresolved, {} sources lost",
-                self.facets, self.facets_not_finite, self.facets_negative, self.pairs_unresolved, self.sources_lost
+                self.facets,
+                self.facets_not_finite,
+                self.facets_negative,
+                self.pairs_unresolved,
+                self.sources_lost
             ));
         }
         parts.join("; ")
@@ -101,7 +109,8 @@ mod tests {
 
     #[test]
     fn what_is_odd_is_counted_and_nothing_else() {
-        let rgba = [0.5, 1.0, 0.2, 1.0, f32::NAN, 0.0, 65504.0, 1.0, f32::INFINITY, -70000.0, 1.0, 0.3];
+        let rgba =
+            [0.5, 1.0, 0.2, 1.0, f32::NAN, 0.0, 65504.0, 1.0, f32::INFINITY, -70000.0, 1.0, 0.3];
         let of = |format| {
             let c = Counts::of_picture(&rgba, format);
             (c.values, c.not_finite, c.saturated)
@@ -125,6 +134,9 @@ mod tests {
         ]);
         assert_eq!((counts.facets, counts.facets_not_finite, counts.facets_negative), (4, 2, 2));
         assert_eq!((counts.pairs_unresolved, counts.sources_lost), (8, 3));
-        assert!(Counts::default().text().contains("0 not finite, 0 at the format's end"), "zero is said as zero");
+        assert!(
+            Counts::default().text().contains("0 not finite, 0 at the format's end"),
+            "zero is said as zero"
+        );
     }
 }

@@ -75,7 +75,12 @@ pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
         let of_b = b.cases.iter().find(|of_b| of_b.name() == of_a.name());
         if let Some(of_b) = of_b.filter(|of_b| of_b.scene_hash != of_a.scene_hash) {
             let (a, b) = (short(&of_a.scene_hash).to_owned(), short(&of_b.scene_hash).to_owned());
-            found.push(Difference { kind: Sameness::Scene, what: format!("{}, hash", of_a.name()), a, b });
+            found.push(Difference {
+                kind: Sameness::Scene,
+                what: format!("{}, hash", of_a.name()),
+                a,
+                b,
+            });
         }
     }
     found
@@ -85,7 +90,8 @@ const UNSET: &str = "not set";
 /// Of a long list the first say what happened; two scenes that share nothing would fill a page.
 const N_KEYS_SHOWN: usize = 5;
 
-/// The hashes, and the first keys that differ; none do where only a file that the scene names was changed.
+/// The hashes, and the first keys that differ; none do where only a file that the scene names was
+/// changed.
 fn scene_differences(a: &Run, b: &Run) -> Vec<Difference> {
     let new = |what: &str, a: &str, b: &str| Difference {
         kind: Sameness::Scene,
@@ -102,7 +108,9 @@ fn scene_differences(a: &Run, b: &Run) -> Vec<Difference> {
     keys.dedup();
     keys.retain(|key| of_a.get(*key) != of_b.get(*key));
     for key in keys.iter().take(N_KEYS_SHOWN) {
-        let of = |leaves: &BTreeMap<String, String>| leaves.get(*key).map_or(UNSET.to_owned(), Clone::clone);
+        let of = |leaves: &BTreeMap<String, String>| {
+            leaves.get(*key).map_or(UNSET.to_owned(), Clone::clone)
+        };
         found.push(new(key, &of(&of_a), &of(&of_b)));
     }
     if keys.len() > N_KEYS_SHOWN {
@@ -117,13 +125,19 @@ fn short(hash: &str) -> &str {
     hash.get(..12).unwrap_or(hash)
 }
 
-/// "lighting.grid" → "64" for every value that holds no other; a list of numbers is one value, as `--set` takes it.
+/// "lighting.grid" → "64" for every value that holds no other; a list of numbers is one value, as
+/// `--set` takes it.
 fn leaves(value: &Value, at: &str, found: &mut BTreeMap<String, String>) {
     let below = |key: &str| if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") };
     match value {
-        Value::Object(object) => object.iter().for_each(|(key, value)| leaves(value, &below(key), found)),
+        Value::Object(object) => {
+            object.iter().for_each(|(key, value)| leaves(value, &below(key), found))
+        }
         Value::Array(items) if items.iter().any(|item| item.is_object() || item.is_array()) => {
-            items.iter().enumerate().for_each(|(i, item)| leaves(item, &below(&i.to_string()), found));
+            items
+                .iter()
+                .enumerate()
+                .for_each(|(i, item)| leaves(item, &below(&i.to_string()), found));
         }
         _ => {
             found.insert(at.to_owned(), value.to_string());
@@ -136,22 +150,31 @@ pub fn remarks(a: &Run, b: &Run) -> Vec<String> {
     let mut remarks = Vec::new();
     if a.revision == b.revision && (a.revision == "unknown" || a.revision.ends_with("-dirty")) {
         let revision = &a.revision;
-        remarks.push(format!("both builds call themselves {revision}: that does not say that they are the same"));
+        remarks.push(format!(
+            "both builds call themselves {revision}: that does not say that they are the same"
+        ));
     }
     for (name, run) in [("A", a), ("B", b)] {
         if run.interrupted {
-            remarks
-                .push(format!("{name} was interrupted: its last block is not whole, and its blocks may not balance"));
+            remarks.push(format!(
+                "{name} was interrupted: its last block is not whole, and its blocks \
+                    may not balance"
+            ));
         }
     }
     let (of_a, of_b) = (wishes(&a.command), wishes(&b.command));
     if of_a != of_b {
-        remarks.push(format!("A and B were asked for differently: A \"{}\", B \"{}\"", of_a.join(" "), of_b.join(" ")));
+        remarks.push(format!(
+            "A and B were asked for differently: A \"{}\", B \"{}\"",
+            of_a.join(" "),
+            of_b.join(" ")
+        ));
     }
     remarks
 }
 
-/// The command without the program and without what changes no time: where results go and how much is said.
+/// The command without the program and without what changes no time: where results go and how much
+/// is said.
 fn wishes(command: &[String]) -> Vec<&str> {
     let mut words = command.iter().skip(1).map(String::as_str);
     let mut kept = Vec::new();

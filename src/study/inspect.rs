@@ -30,8 +30,8 @@ pub struct ParticleRow {
     pub b: f64,
 }
 
-/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera, which a surface's back
-/// does not have. I_i and L2 are zero where lighting.mode is "first".
+/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera,
+/// which a surface's back does not have. I_i and L2 are zero where lighting.mode is "first".
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FacetRow {
     pub index: usize,
@@ -90,7 +90,14 @@ pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
     let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
         let position = Vec3::from(p.position).as_dvec3() + origin;
         let color = Vec3::from(r.color).as_dvec3();
-        particle_row(i, cloud_of(&groups, i), position, f64::from(p.sigma), f64::from(r.kappa), color)
+        particle_row(
+            i,
+            cloud_of(&groups, i),
+            position,
+            f64::from(p.sigma),
+            f64::from(r.kappa),
+            color,
+        )
     });
     Ok(rows.collect())
 }
@@ -135,26 +142,38 @@ pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
     let rows = truth.facets.iter().enumerate().map(|(i, f)| {
         let place = f.position + truth.setting.light_origin;
         let or_dark = |of: &[DVec3]| of.get(i).copied().unwrap_or(DVec3::ZERO);
-        let lit = [truth.irradiance[i], or_dark(&truth.indirect), truth.radiance[i], or_dark(&truth.second)];
-        let lit = toward_camera(scene, f.region, truth.setting.pose.position - place, f.normal, lit);
+        let lit = [
+            truth.irradiance[i],
+            or_dark(&truth.indirect),
+            truth.radiance[i],
+            or_dark(&truth.second),
+        ];
+        let lit =
+            toward_camera(scene, f.region, truth.setting.pose.position - place, f.normal, lit);
         facet_row(i, f.region, [place, f.normal], f.area, lit)
     });
     Ok(rows.collect())
 }
 
-/// The area means of the facets of each surface and ground, a row each; its index, region, centre, normal and whole area.
+/// The area means of the facets of each surface and ground, a row each; its index, region, centre,
+/// normal and whole area.
 pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
     let of_ground = |t: &Terrain| {
         let (low, high) = t.bounds();
-        [0.5 * (low + high), t.facets().map(|f| f.area * f.normal).sum::<DVec3>().normalize_or(DVec3::Y)]
+        [
+            0.5 * (low + high),
+            t.facets().map(|f| f.area * f.normal).sum::<DVec3>().normalize_or(DVec3::Y),
+        ]
     };
     let surfaces = scene.surfaces.iter().map(|s| [s.center, s.normal()]);
     let mean = |(i, place): (usize, [DVec3; 2])| {
         let own: Vec<&FacetRow> = rows.iter().filter(|r| r.region as usize == i).collect();
         let area: f64 = own.iter().map(|r| r.area).sum();
-        let of = |value: fn(&FacetRow) -> f64| own.iter().map(|r| r.area * value(r)).sum::<f64>() / area;
-        let rgb =
-            |r: fn(&FacetRow) -> f64, g: fn(&FacetRow) -> f64, b: fn(&FacetRow) -> f64| DVec3::new(of(r), of(g), of(b));
+        let of =
+            |value: fn(&FacetRow) -> f64| own.iter().map(|r| r.area * value(r)).sum::<f64>() / area;
+        let rgb = |r: fn(&FacetRow) -> f64, g: fn(&FacetRow) -> f64, b: fn(&FacetRow) -> f64| {
+            DVec3::new(of(r), of(g), of(b))
+        };
         let lit = [
             rgb(|r| r.id_r, |r| r.id_g, |r| r.id_b),
             rgb(|r| r.ii_r, |r| r.ii_g, |r| r.ii_b),
@@ -166,31 +185,35 @@ pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
     surfaces.chain(scene.terrains.iter().map(of_ground)).enumerate().map(mean).collect()
 }
 
-/// What the last frame's light has that a reader should know: radiances that are negative or no numbers, and pairs that
-/// stayed too wide. Nothing for most scenes.
+/// What the last frame's light has that a reader should know: radiances that are negative or no
+/// numbers, and pairs that stayed too wide. Nothing for most scenes.
 pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
     if stage.scene.lighting.mode == LightingMode::None {
         return Ok(vec![]);
     }
     let lit = stage.renderer.facets(&stage.device)?.1;
-    let count =
-        |what: &dyn Fn(f32) -> bool| lit.iter().filter(|l| l.first.iter().chain(&l.second).any(|v| what(*v))).count();
+    let count = |what: &dyn Fn(f32) -> bool| {
+        lit.iter().filter(|l| l.first.iter().chain(&l.second).any(|v| what(*v))).count()
+    };
     let (n_negative, n_odd) = (count(&|v| v < 0.0), count(&|v| !v.is_finite()));
     let mut notes = Vec::new();
     if n_odd > 0 {
         notes.push(format!("the radiance of {n_odd} facets is not a finite number"));
     }
     if n_negative > 0 {
-        let least = lit.iter().flat_map(|l| l.first.iter().chain(&l.second)).copied().fold(0.0, f32::min);
+        let least =
+            lit.iter().flat_map(|l| l.first.iter().chain(&l.second)).copied().fold(0.0, f32::min);
         notes.push(format!(
-            "the radiance of {n_negative} facets is negative, {least:.3e} at the least: the lobes' basis is cut off; more \
+            "the radiance of {n_negative} facets is negative, {least:.3e} at the least: the lobes' \
+             basis is cut off; more \
              lighting.bases bring it nearer to 0"
         ));
     }
     let n_lost: f64 = lit.iter().map(|l| f64::from(l.n_lost)).sum();
     if n_lost > 0.0 {
         notes.push(format!(
-            "{n_lost:.0} sources were not looked at in the turns that loops may take, and their light is missing from L2; fewer \
+            "{n_lost:.0} sources were not looked at in the turns that loops may take, and their \
+             light is missing from L2; fewer \
              facets a surface or cloud, a greater lighting.theta or broader lobes need fewer"
         ));
     }
@@ -200,13 +223,16 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
         let most = unresolved.iter().map(|l| f64::from(l.unresolved)).fold(0.0, f64::max);
         let most = match most.is_finite() {
             true => format!("by up to {most:.3e}"),
-            false => "by an amount that is not known (there is no bound on light that was left out, or in tensors)"
+            false => "by an amount that is not known (there is no bound on light that was left \
+                out, or in tensors)"
                 .to_owned(),
         };
         let brightest = lit.iter().flat_map(|l| l.second).map(f64::from).fold(0.0, f64::max);
         notes.push(format!(
-            "{n_pairs} pairs of {} facets stayed wider than lighting.pair_size asks for: L2 may be off {most} \
-             there (the greatest L2 is {brightest:.3e}); finer `subdivide` or more lighting.pair_levels resolve them",
+            "{n_pairs} pairs of {} facets stayed wider than lighting.pair_size asks for: L2 may be \
+             off {most} \
+             there (the greatest L2 is {brightest:.3e}); finer `subdivide` or more \
+             lighting.pair_levels resolve them",
             unresolved.len()
         ));
     }
@@ -216,14 +242,16 @@ pub fn light_notes(stage: &mut Stage) -> Result<Vec<String>> {
 /// Attempts and folded particles of every box, from the device.
 pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
     let status = stage.renderer.generate_now(&stage.device)?.1;
-    let tries = status.iter().map(|s| (u64::from(s & !FOLDED), s & FOLDED != 0)).collect::<Vec<_>>();
+    let tries =
+        status.iter().map(|s| (u64::from(s & !FOLDED), s & FOLDED != 0)).collect::<Vec<_>>();
     Ok(box_rows(&stage.scene, &tries))
 }
 
 /// The same from the reference.
 pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
     let tried = |g: Generated| (u64::from(g.n_attempts), g.folded);
-    let tries: Vec<_> = scene.clouds.iter().flat_map(crate::reference::generate::cloud).map(tried).collect();
+    let tries: Vec<_> =
+        scene.clouds.iter().flat_map(crate::reference::generate::cloud).map(tried).collect();
     box_rows(scene, &tries)
 }
 
@@ -262,7 +290,12 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
     let on_frame = &mut |times: crate::frame::FrameTimes, _: &mut _| {
         rows.extend(Pass::ALL.iter().map(|pass| {
             let decision = times.plan.decision(*pass);
-            PlanRow { frame: times.i_frame, pass: pass.name(), run: decision.run, reason: decision.reason.to_string() }
+            PlanRow {
+                frame: times.i_frame,
+                pass: pass.name(),
+                run: decision.run,
+                reason: decision.reason.to_string(),
+            }
         }));
         Ok(true)
     };
@@ -273,30 +306,63 @@ pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
 
 fn check_lit(scene: &Scene) -> Result<()> {
     match scene.lighting.mode {
-        LightingMode::None => Err(Error::usage("the scene has no facets: lighting.mode is \"none\"")),
+        LightingMode::None => {
+            Err(Error::usage("the scene has no facets: lighting.mode is \"none\""))
+        }
         _ => Ok(()),
     }
 }
 
-/// Groups are in order of their particles, so the last that begins at or before i holds it (empty ones begin where the
-/// next does, and come before it).
+/// Groups are in order of their particles, so the last that begins at or before i holds it (empty
+/// ones begin where the next does, and come before it).
 fn cloud_of(groups: &[Group], i: usize) -> usize {
     let after = groups.partition_point(|g| g.i_first as usize <= i);
     groups[after.saturating_sub(1)].i_cloud
 }
 
-fn particle_row(index: usize, cloud: usize, p: DVec3, sigma: f64, kappa: f64, c: DVec3) -> ParticleRow {
+fn particle_row(
+    index: usize,
+    cloud: usize,
+    p: DVec3,
+    sigma: f64,
+    kappa: f64,
+    c: DVec3,
+) -> ParticleRow {
     let radius = sigma / SIGMA_PER_RADIUS;
-    ParticleRow { index, cloud, x: p.x, y: p.y, z: p.z, radius, sigma, kappa, r: c.x, g: c.y, b: c.z }
+    ParticleRow {
+        index,
+        cloud,
+        x: p.x,
+        y: p.y,
+        z: p.z,
+        radius,
+        sigma,
+        kappa,
+        r: c.x,
+        g: c.y,
+        b: c.z,
+    }
 }
 
 /// L1 and L2 (the last two) are zero where the camera sees a surface's or the ground's back.
-fn toward_camera(scene: &Scene, region: u32, to_eye: DVec3, normal: DVec3, lit: [DVec3; 4]) -> [DVec3; 4] {
+fn toward_camera(
+    scene: &Scene,
+    region: u32,
+    to_eye: DVec3,
+    normal: DVec3,
+    lit: [DVec3; 4],
+) -> [DVec3; 4] {
     let is_back = (region as usize) < scene.n_solids() && normal.dot(to_eye) <= 0.0;
     if is_back { [lit[0], lit[1], DVec3::ZERO, DVec3::ZERO] } else { lit }
 }
 
-fn facet_row(index: usize, region: u32, [p, n]: [DVec3; 2], area: f64, [id, ii, l1, l2]: [DVec3; 4]) -> FacetRow {
+fn facet_row(
+    index: usize,
+    region: u32,
+    [p, n]: [DVec3; 2],
+    area: f64,
+    [id, ii, l1, l2]: [DVec3; 4],
+) -> FacetRow {
     FacetRow {
         index,
         region,

@@ -1,5 +1,5 @@
-//! References kept between runs, by the hash of all that they are computed from: the code, the scene as far as it
-//! counts, time, pixels, and what is asked for.
+//! References kept between runs, by the hash of all that they are computed from: the code, the
+//! scene as far as it counts, time, pixels, and what is asked for.
 
 use std::fs;
 use std::io::Write;
@@ -80,7 +80,11 @@ fn hash_of(against: Against, scene: &Scene, time_s: f64, pixels: &Pixels) -> Str
     let mut hasher = Sha256::new();
     let counted = counted(&Against::of_scene(scene), against);
     let pixels = (pixels.width, pixels.height, pixels.tile, pixels.cell);
-    hasher.update(format!("{}\n{against}\n{:x}\n{pixels:?}\n", env!("NIMBUS_REFERENCE_CODE"), time_s.to_bits()));
+    hasher.update(format!(
+        "{}\n{against}\n{:x}\n{pixels:?}\n",
+        env!("NIMBUS_REFERENCE_CODE"),
+        time_s.to_bits()
+    ));
     // Shortest digits that read back as the same numbers: two scenes that differ differ here.
     hasher.update(format!("{counted:?}"));
     format!("{:x}", hasher.finalize())
@@ -90,7 +94,8 @@ fn hash_of(against: Against, scene: &Scene, time_s: f64, pixels: &Pixels) -> Str
 fn counted(scene: &Scene, against: Against) -> Scene {
     let Lighting { mode, grid, step, forward, facets_per_cloud, .. } = scene.lighting;
     let by_model = matches!(against, Against::Model | Against::Reflections(_));
-    let (grid, step, facets_per_cloud) = if by_model { (1, 1.0, None) } else { (grid, step, facets_per_cloud) };
+    let (grid, step, facets_per_cloud) =
+        if by_model { (1, 1.0, None) } else { (grid, step, facets_per_cloud) };
     let lighting = Lighting {
         mode,
         grid,
@@ -125,12 +130,19 @@ fn read(path: &Path, hash: &str, n_pixels: usize) -> Option<Reference> {
     let end = bytes.iter().position(|b| *b == b'\n')?;
     let head: Head = serde_json::from_slice(&bytes[..end]).ok()?;
     let numbers = &bytes[end + 1..];
-    let is_whole = head.hash == hash && head.n_pixels == n_pixels && head.content == digest(numbers);
+    let is_whole =
+        head.hash == hash && head.n_pixels == n_pixels && head.content == digest(numbers);
     let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
     let values: Vec<f64> = numbers.chunks_exact(8).map(value).collect::<Option<_>>()?;
     let rgba: Vec<[f64; 4]> = values.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect();
     let Head { own_error, accuracy, seconds, pixels_s, .. } = head;
-    (is_whole && rgba.len() == n_pixels).then_some(Reference { rgba, own_error, accuracy, seconds, pixels_s })
+    (is_whole && rgba.len() == n_pixels).then_some(Reference {
+        rgba,
+        own_error,
+        accuracy,
+        seconds,
+        pixels_s,
+    })
 }
 
 fn write(path: &Path, hash: &str, reference: &Reference) -> Result<()> {
@@ -165,7 +177,13 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.f64");
         let rgba = vec![[0.1, -2.0, 1e-300, 1.0], [0.0, f64::MAX, 0.3, 0.4]];
-        let reference = Reference { rgba, own_error: 1e-7, accuracy: "rounding".into(), seconds: 2.5, pixels_s: 0.5 };
+        let reference = Reference {
+            rgba,
+            own_error: 1e-7,
+            accuracy: "rounding".into(),
+            seconds: 2.5,
+            pixels_s: 0.5,
+        };
         write(&path, "abc", &reference).unwrap();
         assert_eq!(read(&path, "abc", 2), Some(reference));
         assert_eq!((read(&path, "abd", 2), read(&path, "abc", 3)), (None, None));

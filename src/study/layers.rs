@@ -1,4 +1,5 @@
-//! How much there is to compose in the parts of a picture: what of it takes time before any of it is drawn.
+//! How much there is to compose in the parts of a picture: what of it takes time before any of it
+//! is drawn.
 
 use super::picture;
 use super::pixels::Tile;
@@ -21,7 +22,8 @@ impl Layers {
     pub fn of(scene: &Scene, truth: &Truth, reach: f64) -> Layers {
         let view = picture::view(scene, truth);
         let origin = truth.setting.light_origin;
-        let placed: Vec<Surface> = scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect();
+        let placed: Vec<Surface> =
+            scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect();
         let sees = |i: u32, j: u32| surfaces::seen(&view, &placed, view.ray(i, j)).is_some();
         let all = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
         let solid = all.map(|(i, j)| !placed.is_empty() && sees(i, j)).collect();

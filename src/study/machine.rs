@@ -70,7 +70,8 @@ pub fn device_record(info: &DeviceInfo) -> Device {
 pub fn clocks_record(info: &DeviceInfo, renderer: &mut Renderer) -> Result<Clocks> {
     let host = ClockQuality::measure();
     let limits = &info.limits;
-    let timestamp_period_ns = (limits.timestamp_valid_bits > 0).then_some(limits.timestamp_period_ns);
+    let timestamp_period_ns =
+        (limits.timestamp_valid_bits > 0).then_some(limits.timestamp_period_ns);
     let timestamp_overhead_ns = renderer.empty_scope_ns()?;
     let (resolution_ns, overhead_ns) = (host.resolution_ns as f64, host.overhead_ns);
     Ok(Clocks { resolution_ns, overhead_ns, timestamp_period_ns, timestamp_overhead_ns })
@@ -83,7 +84,9 @@ pub fn revision() -> &'static str {
 
 pub fn cpu() -> Cpu {
     let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
+    let model = text
+        .lines()
+        .find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, name)| name));
     Cpu {
         model: model.map_or_else(|| "unknown".to_owned(), |name| name.trim().to_owned()),
         logical_cores: std::thread::available_parallelism().map_or(1, usize::from),
@@ -92,7 +95,10 @@ pub fn cpu() -> Cpu {
 
 /// Of the process: Mesa, its software rasteriser, and the Vulkan loader.
 pub fn environment() -> BTreeMap<String, String> {
-    relevant(std::env::vars_os().filter_map(|(key, value)| Some((key.into_string().ok()?, value.into_string().ok()?))))
+    relevant(
+        std::env::vars_os()
+            .filter_map(|(key, value)| Some((key.into_string().ok()?, value.into_string().ok()?))),
+    )
 }
 
 fn relevant(variables: impl Iterator<Item = (String, String)>) -> BTreeMap<String, String> {
@@ -105,14 +111,16 @@ pub fn utc_now() -> String {
     iso_8601_utc(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()))
 }
 
-/// Seconds since 1970-01-01T00:00:00Z, without leap seconds. The date is Howard Hinnant's `civil_from_days`: years
-/// begin in March, so that the leap day is a year's last, and repeat every 400 years of 146 097 days.
+/// Seconds since 1970-01-01T00:00:00Z, without leap seconds. The date is Howard Hinnant's
+/// `civil_from_days`: years begin in March, so that the leap day is a year's last, and repeat every
+/// 400 years of 146 097 days.
 pub fn iso_8601_utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
     // Days from 0000-03-01 to 1970-01-01.
     let days = days + 719_468;
     let (era, day_of_era) = (days / 146_097, days % 146_097);
-    let year_of_era = (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let year_of_era =
+        (day_of_era - day_of_era / 1_460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
     let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
     // Months from March have 31, 30, 31, 30, 31 days and again: 153 days in five.
     let month_from_march = (5 * day_of_year + 2) / 153;
@@ -143,8 +151,12 @@ mod tests {
 
     #[test]
     fn only_variables_that_matter_are_kept() {
-        let given = ["LP_NUM_THREADS", "HOME", "VK_DRIVER_FILES", "MESA_VK_DEVICE_SELECT", "SECRET_VK_KEY"];
+        let given =
+            ["LP_NUM_THREADS", "HOME", "VK_DRIVER_FILES", "MESA_VK_DEVICE_SELECT", "SECRET_VK_KEY"];
         let kept = relevant(given.iter().map(|key| ((*key).to_owned(), "1".to_owned())));
-        assert_eq!(kept.keys().collect::<Vec<_>>(), ["LP_NUM_THREADS", "MESA_VK_DEVICE_SELECT", "VK_DRIVER_FILES"]);
+        assert_eq!(
+            kept.keys().collect::<Vec<_>>(),
+            ["LP_NUM_THREADS", "MESA_VK_DEVICE_SELECT", "VK_DRIVER_FILES"]
+        );
     }
 }

@@ -1,6 +1,6 @@
-//! Light by the model itself, at any point and without what nimbus makes it cheap by: transmittance in closed form,
-//! normals from the blobs' own density, a facet a particle, areas integrated, the BRDF itself, and as many reflections
-//! as asked for.
+//! Light by the model itself, at any point and without what nimbus makes it cheap by: transmittance
+//! in closed form, normals from the blobs' own density, a facet a particle, areas integrated, the
+//! BRDF itself, and as many reflections as asked for.
 
 use std::ops::{Add, Mul};
 
@@ -80,8 +80,8 @@ pub(super) fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
     if n == 0 { 0.0 } else { (sum / n as f64).sqrt() }
 }
 
-/// How exactly the second reflection is integrated: of a light that is a tenth of all a tenth of a thousandth is left,
-/// far below what pictures are off by.
+/// How exactly the second reflection is integrated: of a light that is a tenth of all a tenth of a
+/// thousandth is left, far below what pictures are off by.
 const SECOND_ACCURACY: f64 = 1e-3;
 /// Random paths of a receiver, for what comes after the second reflection: so many at once,
 const N_PATHS: u32 = 128;
@@ -102,7 +102,8 @@ impl Met {
         let n_surfaces = scene.surfaces.len();
         let kd = |region: u32| scene.region_material(region as usize).at(time_s).kd;
         let ground = ground(scene, origin);
-        let of_particles = facets.into_iter().map(|f| Facet { region: f.region + scene.n_solids() as u32, ..f });
+        let of_particles =
+            facets.into_iter().map(|f| Facet { region: f.region + scene.n_solids() as u32, ..f });
         let n_ground = ground.len();
         let colors = std::iter::repeat_n(DVec3::ONE, n_ground).chain(truth.colors.iter().copied());
         let disc = |(f, color): (Facet, DVec3)| Disc {
@@ -112,7 +113,11 @@ impl Met {
             kd: kd(f.region) * color,
         };
         Met {
-            surfaces: scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect(),
+            surfaces: scene
+                .surfaces
+                .iter()
+                .map(|s| Surface { center: s.center - origin, ..*s })
+                .collect(),
             brdfs: (0..n_surfaces).map(|i| scene.region_material(i).at(time_s)).collect(),
             lights: scene.lights.iter().map(|l| l.relative_to(origin)).collect(),
             discs: ground.into_iter().chain(of_particles).zip(colors).map(disc).collect(),
@@ -141,10 +146,20 @@ pub struct ModelLight<'a> {
 
 impl<'a> ModelLight<'a> {
     /// `n_reflections`, where they are others than those of the scene.
-    pub fn new(scene: &Scene, met: &'a Met, truth: &'a Truth, n_reflections: Option<u32>) -> ModelLight<'a> {
+    pub fn new(
+        scene: &Scene,
+        met: &'a Met,
+        truth: &'a Truth,
+        n_reflections: Option<u32>,
+    ) -> ModelLight<'a> {
         let forward = scene.lighting.forward;
-        let scenery = Scenery::new(&met.surfaces, &met.brdfs, &met.lights, &truth.blobs, forward, &met.discs);
-        ModelLight { scenery, eye: met.eye, n_reflections: n_reflections.unwrap_or(reflections_of(scene)) }
+        let scenery =
+            Scenery::new(&met.surfaces, &met.brdfs, &met.lights, &truth.blobs, forward, &met.discs);
+        ModelLight {
+            scenery,
+            eye: met.eye,
+            n_reflections: n_reflections.unwrap_or(reflections_of(scene)),
+        }
     }
 
     /// Whether it has random paths in it, and so differs from sample to sample.
@@ -171,34 +186,50 @@ impl<'a> ModelLight<'a> {
             lit.doubt.quadrature += second.error;
         }
         if self.is_random() {
-            let (radiance, error) = self.further(at, toward, number, PATHS_ACCURACY * lit.radiance.abs().max_element());
+            let (radiance, error) =
+                self.further(at, toward, number, PATHS_ACCURACY * lit.radiance.abs().max_element());
             lit.radiance += radiance;
             lit.doubt.chance += error;
         }
         lit
     }
 
-    /// What comes after the second reflection, by random paths, to about `accuracy`, and its standard error. A first
-    /// batch says how many are needed and counts for nothing else: who stops where chance has looked best so far is off
-    /// to that side.
-    fn further(&self, at: &Receiver, toward: DVec3, [i, i_sample]: [u32; 2], accuracy: f64) -> (DVec3, f64) {
+    /// What comes after the second reflection, by random paths, to about `accuracy`, and its
+    /// standard error. A first batch says how many are needed and counts for nothing else: who
+    /// stops where chance has looked best so far is off to that side.
+    fn further(
+        &self,
+        at: &Receiver,
+        toward: DVec3,
+        [i, i_sample]: [u32; 2],
+        accuracy: f64,
+    ) -> (DVec3, f64) {
         let k = self.n_reflections as usize;
         let batch = |i_batch: u32| {
             let seed = i.wrapping_mul(N_BATCHES + 1).wrapping_add(i_batch);
-            let all = self.scenery.reflections(at, toward, k, Chance { n_paths: N_PATHS, seed, i_sample });
+            let all = self.scenery.reflections(
+                at,
+                toward,
+                k,
+                Chance { n_paths: N_PATHS, seed, i_sample },
+            );
             let radiance = all[2..k].iter().map(|r| r.radiance).sum::<DVec3>();
             // Of the same paths: errors of one reflection and the next may add up.
             (radiance, all[2..k].iter().map(|r| r.error.max_element()).sum::<f64>())
         };
         let (_, pilot) = batch(0);
         let n = match pilot > 0.0 && accuracy > 0.0 {
-            true => (pilot / accuracy).powi(2).ceil().clamp(f64::from(LEAST_BATCHES), f64::from(N_BATCHES)) as u32,
+            true => (pilot / accuracy)
+                .powi(2)
+                .ceil()
+                .clamp(f64::from(LEAST_BATCHES), f64::from(N_BATCHES)) as u32,
             // It met no light, or the same everywhere.
             false => N_BATCHES,
         };
-        let (sum, squares) = (1..=n)
-            .map(batch)
-            .fold((DVec3::ZERO, 0.0), |(sum, squares), found| (sum + found.0, squares + found.1 * found.1));
+        let (sum, squares) =
+            (1..=n).map(batch).fold((DVec3::ZERO, 0.0), |(sum, squares), found| {
+                (sum + found.0, squares + found.1 * found.1)
+            });
         (sum / f64::from(n), squares.sqrt() / f64::from(n))
     }
 }

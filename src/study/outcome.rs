@@ -42,7 +42,8 @@ impl Timed<'_> {
     fn measured(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Option<Measured> {
         let values = self.column(of);
         let bootstrap = Bootstrap::of_neighbours(values.len());
-        let interval = if values.len() < N_FRAMES_NEEDED { None } else { bootstrap.median(&values) };
+        let interval =
+            if values.len() < N_FRAMES_NEEDED { None } else { bootstrap.median(&values) };
         // The widened interval may reach below what a time can be.
         let (p50_low, p50_high) = interval.map(|i| (i.low.max(0.0), i.high)).unzip();
         Summary::of(&values).map(|of| Measured { of, p50_low, p50_high })
@@ -63,7 +64,8 @@ impl Outcome {
     fn case(&self, i: usize, case: &Case, plan: &BenchPlan) -> records::Case {
         // With --no-skip no loop skips; else the one that does not is there to measure skipping by.
         let skip = case.loops.iter().any(|of| of.skip);
-        let find = |threading| case.loops.iter().copied().find(|of| *of == Loop { threading, skip });
+        let find =
+            |threading| case.loops.iter().copied().find(|of| *of == Loop { threading, skip });
         let (serial, parallel) = (find(Threading::Serial), find(Threading::Parallel));
         let pair = serial.zip(parallel);
         let unskipped = case.loops.iter().copied().find(|of| skip && !of.skip);
@@ -79,18 +81,21 @@ impl Outcome {
             ratio: pair.and_then(|(serial, parallel)| self.ratio(i, serial, parallel)),
             overlap: serial.and_then(|serial| self.overlap(i, serial, pair.map(|p| p.1))),
             counts: self.counts.get(&i).copied(),
-            skipping: unskipped
-                .and_then(|unskipped| self.skipping(i, case, [Loop { skip: true, ..unskipped }, unskipped])),
+            skipping: unskipped.and_then(|unskipped| {
+                self.skipping(i, case, [Loop { skip: true, ..unskipped }, unskipped])
+            }),
         }
     }
 
-    /// Ratio of the median frame times with its bootstrap 95 % interval. Neighbouring frames are alike, so whole runs of
-    /// frames are drawn, not single ones: √n frames each.
+    /// Ratio of the median frame times with its bootstrap 95 % interval. Neighbouring frames are
+    /// alike, so whole runs of frames are drawn, not single ones: √n frames each.
     fn ratio(&self, i: usize, serial: Loop, parallel: Loop) -> Option<Ratio> {
-        let (serial, parallel) = (self.timed(i, serial).frame_ms(), self.timed(i, parallel).frame_ms());
+        let (serial, parallel) =
+            (self.timed(i, serial).frame_ms(), self.timed(i, parallel).frame_ms());
         let n = serial.len().min(parallel.len());
         let bootstrap = Bootstrap::of_neighbours(n);
-        let interval = if n < N_FRAMES_NEEDED { None } else { bootstrap.ratio_of_medians(&parallel, &serial) };
+        let interval =
+            if n < N_FRAMES_NEEDED { None } else { bootstrap.ratio_of_medians(&parallel, &serial) };
         let (low, high) = interval.map(|i| (i.low, i.high)).unzip();
         let parallel_by_serial = median(&parallel)? / median(&serial).filter(|ms| *ms > 0.0)?;
         Some(Ratio { parallel_by_serial, low, high })
@@ -98,7 +103,11 @@ impl Outcome {
 
     /// What overlap could gain, and how much of it the parallel loop gained.
     fn overlap(&self, i: usize, serial: Loop, parallel: Option<Loop>) -> Option<Overlap> {
-        let row = |t: &&FrameTimes| SerialFrame { frame_ms: t.frame_ms, game_ms: t.game_ms, render_ms: t.render_ms() };
+        let row = |t: &&FrameTimes| SerialFrame {
+            frame_ms: t.frame_ms,
+            game_ms: t.game_ms,
+            render_ms: t.render_ms(),
+        };
         let serial: Vec<SerialFrame> = self.timed(i, serial).0.iter().map(row).collect();
         Overlap::of(&serial, &parallel.map_or(vec![], |of| self.timed(i, of).frame_ms()))
     }
@@ -121,8 +130,8 @@ impl Outcome {
         blocks.find_map(|b| b.image_hash.as_deref())
     }
 
-    /// Whether the last frames of all blocks of a case are the same, to the byte; none of fewer than two. With impostors of
-    /// those that skip: without skipping there are none.
+    /// Whether the last frames of all blocks of a case are the same, to the byte; none of fewer
+    /// than two. With impostors of those that skip: without skipping there are none.
     pub fn is_same_picture(&self, i_case: usize, case: &Case) -> Option<bool> {
         let exact = case.scene.draw.impostors == Impostors::Off;
         let blocks = self.blocks.iter().filter(|b| b.i_case == i_case && (exact || b.of.skip));
@@ -140,16 +149,28 @@ impl Outcome {
         self.blocks.iter().map(of).collect()
     }
 
-    fn mode(&self, i: usize, case: &Case, of: Loop, unskipped: Option<Loop>, plan: &BenchPlan) -> Mode {
+    fn mode(
+        &self,
+        i: usize,
+        case: &Case,
+        of: Loop,
+        unskipped: Option<Loop>,
+        plan: &BenchPlan,
+    ) -> Mode {
         let timed = self.timed(i, of);
-        let blocks: BTreeSet<u32> =
-            self.samples.iter().filter(|s| s.i_case == i && s.of == of).map(|s| s.i_block).collect();
+        let blocks: BTreeSet<u32> = self
+            .samples
+            .iter()
+            .filter(|s| s.i_case == i && s.of == of)
+            .map(|s| s.i_block)
+            .collect();
         let depths = timed.column(|t| Some(f64::from(t.queue_depth)));
         let against = unskipped.filter(|u| *u != of).map(|u| self.timed(i, u));
         Mode {
             threading: of.threading.name().into(),
             skip: of.skip,
-            simulate: if case.scene.threads.simulate == Simulate::Cpu { "cpu" } else { "gpu" }.into(),
+            simulate: if case.scene.threads.simulate == Simulate::Cpu { "cpu" } else { "gpu" }
+                .into(),
             frames: timed.0.len(),
             warm_up: plan.n_warm_up as usize,
             blocks: blocks.len(),
@@ -163,7 +184,8 @@ impl Outcome {
             gpu_ms: timed.measured(FrameTimes::gpu_ms),
             latency_ms: timed.measured(|t| Some(t.latency_ms)),
             queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
-            drawn: Summary::of(&timed.column(|t| Some(f64::from(t.n_shown())))).map(|s| [s.min, s.mean, s.max]),
+            drawn: Summary::of(&timed.column(|t| Some(f64::from(t.n_shown()))))
+                .map(|s| [s.min, s.mean, s.max]),
             impostors_reused: timed.0.iter().filter(|t| is_reused(t)).count(),
             passes: pass_records(&timed, against.as_ref()),
             image_hash: self.image_hash(i, of).map(str::to_owned),
@@ -216,7 +238,12 @@ fn is_reused(times: &FrameTimes) -> bool {
 
 /// "sort+sprites".
 fn ran(times: &FrameTimes) -> String {
-    Pass::ALL.into_iter().filter(|p| times.plan.runs(*p)).map(Pass::name).collect::<Vec<_>>().join("+")
+    Pass::ALL
+        .into_iter()
+        .filter(|p| times.plan.runs(*p))
+        .map(Pass::name)
+        .collect::<Vec<_>>()
+        .join("+")
 }
 
 /// Each once, the most frequent first.
@@ -225,7 +252,8 @@ fn reasons(all: impl Iterator<Item = String>) -> Vec<Reason> {
     for reason in all {
         *counts.entry(reason).or_default() += 1;
     }
-    let mut reasons: Vec<Reason> = counts.into_iter().map(|(reason, n)| Reason { reason, n }).collect();
+    let mut reasons: Vec<Reason> =
+        counts.into_iter().map(|(reason, n)| Reason { reason, n }).collect();
     reasons.sort_by_key(|r| std::cmp::Reverse(r.n));
     reasons
 }
@@ -251,7 +279,9 @@ fn pass_records(timed: &Timed<'_>, against: Option<&Timed<'_>>) -> Vec<PassRecor
             n_skipped: skipped.len(),
             reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_string()),
             reasons: reasons(skipped.iter().map(|t| t.plan.decision(pass).reason.to_string())),
-            saved_ms: whole.filter(|_| !skipped.is_empty()).map(|ms| ms * (skipped.len() as f64 / n as f64)),
+            saved_ms: whole
+                .filter(|_| !skipped.is_empty())
+                .map(|ms| ms * (skipped.len() as f64 / n as f64)),
         }
     };
     Pass::ALL.into_iter().map(record).collect()

@@ -1,10 +1,11 @@
 //! What running the game step beside the render step could gain, and how much of it was gained.
 //!
-//! The serial loop takes T_serial ≈ T_game + T_render a frame. Side by side a frame takes no less than the slower of
-//! the two, max(T_game, T_render), with both as long as they take alone; but recording is a part of the render step that
-//! the parallel loop lays beside the device's, so that it may come below that. T_serial less that is the possible gain;
-//! T_serial − T_parallel is what was gained. (Steps that slow one another down by sharing cores, caches or memory
-//! gain less; that is what the share is there to show.) All T are medians.
+//! The serial loop takes T_serial ≈ T_game + T_render a frame. Side by side a frame takes no less
+//! than the slower of the two, max(T_game, T_render), with both as long as they take alone; but
+//! recording is a part of the render step that the parallel loop lays beside the device's, so that
+//! it may come below that. T_serial less that is the possible gain; T_serial − T_parallel is what
+//! was gained. (Steps that slow one another down by sharing cores, caches or memory gain less; that
+//! is what the share is there to show.) All T are medians.
 
 use serde::{Deserialize, Serialize};
 
@@ -27,13 +28,14 @@ pub struct Overlap {
     pub render_ms: f64,
     /// max(game, render): what overlapping these two alone can come to.
     pub bound_ms: f64,
-    /// None where the parallel loop did not run, or the possible gain is less than 0.05 ms, a twentieth of the serial frame, or not
-    /// certainly above 0: a share of next to nothing says nothing.
+    /// None where the parallel loop did not run, or the possible gain is less than 0.05 ms, a
+    /// twentieth of the serial frame, or not certainly above 0: a share of next to nothing says
+    /// nothing.
     pub reached: Option<Reached>,
 }
 
-/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap of the two, above it
-/// recording was hidden too, 0 no gain, below 0 a loss.
+/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap of the two,
+/// above it recording was hidden too, 0 no gain, below 0 a loss.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
     pub share: f64,
@@ -51,30 +53,41 @@ pub struct SerialFrame {
 }
 
 impl Overlap {
-    /// Frames in the order they ran; those with a time that is not finite are left out. None without a serial frame.
+    /// Frames in the order they ran; those with a time that is not finite are left out. None
+    /// without a serial frame.
     pub fn of(serial: &[SerialFrame], parallel_ms: &[f64]) -> Option<Overlap> {
-        let is_whole = |f: &&SerialFrame| [f.frame_ms, f.game_ms, f.render_ms].iter().all(|ms| ms.is_finite());
+        let is_whole =
+            |f: &&SerialFrame| [f.frame_ms, f.game_ms, f.render_ms].iter().all(|ms| ms.is_finite());
         let serial: Vec<SerialFrame> = serial.iter().filter(is_whole).copied().collect();
         let column = |f: fn(&SerialFrame) -> f64| serial.iter().map(f).collect::<Vec<f64>>();
-        let (frame, game, render) = (column(|f| f.frame_ms), column(|f| f.game_ms), column(|f| f.render_ms));
+        let (frame, game, render) =
+            (column(|f| f.frame_ms), column(|f| f.game_ms), column(|f| f.render_ms));
         let parallel: Vec<f64> = parallel_ms.iter().copied().filter(|ms| ms.is_finite()).collect();
         let (game_ms, render_ms, serial_ms) = (median(&game)?, median(&render)?, median(&frame)?);
-        let is_worth_it = serial_ms - game_ms.max(render_ms) >= LEAST_GAIN_MS.max(LEAST_GAIN * serial_ms);
-        // A serial frame is drawn with its game and render step: what slows all three together cancels.
+        let is_worth_it =
+            serial_ms - game_ms.max(render_ms) >= LEAST_GAIN_MS.max(LEAST_GAIN * serial_ms);
+        // A serial frame is drawn with its game and render step: what slows all three together
+        // cancels.
         let bootstrap = Bootstrap::of_neighbours(serial.len().min(parallel.len()));
-        let reached = bootstrap.interval([serial.len(), parallel.len()], |[rows, parallel_rows]| {
-            let serial_ms = median_of_rows(&frame, rows);
-            let possible = serial_ms - median_of_rows(&game, rows).max(median_of_rows(&render, rows));
-            let gained = serial_ms - median_of_rows(&parallel, parallel_rows);
-            if possible > 0.0 { gained / possible } else { f64::NAN }
-        });
+        let reached =
+            bootstrap.interval([serial.len(), parallel.len()], |[rows, parallel_rows]| {
+                let serial_ms = median_of_rows(&frame, rows);
+                let possible =
+                    serial_ms - median_of_rows(&game, rows).max(median_of_rows(&render, rows));
+                let gained = serial_ms - median_of_rows(&parallel, parallel_rows);
+                if possible > 0.0 { gained / possible } else { f64::NAN }
+            });
         Some(Overlap {
             serial_ms,
             parallel_ms: median(&parallel),
             game_ms,
             render_ms,
             bound_ms: game_ms.max(render_ms),
-            reached: reached.filter(|_| is_worth_it).map(|i| Reached { share: i.estimate, low: i.low, high: i.high }),
+            reached: reached.filter(|_| is_worth_it).map(|i| Reached {
+                share: i.estimate,
+                low: i.low,
+                high: i.high,
+            }),
         })
     }
 }
@@ -90,11 +103,15 @@ mod tests {
 
     #[test]
     fn worked_by_hand() {
-        // 4 + 10 = 14 ms, at best 10: 4 to gain. 11 ms gains 3 of them, 10 all, 16 loses 2; the other way round too.
+        // 4 + 10 = 14 ms, at best 10: 4 to gain. 11 ms gains 3 of them, 10 all, 16 loses 2; the
+        // other way round too.
         for (parallel_ms, share) in [(11.0, 0.75), (10.0, 1.0), (14.0, 0.0), (16.0, -0.5)] {
             for (game, render) in [(4.0, 10.0), (10.0, 4.0)] {
                 let overlap = Overlap::of(&serial(5, game, render), &[parallel_ms; 7]).unwrap();
-                assert_eq!((overlap.serial_ms, overlap.bound_ms, overlap.parallel_ms), (14.0, 10.0, Some(parallel_ms)));
+                assert_eq!(
+                    (overlap.serial_ms, overlap.bound_ms, overlap.parallel_ms),
+                    (14.0, 10.0, Some(parallel_ms))
+                );
                 assert_eq!(overlap.reached, Some(Reached { share, low: share, high: share }));
             }
         }
@@ -111,8 +128,8 @@ mod tests {
         assert_eq!(Overlap::of(&[nan], &[1.0]), None);
     }
 
-    /// Of `n_trials` intervals how many hold the truth. Render 10 ± 0.5 ms, game 4 ± 0.1 ms; parallel 12 ± 0.5 ms: half of
-    /// the 4 ms to gain.
+    /// Of `n_trials` intervals how many hold the truth. Render 10 ± 0.5 ms, game 4 ± 0.1 ms;
+    /// parallel 12 ± 0.5 ms: half of the 4 ms to gain.
     fn n_held(n_trials: usize, n: usize, rho: f64) -> usize {
         let mut random = SplitMix64(19);
         let mut values = || {
@@ -123,9 +140,14 @@ mod tests {
             values
         };
         let mut holds = || {
-            let frames = values().into_iter().zip(values()).map(|(a, b)| (4.0 + 0.1 * a, 10.0 + 0.5 * b));
+            let frames =
+                values().into_iter().zip(values()).map(|(a, b)| (4.0 + 0.1 * a, 10.0 + 0.5 * b));
             let serial: Vec<SerialFrame> = frames
-                .map(|(game_ms, render_ms)| SerialFrame { frame_ms: game_ms + render_ms, game_ms, render_ms })
+                .map(|(game_ms, render_ms)| SerialFrame {
+                    frame_ms: game_ms + render_ms,
+                    game_ms,
+                    render_ms,
+                })
                 .collect();
             let parallel: Vec<f64> = values().iter().map(|z| 12.0 + 0.5 * z).collect();
             let reached = Overlap::of(&serial, &parallel).unwrap().reached.unwrap();
@@ -136,8 +158,8 @@ mod tests {
 
     #[test]
     fn the_interval_holds_the_truth_about_as_often_as_it_says() {
-        // 96.0 % of 2000 trials (ρ = 0: 96.3; 0.6: 95.7; n = 60, ρ = 0.3: 95.7). Over 300 the standard error is 1.2 %;
-        // outside 91–98.5 % it would be wrong, not unlucky.
+        // 96.0 % of 2000 trials (ρ = 0: 96.3; 0.6: 95.7; n = 60, ρ = 0.3: 95.7). Over 300 the
+        // standard error is 1.2 %; outside 91–98.5 % it would be wrong, not unlucky.
         let n_held = n_held(300, 120, 0.3);
         assert!((273..=295).contains(&n_held), "{n_held} of 300");
     }

@@ -1,5 +1,5 @@
-//! A whole frame's picture in f64, from the scene alone: by the thin sprites that nimbus draws, or by the volume that
-//! they stand for.
+//! A whole frame's picture in f64, from the scene alone: by the thin sprites that nimbus draws, or
+//! by the volume that they stand for.
 
 use glam::{DVec2, DVec3};
 
@@ -38,14 +38,16 @@ pub enum Work {
     Sampling,
 }
 
-/// Hears how much of a piece of work there is each time that one more of it is done, from any thread.
+/// Hears how much of a piece of work there is each time that one more of it is done, from any
+/// thread.
 pub type Listener<'a> = &'a (dyn Fn(Work, usize) + Sync);
 
 /// Premultiplied linear RGBA, row 0 the top.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
     pub rgba: Vec<[f64; 4]>,
-    /// Greatest error estimate of a pixel's radiance; of thin sprites none, whose only error is rounding.
+    /// Greatest error estimate of a pixel's radiance; of thin sprites none, whose only error is
+    /// rounding.
     pub error: Option<f64>,
     /// Greatest magnitude of a particle's radiance: what the error is small against.
     pub brightest: f64,
@@ -56,7 +58,12 @@ pub struct Picture {
 }
 
 /// The scene at `time_s`.
-pub fn picture(scene: &Scene, time_s: f64, drawing: Drawing, listener: Listener) -> Result<Picture> {
+pub fn picture(
+    scene: &Scene,
+    time_s: f64,
+    drawing: Drawing,
+    listener: Listener,
+) -> Result<Picture> {
     check(scene, time_s, drawing)?;
     let truth = Truth::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
     Ok(draw(scene, &truth, drawing, listener))
@@ -78,8 +85,11 @@ pub(super) fn draw(scene: &Scene, truth: &Truth, drawing: Drawing, listener: Lis
             };
             let factor: Option<Factor> = if pool.is_some() { Some(&factor) } else { None };
             let none = Rounding::NONE;
-            let (rgba, _) = sprites::render_textured(&view, &behind, &blobs, &radiance, &order, &none, factor);
-            let cut = threshold::cut(&view, &behind, &blobs, factor).into_iter().fold(Cut::default(), Cut::most);
+            let (rgba, _) =
+                sprites::render_textured(&view, &behind, &blobs, &radiance, &order, &none, factor);
+            let cut = threshold::cut(&view, &behind, &blobs, factor)
+                .into_iter()
+                .fold(Cut::default(), Cut::most);
             Picture { rgba, error: None, brightest, n_particles: order.len(), cut }
         }
         Drawing::Volume => {
@@ -93,7 +103,13 @@ pub(super) fn draw(scene: &Scene, truth: &Truth, drawing: Drawing, listener: Lis
             let pixels = rows.concat();
             let error = pixels.iter().map(|p| p.error).fold(0.0, f64::max);
             let rgba = pixels.into_iter().map(|p| p.color).collect();
-            Picture { rgba, error: Some(error), brightest, n_particles: truth.blobs.len(), cut: Cut::default() }
+            Picture {
+                rgba,
+                error: Some(error),
+                brightest,
+                n_particles: truth.blobs.len(),
+                cut: Cut::default(),
+            }
         }
     }
 }
@@ -103,7 +119,8 @@ pub(super) fn check(scene: &Scene, time_s: f64, drawing: Drawing) -> Result<()> 
     let textured = scene.clouds.iter().position(|c| !c.texture.is_none());
     if let Some(i) = textured.filter(|_| drawing == Drawing::Volume) {
         return Err(Error::usage(format!(
-            "cloud {i} is textured, and the volume knows plain blobs alone; expected --set 'cloud.{i}.texture=\"none\"'"
+            "cloud {i} is textured, and the volume knows plain blobs alone; expected --set \
+             'cloud.{i}.texture=\"none\"'"
         )));
     }
     if scene.lighting.mode == LightingMode::None {
@@ -113,7 +130,8 @@ pub(super) fn check(scene: &Scene, time_s: f64, drawing: Drawing) -> Result<()> 
         let material = &scene.materials[cloud.i_material];
         if material.at(time_s).ks != DVec3::ZERO {
             return Err(Error::usage(format!(
-                "cloud {i}: its material \"{}\" has a lobe, and the f64 reference knows clouds that reflect diffusely alone; \
+                "cloud {i}: its material \"{}\" has a lobe, and the f64 reference knows clouds \
+                 that reflect diffusely alone; \
                  expected ks = [0, 0, 0]",
                 material.name
             )));
@@ -167,8 +185,9 @@ fn behind_from(
     picture
 }
 
-/// The surfaces relative to the lighting origin, and the radiance of their facets and of the ground's points; where
-/// nothing is lit they show their materials' K_d, as particles show their colours.
+/// The surfaces relative to the lighting origin, and the radiance of their facets and of the
+/// ground's points; where nothing is lit they show their materials' K_d, as particles show their
+/// colours.
 fn facets(scene: &Scene, truth: &Truth) -> (Vec<Surface>, Vec<DVec3>) {
     let origin = truth.setting.light_origin;
     let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
@@ -177,9 +196,12 @@ fn facets(scene: &Scene, truth: &Truth) -> (Vec<Surface>, Vec<DVec3>) {
     let all = |(i_material, n): (usize, u64)| std::iter::repeat_n(kd(i_material), n as usize);
     let of_terrains = scene.terrains.iter().map(|t| (t.i_material, t.n_facets()));
     let facets: Vec<DVec3> = match scene.lighting.mode {
-        LightingMode::None => {
-            placed.iter().map(|s| (s.i_material, s.n_facets())).chain(of_terrains).flat_map(all).collect()
-        }
+        LightingMode::None => placed
+            .iter()
+            .map(|s| (s.i_material, s.n_facets()))
+            .chain(of_terrains)
+            .flat_map(all)
+            .collect(),
         _ => (0..scene.n_solid_facets() as usize).map(|i| truth.facet_radiance(i)).collect(),
     };
     (placed, facets)
@@ -226,15 +248,16 @@ pub(super) fn sheets(scene: &Scene, truth: &Truth, view: &View) -> Option<(Pool,
     Some((Pool::new(scene.draw.texture_seed).rounded(), sheets))
 }
 
-/// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn are: far to near by
-/// exact view depth, ties by index.
+/// The blobs with κ as their clouds' distance asks for, and in which order those that are drawn
+/// are: far to near by exact view depth, ties by index.
 pub(super) fn drawn(scene: &Scene, truth: &Truth) -> (Vec<Blob>, Vec<u32>) {
     let weights = weights(scene, truth);
     let weighed = |(b, w): (&Blob, &f64)| Blob { kappa: b.kappa * w, ..*b };
     let blobs: Vec<Blob> = truth.blobs.iter().zip(&weights).map(weighed).collect();
     let positions: Vec<DVec3> = blobs.iter().map(|b| b.position).collect();
     let depths = sort::depths(truth.setting.pose.forward, &positions);
-    let mut order: Vec<u32> = (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
+    let mut order: Vec<u32> =
+        (0..blobs.len() as u32).filter(|&i| weights[i as usize] > 0.0).collect();
     order.sort_by(|&i, &j| depths[j as usize].total_cmp(&depths[i as usize]));
     (blobs, order)
 }
@@ -246,7 +269,12 @@ fn weights(scene: &Scene, truth: &Truth) -> Vec<f64> {
     let centers = place::cloud_centers(clouds, setting.time_s, DVec3::ZERO);
     let of_cloud = |(cloud, center): (_, &DVec3)| {
         let distance = (setting.pose.position - *center).length();
-        count::printed(distance / rule.d0, place::scale(cloud, setting.time_s), rule.a, rule.normalised)
+        count::printed(
+            distance / rule.d0,
+            place::scale(cloud, setting.time_s),
+            rule.a,
+            rule.normalised,
+        )
     };
     let shares: Vec<f64> = clouds.iter().zip(&centers).map(of_cloud).collect();
     let of_group = |g: &Group| {

@@ -45,8 +45,9 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// One pixel at random in each cell, at most `n` in all but for the cells that the picture's edges cut. A mean over
-    /// them is one over the picture but for those cells, whose pixels count as much as a whole one's.
+    /// One pixel at random in each cell, at most `n` in all but for the cells that the picture's
+    /// edges cut. A mean over them is one over the picture but for those cells, whose pixels count
+    /// as much as a whole one's.
     pub fn sample(width: u32, height: u32, n: usize) -> Pixels {
         let all = f64::from(width) * f64::from(height);
         let cell = ((all / n.max(1) as f64).sqrt().ceil() as u32).max(1);
@@ -59,7 +60,10 @@ impl Pixels {
             };
             [within(i, width, words[0]), within(j, height, words[1])]
         };
-        let at = (0..rows).flat_map(|j| (0..columns).map(move |i| (i, j))).map(|(i, j)| place(i, j)).collect();
+        let at = (0..rows)
+            .flat_map(|j| (0..columns).map(move |i| (i, j)))
+            .map(|(i, j)| place(i, j))
+            .collect();
         Pixels { width, height, tile: Tile::whole(width, height), cell, at }
     }
 
@@ -85,7 +89,8 @@ impl Pixels {
         j as usize * self.width as usize + i as usize
     }
 
-    /// Number of pixel `k` where each is to be told from all others: in a whole picture and in its tiles the same.
+    /// Number of pixel `k` where each is to be told from all others: in a whole picture and in its
+    /// tiles the same.
     pub fn number(&self, k: usize) -> usize {
         if self.cell == 1 { self.index(self.at[k]) } else { k }
     }
@@ -118,7 +123,10 @@ mod tests {
     fn one_in_each_cell_of_few_enough() {
         let pixels = Pixels::sample(80, 61, 500);
         // 4880/500 = 9.76: cells of 4, 20 by 16 of them.
-        assert_eq!((pixels.cell, pixels.n_columns(), pixels.n_rows(), pixels.at.len()), (4, 20, 16, 320));
+        assert_eq!(
+            (pixels.cell, pixels.n_columns(), pixels.n_rows(), pixels.at.len()),
+            (4, 20, 16, 320)
+        );
         for (k, [i, j]) in pixels.at.iter().enumerate() {
             assert_eq!((i / 4, j / 4), (k as u32 % 20, k as u32 / 20));
             assert!(*i < 80 && *j < 61);

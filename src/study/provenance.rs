@@ -19,7 +19,8 @@ pub struct Provenance {
     pub schema: u32,
     pub nimbus: String,
     pub revision: String,
-    /// Digest of the sources that were built: two builds that differ from one revision differ in it.
+    /// Digest of the sources that were built: two builds that differ from one revision differ in
+    /// it.
     pub code: String,
     /// UTC, ISO 8601.
     pub date: String,
@@ -37,7 +38,13 @@ pub struct Provenance {
 
 impl Provenance {
     /// Of a study of `scene` that is being made now.
-    pub fn now(schema: u32, scene_file: &Path, scene: &LoadedScene, info: &DeviceInfo, clocks: Clocks) -> Provenance {
+    pub fn now(
+        schema: u32,
+        scene_file: &Path,
+        scene: &LoadedScene,
+        info: &DeviceInfo,
+        clocks: Clocks,
+    ) -> Provenance {
         Provenance {
             schema,
             nimbus: env!("CARGO_PKG_VERSION").into(),
@@ -71,11 +78,13 @@ pub struct ReferenceRecord {
     pub against: String,
     /// SHA-256 of all that it is computed from.
     pub hash: String,
-    /// Root mean square of its own error over the pixels: an estimate, see `accuracy`; none where there is no bound.
+    /// Root mean square of its own error over the pixels: an estimate, see `accuracy`; none where
+    /// there is no bound.
     pub own_error: Option<f64>,
     /// What that estimate is, in words.
     pub accuracy: String,
-    /// Root mean square of its premultiplied red, green, blue and alpha: what errors are relative to.
+    /// Root mean square of its premultiplied red, green, blue and alpha: what errors are relative
+    /// to.
     pub magnitude: f64,
     /// It was computed before and kept.
     pub from_cache: bool,
@@ -91,7 +100,13 @@ pub struct ReferenceRecord {
 
 impl ReferenceRecord {
     /// Of `kept`, which is `against`'s picture of a frame at `pixels`.
-    pub fn of(kept: &Kept, against: Against, pixels: &Pixels, frame: u32, time_s: f64) -> ReferenceRecord {
+    pub fn of(
+        kept: &Kept,
+        against: Against,
+        pixels: &Pixels,
+        frame: u32,
+        time_s: f64,
+    ) -> ReferenceRecord {
         let Kept { reference, hash, from_cache } = kept;
         let squares: f64 = reference.rgba.iter().flatten().map(|v| v * v).sum();
         ReferenceRecord {

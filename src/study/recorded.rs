@@ -1,4 +1,5 @@
-//! Reads back what [`super::records::write_results`] wrote, and finds out when it is not that, or not all of it.
+//! Reads back what [`super::records::write_results`] wrote, and finds out when it is not that, or
+//! not all of it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -31,17 +32,22 @@ pub struct TimedMode {
     pub measures: Vec<Measure>,
 }
 
-/// Times in ms in the order they were taken; frames without one (a pass that was skipped) are left out.
+/// Times in ms in the order they were taken; frames without one (a pass that was skipped) are left
+/// out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measure {
     pub name: String,
     pub ms: Vec<f64>,
 }
 
-/// Reads a folder that `bench --out` made. An error names the file, and the line where there is one.
+/// Reads a folder that `bench --out` made. An error names the file, and the line where there is
+/// one.
 pub fn read_results(folder: &Path) -> Result<Recorded> {
     if !folder.is_dir() {
-        return Err(Error::io(folder, "no such folder; expected one that nimbus bench --out wrote"));
+        return Err(Error::io(
+            folder,
+            "no such folder; expected one that nimbus bench --out wrote",
+        ));
     }
     if !folder.join(RUN_FILE).exists() {
         return Err(Error::io(folder, format!("holds no {RUN_FILE}; {}", expected_in(folder))));
@@ -62,14 +68,18 @@ pub fn join(run: Run, text: &str, path: &Path) -> Result<Recorded> {
         let n = timed.as_ref().map_or(0, |timed| timed.frames.len());
         if n != mode.frames {
             let wanted = mode.frames;
-            let what =
-                format!("holds {n} timed {name} frames and {RUN_FILE} names {wanted}: cut off, or another run's");
+            let what = format!(
+                "holds {n} timed {name} frames and {RUN_FILE} names {wanted}: cut off, or \
+                 another run's"
+            );
             return Err(Error::io(path, what));
         }
         modes.extend(timed);
     }
     match by_mode.keys().next() {
-        Some(other) => Err(Error::io(path, format!("holds {other} frames, of which {RUN_FILE} knows nothing"))),
+        Some(other) => {
+            Err(Error::io(path, format!("holds {other} frames, of which {RUN_FILE} knows nothing")))
+        }
         None => Ok(Recorded { run, modes }),
     }
 }
@@ -77,15 +87,20 @@ pub fn join(run: Run, text: &str, path: &Path) -> Result<Recorded> {
 /// Results of several scenes lie one folder deeper.
 fn expected_in(folder: &Path) -> String {
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut deeper: Vec<PathBuf> = entries.map(|e| e.path()).filter(|p| p.join(RUN_FILE).exists()).collect();
+    let mut deeper: Vec<PathBuf> =
+        entries.map(|e| e.path()).filter(|p| p.join(RUN_FILE).exists()).collect();
     deeper.sort();
     match deeper.first() {
-        Some(first) => format!("it has folders of results in it: name one of those, such as {}", first.display()),
+        Some(first) => format!(
+            "it has folders of results in it: name one of those, such as {}",
+            first.display()
+        ),
         None => "expected a folder that nimbus bench --out wrote".to_owned(),
     }
 }
 
-/// A case's loop in words: "dense, size=800x600: serial", or the loop alone where there is one case.
+/// A case's loop in words: "dense, size=800x600: serial", or the loop alone where there is one
+/// case.
 fn mode_name(case: &str, threading: &str, skip: bool) -> String {
     let of = if skip { threading.to_owned() } else { format!("{threading} no-skip") };
     if case.is_empty() { of } else { format!("{case}: {of}") }
@@ -130,14 +145,19 @@ impl Columns {
             submit_ms: find("submit_ms")?,
             wait_ms: find("wait_ms")?,
             gpu_ms: find("gpu_ms")?,
-            passes: header.iter().enumerate().filter_map(|(i, field)| Some((pass(field)?, i))).collect(),
+            passes: header
+                .iter()
+                .enumerate()
+                .filter_map(|(i, field)| Some((pass(field)?, i)))
+                .collect(),
             n: header.len(),
         })
     }
 
     fn measures(&self) -> Vec<Measure> {
-        let names =
-            ["frame", "game", "render", "gpu"].into_iter().chain(self.passes.iter().map(|(name, _)| name.as_str()));
+        let names = ["frame", "game", "render", "gpu"]
+            .into_iter()
+            .chain(self.passes.iter().map(|(name, _)| name.as_str()));
         names.map(|name| Measure { name: name.to_owned(), ms: Vec::new() }).collect()
     }
 
@@ -145,9 +165,12 @@ impl Columns {
     fn times(&self, line: &StringRecord) -> std::result::Result<Vec<Option<f64>>, String> {
         let ms = |column: usize| match &line[column] {
             "" => Ok(None),
-            text => {
-                text.parse::<f64>().ok().filter(|ms| ms.is_finite()).map(Some).ok_or_else(|| odd("a time in ms", text))
-            }
+            text => text
+                .parse::<f64>()
+                .ok()
+                .filter(|ms| ms.is_finite())
+                .map(Some)
+                .ok_or_else(|| odd("a time in ms", text)),
         };
         let parts = [ms(self.record_ms)?, ms(self.submit_ms)?, ms(self.wait_ms)?];
         let render = parts.into_iter().try_fold(0.0, |sum, part| part.map(|part| sum + part));
@@ -175,13 +198,15 @@ fn read_frames(path: &Path, text: &str) -> Result<BTreeMap<String, TimedMode>> {
     // Lines of another length are found here, for one message that says what is wrong.
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
     let header = reader.headers().map_err(|cause| Error::io(path, cause))?.clone();
-    let columns = Columns::of(&header)
-        .map_err(|name| Error::io(path, format!("no {FRAMES_FILE} of nimbus: it has no column {name}")))?;
+    let columns = Columns::of(&header).map_err(|name| {
+        Error::io(path, format!("no {FRAMES_FILE} of nimbus: it has no column {name}"))
+    })?;
     let mut modes: BTreeMap<String, Lines> = BTreeMap::new();
     for line in reader.records() {
         let line = line.map_err(|cause| Error::io(path, cause))?;
         let at = line.position().map_or(0, csv::Position::line);
-        add_line(&columns, &line, &mut modes).map_err(|what| Error::io(path, format!("line {at}: {what}")))?;
+        add_line(&columns, &line, &mut modes)
+            .map_err(|what| Error::io(path, format!("line {at}: {what}")))?;
     }
     Ok(modes.into_iter().map(|(name, lines)| (name, lines.mode)).collect())
 }
@@ -192,7 +217,11 @@ fn add_line(
     modes: &mut BTreeMap<String, Lines>,
 ) -> std::result::Result<(), String> {
     if line.len() != columns.n {
-        return Err(format!("expected {} fields as in the header, found {}: cut off?", columns.n, line.len()));
+        return Err(format!(
+            "expected {} fields as in the header, found {}: cut off?",
+            columns.n,
+            line.len()
+        ));
     }
     let is = |column: usize, of: &str| match &line[column] {
         "true" => Ok(true),
@@ -202,13 +231,21 @@ fn add_line(
     if is(columns.warm_up, "warm_up")? {
         return Ok(());
     }
-    let number = |column: usize, what: &str| line[column].parse::<u32>().map_err(|_| odd(what, &line[column]));
-    let (block, frame) = (number(columns.block, "a block's number")?, number(columns.frame, "a frame's number")?);
+    let number = |column: usize, what: &str| {
+        line[column].parse::<u32>().map_err(|_| odd(what, &line[column]))
+    };
+    let (block, frame) =
+        (number(columns.block, "a block's number")?, number(columns.frame, "a frame's number")?);
     let times = columns.times(line)?;
     let case = case_name(&line[columns.phase], &line[columns.sweep]);
     let name = mode_name(&case, &line[columns.threading], is(columns.skip, "skip")?);
     let lines = modes.entry(name.clone()).or_insert_with(|| Lines {
-        mode: TimedMode { name, frames: Vec::new(), blocks: Vec::new(), measures: columns.measures() },
+        mode: TimedMode {
+            name,
+            frames: Vec::new(),
+            blocks: Vec::new(),
+            measures: columns.measures(),
+        },
         last_block: None,
     });
     if lines.last_block.replace(block) != Some(block) {

@@ -1,7 +1,8 @@
-//! Results on disk: `run.json` (what was run, where, and what it says) and `frames.csv` (every frame, raw).
+//! Results on disk: `run.json` (what was run, where, and what it says) and `frames.csv` (every
+//! frame, raw).
 //!
-//! The form of `run.json` is docs/run.schema.json; a change of meaning, or of a key, raises `SCHEMA_VERSION`.
-//! Both appear whole and together, or not at all ([`crate::io::folder`]).
+//! The form of `run.json` is docs/run.schema.json; a change of meaning, or of a key, raises
+//! `SCHEMA_VERSION`. Both appear whole and together, or not at all ([`crate::io::folder`]).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -33,7 +34,8 @@ pub struct Run {
     pub schema: u32,
     /// Version of nimbus.
     pub nimbus: String,
-    /// Git revision that was built; "unknown" outside a checkout, "-dirty" behind it where sources differ.
+    /// Git revision that was built; "unknown" outside a checkout, "-dirty" behind it where sources
+    /// differ.
     pub revision: String,
     /// Start of the run, UTC, ISO 8601.
     pub date: String,
@@ -121,7 +123,8 @@ pub struct Skipping {
     pub same_bytes: Option<bool>,
 }
 
-/// A list of times, and the 95 % bootstrap interval of its median; null where there are too few frames for one.
+/// A list of times, and the 95 % bootstrap interval of its median; null where there are too few
+/// frames for one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Measured {
     #[serde(flatten)]
@@ -130,7 +133,8 @@ pub struct Measured {
     pub p50_high: Option<f64>,
 }
 
-/// One way of running the scene. A summary is null where nothing finite was measured. Warm-up frames are in none.
+/// One way of running the scene. A summary is null where nothing finite was measured. Warm-up
+/// frames are in none.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mode {
     /// "serial" or "parallel".
@@ -157,14 +161,16 @@ pub struct Mode {
     pub latency_ms: Option<Measured>,
     /// Mean of the frames that the device still had when it was handed one.
     pub queue_depth: Option<f64>,
-    /// Particles that were drawn in a frame, which distance and view make fewer: least, mean and most.
+    /// Particles that were drawn in a frame, which distance and view make fewer: least, mean and
+    /// most.
     pub drawn: Option<[f64; 3]>,
     /// Frames that showed what is far from a picture that an earlier one made.
     pub impostors_reused: usize,
     pub passes: Vec<Pass>,
     /// SHA-256 of the last frame's pixels, where it was taken.
     pub image_hash: Option<String>,
-    /// Greatest median frame time of a block by the least: what the machine's own changes come to. null of one block.
+    /// Greatest median frame time of a block by the least: what the machine's own changes come to.
+    /// null of one block.
     pub block_spread: Option<f64>,
 }
 
@@ -181,8 +187,8 @@ pub struct Pass {
     pub reason: Option<String>,
     /// Every reason it was skipped for, the most frequent first.
     pub reasons: Vec<Reason>,
-    /// Device time that skipping it saved a frame: its median where nothing is skipped, in the share of the frames that
-    /// skipped it. null where that was not measured.
+    /// Device time that skipping it saved a frame: its median where nothing is skipped, in the
+    /// share of the frames that skipped it. null where that was not measured.
     pub saved_ms: Option<f64>,
 }
 
@@ -258,13 +264,16 @@ pub(super) const FRAME_COLUMNS: [&str; 19] = [
     "ran",
 ];
 
-/// Makes the folder results will go to, before anything is measured. What exists is refused unless `force`; then its
-/// results are replaced when the new ones are there, and other files in it are left alone.
+/// Makes the folder results will go to, before anything is measured. What exists is refused unless
+/// `force`; then its results are replaced when the new ones are there, and other files in it are
+/// left alone.
 pub fn prepare_out_dir(path: &Path, force: bool) -> Result<()> {
     match fs::symlink_metadata(path) {
         Ok(_) if !force => {
             let path = path.display();
-            Err(Error::usage(format!("{path}: exists already; name another folder, or add --force to overwrite it")))
+            Err(Error::usage(format!(
+                "{path}: exists already; name another folder, or add --force to overwrite it"
+            )))
         }
         Ok(_) if !path.is_dir() => Err(Error::io(path, "is not a folder; results need one")),
         Ok(_) => check_writable(path),
@@ -273,11 +282,17 @@ pub fn prepare_out_dir(path: &Path, force: bool) -> Result<()> {
 }
 
 /// Both files, at once: never a `run.json` beside another run's frames.
-pub fn write_results(out_dir: &Path, run: &Run, pass_names: &[String], rows: &[FrameRow]) -> Result<()> {
+pub fn write_results(
+    out_dir: &Path,
+    run: &Run,
+    pass_names: &[String],
+    rows: &[FrameRow],
+) -> Result<()> {
     write_results_with(out_dir, run, pass_names, rows, &Beside::default())
 }
 
-/// The same, and at once with them what lies beside them; of an earlier run's pictures and charts none is left.
+/// The same, and at once with them what lies beside them; of an earlier run's pictures and charts
+/// none is left.
 pub fn write_results_with(
     out_dir: &Path,
     run: &Run,
@@ -290,8 +305,12 @@ pub fn write_results_with(
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     // Those that are only now made, too: RUN_FILE stays the last.
     let made = beside.names();
-    let all: Vec<&str> =
-        made.iter().map(String::as_str).filter(|name| !names.contains(name)).chain(names.clone()).collect();
+    let all: Vec<&str> = made
+        .iter()
+        .map(String::as_str)
+        .filter(|name| !names.contains(name))
+        .chain(names.clone())
+        .collect();
     replace_files(out_dir, &all, |folder| {
         beside.write(folder)?;
         write_frames(&folder.join(FRAMES_FILE), pass_names, rows)?;
@@ -319,11 +338,17 @@ pub fn parse_run(text: &str, path: &Path) -> Result<Run> {
     match value.get("schema").and_then(serde_json::Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}
         Some(version) => {
-            return Err(Error::io(path, format!("results of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
+            return Err(Error::io(
+                path,
+                format!("results of schema {version}; this nimbus reads {SCHEMA_VERSION}"),
+            ));
         }
-        None => return Err(Error::io(path, "not a run.json of nimbus: it names no schema version")),
+        None => {
+            return Err(Error::io(path, "not a run.json of nimbus: it names no schema version"));
+        }
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a run.json of nimbus: {cause}")))
+    serde_json::from_value(value)
+        .map_err(|cause| Error::io(path, format!("not a run.json of nimbus: {cause}")))
 }
 
 pub fn write_frames(path: &Path, pass_names: &[String], rows: &[FrameRow]) -> Result<()> {
@@ -331,11 +356,16 @@ pub fn write_frames(path: &Path, pass_names: &[String], rows: &[FrameRow]) -> Re
     let mut writer = csv::Writer::from_writer(Vec::new());
     let columns = FRAME_COLUMNS.iter().map(|name| (*name).to_owned());
     let pass_columns = pass_names.iter().map(|name| format!("gpu_{name}_ms"));
-    writer.write_record(columns.chain(pass_columns).chain(["image_hash".to_owned()])).map_err(failed)?;
+    writer
+        .write_record(columns.chain(pass_columns).chain(["image_hash".to_owned()]))
+        .map_err(failed)?;
     for (i_row, row) in rows.iter().enumerate() {
         if row.pass_ms.len() != pass_names.len() {
             let (got, wanted) = (row.pass_ms.len(), pass_names.len());
-            return Err(Error::io(path, format!("row {i_row} has {got} pass times for {wanted} passes")));
+            return Err(Error::io(
+                path,
+                format!("row {i_row} has {got} pass times for {wanted} passes"),
+            ));
         }
         writer.write_record(fields(i_row, row)).map_err(failed)?;
     }

@@ -1,4 +1,5 @@
-//! Every row of a `frames.csv`, read back as it was written: writing what was read gives the same bytes.
+//! Every row of a `frames.csv`, read back as it was written: writing what was read gives the same
+//! bytes.
 
 use std::path::Path;
 
@@ -9,20 +10,28 @@ use crate::error::{Error, Result};
 
 type Told<T> = std::result::Result<T, String>;
 
-/// Names of the passes and all rows, warm-up included, of the text of a `frames.csv`; `path` is for messages, which
-/// name the line.
+/// Names of the passes and all rows, warm-up included, of the text of a `frames.csv`; `path` is for
+/// messages, which name the line.
 pub fn read_rows(text: &str, path: &Path) -> Result<(Vec<String>, Vec<FrameRow>)> {
     let failed = |cause: csv::Error| Error::io(path, cause);
     let mut reader = csv::Reader::from_reader(text.as_bytes());
     let header = reader.headers().map_err(failed)?.clone();
     let passes = passes(&header).ok_or_else(|| {
-        Error::io(path, format!("no {FRAMES_FILE} of this nimbus: it has other columns; results of another version?"))
+        Error::io(
+            path,
+            format!(
+                "no {FRAMES_FILE} of this nimbus: it has other columns; results of another version?"
+            ),
+        )
     })?;
     let mut rows = Vec::new();
     for line in reader.records() {
         let line = line.map_err(failed)?;
         let at = line.position().map_or(0, csv::Position::line);
-        rows.push(row(&line, passes.len()).map_err(|what| Error::io(path, format!("line {at}: {what}")))?);
+        rows.push(
+            row(&line, passes.len())
+                .map_err(|what| Error::io(path, format!("line {at}: {what}")))?,
+        );
     }
     Ok((passes, rows))
 }
@@ -50,11 +59,14 @@ fn row(line: &StringRecord, n_passes: usize) -> Told<FrameRow> {
         "false" => Ok(false),
         other => Err(odd(name, "true or false", other)),
     };
-    let count = |name: &str| field(name)?.parse::<u32>().map_err(|_| odd(name, "a number", field(name).unwrap_or("")));
+    let count = |name: &str| {
+        field(name)?.parse::<u32>().map_err(|_| odd(name, "a number", field(name).unwrap_or("")))
+    };
     let ms = |name: &str| time(name, field(name)?);
     // What is empty was not finite.
     let or_nan = |name: &str| ms(name).map(|value| value.unwrap_or(f64::NAN));
-    let pass_ms = line.iter().skip(FRAME_COLUMNS.len()).take(n_passes).map(|field| time("a pass", field));
+    let pass_ms =
+        line.iter().skip(FRAME_COLUMNS.len()).take(n_passes).map(|field| time("a pass", field));
     let hash = line.iter().next_back().unwrap_or_default();
     Ok(FrameRow {
         phase: text("phase")?,
@@ -83,7 +95,12 @@ fn row(line: &StringRecord, n_passes: usize) -> Told<FrameRow> {
 fn time(name: &str, field: &str) -> Told<Option<f64>> {
     match field {
         "" => Ok(None),
-        text => text.parse::<f64>().ok().filter(|v| v.is_finite()).map(Some).ok_or_else(|| odd(name, "a time", text)),
+        text => text
+            .parse::<f64>()
+            .ok()
+            .filter(|v| v.is_finite())
+            .map(Some)
+            .ok_or_else(|| odd(name, "a time", text)),
     }
 }
 
@@ -98,7 +115,8 @@ mod tests {
 
     const HEADER: &str = "i_row,phase,sweep,threading,skip,block,frame,time_s,warm_up,frame_ms,game_ms,record_ms,submit_ms,wait_ms,\
                           gpu_ms,latency_ms,queue_depth,n_drawn,ran,gpu_sort_ms,gpu_first_ms,image_hash\n";
-    const ROWS: &str = "0,dense,\"a=1, b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
+    const ROWS: &str = "0,dense,\"a=1, \
+        b=2\",serial,true,0,0,0,true,16.123456789012344,1,0.5,0.25,14.5,,,1,7,sort+sprites,1.5,,\n\
                         1,,,parallel,false,3,4000000000,-0.1,false,0.1,1e-9,,0,3,7.25,1,0,0,,,0.3,0abc\n";
 
     fn read(text: &str) -> Result<(Vec<String>, Vec<FrameRow>)> {
@@ -110,7 +128,9 @@ mod tests {
         let text = format!("{HEADER}{ROWS}").replace("1e-9", "0.000000001");
         let (passes, rows) = read(&text).unwrap();
         assert_eq!(passes, ["sort", "first"]);
-        assert!(rows[0].latency_ms.is_nan() && rows[0].gpu_ms.is_none() && rows[1].record_ms.is_nan());
+        assert!(
+            rows[0].latency_ms.is_nan() && rows[0].gpu_ms.is_none() && rows[1].record_ms.is_nan()
+        );
         assert_eq!((rows[1].frame, rows[1].image_hash.as_deref()), (4_000_000_000, Some("0abc")));
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("again.csv");
@@ -124,7 +144,11 @@ mod tests {
             ("i_row", "row", "other columns"),
             ("image_hash", "hash", "other columns"),
             ("gpu_sort_ms", "sort", "other columns"),
-            (",serial,true", ",serial,maybe", "line 2: skip: expected true or false, found \"maybe\""),
+            (
+                ",serial,true",
+                ",serial,maybe",
+                "line 2: skip: expected true or false, found \"maybe\"",
+            ),
             ("4000000000", "-1", "line 3: frame: expected a number"),
             (",0.3,0abc", ",NaN,0abc", "line 3: a pass: expected a time"),
             (",0.3,0abc", ",0.3", "record 2"),

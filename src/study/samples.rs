@@ -1,5 +1,6 @@
-//! A reference picture as the mean of samples, each through another place of every pixel and by other random paths; and
-//! the sums that parts of it are put together from, tile by tile and range by range, to the same bits as the whole.
+//! A reference picture as the mean of samples, each through another place of every pixel and by
+//! other random paths; and the sums that parts of it are put together from, tile by tile and range
+//! by range, to the same bits as the whole.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,8 +19,8 @@ use crate::model::scene::{LightingMode, Scene};
 /// Most samples of a picture: their numbers' last digits still tell places in a pixel apart.
 pub const MOST_SAMPLES: u32 = 1 << 20;
 
-/// Values of a pixel in [`Sums`]: premultiplied linear R, G, B, A; the sum of their squares; what quadrature leaves;
-/// and the square of the random paths' standard error.
+/// Values of a pixel in [`Sums`]: premultiplied linear R, G, B, A; the sum of their squares; what
+/// quadrature leaves; and the square of the random paths' standard error.
 pub const N_VALUES: usize = 7;
 
 /// Sums over samples, [`N_VALUES`] a pixel.
@@ -42,18 +43,20 @@ pub struct Subject<'a> {
 pub struct Mean {
     /// Premultiplied linear RGBA, in the order of the pixels.
     pub rgba: Vec<[f64; 4]>,
-    /// Root mean square of the estimates of what each pixel may be off: quadrature, and one standard error of the mean.
+    /// Root mean square of the estimates of what each pixel may be off: quadrature, and one
+    /// standard error of the mean.
     pub own_error: f64,
 }
 
-/// Where in a pixel sample `i` lies, off its centre: the first in it, the others spread evenly (Roberts' R2, the powers
-/// of the plastic number's inverse), whatever number of them is taken.
+/// Where in a pixel sample `i` lies, off its centre: the first in it, the others spread evenly
+/// (Roberts' R2, the powers of the plastic number's inverse), whatever number of them is taken.
 pub fn shift(i: u32) -> DVec2 {
     const STEP: DVec2 = DVec2::new(0.754_877_666_246_692_7, 0.569_840_290_998_053_2);
     (0.5 + f64::from(i) * STEP).fract() - 0.5
 }
 
-/// The sums of `samples` at `pixels`. Err where the reference does not know the scene, or it was stopped.
+/// The sums of `samples` at `pixels`. Err where the reference does not know the scene, or it was
+/// stopped.
 pub fn sums(
     subject: &Subject<'_>,
     pixels: &Pixels,
@@ -89,7 +92,9 @@ pub fn sums(
         }
         Against::Model | Against::Reflections(_) if scene.lighting.mode == LightingMode::None => {
             let truth = Truth::unlit(scene, time_s)?;
-            each(&mut |sample| of_scene_light(scene, &truth, Drawing::Volume, pixels, sample, inner))?;
+            each(&mut |sample| {
+                of_scene_light(scene, &truth, Drawing::Volume, pixels, sample, inner)
+            })?;
         }
         Against::Model | Against::Reflections(_) => {
             let truth = Truth::unlit(scene, time_s)?;
@@ -139,13 +144,16 @@ impl Sums {
         let rgba = |v: &[f64]| [v[0] / n, v[1] / n, v[2] / n, v[3] / n];
         let error = |v: &[f64]| {
             let of_mean: f64 = rgba(v).iter().map(|c| c * c).sum();
-            // Of all channels together: no channel's alone is greater. Samples are spread more evenly than by chance,
-            // and so the mean is nearer than this.
+            // Of all channels together: no channel's alone is greater. Samples are spread more
+            // evenly than by chance, and so the mean is nearer than this.
             let spread = ((v[4] / n - of_mean).max(0.0) / (n - 1.0).max(1.0)).sqrt();
             v[5] / n + spread.max(v[6].sqrt() / n)
         };
         let pixels = || self.values.chunks_exact(N_VALUES);
-        Mean { rgba: pixels().map(rgba).collect(), own_error: root_mean_square(pixels().map(error)) }
+        Mean {
+            rgba: pixels().map(rgba).collect(),
+            own_error: root_mean_square(pixels().map(error)),
+        }
     }
 
     /// Numbers of f64 in little-endian order.
@@ -157,15 +165,16 @@ impl Sums {
     pub fn from_bytes(bytes: &[u8], n_pixels: usize, n_samples: u32) -> Option<Sums> {
         let value = |b: &[u8]| b.try_into().map(f64::from_le_bytes).ok();
         let is_whole = bytes.len() == 8 * N_VALUES * n_pixels;
-        let values = is_whole.then(|| bytes.chunks_exact(8).map(value).collect::<Option<Vec<f64>>>())??;
+        let values =
+            is_whole.then(|| bytes.chunks_exact(8).map(value).collect::<Option<Vec<f64>>>())??;
         Some(Sums { n_samples, values })
     }
 }
 
-/// Sums of neighbouring ranges of samples, added as one fixed tree of pairs: (0 + 1) + (2 + 3) and so on. Ranges whose
-/// length is a power of two, and that begin at a multiple of it, are nodes of that tree; so a whole put together from
-/// them in order has the bits of a whole that was never cut. What rounding adds grows with the tree's height, not with
-/// the samples.
+/// Sums of neighbouring ranges of samples, added as one fixed tree of pairs: (0 + 1) + (2 + 3) and
+/// so on. Ranges whose length is a power of two, and that begin at a multiple of it, are nodes of
+/// that tree; so a whole put together from them in order has the bits of a whole that was never
+/// cut. What rounding adds grows with the tree's height, not with the samples.
 #[derive(Debug, Default)]
 pub struct Pairs {
     /// Each shorter than the one before it.
@@ -199,7 +208,8 @@ mod tests {
     fn sample(i: u32) -> Sums {
         // Of magnitudes so different that another order of additions shows.
         let words = philox4x32_10([7, 7], [i, 0, 0, 0]).map(uniform);
-        let values = (0..N_VALUES).map(|k| (words[k % 4] - 0.5) * 10f64.powi((words[(k + 1) % 4] * 17.0) as i32));
+        let values = (0..N_VALUES)
+            .map(|k| (words[k % 4] - 0.5) * 10f64.powi((words[(k + 1) % 4] * 17.0) as i32));
         Sums { n_samples: 1, values: values.collect() }
     }
 
@@ -216,7 +226,11 @@ mod tests {
             let whole = summed((0..n).map(sample));
             for length in [1u32, 2, 4, 8, 16, 32, 64, 128] {
                 let range = |k: u32| summed((k * length..n.min((k + 1) * length)).map(sample));
-                assert_eq!(summed((0..n.div_ceil(length)).map(range)), whole, "{n} in ranges of {length}");
+                assert_eq!(
+                    summed((0..n.div_ceil(length)).map(range)),
+                    whole,
+                    "{n} in ranges of {length}"
+                );
             }
             // One after another they are not the same bits, and neither are ranges of three.
             let in_turn = (0..n).map(sample).reduce(|a, b| a.add(&b)).unwrap();
@@ -246,19 +260,24 @@ mod tests {
 
     #[test]
     fn means_and_their_errors_by_hand() {
-        // Red 1 and 3: mean 2, squares 10, variance of the mean ((10/2) - 4)/1 = 1. Quadrature 0.25.
+        // Red 1 and 3: mean 2, squares 10, variance of the mean ((10/2) - 4)/1 = 1. Quadrature
+        // 0.25.
         let of = |red: f64, chance: f64| Sums {
             n_samples: 1,
             values: vec![red, 0.0, 0.0, 0.0, red * red, 0.25, chance * chance],
         };
         let two = of(1.0, 0.0).add(&of(3.0, 0.0));
         assert_eq!(two.mean(), Mean { rgba: vec![[2.0, 0.0, 0.0, 0.0]], own_error: 1.25 });
-        // One sample has its own standard error alone; equal ones have what their paths say: sqrt(0.5)/2 · 0.6.
+        // One sample has its own standard error alone; equal ones have what their paths say:
+        // sqrt(0.5)/2 · 0.6.
         assert_eq!(of(1.0, 0.5).mean().own_error, 0.75);
         let equal = of(1.0, 0.6).add(&of(1.0, 0.6)).mean().own_error;
         assert!((equal - 0.25 - 0.6 / 2f64.sqrt()).abs() < 1e-15, "{equal}");
         let bytes = two.bytes();
         assert_eq!(Sums::from_bytes(&bytes, 1, 2), Some(two));
-        assert_eq!((Sums::from_bytes(&bytes, 2, 2), Sums::from_bytes(&bytes[1..], 1, 2)), (None, None));
+        assert_eq!(
+            (Sums::from_bytes(&bytes, 2, 2), Sums::from_bytes(&bytes[1..], 1, 2)),
+            (None, None)
+        );
     }
 }

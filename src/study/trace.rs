@@ -25,14 +25,16 @@ pub struct Beside<'a> {
     pub clock: Option<ClockFit>,
 }
 
-/// What takes the events, one after the other: all of them at once would be a hundred times the size of the zones.
+/// What takes the events, one after the other: all of them at once would be a hundred times the
+/// size of the zones.
 type Emit<'a> = dyn FnMut(Value) -> std::io::Result<()> + 'a;
 
-/// Writes the samples' time line to `path`, by way of a temporary name: one event a step, pass and zone, in µs from the
-/// first game step.
+/// Writes the samples' time line to `path`, by way of a temporary name: one event a step, pass and
+/// zone, in µs from the first game step.
 ///
-/// The device's clock is laid on the host's by calibrated timestamps, where it has them; else so that no pass ends after
-/// its frame was seen to end, as late as that allows: off by what it took to see the promptest of all frames' ends.
+/// The device's clock is laid on the host's by calibrated timestamps, where it has them; else so
+/// that no pass ends after its frame was seen to end, as late as that allows: off by what it took
+/// to see the promptest of all frames' ends.
 pub fn write(path: &Path, samples: &[Sample], beside: &Beside<'_>) -> Result<()> {
     write_atomic(path, |file| {
         let mut separator = "{\"traceEvents\":[\n";
@@ -49,8 +51,10 @@ fn emit_all(samples: &[Sample], beside: &Beside<'_>, emit: &mut Emit<'_>) -> std
     TRACKS.iter().enumerate().flat_map(|(tid, name)| track(tid, name)).try_for_each(&mut *emit)?;
     let Some(zero) = samples.iter().map(|s| s.times.marks.game[0]).min() else { return Ok(()) };
     let us = |at: Instant| at.saturating_duration_since(zero).as_secs_f64() * 1e6;
-    let by_ends =
-        samples.iter().filter_map(|s| Some(us(s.times.marks.end) - 1e-3 * last_ns(&s.times)?)).reduce(f64::min);
+    let by_ends = samples
+        .iter()
+        .filter_map(|s| Some(us(s.times.marks.end) - 1e-3 * last_ns(&s.times)?))
+        .reduce(f64::min);
     let gpu_us = |device_ns: f64| match beside.clock {
         Some(clock) => 1e-3 * clock.ns_since(zero, device_ns),
         // There is an offset where there is a pass.
@@ -76,9 +80,12 @@ fn emit_all(samples: &[Sample], beside: &Beside<'_>, emit: &mut Emit<'_>) -> std
         for pass in &times.passes {
             emit(event(2, pass.name, [pass.begin_ns, pass.end_ns].map(gpu_us)))?;
         }
-        // From the game step's begin to the picture: frames in flight overlap, so they are no step of a track.
+        // From the game step's begin to the picture: frames in flight overlap, so they are no step
+        // of a track.
         for (ph, at) in [("b", marks.game[0]), ("e", marks.end)] {
-            emit(json!({ "ph": ph, "cat": "frame", "id": id, "pid": 1, "tid": 1, "name": "frame", "ts": us(at) }))?;
+            emit(
+                json!({ "ph": ph, "cat": "frame", "id": id, "pid": 1, "tid": 1, "name": "frame", "ts": us(at) }),
+            )?;
         }
     }
     beside.zones.map_or(Ok(()), |zones| emit_zones(zones, zero, emit))
@@ -87,13 +94,20 @@ fn emit_all(samples: &[Sample], beside: &Beside<'_>, emit: &mut Emit<'_>) -> std
 /// The name of a track and its place among them.
 fn track(tid: usize, name: &str) -> [Value; 2] {
     let about = |what: &str, args: Value| json!({ "ph": "M", "pid": 1, "tid": tid, "name": what, "args": args });
-    [about("thread_name", json!({ "name": name })), about("thread_sort_index", json!({ "sort_index": tid }))]
+    [
+        about("thread_name", json!({ "name": name })),
+        about("thread_sort_index", json!({ "sort_index": tid })),
+    ]
 }
 
 /// A track a thread. What was before the first game step (the scene being made ready) is left out.
 fn emit_zones(of: &Collected, zero: Instant, emit: &mut Emit<'_>) -> std::io::Result<()> {
     let tid = |i_thread: usize| TRACKS.len() + i_thread;
-    let mut tracks = of.threads.iter().enumerate().flat_map(|(i, name)| track(tid(i), &format!("thread {name}")));
+    let mut tracks = of
+        .threads
+        .iter()
+        .enumerate()
+        .flat_map(|(i, name)| track(tid(i), &format!("thread {name}")));
     tracks.try_for_each(&mut *emit)?;
     let zero_ns = zero.saturating_duration_since(of.epoch).as_nanos() as u64;
     for zone in of.zones.iter().filter(|zone| zone.begin_ns >= zero_ns) {

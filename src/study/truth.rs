@@ -19,7 +19,8 @@ use crate::reference::occlude::Rectangle;
 use crate::reference::transmit::{self, Obstacles};
 use crate::reference::{self, Blob};
 
-/// All stages of one frame up to the light on the facets. Positions relative to the lighting origin.
+/// All stages of one frame up to the light on the facets. Positions relative to the lighting
+/// origin.
 #[derive(Clone)]
 pub struct Truth {
     pub setting: Setting,
@@ -45,8 +46,13 @@ impl Truth {
         Truth::of_with_listener(scene, time_s, &|_| ())
     }
 
-    /// `on_facet` hears how many facets receive a second reflection each time that one of them has; it may take long.
-    pub fn of_with_listener(scene: &Scene, time_s: f64, on_facet: &(dyn Fn(usize) + Sync)) -> Result<Truth> {
+    /// `on_facet` hears how many facets receive a second reflection each time that one of them has;
+    /// it may take long.
+    pub fn of_with_listener(
+        scene: &Scene,
+        time_s: f64,
+        on_facet: &(dyn Fn(usize) + Sync),
+    ) -> Result<Truth> {
         let mut truth = Truth::unlit(scene, time_s)?;
         if scene.lighting.mode != LightingMode::None {
             truth.light(scene, on_facet);
@@ -65,7 +71,8 @@ impl Truth {
         }
         let alive = |c| reference::live::cloud(c, time_s);
         let generated: Vec<Generated> = scene.clouds.iter().flat_map(alive).collect();
-        let offsets = reference::place::offsets(&groups, &scene.clouds, time_s, setting.light_origin);
+        let offsets =
+            reference::place::offsets(&groups, &scene.clouds, time_s, setting.light_origin);
         let generated = reference::place::grown(&generated, &groups, &scene.clouds, time_s);
         let positions: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
         let mut placed = reference::place::place(&positions, &groups, &offsets);
@@ -91,20 +98,41 @@ impl Truth {
     fn light(&mut self, scene: &Scene, on_facet: &(dyn Fn(usize) + Sync)) {
         let grid = &self.setting.grid;
         let cells = reference::grid::deposit(grid, &self.blobs);
-        let centers = reference::place::cloud_centers(&scene.clouds, self.setting.time_s, self.setting.light_origin);
+        let centers = reference::place::cloud_centers(
+            &scene.clouds,
+            self.setting.time_s,
+            self.setting.light_origin,
+        );
         let regions = reference::place::regions(&self.groups);
-        let scales = reference::place::sigma_means(&self.groups, &scene.clouds, self.setting.time_s);
-        let members = Members { blobs: &self.blobs, sigma_means: &scales, regions: &regions, colors: &self.colors };
+        let scales =
+            reference::place::sigma_means(&self.groups, &scene.clouds, self.setting.time_s);
+        let members = Members {
+            blobs: &self.blobs,
+            sigma_means: &scales,
+            regions: &regions,
+            colors: &self.colors,
+        };
         (self.facets, self.facet_colors) = if scene.groups_facets() {
             let order = self.order(scene, &regions);
-            reference::facets::grouped(grid, &cells, &members, &centers, &order, &scene.facet_runs())
-                .into_iter()
-                .unzip()
+            reference::facets::grouped(
+                grid,
+                &cells,
+                &members,
+                &centers,
+                &order,
+                &scene.facet_runs(),
+            )
+            .into_iter()
+            .unzip()
         } else {
-            (reference::facets::facets(grid, &cells, &self.blobs, &scales, &regions, &centers), self.colors.clone())
+            (
+                reference::facets::facets(grid, &cells, &self.blobs, &scales, &regions, &centers),
+                self.colors.clone(),
+            )
         };
         let lighting = &scene.lighting;
-        let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(self.setting.light_origin)).collect();
+        let lights: Vec<Light> =
+            scene.lights.iter().map(|l| l.relative_to(self.setting.light_origin)).collect();
         let rectangles: Vec<Rectangle> =
             scene.surfaces.iter().map(|s| Rectangle::new(s, self.setting.light_origin)).collect();
         let obstacles = Obstacles {
@@ -123,23 +151,37 @@ impl Truth {
         self.facets.splice(0..0, ground);
         let positions: Vec<DVec3> = self.facets.iter().map(|f| f.position).collect();
         let normals: Vec<DVec3> = self.facets.iter().map(|f| f.normal).collect();
-        let receivers: Vec<transmit::Receiver> =
-            self.facets.iter().map(|f| transmit::Receiver { position: f.position, i_region: f.region }).collect();
+        let receivers: Vec<transmit::Receiver> = self
+            .facets
+            .iter()
+            .map(|f| transmit::Receiver { position: f.position, i_region: f.region })
+            .collect();
         let transmittance = obstacles.transmittance(&receivers, &lights);
-        self.irradiance = reference::first::irradiance(&positions, &normals, &transmittance, &lights);
-        let kd: Vec<DVec3> =
-            (0..scene.n_regions()).map(|i| scene.region_material(i).at(self.setting.time_s).kd).collect();
+        self.irradiance =
+            reference::first::irradiance(&positions, &normals, &transmittance, &lights);
+        let kd: Vec<DVec3> = (0..scene.n_regions())
+            .map(|i| scene.region_material(i).at(self.setting.time_s).kd)
+            .collect();
         let regions: Vec<u32> = self.facets.iter().map(|f| f.region).collect();
-        self.radiance = reference::first::radiance(&self.irradiance, &regions, &kd, &self.facet_colors);
+        self.radiance =
+            reference::first::radiance(&self.irradiance, &regions, &kd, &self.facet_colors);
         self.light_surfaces(scene, &lights, &kd, on_facet);
     }
 
-    /// Puts the surfaces' facets before the clouds', lit by the area reference, and adds the second reflection to both.
-    fn light_surfaces(&mut self, scene: &Scene, lights: &[Light], kd: &[DVec3], on_facet: &(dyn Fn(usize) + Sync)) {
+    /// Puts the surfaces' facets before the clouds', lit by the area reference, and adds the second
+    /// reflection to both.
+    fn light_surfaces(
+        &mut self,
+        scene: &Scene,
+        lights: &[Light],
+        kd: &[DVec3],
+        on_facet: &(dyn Fn(usize) + Sync),
+    ) {
         let origin = self.setting.light_origin;
         let at_origin = |s: &Surface| Surface { center: s.center - origin, ..*s };
         let surfaces: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
-        let brdfs: Vec<Brdf> = (0..surfaces.len()).map(|i| scene.region_material(i).at(self.setting.time_s)).collect();
+        let brdfs: Vec<Brdf> =
+            (0..surfaces.len()).map(|i| scene.region_material(i).at(self.setting.time_s)).collect();
         let disc = |(f, c): (&Facet, &DVec3)| Disc {
             position: f.position,
             normal: f.normal,
@@ -149,7 +191,8 @@ impl Truth {
         let discs: Vec<Disc> = self.facets.iter().zip(&self.facet_colors).map(disc).collect();
         let forward = scene.lighting.forward;
         let scenery = Scenery::new(&surfaces, &brdfs, lights, &self.blobs, forward, &discs);
-        let flat: Vec<Facet> = surfaces.iter().zip(0u32..).flat_map(|(s, i)| facets_of(s, i)).collect();
+        let flat: Vec<Facet> =
+            surfaces.iter().zip(0u32..).flat_map(|(s, i)| facets_of(s, i)).collect();
         let eye = self.setting.pose.position - origin;
         let on_surfaces = flat.iter().map(|f| scenery.on_surface(f.region as usize, f.position));
         let receivers: Vec<(Receiver, DVec3)> = on_surfaces
@@ -180,7 +223,8 @@ impl Truth {
         self.radiance[i] + self.second.get(i).copied().unwrap_or(DVec3::ZERO)
     }
 
-    /// What every particle is drawn with: the radiance of its facet, or its own colour where nothing is lit.
+    /// What every particle is drawn with: the radiance of its facet, or its own colour where
+    /// nothing is lit.
     pub fn particle_radiance(&self, scene: &Scene) -> Vec<DVec3> {
         if self.facets.is_empty() {
             return self.colors.clone();
@@ -203,14 +247,16 @@ impl Truth {
     fn order(&self, scene: &Scene, i_cloud: &[u32]) -> Vec<u32> {
         let (n_solids, origin) = (scene.n_solids() as u32, self.setting.light_origin);
         let bounds = scene.region_bounds(&self.groups, self.setting.time_s, DEPOSIT_CUT_SIGMA);
-        let bounds: Vec<_> = bounds.into_iter().map(|(low, high)| (low - origin, high - origin)).collect();
+        let bounds: Vec<_> =
+            bounds.into_iter().map(|(low, high)| (low - origin, high - origin)).collect();
         let positions: Vec<DVec3> = self.blobs.iter().map(|b| b.position).collect();
         let regions: Vec<u32> = i_cloud.iter().map(|i| n_solids + i).collect();
         reference::morton::order(&positions, &regions, &bounds)
     }
 }
 
-/// How exactly the second reflection is integrated: a hundredth of the percent that it is compared to.
+/// How exactly the second reflection is integrated: a hundredth of the percent that it is compared
+/// to.
 const SECOND_ACCURACY: f64 = 1e-4;
 
 /// Facets of a surface, whose region is its number.
@@ -218,7 +264,13 @@ fn facets_of(surface: &Surface, region: u32) -> impl Iterator<Item = Facet> + '_
     let n = surface.subdivide[0] * surface.subdivide[1];
     let area = surface.area() / f64::from(n);
     let normal = surface.normal();
-    (0..n).map(move |i| Facet { position: surface.facet_center(i), normal, area, region, conditioning: 1.0 })
+    (0..n).map(move |i| Facet {
+        position: surface.facet_center(i),
+        normal,
+        area,
+        region,
+        conditioning: 1.0,
+    })
 }
 
 /// Facets of the scene's ground, relative to `origin`.

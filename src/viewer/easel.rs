@@ -1,4 +1,5 @@
-//! The thread that draws what is edited: a frame where something has changed, of particles that follow from it alone.
+//! The thread that draws what is edited: a frame where something has changed, of particles that
+//! follow from it alone.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -202,7 +203,11 @@ impl Easel {
             return Ok(());
         }
         let wanted = (order.document.clone(), order.pose);
-        if made.drawn.as_ref().is_some_and(|(document, pose)| document.is_same(&wanted.0) && *pose == wanted.1) {
+        if made
+            .drawn
+            .as_ref()
+            .is_some_and(|(document, pose)| document.is_same(&wanted.0) && *pose == wanted.1)
+        {
             return Ok(());
         }
         *made.pose.lock().unwrap_or_else(PoisonError::into_inner) = order.pose;
@@ -222,7 +227,9 @@ impl Easel {
         let mut player = self.pane.bed.player(self.scene(order), true)?;
         let pose = Arc::new(Mutex::new(order.pose));
         let seen = pose.clone();
-        player.game = player.game.seen_from(Box::new(move || *seen.lock().unwrap_or_else(PoisonError::into_inner)));
+        player.game = player
+            .game
+            .seen_from(Box::new(move || *seen.lock().unwrap_or_else(PoisonError::into_inner)));
         let showing = self.pane.showing(&player.renderer, &player.scene.film)?;
         let showing = showing.ok_or_else(|| Error::usage("nothing of the window is seen"))?;
         Ok(Made { showing, player, pose, document: order.document.clone(), drawn: None })

@@ -1,10 +1,13 @@
-//! The editor's panels: numbers, the list of boxes, questions and keys; and the sketch of the boxes behind them. What is
-//! clicked or typed becomes the desk's inputs.
+//! The editor's panels: numbers, the list of boxes, questions and keys; and the sketch of the boxes
+//! behind them. What is clicked or typed becomes the desk's inputs.
 
 mod dialogs;
 mod fields;
 
-use egui::{Align2, Color32, FontId, Frame, Margin, Panel, Pos2, Rect, RichText, ScrollArea, Stroke, Ui, pos2};
+use egui::{
+    Align2, Color32, FontId, Frame, Margin, Panel, Pos2, Rect, RichText, ScrollArea, Stroke, Ui,
+    pos2,
+};
 use glam::DVec2;
 
 use super::editor::acceptance::{Counted, mean_rate};
@@ -27,9 +30,12 @@ const WRONG: Color32 = Color32::from_rgb(240, 110, 100);
 /// Of the list of boxes.
 const LIST: f32 = 130.0;
 
-/// What panels leave of a window of `size` pixels to the picture, at its upper left corner; a pixel at least.
+/// What panels leave of a window of `size` pixels to the picture, at its upper left corner; a pixel
+/// at least.
 pub fn picture_of([width, height]: [u32; 2], px_per_point: f64) -> [u32; 2] {
-    let less = |n: u32, points: f32| n.saturating_sub((f64::from(points) * px_per_point).round() as u32).max(1);
+    let less = |n: u32, points: f32| {
+        n.saturating_sub((f64::from(points) * px_per_point).round() as u32).max(1)
+    };
     [less(width, WIDTH), less(height, STATUS)]
 }
 
@@ -44,11 +50,20 @@ pub struct Shown<'a> {
 }
 
 /// The sketch and all panels, and what is to be done.
-pub fn show(ui: &mut Ui, shown: &Shown<'_>, typing: &mut Typing, choosing: &mut Option<Choosing>) -> Vec<Input> {
+pub fn show(
+    ui: &mut Ui,
+    shown: &Shown<'_>,
+    typing: &mut Typing,
+    choosing: &mut Option<Choosing>,
+) -> Vec<Input> {
     let mut inputs = vec![];
     draw(ui, shown.desk);
     let frame = Frame::new().fill(BACKGROUND).inner_margin(Margin::same(6));
-    Panel::bottom("status").resizable(false).exact_size(STATUS).frame(frame).show(ui, |ui| status(ui, shown));
+    Panel::bottom("status")
+        .resizable(false)
+        .exact_size(STATUS)
+        .frame(frame)
+        .show(ui, |ui| status(ui, shown));
     Panel::right("numbers").resizable(false).exact_size(WIDTH).frame(frame).show(ui, |ui| {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             file(ui, shown, &mut inputs);
@@ -87,9 +102,12 @@ fn file(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
     let mark = if session.is_dirty() { " *" } else { "" };
     ui.label(RichText::new(format!("{name}{mark}")).strong());
     ui.horizontal_wrapped(|ui| {
-        for (text, command) in
-            [("New", Command::New), ("Open", Command::Open), ("Save", Command::Save), ("Save as", Command::SaveAs)]
-        {
+        for (text, command) in [
+            ("New", Command::New),
+            ("Open", Command::Open),
+            ("Save", Command::Save),
+            ("Save as", Command::SaveAs),
+        ] {
             button(ui, text, command, true, inputs);
         }
         button(ui, "?", Command::Help, true, inputs);
@@ -108,9 +126,23 @@ fn buttons(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
         button(ui, "Frame", Command::Frame, true, inputs);
     });
     ui.horizontal_wrapped(|ui| {
-        let text = |verb: &str, label: Option<&str>| label.map_or(verb.to_owned(), |label| format!("{verb} {label}"));
-        button(ui, &text("Undo", history.undo_label()), Command::Undo, history.n_undo() > 0, inputs);
-        button(ui, &text("Redo", history.redo_label()), Command::Redo, history.n_redo() > 0, inputs);
+        let text = |verb: &str, label: Option<&str>| {
+            label.map_or(verb.to_owned(), |label| format!("{verb} {label}"))
+        };
+        button(
+            ui,
+            &text("Undo", history.undo_label()),
+            Command::Undo,
+            history.n_undo() > 0,
+            inputs,
+        );
+        button(
+            ui,
+            &text("Redo", history.redo_label()),
+            Command::Redo,
+            history.n_redo() > 0,
+            inputs,
+        );
     });
     ui.horizontal(|ui| {
         let now = editor.settings().view;
@@ -127,7 +159,8 @@ fn buttons(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
     ui.horizontal(|ui| {
         let scaling = editor.settings().scaling;
         let mut is_symmetric = scaling == Scaling::Symmetric;
-        let hover = "an edge that is scaled keeps its middle, or else its other end (held Shift: the other way)";
+        let hover = "an edge that is scaled keeps its middle, or else its other end (held Shift: \
+            the other way)";
         if ui.checkbox(&mut is_symmetric, "Symmetric").on_hover_text(hover).clicked() {
             inputs.push(Input::Event(Event::Act(Action::Set(Setting::Scaling(scaling.other())))));
         }
@@ -151,7 +184,8 @@ fn list(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
         |ui, rows| {
             for i in rows {
                 let rate = shown.counted.get(i).and_then(Counted::rate);
-                let rate = rate.map_or(String::new(), |rate| format!(", {:.0} % accepted", 100.0 * rate));
+                let rate =
+                    rate.map_or(String::new(), |rate| format!(", {:.0} % accepted", 100.0 * rate));
                 let text = format!("{i}: {} particles{rate}", editor.boxes()[i].n_particles);
                 if ui.selectable_label(editor.selection().contains(i), text).clicked() {
                     let held = ui.input(|input| input.modifiers);
@@ -160,7 +194,10 @@ fn list(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
                         (_, true) => How::Add,
                         _ => How::Replace,
                     };
-                    inputs.push(Input::Event(Event::Act(Action::Select(Select::Boxes { boxes: vec![i], how }))));
+                    inputs.push(Input::Event(Event::Act(Action::Select(Select::Boxes {
+                        boxes: vec![i],
+                        how,
+                    }))));
                 }
             }
         },
@@ -170,7 +207,8 @@ fn list(ui: &mut Ui, shown: &Shown<'_>, inputs: &mut Vec<Input>) {
 fn status(ui: &mut Ui, shown: &Shown<'_>) {
     let document = shown.desk.editor().document();
     ui.horizontal(|ui| {
-        let mut text = format!("{} boxes, {} particles", document.boxes.len(), document.n_particles());
+        let mut text =
+            format!("{} boxes, {} particles", document.boxes.len(), document.n_particles());
         if let Some(rate) = mean_rate(shown.counted) {
             text += &format!(", {:.1} % of attempts accepted", 100.0 * rate);
         }
@@ -189,10 +227,13 @@ fn draw(ui: &Ui, desk: &Desk) {
     let size = view.size_px / view.px_per_point;
     let picture = Rect::from_min_size(Pos2::ZERO, egui::vec2(size.x as f32, size.y as f32));
     let painter = ui.painter_at(picture);
-    let point = |p: DVec2| -> Pos2 { pos2((p.x / view.px_per_point) as f32, (p.y / view.px_per_point) as f32) };
+    let point = |p: DVec2| -> Pos2 {
+        pos2((p.x / view.px_per_point) as f32, (p.y / view.px_per_point) as f32)
+    };
     let color = |[r, g, b, a]: Color| Color32::from_rgba_unmultiplied(r, g, b, a);
-    let stroke =
-        |s: super::editor::sketch::Stroke| Stroke::new((s.width_px / view.px_per_point) as f32, color(s.color));
+    let stroke = |s: super::editor::sketch::Stroke| {
+        Stroke::new((s.width_px / view.px_per_point) as f32, color(s.color))
+    };
     for shape in sketch(desk.editor(), &view, desk.pointing()) {
         match shape {
             Shape::Polygon { corners, fill, stroke: around } => {
@@ -204,7 +245,13 @@ fn draw(ui: &Ui, desk: &Desk) {
                 painter.line_segment([point(from), point(to)], stroke(s));
             }
             Shape::Label { at, text, color: c } => {
-                painter.text(point(at), Align2::LEFT_CENTER, text, FontId::proportional(12.0), color(c));
+                painter.text(
+                    point(at),
+                    Align2::LEFT_CENTER,
+                    text,
+                    FontId::proportional(12.0),
+                    color(c),
+                );
             }
         }
     }

@@ -46,7 +46,8 @@ pub fn run(options: Options) -> Result<()> {
     let events = EventLoop::<Told>::with_user_event().build().map_err(|e| {
         no_display(
             &e.to_string(),
-            "a box file is text that any editor changes, and `nimbus render SCENE -o FILE.png` draws it",
+            "a box file is text that any editor changes, and `nimbus render SCENE -o \
+             FILE.png` draws it",
         )
     })?;
     let mut app = App::new(options, events.create_proxy())?;
@@ -102,10 +103,27 @@ impl App {
         let pose = Pose { position: pose.position - origin, ..pose };
         let picture = edit_panels::picture_of(size, 1.0);
         let [width, height] = picture.map(f64::from);
-        let screen = Screen { size_px: DVec2::new(width, height), px_per_point: 1.0, fov_y_rad: camera.fov_y_rad };
-        let desk = Desk::new(session, (&pose, camera.up, target - origin), screen, scenery.metres_per_unit());
+        let screen = Screen {
+            size_px: DVec2::new(width, height),
+            px_per_point: 1.0,
+            fov_y_rad: camera.fov_y_rad,
+        };
+        let desk = Desk::new(
+            session,
+            (&pose, camera.up, target - origin),
+            screen,
+            scenery.metres_per_unit(),
+        );
         let pose = Pose { position: pose.position + origin, ..pose };
-        let orders = Orders::new(Order { document, pose, has_cloud: false, size, picture, n: 0, quits: false });
+        let orders = Orders::new(Order {
+            document,
+            pose,
+            has_cloud: false,
+            size,
+            picture,
+            n: 0,
+            quits: false,
+        });
         Ok(App {
             desk,
             scenery,
@@ -123,20 +141,24 @@ impl App {
             choosing: None,
             counted: vec![],
             wrong: None,
-            recent: recent::default_place().map_or_else(Recent::default, |place| Recent::load(&place)),
+            recent: recent::default_place()
+                .map_or_else(Recent::default, |place| Recent::load(&place)),
             failed: None,
             is_closed: false,
         })
     }
 
-    /// Where the window ends and nobody was asked, by a device that is lost or by Ctrl-C, what was not saved is kept beside the file.
+    /// Where the window ends and nobody was asked, by a device that is lost or by Ctrl-C, what was
+    /// not saved is kept beside the file.
     fn rescue(&self) {
         let session = self.desk.session();
         if self.is_closed || !session.is_dirty() {
             return;
         }
         let path = session.path().unwrap_or(Path::new("cloud.dat"));
-        let free = (1..).map(|n| path.with_extension(format!("unsaved-{n}.dat"))).find(|path| !path.exists());
+        let free = (1..)
+            .map(|n| path.with_extension(format!("unsaved-{n}.dat")))
+            .find(|path| !path.exists());
         let Some(free) = free else { return };
         match box_file::write(&free, session.editor().boxes()) {
             Ok(()) => eprintln!("what was not saved is in {}", free.display()),
@@ -149,11 +171,13 @@ impl App {
         let proxy = self.proxy.clone();
         let tell = Box::new(move |told| drop(proxy.send_event(told)));
         let shared = (self.orders.clone(), self.face.clone());
-        let easel = Easel::new(surface, &self.choice, self.scenery.clone(), shared, (tell, self.stop))?;
+        let easel =
+            Easel::new(surface, &self.choice, self.scenery.clone(), shared, (tell, self.stop))?;
         self.layer = Some(Layer::new(&window, self.face.clone(), (STEADY, true)));
         let proxy = self.proxy.clone();
         // Whether it went well is asked when the loop of events has ended.
-        self.thread = Some(Thread::start(move || easel.run(), move || drop(proxy.send_event(Told::Ended)))?);
+        self.thread =
+            Some(Thread::start(move || easel.run(), move || drop(proxy.send_event(Told::Ended)))?);
         let PhysicalSize { width, height } = window.inner_size();
         let px_per_point = window.scale_factor();
         self.window = Some(window);
@@ -185,7 +209,9 @@ impl App {
     fn perform(&mut self, request: &Request) -> Option<Input> {
         match request {
             Request::ChooseToOpen => self.choosing = Some(Choosing::new(false, None)),
-            Request::ChooseToSave => self.choosing = Some(Choosing::new(true, self.desk.session().path())),
+            Request::ChooseToSave => {
+                self.choosing = Some(Choosing::new(true, self.desk.session().path()))
+            }
             // The panel asks it.
             Request::Ask(_) => {}
             Request::Quit => {
@@ -218,11 +244,16 @@ impl App {
         let (document, size) = (self.desk.editor().shared_document(), self.size);
         let picture = self.desk.viewport().size_px.to_array().map(|v| v as u32);
         let has_cloud = self.desk.editor().settings().view != View::Boxes;
-        self.orders.change(|order| *order = Order { document, pose, has_cloud, size, picture, ..order.clone() });
+        self.orders.change(|order| {
+            *order = Order { document, pose, has_cloud, size, picture, ..order.clone() }
+        });
     }
 
     fn held(&self) -> Held {
-        Held { ctrl: self.held.control_key() || self.held.super_key(), shift: self.held.shift_key() }
+        Held {
+            ctrl: self.held.control_key() || self.held.super_key(),
+            shift: self.held.shift_key(),
+        }
     }
 
     fn pressed(&mut self, event: &KeyEvent) {
@@ -301,7 +332,9 @@ impl ApplicationHandler<Told> for App {
         }
         self.show_panels();
         let due = self.layer.as_ref().and_then(Layer::due);
-        events.set_control_flow(ControlFlow::WaitUntil(due.unwrap_or_else(|| Instant::now() + STEADY)));
+        events.set_control_flow(ControlFlow::WaitUntil(
+            due.unwrap_or_else(|| Instant::now() + STEADY),
+        ));
     }
 
     fn window_event(&mut self, _: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
@@ -314,7 +347,9 @@ impl ApplicationHandler<Told> for App {
         match event {
             WindowEvent::CloseRequested => self.take(Input::Event(Event::Wish(Wish::Quit))),
             WindowEvent::Destroyed => self.orders.change(|order| order.quits = true),
-            WindowEvent::Resized(PhysicalSize { width, height }) => self.resize(width, height, px_per_point),
+            WindowEvent::Resized(PhysicalSize { width, height }) => {
+                self.resize(width, height, px_per_point)
+            }
             WindowEvent::ModifiersChanged(held) => self.held = held.state(),
             WindowEvent::Focused(false) => self.take(Input::FocusLost),
             // A drag goes on over panels, and ends there.
@@ -332,10 +367,12 @@ impl ApplicationHandler<Told> for App {
                     self.take(Input::Button { which, is_down, held: self.held() });
                 }
             }
-            WindowEvent::MouseWheel { delta, .. } if !is_heard => self.take(Input::Wheel(match delta {
-                MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
-                MouseScrollDelta::PixelDelta(by) => by.y / PIXELS_A_NOTCH,
-            })),
+            WindowEvent::MouseWheel { delta, .. } if !is_heard => {
+                self.take(Input::Wheel(match delta {
+                    MouseScrollDelta::LineDelta(_, lines) => f64::from(lines),
+                    MouseScrollDelta::PixelDelta(by) => by.y / PIXELS_A_NOTCH,
+                }))
+            }
             WindowEvent::KeyboardInput { event, .. } if !is_typing => self.pressed(&event),
             _ => {}
         }

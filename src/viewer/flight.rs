@@ -39,7 +39,8 @@ const FROM_UP: f64 = 0.01;
 const NOTCH: f64 = 0.1;
 /// Across what is looked at in as many seconds.
 const CROSSING_S: f64 = 4.0;
-/// Distances and speeds are no less and no greater: what f32 and the scene's greatest coordinate allow.
+/// Distances and speeds are no less and no greater: what f32 and the scene's greatest coordinate
+/// allow.
 const LIMITS: (f64, f64) = (1e-6, 1e14);
 /// Coordinates are no greater.
 const FARTHEST: f64 = 1e15;
@@ -49,7 +50,13 @@ impl Flight {
     pub fn new(pose: &Pose, up: DVec3, target: DVec3) -> Flight {
         let distance = (target - pose.position).length().clamp(LIMITS.0, LIMITS.1);
         let up = up.normalize_or(DVec3::Y);
-        Flight { position: pose.position, forward: pose.forward, up, distance, speed: distance / CROSSING_S }
+        Flight {
+            position: pose.position,
+            forward: pose.forward,
+            up,
+            distance,
+            speed: distance / CROSSING_S,
+        }
     }
 
     pub fn position(&self) -> DVec3 {
@@ -66,7 +73,12 @@ impl Flight {
 
     pub fn pose(&self) -> Pose {
         let right = self.forward.cross(self.up).normalize();
-        Pose { position: self.position, right, up: right.cross(self.forward), forward: self.forward }
+        Pose {
+            position: self.position,
+            right,
+            up: right.cross(self.forward),
+            forward: self.forward,
+        }
     }
 
     /// After `motion`; what is no number changes nothing.
@@ -74,29 +86,35 @@ impl Flight {
         let next = match motion {
             Motion::Fly { along, seconds } => {
                 let Pose { right, up, forward, .. } = self.pose();
-                let step = self.speed * seconds * (along.x * right + along.y * up + along.z * forward);
+                let step =
+                    self.speed * seconds * (along.x * right + along.y * up + along.z * forward);
                 Flight { position: self.position + step, ..self }
             }
-            Motion::Look { right, upward } => Flight { forward: self.turned(right, upward), ..self },
+            Motion::Look { right, upward } => {
+                Flight { forward: self.turned(right, upward), ..self }
+            }
             Motion::Orbit { right, upward } => {
                 // The eye goes to the right where it turns to the left.
                 let forward = self.turned(-right, -upward);
                 Flight { position: self.target() - self.distance * forward, forward, ..self }
             }
             Motion::Approach { notches } => {
-                let distance = (self.distance * (1.0 - NOTCH).powf(notches)).clamp(LIMITS.0, LIMITS.1);
+                let distance =
+                    (self.distance * (1.0 - NOTCH).powf(notches)).clamp(LIMITS.0, LIMITS.1);
                 Flight { position: self.target() - distance * self.forward, distance, ..self }
             }
             Motion::Speed { doublings } => {
                 Flight { speed: (self.speed * doublings.exp2()).clamp(LIMITS.0, LIMITS.1), ..self }
             }
         };
-        let is_sound =
-            next.position.abs().max_element() <= FARTHEST && next.forward.is_finite() && next.speed.is_finite();
+        let is_sound = next.position.abs().max_element() <= FARTHEST
+            && next.forward.is_finite()
+            && next.speed.is_finite();
         if is_sound { next } else { self }
     }
 
-    /// `forward` turned about `up` and about what is to the right, no nearer to `up` than [`FROM_UP`].
+    /// `forward` turned about `up` and about what is to the right, no nearer to `up` than
+    /// [`FROM_UP`].
     fn turned(&self, right: f64, upward: f64) -> DVec3 {
         if !(right.is_finite() && upward.is_finite()) {
             return self.forward;
@@ -128,10 +146,15 @@ mod tests {
     #[test]
     fn flying_goes_along_the_view() {
         let f = flight();
-        assert_eq!((f.pose().right, f.pose().up, f.target(), f.speed()), (DVec3::X, DVec3::Y, DVec3::ZERO, 2.0));
+        assert_eq!(
+            (f.pose().right, f.pose().up, f.target(), f.speed()),
+            (DVec3::X, DVec3::Y, DVec3::ZERO, 2.0)
+        );
         let ahead = f.after(Motion::Fly { along: DVec3::Z, seconds: 0.5 });
         assert!(is(ahead.position(), [0.0, 0.0, 7.0]) && is(ahead.target(), [0.0, 0.0, -1.0]));
-        let aside = f.after(Motion::Speed { doublings: 1.0 }).after(Motion::Fly { along: DVec3::X, seconds: 1.0 });
+        let aside = f
+            .after(Motion::Speed { doublings: 1.0 })
+            .after(Motion::Fly { along: DVec3::X, seconds: 1.0 });
         assert!(is(aside.position(), [4.0, 0.0, 8.0]));
     }
 
@@ -154,7 +177,9 @@ mod tests {
     #[test]
     fn nobody_stands_on_his_head_and_nobody_gets_lost() {
         for upward in [9.0, -9.0] {
-            for motion in [Motion::Look { right: 0.3, upward }, Motion::Orbit { right: 0.3, upward }] {
+            for motion in
+                [Motion::Look { right: 0.3, upward }, Motion::Orbit { right: 0.3, upward }]
+            {
                 let f = flight().after(motion).after(motion);
                 let pose = f.pose();
                 assert!(pose.right.is_finite() && pose.up.y > 0.0, "{pose:?}");

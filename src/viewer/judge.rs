@@ -1,6 +1,7 @@
-//! How far what is seen is from the truth: the f64 reference of a view, computed on a thread of its own, and the errors
-//! of pictures of it. A view is judged at a few hundred pixels first and at as many as the time allows then; both are
-//! kept between runs (`study::kept`), so that a view that was judged once is judged at once.
+//! How far what is seen is from the truth: the f64 reference of a view, computed on a thread of its
+//! own, and the errors of pictures of it. A view is judged at a few hundred pixels first and at as
+//! many as the time allows then; both are kept between runs (`study::kept`), so that a view that
+//! was judged once is judged at once.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -40,9 +41,14 @@ pub struct View {
 }
 
 impl View {
-    /// What `scene` can be measured by: the integral over its blobs, or, where they are textured, thin sprites.
+    /// What `scene` can be measured by: the integral over its blobs, or, where they are textured,
+    /// thin sprites.
     pub fn against(scene: &Scene) -> Against {
-        if scene.clouds.iter().any(|c| !c.texture.is_none()) { Against::Thin } else { Against::Volume }
+        if scene.clouds.iter().any(|c| !c.texture.is_none()) {
+            Against::Thin
+        } else {
+            Against::Volume
+        }
     }
 
     /// The scene with exactly this camera and film.
@@ -53,15 +59,18 @@ impl View {
         Scene { camera, film: Film { width, height, ..self.scene.film }, ..(*self.scene).clone() }
     }
 
-    /// Whether one reference is right for both: what leaves things out, and how frames are run, may differ.
+    /// Whether one reference is right for both: what leaves things out, and how frames are run, may
+    /// differ.
     fn is_as(&self, other: &View) -> bool {
-        let same = |a: DVec3, b: DVec3| a.to_array().map(f64::to_bits) == b.to_array().map(f64::to_bits);
+        let same =
+            |a: DVec3, b: DVec3| a.to_array().map(f64::to_bits) == b.to_array().map(f64::to_bits);
         self.against == other.against
             && self.time_s.to_bits() == other.time_s.to_bits()
             && self.size == other.size
             && same(self.position, other.position)
             && same(self.target, other.target)
-            && (Arc::ptr_eq(&self.scene, &other.scene) || kept::is_same(self.against, &self.exact(), &other.exact()))
+            && (Arc::ptr_eq(&self.scene, &other.scene)
+                || kept::is_same(self.against, &self.exact(), &other.exact()))
     }
 }
 
@@ -76,8 +85,9 @@ pub struct Known {
 }
 
 impl Known {
-    /// How far a picture is off at the pixels of the reference: premultiplied linear RGBA, rows from the top, of the
-    /// whole picture. None where it has another size, or some value is no finite number.
+    /// How far a picture is off at the pixels of the reference: premultiplied linear RGBA, rows
+    /// from the top, of the whole picture. None where it has another size, or some value is no
+    /// finite number.
     pub fn error(&self, rgba: &[f32]) -> Option<PictureError> {
         let [width, height] = self.view.size.map(|n| n as usize);
         if rgba.len() != 4 * width * height {
@@ -91,8 +101,8 @@ impl Known {
         picture_error(&self.pixels, &picture, &self.reference.rgba, self.reference.own_error)
     }
 
-    /// FLIP's mean, of the two as the film shows them. It looks at what is around each pixel, so there is none where
-    /// not all are known. Some tenths of a second of 800 by 600.
+    /// FLIP's mean, of the two as the film shows them. It looks at what is around each pixel, so
+    /// there is none where not all are known. Some tenths of a second of 800 by 600.
     pub fn flip(&self, rgba: &[f32]) -> Option<f64> {
         let [width, height] = self.view.size;
         if self.pixels.cell > 1 || rgba.len() != 4 * self.pixels.at.len() {
@@ -157,22 +167,28 @@ struct Desk {
 const N_FIRST: usize = 256;
 
 impl Judge {
-    /// Keeps references in `folder` (`study::kept::default_folder`), if there is one. Of one view they take about
-    /// `budget` in all, as far as its light alone does not take longer.
+    /// Keeps references in `folder` (`study::kept::default_folder`), if there is one. Of one view
+    /// they take about `budget` in all, as far as its light alone does not take longer.
     pub fn new(folder: Option<PathBuf>, budget: Duration) -> Result<Judge> {
         let fail = |e: String| Error::Fault { what: format!("no thread for references: {e}") };
         // The window is to go on meanwhile.
         let n_threads = std::thread::available_parallelism().map_or(1, |n| (n.get() / 2).max(1));
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).thread_name(|i| format!("judge-{i}"));
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(n_threads)
+            .thread_name(|i| format!("judge-{i}"));
         let pool = pool.build().map_err(|e| fail(e.to_string()))?;
-        let shared = Arc::new(Shared { desk: Mutex::default(), wake: Condvar::new(), wish: AtomicU64::new(0) });
+        let shared = Arc::new(Shared {
+            desk: Mutex::default(),
+            wake: Condvar::new(),
+            wish: AtomicU64::new(0),
+        });
         let worker = Worker { shared: shared.clone(), pool, folder, budget };
         let thread = std::thread::Builder::new().name("judge".into()).spawn(move || worker.run());
         Ok(Judge { shared, thread: Some(thread.map_err(|e| fail(e.to_string()))?) })
     }
 
-    /// Wants `view` judged, and nothing else any more; what is under way for another is stopped, for the same it goes
-    /// on. To be asked where the eye stands still.
+    /// Wants `view` judged, and nothing else any more; what is under way for another is stopped,
+    /// for the same it goes on. To be asked where the eye stands still.
     pub fn ask(&self, view: View) {
         let mut desk = self.shared.lock();
         let Desk { next, current, .. } = &mut *desk;
@@ -213,7 +229,8 @@ impl Drop for Judge {
 }
 
 impl Shared {
-    /// What is in it is whole at every moment: nobody panics between two changes that belong together.
+    /// What is in it is whole at every moment: nobody panics between two changes that belong
+    /// together.
     fn lock(&self) -> MutexGuard<'_, Desk> {
         self.desk.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -267,8 +284,10 @@ impl Worker {
         let n_all = width as usize * height as usize;
         let first = Pixels::sample(width, height, N_FIRST);
         let (cell, n_first) = (first.cell, first.at.len());
-        let Reference { seconds, pixels_s, .. } = self.reference(view, &scene, first, wish)?.reference;
-        // As the first took it also where it was there already: the same pixels come again, and they are there too.
+        let Reference { seconds, pixels_s, .. } =
+            self.reference(view, &scene, first, wish)?.reference;
+        // As the first took it also where it was there already: the same pixels come again, and
+        // they are there too.
         let left_s = self.budget.as_secs_f64() - seconds - (seconds - pixels_s);
         let n_more = (left_s / (pixels_s / n_first as f64)).clamp(0.0, n_all as f64) as usize;
         let more = Pixels::sample(width, height, n_more.max(1));
@@ -278,23 +297,32 @@ impl Worker {
         Ok(())
     }
 
-    /// The truth at `pixels`, said to be known. Unwinds with [`Stopped`] where it is not wanted any more.
-    fn reference(&self, view: &View, scene: &Scene, pixels: Pixels, wish: u64) -> Result<Arc<Known>> {
+    /// The truth at `pixels`, said to be known. Unwinds with [`Stopped`] where it is not wanted any
+    /// more.
+    fn reference(
+        &self,
+        view: &View,
+        scene: &Scene,
+        pixels: Pixels,
+        wish: u64,
+    ) -> Result<Arc<Known>> {
         let n_pixels = pixels.at.len();
         let listener = |work: Work, n: usize| {
             let mut desk = self.shared.lock();
             if !self.is_wanted(wish) {
                 drop(desk);
-                // As a panic that nobody reads of. All that is being computed is dropped on the way, and files are
-                // written aside and renamed.
+                // As a panic that nobody reads of. All that is being computed is dropped on the
+                // way, and files are written aside and renamed.
                 resume_unwind(Box::new(Stopped));
             }
-            let before = desk.standing.progress.filter(|p| p.work == work && p.n_pixels == n_pixels);
+            let before =
+                desk.standing.progress.filter(|p| p.work == work && p.n_pixels == n_pixels);
             let n_done = before.map_or(1, |p| p.n_done + 1);
             desk.standing.progress = Some(Progress { work, n_done, n, n_pixels });
         };
         let folder = self.folder.as_deref();
-        let compute = || kept::reference(view.against, scene, view.time_s, &pixels, folder, &listener);
+        let compute =
+            || kept::reference(view.against, scene, view.time_s, &pixels, folder, &listener);
         let found = self.pool.install(compute)?;
         let (view, kept::Kept { reference, from_cache, .. }) = (view.clone(), found);
         let known = Arc::new(Known { view, pixels, reference, from_cache });

@@ -1,4 +1,5 @@
-//! What is seen measured while it stands still: asks for the view's truth, for the pictures, and says how far apart they are.
+//! What is seen measured while it stands still: asks for the view's truth, for the pictures, and
+//! says how far apart they are.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -45,15 +46,17 @@ impl Judging {
             lock_seen(seen).judged = None;
             return;
         }
-        let judge =
-            match self.judge.get_or_insert_with(|| Judge::new(default_folder(), BUDGET).map_err(|e| e.to_string())) {
-                Ok(judge) => judge,
-                Err(why) => {
-                    let standing = Standing { failed: Some(why.clone()), ..Standing::default() };
-                    lock_seen(seen).judged = Some(Judged { standing, ..Judged::default() });
-                    return;
-                }
-            };
+        let judge = match self
+            .judge
+            .get_or_insert_with(|| Judge::new(default_folder(), BUDGET).map_err(|e| e.to_string()))
+        {
+            Ok(judge) => judge,
+            Err(why) => {
+                let standing = Standing { failed: Some(why.clone()), ..Standing::default() };
+                lock_seen(seen).judged = Some(Judged { standing, ..Judged::default() });
+                return;
+            }
+        };
         let moment = Moment { flight: now.flight, i_frame: now.playback.i_frame(), size: now.size };
         let is_still = self.last.replace(moment) == Some(moment) && now.playback.is_paused();
         if !is_still {
@@ -65,7 +68,9 @@ impl Judging {
         judge.ask(view(&now, &moment));
         let standing = judge.standing();
         if let Some(known) = &standing.known {
-            let is_measured = |(by, version): &(Arc<Known>, u64)| Arc::ptr_eq(by, known) && *version == now.version;
+            let is_measured = |(by, version): &(Arc<Known>, u64)| {
+                Arc::ptr_eq(by, known) && *version == now.version
+            };
             if !self.measured.as_ref().is_some_and(is_measured) {
                 self.measured = Some((known.clone(), now.version));
                 self.errors = [None, None];
@@ -79,20 +84,26 @@ impl Judging {
     pub fn take(&mut self, read: &Read) -> Option<String> {
         let Read { version, flight, i_frame, film, pictures } = read;
         let moment = Moment { flight: *flight, i_frame: *i_frame, size: [film.width, film.height] };
-        let is_asked = |(_, asked): &&(Arc<Known>, u64)| self.last == Some(moment) && asked == version;
+        let is_asked =
+            |(_, asked): &&(Arc<Known>, u64)| self.last == Some(moment) && asked == version;
         let Some((known, _)) = self.measured.as_ref().filter(is_asked) else {
             // Those of another moment: others are asked for.
             self.measured = None;
             return None;
         };
-        let error = |picture: &Option<Vec<f32>>| picture.as_ref().and_then(|rgba| known.error(rgba));
+        let error =
+            |picture: &Option<Vec<f32>>| picture.as_ref().and_then(|rgba| known.error(rgba));
         self.errors = [error(&pictures[0]), error(&pictures[1])];
         let (n, against) = (known.pixels.at.len(), known.view.against);
         let text = |(name, e): (&str, &Option<PictureError>)| {
             let e = e.as_ref()?;
-            Some(format!("{name}: RMSE {:.2e}, greatest {:.2e}, at {n} pixels against {against}", e.rmse.value, e.max))
+            Some(format!(
+                "{name}: RMSE {:.2e}, greatest {:.2e}, at {n} pixels against {against}",
+                e.rmse.value, e.max
+            ))
         };
-        let texts: Vec<String> = ["A", "B"].into_iter().zip(&self.errors).filter_map(text).collect();
+        let texts: Vec<String> =
+            ["A", "B"].into_iter().zip(&self.errors).filter_map(text).collect();
         (!texts.is_empty()).then(|| texts.join("\n"))
     }
 }

@@ -1,4 +1,5 @@
-//! What of a scene is turned while it runs, a key a knob: its values in a circle, and what the scene file would say.
+//! What of a scene is turned while it runs, a key a knob: its values in a circle, and what the
+//! scene file would say.
 
 use crate::frame::choice::named;
 use crate::model::resolution::Resolution;
@@ -70,14 +71,23 @@ impl Knob {
         }
         let (lighting, draw, threads) = (&mut scene.lighting, &mut scene.draw, &mut scene.threads);
         match self {
-            Knob::Threading => threads.mode = next(&[Threading::Serial, Threading::Parallel], threads.mode),
-            Knob::Simulate => threads.simulate = next(&[Simulate::Gpu, Simulate::Cpu], threads.simulate),
+            Knob::Threading => {
+                threads.mode = next(&[Threading::Serial, Threading::Parallel], threads.mode)
+            }
+            Knob::Simulate => {
+                threads.simulate = next(&[Simulate::Gpu, Simulate::Cpu], threads.simulate)
+            }
             Knob::Lighting => {
-                lighting.mode =
-                    next(&[LightingMode::None, LightingMode::First, LightingMode::TwoReflection], lighting.mode);
+                lighting.mode = next(
+                    &[LightingMode::None, LightingMode::First, LightingMode::TwoReflection],
+                    lighting.mode,
+                );
             }
             Knob::Bases => lighting.bases = next(&BASES, lighting.bases),
-            Knob::Gather => lighting.gather = next(&[Gather::Auto, Gather::Exact, Gather::Tree], lighting.gather),
+            Knob::Gather => {
+                lighting.gather =
+                    next(&[Gather::Auto, Gather::Exact, Gather::Tree], lighting.gather)
+            }
             Knob::Theta => lighting.theta = next(&THETAS, lighting.theta),
             Knob::Path => draw.path = next(&[DrawPath::Tiles, DrawPath::Sprites], draw.path),
             Knob::Resolution => draw.resolution = next(&RESOLUTIONS, draw.resolution),
@@ -132,7 +142,8 @@ mod tests {
         let mut still = scene("");
         assert!(Knob::Simulate.turn(&mut still).is_ok());
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/x.toml");
-        let text = "[threads]\nsimulate = 'cpu'\n[[cloud]]\nfrom = 'weather'\nfile = 'weather/supercell.nc'\nspeed = 30\nparticles = 10";
+        let text = "[threads]\nsimulate = 'cpu'\n[[cloud]]\nfrom = 'weather'\nfile = \
+            'weather/supercell.nc'\nspeed = 30\nparticles = 10";
         let mut moving = scene_file::parse(text.to_owned(), &path, &[], None).unwrap().scene;
         assert!(Knob::Simulate.turn(&mut moving).unwrap_err().contains("game thread"));
     }

@@ -1,5 +1,6 @@
-//! Looking at scenes: a window to fly in, with what can be toggled while it runs. Pure reducers, and under them a window.
-//! And changing clouds by hand: the [`editor`], (state, action) → state, which knows no window.
+//! Looking at scenes: a window to fly in, with what can be toggled while it runs. Pure reducers,
+//! and under them a window. And changing clouds by hand: the [`editor`], (state, action) → state,
+//! which knows no window.
 
 #[cfg(feature = "window")]
 pub mod easel;

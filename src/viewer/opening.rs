@@ -19,7 +19,9 @@ pub fn open(
     validation: bool,
 ) -> Result<(Window, (Arc<Instance>, Surface))> {
     let fail = |e: String| Error::vulkan("opening a window", e);
-    let attributes = Window::default_attributes().with_title(title).with_inner_size(PhysicalSize::new(width, height));
+    let attributes = Window::default_attributes()
+        .with_title(title)
+        .with_inner_size(PhysicalSize::new(width, height));
     let window = events.create_window(attributes).map_err(|e| fail(e.to_string()))?;
     let display = window.display_handle().map_err(|e| fail(e.to_string()))?.as_raw();
     let handle = window.window_handle().map_err(|e| fail(e.to_string()))?.as_raw();
@@ -31,7 +33,9 @@ pub fn open(
 pub fn no_display(why: &str, without: &str) -> Error {
     let set = |name: &str| std::env::var(name).is_ok_and(|v| !v.is_empty());
     let what = match set("DISPLAY") {
-        true => format!("the display {} cannot be opened", std::env::var("DISPLAY").unwrap_or_default()),
+        true => {
+            format!("the display {} cannot be opened", std::env::var("DISPLAY").unwrap_or_default())
+        }
         false => "there is no display: DISPLAY is not set".to_owned(),
     };
     Error::vulkan("opening a window", format!("{what} ({why}); {without}"))
@@ -85,7 +89,8 @@ mod tests {
         let well = Thread::start(|| Ok(7), move || first.send(()).unwrap()).unwrap();
         told.recv().unwrap();
         assert_eq!(well.end(), Ok(7));
-        let badly = Thread::<u32>::start(|| panic!("on purpose"), move || second.send(()).unwrap()).unwrap();
+        let badly = Thread::<u32>::start(|| panic!("on purpose"), move || second.send(()).unwrap())
+            .unwrap();
         told.recv().unwrap();
         assert!(matches!(badly.end(), Err(Error::Fault { .. })));
     }

@@ -1,5 +1,5 @@
-//! Where a view came from: the scene's file and those that it names, watched and read again; and where it goes, a scene of
-//! what is seen.
+//! Where a view came from: the scene's file and those that it names, watched and read again; and
+//! where it goes, a scene of what is seen.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,14 +22,21 @@ pub struct Origin {
 }
 
 impl Origin {
-    /// Of `first`, which was read from `files`, the scene's own being the first; and of shaders from a folder.
+    /// Of `first`, which was read from `files`, the scene's own being the first; and of shaders
+    /// from a folder.
     pub fn new(
         (path, first): (&Path, Arc<Scene>),
         (overrides, seed): (Vec<String>, Option<u32>),
         files: Vec<PathBuf>,
         shaders: Option<&Path>,
     ) -> Origin {
-        Origin { path: path.to_owned(), overrides, seed, first, watch: Watch::new(Files::new(files, shaders)) }
+        Origin {
+            path: path.to_owned(),
+            overrides,
+            seed,
+            first,
+            watch: Watch::new(Files::new(files, shaders)),
+        }
     }
 
     /// What has changed on the disk.

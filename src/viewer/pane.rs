@@ -1,4 +1,5 @@
-//! What lies between a device and a window: the surface, its images, and what draws a picture and widgets into them.
+//! What lies between a device and a window: the surface, its images, and what draws a picture and
+//! widgets into them.
 
 use std::sync::Arc;
 
@@ -7,7 +8,9 @@ use crate::error::Result;
 use crate::frame::render::Renderer;
 use crate::frame::stage::{Bed, DeviceChoice};
 use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Commands, Instance, Overlay, Place, PresentMode, Recorder, Shown, Surface, Swapchain};
+use crate::gpu::{
+    Buffer, Commands, Instance, Overlay, Place, PresentMode, Recorder, Shown, Surface, Swapchain,
+};
 use crate::model::film::{Film, ToneMap};
 use crate::passes::present::{self, Compare, Present};
 
@@ -46,8 +49,8 @@ impl Pane {
         self.i_mode = (self.i_mode + n) % self.modes.len().max(1);
     }
 
-    /// Makes the window's images anew; false where nothing of the window is seen. `size` is asked for where the window system
-    /// leaves it open.
+    /// Makes the window's images anew; false where nothing of the window is seen. `size` is asked
+    /// for where the window system leaves it open.
     pub fn remake(&mut self, size: [u32; 2]) -> Result<bool> {
         // A surface has one swapchain at a time.
         self.swapchain = None;
@@ -95,8 +98,8 @@ impl Pane {
         }))
     }
 
-    /// Shows what `first` drew last, the background alone where there is none, under `face`; and what `second` did, as `compare`
-    /// says. False where the window is another by now.
+    /// Shows what `first` drew last, the background alone where there is none, under `face`; and
+    /// what `second` did, as `compare` says. False where the window is another by now.
     pub fn show(
         &mut self,
         showing: &Showing,
@@ -104,13 +107,20 @@ impl Pane {
         compare: Option<Compare>,
         face: &SharedFace,
     ) -> Result<bool> {
-        let (Some(swapchain), Some(overlay)) = (&mut self.swapchain, &mut self.overlay) else { return Ok(false) };
+        let (Some(swapchain), Some(overlay)) = (&mut self.swapchain, &mut self.overlay) else {
+            return Ok(false);
+        };
         let widgets = take(face, overlay)?;
         let shown = swapchain.show(|rec, image| {
             let [own_first, own_second] = &showing.pictures;
             let first = picture(rec, first, own_first);
             let second = if second.is_some() { picture(rec, second, own_second) } else { first };
-            showing.present.record(rec, [first, second], image, &present::Shown { compare, ..showing.shown })?;
+            showing.present.record(
+                rec,
+                [first, second],
+                image,
+                &present::Shown { compare, ..showing.shown },
+            )?;
             widgets.map_or(Ok(()), |widgets| overlay.record(rec, image, &widgets))
         })?;
         Ok(shown != Shown::Outdated)
@@ -137,8 +147,13 @@ impl Pane {
     }
 }
 
-/// Where a renderer's last picture lies, which is copied to `own` where it lies in no buffer; `own` without a renderer.
-fn picture<'a>(rec: &mut Recorder<'_>, renderer: Option<&'a mut Renderer>, own: &'a Buffer) -> &'a Buffer {
+/// Where a renderer's last picture lies, which is copied to `own` where it lies in no buffer; `own`
+/// without a renderer.
+fn picture<'a>(
+    rec: &mut Recorder<'_>,
+    renderer: Option<&'a mut Renderer>,
+    own: &'a Buffer,
+) -> &'a Buffer {
     let Some(renderer) = renderer else { return own };
     if renderer.picture().is_none() {
         renderer.record_picture(rec, own);

@@ -1,10 +1,13 @@
-//! What panels show beside the picture, and what is clicked in them: commands, the same that keys mean.
+//! What panels show beside the picture, and what is clicked in them: commands, the same that keys
+//! mean.
 
 mod lanes;
 mod settings;
 mod times;
 
-use egui::{Align2, CollapsingHeader, Color32, FontId, Frame, Margin, Panel, RichText, ScrollArea, Ui};
+use egui::{
+    Align2, CollapsingHeader, Color32, FontId, Frame, Margin, Panel, RichText, ScrollArea, Ui,
+};
 
 use super::seen::Seen;
 use super::wanted::{Command, Wanted};
@@ -39,7 +42,11 @@ pub fn show(ui: &mut Ui, wanted: &Wanted, seen: &Seen) -> (Vec<Command>, Backdro
     let mut commands = vec![];
     let width = WIDTH.min(SHARE * ui.max_rect().width());
     let frame = Frame::new().inner_margin(Margin::same(6));
-    let panel = Panel::right("panels").resizable(false).show_separator_line(false).exact_size(width).frame(frame);
+    let panel = Panel::right("panels")
+        .resizable(false)
+        .show_separator_line(false)
+        .exact_size(width)
+        .frame(frame);
     let shown = panel.show(ui, |ui| {
         ScrollArea::vertical().auto_shrink(false).show(ui, |ui| {
             section(ui, "Frame times", true, |ui| times::show(ui, &seen.timeline));
@@ -56,15 +63,23 @@ pub fn show(ui: &mut Ui, wanted: &Wanted, seen: &Seen) -> (Vec<Command>, Backdro
 }
 
 fn section(ui: &mut Ui, title: &str, is_open: bool, add: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(RichText::new(title).strong()).default_open(is_open).show_unindented(ui, add);
+    CollapsingHeader::new(RichText::new(title).strong())
+        .default_open(is_open)
+        .show_unindented(ui, add);
 }
 
 /// Something that went wrong, over the picture that is still the last good one.
 pub fn alarm(ui: &Ui, text: &str) {
     let painter = ui.painter();
     let room = ui.max_rect().shrink(8.0);
-    let galley = painter.layout(text.to_owned(), FontId::monospace(12.0), Color32::WHITE, room.width() - 16.0);
-    let box_ = Align2::LEFT_BOTTOM.anchor_size(room.left_bottom(), galley.size() + egui::vec2(16.0, 12.0));
+    let galley = painter.layout(
+        text.to_owned(),
+        FontId::monospace(12.0),
+        Color32::WHITE,
+        room.width() - 16.0,
+    );
+    let box_ =
+        Align2::LEFT_BOTTOM.anchor_size(room.left_bottom(), galley.size() + egui::vec2(16.0, 12.0));
     painter.rect_filled(box_, 4.0, WRONG);
     painter.galley(box_.min + egui::vec2(8.0, 6.0), galley, Color32::WHITE);
 }

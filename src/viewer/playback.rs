@@ -46,14 +46,17 @@ impl Playback {
     pub fn after(self, action: Action) -> Playback {
         match action {
             Action::Toggle => Playback { is_paused: !self.is_paused, ..self },
-            Action::Step(n) => Playback { i_frame: self.around(i64::from(n)), is_paused: true, ..self },
+            Action::Step(n) => {
+                Playback { i_frame: self.around(i64::from(n)), is_paused: true, ..self }
+            }
             Action::Seek(i_frame) => Playback { i_frame: i_frame % self.n_frames, ..self },
         }
     }
 
     /// The frame to draw now, and what is asked for after it.
     pub fn next(self) -> (u32, Playback) {
-        let after = if self.is_paused { self } else { Playback { i_frame: self.around(1), ..self } };
+        let after =
+            if self.is_paused { self } else { Playback { i_frame: self.around(1), ..self } };
         (self.i_frame, after)
     }
 

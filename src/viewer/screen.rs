@@ -1,4 +1,5 @@
-//! The thread that draws what a window shows: the loops that bench times, each frame's picture shown as it ends.
+//! The thread that draws what a window shows: the loops that bench times, each frame's picture
+//! shown as it ends.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -91,12 +92,13 @@ pub struct Screen {
     n_mode_turns: u32,
     /// Frames to show; all that come without.
     n_left: Option<u32>,
-    /// Frame times by loop, serial first, and by whether panels were shown, without those of frames after something was made
-    /// anew.
+    /// Frame times by loop, serial first, and by whether panels were shown, without those of frames
+    /// after something was made anew.
     times: [[Vec<f64>; 2]; 2],
 }
 
-/// The frames after something was made are not counted among the times: as many as a bench leaves out unless told otherwise.
+/// The frames after something was made are not counted among the times: as many as a bench leaves
+/// out unless told otherwise.
 const N_WARM_UP: u32 = 10;
 /// So often the title says how long frames take.
 const STATUS: Duration = Duration::from_millis(500);
@@ -161,16 +163,22 @@ impl Screen {
         let Screen { pane, times, .. } = self;
         pane.close()?;
         let mut loops = vec![];
-        for (threading, by_panels) in [Threading::Serial, Threading::Parallel].into_iter().zip(&times) {
+        for (threading, by_panels) in
+            [Threading::Serial, Threading::Parallel].into_iter().zip(&times)
+        {
             for (has_panels, ms) in [false, true].into_iter().zip(by_panels) {
-                loops.extend(Summary::of(ms).map(|frame_ms| LoopTimes { threading, has_panels, frame_ms }));
+                loops.extend(Summary::of(ms).map(|frame_ms| LoopTimes {
+                    threading,
+                    has_panels,
+                    frame_ms,
+                }));
             }
         }
         Ok(loops)
     }
 
-    /// Takes the shaders as they are now, where they have changed: the compiler of those before; an error where they cannot be
-    /// read, which is shown, and those before stay.
+    /// Takes the shaders as they are now, where they have changed: the compiler of those before; an
+    /// error where they cannot be read, which is shown, and those before stay.
     fn follow_shaders(&mut self, seen: &Wanted) -> std::result::Result<Option<Compiler>, ()> {
         if std::mem::replace(&mut self.n_shader_loads, seen.n_shader_loads) == seen.n_shader_loads {
             return Ok(None);
@@ -187,7 +195,8 @@ impl Screen {
         (self.ties.tell)(Told::Said(text));
     }
 
-    /// Back to the shaders of `before`, or to the scene that was good; the error where there is nothing to go back to.
+    /// Back to the shaders of `before`, or to the scene that was good; the error where there is
+    /// nothing to go back to.
     fn turn_back(
         &mut self,
         error: Error,
@@ -197,7 +206,9 @@ impl Screen {
     ) -> Result<()> {
         match (before, good) {
             (Some(compiler), _) => self.pane.bed.set_compiler(compiler),
-            (None, Some((scene, other))) if *scene != seen.scene || other.is_none() && seen.other.is_some() => {
+            (None, Some((scene, other)))
+                if *scene != seen.scene || other.is_none() && seen.other.is_some() =>
+            {
                 let mut wanted = lock(&self.ties.wanted);
                 // Somebody may have turned on meanwhile.
                 if wanted.version == seen.version {
@@ -215,13 +226,19 @@ impl Screen {
         let film_of = |scene: &Arc<Scene>| self.scene_of(scene);
         let bed = &self.pane.bed;
         let player = bed.player(film_of(&seen.scene), seen.skip)?;
-        let other = seen.other.as_ref().map(|other| bed.player(film_of(&other.scene), other.skip)).transpose()?;
+        let other = seen
+            .other
+            .as_ref()
+            .map(|other| bed.player(film_of(&other.scene), other.skip))
+            .transpose()?;
         let showing = self.pane.showing(&player.renderer, &player.scene.film)?;
         Ok(showing.map(|showing| Cast { showing, player, other: other.map(Second::new) }))
     }
 
     fn is_over(&self) -> bool {
-        lock(&self.ties.wanted).quits || self.ties.stop.load(Ordering::Relaxed) || self.n_left == Some(0)
+        lock(&self.ties.wanted).quits
+            || self.ties.stop.load(Ordering::Relaxed)
+            || self.n_left == Some(0)
     }
 
     /// `scene` with the window's film.
@@ -234,13 +251,19 @@ impl Screen {
         scene
     }
 
-    /// Makes what pictures are shown by, as it is wanted; false where nothing of the window is seen.
+    /// Makes what pictures are shown by, as it is wanted; false where nothing of the window is
+    /// seen.
     fn remake(&mut self, seen: &Wanted) -> Result<bool> {
         let (size, n_mode_turns) = (seen.size, seen.n_mode_turns);
-        let turns = n_mode_turns.wrapping_sub(std::mem::replace(&mut self.n_mode_turns, n_mode_turns)) as usize;
+        let turns = n_mode_turns
+            .wrapping_sub(std::mem::replace(&mut self.n_mode_turns, n_mode_turns))
+            as usize;
         self.pane.turn_mode(turns);
         if turns > 0 {
-            (self.ties.tell)(Told::Said(format!("pictures are shown by {}", self.pane.mode().name())));
+            (self.ties.tell)(Told::Said(format!(
+                "pictures are shown by {}",
+                self.pane.mode().name()
+            )));
         }
         lock_seen(&self.ties.seen).present = Some(self.pane.mode());
         self.pane.remake(size)
@@ -289,13 +312,21 @@ impl Screen {
                 }
                 let second = other.as_mut().map(|other| &mut other.player.renderer);
                 let compare = second.as_ref().map(|_| compare_of(now.beside, scene.film.width));
-                let is_shown = self.pane.show(showing, [Some(&mut *renderer), second], compare, &self.ties.face)?;
-                // One after the other: no game step runs beside it, or this loop would be a little parallel.
+                let is_shown = self.pane.show(
+                    showing,
+                    [Some(&mut *renderer), second],
+                    compare,
+                    &self.ties.face,
+                )?;
+                // One after the other: no game step runs beside it, or this loop would be a little
+                // parallel.
                 if threading == Threading::Serial {
                     self.pane.wait()?;
                 }
                 match (n_warm_up, &other) {
-                    (0, None) => self.times[threading as usize][usize::from(now.panels)].push(times.frame_ms),
+                    (0, None) => {
+                        self.times[threading as usize][usize::from(now.panels)].push(times.frame_ms)
+                    }
                     // Two pictures are no scene's frame time.
                     (0, Some(_)) => {}
                     _ => n_warm_up -= 1,
@@ -314,12 +345,22 @@ impl Screen {
                     (self.ties.tell)(Told::Picture { keep, film: scene.film, rgba });
                 }
                 if let (true, Some(flight)) = (reads, flight) {
-                    let second = other.as_mut().map(|other| other.player.renderer.image()).transpose()?;
+                    let second =
+                        other.as_mut().map(|other| other.player.renderer.image()).transpose()?;
                     let (film, pictures) = (scene.film, [Some(renderer.image()?), second]);
                     let version = seen.version;
-                    (self.ties.tell)(Told::Read(Read { version, flight, i_frame: times.i_frame, film, pictures }));
+                    (self.ties.tell)(Told::Read(Read {
+                        version,
+                        flight,
+                        i_frame: times.i_frame,
+                        film,
+                        pictures,
+                    }));
                 }
-                Ok(is_shown && goes_on(&now, seen) && !self.ties.stop.load(Ordering::Relaxed) && self.n_left != Some(0))
+                Ok(is_shown
+                    && goes_on(&now, seen)
+                    && !self.ties.stop.load(Ordering::Relaxed)
+                    && self.n_left != Some(0))
             };
             match threading {
                 Threading::Serial => serial::run(game, renderer, frames, &mut on_frame)?,
@@ -386,7 +427,13 @@ impl Status {
         let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
         let name = scene.threads.mode.name();
         let summary = Summary::of(&std::mem::take(&mut self.frame_ms));
-        let times = summary.map_or(String::new(), |s| format!(" | {:.1} ms p50, {:.1} p99 of {}", s.p50, s.p99, s.n));
-        Some(format!("{title} | {name}{times} | frame {} | {} particles | ? for keys", last.i_frame, last.n_shown()))
+        let times = summary.map_or(String::new(), |s| {
+            format!(" | {:.1} ms p50, {:.1} p99 of {}", s.p50, s.p99, s.n)
+        });
+        Some(format!(
+            "{title} | {name}{times} | frame {} | {} particles | ? for keys",
+            last.i_frame,
+            last.n_shown()
+        ))
     }
 }

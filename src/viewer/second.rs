@@ -41,7 +41,8 @@ impl Poses {
     }
 }
 
-/// All that draws what a window shows. Dropped in this order, once nothing is on its way to the window.
+/// All that draws what a window shows. Dropped in this order, once nothing is on its way to the
+/// window.
 pub struct Cast {
     pub showing: Showing,
     pub player: Player,
@@ -56,8 +57,12 @@ pub struct Second {
 impl Second {
     pub fn new(player: Player) -> Second {
         // Every frame is told where it is seen from before it is made.
-        let seen_from =
-            Arc::new(Mutex::new(Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z }));
+        let seen_from = Arc::new(Mutex::new(Pose {
+            position: DVec3::ZERO,
+            right: DVec3::X,
+            up: DVec3::Y,
+            forward: DVec3::NEG_Z,
+        }));
         let seen = seen_from.clone();
         let pose = move || *seen.lock().unwrap_or_else(PoisonError::into_inner);
         let player = Player { game: player.game.seen_from(Box::new(pose)), ..player };
@@ -77,7 +82,9 @@ impl Second {
 /// As the pass has it, of a picture so many pixels wide.
 pub fn compare_of(beside: Beside, width: u32) -> Compare {
     match beside {
-        Beside::Split(share) => Compare::Split { column: (share.clamp(0.0, 1.0) * f64::from(width)) as i32 },
+        Beside::Split(share) => {
+            Compare::Split { column: (share.clamp(0.0, 1.0) * f64::from(width)) as i32 }
+        }
         Beside::Difference(gain) => Compare::Difference { gain: gain as f32 },
         Beside::Other => Compare::Second,
     }

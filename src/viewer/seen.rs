@@ -20,7 +20,8 @@ pub struct Seen {
     pub present: Option<PresentMode>,
     /// Its name.
     pub device: String,
-    /// What went wrong since the picture that is shown: with the scene's files, and with drawing it.
+    /// What went wrong since the picture that is shown: with the scene's files, and with drawing
+    /// it.
     pub wrong: [Option<String>; 2],
     /// What B's last frame took, ms; none without B.
     pub other_ms: Option<f64>,

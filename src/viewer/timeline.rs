@@ -1,4 +1,5 @@
-//! The last frames of a loop as panels show them: how long they took, what each pass took, and who did what when.
+//! The last frames of a loop as panels show them: how long they took, what each pass took, and who
+//! did what when.
 
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -26,8 +27,9 @@ pub struct Frame {
     pub game: Span,
     pub record: Span,
     pub end: f64,
-    /// The device's passes in order, the last one ending with the frame: the device's clock is not the host's, and how far apart
-    /// they are is not asked for here (`bench --trace` does). Empty without timestamps.
+    /// The device's passes in order, the last one ending with the frame: the device's clock is not
+    /// the host's, and how far apart they are is not asked for here (`bench --trace` does). Empty
+    /// without timestamps.
     pub passes: Vec<(&'static str, Span)>,
 }
 
@@ -59,7 +61,11 @@ impl Timeline {
             game: span(times.marks.game),
             record: span(times.marks.record),
             end,
-            passes: times.passes.iter().map(|p| (p.name, [on_host(p.begin_ns), on_host(p.end_ns)])).collect(),
+            passes: times
+                .passes
+                .iter()
+                .map(|p| (p.name, [on_host(p.begin_ns), on_host(p.end_ns)]))
+                .collect(),
         });
     }
 
@@ -73,8 +79,8 @@ impl Timeline {
         Summary::of(&self.frames.iter().map(of).collect::<Vec<_>>())
     }
 
-    /// Every pass that ran in one of the frames: its median over those that it ran in, ms, and in what share of all frames that
-    /// was; in the order that they were first met in.
+    /// Every pass that ran in one of the frames: its median over those that it ran in, ms, and in
+    /// what share of all frames that was; in the order that they were first met in.
     pub fn passes(&self) -> Vec<(&'static str, f64, f64)> {
         let mut names: Vec<&'static str> = vec![];
         for (name, _) in self.frames.iter().flat_map(|f| &f.passes) {
@@ -134,11 +140,17 @@ mod tests {
         let [first, second] = [0, 1].map(|i| line.frames().nth(i).unwrap().clone());
         let near = |a: Span, b: Span| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
         assert!(near(first.game, [0.0, 2.0]) && near(second.record, [12.0, 13.0]));
-        assert!(near(first.passes[0].1, [5.0, 6.0]) && near(first.passes[1].1, [6.0, 9.0]), "{first:?}");
+        assert!(
+            near(first.passes[0].1, [5.0, 6.0]) && near(first.passes[1].1, [6.0, 9.0]),
+            "{first:?}"
+        );
         assert!(near(second.passes[0].1, [18.0, 19.0]));
         assert_eq!(line.summary(|f| f.frame_ms).map(|s| (s.n, s.p50)), Some((2, 10.5)));
         let passes = line.passes();
-        assert_eq!(passes.iter().map(|p| (p.0, p.2)).collect::<Vec<_>>(), [("grid", 0.5), ("tiles", 1.0)]);
+        assert_eq!(
+            passes.iter().map(|p| (p.0, p.2)).collect::<Vec<_>>(),
+            [("grid", 0.5), ("tiles", 1.0)]
+        );
         assert!((passes[1].1 - 2.0).abs() < 1e-6);
     }
 

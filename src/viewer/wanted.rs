@@ -68,7 +68,11 @@ pub struct Other {
 
 /// A key by its name (of letters and signs themselves), what it means, and what that is called.
 pub const SHORTCUTS: [(&str, Command, &str); 27] = [
-    ("t", Command::Turn(Knob::Threading), "game and render step one after the other, or side by side"),
+    (
+        "t",
+        Command::Turn(Knob::Threading),
+        "game and render step one after the other, or side by side",
+    ),
     ("c", Command::Turn(Knob::Simulate), "particles moved by the device, or by the game thread"),
     ("l", Command::Turn(Knob::Lighting), "no light, one reflection, two"),
     ("b", Command::Turn(Knob::Bases), "vectors of the basis"),
@@ -98,14 +102,22 @@ pub const SHORTCUTS: [(&str, Command, &str); 27] = [
 ];
 
 /// Keys that fly as long as they are held: along right, up, forward.
-const FLYING: [(&str, DVec3); 6] =
-    [("w", DVec3::Z), ("s", DVec3::NEG_Z), ("d", DVec3::X), ("a", DVec3::NEG_X), ("e", DVec3::Y), ("q", DVec3::NEG_Y)];
+const FLYING: [(&str, DVec3); 6] = [
+    ("w", DVec3::Z),
+    ("s", DVec3::NEG_Z),
+    ("d", DVec3::X),
+    ("a", DVec3::NEG_X),
+    ("e", DVec3::Y),
+    ("q", DVec3::NEG_Y),
+];
 
 /// What `?` prints.
 pub fn help() -> String {
-    let keys = SHORTCUTS.iter().map(|(key, _, what)| format!("  {key:<7} {what}\n")).collect::<String>();
+    let keys =
+        SHORTCUTS.iter().map(|(key, _, what)| format!("  {key:<7} {what}\n")).collect::<String>();
     format!(
-        "keys:\n{keys}  w a s d q e  fly\nmouse: left button turns the eye, right button goes around what is looked at, wheel nearer and farther\n"
+        "keys:\n{keys}  w a s d q e  fly\nmouse: left button turns the eye, right button goes \
+         around what is looked at, wheel nearer and farther\n"
     )
 }
 
@@ -214,7 +226,11 @@ impl Wanted {
             Command::Turn(knob) => {
                 let scene = Arc::make_mut(&mut self.scene);
                 if let Err(why) = knob.turn(scene) {
-                    return Said::Text(format!("{} stays {}: {why}", knob.key(), knob.value(scene)));
+                    return Said::Text(format!(
+                        "{} stays {}: {why}",
+                        knob.key(),
+                        knob.value(scene)
+                    ));
                 }
                 self.version += 1;
                 return Said::Text(format!("{} = {}", knob.key(), knob.value(scene)));
@@ -226,7 +242,9 @@ impl Wanted {
             }
             Command::PresentMode => self.n_mode_turns += 1,
             Command::Play(action) => self.playback = self.playback.after(action),
-            Command::Speed(doublings) => self.flight = self.flight.after(Motion::Speed { doublings }),
+            Command::Speed(doublings) => {
+                self.flight = self.flight.after(Motion::Speed { doublings })
+            }
             Command::Keep(keep) => self.keep = Some(keep),
             Command::Panels => self.panels = !self.panels,
             Command::Count => self.counts = true,
@@ -235,7 +253,11 @@ impl Wanted {
                 self.other = if self.other.is_none() { Some(held) } else { None };
                 self.version += 1;
                 let is_held = self.other.is_some();
-                let text = if is_held { "B is what is set now: what you turn is A" } else { "there is no B any more" };
+                let text = if is_held {
+                    "B is what is set now: what you turn is A"
+                } else {
+                    "there is no B any more"
+                };
                 return Said::Text(text.to_owned());
             }
             Command::Compare => {
@@ -271,14 +293,18 @@ impl Wanted {
 
     /// Time goes on for keys that are held.
     pub fn fly(&mut self, seconds: f64) {
-        let along: DVec3 = FLYING.iter().filter(|(name, _)| self.held.contains(name)).map(|(_, along)| *along).sum();
+        let along: DVec3 = FLYING
+            .iter()
+            .filter(|(name, _)| self.held.contains(name))
+            .map(|(_, along)| *along)
+            .sum();
         if along != DVec3::ZERO {
             self.flight = self.flight.after(Motion::Fly { along, seconds });
         }
     }
 
-    /// A picture to keep and whether pictures are to be read, of a frame of this version of what is wanted; neither is wished for
-    /// any more then.
+    /// A picture to keep and whether pictures are to be read, of a frame of this version of what is
+    /// wanted; neither is wished for any more then.
     pub fn take_wishes(&mut self, version: u64) -> (Option<Keep>, bool) {
         if self.version != version {
             return (None, false);
@@ -293,17 +319,19 @@ impl Wanted {
         i_frame
     }
 
-    /// Keys of the scene and values, as `--set` has them, that make `first`, as it was opened, what is seen: what was turned, and
-    /// where the eye is. The size is that of [`Wanted::size`].
+    /// Keys of the scene and values, as `--set` has them, that make `first`, as it was opened, what
+    /// is seen: what was turned, and where the eye is. The size is that of [`Wanted::size`].
     pub fn settings(&self, first: &Scene) -> Vec<(&'static str, String)> {
         let turned = Knob::ALL.iter().filter(|knob| knob.value(first) != knob.value(&self.scene));
-        let mut settings: Vec<_> = turned.map(|knob| (knob.key(), knob.value(&self.scene))).collect();
+        let mut settings: Vec<_> =
+            turned.map(|knob| (knob.key(), knob.value(&self.scene))).collect();
         let place = |v: DVec3| format!("[{:?}, {:?}, {:?}]", v.x, v.y, v.z);
         let (position, target) = (place(self.flight.position()), place(self.flight.target()));
         match first.camera.keys.len() {
             1 => settings.extend([("camera.position", position), ("camera.target", target)]),
             _ => {
-                let path = format!("[{{ time_s = 0.0, position = {position}, target = {target} }}]");
+                let path =
+                    format!("[{{ time_s = 0.0, position = {position}, target = {target} }}]");
                 settings.push(("camera.path", path));
             }
         }
@@ -320,7 +348,10 @@ impl Wanted {
     pub fn overrides(&self, first: &Scene) -> Vec<String> {
         let [width, height] = self.size;
         let size = [("film.width", width.to_string()), ("film.height", height.to_string())];
-        size.into_iter().chain(self.settings(first)).map(|(key, value)| format!("{key}={value}")).collect()
+        size.into_iter()
+            .chain(self.settings(first))
+            .map(|(key, value)| format!("{key}={value}"))
+            .collect()
     }
 
     /// The command that draws what is seen, of the scene at `path`, from `first` as it was opened.
@@ -330,7 +361,10 @@ impl Wanted {
         let no_skip = if self.skip { "" } else { " --no-skip" };
         let [width, height] = self.size;
         let i_frame = self.playback.i_frame();
-        format!("nimbus render {path} -o view.png --frame {i_frame} --size {width}x{height}{no_skip}{settings}")
+        format!(
+            "nimbus render {path} -o view.png --frame {i_frame} --size \
+             {width}x{height}{no_skip}{settings}"
+        )
     }
 }
 
@@ -346,9 +380,12 @@ mod tests {
 
     #[test]
     fn keys_mean_one_thing_each() {
-        let names: Vec<&str> = SHORTCUTS.iter().map(|s| s.0).chain(FLYING.iter().map(|f| f.0)).collect();
+        let names: Vec<&str> =
+            SHORTCUTS.iter().map(|s| s.0).chain(FLYING.iter().map(|f| f.0)).collect();
         assert_eq!(names.iter().collect::<BTreeSet<_>>().len(), names.len());
-        assert!(SHORTCUTS.iter().all(|(key, _, what)| help().contains(key) && help().contains(what)));
+        assert!(
+            SHORTCUTS.iter().all(|(key, _, what)| help().contains(key) && help().contains(what))
+        );
         let mut w = wanted();
         assert_eq!(w.press("t"), Said::Text("threads.mode = \"serial\"".to_owned()));
         assert_eq!((w.press("k"), w.version), (Said::Text("skipping is off".to_owned()), 2));
@@ -393,10 +430,16 @@ mod tests {
         }
         w.drag(DVec2::new(31.0, -17.0), true);
         let line = w.command_line("scenes/hello.toml", &first);
-        assert!(line.starts_with("nimbus render scenes/hello.toml -o view.png --frame 2 --size "), "{line}");
+        assert!(
+            line.starts_with("nimbus render scenes/hello.toml -o view.png --frame 2 --size "),
+            "{line}"
+        );
         assert!(line.contains(" --no-skip"));
-        let set: Vec<String> =
-            line.split(" --set '").skip(1).map(|part| part.split('\'').next().unwrap().to_owned()).collect();
+        let set: Vec<String> = line
+            .split(" --set '")
+            .skip(1)
+            .map(|part| part.split('\'').next().unwrap().to_owned())
+            .collect();
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/hello.toml");
         let read = scene_file::load(&path, &set, None).unwrap().scene;
         for knob in Knob::ALL {

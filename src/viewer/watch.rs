@@ -1,6 +1,6 @@
-//! Which files a view is made of, and whether they changed since: polled, because every file system can be, and told
-//! once they have settled, because a save is often a file cut to nothing, written in parts, removed, and another
-//! renamed into its place.
+//! Which files a view is made of, and whether they changed since: polled, because every file system
+//! can be, and told once they have settled, because a save is often a file cut to nothing, written
+//! in parts, removed, and another renamed into its place.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,8 @@ pub struct Stamp {
 }
 
 impl Stamp {
-    /// Of the regular file at `path`, or where a link there leads; None where there is none that can be asked.
+    /// Of the regular file at `path`, or where a link there leads; None where there is none that
+    /// can be asked.
     pub fn of(path: &Path) -> Option<Stamp> {
         let about = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
         Some(Stamp { modified: about.modified().ok(), n_bytes: about.len() })
@@ -41,17 +42,20 @@ pub struct Files {
 }
 
 impl Files {
-    /// `shaders` is the folder of `--shaders`. Of that all that nimbus would read, there or not yet.
+    /// `shaders` is the folder of `--shaders`. Of that all that nimbus would read, there or not
+    /// yet.
     pub fn new(scene: Vec<PathBuf>, shaders: Option<&Path>) -> Files {
-        let in_folder = |folder: &Path| passes::sources().names().map(|name| folder.join(name)).collect();
+        let in_folder =
+            |folder: &Path| passes::sources().names().map(|name| folder.join(name)).collect();
         Files { scene, shaders: shaders.map(in_folder).unwrap_or_default() }
     }
 }
 
-/// Files are looked at no more often: whoever polls at each frame asks the system of a hundred files twenty times a
-/// second.
+/// Files are looked at no more often: whoever polls at each frame asks the system of a hundred
+/// files twenty times a second.
 const EVERY: Duration = Duration::from_millis(50);
-/// What nobody has touched for so long is whole: an editor's write of a scene takes less, and nobody feels it.
+/// What nobody has touched for so long is whole: an editor's write of a scene takes less, and
+/// nobody feels it.
 const SETTLED: Duration = Duration::from_millis(100);
 /// What has been away for so long was not renamed: it was removed.
 const GONE: Duration = Duration::from_millis(1000);
@@ -91,8 +95,8 @@ impl Watch {
         Watch { ask, scene, shaders, looked: None }
     }
 
-    /// The scene now is made of `files`. What was watched before goes on from what was told of it, so that nothing that
-    /// happened while the scene was read is lost; what is new begins as it is.
+    /// The scene now is made of `files`. What was watched before goes on from what was told of it,
+    /// so that nothing that happened while the scene was read is lost; what is new begins as it is.
     pub fn set_scene_files(&mut self, files: Vec<PathBuf>) {
         let mut before = std::mem::take(&mut self.scene);
         let taken = watched(files, &mut self.ask);
@@ -103,8 +107,8 @@ impl Watch {
         self.scene = taken.into_iter().map(known).collect();
     }
 
-    /// What has changed since the last time that it was said, and stays as it is: asked of the file system where that
-    /// was not done just now.
+    /// What has changed since the last time that it was said, and stays as it is: asked of the file
+    /// system where that was not done just now.
     pub fn poll(&mut self, now: Instant) -> Changed {
         if self.looked.is_some_and(|looked| now.saturating_duration_since(looked) < EVERY) {
             return Changed::default();
@@ -125,7 +129,8 @@ fn watched(paths: Vec<PathBuf>, ask: &mut Ask) -> Vec<Watched> {
     paths.into_iter().map(one).collect()
 }
 
-/// Whether some of `files` are others than was told, and none of them is about to change further; that is told then.
+/// Whether some of `files` are others than was told, and none of them is about to change further;
+/// that is told then.
 fn look(files: &mut [Watched], now: Instant, ask: &mut Ask) -> bool {
     for file in files.iter_mut() {
         let stamp = ask(&file.path);
@@ -157,13 +162,17 @@ mod tests {
 
     type Disk = Arc<Mutex<BTreeMap<PathBuf, Stamp>>>;
 
-    /// A disk of "a", "b" (the scene's) and "s" (a shader) of one byte, and what watches it by a clock in milliseconds.
+    /// A disk of "a", "b" (the scene's) and "s" (a shader) of one byte, and what watches it by a
+    /// clock in milliseconds.
     fn watch() -> (Disk, impl FnMut(u64) -> Changed) {
         let disk: Disk = Arc::default();
         ["a", "b", "s"].iter().for_each(|name| write(&disk, name, 1));
         let asked = disk.clone();
         let files = Files { scene: vec!["a".into(), "b".into()], shaders: vec!["s".into()] };
-        let mut watch = Watch::asking(files, Box::new(move |path: &Path| asked.lock().unwrap().get(path).copied()));
+        let mut watch = Watch::asking(
+            files,
+            Box::new(move |path: &Path| asked.lock().unwrap().get(path).copied()),
+        );
         let begin = Instant::now();
         (disk, move |ms| watch.poll(begin + Duration::from_millis(ms)))
     }
@@ -235,13 +244,16 @@ mod tests {
             *count.lock().unwrap() += 1;
             None
         };
-        let mut watch = Watch::asking(Files { scene: vec!["a".into()], shaders: vec![] }, Box::new(ask));
+        let mut watch =
+            Watch::asking(Files { scene: vec!["a".into()], shaders: vec![] }, Box::new(ask));
         let begin = Instant::now();
-        let n_told = (0..1000).filter(|k| watch.poll(begin + Duration::from_millis(*k)) != NOTHING).count();
+        let n_told =
+            (0..1000).filter(|k| watch.poll(begin + Duration::from_millis(*k)) != NOTHING).count();
         assert_eq!((n_told, *asked.lock().unwrap()), (0, 1 + 20));
     }
 
-    /// What was read before it was named is watched from then on; what changed while a scene was read is told.
+    /// What was read before it was named is watched from then on; what changed while a scene was
+    /// read is told.
     #[test]
     fn a_scene_may_come_to_name_other_files() {
         let dir = tempfile::tempdir().unwrap();
@@ -252,7 +264,8 @@ mod tests {
         let mut ms = 0;
         let mut settled = |watch: &mut Watch| {
             ms += 1000;
-            let polled = [0, 60, 120, 180].map(|k| watch.poll(begin + Duration::from_millis(ms + k)));
+            let polled =
+                [0, 60, 120, 180].map(|k| watch.poll(begin + Duration::from_millis(ms + k)));
             polled.iter().filter(|changed| **changed != NOTHING).count()
         };
         fs::write(&a, "other").unwrap();
@@ -267,7 +280,8 @@ mod tests {
         assert_eq!(settled(&mut watch), 1);
     }
 
-    /// As editors save: in place, by a temporary name and a rename, by moving the old one away first.
+    /// As editors save: in place, by a temporary name and a rename, by moving the old one away
+    /// first.
     #[test]
     fn every_way_to_save_is_seen() {
         let dir = tempfile::tempdir().unwrap();

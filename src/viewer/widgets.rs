@@ -36,7 +36,10 @@ pub fn lock(face: &SharedFace) -> MutexGuard<'_, Face> {
 }
 
 /// What is drawn of `face` now, with its textures where `overlay` finds them.
-pub fn take(face: &SharedFace, overlay: &mut Overlay) -> crate::error::Result<Option<Arc<Widgets>>> {
+pub fn take(
+    face: &SharedFace,
+    overlay: &mut Overlay,
+) -> crate::error::Result<Option<Arc<Widgets>>> {
     let (widgets, changes) = {
         let mut face = lock(face);
         (face.widgets.clone(), std::mem::take(&mut face.changes))
@@ -70,8 +73,14 @@ impl Layer {
         // Soft edges are most of the triangles, and a software device's time goes by those.
         context.tessellation_options_mut(|options| options.feathering = softens);
         let scale = Some(window.scale_factor() as f32);
-        let state =
-            egui_winit::State::new(context.clone(), ViewportId::ROOT, window, scale, None, Some(MAX_TEXTURE_SIDE));
+        let state = egui_winit::State::new(
+            context.clone(),
+            ViewportId::ROOT,
+            window,
+            scale,
+            None,
+            Some(MAX_TEXTURE_SIDE),
+        );
         Layer { context, state, face, steady, last: None, is_touched: true }
     }
 

@@ -1,4 +1,5 @@
-//! The window: events of the window system to what is wanted, on the thread that the window system insists on.
+//! The window: events of the window system to what is wanted, on the thread that the window system
+//! insists on.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -156,7 +157,8 @@ impl ApplicationHandler<Told> for App {
         if let WindowEvent::MouseInput { state: ElementState::Released, .. } = &event {
             (self.pointer.looks, self.pointer.orbits) = (false, false);
         }
-        if let (Some(layer), Some(window), true) = (&mut self.layer, &self.window, lock(&self.wanted).panels)
+        if let (Some(layer), Some(window), true) =
+            (&mut self.layer, &self.window, lock(&self.wanted).panels)
             && layer.hears(window, &event)
         {
             return;
@@ -207,22 +209,31 @@ impl App {
         let Options { origin, choice, mode, n_frames, stop, .. } = &self.options;
         let scene = &origin.first;
         let title = if scene.title.is_empty() { "nimbus" } else { &scene.title };
-        let (window, surface) = open(events, title, [scene.film.width, scene.film.height], choice.validation)?;
+        let (window, surface) =
+            open(events, title, [scene.film.width, scene.film.height], choice.validation)?;
         let PhysicalSize { width, height } = window.inner_size();
         lock(&self.wanted).size = [width, height];
         let proxy = self.proxy.clone();
         let tell = Box::new(move |told| drop(proxy.send_event(told)));
         let (wanted, seen, face) = (self.wanted.clone(), self.seen.clone(), self.face.clone());
-        let screen = Screen::new(surface, choice, *mode, *n_frames, Ties { wanted, seen, face, tell, stop })?;
+        let screen = Screen::new(
+            surface,
+            choice,
+            *mode,
+            *n_frames,
+            Ties { wanted, seen, face, tell, stop },
+        )?;
         self.layer = Some(Layer::new(&window, self.face.clone(), (STEADY, false)));
         let proxy = self.proxy.clone();
         // Whether it went well is asked when the loop of events has ended.
-        self.thread = Some(Thread::start(move || screen.run(), move || drop(proxy.send_event(Told::Ended)))?);
+        self.thread =
+            Some(Thread::start(move || screen.run(), move || drop(proxy.send_event(Told::Ended)))?);
         self.window = Some(window);
         Ok(())
     }
 
-    /// Reads again what has changed on the disk; what is wrong with it is shown, and the last good picture stays.
+    /// Reads again what has changed on the disk; what is wrong with it is shown, and the last good
+    /// picture stays.
     fn follow_files(&mut self) {
         let changed = self.options.origin.poll(Instant::now());
         if changed.shaders {
@@ -289,13 +300,15 @@ impl App {
             Said::Text(text) => self.say(&text),
             Said::CommandLine => {
                 let origin = &self.options.origin;
-                let line = lock(&self.wanted).command_line(&origin.path.display().to_string(), &origin.first);
+                let line = lock(&self.wanted)
+                    .command_line(&origin.path.display().to_string(), &origin.first);
                 println!("{line}");
                 self.layer.iter().for_each(|layer| layer.copy(&line));
             }
             Said::Scene => {
                 let wanted = lock(&self.wanted).clone();
-                let saved = self.options.origin.save(&wanted).map(|to| format!("saved {}", to.display()));
+                let saved =
+                    self.options.origin.save(&wanted).map(|to| format!("saved {}", to.display()));
                 self.say(&saved.unwrap_or_else(|e| e.to_string()));
             }
         }
@@ -308,7 +321,12 @@ impl App {
     }
 
     /// Writes a picture under the first name that is free.
-    fn keep(&mut self, keep: Keep, film: &crate::model::film::Film, rgba: &[f32]) -> Result<String> {
+    fn keep(
+        &mut self,
+        keep: Keep,
+        film: &crate::model::film::Film,
+        rgba: &[f32],
+    ) -> Result<String> {
         let extension = if keep == Keep::Png { "png" } else { "exr" };
         loop {
             self.n_kept += 1;

@@ -1,5 +1,5 @@
-//! Just enough Rust to read imports: tokens without comments and strings, and the paths that begin with `crate`,
-//! `nimbus`, `super` or `self`, resolved against the module they stand in.
+//! Just enough Rust to read imports: tokens without comments and strings, and the paths that begin
+//! with `crate`, `nimbus`, `super` or `self`, resolved against the module they stand in.
 
 use std::path::Path;
 
@@ -28,8 +28,11 @@ pub struct Import {
 
 impl Source {
     pub fn read(path: &Path, text: &str) -> Self {
-        let mut module: Vec<String> =
-            path.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        let mut module: Vec<String> = path
+            .with_extension("")
+            .iter()
+            .map(|part| part.to_string_lossy().into_owned())
+            .collect();
         if module.last().is_some_and(|name| name == "mod") {
             module.pop();
         }
@@ -63,7 +66,9 @@ impl Source {
                 "}" => {
                     open.pop();
                 }
-                "crate" | "nimbus" | "super" | "self" if self.text(i + 1) == "::" && !self.continues_a_path(i) => {
+                "crate" | "nimbus" | "super" | "self"
+                    if self.text(i + 1) == "::" && !self.continues_a_path(i) =>
+                {
                     self.read_path(i, open.iter().flatten(), &mut imports);
                 }
                 _ => {}
@@ -76,7 +81,8 @@ impl Source {
     pub fn crate_mentions<'a>(&'a self, crates: &'a [String]) -> impl Iterator<Item = &'a Token> {
         self.tokens.iter().enumerate().filter_map(move |(i, token)| {
             let begins_path = self.text(i + 1) == "::" || (i > 0 && self.text(i - 1) == "use");
-            (crates.contains(&token.text) && begins_path && !self.continues_a_path(i)).then_some(token)
+            (crates.contains(&token.text) && begins_path && !self.continues_a_path(i))
+                .then_some(token)
         })
     }
 
@@ -86,16 +92,26 @@ impl Source {
 
     fn continues_a_path(&self, i: usize) -> bool {
         // `use ::ash` starts at the root, all the same.
-        i >= 2 && self.text(i - 1) == "::" && is_identifier(self.text(i - 2)) && self.text(i - 2) != "use"
+        i >= 2
+            && self.text(i - 1) == "::"
+            && is_identifier(self.text(i - 2))
+            && self.text(i - 2) != "use"
     }
 
-    fn read_path<'a>(&self, at: usize, open: impl Iterator<Item = &'a &'a str>, imports: &mut Vec<Import>) {
+    fn read_path<'a>(
+        &self,
+        at: usize,
+        open: impl Iterator<Item = &'a &'a str>,
+        imports: &mut Vec<Import>,
+    ) {
         let mut prefix = Vec::new();
         let mut i = at;
         if matches!(self.text(i), "super" | "self") {
             prefix.extend(self.module.iter().cloned().chain(open.map(|name| (*name).to_owned())));
         }
-        while matches!(self.text(i), "super" | "self" | "crate" | "nimbus") && self.text(i + 1) == "::" {
+        while matches!(self.text(i), "super" | "self" | "crate" | "nimbus")
+            && self.text(i + 1) == "::"
+        {
             if self.text(i) == "super" {
                 prefix.pop();
             }
@@ -122,7 +138,9 @@ impl Source {
         if self.text(i) != "self" && self.text(i) != "*" || path.is_empty() {
             path.push(self.text(i).to_owned());
         }
-        if self.text(i + 1) == "::" && (is_identifier(self.text(i + 2)) || matches!(self.text(i + 2), "{" | "*")) {
+        if self.text(i + 1) == "::"
+            && (is_identifier(self.text(i + 2)) || matches!(self.text(i + 2), "{" | "*"))
+        {
             return self.read_tree(i + 2, &path, imports);
         }
         let Token { line, in_test, .. } = self.tokens[i.min(self.tokens.len() - 1)];
@@ -146,7 +164,9 @@ fn tokens(text: &str) -> Vec<Token> {
             '/' if token.len() > 1 => None,
             // A lifetime.
             '\'' if !token.ends_with(&['\'']) => None,
-            _ if token.len() > 1 && token.iter().any(|c| matches!(c, '"' | '\'')) => Some("\"".to_owned()),
+            _ if token.len() > 1 && token.iter().any(|c| matches!(c, '"' | '\'')) => {
+                Some("\"".to_owned())
+            }
             _ => Some(token.iter().collect()),
         };
         tokens.extend(text.map(|text| Token { text, line, in_test: false }));
@@ -158,22 +178,31 @@ fn tokens(text: &str) -> Vec<Token> {
 
 fn end_of_token(chars: &[char], i: usize) -> usize {
     let at = |i: usize| chars.get(i).copied().unwrap_or('\0');
-    let while_in = |from: usize, holds: fn(char) -> bool| (from..).find(|&i| !holds(at(i))).unwrap_or(chars.len());
+    let while_in = |from: usize, holds: fn(char) -> bool| {
+        (from..).find(|&i| !holds(at(i))).unwrap_or(chars.len())
+    };
     match (at(i), at(i + 1)) {
         ('/', '/') => while_in(i, |c| c != '\n' && c != '\0'),
         ('/', '*') => end_of_block_comment(chars, i),
         (':', ':') => i + 2,
         ('"', _) => end_of_string(chars, i),
-        ('\'', '\\') => (i + 3..chars.len()).find(|&i| at(i) == '\'').map_or(chars.len(), |i| i + 1),
+        ('\'', '\\') => {
+            (i + 3..chars.len()).find(|&i| at(i) == '\'').map_or(chars.len(), |i| i + 1)
+        }
         ('\'', _) if at(i + 2) == '\'' => i + 3,
         ('\'', _) => while_in(i + 1, |c| c.is_alphanumeric() || c == '_'),
-        ('r' | 'b' | 'c', _) if string_start(chars, i).is_some() => string_start(chars, i).unwrap_or(i + 1),
-        (c, _) if c.is_alphanumeric() || c == '_' => while_in(i, |c| c.is_alphanumeric() || c == '_'),
+        ('r' | 'b' | 'c', _) if string_start(chars, i).is_some() => {
+            string_start(chars, i).unwrap_or(i + 1)
+        }
+        (c, _) if c.is_alphanumeric() || c == '_' => {
+            while_in(i, |c| c.is_alphanumeric() || c == '_')
+        }
         _ => i + 1,
     }
 }
 
-/// The end of a string with a prefix: b"…", r"…", r#"…"#, br#"…"#. None if no such string begins here.
+/// The end of a string with a prefix: b"…", r"…", r#"…"#, br#"…"#. None if no such string begins
+/// here.
 fn string_start(chars: &[char], i: usize) -> Option<usize> {
     let n_letters = chars[i..].iter().take(2).take_while(|c| matches!(c, 'r' | 'b' | 'c')).count();
     let n_hashes = chars[i + n_letters..].iter().take_while(|c| **c == '#').count();
@@ -184,8 +213,12 @@ fn string_start(chars: &[char], i: usize) -> Option<usize> {
     if !chars[i..i + n_letters].contains(&'r') {
         return Some(end_of_string(chars, quote));
     }
-    let closes = |at: usize| chars[at] == '"' && chars[at + 1..].iter().take_while(|c| **c == '#').count() >= n_hashes;
-    Some((quote + 1..chars.len()).find(|&at| closes(at)).map_or(chars.len(), |at| at + 1 + n_hashes))
+    let closes = |at: usize| {
+        chars[at] == '"' && chars[at + 1..].iter().take_while(|c| **c == '#').count() >= n_hashes
+    };
+    Some(
+        (quote + 1..chars.len()).find(|&at| closes(at)).map_or(chars.len(), |at| at + 1 + n_hashes),
+    )
 }
 
 fn end_of_string(chars: &[char], quote: usize) -> usize {
@@ -211,12 +244,14 @@ fn end_of_block_comment(chars: &[char], start: usize) -> usize {
     i
 }
 
-/// Marks every item that stands under `#[cfg(test)]`: up to its `;`, or to the brace that closes its first one.
+/// Marks every item that stands under `#[cfg(test)]`: up to its `;`, or to the brace that closes
+/// its first one.
 fn mark_tests(tokens: &mut [Token], all: bool) {
     let attribute = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut i = 0;
     while i < tokens.len() {
-        let is_attribute = tokens[i..].iter().map(|token| token.text.as_str()).take(7).eq(attribute);
+        let is_attribute =
+            tokens[i..].iter().map(|token| token.text.as_str()).take(7).eq(attribute);
         let end = if is_attribute { end_of_item(tokens, i + attribute.len()) } else { i + 1 };
         for token in &mut tokens[i..end] {
             token.in_test = is_attribute || all;

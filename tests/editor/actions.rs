@@ -28,7 +28,8 @@ fn edge() -> BoxedStrategy<f64> {
 
 /// And anything at all.
 fn wild() -> BoxedStrategy<f64> {
-    let ends = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, 1e-31, 1e15, -1e15, f64::MIN_POSITIVE];
+    let ends =
+        [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, 1e-31, 1e15, -1e15, f64::MIN_POSITIVE];
     prop_oneof![6 => -9.0..9.0, 2 => prop::sample::select(ends.to_vec()), 1 => any::<f64>(), 1 => Just(0.0)].boxed()
 }
 
@@ -41,7 +42,12 @@ fn vector(of: Number) -> impl Strategy<Value = DVec3> {
 fn cloud_box(edge: Number, coordinate: Number) -> impl Strategy<Value = CloudBox> {
     let count = prop_oneof![8 => 0..300u32, 1 => any::<u32>()];
     let numbers = (count, vector(edge), vector(coordinate), edge());
-    numbers.prop_map(|(n_particles, extent, center, radius_max)| CloudBox { n_particles, extent, center, radius_max })
+    numbers.prop_map(|(n_particles, extent, center, radius_max)| CloudBox {
+        n_particles,
+        extent,
+        center,
+        radius_max,
+    })
 }
 
 pub fn boxes() -> impl Strategy<Value = Vec<CloudBox>> {
@@ -50,7 +56,10 @@ pub fn boxes() -> impl Strategy<Value = Vec<CloudBox>> {
 
 /// Within some ten units, none of them flat.
 pub fn usual_boxes() -> impl Strategy<Value = Vec<CloudBox>> {
-    vec(cloud_box(|| (0.1..8.0).boxed(), || prop_oneof![8 => -9.0..9.0, 1 => Just(0.0)].boxed()), 0..8)
+    vec(
+        cloud_box(|| (0.1..8.0).boxed(), || prop_oneof![8 => -9.0..9.0, 1 => Just(0.0)].boxed()),
+        0..8,
+    )
 }
 
 fn axis() -> impl Strategy<Value = Axis> {
@@ -79,7 +88,11 @@ fn edit(n: Number) -> impl Strategy<Value = Edit> {
 fn mirror() -> impl Strategy<Value = Edit> {
     let plane = prop_oneof![Just(Plane::Zero), Just(Plane::Middle)];
     let outcome = prop_oneof![Just(Outcome::Move), Just(Outcome::Copy)];
-    (axis(), plane, outcome).prop_map(|(axis, plane, outcome)| Edit::Mirror { axis, plane, outcome })
+    (axis(), plane, outcome).prop_map(|(axis, plane, outcome)| Edit::Mirror {
+        axis,
+        plane,
+        outcome,
+    })
 }
 
 fn selection() -> impl Strategy<Value = Select> {
@@ -97,7 +110,8 @@ fn setting() -> impl Strategy<Value = Setting> {
     prop_oneof![
         (any::<bool>(), prop_oneof![Just(0.1), 0.01..2.0, wild()])
             .prop_map(|(on, step)| Setting::Snap(Snap { on, step })),
-        prop_oneof![Just(Scaling::Symmetric), Just(Scaling::OppositeFace)].prop_map(Setting::Scaling),
+        prop_oneof![Just(Scaling::Symmetric), Just(Scaling::OppositeFace)]
+            .prop_map(Setting::Scaling),
         prop_oneof![Just(View::Boxes), Just(View::Cloud), Just(View::Both)].prop_map(Setting::View),
         axis().prop_map(Setting::Axis),
     ]
@@ -109,7 +123,8 @@ fn ray() -> impl Strategy<Value = Ray> {
         origin: DVec3::new(x, y, 20.0),
         direction: DVec3::new(dx, dy, -1.0).normalize(),
     });
-    let any = (vector(wild), vector(wild)).prop_map(|(origin, direction)| Ray { origin, direction });
+    let any =
+        (vector(wild), vector(wild)).prop_map(|(origin, direction)| Ray { origin, direction });
     prop_oneof![12 => usual, 1 => any]
 }
 
@@ -125,12 +140,17 @@ fn handle() -> impl Strategy<Value = Handle> {
 }
 
 pub fn begin() -> impl Strategy<Value = Action> {
-    let begin = (handle(), ray()).prop_map(|(handle, ray)| DragAction::Begin { handle, ray, forward: -DVec3::Z });
+    let begin = (handle(), ray()).prop_map(|(handle, ray)| DragAction::Begin {
+        handle,
+        ray,
+        forward: -DVec3::Z,
+    });
     begin.prop_map(Action::Drag)
 }
 
 pub fn drag_to() -> impl Strategy<Value = Action> {
-    let modifiers = (any::<bool>(), any::<bool>()).prop_map(|(snap, scaling)| Modifiers { snap, scaling });
+    let modifiers =
+        (any::<bool>(), any::<bool>()).prop_map(|(snap, scaling)| Modifiers { snap, scaling });
     (ray(), modifiers).prop_map(|(ray, modifiers)| Action::Drag(DragAction::To { ray, modifiers }))
 }
 

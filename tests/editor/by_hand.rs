@@ -1,5 +1,5 @@
-//! P, Table 2, by hands alone: the pointer's pixels, keys, and numbers as they are printed, from an empty window to a saved
-//! file.
+//! P, Table 2, by hands alone: the pointer's pixels, keys, and numbers as they are printed, from an
+//! empty window to a saved file.
 
 use std::path::Path;
 
@@ -57,14 +57,16 @@ impl Window<'_> {
         *self.desk.editor().active_box().unwrap().1
     }
 
-    /// Pulls the arrow along an axis so that the box's coordinate becomes about `to`, with Ctrl held: the grid of tenths.
+    /// Pulls the arrow along an axis so that the box's coordinate becomes about `to`, with Ctrl
+    /// held: the grid of tenths.
     fn pulls(&mut self, axis: Axis, to: f64) {
         let (view, b) = (self.desk.viewport(), self.active());
         let handles = self.desk.editor().handles(&view);
         let arrow = handles.iter().find(|p| p.handle == Handle::MoveAxis(axis)).unwrap();
         let middle = 0.5 * (arrow.from + arrow.to);
         let pixel = |place: DVec3| view.project(place).unwrap().round();
-        let (from, to) = (pixel(middle), pixel(middle + (to - b.center[axis.index()]) * axis.unit()));
+        let (from, to) =
+            (pixel(middle), pixel(middle + (to - b.center[axis.index()]) * axis.unit()));
         self.moves(from, NONE);
         assert_eq!(self.desk.hovered(), Some(Handle::MoveAxis(axis)));
         self.takes(Input::Button { which: Button::Left, is_down: true, held: NONE });
@@ -124,7 +126,9 @@ fn lines_of_the_papers_table_are_made_by_pixels_keys_and_numbers() {
     // A drag is undone as one step, and all of it one by one.
     let steps = window.desk.editor().history().n_undo();
     window.key('z', true);
-    assert!(window.desk.session().is_dirty() && window.desk.editor().history().n_undo() == steps - 1);
+    assert!(
+        window.desk.session().is_dirty() && window.desk.editor().history().n_undo() == steps - 1
+    );
     for _ in 1..steps {
         window.key('z', true);
     }

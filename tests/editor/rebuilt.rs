@@ -1,5 +1,6 @@
-//! P, Tables 2 and 3, made from nothing by what a hand does: boxes are added and duplicated, dragged onto the grid,
-//! mirrored, and given numbers as they are printed; then saved, and compared with the tables as values.
+//! P, Tables 2 and 3, made from nothing by what a hand does: boxes are added and duplicated,
+//! dragged onto the grid, mirrored, and given numbers as they are printed; then saved, and compared
+//! with the tables as values.
 
 use std::path::{Path, PathBuf};
 
@@ -63,7 +64,10 @@ impl Hand {
         }
         // Left of the middle what was placed right of it is mirrored.
         let x = typed(4);
-        self.place(DVec3::new(x.abs(), typed(5), typed(6)), [fields[4].trim_start_matches('-'), fields[5], fields[6]]);
+        self.place(
+            DVec3::new(x.abs(), typed(5), typed(6)),
+            [fields[4].trim_start_matches('-'), fields[5], fields[6]],
+        );
         if x < 0.0 {
             self.edit(Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Move });
             self.acts.n_mirrored += 1;
@@ -75,13 +79,20 @@ impl Hand {
         }
     }
 
-    /// Along x and y by a drag onto the grid of tenths, from wherever the box was; what does not lie on it is typed.
+    /// Along x and y by a drag onto the grid of tenths, from wherever the box was; what does not
+    /// lie on it is typed.
     fn place(&mut self, to: DVec3, printed: [&str; 3]) {
         let from = self.active().center;
         // Three hundredths beside the mark: that is what the grid is for.
-        for (axis, beside) in [(Axis::X, DVec3::new(0.03, 5.0, 0.0)), (Axis::Y, DVec3::new(-5.0, -0.03, 0.0))] {
+        for (axis, beside) in
+            [(Axis::X, DVec3::new(0.03, 5.0, 0.0)), (Axis::Y, DVec3::new(-5.0, -0.03, 0.0))]
+        {
             let ray = |v: DVec3| Ray { origin: v + 20.0 * DVec3::Z, direction: -DVec3::Z };
-            let begin = DragAction::Begin { handle: Handle::MoveAxis(axis), ray: ray(from), forward: -DVec3::Z };
+            let begin = DragAction::Begin {
+                handle: Handle::MoveAxis(axis),
+                ray: ray(from),
+                forward: -DVec3::Z,
+            };
             let to = |share: f64| DragAction::To {
                 ray: ray(from + share * (to - from) + beside),
                 modifiers: Modifiers::default(),
@@ -121,7 +132,10 @@ fn rebuild(table: &str) -> Acts {
     let folder = tempfile::tempdir().unwrap();
     let saved = save_before_quitting(&hand.session, folder.path().join("made.dat"));
     assert_eq!(box_file::read(saved.path().unwrap()).unwrap(), expected);
-    assert_eq!(saved.editor().document().n_particles(), expected.iter().map(|b| u64::from(b.n_particles)).sum::<u64>());
+    assert_eq!(
+        saved.editor().document().n_particles(),
+        expected.iter().map(|b| u64::from(b.n_particles)).sum::<u64>()
+    );
     // And all the way back.
     while hand.session.editor().history().n_undo() > 0 {
         hand.act(Action::Undo);
@@ -149,17 +163,26 @@ fn save_before_quitting(session: &Session, path: PathBuf) -> Session {
 #[test]
 fn the_cloud_of_554_particles_is_made_by_hand() {
     let acts = rebuild("cubes-554.dat");
-    assert_eq!((acts.n_added, acts.n_duplicated, acts.n_dragged, acts.n_densities), (1, 16, 34, 17), "{acts:?}");
+    assert_eq!(
+        (acts.n_added, acts.n_duplicated, acts.n_dragged, acts.n_densities),
+        (1, 16, 34, 17),
+        "{acts:?}"
+    );
     // Left of the middle lie eight boxes, by the table.
     assert_eq!(acts.n_mirrored, 8, "{acts:?}");
-    // Of 17 · 8 numbers the grid and what was duplicated leave these: by the table, edges and radii that differ from the
-    // line before, heights z that do, and places x and y with more than one decimal.
+    // Of 17 · 8 numbers the grid and what was duplicated leave these: by the table, edges and radii
+    // that differ from the line before, heights z that do, and places x and y with more than one
+    // decimal.
     assert_eq!(acts.n_typed, 49, "{acts:?}");
 }
 
 #[test]
 fn the_cloud_of_615_particles_is_made_by_hand() {
     let acts = rebuild("cubes-615.dat");
-    assert_eq!((acts.n_added, acts.n_duplicated, acts.n_dragged, acts.n_densities), (1, 22, 46, 23), "{acts:?}");
+    assert_eq!(
+        (acts.n_added, acts.n_duplicated, acts.n_dragged, acts.n_densities),
+        (1, 22, 46, 23),
+        "{acts:?}"
+    );
     assert_eq!((acts.n_mirrored, acts.n_typed), (8, 58), "{acts:?}");
 }

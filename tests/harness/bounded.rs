@@ -1,7 +1,9 @@
-//! Running error analysis of an f32 evaluation: a number and a bound on how far its f32 evaluation may lie from it, by
-//! what Vulkan promises of each operation (specification, "Precision and Operation of SPIR-V Instructions"): +, −, ×
-//! correctly rounded (contraction to fma only rounds less), division 2.5 ulp, exp and exp2 3 + 2|x| ulp, log and log2 3 ulp or 2⁻²¹ near 1, inversesqrt 2 ulp. An ulp is at most 2u of
-//! the result, u = 2⁻²⁴; a result below the least normal number may be flushed to zero.
+//! Running error analysis of an f32 evaluation: a number and a bound on how far its f32 evaluation
+//! may lie from it, by what Vulkan promises of each operation (specification, "Precision and
+//! Operation of SPIR-V Instructions"): +, −, × correctly rounded (contraction to fma only rounds
+//! less), division 2.5 ulp, exp and exp2 3 + 2|x| ulp, log and log2 3 ulp or 2⁻²¹ near 1,
+//! inversesqrt 2 ulp. An ulp is at most 2u of the result, u = 2⁻²⁴; a result below the least normal
+//! number may be flushed to zero.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -40,7 +42,8 @@ impl Bounded {
     }
 
     pub fn times(self, b: Bounded) -> Bounded {
-        let inherited = self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
+        let inherited =
+            self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
         Bounded::rounded(self.value * b.value, inherited, 1.0)
     }
 
@@ -48,7 +51,8 @@ impl Bounded {
         let value = self.value / b.value;
         // |a'/b' − a/b| ≤ (δa + |a/b| δb)/|b'|; |b'| ≥ |b| − δb, and a divisor that may be 0 bounds nothing.
         let least = b.value.abs() - b.error;
-        let inherited = if least > 0.0 { (self.error + value.abs() * b.error) / least } else { f64::INFINITY };
+        let inherited =
+            if least > 0.0 { (self.error + value.abs() * b.error) / least } else { f64::INFINITY };
         Bounded::rounded(value, inherited, 5.0)
     }
 
@@ -89,10 +93,15 @@ impl Bounded {
         Bounded::rounded(value, value * self.error.exp_m1(), 2.0 * ulps)
     }
 
-    /// ln, or log2 in units of ln 2: 3 ulp, or 2⁻²¹ from ½ to 2; infinite where the number may be 0.
+    /// ln, or log2 in units of ln 2: 3 ulp, or 2⁻²¹ from ½ to 2; infinite where the number may be
+    /// 0.
     pub fn log(self) -> Bounded {
         let value = self.value.ln();
-        let inherited = if self.error < self.value { -(-self.error / self.value).ln_1p() } else { f64::INFINITY };
+        let inherited = if self.error < self.value {
+            -(-self.error / self.value).ln_1p()
+        } else {
+            f64::INFINITY
+        };
         let near_1 = self.value - self.error < 2.0 && self.value + self.error > 0.5;
         let promised = if near_1 { 2f64.powi(-21) } else { 0.0 };
         Bounded::rounded(value, inherited + promised, 6.0)
@@ -110,7 +119,10 @@ pub fn dot(a: [Bounded; 3], b: [Bounded; 3]) -> Bounded {
     let products = [0, 1, 2].map(|i| a[i].times(b[i]));
     let sum = products[0].plus(products[1]).plus(products[2]);
     let magnitude: f64 = products.iter().map(|p| p.value.abs() + p.error).sum();
-    Bounded { value: sum.value, error: products.iter().map(|p| p.error).sum::<f64>() + 2.001 * U * magnitude + TINY }
+    Bounded {
+        value: sum.value,
+        error: products.iter().map(|p| p.error).sum::<f64>() + 2.001 * U * magnitude + TINY,
+    }
 }
 
 pub fn exact3(v: [f32; 3]) -> [Bounded; 3] {

@@ -1,5 +1,5 @@
-//! A headless Chromium, told what to do through a pipe (Chrome DevTools Protocol: JSON messages that end in a zero byte). No
-//! browser is a failure.
+//! A headless Chromium, told what to do through a pipe (Chrome DevTools Protocol: JSON messages
+//! that end in a zero byte). No browser is a failure.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -31,19 +31,30 @@ fn program() -> String {
         return chosen;
     }
     let names = ["chromium", "chromium-browser", "google-chrome-stable", "google-chrome", "chrome"];
-    let folders: Vec<_> = std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
-    let found = names.into_iter().find(|name| folders.iter().any(|folder| folder.join(name).is_file()));
-    found.expect("a Chromium or Chrome in PATH, or named by CHROME; tools/test installs one").to_owned()
+    let folders: Vec<_> =
+        std::env::split_paths(&std::env::var_os("PATH").unwrap_or_default()).collect();
+    let found =
+        names.into_iter().find(|name| folders.iter().any(|folder| folder.join(name).is_file()));
+    found
+        .expect("a Chromium or Chrome in PATH, or named by CHROME; tools/test installs one")
+        .to_owned()
 }
 
 impl Browser {
     /// A page that is empty yet.
     pub fn new() -> Browser {
         let profile = tempfile::tempdir().expect("a folder");
-        // The browser reads from descriptor 3 and writes to 4; a shell can put our pipes there without unsafe code.
+        // The browser reads from descriptor 3 and writes to 4; a shell can put our pipes there
+        // without unsafe code.
         let mut child = Command::new("sh")
             .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1", &program()])
-            .args(["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-dev-shm-usage"])
+            .args([
+                "--headless",
+                "--no-sandbox",
+                "--disable-gpu",
+                "--no-first-run",
+                "--disable-dev-shm-usage",
+            ])
             .args(["--hide-scrollbars", "--remote-debugging-pipe"])
             .arg(format!("--user-data-dir={}", profile.path().display()))
             .arg("about:blank")
@@ -53,10 +64,20 @@ impl Browser {
             .expect("the browser starts");
         let to = child.stdin.take().expect("a pipe");
         let from = listen(child.stdout.take().expect("a pipe"));
-        let mut browser =
-            Browser { child, to, from, session: String::new(), n_sent: 0, events: Vec::new(), _profile: profile };
-        let target = browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"].clone();
-        let attached = browser.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
+        let mut browser = Browser {
+            child,
+            to,
+            from,
+            session: String::new(),
+            n_sent: 0,
+            events: Vec::new(),
+            _profile: profile,
+        };
+        let target =
+            browser.call("Target.createTarget", json!({ "url": "about:blank" }))["targetId"]
+                .clone();
+        let attached =
+            browser.call("Target.attachToTarget", json!({ "targetId": target, "flatten": true }));
         browser.session = attached["sessionId"].as_str().expect("a session").to_owned();
         for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.call(&format!("{domain}.enable"), json!({}));
@@ -74,7 +95,10 @@ impl Browser {
         }
         self.to.write_all(format!("{message}\0").as_bytes()).expect("the browser listens");
         loop {
-            let mut said = self.from.recv_timeout(PATIENCE).unwrap_or_else(|e| panic!("{method}: no answer: {e}"));
+            let mut said = self
+                .from
+                .recv_timeout(PATIENCE)
+                .unwrap_or_else(|e| panic!("{method}: no answer: {e}"));
             if said["id"] == json!(id) {
                 assert!(said.get("error").is_none(), "{method}: {said}");
                 return said["result"].take();
@@ -111,13 +135,15 @@ impl Browser {
     }
 
     pub fn size(&mut self, width: u32, height: u32) {
-        let params = json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
+        let params =
+            json!({ "width": width, "height": height, "deviceScaleFactor": 1, "mobile": false });
         self.call("Emulation.setDeviceMetricsOverride", params);
     }
 
     pub fn key(&mut self, key: &str, code: u32) {
         for kind in ["keyDown", "keyUp"] {
-            let params = json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code });
+            let params =
+                json!({ "type": kind, "key": key, "code": key, "windowsVirtualKeyCode": code });
             self.call("Input.dispatchKeyEvent", params);
         }
     }
@@ -132,11 +158,14 @@ impl Browser {
         self.call("Page.captureScreenshot", params)["data"].as_str().expect("a picture").to_owned()
     }
 
-    /// Errors and warnings of the console, exceptions among them, and what the page asked of a network.
+    /// Errors and warnings of the console, exceptions among them, and what the page asked of a
+    /// network.
     pub fn complaints(&self) -> Vec<String> {
         let is_complaint = |e: &&Value| match e["method"].as_str().unwrap_or_default() {
             "Runtime.exceptionThrown" => true,
-            "Runtime.consoleAPICalled" => ["error", "warning", "assert"].iter().any(|t| e["params"]["type"] == *t),
+            "Runtime.consoleAPICalled" => {
+                ["error", "warning", "assert"].iter().any(|t| e["params"]["type"] == *t)
+            }
             "Log.entryAdded" => e["params"]["entry"]["level"] != "verbose",
             "Network.requestWillBeSent" => {
                 let url = e["params"]["request"]["url"].as_str().unwrap_or_default();

@@ -1,4 +1,5 @@
-//! A virtual display, and hands on its windows: Xvfb and xdotool, which `tools/bootstrap tests` installs. Missing ones fail.
+//! A virtual display, and hands on its windows: Xvfb and xdotool, which `tools/bootstrap tests`
+//! installs. Missing ones fail.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -22,8 +23,18 @@ impl Display {
     /// Of its own, on a number that is free.
     pub fn open() -> Display {
         let mut server = Command::new("Xvfb")
-            // A server that loses its last client begins anew, and whoever comes at that moment is lost: xdotool comes and goes.
-            .args(["-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp", "-noreset"])
+            // A server that loses its last client begins anew, and whoever comes at that moment is
+            // lost: xdotool comes and goes.
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "1280x1024x24",
+                "-nolisten",
+                "tcp",
+                "-noreset",
+            ])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()
@@ -86,15 +97,21 @@ impl Display {
         let id: u32 = window.parse().expect("a window's number");
         let shape = connection.get_geometry(id).expect("asked").reply().expect("a shape");
         let (width, height) = (shape.width, shape.height);
-        let image = connection.get_image(ImageFormat::Z_PIXMAP, id, 0, 0, width, height, !0).expect("asked");
+        let image = connection
+            .get_image(ImageFormat::Z_PIXMAP, id, 0, 0, width, height, !0)
+            .expect("asked");
         let data = image.reply().expect("what is seen").data;
-        assert_eq!(connection.setup().image_byte_order, x11rb::protocol::xproto::ImageOrder::LSB_FIRST);
+        assert_eq!(
+            connection.setup().image_byte_order,
+            x11rb::protocol::xproto::ImageOrder::LSB_FIRST
+        );
         let rgb = data.chunks_exact(4).flat_map(|p| [p[2], p[1], p[0]]).collect();
         (u32::from(width), u32::from(height), rgb)
     }
 
     pub fn resize(&self, window: &str, [width, height]: [u32; 2]) {
-        self.xdotool(&["windowsize", window, &width.to_string(), &height.to_string()]).expect("a size");
+        self.xdotool(&["windowsize", window, &width.to_string(), &height.to_string()])
+            .expect("a size");
     }
 
     /// From a place in the window to another with a button held.
@@ -102,7 +119,8 @@ impl Display {
         let [x, y] = from.map(|v| v.to_string());
         let [to_x, to_y] = to.map(|v| v.to_string());
         let button = button.to_string();
-        self.xdotool(&["mousemove", "--window", window, &x, &y, "mousedown", &button]).expect("down");
+        self.xdotool(&["mousemove", "--window", window, &x, &y, "mousedown", &button])
+            .expect("down");
         self.xdotool(&["mousemove", "--window", window, &to_x, &to_y]).expect("moved");
         self.xdotool(&["mouseup", &button]).expect("up");
     }

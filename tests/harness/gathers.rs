@@ -47,7 +47,8 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
         })
         .collect();
     let groups = scene.groups();
-    let generated: Vec<_> = scene.clouds.iter().flat_map(nimbus::reference::generate::cloud).collect();
+    let generated: Vec<_> =
+        scene.clouds.iter().flat_map(nimbus::reference::generate::cloud).collect();
     let offsets = place::offsets(&groups, &scene.clouds, 0.0, origin);
     let rest: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
     let blobs = place::blobs(&generated, &place::place(&rest, &groups, &offsets));
@@ -55,9 +56,12 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
     let forward = if blobs.is_empty() { 1.0 } else { scene.lighting.forward };
     let lights: Vec<Light> = scene.lights.iter().map(|l| l.relative_to(origin)).collect();
     let step = scene.lighting.step;
-    let obstacles = Obstacles { spec: &setting.grid, cells: &cells, rectangles: &rectangles, step, forward };
-    let receivers: Vec<Receiver> =
-        facets.iter().map(|f| Receiver { position: f.position, i_region: f.i_region as u32 }).collect();
+    let obstacles =
+        Obstacles { spec: &setting.grid, cells: &cells, rectangles: &rectangles, step, forward };
+    let receivers: Vec<Receiver> = facets
+        .iter()
+        .map(|f| Receiver { position: f.position, i_region: f.i_region as u32 })
+        .collect();
     let transmittance = obstacles.transmittance(&receivers, &lights);
     let through = obstacles.through(&receivers, &lights);
     let pairings = pairings(&scene.surfaces, scene.clouds.len());
@@ -84,14 +88,18 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
     each(facets.len(), |j| exchange.gather_from(j, &senders, &clusters))
 }
 
-/// The facet of each place. Keys in f32: a difference and a product, which Vulkan promises to round correctly.
+/// The facet of each place. Keys in f32: a difference and a product, which Vulkan promises to round
+/// correctly.
 fn order(f: &Frame) -> Vec<u32> {
     let (scene, bits) = (&*f.scene, KeyBits::of(f.scene.n_regions() as u32));
     let bounds = scene.region_bounds(&scene.groups(), 0.0, DEPOSIT_CUT_SIGMA);
-    let records: Vec<_> = bounds.into_iter().map(|b| RegionBoundsRecord::new(b, f.origin, bits)).collect();
+    let records: Vec<_> =
+        bounds.into_iter().map(|b| RegionBoundsRecord::new(b, f.origin, bits)).collect();
     let key = |facet: &FacetRecord| {
         let r = &records[facet.i_region as usize];
-        let cells = [0, 1, 2].map(|k| morton::cell(f64::from((facet.position[k] - r.low[k]) * r.scale[k]), bits.axis));
+        let cells = [0, 1, 2].map(|k| {
+            morton::cell(f64::from((facet.position[k] - r.low[k]) * r.scale[k]), bits.axis)
+        });
         morton::key(facet.i_region, cells, bits.region)
     };
     sort::order(&f.facets.iter().map(key).collect::<Vec<_>>())
@@ -99,7 +107,13 @@ fn order(f: &Frame) -> Vec<u32> {
 
 /// I_i and L2, channel by channel.
 pub fn values(f: &Frame) -> [Vec<f64>; 2] {
-    let of = |k: usize| f.lit.iter().flat_map(|l| if k == 0 { l.indirect } else { l.second }).map(f64::from).collect();
+    let of = |k: usize| {
+        f.lit
+            .iter()
+            .flat_map(|l| if k == 0 { l.indirect } else { l.second })
+            .map(f64::from)
+            .collect()
+    };
     [of(0), of(1)]
 }
 
@@ -107,8 +121,13 @@ pub fn values(f: &Frame) -> [Vec<f64>; 2] {
 pub type Truths = ([Vec<f64>; 2], [Vec<f64>; 2]);
 
 pub fn truths(found: &[Gathered]) -> Truths {
-    let flat = |of: &dyn Fn(&Gathered) -> DVec3| found.iter().flat_map(|g| of(g).to_array()).collect::<Vec<f64>>();
-    ([flat(&|g| g.indirect), flat(&|g| g.second)], [flat(&|g| g.indirect_error), flat(&|g| g.second_error)])
+    let flat = |of: &dyn Fn(&Gathered) -> DVec3| {
+        found.iter().flat_map(|g| of(g).to_array()).collect::<Vec<f64>>()
+    };
+    (
+        [flat(&|g| g.indirect), flat(&|g| g.second)],
+        [flat(&|g| g.indirect_error), flat(&|g| g.second_error)],
+    )
 }
 
 pub fn assert_agrees(what: &str, f: &Frame) {
@@ -116,23 +135,36 @@ pub fn assert_agrees(what: &str, f: &Frame) {
     let (values, (truths, bounds)) = (values(f), truths(&found));
     for (k, quantity) in ["I_i", "L2"].into_iter().enumerate() {
         assert_within_and_say(&format!("{what}, {quantity}"), &values[k], &truths[k], &bounds[k]);
-        // The bound says something: all but a few facets' light is known to a thousandth of the greatest.
+        // The bound says something: all but a few facets' light is known to a thousandth of the
+        // greatest.
         let greatest = truths[k].iter().cloned().fold(0.0, f64::max);
         let n_loose = bounds[k].iter().filter(|b| **b > 1e-3 * greatest).count();
         println!("  greatest {greatest:.3e}, {n_loose} of {} loose", bounds[k].len());
-        assert!(greatest > 0.0 && n_loose * 20 <= bounds[k].len(), "{what}: {n_loose} loose bounds");
+        assert!(
+            greatest > 0.0 && n_loose * 20 <= bounds[k].len(),
+            "{what}: {n_loose} loose bounds"
+        );
     }
     let mut n = 0.0;
     for (j, (lit, truth)) in f.lit.iter().zip(&found).enumerate() {
         let off = (f64::from(lit.n_unresolved) - truth.n_unresolved).abs();
-        assert!(off <= truth.n_doubted, "{what}: facet {j} counts {} for {truth:?}", lit.n_unresolved);
+        assert!(
+            off <= truth.n_doubted,
+            "{what}: facet {j} counts {} for {truth:?}",
+            lit.n_unresolved
+        );
         n += truth.n_unresolved;
     }
     println!("  {n} cells unresolved");
 }
 
 /// Whether what `compiler`'s shaders make of the scene is out of the bounds about its truths.
-pub fn is_noticed(gpu: &Gpu, compiler: &Compiler, scene: &Scene, (truths, bounds): &Truths) -> bool {
+pub fn is_noticed(
+    gpu: &Gpu,
+    compiler: &Compiler,
+    scene: &Scene,
+    (truths, bounds): &Truths,
+) -> bool {
     let found = values(&frame_by(gpu, compiler, scene.clone()));
     [0, 1].iter().any(|&k| check_within("wrong", &found[k], &truths[k], &bounds[k]).is_err())
 }

@@ -28,13 +28,21 @@ pub fn arrival(light: &Light, p: [f32; 3]) -> Arrival {
         Light::Point { position, radius, .. } => (position, radius, None),
         Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
             let scale = 1.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA);
-            (position, radius, Some((-direction, Bounded::once(scale), Bounded::once(-cos_outer * scale))))
+            (
+                position,
+                radius,
+                Some((-direction, Bounded::once(scale), Bounded::once(-cos_outer * scale))),
+            )
         }
     };
     let offset = [0, 1, 2].map(|i| exact(position[i]).minus(exact(f64::from(p[i]))));
     let at_the_light = position == double(p);
     let distance = if at_the_light { exact(0.0) } else { dot(offset, offset).root() };
-    let toward = if at_the_light { DVec3::Y.to_array().map(exact) } else { offset.map(|o| o.over(distance)) };
+    let toward = if at_the_light {
+        DVec3::Y.to_array().map(exact)
+    } else {
+        offset.map(|o| o.over(distance))
+    };
     let reach = distance.at_least(radius);
     let share = cone.map_or(exact(1.0), |(axis, scale, offset)| {
         scale.times(dot(toward, axis.to_array().map(exact))).plus(offset).within_0_and_1()
@@ -44,7 +52,11 @@ pub fn arrival(light: &Light, p: [f32; 3]) -> Arrival {
 
 fn from_afar(toward: DVec3) -> Arrival {
     let exact = Bounded::exact;
-    Arrival { toward: exact3(toward.as_vec3().to_array()), distance: exact(f64::INFINITY), falloff: exact(1.0) }
+    Arrival {
+        toward: exact3(toward.as_vec3().to_array()),
+        distance: exact(f64::INFINITY),
+        falloff: exact(1.0),
+    }
 }
 
 /// A point light or a spot whose vectors are f32 numbers, within ±`reach` of the origin.
@@ -57,7 +69,14 @@ pub fn near_light(r: &mut Random, reach: f64, is_spot: bool) -> Light {
     }
     let inner = f64::from(r.within(0.1, 1.0));
     let cos_outer = (inner + f64::from(r.within(0.1, 1.0))).cos();
-    Light::Spot { position, direction: double(r.direction()), intensity, radius, cos_inner: inner.cos(), cos_outer }
+    Light::Spot {
+        position,
+        direction: double(r.direction()),
+        intensity,
+        radius,
+        cos_inner: inner.cos(),
+        cos_outer,
+    }
 }
 
 /// The records; the inputs are relative to O already.

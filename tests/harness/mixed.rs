@@ -21,9 +21,15 @@ pub fn front() -> Picture {
     Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 0.1)
 }
 
-/// What users are promised: the root mean square over the picture, of full scale. Half floats round once to 2^-11 of a value at
-/// most; f32 errs by some units of 2^-24 a layer, and where rounding decides on an edge by the step there, in few pixels.
-pub fn assert_small(what: &str, format: FilmFormat, [values, truths]: [&[f64]; 2], n_layers: usize) {
+/// What users are promised: the root mean square over the picture, of full scale. Half floats round
+/// once to 2^-11 of a value at most; f32 errs by some units of 2^-24 a layer, and where rounding
+/// decides on an edge by the step there, in few pixels.
+pub fn assert_small(
+    what: &str,
+    format: FilmFormat,
+    [values, truths]: [&[f64]; 2],
+    n_layers: usize,
+) {
     let scale = truths.iter().fold(1.0, |a: f64, b| a.max(b.abs()));
     let sum: f64 = values.iter().zip(truths).map(|(a, b)| ((a - b) / scale).powi(2)).sum();
     let rms = (sum / values.len() as f64).sqrt();
@@ -37,7 +43,8 @@ pub fn assert_small(what: &str, format: FilmFormat, [values, truths]: [&[f64]; 2
     assert!(rms <= most, "{what}: rms {rms:e}, more than {most:e}");
 }
 
-/// Blobs thin and opaque, some in one place, before and behind the eye, of sigma from 10^`least` to 1.
+/// Blobs thin and opaque, some in one place, before and behind the eye, of sigma from 10^`least` to
+/// 1.
 pub fn mixed(n: usize, seed: u64, tau_most: f64, least: f64) -> Picture {
     let mut random = Random(seed);
     let mut picture = front();
@@ -53,10 +60,12 @@ pub fn mixed(n: usize, seed: u64, tau_most: f64, least: f64) -> Picture {
     picture
 }
 
-/// Pictures of all that can be drawn: what it is, and the least that the greatest number of it is; 0: nothing shows.
+/// Pictures of all that can be drawn: what it is, and the least that the greatest number of it is;
+/// 0: nothing shows.
 pub fn cases() -> Vec<(String, Picture, f64)> {
     let mut all = Vec::new();
-    let mut case = |what: &str, picture: Picture, least: f64| all.push((what.to_owned(), picture, least));
+    let mut case =
+        |what: &str, picture: Picture, least: f64| all.push((what.to_owned(), picture, least));
     // Above 1/8 the opacity of `tiles` has another form.
     for (seed, tau_most) in [(1, 0.125), (2, 3.0), (3, 30.0)] {
         case(&format!("tau up to {tau_most}"), mixed(150, seed, tau_most, -4.0), 0.1);
@@ -72,8 +81,13 @@ pub fn cases() -> Vec<(String, Picture, f64)> {
     let (near, beside) = (around.at(0.2, 0.1, 0.5), around.at(1.5, 0.0, 0.3));
     case("around the eye", around.blob(near, 2.0, 1.0).blob(beside, 0.8, 0.5), 0.5);
     let p = Picture::new(EYE, DVec3::new(3.0, 1.0, 0.0), 120.0, 0.1);
-    let (a, b, c, d) = (p.at(2.0, 1.5, 1.0), p.at(-3.0, -2.4, 1.5), p.at(4.0, 0.0, 2.3), p.at(0.1, -1.0, 0.5));
-    case("120 degrees", p.blob(a, 0.2, 1.0).blob(b, 0.5, 0.5).blob(c, 1.4, 0.4).blob(d, 0.33, 0.7), 0.5);
+    let (a, b, c, d) =
+        (p.at(2.0, 1.5, 1.0), p.at(-3.0, -2.4, 1.5), p.at(4.0, 0.0, 2.3), p.at(0.1, -1.0, 0.5));
+    case(
+        "120 degrees",
+        p.blob(a, 0.2, 1.0).blob(b, 0.5, 0.5).blob(c, 1.4, 0.4).blob(d, 0.33, 0.7),
+        0.5,
+    );
     let empty = Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 1.0);
     let near = |z: f64| empty.clone().blob(empty.at(0.05, 0.02, z), 0.1, 1.0);
     case("before the near plane", near(0.9999), 0.0);
@@ -104,9 +118,16 @@ fn lit_and_weighted() -> [(&'static str, Picture); 3] {
     };
     let singly = Picture { lit: Some((0..40).map(|_| lit()).collect()), ..picture.clone() };
     let i_facet = Some((0..40).map(|i| (7 * i) % 11).collect());
-    let shared = Picture { lit: Some((0..11).map(|_| lit()).collect()), i_facet, ..picture.clone() };
-    let part = |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
+    let shared =
+        Picture { lit: Some((0..11).map(|_| lit()).collect()), i_facet, ..picture.clone() };
+    let part =
+        |end, kappa_scale, last_weight| DrawnRecord { shift: 0, end, kappa_scale, last_weight };
     let i_group = (0..40).map(|i| i / 10).collect();
-    let drawn = vec![part(8, 1.6, 0.25), part(20, 1.0, 1.0), part(20, 1.0, 1.0), part(39, 2.0, 0.5)];
-    [("lit", singly), ("shared facets", shared), ("weights", Picture { drawn: Some((i_group, drawn)), ..picture })]
+    let drawn =
+        vec![part(8, 1.6, 0.25), part(20, 1.0, 1.0), part(20, 1.0, 1.0), part(39, 2.0, 0.5)];
+    [
+        ("lit", singly),
+        ("shared facets", shared),
+        ("weights", Picture { drawn: Some((i_group, drawn)), ..picture }),
+    ]
 }

@@ -1,5 +1,6 @@
-//! What every GPU test starts from: a device with validation and synchronization validation on, and the promise that it
-//! has said nothing when the test ends. No device, or no validation layer, is a failure.
+//! What every GPU test starts from: a device with validation and synchronization validation on, and
+//! the promise that it has said nothing when the test ends. No device, or no validation layer, is a
+//! failure.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -20,7 +21,8 @@ impl Gpu {
     pub fn new() -> Gpu {
         let instance = Instance::new(true).expect("an instance with validation");
         let device = Device::open(&instance, None).expect("a Vulkan 1.3 device");
-        let compiler = Compiler::new(passes::sources(), Compiler::default_cache()).expect("shaderc");
+        let compiler =
+            Compiler::new(passes::sources(), Compiler::default_cache()).expect("shaderc");
         let commands = Commands::new(&device, "test").expect("commands");
         Gpu { commands, compiler, device, instance }
     }
@@ -28,7 +30,8 @@ impl Gpu {
     /// A device buffer that holds `data`.
     pub fn upload<T: Pod>(&mut self, data: &[T]) -> Buffer {
         let n = data.len() as u64;
-        let mut staging = Buffer::new::<T>(&self.device, "test.staging", n, Place::Upload).expect("staging");
+        let mut staging =
+            Buffer::new::<T>(&self.device, "test.staging", n, Place::Upload).expect("staging");
         staging.write(data).expect("write");
         let buffer = self.buffer::<T>(data.len());
         self.run(|rec| {
@@ -45,7 +48,8 @@ impl Gpu {
 
     /// The first `n` records of a device buffer.
     pub fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Vec<T> {
-        let readback = Buffer::new::<T>(&self.device, "test.readback", n as u64, Place::Readback).expect("readback");
+        let readback = Buffer::new::<T>(&self.device, "test.readback", n as u64, Place::Readback)
+            .expect("readback");
         self.run(|rec| {
             rec.copy(buffer, &readback);
             Ok(())
@@ -68,7 +72,8 @@ impl Drop for Gpu {
     }
 }
 
-/// The greatest |value − truth| − bound over all elements, which must not be positive; `what` names the quantity.
+/// The greatest |value − truth| − bound over all elements, which must not be positive; `what` names
+/// the quantity.
 pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
     assert_eq!(values.len(), truths.len(), "{what}: lengths");
     let check = |i: usize| {
@@ -80,7 +85,8 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
     if let Some((i, error)) = bad.first() {
         let (value, truth, bound) = (values[*i], truths[*i], bounds[*i]);
         panic!(
-            "{what}: {} of {} out of bound; first [{i}] {value} against {truth}: error {error:e}, bound {bound:e}",
+            "{what}: {} of {} out of bound; first [{i}] {value} against {truth}: error {error:e}, \
+             bound {bound:e}",
             bad.len(),
             values.len()
         );
@@ -89,15 +95,22 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
 
 impl Gpu {
     /// The test's own kernel `name`, which may include what nimbus's shaders include.
-    pub fn test_kernel(&self, name: &str, text: &str, push: &[nimbus::gpu::Field]) -> nimbus::gpu::Kernel {
+    pub fn test_kernel(
+        &self,
+        name: &str,
+        text: &str,
+        push: &[nimbus::gpu::Field],
+    ) -> nimbus::gpu::Kernel {
         let file = format!("{name}.comp");
         let texts = [&[(file.as_str(), text)], passes::SHADERS].concat();
-        let compiler = Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).expect("shaderc");
-        nimbus::gpu::Kernel::new(&self.device, &compiler, name, push, &[]).expect("the test's kernel")
+        let compiler =
+            Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).expect("shaderc");
+        nimbus::gpu::Kernel::new(&self.device, &compiler, name, push, &[])
+            .expect("the test's kernel")
     }
 
-    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant that a test must
-    /// notice.
+    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant
+    /// that a test must notice.
     pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{file} does not hold {from}");
@@ -105,22 +118,35 @@ impl Gpu {
     }
 }
 
-/// The greatest error/bound over all elements, or what is out of bound: [`assert_within`] for checks that must fail.
-pub fn check_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) -> Result<f64, String> {
+/// The greatest error/bound over all elements, or what is out of bound: [`assert_within`] for
+/// checks that must fail.
+pub fn check_within(
+    what: &str,
+    values: &[f64],
+    truths: &[f64],
+    bounds: &[f64],
+) -> Result<f64, String> {
     assert!(values.len() == truths.len() && values.len() == bounds.len(), "{what}: lengths");
     let error = |i: usize| (values[i] - truths[i]).abs();
     // Written so that NaN is bad.
-    let bad: Vec<usize> = (0..values.len()).filter(|i| !matches!(error(*i), e if e <= bounds[*i])).collect();
+    let bad: Vec<usize> =
+        (0..values.len()).filter(|i| !matches!(error(*i), e if e <= bounds[*i])).collect();
     if let Some(&i) = bad.first() {
         let (value, truth, bound) = (values[i], truths[i], bounds[i]);
         let n = values.len();
-        return Err(format!("{what}: {} of {n} out of bound; [{i}] {value} against {truth} ± {bound:e}", bad.len()));
+        return Err(format!(
+            "{what}: {} of {n} out of bound; [{i}] {value} against {truth} ± {bound:e}",
+            bad.len()
+        ));
     }
-    Ok((0..values.len()).map(|i| if error(i) > 0.0 { error(i) / bounds[i] } else { 0.0 }).fold(0.0, f64::max))
+    Ok((0..values.len())
+        .map(|i| if error(i) > 0.0 { error(i) / bounds[i] } else { 0.0 })
+        .fold(0.0, f64::max))
 }
 
-/// Asserts that all elements are within their bounds, says how much of its bound the worst one used, and proves that
-/// one element just beyond its bound, wherever it lies, or one NaN would have been noticed.
+/// Asserts that all elements are within their bounds, says how much of its bound the worst one
+/// used, and proves that one element just beyond its bound, wherever it lies, or one NaN would have
+/// been noticed.
 pub fn assert_within_and_say(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
     match check_within(what, values, truths, bounds) {
         Ok(ratio) => println!("{what}: {} elements, greatest error/bound {ratio:.3}", values.len()),
@@ -132,7 +158,10 @@ pub fn assert_within_and_say(what: &str, values: &[f64], truths: &[f64], bounds:
         for wrong in [beyond, f64::NAN] {
             let mut corrupted = values.to_vec();
             corrupted[i] = wrong;
-            assert!(check_within(what, &corrupted, truths, bounds).is_err(), "{what}: {wrong} at {i} was not noticed");
+            assert!(
+                check_within(what, &corrupted, truths, bounds).is_err(),
+                "{what}: {wrong} at {i} was not noticed"
+            );
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Whether rectangles hide a way as f32 decides it (shaders/include/occlude.glsl): a verdict that holds whatever the
-//! rounding, or none, where an edge or a plane is nearer than the rounding.
+//! Whether rectangles hide a way as f32 decides it (shaders/include/occlude.glsl): a verdict that
+//! holds whatever the rounding, or none, where an edge or a plane is nearer than the rounding.
 
 use glam::DVec3;
 use nimbus::model::light::Light;
@@ -75,7 +75,8 @@ fn are_apart(a: Bounded, b: Bounded) -> Option<bool> {
 
 fn holds(s: &Surface, x: Point) -> Option<bool> {
     let o = minus(x, exact(s.center));
-    let within = |axis: DVec3| at_most(absolute(dot(o, exact(axis))), dot(exact(axis), exact(axis)));
+    let within =
+        |axis: DVec3| at_most(absolute(dot(o, exact(axis))), dot(exact(axis), exact(axis)));
     match (within(s.u), within(s.v)) {
         (Some(false), _) | (_, Some(false)) => Some(false),
         (Some(true), Some(true)) => Some(true),
@@ -98,7 +99,9 @@ fn hides(s: &Surface, p: Point, light: &Light) -> Option<bool> {
         return Some(false);
     }
     match light {
-        Light::Point { .. } | Light::Spot { .. } => holds(s, plus(p, times(along, a.over(a.minus(b))))),
+        Light::Point { .. } | Light::Spot { .. } => {
+            holds(s, plus(p, times(along, a.over(a.minus(b)))))
+        }
         _ => holds(s, minus(p, times(along, a.over(b)))),
     }
 }

@@ -1,5 +1,5 @@
-//! A picture of sprites, over rectangles or not, its inputs in f32 for the GPU and in f64 for the reference, and the
-//! bound between the two.
+//! A picture of sprites, over rectangles or not, its inputs in f32 for the GPU and in f64 for the
+//! reference, and the bound between the two.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -24,8 +24,8 @@ use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
 
-/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term, three products and
-/// two sums.
+/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term,
+/// three products and two sums.
 pub const DEPTH: f64 = 16.0 * U;
 
 /// What one_minus_exp promises.
@@ -73,7 +73,8 @@ pub struct Picture {
     pub drawn: Option<(Vec<u32>, Vec<DrawnRecord>)>,
     /// Rectangles under the sprites.
     pub scenery: Option<Scenery>,
-    /// Group of each particle, as in `drawn` where that is there; each group's texture; the pool, as it is rounded.
+    /// Group of each particle, as in `drawn` where that is there; each group's texture; the pool,
+    /// as it is rounded.
     pub textured: Option<(Vec<u32>, Vec<TexturedRecord>, Arc<Pool>)>,
 }
 
@@ -115,7 +116,8 @@ impl Picture {
     pub fn blob(mut self, position: DVec3, sigma: f64, tau: f64) -> Picture {
         let kappa = if sigma > 0.0 { (tau / (SQRT_TAU * sigma)) as f32 } else { 1.0 };
         let shade = 0.5 + 0.4 * (self.placed.len() as f32).sin();
-        self.placed.push(PlacedRecord { position: position.as_vec3().to_array(), sigma: sigma as f32 });
+        self.placed
+            .push(PlacedRecord { position: position.as_vec3().to_array(), sigma: sigma as f32 });
         let color = [1.0, shade, 1.5 - shade];
         self.particles.push(ParticleRecord {
             aspect: 1.0,
@@ -165,7 +167,9 @@ impl Picture {
         let group = drawn[i_group[i] as usize];
         match (i as u32 + 1).cmp(&group.end) {
             std::cmp::Ordering::Less => f64::from(group.kappa_scale),
-            std::cmp::Ordering::Equal => f64::from(group.kappa_scale) * f64::from(group.last_weight),
+            std::cmp::Ordering::Equal => {
+                f64::from(group.kappa_scale) * f64::from(group.last_weight)
+            }
             std::cmp::Ordering::Greater => 0.0,
         }
     }
@@ -174,7 +178,8 @@ impl Picture {
         match &self.lit {
             // Their f32 sum is rounded alike on both sides.
             Some(lit) => {
-                let facets = self.i_facet.clone().unwrap_or_else(|| (0..self.placed.len() as u32).collect());
+                let facets =
+                    self.i_facet.clone().unwrap_or_else(|| (0..self.placed.len() as u32).collect());
                 let of = |l: &LitRecord| double([0, 1, 2].map(|i| l.first[i] + l.second[i]));
                 facets.iter().map(|i| of(&lit[*i as usize])).collect()
             }
@@ -202,7 +207,15 @@ impl Picture {
         };
         let sheets = self.sheets();
         let factor = |j: usize, delta: DVec2| self.factor(&sheets, j, delta);
-        let (value, bound) = render_textured(&self.view, &behind, &blobs, &radiance, &order, &rounding, Some(&factor));
+        let (value, bound) = render_textured(
+            &self.view,
+            &behind,
+            &blobs,
+            &radiance,
+            &order,
+            &rounding,
+            Some(&factor),
+        );
         (value.concat(), bound.concat())
     }
 
@@ -219,11 +232,14 @@ impl Picture {
         let scenery = self.scenery.as_ref().expect("rectangles");
         let rounding = Rounding::of(format, 0.0, 0.0);
         let found = scenery.candidates(&self.view, |i, j| self.ray(i, j), &rounding);
-        found.into_iter().map(|all| all.into_iter().map(|one| rounding.stored(one)).collect()).collect()
+        found
+            .into_iter()
+            .map(|all| all.into_iter().map(|one| rounding.stored(one)).collect())
+            .collect()
     }
 
-    /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any bound where it is not
-    /// the only candidate.
+    /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any
+    /// bound where it is not the only candidate.
     pub fn widened(&self, candidates: &Candidates) -> Behind {
         let truth = candidates[0];
         if candidates.len() > 1 {
@@ -234,7 +250,8 @@ impl Picture {
             let depth = near.over(self.view_depth(p));
             depth.error / depth.value.abs()
         });
-        // The rasteriser interpolates between four equal depths: a product, a sum, a shift and a scaling of at most 1.
+        // The rasteriser interpolates between four equal depths: a product, a sum, a shift and a
+        // scaling of at most 1.
         let of_sprites = of_sprites.fold(0.0, f64::max) + 4.0 * U;
         // |near/z − near/z'| ≤ near (r/z + r'/z') for z' within a few r of z.
         Behind { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
@@ -248,28 +265,40 @@ impl Picture {
             let of = &textures[i_group[i] as usize];
             let z = (double(p.position) - pose.position).dot(pose.forward);
             let strength = f64::from(of.strength);
-            let textured = Textured { i_field: of.i_field, strength, seed: of.seed, i_box: of.i_box };
-            Some(Sheet::new(&textured, i as u32 - of.i_first, z / f64::from(p.sigma), self.view.pixel()))
+            let textured =
+                Textured { i_field: of.i_field, strength, seed: of.seed, i_box: of.i_box };
+            Some(Sheet::new(
+                &textured,
+                i as u32 - of.i_first,
+                z / f64::from(p.sigma),
+                self.view.pixel(),
+            ))
         };
         self.placed.iter().enumerate().map(sheet).collect()
     }
 
-    /// How the shaders' α and edges may be off: the worst of all pixels in all blobs, each by a running bound.
+    /// How the shaders' α and edges may be off: the worst of all pixels in all blobs, each by a
+    /// running bound.
     pub fn rounding(&self, format: FilmFormat) -> Rounding {
         let (off_alpha, edge) = self.worst(false);
         let mut rounding = Rounding::of(format, off_alpha, edge);
-        // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C and their sum.
+        // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C
+        // and their sum.
         rounding.unit += 2.0 * U;
         rounding.depth = DEPTH;
         rounding
     }
 
-    /// Relative error of an opacity, and of a sprite's edge, as `tiles` evaluates them or `sprites`.
+    /// Relative error of an opacity, and of a sprite's edge, as `tiles` evaluates them or
+    /// `sprites`.
     pub fn worst(&self, tiled: bool) -> (f64, f64) {
         let (mut off_alpha, mut edge) = (ONE_MINUS_EXP, 8.0 * U);
         for ((blob, placed), sheet) in self.blobs().iter().zip(&self.placed).zip(self.sheets()) {
             let c = blob.position - self.view.pose.position;
-            if !(c.dot(self.view.pose.forward) >= self.view.near && blob.sigma > 0.0 && blob.kappa > 0.0) {
+            if !(c.dot(self.view.pose.forward) >= self.view.near
+                && blob.sigma > 0.0
+                && blob.kappa > 0.0)
+            {
                 continue;
             }
             let sprite = self.sprite(placed, blob);
@@ -301,7 +330,8 @@ impl Picture {
                         let error = if tiled { std::f64::consts::LN_2 * e.error } else { e.error };
                         edge = edge.max(0.51 * (error + cut_error) / cut.max(1.0) + 4.0 * U);
                     }
-                    let sheet = paper.as_ref().map(|p| p.exponent(sprite.difference(self.ray(i, j))));
+                    let sheet =
+                        paper.as_ref().map(|p| p.exponent(sprite.difference(self.ray(i, j))));
                     let log2_e = Bounded::once(std::f64::consts::LOG2_E);
                     let factor = match (sheet, tiled) {
                         (None, false) => e.scaled(-1.0).exp(),
@@ -357,12 +387,20 @@ impl Picture {
         let slope = |axis: DVec3| dot(once(axis), c).over(z);
         let z_sigmas = z.over(Bounded::exact(blob.sigma));
         // The factor is a product, and multiplied.
-        let tau = Bounded::once(SQRT_TAU).times(Bounded::exact(blob.kappa)).times(Bounded::exact(blob.sigma));
+        let tau = Bounded::once(SQRT_TAU)
+            .times(Bounded::exact(blob.kappa))
+            .times(Bounded::exact(blob.sigma));
         let one = Bounded::exact(1.0);
         let tau = if self.drawn.is_some() { tau.times(one).times(one) } else { tau };
-        let ellipsoid =
-            self.has_ellipsoids().then(|| Ellipsoid::new(blob.aspect, [pose.right.y, pose.up.y, pose.forward.y]));
-        Sprite { s: [slope(pose.right), slope(pose.up)], z: z_sigmas.squared().scaled(0.5), tau, ellipsoid }
+        let ellipsoid = self
+            .has_ellipsoids()
+            .then(|| Ellipsoid::new(blob.aspect, [pose.right.y, pose.up.y, pose.forward.y]));
+        Sprite {
+            s: [slope(pose.right), slope(pose.up)],
+            z: z_sigmas.squared().scaled(0.5),
+            tau,
+            ellipsoid,
+        }
     }
 }
 
@@ -399,8 +437,14 @@ impl Ellipsoid {
         let (zero, one) = (Bounded::exact(0.0), Bounded::exact(1.0));
         let (up_x, x) = self.parts([zero, one, s[1].scaled(-1.0)]);
         let (up_y, y) = self.parts([one.scaled(-1.0), zero, s[0]]);
-        let entry = |a: [Bounded; 3], b: [Bounded; 3], up: Bounded| scale.times(self.inverse.times(dot(a, b)).plus(up));
-        [entry(x, x, up_x.squared()), entry(x, y, up_x.times(up_y)).scaled(2.0), entry(y, y, up_y.squared())]
+        let entry = |a: [Bounded; 3], b: [Bounded; 3], up: Bounded| {
+            scale.times(self.inverse.times(dot(a, b)).plus(up))
+        };
+        [
+            entry(x, x, up_x.squared()),
+            entry(x, y, up_x.times(up_y)).scaled(2.0),
+            entry(y, y, up_y.squared()),
+        ]
     }
 
     /// |d|² across y and along it, and |M d|².
@@ -431,7 +475,8 @@ impl Sprite {
         sum.times(Bounded::exact(1.0).over(e.squares(ray)[2]))
     }
 
-    /// The same in powers of two, as `tiles` evaluates it: a polynomial along the row over the norm.
+    /// The same in powers of two, as `tiles` evaluates it: a polynomial along the row over the
+    /// norm.
     fn tiled_exponent(&self, ray: [Bounded; 2]) -> Bounded {
         let (one, s) = (Bounded::exact(1.0), &self.s);
         // log2 e is one more factor.

@@ -37,28 +37,51 @@ enum Made {
 
 impl Picture {
     /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
-    pub fn draw(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat) -> Vec<f64> {
+    pub fn draw(
+        &self,
+        gpu: &mut Gpu,
+        compiler: Option<&Compiler>,
+        format: TargetFormat,
+    ) -> Vec<f64> {
         self.draw_by(gpu, compiler, format, Way::Sprites)
     }
 
     /// The same in the way that is given.
-    pub fn draw_by(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, format: TargetFormat, way: Way) -> Vec<f64> {
+    pub fn draw_by(
+        &self,
+        gpu: &mut Gpu,
+        compiler: Option<&Compiler>,
+        format: TargetFormat,
+        way: Way,
+    ) -> Vec<f64> {
         let compiler = compiler.unwrap_or(&gpu.compiler);
         let mut made = self.make(gpu, compiler, format, way);
-        let under =
-            self.scenery.is_some().then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
+        let under = self
+            .scenery
+            .is_some()
+            .then(|| Surfaces::new(&gpu.device, compiler, format, false).expect("surfaces"));
         let uploaded = self.upload(gpu);
         let (width, height) = (self.view.width, self.view.height);
-        let mut target = Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
-        let mut depth = under.is_some().then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
+        let mut target = Image::color_target(&gpu.device, "test.target", width, height, format)
+            .expect("a target");
+        let mut depth = under
+            .is_some()
+            .then(|| Image::depth(&gpu.device, "test.depth", width, height).expect("depth"));
         let camera = self.camera_record();
         let n_numbers = 4 * target.n_pixels() as usize;
         let bytes = target.n_pixels() * format.bytes_per_pixel();
-        let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback).expect("readback");
+        let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback)
+            .expect("readback");
         gpu.run(|rec| {
             if let Some(under) = &under {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
-                under.record(rec, [&uploaded.regions, &uploaded.of_sprites[3]], target, &camera, uploaded.n_regions)?;
+                under.record(
+                    rec,
+                    [&uploaded.regions, &uploaded.of_sprites[3]],
+                    target,
+                    &camera,
+                    uploaded.n_regions,
+                )?;
             }
             if under.is_none() || uploaded.n_entries > 0 {
                 let target = Target { color: &mut target, depth: depth.as_mut() };
@@ -73,9 +96,12 @@ impl Picture {
             Ok(())
         });
         match format {
-            TargetFormat::Rgba8 | TargetFormat::Bgra8 => {
-                readback.read::<u8>(n_numbers).expect("read").into_iter().map(|v| f64::from(v) / 255.0).collect()
-            }
+            TargetFormat::Rgba8 | TargetFormat::Bgra8 => readback
+                .read::<u8>(n_numbers)
+                .expect("read")
+                .into_iter()
+                .map(|v| f64::from(v) / 255.0)
+                .collect(),
             TargetFormat::Rgba16f => {
                 readback.read::<f16>(n_numbers).expect("read").iter().map(|v| v.to_f64()).collect()
             }
@@ -105,14 +131,20 @@ impl Picture {
         match way {
             Way::Sprites => {
                 let variant = [behind, grouped, weighted, textured, threshold, ellipsoids];
-                Made::Sprites(Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites"))
+                Made::Sprites(
+                    Sprites::new(&gpu.device, compiler, format, lit, variant).expect("sprites"),
+                )
             }
-            Way::Tiles(tiled) => Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated),
+            Way::Tiles(tiled) => {
+                Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated)
+            }
             Way::Chunks(n_chunks, saturated) => {
                 // Room for more than there are, as where some are culled.
-                let (size, n) = ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
+                let (size, n) =
+                    ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
                 let variant = [lit, grouped, weighted, textured, threshold, ellipsoids];
-                let chunks = Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant);
+                let chunks =
+                    Chunks::new(&gpu.device, compiler, size, format, [n, n_chunks], variant);
                 Made::Chunks(Box::new(chunks.expect("chunks")), saturated)
             }
         }
@@ -131,7 +163,10 @@ impl Picture {
             Some((i_group, textures, pool)) => (i_group.clone(), textures.clone(), pool.words()),
             None => Default::default(),
         };
-        assert!(of_drawn.is_empty() || of_textured.is_empty() || of_drawn == of_textured, "a particle has one group");
+        assert!(
+            of_drawn.is_empty() || of_textured.is_empty() || of_drawn == of_textured,
+            "a particle has one group"
+        );
         let i_group = if of_drawn.is_empty() { &of_textured } else { &of_drawn };
         Uploaded {
             n_entries: entries.len() as u32,
@@ -164,21 +199,31 @@ impl Picture {
         let n = (Amount::Known(uploaded.n_entries), uploaded.n_surface_facets);
         let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);
         match made {
-            Made::Sprites(sprites) => sprites.record(rec, from, target, camera, [cutoff, threshold], n),
+            Made::Sprites(sprites) => {
+                sprites.record(rec, from, target, camera, [cutoff, threshold], n)
+            }
             Made::Tiles(tiling, saturated) => {
                 let view = tiles::View { camera, cutoff, threshold, saturated: *saturated };
                 tiling.record(rec, 0, self.scenery.is_some().then_some(target), from, &view, n)
             }
             Made::Chunks(chunks, saturated) => {
                 let start = if self.scenery.is_some() { Start::Load } else { Start::Clear };
-                let view = chunks::View { camera, cuts: [cutoff, threshold], saturated: *saturated };
+                let view =
+                    chunks::View { camera, cuts: [cutoff, threshold], saturated: *saturated };
                 chunks.record(rec, from, (target, start), &view, n)
             }
         }
     }
 
-    fn tiling(&self, gpu: &Gpu, compiler: &Compiler, format: TargetFormat, tiled: &Tiled) -> Tiling {
-        let division = Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
+    fn tiling(
+        &self,
+        gpu: &Gpu,
+        compiler: &Compiler,
+        format: TargetFormat,
+        tiled: &Tiled,
+    ) -> Tiling {
+        let division =
+            Division::of(self.view.width, self.view.height, tiled.invocations).expect("a division");
         let blobs = self.blobs();
         let tau_most = blobs.iter().map(Blob::deepest).fold(0.0, f64::max);
         let variant = Variant {
@@ -196,6 +241,7 @@ impl Picture {
             most_pairs: tiled.most_pairs,
             most_tiles: tiled.most_tiles,
         };
-        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant).expect("tiles")
+        Tiling::new(&gpu.device, compiler, division, blobs.len().max(1) as u32, &variant)
+            .expect("tiles")
     }
 }

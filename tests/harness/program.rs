@@ -1,4 +1,5 @@
-//! The program as users run it: its pictures in a temporary folder, and how far two of them are apart.
+//! The program as users run it: its pictures in a temporary folder, and how far two of them are
+//! apart.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 

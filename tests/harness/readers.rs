@@ -1,5 +1,6 @@
-//! What is done with an input by the fuzz target of its kind (fuzz/fuzz_targets) and by the regression tests: it is read, and
-//! either gives one clean error or something whole, which is then written and read again. A fault is a panic.
+//! What is done with an input by the fuzz target of its kind (fuzz/fuzz_targets) and by the
+//! regression tests: it is read, and either gives one clean error or something whole, which is then
+//! written and read again. A fault is a panic.
 
 #![allow(dead_code, reason = "each program uses its own part")]
 
@@ -34,8 +35,8 @@ fn parts(bytes: &[u8]) -> Option<Vec<&str>> {
     bytes.split(|b| *b == 0).map(|part| std::str::from_utf8(part).ok()).collect()
 }
 
-/// A scene; then the box file that it finds under every name, the particle list that it finds under every name in .csv, and
-/// what is given with `--set`, one a part.
+/// A scene; then the box file that it finds under every name, the particle list that it finds under
+/// every name in .csv, and what is given with `--set`, one a part.
 pub fn scene_file(bytes: &[u8]) -> std::result::Result<(), String> {
     let Some(parts) = parts(bytes) else { return Err("no text".to_owned()) };
     let part = |i: usize| parts.get(i).copied().unwrap_or_default();
@@ -45,7 +46,10 @@ pub fn scene_file(bytes: &[u8]) -> std::result::Result<(), String> {
         let is_list = path.extension().is_some_and(|e| e == "csv");
         let text = part(if is_list { 2 } else { 1 });
         match text.trim().is_empty() {
-            true => Err(Error::scene(Place::line(path, 1, 1), format!("the file is empty: expected {first}"))),
+            true => Err(Error::scene(
+                Place::line(path, 1, 1),
+                format!("the file is empty: expected {first}"),
+            )),
             false => Ok(text.to_owned()),
         }
     };
@@ -55,7 +59,8 @@ pub fn scene_file(bytes: &[u8]) -> std::result::Result<(), String> {
     };
     let resolved = to_toml(&loaded.resolved);
     let again = parse_beside(resolved.clone(), &path, &[], None, &files);
-    let again = again.unwrap_or_else(|e| panic!("the resolved scene does not load: {e}\n{resolved}"));
+    let again =
+        again.unwrap_or_else(|e| panic!("the resolved scene does not load: {e}\n{resolved}"));
     assert_eq!(again.hash, loaded.hash, "the resolved scene is another one:\n{resolved}");
     play(&loaded);
     Ok(())
@@ -73,7 +78,10 @@ fn play(loaded: &LoadedScene) {
     let mut game = Game::new(Arc::new(scene.clone()), None);
     for i_frame in [0, scene.time.n_frames - 1] {
         match game.step(i_frame) {
-            Ok(packet) => assert!(packet.radius.is_finite() && packet.heaviest.is_finite(), "a packet of numbers"),
+            Ok(packet) => assert!(
+                packet.radius.is_finite() && packet.heaviest.is_finite(),
+                "a packet of numbers"
+            ),
             Err(error) => drop(clean(&error, &[])),
         }
     }
@@ -85,8 +93,8 @@ pub fn boxes(bytes: &[u8]) -> std::result::Result<(), String> {
     let path = Path::new("b.dat");
     let boxes = box_file::parse(text, path).map_err(|e| clean(&e, &[text]))?;
     let written = box_file::format(&boxes);
-    let again =
-        box_file::parse(&written, path).unwrap_or_else(|e| panic!("what was written is not read: {e}\n{written}"));
+    let again = box_file::parse(&written, path)
+        .unwrap_or_else(|e| panic!("what was written is not read: {e}\n{written}"));
     assert_eq!(again, boxes, "{written}");
     Ok(())
 }
@@ -94,17 +102,21 @@ pub fn boxes(bytes: &[u8]) -> std::result::Result<(), String> {
 /// A particle list; every particle has a line of its own.
 pub fn particle_list(bytes: &[u8]) -> std::result::Result<(), String> {
     let Ok(text) = std::str::from_utf8(bytes) else { return Err("no text".to_owned()) };
-    let (particles, lines) =
-        particle_file::parse_with_lines(text, Path::new("p.csv")).map_err(|e| clean(&e, &[text]))?;
+    let (particles, lines) = particle_file::parse_with_lines(text, Path::new("p.csv"))
+        .map_err(|e| clean(&e, &[text]))?;
     assert_eq!(particles.len(), lines.len());
     // CSV takes a carriage return alone for a row's end; no editor counts a line there.
     let is_after = |w: &[usize]| if text.contains('\r') { w[0] <= w[1] } else { w[0] < w[1] };
     assert!(lines.windows(2).all(is_after), "lines in order: {lines:?}");
-    assert!(lines.last().is_none_or(|last| *last <= text.split('\n').count()), "a line of the file");
+    assert!(
+        lines.last().is_none_or(|last| *last <= text.split('\n').count()),
+        "a line of the file"
+    );
     Ok(())
 }
 
-/// A JSON file of results and, after a zero byte, the table that belongs to it. What is whole is made a page of, beside itself.
+/// A JSON file of results and, after a zero byte, the table that belongs to it. What is whole is
+/// made a page of, beside itself.
 pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
     let Some(parts) = parts(bytes) else { return Err("no text".to_owned()) };
     let (json, table) = (parts[0], parts.get(1).copied().unwrap_or_default());
@@ -142,12 +154,16 @@ pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
 pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
     const MOST_STEPS: usize = 4;
     let container = netcdf::from_bytes(bytes.to_vec())?;
-    let file = wrf::from_container(Box::new(container), Path::new("w.nc")).map_err(|e| clean(&e, &[]))?;
+    let file =
+        wrf::from_container(Box::new(container), Path::new("w.nc")).map_err(|e| clean(&e, &[]))?;
     for i_step in 0..file.n_steps.min(MOST_STEPS) {
         let step = file.step(i_step).map_err(|e| clean(&e, &[]))?;
         let layout = Layout::new(&step.grid, &[&step.extinction], 100, 1);
         for blob in layout.blobs(&step.grid, &step.extinction) {
-            assert!(blob.position.is_finite() && blob.kappa >= 0.0 && blob.kappa.is_finite(), "{blob:?}");
+            assert!(
+                blob.position.is_finite() && blob.kappa >= 0.0 && blob.kappa.is_finite(),
+                "{blob:?}"
+            );
         }
         let ground = file.terrain(i_step).map_err(|e| clean(&e, &[]))?;
         assert!(ground.iter().flat_map(|(_, heights_m)| heights_m).all(|h| h.abs() <= 200_000.0));
@@ -160,25 +176,35 @@ fn show(found: Found) -> std::result::Result<(), String> {
     if let Found::Bench(recorded) = &found {
         drop(compare_modes(&recorded.modes, &recorded.modes));
     }
-    let source = |name: &str| Source { name: name.to_owned(), folder: PathBuf::from(NOWHERE), found: found.clone() };
+    let source = |name: &str| Source {
+        name: name.to_owned(),
+        folder: PathBuf::from(NOWHERE),
+        found: found.clone(),
+    };
     let html = page(&[source("a"), source("b")]).map_err(|e| clean(&e, &[]))?;
     assert!(html.ends_with("</html>"), "a whole page");
     Ok(())
 }
 
-/// The message of an error that an input may give: of bad input, short, and at a place that the input has.
+/// The message of an error that an input may give: of bad input, short, and at a place that the
+/// input has.
 fn clean(error: &Error, texts: &[&str]) -> String {
     let message = error.to_string();
     assert_eq!(error.exit_code(), 2, "{message}");
     if let Error::Scene { at, what } = error {
-        assert!(!what.is_empty() && what.len() < LONGEST_MESSAGE, "{} bytes of message: {what:.200}", what.len());
+        assert!(
+            !what.is_empty() && what.len() < LONGEST_MESSAGE,
+            "{} bytes of message: {what:.200}",
+            what.len()
+        );
         let n_lines = texts.iter().map(|text| text.split('\n').count()).max().unwrap_or(usize::MAX);
         assert!(at.line <= n_lines, "{message}");
     }
     message
 }
 
-/// JSON's strings, numbers and lists are TOML's but for DEL, which TOML wants escaped, and `:`, which is `=` there.
+/// JSON's strings, numbers and lists are TOML's but for DEL, which TOML wants escaped, and `:`,
+/// which is `=` there.
 fn to_toml(resolved: &Value) -> String {
     fn string(text: &str) -> String {
         Value::from(text).to_string().replace('\u{7f}', "\\u007f")
@@ -186,10 +212,13 @@ fn to_toml(resolved: &Value) -> String {
     fn inline(v: &Value) -> String {
         match v {
             Value::Object(map) => {
-                let items: Vec<String> = map.iter().map(|(k, v)| format!("{} = {}", string(k), inline(v))).collect();
+                let items: Vec<String> =
+                    map.iter().map(|(k, v)| format!("{} = {}", string(k), inline(v))).collect();
                 format!("{{ {} }}", items.join(", "))
             }
-            Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
+            Value::Array(list) => {
+                format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", "))
+            }
             Value::String(text) => string(text),
             other => other.to_string(),
         }

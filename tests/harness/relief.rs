@@ -1,4 +1,5 @@
-//! Ground in pictures: its records, and what of the reference's picture of it a rasteriser and f32 may decide otherwise.
+//! Ground in pictures: its records, and what of the reference's picture of it a rasteriser and f32
+//! may decide otherwise.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -14,7 +15,8 @@ use nimbus::reference::terrain::Half;
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
 
-/// Vulkan promises vertices 4 bits below the pixel; and what f32 does to a place of some hundred pixels.
+/// Vulkan promises vertices 4 bits below the pixel; and what f32 does to a place of some hundred
+/// pixels.
 const SNAP: f64 = 1.0 / 16.0 + 1e-3;
 
 #[derive(Debug, Clone, Default)]
@@ -46,8 +48,15 @@ impl Relief {
         Relief { n_before, lit: vec![other; n_before as usize], ..Relief::default() }
     }
 
-    /// Ground of `n` points `step` apart, x east and −z north, of a height each; each with its own radiance.
-    pub fn ground(mut self, origin: DVec3, n: [u32; 2], step: f64, height: impl Fn(f64, f64) -> f64) -> Relief {
+    /// Ground of `n` points `step` apart, x east and −z north, of a height each; each with its own
+    /// radiance.
+    pub fn ground(
+        mut self,
+        origin: DVec3,
+        n: [u32; 2],
+        step: f64,
+        height: impl Fn(f64, f64) -> f64,
+    ) -> Relief {
         let mut random = Random(7 + self.lit.len() as u64);
         let place = |k: u32| {
             let middle = |i: u32, n: u32| step * (f64::from(i) - 0.5 * f64::from(n - 1));
@@ -61,8 +70,14 @@ impl Relief {
         self.regions.push(RegionRecord::terrain(&terrain, DVec3::ZERO, &brdf, NO_LOBE, i_first));
         self.points.extend(terrain.facets().map(|f| FacetRecord::terrain(&f, i_region)));
         for _ in 0..terrain.n_facets() {
-            let mut color = || [random.within(0.1, 4.0), random.within(0.1, 1.0), random.within(0.0, 0.01)];
-            self.lit.push(LitRecord { first: color(), second: color(), direct: [9.0; 3], ..LitRecord::default() });
+            let mut color =
+                || [random.within(0.1, 4.0), random.within(0.1, 1.0), random.within(0.0, 0.01)];
+            self.lit.push(LitRecord {
+                first: color(),
+                second: color(),
+                direct: [9.0; 3],
+                ..LitRecord::default()
+            });
         }
         self
     }
@@ -74,9 +89,11 @@ impl Relief {
             let points = &self.points[first..][..r.n_facets as usize];
             let lit = &self.lit[r.i_first_facet as usize..][..r.n_facets as usize];
             let (n_u, n_v) = (r.n_u as usize, r.n_v as usize);
-            let cells = (0..(n_u - 1) * (n_v - 1)).map(move |i| i / (n_u - 1) * n_u + i % (n_u - 1));
-            let halves =
-                cells.flat_map(move |low| HALVES.map(|half| half.map(|k| [low, low + 1, low + n_u, low + n_u + 1][k])));
+            let cells =
+                (0..(n_u - 1) * (n_v - 1)).map(move |i| i / (n_u - 1) * n_u + i % (n_u - 1));
+            let halves = cells.flat_map(move |low| {
+                HALVES.map(|half| half.map(|k| [low, low + 1, low + n_u, low + n_u + 1][k]))
+            });
             let of = |k: [usize; 3]| {
                 let radiance = k.map(|k| double(lit[k].first) + double(lit[k].second));
                 Drawn { center: r.center, points: k.map(|k| points[k].position), radiance }
@@ -87,7 +104,11 @@ impl Relief {
     }
 
     /// What each pixel may show; `ray`: the shader's ray through pixel (i, j).
-    pub fn candidates(&self, view: &View, ray: impl Fn(u32, u32) -> [Bounded; 2]) -> Vec<Vec<Candidate>> {
+    pub fn candidates(
+        &self,
+        view: &View,
+        ray: impl Fn(u32, u32) -> [Bounded; 2],
+    ) -> Vec<Vec<Candidate>> {
         let drawn = self.halves();
         let halves: Vec<Half> = drawn.iter().map(Drawn::half).collect();
         let seen: Vec<Seen> = drawn.iter().map(|d| Seen::new(d, view)).collect();
@@ -123,11 +144,19 @@ impl Relief {
     }
 }
 
-/// The greatest depth of what is seen around a pixel's centre, as far as vertices may be off; infinite where nothing is.
-fn farthest<'a>(view: &View, halves: impl Iterator<Item = &'a Half> + Clone, i: u32, j: u32) -> f64 {
+/// The greatest depth of what is seen around a pixel's centre, as far as vertices may be off;
+/// infinite where nothing is.
+fn farthest<'a>(
+    view: &View,
+    halves: impl Iterator<Item = &'a Half> + Clone,
+    i: u32,
+    j: u32,
+) -> f64 {
     let offsets = [-SNAP, 0.0, SNAP];
     let (right, down) = (view.pixel() * view.pose.right, -view.pixel() * view.pose.up);
-    let rays = offsets.iter().flat_map(|x| offsets.iter().map(move |y| view.ray(i, j) + *x * right + *y * down));
+    let rays = offsets
+        .iter()
+        .flat_map(|x| offsets.iter().map(move |y| view.ray(i, j) + *x * right + *y * down));
     let nearest = |ray: DVec3| {
         let depths = halves.clone().filter_map(move |h| h.hit(view, ray)).map(|hit| hit.depth);
         depths.fold(f64::INFINITY, f64::min)
@@ -208,7 +237,9 @@ impl Seen {
         let from_eye = [0, 1, 2].map(|k| center[k].minus(eye[k]));
         let c = along_view([0, 1, 2].map(|k| Bounded::exact(f64::from(p[k])).plus(from_eye[k])));
         // The subtraction is rounded correctly: the shader's length is this one.
-        let length = |to: [f32; 3]| f64::from([0, 1, 2].map(|k| (to[k] - p[k]).abs()).into_iter().fold(0f32, f32::max));
+        let length = |to: [f32; 3]| {
+            f64::from([0, 1, 2].map(|k| (to[k] - p[k]).abs()).into_iter().fold(0f32, f32::max))
+        };
         let lengths = [length(b), length(d)].map(Bounded::exact);
         let side = |to: [f32; 3], length: Bounded| {
             let [to, p] = [to, p].map(exact3);
@@ -217,21 +248,38 @@ impl Seen {
         let (u, v) = (side(b, lengths[0]), side(d, lengths[1]));
         let n = cross(u, v);
         let depths = [c[2], c[2].plus(u[2].times(lengths[0])), c[2].plus(v[2].times(lengths[1]))];
-        Seen { n, q: dot(c, n), m_s: cross(v, c), m_t: cross(c, u), lengths, depths, near: view.near }
+        Seen {
+            n,
+            q: dot(c, n),
+            m_s: cross(v, c),
+            m_t: cross(c, u),
+            lengths,
+            depths,
+            near: view.near,
+        }
     }
 
     /// What is shown of it where `hit` says, from one side or from both where f32 cannot tell.
-    fn candidates(&self, hit: &Hit, ray: [Bounded; 3], half: &Half, drawn: &Drawn) -> Vec<Candidate> {
+    fn candidates(
+        &self,
+        hit: &Hit,
+        ray: [Bounded; 3],
+        half: &Half,
+        drawn: &Drawn,
+    ) -> Vec<Candidate> {
         let inverse = Bounded::exact(1.0).over(dot(ray, self.n));
         // Cut to where it reaches, so never off by more than that.
-        let reach =
-            |f: fn(f64, f64) -> f64, from: f64| self.depths.iter().map(|d| d.value.max(self.near)).fold(from, f);
+        let reach = |f: fn(f64, f64) -> f64, from: f64| {
+            self.depths.iter().map(|d| d.value.max(self.near)).fold(from, f)
+        };
         let (nearest, farthest) = (reach(f64::min, f64::INFINITY), reach(f64::max, 0.0));
         let of_corners = self.depths.iter().map(|d| d.error).fold(0.0, f64::max);
         let off_depth = self.q.times(inverse).error.min(farthest - nearest) + of_corners;
         let z = Bounded { value: hit.depth, error: off_depth.min(0.5 * hit.depth) };
         let depth = Bounded::once(self.near).over(z);
-        let along = |m: [Bounded; 3], length: Bounded| dot(ray, m).times(inverse).over(length).error.min(1.0);
+        let along = |m: [Bounded; 3], length: Bounded| {
+            dot(ray, m).times(inverse).over(length).error.min(1.0)
+        };
         let off_s = along(self.m_s, self.lengths[0]);
         let off_t = (along(self.m_t, self.lengths[1]) + off_s).min(1.0);
         let [corner, b, d] = drawn.radiance;

@@ -46,7 +46,11 @@ pub fn plates_text(plates: &[Plate]) -> String {
         let (kd, ks, ns) = (list(p.kd), list(p.ks), p.ns);
         writeln!(text, "[[material]]\nname = 'm{i}'\nkd = {kd}\nks = {ks}\nns = {ns:?}").unwrap();
         let (c, u, v, n) = (list(p.center), list(p.u), list(p.v), p.subdivide);
-        writeln!(text, "[[surface]]\ncenter = {c}\nu = {u}\nv = {v}\nmaterial = 'm{i}'\nsubdivide = {n:?}").unwrap();
+        writeln!(
+            text,
+            "[[surface]]\ncenter = {c}\nu = {u}\nv = {v}\nmaterial = 'm{i}'\nsubdivide = {n:?}"
+        )
+        .unwrap();
     }
     text
 }
@@ -60,8 +64,8 @@ fn vector(r: &mut Random, low: f64, high: f64) -> DVec3 {
     DVec3::from([0; 3].map(|_| f64::from(r.within(low, high))))
 }
 
-/// Rectangles of half axes 0.3…0.8 about centres within ±`reach`: K_d 0.2…0.6, K_s up to `ks`, n_s from 1 to 100 evenly
-/// in its logarithm.
+/// Rectangles of half axes 0.3…0.8 about centres within ±`reach`: K_d 0.2…0.6, K_s up to `ks`, n_s
+/// from 1 to 100 evenly in its logarithm.
 pub fn random_plates(r: &mut Random, n: usize, reach: f64, ks: f64) -> Vec<Plate> {
     let mut one = || {
         let [a, b] = [0; 2].map(|_| DVec3::from(r.direction().map(f64::from)));
@@ -82,8 +86,15 @@ pub fn random_plates(r: &mut Random, n: usize, reach: f64, ks: f64) -> Vec<Plate
 /// A sun from a random direction and a lamp at a random place.
 pub fn sun_and_lamp(r: &mut Random, reach: f64) -> String {
     let (d, p) = (DVec3::from(r.direction().map(f64::from)), vector(r, -reach, reach));
-    let sun = format!("[[light]]\nkind = 'directional'\ndirection = {}\nirradiance = [3.0, 2.9, 2.7]\n", list(d));
-    format!("{sun}[[light]]\nkind = 'point'\nposition = {}\nintensity = [4.0, 4.0, 4.5]\nradius = 0.05\n", list(p))
+    let sun = format!(
+        "[[light]]\nkind = 'directional'\ndirection = {}\nirradiance = [3.0, 2.9, 2.7]\n",
+        list(d)
+    );
+    format!(
+        "{sun}[[light]]\nkind = 'point'\nposition = {}\nintensity = [4.0, 4.0, \
+         4.5]\nradius = 0.05\n",
+        list(p)
+    )
 }
 
 /// A frame of a scene.
@@ -104,7 +115,8 @@ pub fn frame_by(gpu: &Gpu, compiler: &Compiler, scene: Scene) -> Frame {
     let scene = Arc::new(scene);
     let mut renderer = Renderer::new(&gpu.device, compiler, &scene, true).expect("a renderer");
     let packet = Game::new(scene.clone(), None).step(0).expect("a packet");
-    let (low, high) = scene.lighting_bounds(&scene.groups(), packet.time_s, DEPOSIT_CUT_SIGMA).expect("bounds");
+    let (low, high) =
+        scene.lighting_bounds(&scene.groups(), packet.time_s, DEPOSIT_CUT_SIGMA).expect("bounds");
     let (eye, lights) = (DVec3::from(packet.camera.eye.map(f64::from)), packet.lights.clone());
     renderer.step(packet).expect("a frame");
     let (facets, lit) = renderer.facets(&gpu.device).expect("facets");

@@ -59,10 +59,15 @@ pub fn to_toml(resolved: &Value) -> String {
             Value::Object(map) => {
                 format!(
                     "{{ {} }}",
-                    map.iter().map(|(k, v)| format!("{k} = {}", inline(v))).collect::<Vec<_>>().join(", ")
+                    map.iter()
+                        .map(|(k, v)| format!("{k} = {}", inline(v)))
+                        .collect::<Vec<_>>()
+                        .join(", ")
                 )
             }
-            Value::Array(list) => format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", ")),
+            Value::Array(list) => {
+                format!("[{}]", list.iter().map(inline).collect::<Vec<_>>().join(", "))
+            }
             other => other.to_string(),
         }
     }

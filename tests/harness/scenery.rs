@@ -1,5 +1,5 @@
-//! Rectangles under a picture's sprites: their records, the reference's picture of them, and what of it an f32 evaluation
-//! may decide otherwise.
+//! Rectangles under a picture's sprites: their records, the reference's picture of them, and what
+//! of it an f32 evaluation may decide otherwise.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -20,8 +20,9 @@ pub struct Scenery {
     pub lit: Vec<LitRecord>,
 }
 
-/// What a pixel may show. Most pixels have one candidate. Others have several: a ray that passes within rounding of an edge
-/// or of the near plane, and two rectangles equally near within rounding.
+/// What a pixel may show. Most pixels have one candidate. Others have several: a ray that passes
+/// within rounding of an edge or of the near plane, and two rectangles equally near within
+/// rounding.
 pub type Candidates = Vec<Behind>;
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -37,9 +38,16 @@ impl Scenery {
         let mut random = Random(1000 + u64::from(i_first));
         self.regions.push(RegionRecord::surface(&surface, DVec3::ZERO, &brdf, NO_LOBE, i_first));
         for _ in 0..surface.n_facets() {
-            let mut color = || [random.within(0.1, 4.0), random.within(0.1, 1.0), random.within(0.0, 0.01)];
+            let mut color =
+                || [random.within(0.1, 4.0), random.within(0.1, 1.0), random.within(0.0, 0.01)];
             let (first, second) = (color(), color());
-            self.lit.push(LitRecord { first, second, direct: [9.0; 3], indirect: [9.0; 3], ..LitRecord::default() });
+            self.lit.push(LitRecord {
+                first,
+                second,
+                direct: [9.0; 3],
+                indirect: [9.0; 3],
+                ..LitRecord::default()
+            });
         }
         self
     }
@@ -60,7 +68,8 @@ impl Scenery {
         self.lit.iter().map(|l| double(l.first) + double(l.second)).collect()
     }
 
-    /// Lines along which a pixel may have several candidates: edges, and where two rectangles cross.
+    /// Lines along which a pixel may have several candidates: edges, and where two rectangles
+    /// cross.
     pub fn n_lines(&self) -> usize {
         let n = self.regions.len();
         4 * n + n * n.saturating_sub(1) / 2
@@ -81,11 +90,14 @@ impl Scenery {
         let truths = render(view, &surfaces, &all);
         let pixel = |((i, j), truth): ((u32, u32), &Behind)| {
             let (d, [x, y]) = (view.ray(i, j), ray(i, j));
-            let met = surfaces.iter().zip(&self.regions).zip(&seen).filter_map(|((surface, region), seen)| {
-                let found = seen.meet([x, y, Bounded::exact(1.0)], view.near)?;
-                let hit = meet(surface, view.pose.position, d).expect("no candidate lies along its rectangle's plane");
-                Some(Met::new(found, &hit, surface, facets(region), region, rounding))
-            });
+            let met = surfaces.iter().zip(&self.regions).zip(&seen).filter_map(
+                |((surface, region), seen)| {
+                    let found = seen.meet([x, y, Bounded::exact(1.0)], view.near)?;
+                    let hit = meet(surface, view.pose.position, d)
+                        .expect("no candidate lies along its rectangle's plane");
+                    Some(Met::new(found, &hit, surface, facets(region), region, rounding))
+                },
+            );
             let mut found = candidates(met.collect());
             let is_truth = |c: &Behind| c.color == truth.color && c.depth == truth.depth;
             let at = found.iter().position(is_truth).expect("the truth is among the candidates");
@@ -143,9 +155,15 @@ impl Seen {
         let absolute = |x: Bounded| if x.value < 0.0 { x.scaled(-1.0) } else { x };
         // What must not be negative for a hit, each a comparison of two computed numbers.
         let reach = |x: Bounded, length: f64| (Bounded::exact(length).times(size), absolute(x));
-        let pairs = [(q, Bounded::exact(0.0)), (q, least), reach(s, self.lengths[0]), reach(t, self.lengths[1])];
+        let pairs = [
+            (q, Bounded::exact(0.0)),
+            (q, least),
+            reach(s, self.lengths[0]),
+            reach(t, self.lengths[1]),
+        ];
         let is_never = pairs.iter().any(|(a, b)| a.value + a.error < b.value - b.error);
-        let is_sure = pairs.iter().all(|(a, b)| a.value - a.error > b.value + b.error) && size.value > size.error;
+        let is_sure = pairs.iter().all(|(a, b)| a.value - a.error > b.value + b.error)
+            && size.value > size.error;
         // Where d may have either sign, so may q: no hit only if that of s and t is far from both.
         let may_turn = size.value <= size.error;
         let is_far = pairs[2..].iter().any(|(a, b)| a.value + a.error < b.value - b.error);
@@ -182,7 +200,9 @@ impl Met {
             let off = if is_front { radiance_bound(surface, facets, &found) } else { DVec3::ZERO };
             let (color, off) = (color.extend(1.0).to_array(), off.extend(0.0).to_array());
             // Correct rounding errs by u_t, faithful by 2 u_t, of the number written.
-            let stored = |k: usize| 2.0 * rounding.unit * (color[k].abs() + off[k]).max(rounding.least_normal);
+            let stored = |k: usize| {
+                2.0 * rounding.unit * (color[k].abs() + off[k]).max(rounding.least_normal)
+            };
             let bound = [0, 1, 2, 3].map(|k| off[k] + stored(k));
             Behind { color, bound, depth: hit.depth, depth_bound }
         };
@@ -207,18 +227,23 @@ fn radiance_bound(surface: &Surface, facets: &[DVec3], found: &Found) -> DVec3 {
     let greatest = |steps: &mut dyn Iterator<Item = DVec3>| steps.fold(DVec3::ZERO, DVec3::max);
     let cells = || (0..n_u * n_v).map(|k| (k % n_u, k / n_u, k));
     let along_u = greatest(&mut cells().filter(|(i, _, _)| *i > 0).map(|(_, _, k)| step(k, k - 1)));
-    let along_v = greatest(&mut cells().filter(|(_, j, _)| *j > 0).map(|(_, _, k)| step(k, k - n_u)));
-    let (least, most) = facets.iter().fold((facets[0], facets[0]), |(a, b), f| (a.min(*f), b.max(*f)));
+    let along_v =
+        greatest(&mut cells().filter(|(_, j, _)| *j > 0).map(|(_, _, k)| step(k, k - n_u)));
+    let (least, most) =
+        facets.iter().fold((facets[0], facets[0]), |(a, b), f| (a.min(*f), b.max(*f)));
     // ((s/2 + 1/2) n − 1/2): one rounding of at most 1, two of at most n.
     let place = |x: Bounded, n: usize| (0.5 * x.error + 3.0 * U) * n as f64;
     let moved = place(found.s, n_u) * along_u + place(found.t, n_v) * along_v;
-    // L1 + L2 one rounding, each of two mixes three (1 − a, product, sum) of at most the greatest radiance.
+    // L1 + L2 one rounding, each of two mixes three (1 − a, product, sum) of at most the greatest
+    // radiance.
     moved.min(most - least) + 8.0 * U * most
 }
 
 /// All that may be seen.
 fn candidates(met: Vec<Met>) -> Candidates {
-    let is_hidden = |i: usize| (0..met.len()).any(|k| k != i && met[k].found.is_sure && met[k].hides(&met[i], k > i));
+    let is_hidden = |i: usize| {
+        (0..met.len()).any(|k| k != i && met[k].found.is_sure && met[k].hides(&met[i], k > i))
+    };
     let open: Vec<usize> = (0..met.len()).filter(|i| !is_hidden(*i)).collect();
     let mut found: Candidates = open.iter().flat_map(|i| met[*i].sides.clone()).collect();
     if !open.iter().any(|i| met[*i].found.is_sure) {

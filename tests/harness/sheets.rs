@@ -31,19 +31,35 @@ pub struct Paper<'a> {
 impl Paper<'_> {
     /// `z_in_sigma`: view depth over σ; `pixel`: the slopes' difference from a pixel to the next.
     pub fn new(sheet: Sheet, pool: &Pool, z_in_sigma: Bounded, pixel: f64) -> Paper<'_> {
-        let dense = Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z_in_sigma.times(Bounded::once(pixel)));
+        let dense =
+            Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z_in_sigma.times(Bounded::once(pixel)));
         let level = &pool.0[sheet.i_field][sheet.level];
-        // Where the level itself is uncertain the next one's numbers may stand in place of these; they are rounded anew.
-        let near_step = (dense.value.log2() - dense.value.log2().round()).abs() < 2.0 * dense.error / dense.value;
-        let fade = Bounded { value: sheet.fade, error: dense.error / f64::from(1 << sheet.level) + 2.0 * U };
+        // Where the level itself is uncertain the next one's numbers may stand in place of these;
+        // they are rounded anew.
+        let near_step = (dense.value.log2() - dense.value.log2().round()).abs()
+            < 2.0 * dense.error / dense.value;
+        let fade = Bounded {
+            value: sheet.fade,
+            error: dense.error / f64::from(1 << sheet.level) + 2.0 * U,
+        };
         let stretch = Bounded::once(side(sheet.level) as f64 / PERIOD_SIGMA).times(z_in_sigma);
         let unit = |value| Bounded { value, error: UNIT_AT };
         let turn = [sheet.angle.cos(), sheet.angle.sin()].map(|v| stretch.times(unit(v)));
         // n is continuous and piecewise bilinear: no steeper anywhere than its neighbours differ.
-        let slope =
-            (1.0 - sheet.fade) * steepest(&level.own, level.side) + sheet.fade * steepest(&level.above, level.side);
-        let heights = [&level.own, &level.above].map(|n| n.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
-        Paper { sheet, pool, level, fade, turn, slope, heights, step: if near_step { QUANTUM } else { 0.0 } }
+        let slope = (1.0 - sheet.fade) * steepest(&level.own, level.side)
+            + sheet.fade * steepest(&level.above, level.side);
+        let heights =
+            [&level.own, &level.above].map(|n| n.iter().fold(0.0, |a: f64, b| a.max(b.abs())));
+        Paper {
+            sheet,
+            pool,
+            level,
+            fade,
+            turn,
+            slope,
+            heights,
+            step: if near_step { QUANTUM } else { 0.0 },
+        }
     }
 
     /// s n − s² ⟨n²⟩/2 as the fragment shader evaluates it.
@@ -57,8 +73,8 @@ impl Paper<'_> {
         let n = sheet.n(self.pool, delta);
         let [own, above] = self.heights;
         let height = (1.0 - sheet.fade) * own + sheet.fade * above;
-        // Two gains of three roundings, their products and sum; two interpolations of three roundings, on differences of at
-        // most twice the height; the mean's subtraction.
+        // Two gains of three roundings, their products and sum; two interpolations of three
+        // roundings, on differences of at most twice the height; the mean's subtraction.
         let half = sheet.half_square();
         let error = s * self.slope * (x.error + y.error)
             + s * (self.fade.error * (own + above) + self.step)
@@ -80,8 +96,8 @@ fn steepest(n: &[f64], side: usize) -> f64 {
     (0..n.len()).map(of).fold(0.0, f64::max)
 }
 
-/// Blobs of one texture each, from larger than the picture to smaller than a pixel, so that every level and what lies between
-/// two is met; a plain one among them.
+/// Blobs of one texture each, from larger than the picture to smaller than a pixel, so that every
+/// level and what lies between two is met; a plain one among them.
 pub fn textured(mut picture: Picture, pool: &Arc<Pool>) -> Picture {
     let sizes = [1.3, 0.6, 0.41, 0.3, 0.2, 0.13, 0.1, 0.07, 0.05, 0.035, 0.02, 0.012, 0.006];
     for (k, sigma) in sizes.into_iter().enumerate() {
@@ -97,5 +113,8 @@ pub fn textured(mut picture: Picture, pool: &Arc<Pool>) -> Picture {
         strength: if i == 4 { 0.0 } else { 0.5 + 0.1 * i as f32 },
     };
     let n = picture.placed.len() as u32;
-    Picture { textured: Some(((0..n).collect(), (0..n).map(record).collect(), pool.clone())), ..picture }
+    Picture {
+        textured: Some(((0..n).collect(), (0..n).map(record).collect(), pool.clone())),
+        ..picture
+    }
 }

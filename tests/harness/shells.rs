@@ -10,7 +10,8 @@ use nimbus::passes::facets::Facets;
 use nimbus::passes::grid::Grid;
 use nimbus::reference::Blob;
 use nimbus::reference::facets::{
-    CONDITIONING, Facet, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets, gradient, smoothstep,
+    CONDITIONING, Facet, GRADIENT_RADIUS_SIGMA, SHELL_SIGMA, directions, facets, gradient,
+    smoothstep,
 };
 use nimbus::reference::generate::uniforms;
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
@@ -27,12 +28,12 @@ pub const N_PER_CLOUD: u32 = 1500;
 pub const N_SURFACE_FACETS: usize = 5;
 /// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
 const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
-/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the root, which Vulkan
-/// derives from inversesqrt (2 ulp = 4 u) and a division (5 u).
+/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the
+/// root, which Vulkan derives from inversesqrt (2 ulp = 4 u) and a division (5 u).
 pub const LENGTH_ERROR: f64 = 2.5 + 4.0 + DIVISION_ERROR;
 
-/// Relative error of an area: π, 3σ twice, three products, and the argument's four roundings, which 1 − e^−τ passes on at
-/// most once.
+/// Relative error of an area: π, 3σ twice, three products, and the argument's four roundings, which
+/// 1 − e^−τ passes on at most once.
 pub const AREA_ERROR: f64 = ONE_MINUS_EXP_ERROR + (6.0 + 5.0) * U;
 
 pub struct Scene {
@@ -58,7 +59,8 @@ impl Scene {
         Scene::of_shape(1.0)
     }
 
-    /// The same of blobs from a third of `aspect` to `aspect` times as high as wide, if that is not 1, in cells as flat.
+    /// The same of blobs from a third of `aspect` to `aspect` times as high as wide, if that is not
+    /// 1, in cells as flat.
     pub fn of_shape(aspect: f64) -> Scene {
         let n_cells = UVec3::new(60, (40.0 / aspect) as u32, 44);
         let spec = GridSpec { aspect, n_cells, cell: 0.25, low: DVec3::new(-7.0, -5.0, -5.5) };
@@ -69,9 +71,14 @@ impl Scene {
         let blob = |i: u32| {
             let [a, b, c, d] = uniforms(0xface, 0, i, 0);
             let spread = if i.is_multiple_of(50) { 4.5 } else { 2.0 };
-            let position = centers[(i / N_PER_CLOUD) as usize] + spread * (DVec3::new(a, b, c) * 2.0 - 1.0);
+            let position =
+                centers[(i / N_PER_CLOUD) as usize] + spread * (DVec3::new(a, b, c) * 2.0 - 1.0);
             let sigma = f64::from((0.05 + 0.5 * d * d) as f32);
-            let aspect = if aspect == 1.0 { 1.0 } else { f64::from((aspect * (1.0 - 2.0 / 3.0 * c)) as f32) };
+            let aspect = if aspect == 1.0 {
+                1.0
+            } else {
+                f64::from((aspect * (1.0 - 2.0 / 3.0 * c)) as f32)
+            };
             Blob { aspect, position: f32_of(position), sigma, kappa: f64::from((0.02 + d) as f32) }
         };
         let mut blobs: Vec<Blob> = (0..3000).map(blob).collect();
@@ -102,7 +109,8 @@ impl Scene {
         (density, made)
     }
 
-    /// Facets of the particles, or of `runs` of them if there are any, and then each particle's facet.
+    /// Facets of the particles, or of `runs` of them if there are any, and then each particle's
+    /// facet.
     pub fn run_groups(
         &self,
         gpu: &mut Gpu,
@@ -113,7 +121,10 @@ impl Scene {
         let (n, n_cells) = (self.blobs.len(), self.spec.n_total() as usize);
         let grid = Grid::new(&gpu.device, compiler, n_cells as u64).unwrap();
         let pass = Facets::new(&gpu.device, compiler, self.has_ellipsoids()).unwrap();
-        let placed = |b: &Blob| PlacedRecord { position: b.position.as_vec3().to_array(), sigma: b.sigma as f32 };
+        let placed = |b: &Blob| PlacedRecord {
+            position: b.position.as_vec3().to_array(),
+            sigma: b.sigma as f32,
+        };
         let particle = |b: &Blob| ParticleRecord {
             kappa: b.kappa as f32,
             color: color(b),
@@ -123,19 +134,30 @@ impl Scene {
         let placed = gpu.upload(&self.blobs.iter().map(placed).collect::<Vec<_>>());
         let particles = gpu.upload(&self.blobs.iter().map(particle).collect::<Vec<_>>());
         let (i_group, groups) = (gpu.upload(&self.i_group), gpu.upload(&self.groups));
-        let (density, made) = (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(N_SURFACE_FACETS + n));
+        let (density, made) =
+            (gpu.buffer::<f32>(n_cells), gpu.buffer::<FacetRecord>(N_SURFACE_FACETS + n));
         let heaviest = self.blobs.iter().map(Blob::mass).fold(0.0, f64::max);
-        let run = |r: &(u64, u64)| RunRecord { i_first: r.0 as u32, n_particles: (r.1 - r.0) as u32 };
+        let run =
+            |r: &(u64, u64)| RunRecord { i_first: r.0 as u32, n_particles: (r.1 - r.0) as u32 };
         let records: Vec<RunRecord> = runs.iter().map(run).collect();
-        let (order, records, i_facet) = (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
+        let (order, records, i_facet) =
+            (gpu.upload(order), gpu.upload(&records), gpu.buffer::<u32>(n));
         gpu.run(|rec| {
             grid.record(rec, [&placed, &particles, &density], &self.record, n as u32, heaviest)?;
             if runs.is_empty() {
                 let buffers = [&placed, &particles, &i_group, &groups, &density, &made];
                 return pass.record(rec, buffers, &self.record, n as u32, N_SURFACE_FACETS as u32);
             }
-            let buffers = [&placed, &particles, &i_group, &groups, &density, &order, &records, &made, &i_facet];
-            pass.record_groups(rec, buffers, &self.record, runs.len() as u32, N_SURFACE_FACETS as u32)
+            let buffers = [
+                &placed, &particles, &i_group, &groups, &density, &order, &records, &made, &i_facet,
+            ];
+            pass.record_groups(
+                rec,
+                buffers,
+                &self.record,
+                runs.len() as u32,
+                N_SURFACE_FACETS as u32,
+            )
         });
         let n = if runs.is_empty() { n } else { runs.len() };
         let density = gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect();
@@ -155,21 +177,25 @@ impl Scene {
 
     pub fn reference(&self, cells: &[f64]) -> Vec<Facet> {
         let regions: Vec<u32> = self.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
-        let means: Vec<f64> = self.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
+        let means: Vec<f64> =
+            self.i_group.iter().map(|g| f64::from(SIGMA_MEANS[*g as usize])).collect();
         facets(&self.spec, cells, &self.blobs, &means, &regions, &self.centers())
     }
 
-    /// Bound on the sampled density at `p`, where the sample's own position is rounded: its f32 evaluation meets a cell
-    /// coordinate off by `e`, and ρ changes by at most the difference of neighbouring cells times that; the three
-    /// interpolations then round numbers below the greatest cell around, twice each, and a difference three times.
+    /// Bound on the sampled density at `p`, where the sample's own position is rounded: its f32
+    /// evaluation meets a cell coordinate off by `e`, and ρ changes by at most the difference of
+    /// neighbouring cells times that; the three interpolations then round numbers below the
+    /// greatest cell around, twice each, and a difference three times.
     fn sample_error(&self, cells: &[f64], p: DVec3, sigma: f64, astray: f64) -> f64 {
         let n = self.spec.n_cells.as_ivec3();
         let edges = self.spec.edges();
         let g = (p - self.spec.low) / edges - 0.5;
-        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded, and along y 1/a likewise; less ½.
+        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded,
+        // and along y 1/a likewise; less ½.
         let reach = p.abs() + 3.0 * GRADIENT_RADIUS_SIGMA * sigma;
         let e =
-            (U * (reach + (p - self.spec.low).abs() * 5.0) / edges + U * g.abs() + astray / edges) * (1.0 + 8.0 * U);
+            (U * (reach + (p - self.spec.low).abs() * 5.0) / edges + U * g.abs() + astray / edges)
+                * (1.0 + 8.0 * U);
         // All cells that the sample or one beside it can meet.
         let (from, to) = ((g - e).floor().as_ivec3(), (g + e).floor().as_ivec3() + 1);
         let (mut low, mut high) = (f64::INFINITY, 0.0f64);
@@ -186,8 +212,9 @@ impl Scene {
         (high - low) * e.element_sum() + 15.0 * U * high
     }
 
-    /// Relative error of an area; an ellipsoid's mean width takes two logarithms and two exponentials beside: with |log2 a| < 6 and
-    /// 3 ulp a logarithm, 2⁻²¹ about 1, and 3 + 2|x| an exponential, 320 roundings in all, that of its depth among them.
+    /// Relative error of an area; an ellipsoid's mean width takes two logarithms and two
+    /// exponentials beside: with |log2 a| < 6 and 3 ulp a logarithm, 2⁻²¹ about 1, and 3 + 2|x| an
+    /// exponential, 320 roundings in all, that of its depth among them.
     pub fn area_error(&self) -> f64 {
         AREA_ERROR + if self.has_ellipsoids() { 320.0 * U } else { 0.0 }
     }
@@ -196,8 +223,14 @@ impl Scene {
     pub fn bound(&self, cells: &[f64], i: usize, facet: &Facet) -> (f64, DVec3, f64) {
         let blob = &self.blobs[i];
         let scale = blob.sigma.max(f64::from(SIGMA_MEANS[self.i_group[i] as usize]));
-        let around =
-            Around { p: blob.position, p_error: 0.0, scale, scale_error: 0.0, aspect: blob.aspect, aspect_error: 0.0 };
+        let around = Around {
+            p: blob.position,
+            p_error: 0.0,
+            scale,
+            scale_error: 0.0,
+            aspect: blob.aspect,
+            aspect_error: 0.0,
+        };
         let normal = self.normal_bound(cells, &around, facet);
         (normal, around.shell_bound(normal, facet), facet.area * self.area_error())
     }
@@ -229,18 +262,23 @@ impl Scene {
             // |G| errs by √3 dg, S by dg.
             let dq = (3f64.sqrt() * dg + q * dg) / s + U * q * (LENGTH_ERROR + DIVISION_ERROR);
             let width = CONDITIONING.1 - CONDITIONING.0;
-            let dt = if q + dq < CONDITIONING.0 || q - dq > CONDITIONING.1 { 0.0 } else { 1.5 * dq / width + 8.0 * U };
+            let dt = if q + dq < CONDITIONING.0 || q - dq > CONDITIONING.1 {
+                0.0
+            } else {
+                1.5 * dq / width + 8.0 * U
+            };
             let t = smoothstep(CONDITIONING, q);
             if t + dt == 0.0 {
                 d_away
             } else {
-                // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the blend
-                // v = t·down + (1−t)·away, whose own length divides.
-                // Of an ellipsoid what is off is stretched with it; the quotient by a is rounded, and a may be off.
+                // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the
+                // blend v = t·down + (1−t)·away, whose own length divides. Of an ellipsoid what is
+                // off is stretched with it; the quotient by a is rounded, and a may be off.
                 let down = -(g / axes);
                 let wrong = dg + g.y.abs() * (at.aspect_error / at.aspect + DIVISION_ERROR * U);
-                let d_down = 2.0 * 3f64.sqrt() * wrong / axes.min_element().min(1.0) / down.length()
-                    + U * (LENGTH_ERROR + DIVISION_ERROR);
+                let d_down =
+                    2.0 * 3f64.sqrt() * wrong / axes.min_element().min(1.0) / down.length()
+                        + U * (LENGTH_ERROR + DIVISION_ERROR);
                 let blend = t * down.normalize_or_zero() + (1.0 - t) * away;
                 let dv = (t + dt) * d_down + dt * 2.0 + (1.0 - t + dt) * d_away + 4.0 * U;
                 2.0 * dv / (blend.length() - dv).max(1e-9) + U * (LENGTH_ERROR + DIVISION_ERROR)
@@ -263,10 +301,12 @@ pub struct Around {
 
 impl Around {
     pub fn shell_bound(&self, normal: f64, facet: &Facet) -> DVec3 {
-        // Of an ellipsoid Σn/√(nᵀΣn), Σ = diag(1, a², 1), is at most max(1, a) long and changes by no more than twice max(1, a²)/min(1, a) of
-        // what n does, and by 2 max(1, a) of what a does; eight roundings more, and the root's.
+        // Of an ellipsoid Σn/√(nᵀΣn), Σ = diag(1, a², 1), is at most max(1, a) long and changes by
+        // no more than twice max(1, a²)/min(1, a) of what n does, and by 2 max(1, a) of what a
+        // does; eight roundings more, and the root's.
         let a = self.aspect;
-        let (wide, steep) = (a.max(1.0), if a == 1.0 { 1.0 } else { 2.0 * a.max(1.0).powi(2) / a.min(1.0) });
+        let (wide, steep) =
+            (a.max(1.0), if a == 1.0 { 1.0 } else { 2.0 * a.max(1.0).powi(2) / a.min(1.0) });
         let more = if a == 1.0 { 0.0 } else { 8.0 + LENGTH_ERROR + DIVISION_ERROR };
         let shell = SHELL_SIGMA * (self.scale + self.scale_error) * wide;
         // 1.5σ, its product with n, and the sum.

@@ -8,7 +8,9 @@ use nimbus::study::ledger::records::{Ledger, Row};
 use nimbus::study::machine::{Clocks, Cpu, Device};
 use nimbus::study::provenance::{Figure, Provenance, ReferenceRecord};
 use nimbus::study::records::Setting;
-use nimbus::study::tradeoff::records::{Best, Configuration, Front, PictureError, SCHEMA_VERSION, Study};
+use nimbus::study::tradeoff::records::{
+    Best, Configuration, Front, PictureError, SCHEMA_VERSION, Study,
+};
 use serde_json::json;
 
 pub fn provenance() -> Provenance {
@@ -47,9 +49,13 @@ pub fn about(value: f64, part: f64) -> Figure {
 
 /// Of these GPU ms and RMSE.
 pub fn configuration(settings: &[(&str, &str)], ms: f64, rmse: f64, front: Front) -> Configuration {
-    let setting = |(key, value): &(&str, &str)| Setting { key: (*key).to_owned(), value: (*value).to_owned() };
+    let setting = |(key, value): &(&str, &str)| Setting {
+        key: (*key).to_owned(),
+        value: (*value).to_owned(),
+    };
     let settings: Vec<Setting> = settings.iter().map(setting).collect();
-    let name = settings.iter().map(|s| format!("{}={}", s.key, s.value)).collect::<Vec<_>>().join(", ");
+    let name =
+        settings.iter().map(|s| format!("{}={}", s.key, s.value)).collect::<Vec<_>>().join(", ");
     Configuration {
         name: if name.is_empty() { "as it stands".to_owned() } else { name },
         settings,
@@ -100,13 +106,16 @@ pub fn study(configurations: Vec<Configuration>) -> Study {
     }
 }
 
-/// Twenty-odd settings of three knobs: time falls and error grows with each, four on the front, two near it.
+/// Twenty-odd settings of three knobs: time falls and error grows with each, four on the front, two
+/// near it.
 pub fn usual_study() -> Study {
     let mut all = vec![configuration(&[], 40.0, 2.0e-4, Front::Off)];
     let front = [(4.0, 0.06), (7.5, 0.02), (13.0, 0.0031), (26.0, 1.9e-4)];
     for (i, (ms, rmse)) in front.into_iter().enumerate() {
-        let settings =
-            [("draw.resolution", ["0.25", "0.5", "1", "1"][i]), ("draw.threshold", ["0.05", "0.02", "0.01", "0"][i])];
+        let settings = [
+            ("draw.resolution", ["0.25", "0.5", "1", "1"][i]),
+            ("draw.threshold", ["0.05", "0.02", "0.01", "0"][i]),
+        ];
         all.push(configuration(&settings, ms, rmse, Front::On));
     }
     for (cutoff, ms, rmse) in [("2", 7.8, 0.0205), ("3", 13.4, 0.0032)] {
@@ -124,8 +133,13 @@ pub fn usual_study() -> Study {
         ));
     }
     let mut study = study(all);
-    let best = |budget: &str, value, configuration| Best { budget: budget.to_owned(), value, configuration };
-    study.best = vec![best("ms", 8.0, Some(2)), best("error", 0.005, Some(3)), best("ms", 1.0, None)];
+    let best = |budget: &str, value, configuration| Best {
+        budget: budget.to_owned(),
+        value,
+        configuration,
+    };
+    study.best =
+        vec![best("ms", 8.0, Some(2)), best("error", 0.005, Some(3)), best("ms", 1.0, None)];
     study
 }
 

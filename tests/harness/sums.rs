@@ -10,6 +10,7 @@ pub const PAIRWISE: Sums = Sums { summation: Summation::Pairwise, precision: Pre
 
 /// Plain f32 sums first.
 pub fn every_way() -> Vec<Sums> {
-    let in_numbers = |precision| Summation::NAMES.map(|(_, summation)| Sums { summation, precision });
+    let in_numbers =
+        |precision| Summation::NAMES.map(|(_, summation)| Sums { summation, precision });
     Precision::NAMES.iter().flat_map(|(_, precision)| in_numbers(*precision)).collect()
 }

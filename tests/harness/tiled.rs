@@ -35,9 +35,15 @@ impl Picture {
         self.near_first(format, saturated, false)
     }
 
-    fn near_first(&self, format: FilmFormat, saturated: f64, by_tiles: bool) -> (Vec<f64>, Vec<f64>) {
+    fn near_first(
+        &self,
+        format: FilmFormat,
+        saturated: f64,
+        by_tiles: bool,
+    ) -> (Vec<f64>, Vec<f64>) {
         let (off_alpha, edge) = self.worst(by_tiles);
-        let rounding = Rounding { depth: crate::picture::DEPTH, ..Rounding::of(format, off_alpha, edge) };
+        let rounding =
+            Rounding { depth: crate::picture::DEPTH, ..Rounding::of(format, off_alpha, edge) };
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
         let behind: Vec<Behind> = match &self.scenery {
             None => vec![Behind::NOTHING; self.view.width as usize * self.view.height as usize],

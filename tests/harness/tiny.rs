@@ -1,4 +1,5 @@
-//! A scene of four blobs in a folder of its own, which every command draws in a moment, and what a program says of it.
+//! A scene of four blobs in a folder of its own, which every command draws in a moment, and what a
+//! program says of it.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -37,10 +38,12 @@ grid = 8
 from = "particles"
 file = "blobs.csv"
 "#;
-const BLOBS: &str = "x,y,z,radius,kappa\n-2,0,0,1.2,0.8\n0.5,1,1,1,1.1\n1.5,-1,-1,1.4,0.6\n3,0.5,0,0.7,1.5\n";
+const BLOBS: &str =
+    "x,y,z,radius,kappa\n-2,0,0,1.2,0.8\n0.5,1,1,1,1.1\n1.5,-1,-1,1.4,0.6\n3,0.5,0,0.7,1.5\n";
 
 /// A study of it that takes a moment; knobs are to be named.
-pub const SHORT: [&str; 7] = ["error", "scene.toml", "-q", "--rounds=2", "--frames=1", "--pixels=all", "--time=frame"];
+pub const SHORT: [&str; 7] =
+    ["error", "scene.toml", "-q", "--rounds=2", "--frames=1", "--pixels=all", "--time=frame"];
 pub const OUT: [&str; 2] = ["--out", "out"];
 
 pub fn study(json: &Value) -> &Vec<Value> {
@@ -94,7 +97,9 @@ impl Tiny {
     /// The references that are kept.
     pub fn kept(&self) -> Vec<PathBuf> {
         let folder = self.cache().join("references");
-        folder.read_dir().map_or(Vec::new(), |files| files.map(|file| file.expect("a file").path()).collect())
+        folder
+            .read_dir()
+            .map_or(Vec::new(), |files| files.map(|file| file.expect("a file").path()).collect())
     }
 
     /// The program in the scene's folder.
@@ -125,9 +130,11 @@ impl Tiny {
         let output = self.run(args);
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{args:?}: {stderr}");
-        let message = stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{args:?}: {stderr}"));
+        let message =
+            stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{args:?}: {stderr}"));
         // What clap refuses has a hint below it.
-        let message = message.trim_end().trim_end_matches("For more information, try '--help'.").trim_end();
+        let message =
+            message.trim_end().trim_end_matches("For more information, try '--help'.").trim_end();
         assert!(!message.contains('\n'), "{args:?}: {stderr}");
         message.to_owned()
     }
@@ -136,10 +143,13 @@ impl Tiny {
 /// What `json` has that docs/`schema` does not allow.
 pub fn assert_valid(json: &Value, schema: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(schema);
-    let schema: Value = serde_json::from_str(&fs::read_to_string(path).expect("the schema")).expect("JSON");
+    let schema: Value =
+        serde_json::from_str(&fs::read_to_string(path).expect("the schema")).expect("JSON");
     let validator = jsonschema::draft202012::new(&schema).expect("a schema");
-    let complaints: Vec<String> =
-        validator.iter_errors(json).map(|error| format!("{}: {error}", error.instance_path())).collect();
+    let complaints: Vec<String> = validator
+        .iter_errors(json)
+        .map(|error| format!("{}: {error}", error.instance_path()))
+        .collect();
     assert!(complaints.is_empty(), "{complaints:#?}");
 }
 
@@ -163,7 +173,11 @@ impl Table {
     }
 
     pub fn text<'a>(&self, row: &'a csv::StringRecord, column: &str) -> &'a str {
-        let i = self.header.iter().position(|name| name == column).unwrap_or_else(|| panic!("no column {column}"));
+        let i = self
+            .header
+            .iter()
+            .position(|name| name == column)
+            .unwrap_or_else(|| panic!("no column {column}"));
         &row[i]
     }
 

@@ -1,5 +1,5 @@
-//! Ways of light to facets, past rectangles and through a density grid, on the device and in f64, and the running bound of
-//! what the device makes of them.
+//! Ways of light to facets, past rectangles and through a density grid, on the device and in f64,
+//! and the running bound of what the device makes of them.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -38,7 +38,8 @@ pub fn in_cloud(position: [f32; 3]) -> FacetRecord {
     FacetRecord { position, i_region: CLOUD, ..FacetRecord::default() }
 }
 
-/// Blobs in a slab of cells that are no power of two, suns from all sides and the sky. Facets inside the grid.
+/// Blobs in a slab of cells that are no power of two, suns from all sides and the sky. Facets
+/// inside the grid.
 pub fn case() -> Case {
     case_of_cells(1.0)
 }
@@ -62,7 +63,12 @@ pub fn case_of_cells(aspect: f64) -> Case {
     let (low, high) = (DVec3::new(-3.0, -1.0, -2.0) - reach, DVec3::new(3.0, 1.0, 2.0) + reach);
     let fit = GridSpec::fit_cells(low, high, 48, aspect);
     let aspect = f64::from(fit.aspect as f32);
-    let spec = GridSpec { cell: f64::from(fit.cell as f32), low: fit.low.as_vec3().as_dvec3(), aspect, ..fit };
+    let spec = GridSpec {
+        cell: f64::from(fit.cell as f32),
+        low: fit.low.as_vec3().as_dvec3(),
+        aspect,
+        ..fit
+    };
     let density = deposit(&spec, &blobs).iter().map(|&v| v as f32).collect();
     let (low, high) = (spec.low, spec.high());
     let position = |r: &mut Random| [0, 1, 2].map(|i| r.within(low[i] + 1e-4, high[i] - 1e-4));
@@ -77,8 +83,8 @@ pub fn sun(direction: DVec3) -> Light {
     Light::Directional { direction, irradiance: DVec3::ONE }
 }
 
-/// A corner of three walls around the cloud, tilted plates inside and outside of it; facets on all of them, in the cloud
-/// and far out; lamps and spots among them.
+/// A corner of three walls around the cloud, tilted plates inside and outside of it; facets on all
+/// of them, in the cloud and far out; lamps and spots among them.
 pub fn room() -> Case {
     let mut r = Random(22);
     let mut case = case();
@@ -93,7 +99,8 @@ pub fn room() -> Case {
         let (u, other) = (double(r.direction()), double(r.direction()));
         let v = u.cross(other).normalize();
         // The last one small and far out: its facets' rounded centres do not lie in its plane.
-        let (scale, reach) = if i < 5 { (f64::from(r.within(0.5, 1.5)), 4.0) } else { (0.05, 60.0) };
+        let (scale, reach) =
+            if i < 5 { (f64::from(r.within(0.5, 1.5)), 4.0) } else { (0.05, 60.0) };
         let center = double([0; 3].map(|_| r.within(-reach, reach)));
         case.surfaces.push(surface(center, f32_of(scale * u), f32_of(0.7 * scale * v), [3, 2]));
     }
@@ -118,7 +125,13 @@ pub fn room() -> Case {
 
 impl Case {
     /// Transmittances, and what clouds alone let through.
-    pub fn run(&self, gpu: &mut Gpu, compiler: Option<&Compiler>, step: f64, forward: f64) -> [Vec<f64>; 2] {
+    pub fn run(
+        &self,
+        gpu: &mut Gpu,
+        compiler: Option<&Compiler>,
+        step: f64,
+        forward: f64,
+    ) -> [Vec<f64>; 2] {
         self.run_as(gpu, compiler, [step, forward], PLAIN)
     }
 
@@ -137,7 +150,13 @@ impl Case {
         [transmittance, gpu.download::<f32>(&through, n_total).into_iter().map(f64::from).collect()]
     }
 
-    pub fn dispatch(&self, gpu: &mut Gpu, pass: &Transmit, through: &Buffer, [step, forward]: [f64; 2]) -> Vec<f64> {
+    pub fn dispatch(
+        &self,
+        gpu: &mut Gpu,
+        pass: &Transmit,
+        through: &Buffer,
+        [step, forward]: [f64; 2],
+    ) -> Vec<f64> {
         let brdf = Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 1.0 };
         let region = |s: &Surface| RegionRecord::surface(s, DVec3::ZERO, &brdf, NO_LOBE, 0);
         let facets = gpu.upload(&self.facets);
@@ -148,7 +167,16 @@ impl Case {
         let n_total = self.facets.len() * self.lights.len();
         let out = gpu.buffer::<f32>(n_total);
         let grid = GridRecord::from(&self.spec);
-        gpu.run(|rec| pass.record(rec, [&facets, &lights, &regions, &density, &out, through], &grid, n, step, forward));
+        gpu.run(|rec| {
+            pass.record(
+                rec,
+                [&facets, &lights, &regions, &density, &out, through],
+                &grid,
+                n,
+                step,
+                forward,
+            )
+        });
         gpu.download::<f32>(&out, n_total).into_iter().map(f64::from).collect()
     }
 
@@ -157,15 +185,26 @@ impl Case {
     }
 
     pub fn truth(&self, step: f64, forward: f64) -> [Vec<f64>; 2] {
-        let receiver = |f: &FacetRecord| transmit::Receiver { position: double(f.position), i_region: f.i_region };
+        let receiver = |f: &FacetRecord| transmit::Receiver {
+            position: double(f.position),
+            i_region: f.i_region,
+        };
         let receivers: Vec<_> = self.facets.iter().map(receiver).collect();
-        let rectangles: Vec<_> = self.surfaces.iter().map(|s| Rectangle::new(s, DVec3::ZERO)).collect();
+        let rectangles: Vec<_> =
+            self.surfaces.iter().map(|s| Rectangle::new(s, DVec3::ZERO)).collect();
         let cells = self.cells();
-        let all = transmit::Obstacles { spec: &self.spec, cells: &cells, rectangles: &rectangles, step, forward };
+        let all = transmit::Obstacles {
+            spec: &self.spec,
+            cells: &cells,
+            rectangles: &rectangles,
+            step,
+            forward,
+        };
         [all.transmittance(&receivers, &self.lights), all.through(&receivers, &self.lights)]
     }
 
-    /// Bounds of both, and how many decisions rounding may turn: there the bound is what the decision is worth.
+    /// Bounds of both, and how many decisions rounding may turn: there the bound is what the
+    /// decision is worth.
     pub fn bounds(&self, step: f64, forward: f64) -> ([Vec<f64>; 2], usize) {
         self.bounds_as(step, forward, PLAIN)
     }
@@ -184,8 +223,17 @@ impl Case {
             let tau = march.depth(f.position, l, step, sums);
             let depth = tau.times(Bounded::once(1.0 - forward));
             // Transmittance through nothing is exact by the shader's own test.
-            let through = if depth.value + depth.error > 0.0 { depth.scaled(-1.0).exp() } else { Bounded::exact(1.0) };
-            let at_center = verdict(&self.surfaces, f.i_region, double(f.position).to_array().map(Bounded::exact), l);
+            let through = if depth.value + depth.error > 0.0 {
+                depth.scaled(-1.0).exp()
+            } else {
+                Bounded::exact(1.0)
+            };
+            let at_center = verdict(
+                &self.surfaces,
+                f.i_region,
+                double(f.position).to_array().map(Bounded::exact),
+                l,
+            );
             n_unsure += usize::from(at_center == Verdict::Unsure);
             of_centers.push(match at_center {
                 Verdict::Clear => through.error * (1.0 + 1e-6),

@@ -1,5 +1,5 @@
-//! Weather files made by hand: NetCDF classic in its three versions ("The NetCDF Classic Format Specification"), and
-//! within it a small WRF file that a test changes.
+//! Weather files made by hand: NetCDF classic in its three versions ("The NetCDF Classic Format
+//! Specification"), and within it a small WRF file that a test changes.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -40,29 +40,40 @@ pub const NY: usize = 3;
 pub const NZ: usize = 5;
 
 impl Made {
-    /// A whole WRF file of 4 x 3 columns and 5 levels of 500 m, with a cloud on the second and third level of three
-    /// columns.
+    /// A whole WRF file of 4 x 3 columns and 5 levels of 500 m, with a cloud on the second and
+    /// third level of three columns.
     pub fn wrf(version: u8, n_steps: u32) -> Self {
         Made::wrf_of(version, n_steps, [NX, NY, NZ])
     }
 
     pub fn wrf_of(version: u8, n_steps: u32, [nx, ny, nz]: [usize; 3]) -> Self {
-        let names = ["Time", "DateStrLen", "west_east", "south_north", "bottom_top", "bottom_top_stag"];
+        let names =
+            ["Time", "DateStrLen", "west_east", "south_north", "bottom_top", "bottom_top_stag"];
         let lengths = [0, 19, nx, ny, nz, nz + 1];
         let plane = nx * ny;
-        let of_level = |n: usize, f: &dyn Fn(f32) -> f32| (0..n * plane).map(|i| f((i / plane) as f32)).collect();
+        let of_level = |n: usize, f: &dyn Fn(f32) -> f32| {
+            (0..n * plane).map(|i| f((i / plane) as f32)).collect()
+        };
         let (cells, levels, columns) = (vec![0, 4, 3, 2], vec![0, 5, 3, 2], vec![0, 3, 2]);
         let pressure = |k: f32| 1e5 * (-(k + 0.5) * 500.0 / 8000.0).exp();
-        let cloud = (0..nz * plane).map(|i| if matches!(i / plane, 1 | 2) && i % plane < 3 { 2e-4 } else { 0.0 });
+        let cloud = (0..nz * plane)
+            .map(|i| if matches!(i / plane, 1 | 2) && i % plane < 3 { 2e-4 } else { 0.0 });
         let floats = |name: &str, dims: &[usize], units: &str, numbers: Vec<f32>| Var {
             name: name.to_owned(),
             dims: dims.to_vec(),
             attrs: vec![("units".to_owned(), Attr::Text(units.to_owned()))],
             data: Data::Floats(numbers),
         };
-        let times = (0..n_steps).map(|i| format!("2005-08-28_{:02}:{:02}:00", 12 + i / 60, i % 60)).collect();
+        let times = (0..n_steps)
+            .map(|i| format!("2005-08-28_{:02}:{:02}:00", 12 + i / 60, i % 60))
+            .collect();
         let vars = vec![
-            Var { name: "Times".to_owned(), dims: vec![0, 1], attrs: vec![], data: Data::Rows(times) },
+            Var {
+                name: "Times".to_owned(),
+                dims: vec![0, 1],
+                attrs: vec![],
+                data: Data::Rows(times),
+            },
             floats("P", &cells, "Pa", vec![0.0; nz * plane]),
             floats("PB", &cells, "Pa", of_level(nz, &pressure)),
             floats("T", &cells, "K", of_level(nz, &|k| k * 2.0 - 5.0)),
@@ -80,7 +91,8 @@ impl Made {
             ("MAP_PROJ".to_owned(), Attr::Int(0)),
             ("MP_PHYSICS".to_owned(), Attr::Int(6)),
         ];
-        let dims = names.iter().zip(lengths).map(|(name, n)| ((*name).to_owned(), n as u64)).collect();
+        let dims =
+            names.iter().zip(lengths).map(|(name, n)| ((*name).to_owned(), n as u64)).collect();
         Made { version, n_steps, dims, attrs, vars }
     }
 
@@ -130,7 +142,9 @@ impl Made {
         let mut offset = self.header(&vec![0; self.vars.len()]).len() as u64;
         let mut begins = vec![0; self.vars.len()];
         for with_steps in [false, true] {
-            for (begin, var) in begins.iter_mut().zip(&self.vars).filter(|(_, v)| v.has_steps() == with_steps) {
+            for (begin, var) in
+                begins.iter_mut().zip(&self.vars).filter(|(_, v)| v.has_steps() == with_steps)
+            {
                 *begin = offset;
                 offset += var.record(0).len() as u64;
             }
@@ -164,7 +178,11 @@ impl Made {
             out.attrs(&var.attrs);
             out.word(if matches!(var.data, Data::Floats(_)) { 5 } else { 2 });
             out.count(var.record(0).len() as u64);
-            if self.version == 1 { out.word(*begin as u32) } else { out.bytes.extend(begin.to_be_bytes()) }
+            if self.version == 1 {
+                out.word(*begin as u32)
+            } else {
+                out.bytes.extend(begin.to_be_bytes())
+            }
         }
         out.bytes
     }

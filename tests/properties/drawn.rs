@@ -1,5 +1,5 @@
-//! Small pictures of scenes of a few particles: of numbers, opaque at most, and the same to the byte whether frames leave out
-//! what they need not do or not.
+//! Small pictures of scenes of a few particles: of numbers, opaque at most, and the same to the
+//! byte whether frames leave out what they need not do or not.
 
 use std::cell::RefCell;
 
@@ -26,13 +26,9 @@ type Made = (String, Vec<Particle>, Option<CloudBox>, bool);
 fn blob() -> impl Strategy<Value = Particle> {
     let place = [-4.0..4.0, -3.0..3.0, -4.0..4.0].prop_map(DVec3::from_array);
     let color = [0.0..1.0, 0.0..1.0, 0.0..1.0].prop_map(DVec3::from_array);
-    (place, 0.01..1.5, prop_oneof![Just(0.0), 0.01..50.0], color).prop_map(|(position, sigma, kappa, color)| Particle {
-        aspect: 1.0,
-        position,
-        sigma,
-        kappa,
-        color,
-    })
+    (place, 0.01..1.5, prop_oneof![Just(0.0), 0.01..50.0], color).prop_map(
+        |(position, sigma, kappa, color)| Particle { aspect: 1.0, position, sigma, kappa, color },
+    )
 }
 
 fn some_box() -> impl Strategy<Value = Option<CloudBox>> {
@@ -50,12 +46,16 @@ fn scene() -> impl Strategy<Value = Made> {
     let paths = prop_oneof![Just("sprites"), Just("tiles")];
     let formats = prop_oneof![Just("rgba8"), Just("rgba16f"), Just("rgba32f")];
     let steps = prop_oneof![Just("0.0"), Just("0.4")];
-    let text = (modes, paths, formats, steps, 8..24u32, 2.0..12.0).prop_map(|(mode, path, format, step, grid, z)| {
-        format!(
-            "[film]\nwidth = 24\nheight = 18\nformat = '{format}'\n[camera]\nposition = [0, 1, {z}]\n\
-             [time]\nstep_s = {step}\n[lighting]\nmode = '{mode}'\ngrid = {grid}\n[draw]\npath = '{path}'\n"
-        )
-    });
+    let text = (modes, paths, formats, steps, 8..24u32, 2.0..12.0).prop_map(
+        |(mode, path, format, step, grid, z)| {
+            format!(
+                "[film]\nwidth = 24\nheight = 18\nformat = '{format}'\n[camera]\nposition = [0, 1, \
+             {z}]\n\
+             [time]\nstep_s = {step}\n[lighting]\nmode = '{mode}'\ngrid = {grid}\n[draw]\npath \
+             = '{path}'\n"
+            )
+        },
+    );
     (text, vec(blob(), 0..25), some_box(), any::<bool>())
 }
 
@@ -88,7 +88,11 @@ fn with_clouds(desk: &Desk, (text, list, one_box, is_stirred): Made) -> Scene {
 }
 
 /// Colours and bytes of every frame.
-fn frames(desk: &Desk, scene: &Scene, skip: bool) -> nimbus::error::Result<Vec<(Vec<f32>, Vec<u8>)>> {
+fn frames(
+    desk: &Desk,
+    scene: &Scene,
+    skip: bool,
+) -> nimbus::error::Result<Vec<(Vec<f32>, Vec<u8>)>> {
     let mut player = desk.player(scene, skip)?;
     let mut all = Vec::new();
     serial::run(&mut player.game, &mut player.renderer, 0..N_FRAMES, &mut |_, renderer| {
@@ -107,12 +111,16 @@ fn pictures_are_numbers_and_the_same_whatever_is_left_out() {
         let desk = desk.borrow();
         let desk = desk.as_ref().expect("it is closed at the end");
         let scene = with_clouds(desk, made);
-        let drawn = |skip| frames(desk, &scene, skip).map_err(|e| TestCaseError::fail(e.to_string()));
+        let drawn =
+            |skip| frames(desk, &scene, skip).map_err(|e| TestCaseError::fail(e.to_string()));
         let (some, all) = (drawn(true)?, drawn(false)?);
         prop_assert_eq!(some.len(), N_FRAMES as usize);
         for (i, ((rgba, bytes), (_, bytes_of_all))) in some.iter().zip(&all).enumerate() {
             for pixel in rgba.chunks_exact(4) {
-                prop_assert!(pixel.iter().all(|v| v.is_finite() && *v >= 0.0), "frame {i}: {pixel:?}");
+                prop_assert!(
+                    pixel.iter().all(|v| v.is_finite() && *v >= 0.0),
+                    "frame {i}: {pixel:?}"
+                );
                 prop_assert!(pixel[3] <= 1.0, "frame {i}: {pixel:?}");
             }
             prop_assert!(bytes == bytes_of_all, "frame {i}: other bytes where nothing is left out");

@@ -29,28 +29,41 @@ fn count() -> impl Strategy<Value = Count> {
 #[test]
 fn shares_fall_with_distance_and_weights_add_up() {
     let distance = || prop_oneof![magnitude(-15, 15), Just(0.0), 0.0..1000.0];
-    check(2000, (count(), magnitude(-3, 3), distance(), distance(), any::<u32>()), |(count, scale, a, b, n)| {
-        let (near, far) = (count.share(scale, a.min(b)), count.share(scale, a.max(b)));
-        prop_assert!((0.0..=1.0).contains(&near) && (0.0..=1.0).contains(&far) && far <= near, "{near} {far}");
-        for share in [near, far] {
-            let drawn = count.drawn(n, share);
-            if drawn == Drawn::NOTHING {
-                continue;
-            }
+    check(
+        2000,
+        (count(), magnitude(-3, 3), distance(), distance(), any::<u32>()),
+        |(count, scale, a, b, n)| {
+            let (near, far) = (count.share(scale, a.min(b)), count.share(scale, a.max(b)));
             prop_assert!(
-                (1..=n).contains(&drawn.n) && drawn.last_weight > 0.0 && drawn.last_weight <= 1.0,
-                "{drawn:?}"
+                (0.0..=1.0).contains(&near) && (0.0..=1.0).contains(&far) && far <= near,
+                "{near} {far}"
             );
-            // x = n·share is rounded once, and x − (n − 1) is exact or rounded once more: two units of x.
-            let (x, sum) = (f64::from(n) * share, f64::from(drawn.n - 1) + drawn.last_weight);
-            prop_assert!((sum - x).abs() <= 2.0 * f64::EPSILON * x, "{sum} for {x}");
-            // What is drawn stands for all, as long as there is one to stand for them.
-            let stands_for = sum * drawn.kappa_scale;
-            let expected = if !count.conserve { x } else { f64::from(n) * x.min(1.0) };
-            prop_assert!((stands_for / expected - 1.0).abs() < 8.0 * f64::EPSILON, "{stands_for} for {expected}");
-        }
-        Ok(())
-    });
+            for share in [near, far] {
+                let drawn = count.drawn(n, share);
+                if drawn == Drawn::NOTHING {
+                    continue;
+                }
+                prop_assert!(
+                    (1..=n).contains(&drawn.n)
+                        && drawn.last_weight > 0.0
+                        && drawn.last_weight <= 1.0,
+                    "{drawn:?}"
+                );
+                // x = n·share is rounded once, and x − (n − 1) is exact or rounded once more: two
+                // units of x.
+                let (x, sum) = (f64::from(n) * share, f64::from(drawn.n - 1) + drawn.last_weight);
+                prop_assert!((sum - x).abs() <= 2.0 * f64::EPSILON * x, "{sum} for {x}");
+                // What is drawn stands for all, as long as there is one to stand for them.
+                let stands_for = sum * drawn.kappa_scale;
+                let expected = if !count.conserve { x } else { f64::from(n) * x.min(1.0) };
+                prop_assert!(
+                    (stands_for / expected - 1.0).abs() < 8.0 * f64::EPSILON,
+                    "{stands_for} for {expected}"
+                );
+            }
+            Ok(())
+        },
+    );
 }
 
 #[test]
@@ -102,7 +115,9 @@ fn poses_are_orthonormal_or_refused() {
             prop_assert!(a.dot(b).abs() <= bound && (a.length() - 1.0).abs() <= bound, "{pose:?}");
         }
         // Above is above: right × forward has a part along up.
-        prop_assert!(pose.up.dot(up) >= -bound && pose.right.cross(pose.up).dot(-pose.forward) > 0.9);
+        prop_assert!(
+            pose.up.dot(up) >= -bound && pose.right.cross(pose.up).dot(-pose.forward) > 0.9
+        );
         Ok(())
     });
 }
@@ -114,10 +129,13 @@ fn a_grid_contains_its_bounds_with_the_margin() {
         let half = DVec3::from_array(half);
         let grid = GridSpec::fit(-half, half, n);
         let n = n.clamp(2 * MARGIN_CELLS + 1, MAX_CELLS);
-        prop_assert!(grid.n_cells.max_element() <= n && grid.n_cells.min_element() > 2 * MARGIN_CELLS);
+        prop_assert!(
+            grid.n_cells.max_element() <= n && grid.n_cells.min_element() > 2 * MARGIN_CELLS
+        );
         prop_assert!(half == DVec3::ZERO || grid.n_cells.max_element() == n);
         // A cell in 10⁹ is left over where that saves a layer; and the ends are rounded.
-        let margin = f64::from(MARGIN_CELLS) * grid.cell * (1.0 - 1e-6) - 8.0 * f64::EPSILON * half.max_element();
+        let margin = f64::from(MARGIN_CELLS) * grid.cell * (1.0 - 1e-6)
+            - 8.0 * f64::EPSILON * half.max_element();
         let below = (-half - grid.low).min_element();
         let above = (grid.high() - half).min_element();
         prop_assert!(below >= margin && above >= margin, "{below} {above} of {margin}");
@@ -137,7 +155,10 @@ fn more_bases_are_never_further_off() {
         for n in [1, 2, 3, 5, 8, 13, 21, 32] {
             let error = Basis::new(range, n, sampling).error(ns);
             // A projection is no longer than what is projected; sums of 1025 rounded products.
-            prop_assert!((0.0..=1.0 + 1e-12).contains(&error) && error <= last + 1e-12, "{n}: {error} after {last}");
+            prop_assert!(
+                (0.0..=1.0 + 1e-12).contains(&error) && error <= last + 1e-12,
+                "{n}: {error} after {last}"
+            );
             last = error;
         }
         Ok(())
@@ -148,7 +169,10 @@ fn more_bases_are_never_further_off() {
 fn what_is_shown_is_between_black_and_white_and_brighter_where_there_is_more_light() {
     check(2000, (any::<f64>(), any::<f64>()), |(a, b)| {
         let (dark, bright) = (srgb_encode(a.min(b)), srgb_encode(a.max(b)));
-        prop_assert!((0.0..=1.0).contains(&dark) && (0.0..=1.0).contains(&bright) && dark <= bright, "{dark} {bright}");
+        prop_assert!(
+            (0.0..=1.0).contains(&dark) && (0.0..=1.0).contains(&bright) && dark <= bright,
+            "{dark} {bright}"
+        );
         Ok(())
     });
     // Of neighbours, too: about the foot of the curve it changes its law.
@@ -160,7 +184,14 @@ fn what_is_shown_is_between_black_and_white_and_brighter_where_there_is_more_lig
     check(2000, film, |(rgb, alpha, background, exposure, is_neutral)| {
         let tone_map = if is_neutral { ToneMap::Neutral } else { ToneMap::Clip };
         let background = background.abs();
-        let film = Film { width: 1, height: 1, format: FilmFormat::Rgba32f, background, exposure, tone_map };
+        let film = Film {
+            width: 1,
+            height: 1,
+            format: FilmFormat::Rgba32f,
+            background,
+            exposure,
+            tone_map,
+        };
         let shown = film.display(DVec3::from_array(rgb), alpha);
         prop_assert!(shown.to_array().iter().all(|v| (0.0..=1.0).contains(v)), "{shown}");
         Ok(())
@@ -181,13 +212,19 @@ fn pixels_are_distinct_and_within_the_picture() {
         let whole: Vec<u32> = (0..width * height).collect();
         let spread = pixels.spread(&pixels.pick(&whole));
         prop_assert_eq!(spread.len(), whole.len());
-        prop_assert!(pixels.at.iter().all(|at| spread[pixels.index(*at)] == whole[pixels.index(*at)]));
+        prop_assert!(
+            pixels.at.iter().all(|at| spread[pixels.index(*at)] == whole[pixels.index(*at)])
+        );
         Ok(())
     });
 }
 
 fn times() -> impl Strategy<Value = Vec<f64>> {
-    prop_oneof![vec(magnitude(-6, 6), 1..200), vec(0.9..1.1, 1..200), vec((0..3u8).prop_map(f64::from), 1..60)]
+    prop_oneof![
+        vec(magnitude(-6, 6), 1..200),
+        vec(0.9..1.1, 1..200),
+        vec((0..3u8).prop_map(f64::from), 1..60)
+    ]
 }
 
 #[test]
@@ -210,12 +247,17 @@ fn intervals_hold_what_they_are_of() {
 #[test]
 fn summaries_are_in_order() {
     check(1000, times(), |times| {
-        let Some(s) = Summary::of(&times) else { return Err(TestCaseError::fail("finite values have a summary")) };
+        let Some(s) = Summary::of(&times) else {
+            return Err(TestCaseError::fail("finite values have a summary"));
+        };
         let order = [s.min, s.p1, s.p5, s.p50, s.p95, s.p99, s.max];
         prop_assert!(order.windows(2).all(|w| w[0] <= w[1]), "{s:?}");
         // A sum of n numbers is rounded n times.
         let slack = 1e-13 * s.max;
-        prop_assert!(s.n == times.len() && s.mean >= s.min - slack && s.mean <= s.max + slack, "{s:?}");
+        prop_assert!(
+            s.n == times.len() && s.mean >= s.min - slack && s.mean <= s.max + slack,
+            "{s:?}"
+        );
         if let Some(lows) = Lows::of(&times) {
             let ends = (1000.0 / s.max) * (1.0 - 1e-12)..=(1000.0 / s.min) * (1.0 + 1e-12);
             let all = [lows.p99_fps, lows.slowest_mean_fps, lows.slowest_time_fps];

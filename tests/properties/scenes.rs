@@ -7,15 +7,20 @@ use proptest::strategy::Union;
 
 /// What files of clouds are found under, and what they hold.
 pub const BOXES: &str = "9\n2\n6, 1, 2, 1, 0, 0, 0, 0.8\n3, 1, 1, 1, 1.5, 0, -1, 0.5\n";
-pub const LIST: &str = "x,y,z,sigma,kappa,r,g,b\n0,0,0,0.4,1.5,1,1,1\n0.5,0.2,-0.3,0.3,2,0.5,0.6,1\n";
+pub const LIST: &str =
+    "x,y,z,sigma,kappa,r,g,b\n0,0,0,0.4,1.5,1,1,1\n0.5,0.2,-0.3,0.3,2,0.5,0.6,1\n";
 
 fn quoted(names: &'static [&'static str]) -> BoxedStrategy<String> {
     select(names).prop_map(|name| format!("'{name}'")).boxed()
 }
 
 fn number(low: f64, high: f64) -> BoxedStrategy<String> {
-    prop_oneof![(low..=high).prop_map(|v| format!("{v:?}")), Just(format!("{low:?}")), Just(format!("{high:?}"))]
-        .boxed()
+    prop_oneof![
+        (low..=high).prop_map(|v| format!("{v:?}")),
+        Just(format!("{low:?}")),
+        Just(format!("{high:?}"))
+    ]
+    .boxed()
 }
 
 fn integer(low: u32, high: u32) -> BoxedStrategy<String> {
@@ -38,7 +43,8 @@ fn range(most: f64) -> BoxedStrategy<String> {
 /// A key and what may stand there.
 pub type Key = (&'static str, BoxedStrategy<String>);
 
-/// The keys of the scene's single tables, with values that stand by themselves whatever the others are.
+/// The keys of the scene's single tables, with values that stand by themselves whatever the others
+/// are.
 pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
     vec![
         (
@@ -54,9 +60,20 @@ pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
         ),
         (
             "camera",
-            vec![("fov_y_deg", number(1.0, 170.0)), ("near", number(1e-15, 1.0)), ("position", vector(3.0, 9.0))],
+            vec![
+                ("fov_y_deg", number(1.0, 170.0)),
+                ("near", number(1e-15, 1.0)),
+                ("position", vector(3.0, 9.0)),
+            ],
         ),
-        ("time", vec![("start_s", number(-1e6, 1e6)), ("step_s", number(0.0, 10.0)), ("frames", integer(1, 1000))]),
+        (
+            "time",
+            vec![
+                ("start_s", number(-1e6, 1e6)),
+                ("step_s", number(0.0, 10.0)),
+                ("frames", integer(1, 1000)),
+            ],
+        ),
         (
             "lighting",
             vec![
@@ -84,7 +101,10 @@ pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
                 ("cutoff", number(0.5, 8.0)),
                 ("threshold", prop_oneof![number(0.0, 0.99), Just("'auto'".to_owned())].boxed()),
                 ("sort_bits", select(&["16", "32", "'auto'"][..]).prop_map(str::to_owned).boxed()),
-                ("resolution", select(&["1.0", "0.5", "0.25", "'auto'"][..]).prop_map(str::to_owned).boxed()),
+                (
+                    "resolution",
+                    select(&["1.0", "0.5", "0.25", "'auto'"][..]).prop_map(str::to_owned).boxed(),
+                ),
                 ("error", number(0.0, 0.9)),
                 ("texture_seed", integer(0, u32::MAX)),
                 ("count", quoted(&["all", "distance"])),
@@ -94,14 +114,18 @@ pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
                 ("count_conserve", flag()),
             ],
         ),
-        ("threads", vec![("mode", quoted(&["serial", "parallel"])), ("simulate", quoted(&["gpu", "cpu"]))]),
+        (
+            "threads",
+            vec![("mode", quoted(&["serial", "parallel"])), ("simulate", quoted(&["gpu", "cpu"]))],
+        ),
     ]
 }
 
 /// Each key there or not.
 fn some_of(keys: Vec<Key>) -> BoxedStrategy<String> {
     let lines = keys.into_iter().map(|(key, value)| {
-        proptest::option::weighted(0.3, value).prop_map(move |v| v.map_or(String::new(), |v| format!("{key} = {v}\n")))
+        proptest::option::weighted(0.3, value)
+            .prop_map(move |v| v.map_or(String::new(), |v| format!("{key} = {v}\n")))
     });
     lines.collect::<Vec<_>>().prop_map(|lines| lines.concat()).boxed()
 }
@@ -110,13 +134,18 @@ fn light() -> BoxedStrategy<String> {
     let amount = || vector(0.0, 10.0);
     let place = || vector(-20.0, 20.0);
     prop_oneof![
-        (vector(0.1, 1.0), amount())
-            .prop_map(|(d, e)| format!("kind = 'directional'\ndirection = {d}\nirradiance = {e}\n")),
-        (amount(), number(0.0, 1.0)).prop_map(|(e, c)| format!("kind = 'sky'\nirradiance = {e}\nconstant = {c}\n")),
-        (place(), amount()).prop_map(|(p, i)| format!("kind = 'point'\nposition = {p}\nintensity = {i}\n")),
-        (place(), vector(-1.0, -0.1), amount(), number(45.0, 180.0)).prop_map(|(p, d, i, o)| format!(
-            "kind = 'spot'\nposition = {p}\ndirection = {d}\nintensity = {i}\nouter_deg = {o}\n"
+        (vector(0.1, 1.0), amount()).prop_map(|(d, e)| format!(
+            "kind = 'directional'\ndirection = {d}\nirradiance = {e}\n"
         )),
+        (amount(), number(0.0, 1.0))
+            .prop_map(|(e, c)| format!("kind = 'sky'\nirradiance = {e}\nconstant = {c}\n")),
+        (place(), amount())
+            .prop_map(|(p, i)| format!("kind = 'point'\nposition = {p}\nintensity = {i}\n")),
+        (place(), vector(-1.0, -0.1), amount(), number(45.0, 180.0)).prop_map(
+            |(p, d, i, o)| format!(
+                "kind = 'spot'\nposition = {p}\ndirection = {d}\nintensity = {i}\nouter_deg = {o}\n"
+            )
+        ),
     ]
     .prop_map(|keys| format!("[[light]]\n{keys}"))
     .boxed()
@@ -151,7 +180,10 @@ fn surface() -> BoxedStrategy<String> {
     let half = || number(0.1, 5.0);
     (vector(-5.0, 5.0), half(), half(), integer(1, 6), integer(1, 6))
         .prop_map(|(c, a, b, m, n)| {
-            format!("[[surface]]\ncenter = {c}\nu = [0, 0, {a}]\nv = [{b}, 0, 0]\nsubdivide = [{m}, {n}]\n")
+            format!(
+                "[[surface]]\ncenter = {c}\nu = [0, 0, {a}]\nv = [{b}, 0, 0]\nsubdivide = \
+                [{m}, {n}]\n"
+            )
         })
         .boxed()
 }
@@ -175,14 +207,17 @@ fn phases() -> BoxedStrategy<String> {
 
 /// A scene of values that may be: nearly all of these load.
 pub fn usual() -> BoxedStrategy<String> {
-    let single =
-        tables().into_iter().map(|(name, keys)| some_of(keys).prop_map(move |keys| format!("[{name}]\n{keys}")));
+    let single = tables()
+        .into_iter()
+        .map(|(name, keys)| some_of(keys).prop_map(move |keys| format!("[{name}]\n{keys}")));
     let single = single.collect::<Vec<_>>().prop_map(|tables| tables.concat());
-    let maybe = |s: BoxedStrategy<String>, most: usize| vec(s, 0..=most).prop_map(|all| all.concat());
+    let maybe =
+        |s: BoxedStrategy<String>, most: usize| vec(s, 0..=most).prop_map(|all| all.concat());
     let with = (single, maybe(light(), 3), material(), maybe(surface(), 2), maybe(cloud(), 3));
     let plain = with.prop_map(|(a, b, c, d, e)| [a, b, c, d, e].concat());
     // What the phases have in frames the scene may not say otherwise.
-    let in_phases = (maybe(light(), 2), maybe(cloud(), 2), phases()).prop_map(|(a, b, c)| [a, b, c].concat());
+    let in_phases =
+        (maybe(light(), 2), maybe(cloud(), 2), phases()).prop_map(|(a, b, c)| [a, b, c].concat());
     Union::new_weighted(vec![(4, plain.boxed()), (1, in_phases.boxed())]).boxed()
 }
 
@@ -228,8 +263,12 @@ fn odd() -> BoxedStrategy<String> {
         "=",
         "\"",
     ];
-    prop_oneof![select(ODD).prop_map(str::to_owned), any::<f64>().prop_map(|v| format!("{v:?}")), "\\PC{0,12}".boxed()]
-        .boxed()
+    prop_oneof![
+        select(ODD).prop_map(str::to_owned),
+        any::<f64>().prop_map(|v| format!("{v:?}")),
+        "\\PC{0,12}".boxed()
+    ]
+    .boxed()
 }
 
 /// A scene some of whose lines are another's, or nobody's.
@@ -259,7 +298,8 @@ pub fn unusual() -> BoxedStrategy<String> {
 /// Something given with `--set`: a key of the single tables with a value that it takes.
 pub fn setting() -> BoxedStrategy<(&'static str, &'static str, String)> {
     let all = tables().into_iter().flat_map(|(table, keys)| {
-        keys.into_iter().map(move |(key, value)| value.prop_map(move |value| (table, key, value)).boxed())
+        keys.into_iter()
+            .map(move |(key, value)| value.prop_map(move |value| (table, key, value)).boxed())
     });
     Union::new(all).boxed()
 }
@@ -268,11 +308,24 @@ pub fn setting() -> BoxedStrategy<(&'static str, &'static str, String)> {
 pub fn odd_setting() -> BoxedStrategy<String> {
     let path = prop_oneof![
         select(
-            &["film.width", "cloud.0.seed", "cloud.*.file", "cloud.9.seed", "light.*", "phase.0.frames", "", ".", "x"]
-                [..]
+            &[
+                "film.width",
+                "cloud.0.seed",
+                "cloud.*.file",
+                "cloud.9.seed",
+                "light.*",
+                "phase.0.frames",
+                "",
+                ".",
+                "x"
+            ][..]
         )
         .prop_map(str::to_owned),
         "[a-z.*0-9]{0,24}".boxed(),
     ];
-    prop_oneof![(path, odd()).prop_map(|(path, value)| format!("{path}={value}")), "\\PC{0,40}".boxed()].boxed()
+    prop_oneof![
+        (path, odd()).prop_map(|(path, value)| format!("{path}={value}")),
+        "\\PC{0,40}".boxed()
+    ]
+    .boxed()
 }

@@ -16,48 +16,54 @@ pub struct FarmArgs {
 
 #[derive(Debug, Subcommand)]
 pub enum FarmCommand {
-    /// Cut the frames of an animation, the configurations of an error study, the cases of a sweep, or a reference
-    /// picture into shards
+    /// Cut the frames of an animation, the configurations of an error study, the cases of a sweep,
+    /// or a reference picture into shards
     #[command(after_help = "An animation on this machine:\n  \
         nimbus farm plan scenes/flyby.toml --frames 0..240 --size 320x240 -o farm\n  \
         nimbus farm local --plan farm\n  nimbus farm merge --plan farm -o frames\n\n\
         A study of 60 configurations, as `nimbus error` makes it:\n  \
-        nimbus farm plan scenes/study-cloud.toml -o farm --error -- --grid --knob draw.cutoff=2,2.5,3,3.5,4 \\\n      \
+        nimbus farm plan scenes/study-cloud.toml -o farm --error -- --grid --knob \
+        draw.cutoff=2,2.5,3,3.5,4 \\\n      \
         --knob lighting.grid=16,24,32,48 --knob lighting.step=1,0.75,0.5\n\n\
         A sweep of 12 cases, as `nimbus bench` times it:\n  \
-        nimbus farm plan scenes/cubes-554.toml -o farm --bench --shard-cases 4 -- --repeat 4 \\\n      \
+        nimbus farm plan scenes/cubes-554.toml -o farm --bench --shard-cases 4 -- --repeat \
+        4 \\\n      \
         --sweep draw.particles=500,5000,50000 --sweep size=400x300,800x600,1024x768,1600x1200\n\n\
         A picture in f64 of 64 samples a pixel, as `nimbus render --reference` draws it:\n  \
-        nimbus farm plan scenes/study-light.toml -o farm --reference model --samples 64 --tile 80x60")]
+        nimbus farm plan scenes/study-light.toml -o farm --reference model --samples 64 \
+        --tile 80x60")]
     Plan(Box<PlanArgs>),
     /// Time a few frames of scenes here and fit the cost model that plans are made with
     ///
-    /// t = setup + d · steps + a · particles · steps + g · cells of the density grid + b · layers of pixels + c · facet
-    /// pairs + e · textures, by non-negative least squares of relative errors over runs of one frame and of several at
-    /// three sizes, each timed as a shard is. It is for this class of devices; scenes like those to come make it good.
-    /// What it is off by for runs that it has not seen is said (each left out in turn).
+    /// t = setup + d · steps + a · particles · steps + g · cells of the density grid + b · layers
+    /// of pixels + c · facet pairs + e · textures, by non-negative least squares of relative errors
+    /// over runs of one frame and of several at three sizes, each timed as a shard is. It is for
+    /// this class of devices; scenes like those to come make it good. What it is off by for runs
+    /// that it has not seen is said (each left out in turn).
     Calibrate(CalibrateArgs),
     /// Do one shard, unless it is done
     ///
-    /// Exit codes: 0 done, by whomever; 75 it went wrong in a way that may pass (full disk, lost device, a signal):
-    /// another try may go well; 70 the result differs from one that is there; others as everywhere: another try is of
-    /// no use.
+    /// Exit codes: 0 done, by whomever; 75 it went wrong in a way that may pass (full disk, lost
+    /// device, a signal): another try may go well; 70 the result differs from one that is there;
+    /// others as everywhere: another try is of no use.
     Run(RunArgs),
     /// Do all shards that are not done, here, some processes at a time
     Local(LocalArgs),
-    /// Say what is done and what is not; reads and verifies every result, and asks the engine for 10 s at most
+    /// Say what is done and what is not; reads and verifies every result, and asks the engine for
+    /// 10 s at most
     Status(StatusArgs),
     /// Put all results together, as one machine would have made them
     ///
-    /// Every result is verified before and every copy after. Where a shard is missing nothing is written, and it is
-    /// named.
+    /// Every result is verified before and every copy after. Where a shard is missing nothing is
+    /// written, and it is named.
     Merge(MergeArgs),
     /// Remove what attempts have left behind
     Gc(GcArgs),
-    /// Write job files for an engine: a task for every shard that is not done, and the merge after them
-    Emit(EmitArgs),
-    /// Hand all shards that are not done to an engine, and the merge after them; prints its ids, and `status` follows
+    /// Write job files for an engine: a task for every shard that is not done, and the merge after
     /// them
+    Emit(EmitArgs),
+    /// Hand all shards that are not done to an engine, and the merge after them; prints its ids,
+    /// and `status` follows them
     Submit(SubmitArgs),
 }
 
@@ -71,14 +77,15 @@ pub struct PlanArgs {
     /// Frames: FIRST..END (END is not drawn) or how many from 0 [default: the scene's]
     #[arg(long, value_name = "FIRST..END", value_parser = parse_span)]
     pub frames: Option<Span>,
-    /// The configurations of an error study in place of frames; what follows "--" is what `nimbus error` takes
+    /// The configurations of an error study in place of frames; what follows "--" is what `nimbus
+    /// error` takes
     #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format"])]
     pub error: bool,
     /// The cases of a sweep in place of frames; what follows "--" is what `nimbus bench` takes
     #[arg(long, group = "told-more", conflicts_with_all = ["frames", "shard_frames", "format"])]
     pub bench: bool,
-    /// A picture in f64 in place of frames, as `nimbus render --reference` draws it: thin, volume, model or
-    /// reflections=K
+    /// A picture in f64 in place of frames, as `nimbus render --reference` draws it: thin, volume,
+    /// model or reflections=K
     #[arg(long, value_name = "WHICH", conflicts_with_all = ["frames", "shard_frames", "error", "bench"])]
     pub reference: Option<Against>,
     /// The reference's frame
@@ -90,23 +97,24 @@ pub struct PlanArgs {
     /// Size of its tiles, pixels [default: 256x256, or by --model]
     #[arg(long, value_name = "WxH", requires = "reference", value_parser = parse_size)]
     pub tile: Option<(u32, u32)>,
-    /// Samples of a shard, a power of two: then all shards' sums are the bits of one machine's [default: 16, or by
-    /// --model]
+    /// Samples of a shard, a power of two: then all shards' sums are the bits of one machine's
+    /// [default: 16, or by --model]
     #[arg(long, value_name = "N", requires = "reference", value_parser = parse_power)]
     pub shard_samples: Option<u32>,
-    /// Configurations of a shard, with --error [default: 8, or by --model]. Each shard times the scene as it stands as
-    /// well
+    /// Configurations of a shard, with --error [default: 8, or by --model]. Each shard times the
+    /// scene as it stands as well
     #[arg(long, value_name = "N", requires = "error", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_configurations: Option<u32>,
-    /// Cases of a shard, with --bench [default: 8, or by --model]. Each shard times the first case of all as well
+    /// Cases of a shard, with --bench [default: 8, or by --model]. Each shard times the first case
+    /// of all as well
     #[arg(long, value_name = "N", requires = "bench", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_cases: Option<u32>,
-    /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers once a shard: few
-    /// make it slow, many lose more when it is killed
+    /// Frames of a shard [default: 16, or by --model]. A run opens the device and fills its buffers
+    /// once a shard: few make it slow, many lose more when it is killed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub shard_frames: Option<u32>,
-    /// What `nimbus farm calibrate` wrote: shards are cut to take 1 to 10 minutes, and what all of them will take and
-    /// cost is said
+    /// What `nimbus farm calibrate` wrote: shards are cut to take 1 to 10 minutes, and what all of
+    /// them will take and cost is said
     #[arg(long, value_name = "FILE", help_heading = "Cost")]
     pub model: Option<PathBuf>,
     /// Nodes that are to share the work, by --model [default: 4]
@@ -152,8 +160,8 @@ pub struct PlanArgs {
     /// Folder with shaders that replace those built in
     #[arg(long, value_name = "DIR", help_heading = "Device")]
     pub shaders: Option<PathBuf>,
-    /// Vulkan device of every run, by index or part of its name: a node without it refuses the work. `farm run
-    /// --device` says otherwise for one
+    /// Vulkan device of every run, by index or part of its name: a node without it refuses the
+    /// work. `farm run --device` says otherwise for one
     #[arg(long, value_name = "INDEX|NAME", conflicts_with = "reference", help_heading = "Device")]
     pub device: Option<String>,
     /// Print the plan as JSON, with each shard's arguments and outputs
@@ -198,7 +206,8 @@ pub struct CalibrateArgs {
     /// Scene files whose frames are timed
     #[arg(required_unless_present = "farm", conflicts_with = "farm", value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
-    /// Fit to the shards of a farm that is done (repeatable): the way to a model of studies, benches and references
+    /// Fit to the shards of a farm that is done (repeatable): the way to a model of studies,
+    /// benches and references
     #[arg(long, value_name = "DIR", conflicts_with_all = ["frames", "set", "device"])]
     pub farm: Vec<PathBuf>,
     /// File for the model
@@ -238,8 +247,8 @@ pub struct RunArgs {
     /// Say nothing but errors
     #[arg(short, long)]
     pub quiet: bool,
-    /// In a task of Slurm: where it has failed so often in a row without finishing anything, it ends with 1 in place of
-    /// 75
+    /// In a task of Slurm: where it has failed so often in a row without finishing anything, it
+    /// ends with 1 in place of 75
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub tries: Option<u32>,
     /// Which shard, from 0
@@ -300,7 +309,8 @@ pub struct GcArgs {
     /// The plan's folder
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
-    /// Remove unfinished folders of shards that are not done, too, where nothing has happened for so many hours
+    /// Remove unfinished folders of shards that are not done, too, where nothing has happened for
+    /// so many hours
     #[arg(long, value_name = "HOURS", default_value_t = 24.0, value_parser = super::parse_positive)]
     pub idle: f64,
     /// Also what was put aside: broken results, and those that differ from the one that is there
@@ -333,16 +343,17 @@ pub struct JobArgs {
     /// The plan's folder
     #[arg(long, value_name = "DIR")]
     pub plan: PathBuf,
-    /// Folder for the merged result [default: "merged" in the plan's folder]. What an earlier merge left there is
-    /// replaced (jobs merge with --force)
+    /// Folder for the merged result [default: "merged" in the plan's folder]. What an earlier merge
+    /// left there is replaced (jobs merge with --force)
     #[arg(short, long, value_name = "DIR")]
     pub output: Option<PathBuf>,
-    /// So often a shard, or the merge, is tried that fails in a way that may pass. With Slurm a shard's failures count
-    /// in a row, and one that finished frames ends the row; nodes that die do not count, but for the merge
+    /// So often a shard, or the merge, is tried that fails in a way that may pass. With Slurm a
+    /// shard's failures count in a row, and one that finished frames ends the row; nodes that die
+    /// do not count, but for the merge
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..))]
     pub tries: u32,
-    /// An option for sbatch of the shards, e.g. --sbatch=--gres=gpu:1 (repeatable). The merge has those that say where
-    /// and for whom (--account, --partition, --qos, --reservation), too
+    /// An option for sbatch of the shards, e.g. --sbatch=--gres=gpu:1 (repeatable). The merge has
+    /// those that say where and for whom (--account, --partition, --qos, --reservation), too
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true)]
     pub sbatch: Vec<String>,
     /// An option for sbatch of the merge, after those (repeatable)
@@ -379,18 +390,30 @@ pub(super) fn parse_span(text: &str) -> Result<Span, String> {
         Some((first, end)) => Span { first: number(first)?, end: number(end)? },
         None => Span { first: 0, end: number(text)? },
     };
-    if span.first < span.end { Ok(span) } else { Err(format!("{}: there is nothing in it", wrong())) }
+    if span.first < span.end {
+        Ok(span)
+    } else {
+        Err(format!("{}: there is nothing in it", wrong()))
+    }
 }
 
 fn parse_power(text: &str) -> Result<u32, String> {
     let n = text.parse().ok().filter(|n: &u32| n.is_power_of_two() && *n <= MOST_SAMPLES);
-    n.ok_or_else(|| format!("expected a power of two such as 16, up to {MOST_SAMPLES}, found \"{text}\""))
+    n.ok_or_else(|| {
+        format!("expected a power of two such as 16, up to {MOST_SAMPLES}, found \"{text}\"")
+    })
 }
 
 fn parse_lengths(text: &str) -> Result<(f64, f64), String> {
-    let wrong = || format!("expected LEAST,MOST such as 60,600, seconds from 0 and in this order, found \"{text}\"");
+    let wrong = || {
+        format!(
+            "expected LEAST,MOST such as 60,600, seconds from 0 and in this order, found \"{text}\""
+        )
+    };
     let (least, most) = text.split_once(',').ok_or_else(wrong)?;
-    let number = |t: &str| t.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(wrong);
+    let number = |t: &str| {
+        t.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v >= 0.0).ok_or_else(wrong)
+    };
     let (least, most) = (number(least)?, number(most)?);
     if least <= most && most > 0.0 { Ok((least, most)) } else { Err(wrong()) }
 }
@@ -413,7 +436,8 @@ mod tests {
         use clap::Parser;
         let plan = |more: &str| {
             let line = format!("nimbus farm plan a.toml -o b {more}");
-            crate::cli::args::Args::try_parse_from(line.split_whitespace()).map_err(|cause| cause.to_string())
+            crate::cli::args::Args::try_parse_from(line.split_whitespace())
+                .map_err(|cause| cause.to_string())
         };
         for (wrong, missing) in [
             ("--nodes 3", "--model"),
@@ -427,9 +451,11 @@ mod tests {
             let said = plan(wrong).unwrap_err();
             assert!(said.contains(missing), "{wrong}: {said}");
         }
-        for right in
-            ["", "--model m --nodes 3 --shard-seconds 1,2 --rate 2 --quantum 60 --retries 0.1", "--error -- --grid"]
-        {
+        for right in [
+            "",
+            "--model m --nodes 3 --shard-seconds 1,2 --rate 2 --quantum 60 --retries 0.1",
+            "--error -- --grid",
+        ] {
             assert!(plan(right).is_ok(), "{right}");
         }
     }

@@ -16,7 +16,8 @@ use super::{parse_limit, parse_positive};
     nimbus render scenes/hello.toml --reference thin -o thin.exr\n  \
     nimbus render scenes/hello.toml -o drawn.exr\n  \
     nimbus compare thin.exr drawn.exr --fail-above rmse=1e-3 --fail-below ssim=0.99\n\n\
-    Exit codes: 0 compared, whatever the verdict; 1 a metric is beyond --fail-above or --fail-below;\n  \
+    Exit codes: 0 compared, whatever the verdict; 1 a metric is beyond --fail-above or \
+    --fail-below;\n  \
     2 not comparable, or neither results of nimbus bench nor pictures.")]
 pub struct CompareArgs {
     /// Results folder (`nimbus bench --out DIR`) or picture to measure by
@@ -24,7 +25,13 @@ pub struct CompareArgs {
     /// Results folder that may be faster or slower, or picture that may be off
     pub b: PathBuf,
     /// What may differ between A and B; anything else that does is refused
-    #[arg(long, value_enum, value_delimiter = ',', value_name = "WHAT,…", help_heading = "Results")]
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        value_name = "WHAT,…",
+        help_heading = "Results"
+    )]
     pub allow: Vec<SamenessArg>,
     /// Write every pixel's FLIP error as a picture, dark for none
     #[arg(short, long, value_name = "FILE.png", help_heading = "Pictures")]
@@ -35,7 +42,8 @@ pub struct CompareArgs {
     /// Pixels that a degree of the eye's field of view sees, for FLIP [default: 67]
     #[arg(long, value_name = "N", value_parser = parse_positive, help_heading = "Pictures")]
     pub pixels_per_degree: Option<f64>,
-    /// Exit with 1 where a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or not_finite (repeatable)
+    /// Exit with 1 where a metric is greater: rmse, max, relmse, flip, alpha_rmse, alpha_max or
+    /// not_finite (repeatable)
     #[arg(long, value_name = "METRIC=VALUE", value_parser = parse_limit, help_heading = "Pictures")]
     pub fail_above: Vec<(String, f64)>,
     /// Exit with 1 where a metric is less: psnr or ssim (repeatable)
@@ -64,7 +72,8 @@ pub enum SamenessArg {
     nimbus bench scenes/threads.toml --out before\n  \
     nimbus bench scenes/threads.toml --set lighting.grid=64 --out after\n  \
     nimbus report before after -o change.html\n\n\
-    Exit codes: 0 written; 2 a folder without results, results of another schema, or a page that exists already.")]
+    Exit codes: 0 written; 2 a folder without results, results of another schema, or a page that \
+    exists already.")]
 pub struct ReportArgs {
     /// Folders of results, or run.json, study.json or ledger.json in one
     #[arg(required = true, value_name = "RUN")]

@@ -6,7 +6,8 @@ use clap::Args as ClapArgs;
 
 #[derive(Debug, ClapArgs)]
 #[command(
-    after_help = "Examples:\n  nimbus stress\n  nimbus stress --list\n  nimbus stress functions compositing/thin-tiles\n  \
+    after_help = "Examples:\n  nimbus stress\n  nimbus stress --list\n  nimbus stress functions \
+        compositing/thin-tiles\n  \
     nimbus stress --json --validation > stress.json\n  nimbus stress --shaders my-shaders functions"
 )]
 pub struct StressArgs {

@@ -10,17 +10,21 @@ use crate::study::against::Against;
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
     nimbus error scenes/study-cloud.toml\n  \
-    nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 --knob lighting.theta=0.2,0.4,0.8 --grid\n  \
+    nimbus error scenes/study-light.toml --knob lighting.bases=2,4,8,16 --knob \
+    lighting.theta=0.2,0.4,0.8 --grid\n  \
     nimbus error scenes/study-cloud.toml --out cloud --budget-ms 5 --budget-error 0.01\n  \
     nimbus error scenes/study-cloud.toml --out cloud --resume --knob draw.cutoff=2.2,2.7\n\n\
-    Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept in --out.")]
+    Exit codes: 0 done; 2 bad input; 3 device or driver; 130 interrupted, what was finished is \
+    kept in --out.")]
 pub struct ErrorArgs {
     /// Scene file
     pub scene: PathBuf,
-    /// Values of a key, e.g. draw.cutoff=2,3 or 'surface.*.subdivide=[4,4],[8,8]' (repeatable) [default: every knob that can change the scene]
+    /// Values of a key, e.g. draw.cutoff=2,3 or 'surface.*.subdivide=[4,4],[8,8]' (repeatable)
+    /// [default: every knob that can change the scene]
     #[arg(long, value_name = "KEY=VALUE,…", help_heading = "Knobs")]
     pub knob: Vec<String>,
-    /// All combinations of the knobs; else each value alone, then what saves time for little error put together
+    /// All combinations of the knobs; else each value alone, then what saves time for little error
+    /// put together
     #[arg(long, requires = "knob", help_heading = "Knobs")]
     pub grid: bool,
     /// What pictures are compared with: thin, volume, model or reflections=K
@@ -32,7 +36,8 @@ pub struct ErrorArgs {
     /// The error that decides who is on the front
     #[arg(long, value_enum, default_value = "rmse", help_heading = "Error")]
     pub metric: MetricArg,
-    /// The reference is computed at so many pixels at most, spread over the picture; "all" for every one
+    /// The reference is computed at so many pixels at most, spread over the picture; "all" for
+    /// every one
     #[arg(long, value_name = "N", default_value = "16384", value_parser = parse_pixels, help_heading = "Error")]
     pub pixels: usize,
     /// The frame that is drawn and compared, and the first that is timed
@@ -56,7 +61,8 @@ pub struct ErrorArgs {
     /// Say what is the fastest within such an error (repeatable)
     #[arg(long, value_name = "ERROR", value_parser = parse_positive, help_heading = "Budgets")]
     pub budget_error: Vec<f64>,
-    /// Only these of the configurations, counted from 0, and the scene as it stands; nothing is put together. What the nodes of a farm run
+    /// Only these of the configurations, counted from 0, and the scene as it stands; nothing is put
+    /// together. What the nodes of a farm run
     #[arg(long, value_name = "FIRST..END", value_parser = super::farm::parse_span, requires = "out", hide_short_help = true)]
     pub part: Option<super::Span>,
     /// Folder for study.json, configurations.csv, times.csv, front.svg and pictures
@@ -85,7 +91,8 @@ pub struct ErrorArgs {
 #[command(after_help = "Examples:\n  \
     nimbus ledger scenes/study-both.toml\n  \
     nimbus ledger scenes/cubes-554.toml --plain --size 200x150 --out ledger\n\n\
-    Exit codes: 0 done; 1 the rows do not sum up; 2 bad input; 3 device or driver; 130 interrupted, what was finished is kept.")]
+    Exit codes: 0 done; 1 the rows do not sum up; 2 bad input; 3 device or driver; 130 \
+    interrupted, what was finished is kept.")]
 pub struct LedgerArgs {
     /// Scene file
     pub scene: PathBuf,

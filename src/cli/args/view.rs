@@ -10,7 +10,8 @@ use super::SceneArgs;
 pub struct ViewArgs {
     /// Scene file (TOML)
     pub scene: PathBuf,
-    /// When pictures are shown: at the next refresh in order, at the next refresh the newest, at once
+    /// When pictures are shown: at the next refresh in order, at the next refresh the newest, at
+    /// once
     #[arg(long, value_name = "MODE", default_value = "fifo")]
     pub present: PresentArg,
     /// Close the window after so many frames

@@ -6,7 +6,8 @@ use clap::Args as ClapArgs;
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "What is in a file, and one of its steps alone:\n  \
-    nimbus weather scenes/weather/katrina.nc\n  nimbus weather scenes/weather/supercell.nc --step 2\n\n\
+    nimbus weather scenes/weather/katrina.nc\n  nimbus weather scenes/weather/supercell.nc --step \
+    2\n\n\
     The greatest optical depth of every step:\n  \
     nimbus weather scenes/weather/katrina.nc --json | jq '.steps[].clouds.greatest_depth'\n\n\
     Exit codes: 0 done; 2 no such file, or none that clouds can be made of.")]

@@ -7,11 +7,13 @@ fn tolerance(n_rows: usize, n_columns: usize) -> f64 {
 }
 
 fn residual(columns: &[Vec<f64>], b: &[f64], x: &[f64]) -> Vec<f64> {
-    (0..b.len()).map(|i| b[i] - columns.iter().zip(x).map(|(column, x)| column[i] * x).sum::<f64>()).collect()
+    (0..b.len())
+        .map(|i| b[i] - columns.iter().zip(x).map(|(column, x)| column[i] * x).sum::<f64>())
+        .collect()
 }
 
-/// The conditions of Karush, Kuhn and Tucker, which a least distance over x ≥ 0 has and nothing else: the gradient is 0
-/// where x > 0, and leads outward where x = 0.
+/// The conditions of Karush, Kuhn and Tucker, which a least distance over x ≥ 0 has and nothing
+/// else: the gradient is 0 where x > 0, and leads outward where x = 0.
 fn assert_least(columns: &[Vec<f64>], b: &[f64], x: &[f64]) {
     let left = residual(columns, b, x);
     let lengths: Vec<f64> = columns.iter().map(|column| length(column)).collect();
@@ -21,8 +23,16 @@ fn assert_least(columns: &[Vec<f64>], b: &[f64], x: &[f64]) {
         let gradient = inner(column, &left);
         let allowed = tolerance * size * lengths[j];
         assert!(x[j] >= 0.0 && x[j].is_finite(), "x[{j}] = {}", x[j]);
-        assert!(gradient <= allowed, "column {j}: {gradient:e} of {allowed:e} allowed, x = {:?}", x);
-        assert!(x[j] == 0.0 || gradient >= -allowed, "column {j}: {gradient:e} of {allowed:e} allowed, x = {:?}", x);
+        assert!(
+            gradient <= allowed,
+            "column {j}: {gradient:e} of {allowed:e} allowed, x = {:?}",
+            x
+        );
+        assert!(
+            x[j] == 0.0 || gradient >= -allowed,
+            "column {j}: {gradient:e} of {allowed:e} allowed, x = {:?}",
+            x
+        );
     }
 }
 
@@ -36,7 +46,8 @@ fn problems(seed: u64, n: usize) -> impl Iterator<Item = (Vec<Vec<f64>>, Vec<f64
     })
 }
 
-/// Columns `set` of the normal equations by elimination with pivots, or None where they depend on one another.
+/// Columns `set` of the normal equations by elimination with pivots, or None where they depend on
+/// one another.
 fn by_normal_equations(columns: &[Vec<f64>], b: &[f64], set: usize) -> Option<Vec<f64>> {
     let set: Vec<usize> = (0..columns.len()).filter(|j| set >> j & 1 == 1).collect();
     let n = set.len();
@@ -72,17 +83,18 @@ fn a_line_through_three_points_by_hand() {
 
 #[test]
 fn a_line_that_would_begin_below_zero_begins_at_it() {
-    // Heights 0, 1, 3 over 0, 1, 2: slope 3/2 and height 4/3 − 3/2 = −1/6. Without a height the slope is
-    // (0·0 + 1·1 + 2·3)/(0 + 1 + 4) = 7/5, and the height's gradient 4 − 3 · 7/5 < 0.
+    // Heights 0, 1, 3 over 0, 1, 2: slope 3/2 and height 4/3 − 3/2 = −1/6. Without a height the
+    // slope is (0·0 + 1·1 + 2·3)/(0 + 1 + 4) = 7/5, and the height's gradient 4 − 3 · 7/5 < 0.
     let x = solve(&[vec![1.0; 3], vec![0.0, 1.0, 2.0]], &[0.0, 1.0, 3.0]).unwrap();
     assert!(x[0] == 0.0 && (x[1] - 1.4).abs() < 1e-14, "{x:?}");
 }
 
 #[test]
 fn a_column_goes_out_again_by_hand() {
-    // b = (1, 1, −1/10) is nearest by angle to (1, 1, 1/10), which enters first; what is left then points along
-    // (1, 0, 0), after that along (0, 1, 0). The three together are b with −1, 11/10 and 11/10, so the first goes out:
-    // (0, 1, 1), and what is left, (0, 0, −1/10), has the gradient −1/100 along it.
+    // b = (1, 1, −1/10) is nearest by angle to (1, 1, 1/10), which enters first; what is left then
+    // points along (1, 0, 0), after that along (0, 1, 0). The three together are b with −1, 11/10
+    // and 11/10, so the first goes out: (0, 1, 1), and what is left, (0, 0, −1/10), has the
+    // gradient −1/100 along it.
     let columns = [vec![1.0, 1.0, 0.1], vec![1.0, 0.0, 0.0], vec![0.0, 1.0, 0.0]];
     let b = [1.0, 1.0, -0.1];
     let x = solve(&columns, &b).unwrap();
@@ -149,7 +161,8 @@ fn it_is_the_least_of_all_sets_of_columns() {
         let best = allowed.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
         // Pivots of 1e-6 leave 1e-10 of a coefficient, and coefficients of a thousand at most.
         assert!(distance(&x) < distance(&best) + 1e-7 * length(&b), "{x:?} for {best:?}");
-        // No set was left out where all columns are well apart, and then the nearest point is one alone.
+        // No set was left out where all columns are well apart, and then the nearest point is one
+        // alone.
         if by_normal_equations(&columns, &b, (1 << columns.len()) - 1).is_some() {
             n_compared += 1;
             let to_best: Vec<f64> = best.iter().zip(&x).map(|(best, x)| best - x).collect();
@@ -166,11 +179,16 @@ fn units_do_not_matter() {
         // Powers of two of 1 to about 1e12, by which nothing rounds but the lengths.
         let scale = |j: usize| 2f64.powi((7 * (i + j) % 41) as i32);
         let other = |j: usize, column: &Vec<f64>| column.iter().map(|a| a * scale(j)).collect();
-        let scaled: Vec<Vec<f64>> = columns.iter().enumerate().map(|(j, column)| other(j, column)).collect();
+        let scaled: Vec<Vec<f64>> =
+            columns.iter().enumerate().map(|(j, column)| other(j, column)).collect();
         let (x, y) = (solve(&columns, &b).unwrap(), solve(&scaled, &b).unwrap());
         assert_least(&scaled, &b, &y);
         if columns.len() <= b.len() {
-            let agree = x.iter().zip(&y).enumerate().all(|(j, (x, y))| (x - y * scale(j)).abs() <= 1e-9 * (1.0 + x));
+            let agree = x
+                .iter()
+                .zip(&y)
+                .enumerate()
+                .all(|(j, (x, y))| (x - y * scale(j)).abs() <= 1e-9 * (1.0 + x));
             assert!(agree, "{x:?} and {y:?}");
         }
     }
@@ -181,10 +199,13 @@ fn columns_of_seconds_and_of_pixels_give_their_coefficients_back() {
     // Set-ups, and counts around 1e6, 1e9 and 1e12; coefficients as of a device.
     let mut random = SplitMix64(4);
     let sizes = [1.0, 1e6, 1e9, 1e12];
-    let columns: Vec<Vec<f64>> =
-        sizes.iter().map(|size| normal(&mut random, 12).iter().map(|z| size * z.exp()).collect()).collect();
+    let columns: Vec<Vec<f64>> = sizes
+        .iter()
+        .map(|size| normal(&mut random, 12).iter().map(|z| size * z.exp()).collect())
+        .collect();
     let truth = [3.0, 2e-7, 4e-9, 1e-12];
-    let b: Vec<f64> = (0..12).map(|i| columns.iter().zip(truth).map(|(column, x)| column[i] * x).sum()).collect();
+    let b: Vec<f64> =
+        (0..12).map(|i| columns.iter().zip(truth).map(|(column, x)| column[i] * x).sum()).collect();
     let x = solve(&columns, &b).unwrap();
     for (x, truth) in x.iter().zip(truth) {
         // A condition of about ten, beside 4 · 12 · 4 ε = 4e-14.
@@ -231,6 +252,8 @@ fn what_is_no_number_is_refused() {
         assert!(solve(&[vec![1.0, bad]], &[1.0, 1.0]).unwrap_err().contains("expected finite"));
         assert!(solve(&[vec![1.0, 1.0]], &[bad, 1.0]).unwrap_err().contains("expected finite"));
     }
-    assert!(solve(&[vec![1.0]], &[1.0, 1.0]).unwrap_err().contains("a column of 1 rows, expected 2"));
+    assert!(
+        solve(&[vec![1.0]], &[1.0, 1.0]).unwrap_err().contains("a column of 1 rows, expected 2")
+    );
     assert!(solve(&vec![vec![1.0]; 9], &[1.0]).unwrap_err().contains("expected at most 8"));
 }

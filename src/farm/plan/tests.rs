@@ -28,7 +28,9 @@ fn keys_follow_from_all_that_a_result_follows_from() {
     let mut others = vec![key(&plan), plan.shards[1].key.clone()];
     others.push(key(&Plan::new(wish(&[3, 5])).unwrap()));
     others.push(key(&Plan::new(Wish { seed: Some(9), ..wish(&[4, 4]) }).unwrap()));
-    others.push(key(&Plan::new(Wish { set: vec!["film.width=64".into()], ..wish(&[4, 4]) }).unwrap()));
+    others.push(key(
+        &Plan::new(Wish { set: vec!["film.width=64".into()], ..wish(&[4, 4]) }).unwrap()
+    ));
     let exr = Work::Frames { first: 3, n: 8, format: PictureFormat::Exr };
     others.push(key(&Plan::new(Wish { work: exr, ..wish(&[4, 4]) }).unwrap()));
     let (mut built, mut shaded) = (plan.clone(), plan.clone());

@@ -1,8 +1,13 @@
 use super::*;
 use crate::measure::random::{SplitMix64, normal};
 
-/// What a way to cut is judged by: shards too short, and how many; None where one is too long and not an item alone.
-fn judged(item_s: &[f64], shards: &[Range<usize>], limits: (f64, f64, f64)) -> Option<(usize, usize)> {
+/// What a way to cut is judged by: shards too short, and how many; None where one is too long and
+/// not an item alone.
+fn judged(
+    item_s: &[f64],
+    shards: &[Range<usize>],
+    limits: (f64, f64, f64),
+) -> Option<(usize, usize)> {
     let (setup_s, shortest_s, longest_s) = limits;
     let mut n_short = 0;
     for shard in shards {
@@ -40,7 +45,8 @@ fn items(random: &mut SplitMix64, n: usize, middle: f64) -> Vec<f64> {
 
 #[test]
 fn even_items_by_hand() {
-    // 120 frames of 10 s, a set-up of 20 s, at most 600 s: 58 frames fit, so 3 shards, so 4 on four nodes.
+    // 120 frames of 10 s, a set-up of 20 s, at most 600 s: 58 frames fit, so 3 shards, so 4 on four
+    // nodes.
     let shards = split(&[10.0; 120], 20.0, 60.0, 600.0, 4);
     assert_eq!(shards, [0..30, 30..60, 60..90, 90..120]);
     // On one node 3, on two again 4, on 40 nodes as many as reach 60 s: 4 frames each, 30 shards.
@@ -61,7 +67,10 @@ fn a_long_item_is_alone() {
     assert_eq!(split(&[100.0, 900.0, 100.0], 0.0, 60.0, 600.0, 1), [0..1, 1..2, 2..3]);
     // And so is every one where a set-up alone is too long.
     assert_eq!(split(&[1.0; 3], 700.0, 60.0, 600.0, 1), [0..1, 1..2, 2..3]);
-    assert_eq!(split(&[f64::INFINITY, 10.0, f64::INFINITY], 0.0, 5.0, 600.0, 1), [0..1, 1..2, 2..3]);
+    assert_eq!(
+        split(&[f64::INFINITY, 10.0, f64::INFINITY], 0.0, 5.0, 600.0, 1),
+        [0..1, 1..2, 2..3]
+    );
 }
 
 #[test]
@@ -75,7 +84,8 @@ fn no_shard_is_short_where_another_cut_avoids_it() {
 
 #[test]
 fn there_are_no_more_shards_than_needed_where_an_even_cut_would_make_one() {
-    // 27 s in three are 9 each. 8.5 is nearer to it than 8.5 + 1.5, but then 1.5 + 9.5 are too long.
+    // 27 s in three are 9 each. 8.5 is nearer to it than 8.5 + 1.5, but then 1.5 + 9.5 are too
+    // long.
     assert_eq!(split(&[8.5, 1.5, 9.5, 7.5], 0.0, 0.0, 10.0, 1), [0..2, 2..3, 3..4]);
 }
 
@@ -92,14 +102,23 @@ fn of_all_ways_to_cut_none_has_fewer_short_shards() {
     for i in 0..6000 {
         let (n, n_nodes) = (1 + i % 10, 1 + i / 10 % 5);
         let item_s = items(&mut random, n, [2.0, 6.0, 20.0][i % 3]);
-        let limits = ([0.0, 3.0, 12.0][i / 3 % 3], [5.0, 10.0, 25.0][i / 9 % 3], [12.0, 25.0, 60.0][i / 27 % 3]);
+        let limits = (
+            [0.0, 3.0, 12.0][i / 3 % 3],
+            [5.0, 10.0, 25.0][i / 9 % 3],
+            [12.0, 25.0, 60.0][i / 27 % 3],
+        );
         let shards = split(&item_s, limits.0, limits.1, limits.2, n_nodes);
         assert_covers(&shards, n);
         // The shortest is never above the longest.
-        let (n_short, n_shards) = judged(&item_s, &shards, (limits.0, limits.1.min(limits.2), limits.2)).unwrap();
-        let (fewest_short, most) = best_of_all(&item_s, (limits.0, limits.1.min(limits.2), limits.2));
+        let (n_short, n_shards) =
+            judged(&item_s, &shards, (limits.0, limits.1.min(limits.2), limits.2)).unwrap();
+        let (fewest_short, most) =
+            best_of_all(&item_s, (limits.0, limits.1.min(limits.2), limits.2));
         assert_eq!(n_short, fewest_short, "{shards:?} of {item_s:?} within {limits:?}");
-        assert!(n_shards >= n_nodes.min(most), "{shards:?} of {item_s:?} within {limits:?} on {n_nodes}, {most}");
+        assert!(
+            n_shards >= n_nodes.min(most),
+            "{shards:?} of {item_s:?} within {limits:?} on {n_nodes}, {most}"
+        );
         if n_short == 0 { n_without += 1 } else { n_with_short += 1 }
     }
     assert!(n_with_short > 500 && n_without > 500, "{n_with_short} and {n_without}");
@@ -110,17 +129,23 @@ fn long_lists_are_covered_once_within_the_limits_and_evenly() {
     let mut random = SplitMix64(2);
     for i in 0..40 {
         // Items of a few seconds, of which every shard has dozens.
-        let item_s: Vec<f64> = items(&mut random, 3000, 3.0).iter().map(|seconds| seconds.min(30.0)).collect();
+        let item_s: Vec<f64> =
+            items(&mut random, 3000, 3.0).iter().map(|seconds| seconds.min(30.0)).collect();
         let n_nodes = 1 + i * 3;
         let shards = split(&item_s, 10.0, 60.0, 600.0, n_nodes);
         assert_covers(&shards, item_s.len());
-        let seconds: Vec<f64> = shards.iter().map(|shard| 10.0 + item_s[shard.clone()].iter().sum::<f64>()).collect();
+        let seconds: Vec<f64> =
+            shards.iter().map(|shard| 10.0 + item_s[shard.clone()].iter().sum::<f64>()).collect();
         assert!(seconds.iter().all(|seconds| (60.0..=600.0).contains(seconds)), "{seconds:?}");
         let total: f64 = item_s.iter().sum();
         assert_eq!(shards.len() % n_nodes, 0, "{} on {n_nodes}", shards.len());
-        // Nearest to an even share of what is left: half an item off, of which the others bear their parts.
+        // Nearest to an even share of what is left: half an item off, of which the others bear
+        // their parts.
         let even = 10.0 + total / shards.len() as f64;
-        assert!(seconds.iter().all(|seconds| (seconds - even).abs() <= 30.0), "{seconds:?} for {even}");
+        assert!(
+            seconds.iter().all(|seconds| (seconds - even).abs() <= 30.0),
+            "{seconds:?} for {even}"
+        );
         assert_eq!(shards, split(&item_s, 10.0, 60.0, 600.0, n_nodes));
     }
 }

@@ -8,7 +8,8 @@ use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors};
 /// What a knob's values make other than the time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Changes {
-    /// Every value draws the same law and rounds otherwise: the picture of the one that is taken is the exact one.
+    /// Every value draws the same law and rounds otherwise: the picture of the one that is taken is
+    /// the exact one.
     Rounding,
     /// Nothing, but for what rounds of `tiles` and several chunks may round.
     Nothing,
@@ -21,8 +22,8 @@ pub struct Knob {
     pub key: &'static str,
     pub changes: Changes,
     pub is_auto: fn(&Draw) -> bool,
-    /// What may be taken where the other knobs are as they are, to begin with what changes nothing, then in order of what they
-    /// may change.
+    /// What may be taken where the other knobs are as they are, to begin with what changes nothing,
+    /// then in order of what they may change.
     pub values: fn(&Draw) -> Vec<Draw>,
     /// A value as scene files have it.
     pub name: fn(&Draw) -> String,
@@ -40,7 +41,9 @@ pub const KNOBS: [Knob; 6] = [
         key: "path",
         changes: Changes::Rounding,
         is_auto: |draw| draw.path == DrawPath::Auto,
-        values: |draw| [DrawPath::Sprites, DrawPath::Tiles].map(|path| Draw { path, ..*draw }).to_vec(),
+        values: |draw| {
+            [DrawPath::Sprites, DrawPath::Tiles].map(|path| Draw { path, ..*draw }).to_vec()
+        },
         name: |draw| named(&DrawPath::NAMES, draw.path),
     },
     Knob {
@@ -51,7 +54,9 @@ pub const KNOBS: [Knob; 6] = [
             DrawPath::Tiles => vec![*draw],
             _ => CHUNKS.map(|n| Draw { chunks: Chunks::Of(n), ..*draw }).to_vec(),
         },
-        name: |draw| if let Chunks::Of(n) = draw.chunks { n.to_string() } else { "\"auto\"".to_owned() },
+        name: |draw| {
+            if let Chunks::Of(n) = draw.chunks { n.to_string() } else { "\"auto\"".to_owned() }
+        },
     },
     Knob {
         key: "cull",
@@ -90,8 +95,8 @@ pub const KNOBS: [Knob; 6] = [
 ];
 
 impl Knob {
-    /// Whether what was tried is near enough to the exact picture. Without an error nothing is taken that might change another
-    /// frame.
+    /// Whether what was tried is near enough to the exact picture. Without an error nothing is
+    /// taken that might change another frame.
     pub fn allows(&self, tried: &Tried, error: f64) -> bool {
         match (self.changes, tried.rmse) {
             (_, None) => false,
@@ -148,7 +153,10 @@ mod tests {
             let values = (knob.values)(&exact);
             assert_eq!(values[0], exact, "{}", knob.key);
             let mut names: Vec<String> = values.iter().map(|v| knob.told(v, &exact)).collect();
-            assert!(names.iter().all(|name| !name.contains("auto") && !name.contains("with")), "{names:?}");
+            assert!(
+                names.iter().all(|name| !name.contains("auto") && !name.contains("with")),
+                "{names:?}"
+            );
             names.sort();
             names.dedup();
             assert_eq!(names.len(), values.len(), "{names:?}");
@@ -166,14 +174,24 @@ mod tests {
 
     #[test]
     fn without_an_error_nothing_is_allowed_that_may_change_a_picture() {
-        let tried = |is_first, rmse| Tried { value: String::new(), is_first, times_ms: vec![1.0], rmse };
+        let tried =
+            |is_first, rmse| Tried { value: String::new(), is_first, times_ms: vec![1.0], rmse };
         let of = |changes| KNOBS.iter().find(|k| k.changes == changes).expect("one");
-        let [rounding, nothing, picture] = [Changes::Rounding, Changes::Nothing, Changes::Picture].map(of);
+        let [rounding, nothing, picture] =
+            [Changes::Rounding, Changes::Nothing, Changes::Picture].map(of);
         let equal = tried(false, Some(0.0));
-        assert!(nothing.allows(&equal, 0.0) && !picture.allows(&equal, 0.0) && picture.allows(&equal, 1e-9));
+        assert!(
+            nothing.allows(&equal, 0.0)
+                && !picture.allows(&equal, 0.0)
+                && picture.allows(&equal, 1e-9)
+        );
         assert!(picture.allows(&tried(true, Some(0.0)), 0.0));
         let off = tried(false, Some(0.1));
-        assert!(rounding.allows(&off, 0.0) && !nothing.allows(&off, 0.01) && !picture.allows(&off, 0.01));
+        assert!(
+            rounding.allows(&off, 0.0)
+                && !nothing.allows(&off, 0.01)
+                && !picture.allows(&off, 0.01)
+        );
         assert!(!rounding.allows(&tried(false, None), 1.0));
     }
 }

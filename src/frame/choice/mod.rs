@@ -1,5 +1,6 @@
-//! What "auto" takes of the knobs of a drawing: the scene's first frame is drawn with each value that may be taken, timed, and
-//! compared with the exact picture. A further knob is a line in [`knobs`].
+//! What "auto" takes of the knobs of a drawing: the scene's first frame is drawn with each value
+//! that may be taken, timed, and compared with the exact picture. A further knob is a line in
+//! [`knobs`].
 
 pub mod impostors;
 mod knobs;
@@ -17,9 +18,10 @@ pub use rule::{Choice, Tried};
 use trial::Trial;
 
 impl Renderer {
-    /// Settles every "auto" of `scene`, which `game` plays, one knob after the other, each with what was taken before
-    /// in force; all errors are by the one exact picture, so that those of all knobs together stay within `draw.error`. What is
-    /// drawn by from now on, and what was tried. The next frame is like a first one.
+    /// Settles every "auto" of `scene`, which `game` plays, one knob after the other, each with
+    /// what was taken before in force; all errors are by the one exact picture, so that those of
+    /// all knobs together stay within `draw.error`. What is drawn by from now on, and what was
+    /// tried. The next frame is like a first one.
     pub fn choose(
         &mut self,
         device: &Device,

@@ -1,13 +1,15 @@
 //! Which of the values that were tried is taken, and how users are told.
 
-/// What is not faster by more than this share is not faster: two runs of the same differ by as much.
+/// What is not faster by more than this share is not faster: two runs of the same differ by as
+/// much.
 const NOISE: f64 = 0.03;
 
-/// And so in this share of the turns, in each of which both were timed: a device that is shared is now fast, now slow.
+/// And so in this share of the turns, in each of which both were timed: a device that is shared is
+/// now fast, now slow.
 const MOSTLY: f64 = 0.75;
 
-/// But what takes less than this share of the time, by the median and by the least, is faster whatever single turns say: the
-/// least is what a device takes that is left alone.
+/// But what takes less than this share of the time, by the median and by the least, is faster
+/// whatever single turns say: the least is what a device takes that is left alone.
 const CLEARLY: f64 = 0.75;
 
 /// Values whose times are so far apart need not be timed again.
@@ -20,10 +22,11 @@ pub struct Tried {
     pub value: String,
     /// The first changes nothing.
     pub is_first: bool,
-    /// Of culling, sorting and drawing, ms of device time (of wall time without timestamps); none where it does not fit the device.
+    /// Of culling, sorting and drawing, ms of device time (of wall time without timestamps); none
+    /// where it does not fit the device.
     pub times_ms: Vec<f64>,
-    /// How far its picture is from the exact one, root mean square over all pixels of premultiplied linear red, green, blue and
-    /// alpha; none where there is none.
+    /// How far its picture is from the exact one, root mean square over all pixels of premultiplied
+    /// linear red, green, blue and alpha; none where there is none.
     pub rmse: Option<f64>,
 }
 
@@ -66,8 +69,8 @@ impl Choice {
     }
 }
 
-/// Of those that are allowed the fastest, and of those that are as fast, but for noise, the first; the first of all where none
-/// is.
+/// Of those that are allowed the fastest, and of those that are as fast, but for noise, the first;
+/// the first of all where none is.
 pub fn taken(tried: &[Tried], allows: impl Fn(&Tried) -> bool) -> usize {
     let mut allowed = (0..tried.len()).filter(|i| allows(&tried[*i]));
     let first = allowed.next().unwrap_or(0);
@@ -121,13 +124,17 @@ mod tests {
 
     #[test]
     fn the_fastest_that_is_near_enough_is_taken() {
-        let sizes = |half_ms| tried(&[("1.0", 4.0, 0.0), ("0.5", half_ms, 1e-4), ("0.25", 0.5, 2e-3)]);
+        let sizes =
+            |half_ms| tried(&[("1.0", 4.0, 0.0), ("0.5", half_ms, 1e-4), ("0.25", 0.5, 2e-3)]);
         assert_eq!(taken(&sizes(1.0), near(1e-3)), 1);
         assert_eq!(taken(&sizes(5.0), near(1e-3)), 0);
         assert_eq!(taken(&sizes(1.0), near(1e-2)), 2);
         assert_eq!(taken(&sizes(1.0), near(0.0)), 0);
         // Nor where nothing is, as where the exact picture holds what is no number.
-        assert_eq!(taken(&tried(&[("1.0", 4.0, f64::INFINITY), ("0.5", 1.0, f64::INFINITY)]), near(0.5)), 0);
+        assert_eq!(
+            taken(&tried(&[("1.0", 4.0, f64::INFINITY), ("0.5", 1.0, f64::INFINITY)]), near(0.5)),
+            0
+        );
     }
 
     #[test]
@@ -155,8 +162,8 @@ mod tests {
         (two[1].times_ms, two[1].rmse) = (vec![], None);
         assert_eq!(taken(&two, near(1.0)), 0);
         let choice = Choice { key: "path", taken: 0, tried: two, error: None };
-        let text =
-            "draw.path = \"auto\" took a: at the first frame a takes 4.00 ms (RMSE 0), b does not fit this device";
+        let text = "draw.path = \"auto\" took a: at the first frame a takes 4.00 ms (RMSE 0), b \
+            does not fit this device";
         assert_eq!(choice.text(), text);
     }
 
@@ -166,14 +173,18 @@ mod tests {
         let far = [("1.0", 4.9, 0.0), ("0.5", 1.2, 1e-4), ("0.25", 0.2, 2e-3)];
         assert_eq!(open(&far, 1e-3), [1]);
         assert_eq!(open(&far, 1e-5), [0]);
-        assert_eq!(open(&[("1.0", 4.4, 0.0), ("0.5", 1.2, 1e-4), ("0.25", 0.2, 2e-3)], 1e-3), [0, 1]);
+        assert_eq!(
+            open(&[("1.0", 4.4, 0.0), ("0.5", 1.2, 1e-4), ("0.25", 0.2, 2e-3)], 1e-3),
+            [0, 1]
+        );
     }
 
     #[test]
     fn all_that_was_tried_is_told() {
         let tried = tried(&[("0", 4.0, 0.0), ("0.001", 1.0, 1e-4)]);
         let choice = Choice { key: "threshold", taken: 1, tried, error: Some(1e-3) };
-        let text = "draw.threshold = \"auto\" took 0.001 (draw.error 1.00e-3): at the first frame 0 takes 4.00 ms (RMSE 0), \
+        let text = "draw.threshold = \"auto\" took 0.001 (draw.error 1.00e-3): at the first frame \
+            0 takes 4.00 ms (RMSE 0), \
                     0.001 takes 1.00 ms (RMSE 1.00e-4)";
         assert_eq!(choice.text(), text);
     }

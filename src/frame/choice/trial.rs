@@ -18,12 +18,14 @@ use crate::gpu::{Buffer, Compiler, Device, Recorder};
 use crate::model::least::Least;
 use crate::model::scene::{Cull, Draw, Scene};
 
-/// Timed turns of each value; more of frames that are so short that all turns take less than [`ENOUGH_MS`].
+/// Timed turns of each value; more of frames that are so short that all turns take less than
+/// [`ENOUGH_MS`].
 const LEAST_TURNS: usize = 3;
 const MOST_TURNS: usize = 9;
 const ENOUGH_MS: f64 = 300.0;
 
-/// A frame that takes less depends on whose data the caches hold: it is drawn once more before it is timed.
+/// A frame that takes less depends on whose data the caches hold: it is drawn once more before it
+/// is timed.
 const SHORT_MS: f64 = 100.0;
 
 /// What draws one way and waits for its turn.
@@ -80,7 +82,12 @@ fn key_of_culling(draw: &Draw) -> (Cull, bool) {
 
 impl<'a> Trial<'a> {
     /// On a renderer of the scene with nothing chosen.
-    pub fn new(device: &'a Device, compiler: &'a Compiler, scene: &Scene, packet: &'a Packet) -> Trial<'a> {
+    pub fn new(
+        device: &'a Device,
+        compiler: &'a Compiler,
+        scene: &Scene,
+        packet: &'a Packet,
+    ) -> Trial<'a> {
         let draw = scene.draw.exact();
         let drawings = Spare { in_use: key_of_drawing(&draw), others: Vec::new() };
         let cullings = Spare { in_use: key_of_culling(&draw), others: Vec::new() };
@@ -88,8 +95,8 @@ impl<'a> Trial<'a> {
         Trial { device, compiler, packet, scene, error, drawings, cullings }
     }
 
-    /// What came of `knob`'s values, and their pictures; `exact`: the picture that they are compared with, the first one's where
-    /// there is none.
+    /// What came of `knob`'s values, and their pictures; `exact`: the picture that they are
+    /// compared with, the first one's where there is none.
     pub fn of(
         &mut self,
         renderer: &mut Renderer,
@@ -120,7 +127,8 @@ impl<'a> Trial<'a> {
                 tried[i].times_ms.push(self.draw(renderer)?);
             }
             open = still_open(&tried, &open, |t| knob.allows(t, self.error));
-            if open.len() < 2 || i_turn + 1 >= LEAST_TURNS && ms(begin, Instant::now()) > ENOUGH_MS {
+            if open.len() < 2 || i_turn + 1 >= LEAST_TURNS && ms(begin, Instant::now()) > ENOUGH_MS
+            {
                 break;
             }
         }
@@ -135,7 +143,8 @@ impl<'a> Trial<'a> {
         Ok(())
     }
 
-    /// The picture as `draw` has it, and its time, ms, in which a driver may have compiled something.
+    /// The picture as `draw` has it, and its time, ms, in which a driver may have compiled
+    /// something.
     fn picture(&mut self, renderer: &mut Renderer, draw: &Draw) -> Result<(f64, Vec<f32>)> {
         self.scene.draw = *draw;
         limits::check(&self.scene, self.device.limits())?;
@@ -166,7 +175,8 @@ impl<'a> Trial<'a> {
 
     /// Culls, sorts and draws with all that belongs to the picture, and gives the time, ms.
     fn draw(&self, renderer: &mut Renderer) -> Result<f64> {
-        let Renderer { host, drawing, buffers: b, settings: s, culling, sort, traits, .. } = renderer;
+        let Renderer { host, drawing, buffers: b, settings: s, culling, sort, traits, .. } =
+            renderer;
         let begin = Instant::now();
         let draw = |rec: &mut Recorder<'_>| {
             if let Some(culling) = culling {

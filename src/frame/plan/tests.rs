@@ -84,9 +84,18 @@ fn the_first_frame_runs_everything_and_a_still_one_nothing() {
     assert_eq!(running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p).len(), all - 1);
     // What a run makes once is kept; all else is done as without skipping.
     let moving = Traits { skip: false, keeps_made: true, ..ALL_TRAITS };
-    let (whole, kept) = (running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p), running(&moving, Some(&p), &p));
-    assert!(whole.iter().filter(|pass| !kept.contains(pass)).eq(["generate", "texture"].iter()), "{kept:?}");
-    assert_eq!(running(&moving, None, &p), running(&Traits { skip: false, ..ALL_TRAITS }, None, &p));
+    let (whole, kept) = (
+        running(&Traits { skip: false, ..ALL_TRAITS }, Some(&p), &p),
+        running(&moving, Some(&p), &p),
+    );
+    assert!(
+        whole.iter().filter(|pass| !kept.contains(pass)).eq(["generate", "texture"].iter()),
+        "{kept:?}"
+    );
+    assert_eq!(
+        running(&moving, None, &p),
+        running(&Traits { skip: false, ..ALL_TRAITS }, None, &p)
+    );
     // What lies there from before the first frame is not made again, but where nothing is skipped.
     let there = Traits { made: true, ..ALL_TRAITS };
     let first = running(&there, None, &p);
@@ -114,11 +123,14 @@ fn each_change_runs_what_depends_on_it_and_no_more() {
     assert_eq!(after(&|p| p.lights[0].energy[1] = 2.0), ["first", "sprites"]);
     assert_eq!(after(&|p| p.regions[0].kd[1] = 0.5), ["first", "sprites"]);
     let of_rays: [&dyn Fn(&mut Packet); 3] =
-        [&|p| p.lights[0].toward[1] = 1.0, &|p| p.lights[0].position[1] = 1.0, &|p| p.lights[0].energy = [0.0; 3]];
+        [&|p| p.lights[0].toward[1] = 1.0, &|p| p.lights[0].position[1] = 1.0, &|p| {
+            p.lights[0].energy = [0.0; 3]
+        }];
     for change in of_rays {
         assert_eq!(after(change), ["transmit", "first", "sprites"]);
     }
-    let of_facets: [&dyn Fn(&mut Packet); 2] = [&|p| p.regions[0].center[0] = 1.0, &|p| p.regions[0].u[2] = 1.0];
+    let of_facets: [&dyn Fn(&mut Packet); 2] =
+        [&|p| p.regions[0].center[0] = 1.0, &|p| p.regions[0].u[2] = 1.0];
     for change in of_facets {
         assert_eq!(after(change), ["facets", "transmit", "first", "sprites"]);
     }
@@ -161,14 +173,19 @@ fn with_tensors_an_edit_or_an_energy_is_a_contraction_and_nothing_else() {
         running(traits, Some(&last), &next)
     };
     let contracted = ["contract", "sprites"];
-    let edits: [&dyn Fn(&mut Packet); 4] =
-        [&|p| p.regions[0].kd[0] = 0.7, &|p| p.regions[0].ks[2] = 0.7, &|p| p.coefficients[0][1] = 0.7, &|p| {
-            p.lights[0].energy[1] = 2.0
-        }];
+    let edits: [&dyn Fn(&mut Packet); 4] = [
+        &|p| p.regions[0].kd[0] = 0.7,
+        &|p| p.regions[0].ks[2] = 0.7,
+        &|p| p.coefficients[0][1] = 0.7,
+        &|p| p.lights[0].energy[1] = 2.0,
+    ];
     for edit in edits {
         assert_eq!(after(&KEPT, edit), contracted);
     }
-    assert_eq!(after(&KEPT, &|p| p.lights[0].energy = [0.0; 3]), ["transmit", "contract", "sprites"]);
+    assert_eq!(
+        after(&KEPT, &|p| p.lights[0].energy = [0.0; 3]),
+        ["transmit", "contract", "sprites"]
+    );
     let both = Traits { tensors: Tensors::Needless, ..KEPT };
     let too_large = Traits { tensors: Tensors::TooLarge { bytes: 9, most: 8 }, ..KEPT };
     for traits in [both, too_large] {
@@ -176,7 +193,8 @@ fn with_tensors_an_edit_or_an_energy_is_a_contraction_and_nothing_else() {
     }
     assert_eq!(
         plan(&too_large, Some(&last), &last).decision(Pass::Contract).reason.to_string(),
-        "T2 would take 9 bytes and this device has 8 for it: light is gathered at once, anew at every edit"
+        "T2 would take 9 bytes and this device has 8 for it: light is gathered at once, anew \
+         at every edit"
     );
     let anew = ["first", "second", "contract", "sprites"];
     assert_eq!(after(&KEPT, &|p| p.lights[0].radius = 2.0), anew);
@@ -201,16 +219,23 @@ fn facets_of_several_particles_follow_their_order() {
         change(&mut next);
         running(&grouped, Some(&last), &next)
     };
-    let all_but_generate = ["place", "grid", "morton", "facets", "transmit", "first", "sort", "sprites"];
+    let all_but_generate =
+        ["place", "grid", "morton", "facets", "transmit", "first", "sort", "sprites"];
     assert_eq!(after(&|p| p.groups[0].offset[2] = 0.5), all_but_generate);
-    assert_eq!(after(&|p| p.bounds[0].low[0] = 0.5), ["morton", "facets", "transmit", "first", "sprites"]);
+    assert_eq!(
+        after(&|p| p.bounds[0].low[0] = 0.5),
+        ["morton", "facets", "transmit", "first", "sprites"]
+    );
     assert_eq!(after(&|p| p.camera.eye[0] = 1.0), ["sprites"]);
 }
 
 #[test]
 fn unlit_empty_and_cpu_scenes_leave_out_what_they_do_not_need() {
     let p = packet();
-    assert_eq!(running(&Traits { lit: false, ..TRAITS }, None, &p), ["generate", "place", "sort", "sprites"]);
+    assert_eq!(
+        running(&Traits { lit: false, ..TRAITS }, None, &p),
+        ["generate", "place", "sort", "sprites"]
+    );
     assert_eq!(running(&Traits { n_particles: 0, n_facets: 0, ..TRAITS }, None, &p), ["sprites"]);
     // Where the game thread places the particles, its places decide and not the groups' offsets.
     let (mut last, mut next) = (packet(), packet());

@@ -22,13 +22,19 @@ fn cloud(source: CloudSource) -> Cloud {
 }
 
 fn of_boxes(counts: &[u32]) -> Cloud {
-    let b = |n: &u32| CloudBox { n_particles: *n, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 1.0 };
+    let b = |n: &u32| CloudBox {
+        n_particles: *n,
+        extent: DVec3::ONE,
+        center: DVec3::ZERO,
+        radius_max: 1.0,
+    };
     let boxes = counts.iter().map(b).collect();
     cloud(CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: 1.0, radius_scale: 0.6 })
 }
 
 fn of_list(n: usize) -> Cloud {
-    let p = Particle { position: DVec3::ZERO, sigma: 1.0, aspect: 1.0, kappa: 1.0, color: DVec3::ONE };
+    let p =
+        Particle { position: DVec3::ZERO, sigma: 1.0, aspect: 1.0, kappa: 1.0, color: DVec3::ONE };
     cloud(CloudSource::Particles(vec![p; n]))
 }
 

@@ -75,7 +75,10 @@ fn a_slow_eye_meets_the_same_shell_until_it_is_off_by_too_much() {
             Step::Nothing(why) => panic!("{why}"),
         }
     }
-    assert!(n_made >= 2 && n_reused >= 2 * n_made && most > 0.25 && most <= 0.5, "{n_made} {n_reused} {most}");
+    assert!(
+        n_made >= 2 && n_reused >= 2 * n_made && most > 0.25 && most <= 0.5,
+        "{n_made} {n_reused} {most}"
+    );
 }
 
 #[test]
@@ -102,9 +105,15 @@ fn nothing_is_made_where_it_would_not_live_or_not_pay() {
 fn what_changes_ends_a_shell() {
     let mut keeper = keeper();
     keeper.step(&packet(0.0, 12.0), Some("there is no frame before"));
-    assert!(matches!(keeper.step(&packet(0.02, 12.0), None), Step::Made { why: "there is none", .. }));
+    assert!(matches!(
+        keeper.step(&packet(0.02, 12.0), None),
+        Step::Made { why: "there is none", .. }
+    ));
     assert!(matches!(keeper.step(&packet(0.04, 12.0), None), Step::Reused { .. }));
-    assert_eq!(keeper.step(&packet(0.06, 12.0), Some("light changed")), Step::Nothing("light changed"));
+    assert_eq!(
+        keeper.step(&packet(0.06, 12.0), Some("light changed")),
+        Step::Nothing("light changed")
+    );
     assert!(matches!(keeper.step(&packet(0.08, 12.0), None), Step::Made { .. }));
     // A jump, and a look elsewhere.
     let far = packet(3.0, 12.0);
@@ -114,19 +123,29 @@ fn what_changes_ends_a_shell() {
     (turned.camera.right, turned.camera.forward) = ([0.8, 0.0, 0.6], [0.6, 0.0, -0.8]);
     assert!(!matches!(keeper.step(&turned, None), Step::Reused { .. }));
     keeper.reset();
-    assert_eq!(keeper.step(&turned, None), Step::Nothing("how fast the eye moves is not known yet"));
+    assert_eq!(
+        keeper.step(&turned, None),
+        Step::Nothing("how fast the eye moves is not known yet")
+    );
 }
 
 #[test]
 fn a_surface_among_what_is_far_forbids_it() {
-    // At depths 3, 14 and 40 from an eye at z = 12: before, among and behind a cloud at depths from 12 on.
+    // At depths 3, 14 and 40 from an eye at z = 12: before, among and behind a cloud at depths from
+    // 12 on.
     for (z, forbids) in [(9.0, false), (-2.0, true), (-28.0, false)] {
         let mut keeper = keeper();
         let mut last = Step::Nothing("");
         for k in 0..3 {
             let mut at = packet(0.02 * f64::from(k), 12.0);
             let (u, v) = ([5.0, 0.0, 0.0], [0.0, 5.0, 0.0]);
-            at.regions.push(RegionRecord { kind: REGION_SURFACE, center: [0.0, 0.0, z], u, v, ..Default::default() });
+            at.regions.push(RegionRecord {
+                kind: REGION_SURFACE,
+                center: [0.0, 0.0, z],
+                u,
+                v,
+                ..Default::default()
+            });
             last = keeper.step(&at, (k == 0).then_some("there is no frame before"));
         }
         let is_whole = |kept: &Kept| kept.shell.far.nearest < 11.6;

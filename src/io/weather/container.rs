@@ -1,5 +1,5 @@
-//! What a weather file is, whatever its format: named dimensions, variables over them, attributes. What a variable
-//! holds is read a part at a time.
+//! What a weather file is, whatever its format: named dimensions, variables over them, attributes.
+//! What a variable holds is read a part at a time.
 
 /// A dimension and its length.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -74,8 +74,8 @@ pub trait Container: Send + Sync {
     /// Those of the whole file.
     fn attributes(&self) -> &[Attribute];
 
-    /// The numbers of the part of a variable that begins at `start` and has `count` along each of its dimensions,
-    /// slowest first, as they are stored: fill values are numbers like others.
+    /// The numbers of the part of a variable that begins at `start` and has `count` along each of
+    /// its dimensions, slowest first, as they are stored: fill values are numbers like others.
     ///
     /// # Errors
     /// What is wrong with the file or the request.

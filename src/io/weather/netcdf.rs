@@ -1,5 +1,5 @@
-//! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data (CDF-5) and NetCDF-4
-//! (HDF5).
+//! NetCDF of every kind through the crate `netcdf-reader`: classic, 64-bit offset, 64-bit data
+//! (CDF-5) and NetCDF-4 (HDF5).
 
 use std::fs::{self, File};
 use std::io::ErrorKind;
@@ -7,8 +7,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use netcdf_reader::{
-    BytesStorage, DynStorage, FileStorage, NcAttrValue, NcAttribute, NcDimension, NcFile, NcFormat, NcOpenOptions,
-    NcSliceInfo, NcSliceInfoElem, NcVariable,
+    BytesStorage, DynStorage, FileStorage, NcAttrValue, NcAttribute, NcDimension, NcFile, NcFormat,
+    NcOpenOptions, NcSliceInfo, NcSliceInfoElem, NcVariable,
 };
 
 use super::container::{Attribute, Container, Dimension, Value, Variable};
@@ -18,8 +18,8 @@ use crate::error::{Error, Place, Result};
 const MOST_NUMBERS: u64 = 1 << 25;
 /// Most characters of a variable of text: a year of steps has less than 1 MiB.
 const MOST_CHARACTERS: u64 = 8 << 20;
-/// Largest chunk and largest part, bytes: f32 or f64 of [`MOST_NUMBERS`]. What a damaged file asks for is more, and
-/// refused before it is made room for.
+/// Largest chunk and largest part, bytes: f32 or f64 of [`MOST_NUMBERS`]. What a damaged file asks
+/// for is more, and refused before it is made room for.
 const MOST_BYTES: usize = (MOST_NUMBERS as usize) * 8;
 const MOST_HEADER_BYTES: usize = 16 << 20;
 /// Unpacked chunks that are kept, for variables whose chunks hold several steps.
@@ -49,7 +49,8 @@ pub fn open(path: &Path) -> Result<NetCdf> {
         return Err(Error::io(path, "is not a regular file"));
     }
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
-    // Read by ranges and not mapped: a mapped file that is cut off while it is read ends the process.
+    // Read by ranges and not mapped: a mapped file that is cut off while it is read ends the
+    // process.
     let storage = FileStorage::from_file(file).map_err(|e| Error::io(path, e))?;
     from_storage(Arc::new(storage)).map_err(|what| Error::scene(Place::file(path), what))
 }
@@ -90,7 +91,8 @@ const HDF5_SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// A superblock of any version lies within.
 const SUPERBLOCK_LENGTH: usize = 96;
 
-/// Says what a file is that is not NetCDF, and whether an HDF5 file has been cut off, which its end alone tells.
+/// Says what a file is that is not NetCDF, and whether an HDF5 file has been cut off, which its end
+/// alone tells.
 fn check_begin(storage: &DynStorage) -> std::result::Result<(), String> {
     let length = storage.len();
     if length == 0 {
@@ -101,21 +103,23 @@ fn check_begin(storage: &DynStorage) -> std::result::Result<(), String> {
     let begin: &[u8] = &begin;
     let is_classic = matches!(begin, [b'C', b'D', b'F', 1 | 2 | 5, ..]);
     if !is_classic && !begin.starts_with(HDF5_SIGNATURE) {
-        let shown: String = begin.iter().take(4).map(|b| std::ascii::escape_default(*b).to_string()).collect();
+        let shown: String =
+            begin.iter().take(4).map(|b| std::ascii::escape_default(*b).to_string()).collect();
         return Err(format!(
-            "not a NetCDF file: it begins with \"{shown}\", expected \"CDF\" and 1, 2 or 5, or \"\\x89HDF\""
+            "not a NetCDF file: it begins with \"{shown}\", expected \"CDF\" and 1, 2 or 5, \
+             or \"\\x89HDF\""
         ));
     }
     match superblock_end(begin) {
-        Some(end) if end > length => {
-            Err(format!("the file is cut off: it has {length} bytes, and by its own superblock it ends at {end}"))
-        }
+        Some(end) if end > length => Err(format!(
+            "the file is cut off: it has {length} bytes, and by its own superblock it ends at {end}"
+        )),
         _ => Ok(()),
     }
 }
 
-/// Where an HDF5 file says that it ends ("HDF5 File Format Specification" 3.0, II.A): the third address of its
-/// superblock.
+/// Where an HDF5 file says that it ends ("HDF5 File Format Specification" 3.0, II.A): the third
+/// address of its superblock.
 fn superblock_end(begin: &[u8]) -> Option<u64> {
     let begin_of_addresses = |version: u8| match version {
         0 => Some((13, 24)),
@@ -140,7 +144,11 @@ fn dimension(d: &NcDimension) -> Dimension {
 fn variable(v: &NcVariable) -> Variable {
     Variable {
         name: v.name().to_owned(),
-        kind: format!("{:?}", v.dtype()).to_lowercase().chars().take_while(char::is_ascii_alphanumeric).collect(),
+        kind: format!("{:?}", v.dtype())
+            .to_lowercase()
+            .chars()
+            .take_while(char::is_ascii_alphanumeric)
+            .collect(),
         dimensions: v.dimensions().iter().map(dimension).collect(),
         attributes: v.attributes().iter().map(attribute).collect(),
     }
@@ -172,7 +180,12 @@ impl Container for NetCdf {
         &self.attributes
     }
 
-    fn read(&self, name: &str, start: &[u64], count: &[u64]) -> std::result::Result<Vec<f64>, String> {
+    fn read(
+        &self,
+        name: &str,
+        start: &[u64],
+        count: &[u64],
+    ) -> std::result::Result<Vec<f64>, String> {
         let lengths = self.lengths(name)?;
         let is_within = lengths.len() == start.len()
             && lengths.len() == count.len()
@@ -181,11 +194,16 @@ impl Container for NetCdf {
                 .zip(start.iter().zip(count))
                 .all(|(n, (s, c))| s.checked_add(*c).is_some_and(|e| e <= *n));
         if !is_within {
-            return Err(format!("it has {lengths:?} values, asked for {count:?} from {start:?} on"));
+            return Err(format!(
+                "it has {lengths:?} values, asked for {count:?} from {start:?} on"
+            ));
         }
         let n = product(count.iter().copied(), MOST_NUMBERS)?;
-        let selections =
-            start.iter().zip(count).map(|(s, c)| NcSliceInfoElem::Slice { start: *s, end: s + c, step: 1 }).collect();
+        let selections = start
+            .iter()
+            .zip(count)
+            .map(|(s, c)| NcSliceInfoElem::Slice { start: *s, end: s + c, step: 1 })
+            .collect();
         let read = self.file.read_variable_slice_as_f64(name, &NcSliceInfo { selections });
         let read = read.map_err(|e| format!("cannot be read: {e}"))?;
         // Not copied: a step of the largest grid is 128 MiB a variable.

@@ -1,4 +1,5 @@
-//! WRF's output: which variables mean what, and a step of them as a grid with extinction (docs/model.md §15).
+//! WRF's output: which variables mean what, and a step of them as a grid with extinction
+//! (docs/model.md §15).
 
 use std::path::{Path, PathBuf};
 
@@ -11,11 +12,13 @@ use super::wrf_fields::{Extent, Field, place};
 use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
-use crate::model::weather::extinction::{ICE, LIQUID, Oddities, Phase, SNOW, add, single_moment_phase};
+use crate::model::weather::extinction::{
+    ICE, LIQUID, Oddities, Phase, SNOW, add, single_moment_phase,
+};
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
-/// Cells of a step at most: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more while it is read: less
-/// than 1 GiB.
+/// Cells of a step at most: 500 × 500 × 67. A step takes 40 bytes of memory a cell, and 12 more
+/// while it is read: less than 1 GiB.
 pub const MOST_CELLS: u64 = 1 << 24;
 /// m; sizes of WRF's cells, from a large eddy to a globe's degree.
 const SPACINGS_M: (f64, f64) = (1.0, 500_000.0);
@@ -30,11 +33,22 @@ const GREATEST_RATIO: f64 = 1.0;
 const PASCAL: &[(&str, f64)] = &[("Pa", 1.0)];
 const KELVIN: &[(&str, f64)] = &[("K", 1.0)];
 const GEOPOTENTIAL: &[(&str, f64)] = &[("m2 s-2", 1.0), ("m2/s2", 1.0), ("m**2 s**-2", 1.0)];
-const RATIO: &[(&str, f64)] =
-    &[("kg kg-1", 1.0), ("kg/kg", 1.0), ("kg kg**-1", 1.0), ("g kg-1", 1e-3), ("g/kg", 1e-3), ("g kg**-1", 1e-3)];
+const RATIO: &[(&str, f64)] = &[
+    ("kg kg-1", 1.0),
+    ("kg/kg", 1.0),
+    ("kg kg**-1", 1.0),
+    ("g kg-1", 1e-3),
+    ("g/kg", 1e-3),
+    ("g kg**-1", 1e-3),
+];
 const METRE: &[(&str, f64)] = &[("m", 1.0)];
-const DEGREE: &[(&str, f64)] =
-    &[("degree_north", 1.0), ("degree_east", 1.0), ("degrees_north", 1.0), ("degrees_east", 1.0), ("degree", 1.0)];
+const DEGREE: &[(&str, f64)] = &[
+    ("degree_north", 1.0),
+    ("degree_east", 1.0),
+    ("degrees_north", 1.0),
+    ("degrees_east", 1.0),
+    ("degree", 1.0),
+];
 /// Map factors have none, and WRF writes none or a blank.
 const NO_UNIT: &[(&str, f64)] = &[("1", 1.0)];
 
@@ -95,8 +109,8 @@ pub struct Step {
     pub temperature_k: Vec<f64>,
     /// kg/kg.
     pub vapour: Vec<f64>,
-    /// Radians north and east in the domain's middle, which moves where a nest follows a storm; None of an idealised
-    /// file, whose are 0.
+    /// Radians north and east in the domain's middle, which moves where a nest follows a storm;
+    /// None of an idealised file, whose are 0.
     pub middle: Option<(f64, f64)>,
     pub oddities: Oddities,
 }
@@ -117,9 +131,13 @@ pub fn from_container(container: Box<dyn Container>, path: &Path) -> Result<Weat
     understand(container, path).map_err(|what| Error::scene(Place::file(path), what))
 }
 
-fn understand(container: Box<dyn Container>, path: &Path) -> std::result::Result<WeatherFile, String> {
+fn understand(
+    container: Box<dyn Container>,
+    path: &Path,
+) -> std::result::Result<WeatherFile, String> {
     let file = container.as_ref();
-    let missing: Vec<&str> = NEEDED.into_iter().filter(|name| file.variable(name).is_none()).collect();
+    let missing: Vec<&str> =
+        NEEDED.into_iter().filter(|name| file.variable(name).is_none()).collect();
     if missing.len() == NEEDED.len() {
         let names: Vec<&str> = file.variables().iter().take(8).map(|v| v.name.as_str()).collect();
         return Err(format!(
@@ -142,11 +160,26 @@ fn understand(container: Box<dyn Container>, path: &Path) -> std::result::Result
     let fields = Fields::find(file, shape, n_steps, &mut notes)?;
     let clouds = if fields.condensates.is_empty() { Clouds::Diagnosed } else { Clouds::Given };
     if clouds == Clouds::Diagnosed && fields.vapour.is_none() {
-        return Err("QCLOUD, QICE, QSNOW and QVAPOR are missing: expected one of the first three, or QVAPOR to diagnose clouds from".to_owned());
+        return Err(
+            "QCLOUD, QICE, QSNOW and QVAPOR are missing: expected one of the first three, \
+            or QVAPOR to diagnose clouds from"
+                .to_owned(),
+        );
     }
     let times_s = wrf_clock::times(file, n_steps)?;
     let path = path.to_owned();
-    Ok(WeatherFile { container, path, shape, n_steps, times_s, spacing_m, is_idealised, clouds, notes, fields })
+    Ok(WeatherFile {
+        container,
+        path,
+        shape,
+        n_steps,
+        times_s,
+        spacing_m,
+        is_idealised,
+        clouds,
+        notes,
+        fields,
+    })
 }
 
 /// "QICE is", "QICE and QSNOW are".
@@ -159,8 +192,10 @@ fn list(names: &[&str]) -> String {
 
 /// Of P, which is on the cells' mass points.
 fn shape_of(file: &dyn Container) -> std::result::Result<(Shape, usize), String> {
-    let lengths: Vec<u64> =
-        file.variable("P").map(|v| v.dimensions.iter().map(|d| d.length).collect()).unwrap_or_default();
+    let lengths: Vec<u64> = file
+        .variable("P")
+        .map(|v| v.dimensions.iter().map(|d| d.length).collect())
+        .unwrap_or_default();
     let [n_steps, nz, ny, nx] = lengths[..] else {
         return Err(format!(
             "variable P: {} dimensions, expected Time, bottom_top, south_north and west_east",
@@ -169,13 +204,20 @@ fn shape_of(file: &dyn Container) -> std::result::Result<(Shape, usize), String>
     };
     let n_cells = [nz, ny, nx].into_iter().try_fold(1u64, u64::checked_mul);
     if n_steps == 0 || n_cells == Some(0) {
-        return Err(format!("variable P: {n_steps} steps of {nz} x {ny} x {nx} cells, expected at least one of each"));
+        return Err(format!(
+            "variable P: {n_steps} steps of {nz} x {ny} x {nx} cells, expected at least one of each"
+        ));
     }
     if n_cells.is_none_or(|n| n > MOST_CELLS) {
-        return Err(format!("variable P: {nz} x {ny} x {nx} cells, at most {MOST_CELLS} can be held"));
+        return Err(format!(
+            "variable P: {nz} x {ny} x {nx} cells, at most {MOST_CELLS} can be held"
+        ));
     }
     if n_steps > wrf_clock::MOST_STEPS {
-        return Err(format!("variable P: {n_steps} steps, at most {} can be held", wrf_clock::MOST_STEPS));
+        return Err(format!(
+            "variable P: {n_steps} steps, at most {} can be held",
+            wrf_clock::MOST_STEPS
+        ));
     }
     Ok((Shape { nx: nx as usize, ny: ny as usize, nz: nz as usize }, n_steps as usize))
 }
@@ -223,14 +265,20 @@ impl Fields {
         let condensates = condensates(file, shape, n_steps, notes)?;
         let has = |name: &str| condensates.iter().any(|(field, _)| field.name == name);
         let scheme = number(file.attributes(), "MP_PHYSICS");
-        let is_single_moment = scheme == Some(SINGLE_MOMENT_SCHEME) && has("QCLOUD") && !has("QICE");
+        let is_single_moment =
+            scheme == Some(SINGLE_MOMENT_SCHEME) && has("QCLOUD") && !has("QICE");
         if is_single_moment {
             notes.push("MP_PHYSICS is 3: QCLOUD is ice below 273.15 K".to_owned());
         }
         if condensates.is_empty() {
             notes.push("clouds are diagnosed from relative humidity".to_owned());
         }
-        for field in condensates.iter().map(|(field, _)| field).chain(&vapour).filter(|field| field.scale != 1.0) {
+        for field in condensates
+            .iter()
+            .map(|(field, _)| field)
+            .chain(&vapour)
+            .filter(|field| field.scale != 1.0)
+        {
             notes.push(format!("{} is in g/kg: converted", field.name));
         }
         for name in LEFT_OUT.into_iter().filter(|name| file.variable(name).is_some()) {
@@ -295,7 +343,8 @@ impl WeatherFile {
         self.of_step(i_step, &|| self.read_step(i_step))
     }
 
-    /// The columns at a step and the ground's height in each, HGT, m; None where the file has no HGT. Nothing else is read.
+    /// The columns at a step and the ground's height in each, HGT, m; None where the file has no
+    /// HGT. Nothing else is read.
     ///
     /// # Errors
     /// As [`WeatherFile::step`].
@@ -305,10 +354,16 @@ impl WeatherFile {
             within(&heights_m, HEIGHTS_M, "HGT", "m", self.shape, i_step)?;
             Ok((self.ground(i_step)?, heights_m))
         };
-        self.of_step(i_step, &|| self.fields.terrain.as_ref().map_err(Clone::clone)?.as_ref().map(read).transpose())
+        self.of_step(i_step, &|| {
+            self.fields.terrain.as_ref().map_err(Clone::clone)?.as_ref().map(read).transpose()
+        })
     }
 
-    fn of_step<T>(&self, i_step: usize, read: &dyn Fn() -> std::result::Result<T, String>) -> Result<T> {
+    fn of_step<T>(
+        &self,
+        i_step: usize,
+        read: &dyn Fn() -> std::result::Result<T, String>,
+    ) -> Result<T> {
         if i_step >= self.n_steps {
             return Err(Error::usage(format!(
                 "step {i_step}: {} has steps 0 to {}",
@@ -328,7 +383,14 @@ impl WeatherFile {
         within(&pressure_pa, PRESSURES_PA, "P + PB", "Pa", shape, i_step)?;
         let mut temperature_k = whole(&fields.t)?;
         temperature_k.iter_mut().zip(&pressure_pa).for_each(|(t, p)| *t = air::temperature(*t, *p));
-        within(&temperature_k, TEMPERATURES_K, "the temperature of T, P and PB", "K", shape, i_step)?;
+        within(
+            &temperature_k,
+            TEMPERATURES_K,
+            "the temperature of T, P and PB",
+            "K",
+            shape,
+            i_step,
+        )?;
         let mut oddities = Oddities::default();
         let vapour = match &fields.vapour {
             Some(field) => ratios(field.read(file, shape, i_step)?, &mut oddities),
@@ -341,15 +403,23 @@ impl WeatherFile {
                 for (field, phase) in &fields.condensates {
                     let read = field.read(file, shape, i_step)?;
                     let is_both = fields.is_single_moment && field.name == "QCLOUD";
-                    let phase_of = |i: usize| if is_both { single_moment_phase(temperature_k[i]) } else { *phase };
-                    let odd = add(&mut extinction, &read, dry_density, phase_of, |ratio| ratio > GREATEST_RATIO);
+                    let phase_of = |i: usize| {
+                        if is_both { single_moment_phase(temperature_k[i]) } else { *phase }
+                    };
+                    let odd = add(&mut extinction, &read, dry_density, phase_of, |ratio| {
+                        ratio > GREATEST_RATIO
+                    });
                     oddities.n_negative += odd.n_negative;
                     oddities.n_missing += odd.n_missing;
                 }
                 extinction
             }
             Clouds::Diagnosed => {
-                let air = Air { pressure_pa: &pressure_pa, temperature_k: &temperature_k, vapour: &vapour };
+                let air = Air {
+                    pressure_pa: &pressure_pa,
+                    temperature_k: &temperature_k,
+                    vapour: &vapour,
+                };
                 diagnosed::extinction(&grid, air)
             }
         };
@@ -366,7 +436,8 @@ impl WeatherFile {
             }
             None => Ok::<_, String>(None),
         };
-        let (latitude, longitude) = (at(&self.fields.latitude, 90.0)?, at(&self.fields.longitude, 360.0)?);
+        let (latitude, longitude) =
+            (at(&self.fields.latitude, 90.0)?, at(&self.fields.longitude, 360.0)?);
         Ok(latitude.zip(longitude).filter(|_| !self.is_idealised))
     }
 
@@ -378,8 +449,9 @@ impl WeatherFile {
             None => Ok(vec![1.0; shape.n_columns()]),
         };
         let [mx, my] = [factors(&fields.factors[0])?, factors(&fields.factors[1])?];
-        Ground::new(shape, self.spacing_m, (&mx, &my), self.is_idealised)
-            .map_err(|what| format!("variables MAPFAC_M, MAPFAC_MX, MAPFAC_MY, step {i_step}: {what}"))
+        Ground::new(shape, self.spacing_m, (&mx, &my), self.is_idealised).map_err(|what| {
+            format!("variables MAPFAC_M, MAPFAC_MX, MAPFAC_MY, step {i_step}: {what}")
+        })
     }
 
     /// Where a step's cells are.
@@ -390,7 +462,8 @@ impl WeatherFile {
         let base = fields.phb.read_whole(file, shape, i_step)?;
         heights_m.iter_mut().zip(base).for_each(|(h, base)| *h = air::height(*h + base));
         within(&heights_m, HEIGHTS_M, "the height of PH + PHB", "m", shape, i_step)?;
-        Grid::new(ground, heights_m).map_err(|what| format!("variables PH, PHB, step {i_step}: {what}"))
+        Grid::new(ground, heights_m)
+            .map_err(|what| format!("variables PH, PHB, step {i_step}: {what}"))
     }
 }
 

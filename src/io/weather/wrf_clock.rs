@@ -6,8 +6,8 @@ use crate::model::weather::steps::{first_out_of_order, format, parse};
 /// Steps that a file may have: two years of 10 minutes.
 pub const MOST_STEPS: u64 = 105_408;
 
-/// Seconds from 1970-01-01 UTC of every step, rising; from Times, else from XTIME. None where the file has neither and
-/// needs none, as it has one step.
+/// Seconds from 1970-01-01 UTC of every step, rising; from Times, else from XTIME. None where the
+/// file has neither and needs none, as it has one step.
 ///
 /// # Errors
 /// What is wrong, with the variable and the step.
@@ -19,7 +19,9 @@ pub fn times(file: &dyn Container, n_steps: usize) -> Result<Option<Vec<f64>>, S
     } else if n_steps == 1 {
         return Ok(None);
     } else {
-        return Err("no times: expected a variable Times, or XTIME in minutes since a date".to_owned());
+        return Err(
+            "no times: expected a variable Times, or XTIME in minutes since a date".to_owned()
+        );
     };
     match first_out_of_order(&times_s) {
         None => Ok(Some(times_s)),
@@ -40,21 +42,34 @@ fn from_text(file: &dyn Container, n_steps: usize) -> Result<Vec<f64>, String> {
     let time = |(i, row): (usize, &String)| {
         parse(row.trim_end_matches(['\0', ' '])).ok_or_else(|| {
             let shown: String = row.chars().take(32).flat_map(char::escape_default).collect();
-            format!("variable Times, step {i}: \"{shown}\" is no time, expected YYYY-MM-DD_HH:MM:SS")
+            format!(
+                "variable Times, step {i}: \"{shown}\" is no time, expected YYYY-MM-DD_HH:MM:SS"
+            )
         })
     };
     rows.iter().enumerate().map(time).collect()
 }
 
-fn from_minutes(file: &dyn Container, variable: &Variable, n_steps: usize) -> Result<Vec<f64>, String> {
-    let since = variable.text("units").and_then(|units| units.strip_prefix("minutes since ")).and_then(parse);
+fn from_minutes(
+    file: &dyn Container,
+    variable: &Variable,
+    n_steps: usize,
+) -> Result<Vec<f64>, String> {
+    let since = variable
+        .text("units")
+        .and_then(|units| units.strip_prefix("minutes since "))
+        .and_then(parse);
     let Some(since) = since else {
-        return Err("variable XTIME: expected units \"minutes since YYYY-MM-DD HH:MM:SS\"".to_owned());
+        return Err(
+            "variable XTIME: expected units \"minutes since YYYY-MM-DD HH:MM:SS\"".to_owned()
+        );
     };
     if variable.dimensions.len() != 1 || variable.dimensions[0].length != n_steps as u64 {
         return Err(format!("variable XTIME: {} values of {n_steps} steps", variable.shape_text()));
     }
-    let minutes = file.read("XTIME", &[0], &[n_steps as u64]).map_err(|what| format!("variable XTIME: {what}"))?;
+    let minutes = file
+        .read("XTIME", &[0], &[n_steps as u64])
+        .map_err(|what| format!("variable XTIME: {what}"))?;
     match minutes.iter().position(|m| m.is_nan() || m.abs() >= 1e9) {
         Some(i) => Err(format!("variable XTIME, step {i}: {} is no time in minutes", minutes[i])),
         None => Ok(minutes.iter().map(|m| since + m * 60.0).collect()),

@@ -3,7 +3,8 @@
 use super::container::{Container, Variable};
 use crate::model::weather::grid::Shape;
 
-/// Beyond every number that weather has: NetCDF's own fill value is 9.969e36, WRF's and others' are 1e20 and more.
+/// Beyond every number that weather has: NetCDF's own fill value is 9.969e36, WRF's and others' are
+/// 1e20 and more.
 const FILL: f64 = 1e19;
 
 /// Along which of the cells' dimensions a variable runs.
@@ -70,7 +71,10 @@ impl Field {
             ));
         }
         let scale = scale(variable, units)?;
-        let fills = ["_FillValue", "missing_value"].iter().filter_map(|name| variable.number(name)).collect();
+        let fills = ["_FillValue", "missing_value"]
+            .iter()
+            .filter_map(|name| variable.number(name))
+            .collect();
         Ok(Some(Field { name, extent, has_time, scale, fills }))
     }
 
@@ -78,14 +82,20 @@ impl Field {
     ///
     /// # Errors
     /// What cannot be read, with variable and step.
-    pub fn read(&self, file: &dyn Container, shape: Shape, i_step: usize) -> Result<Vec<f64>, String> {
+    pub fn read(
+        &self,
+        file: &dyn Container,
+        shape: Shape,
+        i_step: usize,
+    ) -> Result<Vec<f64>, String> {
         let mut count = self.extent.lengths(shape);
         let mut start = vec![0; count.len()];
         if self.has_time {
             count.insert(0, 1);
             start.insert(0, i_step as u64);
         }
-        let mut numbers = file.read(self.name, &start, &count).map_err(|what| self.at(i_step, what))?;
+        let mut numbers =
+            file.read(self.name, &start, &count).map_err(|what| self.at(i_step, what))?;
         for number in &mut numbers {
             let is_fill = number.abs() > FILL || self.fills.contains(number);
             *number = if is_fill { f64::NAN } else { *number * self.scale };
@@ -97,14 +107,22 @@ impl Field {
     ///
     /// # Errors
     /// As [`read`](Self::read), and how many values are missing and where the first one is.
-    pub fn read_whole(&self, file: &dyn Container, shape: Shape, i_step: usize) -> Result<Vec<f64>, String> {
+    pub fn read_whole(
+        &self,
+        file: &dyn Container,
+        shape: Shape,
+        i_step: usize,
+    ) -> Result<Vec<f64>, String> {
         let numbers = self.read(file, shape, i_step)?;
         let Some(first) = numbers.iter().position(|n| n.is_nan()) else { return Ok(numbers) };
         let n_missing = numbers.iter().filter(|n| n.is_nan()).count();
         let place = place(shape, numbers.len(), first);
         Err(self.at(
             i_step,
-            format!("{n_missing} values are NaN or fill values, the first {place}; expected a number everywhere"),
+            format!(
+                "{n_missing} values are NaN or fill values, the first {place}; expected a \
+                number everywhere"
+            ),
         ))
     }
 
@@ -129,7 +147,11 @@ fn scale(variable: &Variable, units: &[(&str, f64)]) -> Result<f64, String> {
         None => {
             let shown: String = unit.chars().take(32).flat_map(char::escape_default).collect();
             let known: Vec<String> = units.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-            Err(format!("variable {}: units \"{shown}\", expected {}", variable.name, known.join(" or ")))
+            Err(format!(
+                "variable {}: units \"{shown}\", expected {}",
+                variable.name,
+                known.join(" or ")
+            ))
         }
     }
 }

@@ -1,5 +1,6 @@
-//! Among others how often intervals hold the truth: a few hundred trials that every run of the tests can afford, and the
-//! thousands behind the figures in the comments (`cargo test --release --lib coverage -- --ignored --nocapture`).
+//! Among others how often intervals hold the truth: a few hundred trials that every run of the
+//! tests can afford, and the thousands behind the figures in the comments (`cargo test --release
+//! --lib coverage -- --ignored --nocapture`).
 
 use super::*;
 use crate::measure::random::{frame_times, normal};
@@ -12,8 +13,8 @@ fn coverage(n_trials: usize, mut holds: impl FnMut(u64) -> bool) -> f64 {
 
 #[test]
 fn the_interval_covers_the_truth_about_as_often_as_it_says() {
-    // 95 % nominal; the standard error over 400 trials is 1.1 %, and the percentile bootstrap of a median is known
-    // to be a little off at n = 60. Outside 91–99 % it would be wrong, not unlucky.
+    // 95 % nominal; the standard error over 400 trials is 1.1 %, and the percentile bootstrap of a
+    // median is known to be a little off at n = 60. Outside 91–99 % it would be wrong, not unlucky.
     let mut random = SplitMix64(11);
     let of_median = coverage(400, |seed| {
         let values = normal(&mut random, 60);
@@ -40,7 +41,8 @@ fn of_neighbours(n_trials: usize, n_resamples: usize, n: usize, rho: f64) -> [f6
     for seed in 0..n_trials as u64 {
         let bootstrap = Bootstrap { n_resamples, seed, ..Bootstrap::of_neighbours(n) };
         let [one, two] = [(); 2].map(|()| frame_times(&mut random, n, 1.0, SD, rho));
-        let intervals = [(bootstrap.median(&one), truth), (bootstrap.ratio_of_medians(&one, &two), 1.0)];
+        let intervals =
+            [(bootstrap.median(&one), truth), (bootstrap.ratio_of_medians(&one, &two), 1.0)];
         for (n_held, (interval, truth)) in n_held.iter_mut().zip(intervals) {
             let interval = interval.unwrap();
             *n_held += u64::from(interval.low <= truth && truth <= interval.high);
@@ -51,10 +53,14 @@ fn of_neighbours(n_trials: usize, n_resamples: usize, n: usize, rho: f64) -> [f6
 
 #[test]
 fn short_lists_of_alike_neighbours_are_covered_too() {
-    // Standard error over 400 trials 1.1 %. Without the two factors the same trials come to 80 to 92 %.
+    // Standard error over 400 trials 1.1 %. Without the two factors the same trials come to 80 to
+    // 92 %.
     for n in [30, 60] {
         let [of_median, of_ratio] = of_neighbours(400, 400, n, 0.3);
-        assert!((0.92..=0.985).contains(&of_median) && (0.92..=0.985).contains(&of_ratio), "{of_median} {of_ratio}");
+        assert!(
+            (0.92..=0.985).contains(&of_median) && (0.92..=0.985).contains(&of_ratio),
+            "{of_median} {of_ratio}"
+        );
     }
 }
 
@@ -63,7 +69,8 @@ fn short_lists_of_alike_neighbours_are_covered_too() {
 fn coverage_in_thousands_of_trials() {
     for n in [30, 60, 120, 240] {
         for rho in [0.0, 0.3, 0.6] {
-            let [of_median, of_ratio] = of_neighbours(4000, 2000, n, rho).map(|share| 100.0 * share);
+            let [of_median, of_ratio] =
+                of_neighbours(4000, 2000, n, rho).map(|share| 100.0 * share);
             println!("n {n}, rho {rho}: median {of_median:.1} %, ratio {of_ratio:.1} %");
         }
     }
@@ -72,7 +79,9 @@ fn coverage_in_thousands_of_trials() {
 #[test]
 fn student_s_percentiles_are_the_tabled_ones() {
     // t at 97.5 %, from any table of it.
-    for (degrees, t, tolerance) in [(2.0, 4.303, 1e-2), (4.0, 2.776, 5e-4), (10.0, 2.228, 5e-4), (28.0, 2.048, 5e-4)] {
+    for (degrees, t, tolerance) in
+        [(2.0, 4.303, 1e-2), (4.0, 2.776, 5e-4), (10.0, 2.228, 5e-4), (28.0, 2.048, 5e-4)]
+    {
         let got = 1.959_964 * student_by_normal(degrees);
         assert!((got / t - 1.0_f64).abs() < tolerance, "{got} for {t}");
     }
@@ -80,21 +89,26 @@ fn student_s_percentiles_are_the_tabled_ones() {
 
 #[test]
 fn the_interval_is_widened_by_the_blocks_there_are() {
-    // Nine blocks of four: √(9/8), and t of 8 degrees, 2.306. Two lists, 27 and 9 blocks: of the shortest, 34 degrees.
+    // Nine blocks of four: √(9/8), and t of 8 degrees, 2.306. Two lists, 27 and 9 blocks: of the
+    // shortest, 34 degrees.
     let bootstrap = Bootstrap { block_len: 4, ..Bootstrap::default() };
     for (n_rows, t) in [(&[36][..], 2.306), (&[108, 36], 2.032)] {
         let want = (9.0_f64 / 8.0).sqrt() * t / 1.959_964;
         assert!((bootstrap.widening(n_rows).unwrap() / want - 1.0).abs() < 5e-4, "{n_rows:?}");
     }
     // A block that is the whole list: every resample is the list.
-    assert_eq!((bootstrap.widening(&[4]), bootstrap.widening(&[36, 3]), bootstrap.widening(&[0])), (None, None, None));
+    assert_eq!(
+        (bootstrap.widening(&[4]), bootstrap.widening(&[36, 3]), bootstrap.widening(&[0])),
+        (None, None, None)
+    );
     assert_eq!(bootstrap.median(&[1.0, 2.0, 3.0, 4.0]), None);
 }
 
 #[test]
 fn the_bootstrap_repeats_and_its_seed_matters() {
     let values = normal(&mut SplitMix64(5), 101);
-    // Few resamples: the ends of many are order statistics of the sample, which two seeds may well share.
+    // Few resamples: the ends of many are order statistics of the sample, which two seeds may well
+    // share.
     let bootstrap = Bootstrap { n_resamples: 10, ..Bootstrap::default() };
     let first = bootstrap.median(&values).unwrap();
     assert_eq!(Some(first), bootstrap.median(&values));
@@ -113,7 +127,8 @@ fn constant_values_leave_no_doubt() {
 
 #[test]
 fn blocks_widen_the_interval_of_correlated_values() {
-    // First-order autoregression with ρ = 0.9: the true interval is wider by about sqrt((1 + ρ)/(1 − ρ)) = 4.4.
+    // First-order autoregression with ρ = 0.9: the true interval is wider by about sqrt((1 + ρ)/(1
+    // − ρ)) = 4.4.
     let mut values = normal(&mut SplitMix64(13), 2000);
     for i in 1..values.len() {
         values[i] += 0.9 * values[i - 1];
@@ -129,14 +144,23 @@ fn blocks_widen_the_interval_of_correlated_values() {
 fn rows_of_a_list_stay_together_and_what_is_unbounded_has_no_interval() {
     let one: Vec<f64> = normal(&mut SplitMix64(17), 50);
     let two: Vec<f64> = one.iter().map(|v| v + 1.0).collect();
-    let at = |values: &[f64], rows: &[usize]| rows.iter().map(|&row| values[row]).sum::<f64>() / 50.0;
+    let at =
+        |values: &[f64], rows: &[usize]| rows.iter().map(|&row| values[row]).sum::<f64>() / 50.0;
     // A difference of columns drawn together is exact; drawn apart it would scatter by 0.2.
-    let together = Bootstrap::default().interval([50], |[rows]| at(&two, rows) - at(&one, rows)).unwrap();
-    assert!((together.low - 1.0).abs() < 1e-12 && (together.high - 1.0).abs() < 1e-12, "{together:?}");
-    let apart = Bootstrap::default().interval([50, 50], |[a, b]| at(&two, a) - at(&one, b)).unwrap();
+    let together =
+        Bootstrap::default().interval([50], |[rows]| at(&two, rows) - at(&one, rows)).unwrap();
+    assert!(
+        (together.low - 1.0).abs() < 1e-12 && (together.high - 1.0).abs() < 1e-12,
+        "{together:?}"
+    );
+    let apart =
+        Bootstrap::default().interval([50, 50], |[a, b]| at(&two, a) - at(&one, b)).unwrap();
     assert!(apart.high - apart.low > 0.4, "{apart:?}");
     // A fiftieth of the resamples have no value; a single one would do.
-    assert_eq!(Bootstrap::default().interval([50], |[rows]| if rows[0] == 7 { f64::NAN } else { 1.0 }), None);
+    assert_eq!(
+        Bootstrap::default().interval([50], |[rows]| if rows[0] == 7 { f64::NAN } else { 1.0 }),
+        None
+    );
     assert_eq!(Bootstrap::default().interval([0, 3], |_| 1.0), None);
 }
 

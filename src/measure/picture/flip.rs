@@ -1,4 +1,5 @@
-//! FLIP (Andersson et al. 2020): what an eye sees that flips between two pictures on a display; NVIDIA's own code.
+//! FLIP (Andersson et al. 2020): what an eye sees that flips between two pictures on a display;
+//! NVIDIA's own code.
 
 use nv_flip::{FlipImageFloat, FlipImageRgb8, magma_lut};
 
@@ -42,7 +43,9 @@ mod tests {
 
     /// CIELAB of a primary of sRGB (IEC 61966-2-1, D65), its chroma times L/100 for Hunt's effect.
     fn lab([r, g, b]: [f64; 3]) -> [f64; 3] {
-        let f = |t: f64| if t > 216.0 / 24389.0 { t.cbrt() } else { (24389.0 / 27.0 * t + 16.0) / 116.0 };
+        let f = |t: f64| {
+            if t > 216.0 / 24389.0 { t.cbrt() } else { (24389.0 / 27.0 * t + 16.0) / 116.0 }
+        };
         let x = f((0.4124 * r + 0.3576 * g + 0.1805 * b) / 0.9505);
         let y = f(0.2126 * r + 0.7152 * g + 0.0722 * b);
         let z = f((0.0193 * r + 0.1192 * g + 0.9505 * b) / 1.0890);
@@ -57,15 +60,16 @@ mod tests {
 
     #[test]
     fn equal_pictures_do_not_flip() {
-        let noise: Vec<u8> = (0..32 * 24 * 3u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
+        let noise: Vec<u8> =
+            (0..32 * 24 * 3u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect();
         assert_eq!(flip(32, 24, &noise, &noise, PIXELS_PER_DEGREE).mean(), 0.0);
         assert_eq!(PIXELS_PER_DEGREE as f32, nv_flip::DEFAULT_PIXELS_PER_DEGREE);
     }
 
     #[test]
     fn black_against_white_is_the_papers_formula() {
-        // Without edges the error is the colours' alone: x = HyAB^0.7 by its greatest, that of green and blue; above 0.4 of it
-        // 0.95 + 0.05 (x − 0.4)/0.6 (Andersson et al. 2020, 5.1).
+        // Without edges the error is the colours' alone: x = HyAB^0.7 by its greatest, that of
+        // green and blue; above 0.4 of it 0.95 + 0.05 (x − 0.4)/0.6 (Andersson et al. 2020, 5.1).
         let most = hyab(lab([0.0, 1.0, 0.0]), lab([0.0, 0.0, 1.0]));
         let x = 100f64.powf(0.7) / most;
         assert!((mean([0; 3], [255; 3]) - (0.95 + 0.05 * (x - 0.4) / 0.6)).abs() < 1e-3, "{x}");

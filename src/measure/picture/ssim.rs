@@ -1,5 +1,5 @@
-//! Structural similarity, Wang, Bovik, Sheikh and Simoncelli 2004, with the constants of that paper: of one channel in
-//! [0, 1], here the luminance of display values.
+//! Structural similarity, Wang, Bovik, Sheikh and Simoncelli 2004, with the constants of that
+//! paper: of one channel in [0, 1], here the luminance of display values.
 
 /// The window is a Gaussian of this σ, in pixels …
 const SIGMA: f64 = 1.5;
@@ -14,7 +14,8 @@ pub fn luminance(rgb: [f64; 3]) -> f64 {
     0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 }
 
-/// Mean of the index over every place where the whole window lies in the picture; none where it nowhere does.
+/// Mean of the index over every place where the whole window lies in the picture; none where it
+/// nowhere does.
 pub fn ssim(width: usize, height: usize, a: &[f64], b: &[f64]) -> Option<f64> {
     assert!(a.len() == width * height && b.len() == a.len(), "a number a pixel");
     if width < WINDOW || height < WINDOW {
@@ -37,7 +38,8 @@ pub fn ssim(width: usize, height: usize, a: &[f64], b: &[f64]) -> Option<f64> {
 fn blurred(width: usize, x: &[f64]) -> Vec<f64> {
     let weights = weights();
     let n_across = width - WINDOW + 1;
-    let row = |row: &[f64]| (0..n_across).map(|i| dot(&weights, row[i..].iter())).collect::<Vec<f64>>();
+    let row =
+        |row: &[f64]| (0..n_across).map(|i| dot(&weights, row[i..].iter())).collect::<Vec<f64>>();
     let across: Vec<f64> = x.chunks(width).flat_map(row).collect();
     let n_down = x.len() / width - WINDOW + 1;
     let at = |k: usize| dot(&weights, across[k..].iter().step_by(n_across));
@@ -87,13 +89,15 @@ mod tests {
     #[test]
     fn one_window_by_the_definition() {
         // 11 × 11: one place, its means by plain sums over all pixels.
-        let (a, b): (Vec<f64>, Vec<f64>) = noise().chunks(2).take(121).map(|c| (c[0], 0.5 * c[0] + 0.3 * c[1])).unzip();
+        let (a, b): (Vec<f64>, Vec<f64>) =
+            noise().chunks(2).take(121).map(|c| (c[0], 0.5 * c[0] + 0.3 * c[1])).unzip();
         let weight = |k: usize| {
             let (x, y) = ((k % 11) as f64 - 5.0, (k / 11) as f64 - 5.0);
             (-(x * x + y * y) / 4.5).exp()
         };
         let total: f64 = (0..121).map(weight).sum();
-        let mean = |f: &dyn Fn(usize) -> f64| (0..121).map(|k| weight(k) * f(k)).sum::<f64>() / total;
+        let mean =
+            |f: &dyn Fn(usize) -> f64| (0..121).map(|k| weight(k) * f(k)).sum::<f64>() / total;
         let (m, n) = (mean(&|k| a[k]), mean(&|k| b[k]));
         let spread = |x: &[f64], y: &[f64], m: f64, n: f64| mean(&|k| (x[k] - m) * (y[k] - n));
         let index = (2.0 * m * n + 1e-4) * (2.0 * spread(&a, &b, m, n) + 9e-4)

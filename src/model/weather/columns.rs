@@ -1,4 +1,5 @@
-//! Optical depth straight up through every column: of a file's cells, and of the blobs that stand for them.
+//! Optical depth straight up through every column: of a file's cells, and of the blobs that stand
+//! for them.
 
 use std::f64::consts::TAU;
 
@@ -20,8 +21,8 @@ pub fn of_cells(grid: &Grid, extinction: &[f64]) -> Vec<f64> {
     depths
 }
 
-/// The blobs' optical depth straight up, its mean over the area of each column: every blob's mass over the area, by the
-/// share of its footprint that lies within (a product of differences of erf).
+/// The blobs' optical depth straight up, its mean over the area of each column: every blob's mass
+/// over the area, by the share of its footprint that lies within (a product of differences of erf).
 pub fn of_blobs(grid: &Grid, blobs: &[WeatherBlob]) -> Vec<f64> {
     let ground = &grid.ground;
     let mut depths = vec![0.0; ground.shape.n_columns()];
@@ -40,8 +41,8 @@ pub fn of_blobs(grid: &Grid, blobs: &[WeatherBlob]) -> Vec<f64> {
     depths
 }
 
-/// The blobs' optical depth straight up at `side`² points of each column, in the middles of equal parts; a column's lie
-/// together.
+/// The blobs' optical depth straight up at `side`² points of each column, in the middles of equal
+/// parts; a column's lie together.
 pub fn at_points(grid: &Grid, blobs: &[WeatherBlob], side: usize) -> Vec<f64> {
     let ground = &grid.ground;
     let n_points = side * side;
@@ -49,10 +50,13 @@ pub fn at_points(grid: &Grid, blobs: &[WeatherBlob], side: usize) -> Vec<f64> {
     for blob in blobs {
         let peak = blob.mass() / (TAU * blob.sigma_xy * blob.sigma_xy);
         for i_column in near(grid, blob, REACH * blob.sigma_xy) {
-            for (i_point, depth) in depths[i_column * n_points..][..n_points].iter_mut().enumerate() {
+            for (i_point, depth) in depths[i_column * n_points..][..n_points].iter_mut().enumerate()
+            {
                 let part = |i: usize| (i as f64 + 0.5) / side as f64 - 0.5;
-                let x = ground.east_m[i_column] + part(i_point % side) * ground.dx_m[i_column] - blob.position.x;
-                let z = ground.south_m[i_column] + part(i_point / side) * ground.dy_m[i_column] - blob.position.z;
+                let x = ground.east_m[i_column] + part(i_point % side) * ground.dx_m[i_column]
+                    - blob.position.x;
+                let z = ground.south_m[i_column] + part(i_point / side) * ground.dy_m[i_column]
+                    - blob.position.z;
                 *depth += peak * (-(x * x + z * z) / (2.0 * blob.sigma_xy * blob.sigma_xy)).exp();
             }
         }

@@ -1,21 +1,25 @@
-//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §15. Whatever shows them says
-//! "diagnosed".
+//! Clouds where a file has no cloud water: from relative humidity, docs/model.md §15. Whatever
+//! shows them says "diagnosed".
 
-use super::air::{EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, relative_humidity, saturation_ratio};
+use super::air::{
+    EPSILON, GRAVITY, HEAT_CAPACITY, R_DRY, dry_density, relative_humidity, saturation_ratio,
+};
 use super::extinction::single_moment_phase;
 use super::grid::Grid;
 
-/// Relative humidity above which a cell has clouds: between Sundqvist's 0.75 over land and 0.85 over sea.
+/// Relative humidity above which a cell has clouds: between Sundqvist's 0.75 over land and 0.85
+/// over sea.
 pub const CRITICAL_HUMIDITY: f64 = 0.8;
-/// Share of the adiabatic liquid water that a cloud has: mixing takes the rest. A choice; stratocumulus has 0.6 to 0.9
-/// of it, cumulus half and less.
+/// Share of the adiabatic liquid water that a cloud has: mixing takes the rest. A choice;
+/// stratocumulus has 0.6 to 0.9 of it, cumulus half and less.
 pub const ADIABATIC_SHARE: f64 = 0.5;
 /// Most water within a cloud, kg/kg: beyond it, it rains.
 pub const GREATEST_RATIO: f64 = 0.5e-3;
 /// Latent heat of evaporation, J/kg, at 0 °C.
 const LATENT_HEAT: f64 = 2.501e6;
 
-/// Share of a cell that clouds cover: Sundqvist, Berge and Kristjánsson 1989, 1 − √((1 − f)/(1 − f_c)).
+/// Share of a cell that clouds cover: Sundqvist, Berge and Kristjánsson 1989, 1 − √((1 − f)/(1 −
+/// f_c)).
 pub fn fraction(humidity: f64) -> f64 {
     if humidity.is_nan() || humidity <= CRITICAL_HUMIDITY {
         return 0.0;
@@ -23,12 +27,13 @@ pub fn fraction(humidity: f64) -> f64 {
     1.0 - ((1.0 - humidity.min(1.0)) / (1.0 - CRITICAL_HUMIDITY)).sqrt()
 }
 
-/// What rising saturated air condenses, kg/kg a metre: (c_p/L)(Γ_d − Γ_s), Γ_s the moist-adiabatic lapse rate of the
-/// Glossary of Meteorology (AMS).
+/// What rising saturated air condenses, kg/kg a metre: (c_p/L)(Γ_d − Γ_s), Γ_s the moist-adiabatic
+/// lapse rate of the Glossary of Meteorology (AMS).
 pub fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
     let q = saturation_ratio(p_pa, t_k);
     let dry = GRAVITY / HEAT_CAPACITY;
-    let (warmth, spread) = (LATENT_HEAT * q / (R_DRY * t_k), LATENT_HEAT * LATENT_HEAT * q * EPSILON);
+    let (warmth, spread) =
+        (LATENT_HEAT * q / (R_DRY * t_k), LATENT_HEAT * LATENT_HEAT * q * EPSILON);
     let moist = GRAVITY * (1.0 + warmth) / (HEAT_CAPACITY + spread / (R_DRY * t_k * t_k));
     (HEAT_CAPACITY / LATENT_HEAT * (dry - moist)).max(0.0)
 }
@@ -42,8 +47,8 @@ pub struct Air<'a> {
     pub vapour: &'a [f64],
 }
 
-/// Extinction in m⁻¹ of every cell: [`fraction`] times water that grows adiabatically from the lowest humid cell of the
-/// layer. What is below 273.15 K is ice.
+/// Extinction in m⁻¹ of every cell: [`fraction`] times water that grows adiabatically from the
+/// lowest humid cell of the layer. What is below 273.15 K is ice.
 pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
     let shape = grid.shape();
     let mut extinction = vec![0.0; shape.n_cells()];
@@ -61,7 +66,8 @@ pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
             let grown = ADIABATIC_SHARE * condensed_per_metre(p, t) * grid.thickness_m(i);
             let within = (below + 0.5 * grown).min(GREATEST_RATIO);
             below += grown;
-            extinction[i] = covered * single_moment_phase(t).extinction(within, dry_density(p, t, air.vapour[i]));
+            extinction[i] = covered
+                * single_moment_phase(t).extinction(within, dry_density(p, t, air.vapour[i]));
         }
     }
     extinction
@@ -74,7 +80,10 @@ mod tests {
 
     #[test]
     fn fraction_by_hand() {
-        assert_eq!((fraction(0.0), fraction(0.8), fraction(1.0), fraction(1.3)), (0.0, 0.0, 1.0, 1.0));
+        assert_eq!(
+            (fraction(0.0), fraction(0.8), fraction(1.0), fraction(1.3)),
+            (0.0, 0.0, 1.0, 1.0)
+        );
         // 1 − √(0.05/0.2) = 0.5.
         assert!((fraction(0.95) - 0.5).abs() < 1e-12);
         assert_eq!(fraction(f64::NAN), 0.0);
@@ -82,10 +91,15 @@ mod tests {
 
     #[test]
     fn condensation_by_hand() {
-        // At 10 °C and 900 hPa q_s = 0.622 · 12.27/(900 − 0.378 · 12.27) = 8.524e-3; L q/(R T) = 0.26235; Γ_s = 9.81 ·
-        // 1.26235/(1004.5 + 2.501e6² · 8.524e-3 · 0.622/(287 · 283.15²)) = 9.81 · 1.26235/2445.8 = 5.0633e-3 K/m; Γ_d =
-        // 9.7661e-3; times 1004.5/2.501e6: 1.8888e-6 a metre, the usual 2 g/kg a kilometre.
-        assert!((condensed_per_metre(9e4, 283.15) - 1.889e-6).abs() < 3e-9, "{}", condensed_per_metre(9e4, 283.15));
+        // At 10 °C and 900 hPa q_s = 0.622 · 12.27/(900 − 0.378 · 12.27) = 8.524e-3; L q/(R T) =
+        // 0.26235; Γ_s = 9.81 · 1.26235/(1004.5 + 2.501e6² · 8.524e-3 · 0.622/(287 · 283.15²)) =
+        // 9.81 · 1.26235/2445.8 = 5.0633e-3 K/m; Γ_d = 9.7661e-3; times 1004.5/2.501e6: 1.8888e-6 a
+        // metre, the usual 2 g/kg a kilometre.
+        assert!(
+            (condensed_per_metre(9e4, 283.15) - 1.889e-6).abs() < 3e-9,
+            "{}",
+            condensed_per_metre(9e4, 283.15)
+        );
         // Cold air has next to nothing to condense.
         assert!(condensed_per_metre(3e4, 230.0) < 0.3e-6);
     }
@@ -101,8 +115,8 @@ mod tests {
         let vapour = [0.5, 1.0, 1.0, 0.5, 1.0].map(|f| f * saturated);
         let air = Air { pressure_pa: &[p; 5], temperature_k: &[t; 5], vapour: &vapour };
         let beta = extinction(&grid, air);
-        // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m; 0.15 m⁻¹ a g/kg in 1 kg/m³, of
-        // which there are 9e4/(287 · 283.15 (1 + 8.524e-3/0.622)) = 1.0925.
+        // 0.5 · 1.889e-6 · 100 m = 9.444e-5 kg/kg at the middle of the first 200 m; 0.15 m⁻¹ a g/kg
+        // in 1 kg/m³, of which there are 9e4/(287 · 283.15 (1 + 8.524e-3/0.622)) = 1.0925.
         assert!((beta[1] - 0.15 * 1.0925 * 0.09444).abs() < 1e-5, "{beta:?}");
         assert!((beta[2] / beta[1] - 3.0).abs() < 1e-12);
         assert_eq!((beta[0], beta[3], beta[4]), (0.0, 0.0, beta[1]));

@@ -1,4 +1,5 @@
-//! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of spheres, docs/model.md §15.
+//! Extinction of droplets and crystals in m⁻¹ from their mixing ratios: geometric optics of
+//! spheres, docs/model.md §15.
 
 use crate::model::moisture::T0_K;
 
@@ -15,14 +16,15 @@ pub const ICE: Phase = Phase { density_kg_m3: 917.0, radius_m: 30e-6 };
 pub const SNOW: Phase = Phase { density_kg_m3: 917.0, radius_m: 100e-6 };
 
 impl Phase {
-    /// β = 3/2 q ρ_d/(ρ_x r_x): of spheres much larger than the wavelength, whose cross section for extinction is twice
-    /// their own.
+    /// β = 3/2 q ρ_d/(ρ_x r_x): of spheres much larger than the wavelength, whose cross section for
+    /// extinction is twice their own.
     pub fn extinction(self, ratio: f64, dry_density: f64) -> f64 {
         1.5 * ratio * dry_density / (self.density_kg_m3 * self.radius_m)
     }
 }
 
-/// What cloud water is at a temperature, where a scheme has one ratio for both (WSM3): ice below 273.15 K.
+/// What cloud water is at a temperature, where a scheme has one ratio for both (WSM3): ice below
+/// 273.15 K.
 pub fn single_moment_phase(t_k: f64) -> Phase {
     if t_k < T0_K { ICE } else { LIQUID }
 }
@@ -42,8 +44,8 @@ impl Oddities {
     }
 }
 
-/// Adds what one kind of condensate brings to every cell's extinction. `ratios` are kg/kg, `scale` times what they say;
-/// `is_missing` says what stands for no value.
+/// Adds what one kind of condensate brings to every cell's extinction. `ratios` are kg/kg, `scale`
+/// times what they say; `is_missing` says what stands for no value.
 pub fn add(
     extinction: &mut [f64],
     ratios: &[f64],

@@ -1,5 +1,5 @@
-//! Where WRF's cells are: their sizes on the ground from the map factors, their bottoms and tops from staggered
-//! heights.
+//! Where WRF's cells are: their sizes on the ground from the map factors, their bottoms and tops
+//! from staggered heights.
 
 /// Cells along west–east, south–north and upward.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,15 +31,16 @@ pub struct Ground {
     /// Sizes of the columns, m: the file's spacing over the map factor there.
     pub dx_m: Vec<f64>,
     pub dy_m: Vec<f64>,
-    /// Their centres, m east and m south of the domain's centre: sizes added up along rows and columns, so that every
-    /// column has its own size; rows are then shifted against each other by what map factors differ.
+    /// Their centres, m east and m south of the domain's centre: sizes added up along rows and
+    /// columns, so that every column has its own size; rows are then shifted against each other by
+    /// what map factors differ.
     pub east_m: Vec<f64>,
     pub south_m: Vec<f64>,
 }
 
 impl Ground {
-    /// From the file's spacing and its map factors, a column each; a factor of 0 is that of an idealised file, which
-    /// has no map, if `is_idealised`.
+    /// From the file's spacing and its map factors, a column each; a factor of 0 is that of an
+    /// idealised file, which has no map, if `is_idealised`.
     ///
     /// # Errors
     /// What a spacing or a factor should be.
@@ -74,7 +75,11 @@ impl Ground {
     /// Greatest distance of a column's edge from the centre, m.
     pub fn extent_m(&self) -> (f64, f64) {
         let greatest = |places: &[f64], sizes: &[f64]| {
-            places.iter().zip(sizes).map(|(place, size)| place.abs() + size / 2.0).fold(0.0, f64::max)
+            places
+                .iter()
+                .zip(sizes)
+                .map(|(place, size)| place.abs() + size / 2.0)
+                .fold(0.0, f64::max)
         };
         (greatest(&self.east_m, &self.dx_m), greatest(&self.south_m, &self.dy_m))
     }
@@ -86,7 +91,10 @@ const FACTORS: (f64, f64) = (0.05, 20.0);
 fn size(spacing_m: f64, factor: f64, is_idealised: bool) -> Result<f64, String> {
     let factor = if is_idealised && factor == 0.0 { 1.0 } else { factor };
     if !(FACTORS.0..=FACTORS.1).contains(&factor) {
-        return Err(format!("a map factor is {factor}: expected one from {} to {}", FACTORS.0, FACTORS.1));
+        return Err(format!(
+            "a map factor is {factor}: expected one from {} to {}",
+            FACTORS.0, FACTORS.1
+        ));
     }
     Ok(spacing_m / factor)
 }
@@ -114,11 +122,14 @@ impl Grid {
     pub fn new(ground: Ground, heights_m: Vec<f64>) -> Result<Self, String> {
         let n = ground.shape.n_columns();
         let is_above = |(below, above): (&f64, &f64)| above > below;
-        if let Some(i) = heights_m.iter().zip(heights_m.iter().skip(n)).position(|pair| !is_above(pair)) {
+        if let Some(i) =
+            heights_m.iter().zip(heights_m.iter().skip(n)).position(|pair| !is_above(pair))
+        {
             let (k, j, i_row) = (i / n, i % n / ground.shape.nx, i % ground.shape.nx);
             let (below, above) = (heights_m[i], heights_m[i + n]);
             return Err(format!(
-                "heights do not rise: {above:.1} m above {below:.1} m at level {k}, row {j}, column {i_row}; expected every staggered level above the one before it"
+                "heights do not rise: {above:.1} m above {below:.1} m at level {k}, row {j}, \
+                 column {i_row}; expected every staggered level above the one before it"
             ));
         }
         Ok(Grid { ground, heights_m })
@@ -172,7 +183,9 @@ mod tests {
 
     #[test]
     fn factors_of_nothing_are_one_without_a_map() {
-        let of = |factor: f64, is_idealised| Ground::new(SHAPE, (9.0, 9.0), (&[factor; 6], &[1.0; 6]), is_idealised);
+        let of = |factor: f64, is_idealised| {
+            Ground::new(SHAPE, (9.0, 9.0), (&[factor; 6], &[1.0; 6]), is_idealised)
+        };
         assert_eq!(of(0.0, true).unwrap().dx_m, [9.0; 6]);
         assert_eq!(of(0.0, false).unwrap_err(), "a map factor is 0: expected one from 0.05 to 20");
         assert!(of(f64::NAN, true).is_err() && of(-1.0, true).is_err() && of(1e30, false).is_err());
@@ -187,7 +200,9 @@ mod tests {
         heights[10] = 10.0;
         let said = Grid::new(ground.clone(), heights.clone()).unwrap_err();
         assert!(
-            said.starts_with("heights do not rise: 10.0 m above 10.0 m at level 0, row 1, column 1; expected"),
+            said.starts_with(
+                "heights do not rise: 10.0 m above 10.0 m at level 0, row 1, column 1; expected"
+            ),
             "{said}"
         );
         heights[10] = f64::NAN;

@@ -1,5 +1,5 @@
-//! The blobs of all moments between two steps, or of one step alone: laid out once, and then as cheap as a mean of two
-//! numbers a blob.
+//! The blobs of all moments between two steps, or of one step alone: laid out once, and then as
+//! cheap as a mean of two numbers a blob.
 
 use super::grid::Grid;
 use super::particles::{Layout, WeatherBlob};
@@ -20,9 +20,13 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// From a step to the next one, on a grid of the same shape, or a step alone; `layout` stands for them, and maybe for more.
+    /// From a step to the next one, on a grid of the same shape, or a step alone; `layout` stands
+    /// for them, and maybe for more.
     pub fn laid_out(layout: &Layout, a: Moment, b: Option<Moment>) -> Self {
-        Interval { from: layout.blobs(a.grid, a.extinction), to: b.map(|b| layout.blobs(b.grid, b.extinction)) }
+        Interval {
+            from: layout.blobs(a.grid, a.extinction),
+            to: b.map(|b| layout.blobs(b.grid, b.extinction)),
+        }
     }
 
     pub fn len(&self) -> usize {
@@ -33,11 +37,13 @@ impl Interval {
         self.from.is_empty()
     }
 
-    /// A blob `weight` of the way from the first step to the second: place, widths and mass are linear in it, so that
-    /// the clouds' mass is.
+    /// A blob `weight` of the way from the first step to the second: place, widths and mass are
+    /// linear in it, so that the clouds' mass is.
     pub fn blob(&self, i: usize, weight: f64) -> WeatherBlob {
         let from = self.from[i];
-        let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else { return from };
+        let Some(to) = self.to.as_ref().map(|to| to[i]).filter(|_| weight != 0.0) else {
+            return from;
+        };
         let mix = |a: f64, b: f64| a + weight * (b - a);
         let mut blob = WeatherBlob {
             position: from.position.lerp(to.position, weight),

@@ -1,8 +1,9 @@
-//! Clouds of a weather model as plain arrays: from pressure, temperature and mixing ratios on WRF's grid to extinction
-//! in m⁻¹, and from that to blobs (docs/model.md §15). No files: `io::weather` reads them.
+//! Clouds of a weather model as plain arrays: from pressure, temperature and mixing ratios on WRF's
+//! grid to extinction in m⁻¹, and from that to blobs (docs/model.md §15). No files: `io::weather`
+//! reads them.
 //!
-//! Arrays are ordered as in the files: level by level from the ground, in each row by row from the south, in each from
-//! the west.
+//! Arrays are ordered as in the files: level by level from the ground, in each row by row from the
+//! south, in each from the west.
 
 pub mod air;
 pub mod columns;

@@ -1,5 +1,5 @@
-//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass the cell's
-//! (docs/model.md §15).
+//! Blobs for cells: how many each gets, where they lie, and the extinction that makes their mass
+//! the cell's (docs/model.md §15).
 
 use std::f64::consts::{PI, TAU};
 
@@ -8,24 +8,25 @@ use glam::DVec3;
 use super::grid::{Grid, Shape};
 use super::places::CellSeed;
 
-/// A column thinner than this optical depth, 0.1 % of the light, may be without blobs where more than one in
-/// [`AFFORDED`] would go to see that every column has one. Its mass goes to the next column that has.
+/// A column thinner than this optical depth, 0.1 % of the light, may be without blobs where more
+/// than one in [`AFFORDED`] would go to see that every column has one. Its mass goes to the next
+/// column that has.
 pub const THIN: f64 = 1e-3;
 pub const AFFORDED: usize = 10;
-/// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other, narrower ones leave gaps
-/// between themselves (docs/model.md §15 has the errors).
+/// σ_xy over the spacing √(area/n) of a cell's blobs. Wider blobs blur cells into each other,
+/// narrower ones leave gaps between themselves (docs/model.md §15 has the errors).
 pub const SPREAD: f64 = 0.45;
-/// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear columns, and what is
-/// missing at an edge between two clouds is small.
+/// By how many σ_xy the centres keep further from a cell's edge: thick clouds leak less into clear
+/// columns, and what is missing at an edge between two clouds is small.
 pub const INSET: f64 = 0.5;
 /// σ of what is spread evenly over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
-/// σ_z over the thickness of a cell that several blobs share: their heights, over half of it, bring the rest of the
-/// variance, 1/16 + 1/48 = 1/12.
+/// σ_z over the thickness of a cell that several blobs share: their heights, over half of it, bring
+/// the rest of the variance, 1/16 + 1/48 = 1/12.
 const THICKNESS: f64 = 0.25;
 
-/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²). Metres: x east, y up from sea level, z
-/// south, from the middle of the domain.
+/// A Gaussian blob with a round footprint: κ exp(−(x² + z²)/2σ_xy² − y²/2σ_z²). Metres: x east, y
+/// up from sea level, z south, from the middle of the domain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeatherBlob {
     pub position: DVec3,
@@ -49,8 +50,9 @@ pub struct Place {
     pub number: u32,
 }
 
-/// Which cells have how many blobs, and which cell's blobs hold a cell's mass. It stands for one step, or for all
-/// moments between two, over which blobs keep their places and only their extinction changes.
+/// Which cells have how many blobs, and which cell's blobs hold a cell's mass. It stands for one
+/// step, or for all moments between two, over which blobs keep their places and only their
+/// extinction changes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
     seed: u32,
@@ -62,8 +64,8 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// `n` blobs, by 1 − e^{−τ} of the cells; of several moments each cell has the greatest weight that it has in any
-    /// of them.
+    /// `n` blobs, by 1 − e^{−τ} of the cells; of several moments each cell has the greatest weight
+    /// that it has in any of them.
     pub fn new(grid: &Grid, moments: &[&[f64]], n: usize, seed: u32) -> Self {
         let depths = greatest_depths(grid, moments);
         let n_blobs = allocate(grid, &depths, n);
@@ -72,7 +74,10 @@ impl Layout {
         for (i_cell, &n_here) in (0u32..).zip(&n_blobs) {
             if n_here > 0 {
                 let cell = CellSeed::new(seed, i_cell);
-                ordered.extend((0..n_here).map(|number| (cell.order(number, n_here), Place { i_cell, number })));
+                ordered.extend(
+                    (0..n_here)
+                        .map(|number| (cell.order(number, n_here), Place { i_cell, number })),
+                );
             }
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -89,31 +94,38 @@ impl Layout {
         &self.n_blobs
     }
 
-    /// The blobs that hold the extinction of `extinction`, m⁻¹ a cell, on `grid`: together ∫ β dV of it, and of each
-    /// cell or of those whose host it is its own. Linear in `extinction`, which has clouds only where one of the
-    /// moments has that the layout was made for.
+    /// The blobs that hold the extinction of `extinction`, m⁻¹ a cell, on `grid`: together ∫ β dV
+    /// of it, and of each cell or of those whose host it is its own. Linear in `extinction`, which
+    /// has clouds only where one of the moments has that the layout was made for.
     pub fn blobs(&self, grid: &Grid, extinction: &[f64]) -> Vec<WeatherBlob> {
         let n_columns = grid.shape().n_columns();
         let mut masses = vec![0.0; extinction.len()];
         for (i, beta) in extinction.iter().enumerate().filter(|(_, beta)| **beta > 0.0) {
-            masses[self.hosts[i] as usize] += beta * grid.thickness_m(i) * grid.ground.area_m2(i % n_columns);
+            masses[self.hosts[i] as usize] +=
+                beta * grid.thickness_m(i) * grid.ground.area_m2(i % n_columns);
         }
-        self.places.iter().map(|place| self.blob(grid, *place, masses[place.i_cell as usize])).collect()
+        self.places
+            .iter()
+            .map(|place| self.blob(grid, *place, masses[place.i_cell as usize]))
+            .collect()
     }
 
     fn blob(&self, grid: &Grid, place: Place, mass_of_cell: f64) -> WeatherBlob {
         let (i, n) = (place.i_cell as usize, f64::from(self.n_blobs[place.i_cell as usize]));
         let i_column = i % grid.shape().n_columns();
         let ground = &grid.ground;
-        let (dx, dy, thickness) = (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
+        let (dx, dy, thickness) =
+            (ground.dx_m[i_column], ground.dy_m[i_column], grid.thickness_m(i));
         let sigma_xy = (SPREAD * (dx * dy / n).sqrt()).min(EVEN * dx.min(dy));
         let sigma_z = if n > 1.0 { THICKNESS } else { EVEN } * thickness;
-        // Of centres and σ together the variance is the cell's: centres keep to its middle by as much as blobs are
-        // wide.
-        let room = |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
+        // Of centres and σ together the variance is the cell's: centres keep to its middle by as
+        // much as blobs are wide.
+        let room =
+            |size: f64, sigma: f64| size * (1.0 - (sigma / (EVEN * size)).powi(2)).max(0.0).sqrt();
         let inside = |size: f64| (room(size, sigma_xy) - 2.0 * INSET * sigma_xy).max(0.0);
         let room = DVec3::new(inside(dx), room(thickness, sigma_z), inside(dy));
-        let middle = DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
+        let middle =
+            DVec3::new(ground.east_m[i_column], grid.middle_m(i), ground.south_m[i_column]);
         let position = middle + room * CellSeed::new(self.seed, place.i_cell).place(place.number);
         let mut blob = WeatherBlob { position, sigma_xy, sigma_z, kappa: 1.0 };
         blob.kappa = mass_of_cell / n / blob.mass();
@@ -127,8 +139,8 @@ fn greatest_depths(grid: &Grid, moments: &[&[f64]]) -> Vec<f64> {
     (0..grid.shape().n_cells()).map(|i| greatest(i) * grid.thickness_m(i)).collect()
 }
 
-/// How many blobs each cell has: those of its column are dealt by Σ 1 − e^{−τ}, and those of the column's cells by
-/// rounding the running sum, so that thin cells have one together.
+/// How many blobs each cell has: those of its column are dealt by Σ 1 − e^{−τ}, and those of the
+/// column's cells by rounding the running sum, so that thin cells have one together.
 fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
@@ -139,13 +151,19 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
         of_columns[i % n_columns] += depth;
     }
     let mut n_blobs = vec![0u32; depths.len()];
-    for (i_column, &n_column) in deal(&weights, &of_columns, n, &there_and_back(shape)).iter().enumerate() {
+    for (i_column, &n_column) in
+        deal(&weights, &of_columns, n, &there_and_back(shape)).iter().enumerate()
+    {
         let (mut sum, mut n_before) = (0.0, 0);
         for k in 0..shape.nz {
             let i = shape.cell(k, i_column);
             sum += -(-depths[i]).exp_m1();
             // The last sum is the weight itself, to the bit.
-            let n_until = if n_column == 0 { 0 } else { (n_column as f64 * (sum / weights[i_column]) + 0.5) as u32 };
+            let n_until = if n_column == 0 {
+                0
+            } else {
+                (n_column as f64 * (sum / weights[i_column]) + 0.5) as u32
+            };
             n_blobs[i] = n_until - n_before;
             n_before = n_until;
         }
@@ -153,9 +171,9 @@ fn allocate(grid: &Grid, depths: &[f64], n: usize) -> Vec<u32> {
     n_blobs
 }
 
-/// `n` things dealt by weight. Where there are enough, one to each that is not thin, and of the rest whole ones by
-/// largest remainder (ties to the first); to the others by rounding the running sum in `order`, so that some neighbours
-/// have one together.
+/// `n` things dealt by weight. Where there are enough, one to each that is not thin, and of the
+/// rest whole ones by largest remainder (ties to the first); to the others by rounding the running
+/// sum in `order`, so that some neighbours have one together.
 fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize> {
     let mut dealt = vec![0; weights.len()];
     let total: f64 = weights.iter().sum();
@@ -184,9 +202,15 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
     }
     let left = room - n_thin;
     let thick: Vec<usize> = (0..weights.len()).filter(|&i| is_thick(i)).collect();
-    // What each is due beyond the one that it has; where that is nothing for all, it goes by weight.
-    let due: Vec<f64> = thick.iter().map(|&i| (n as f64 * weights[i] / total - 1.0).max(0.0)).collect();
-    let due = if due.iter().sum::<f64>() > 0.0 { due } else { thick.iter().map(|&i| weights[i]).collect() };
+    // What each is due beyond the one that it has; where that is nothing for all, it goes by
+    // weight.
+    let due: Vec<f64> =
+        thick.iter().map(|&i| (n as f64 * weights[i] / total - 1.0).max(0.0)).collect();
+    let due = if due.iter().sum::<f64>() > 0.0 {
+        due
+    } else {
+        thick.iter().map(|&i| weights[i]).collect()
+    };
     let due_together: f64 = due.iter().sum();
     let quotas: Vec<f64> = due.iter().map(|d| left as f64 * (d / due_together)).collect();
     let mut by_remainder: Vec<usize> = (0..thick.len()).collect();
@@ -201,17 +225,19 @@ fn deal(weights: &[f64], depths: &[f64], n: usize, order: &[usize]) -> Vec<usize
 
 /// Columns row by row from the south, there and back, so that each lies beside the one before it.
 fn there_and_back(shape: Shape) -> Vec<usize> {
-    let along = |j: usize, i: usize| j * shape.nx + if j.is_multiple_of(2) { i } else { shape.nx - 1 - i };
+    let along =
+        |j: usize, i: usize| j * shape.nx + if j.is_multiple_of(2) { i } else { shape.nx - 1 - i };
     (0..shape.ny).flat_map(|j| (0..shape.nx).map(move |i| along(j, i))).collect()
 }
 
-/// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column; else of the next
-/// column that has some, row by row and there and back.
+/// Whose blobs hold a cell's mass: its own; else those of the cell nearest in level of its column;
+/// else of the next column that has some, row by row and there and back.
 fn hosts(grid: &Grid, depths: &[f64], n_blobs: &[u32]) -> Vec<u32> {
     let shape = grid.shape();
     let n_columns = shape.n_columns();
     let has_some = |i_column: usize| (0..shape.nz).any(|k| n_blobs[shape.cell(k, i_column)] > 0);
-    // For every column the one that holds its mass, in order, those after the last from there backwards.
+    // For every column the one that holds its mass, in order, those after the last from there
+    // backwards.
     let mut holders = vec![None; n_columns];
     let order = there_and_back(shape);
     let backwards: Vec<usize> = order.iter().rev().copied().collect();
@@ -223,7 +249,9 @@ fn hosts(grid: &Grid, depths: &[f64], n_blobs: &[u32]) -> Vec<u32> {
         }
     }
     let mut hosts: Vec<u32> = (0..depths.len() as u32).collect();
-    for (i, host) in hosts.iter_mut().enumerate().filter(|(i, _)| n_blobs[*i] == 0 && depths[*i] > 0.0) {
+    for (i, host) in
+        hosts.iter_mut().enumerate().filter(|(i, _)| n_blobs[*i] == 0 && depths[*i] > 0.0)
+    {
         let Some(holder) = holders[i % n_columns] else { continue };
         let k = i / n_columns;
         let with_some = (0..shape.nz).filter(|&k| n_blobs[shape.cell(k, holder)] > 0);

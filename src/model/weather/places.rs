@@ -1,5 +1,5 @@
-//! Where in its cell a blob lies and in what order blobs are drawn: evenly, and the same of every (seed, cell, number)
-//! at every time.
+//! Where in its cell a blob lies and in what order blobs are drawn: evenly, and the same of every
+//! (seed, cell, number) at every time.
 
 use glam::DVec3;
 
@@ -7,9 +7,9 @@ use crate::model::philox::{philox4x32_10, uniform};
 
 /// "weat": parts these random numbers from all others of the same seed.
 const STREAM: u32 = 0x7765_6174;
-/// The root of x³ = x + 1, whose powers spread points of a plane most evenly, and that of x² = x + 1 for their heights:
-/// Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018); any first points of a cell are spread as
-/// all of them are.
+/// The root of x³ = x + 1, whose powers spread points of a plane most evenly, and that of x² = x +
+/// 1 for their heights: Roberts, "The unreasonable effectiveness of quasirandom sequences" (2018);
+/// any first points of a cell are spread as all of them are.
 const PLANE_ROOT: f64 = 1.324_717_957_244_746;
 const LINE_ROOT: f64 = 1.618_033_988_749_895;
 
@@ -35,8 +35,8 @@ impl CellSeed {
         at - at.floor() - 0.5
     }
 
-    /// Where in the order of all the `number`-th of `n` blobs comes, in [0, 1): a first part of the order has the same
-    /// part of every cell.
+    /// Where in the order of all the `number`-th of `n` blobs comes, in [0, 1): a first part of the
+    /// order has the same part of every cell.
     pub fn order(self, number: u32, n: u32) -> f64 {
         (f64::from(number) + self.order) / f64::from(n)
     }

@@ -3,7 +3,8 @@
 use super::columns;
 use super::grid::Grid;
 
-/// Cells of less extinction, m⁻¹, hold no cloud that can be seen: through 10 km of it 99 % of the light come.
+/// Cells of less extinction, m⁻¹, hold no cloud that can be seen: through 10 km of it 99 % of the
+/// light come.
 pub const FAINT: f64 = 1e-6;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +21,8 @@ pub struct CloudStatistics {
     pub mean_opacity: f64,
     /// Lowest bottom and highest top of such a cell, m above sea level.
     pub base_and_top_m: Option<(f64, f64)>,
-    /// Columns whose highest cell is such a cell: where there is more than one level, what is above may have some, too.
+    /// Columns whose highest cell is such a cell: where there is more than one level, what is above
+    /// may have some, too.
     pub n_columns_to_the_top: usize,
     /// ∫ β dV over the domain, m².
     pub mass_m2: f64,

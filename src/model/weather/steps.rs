@@ -1,13 +1,14 @@
 //! The times of a file's steps: their text, their order, and between which of them a moment lies.
 
-/// Steps further apart are not interpolated, s: clouds on fixed seeds are off by half of their spread between steps 10
-/// minutes apart, and by three quarters between steps 3 hours apart (docs/model.md §15).
+/// Steps further apart are not interpolated, s: clouds on fixed seeds are off by half of their
+/// spread between steps 10 minutes apart, and by three quarters between steps 3 hours apart
+/// (docs/model.md §15).
 pub const LONGEST_INTERPOLATED_S: f64 = 600.0;
 
 const SECONDS_A_DAY: f64 = 86_400.0;
 
-/// Days from 1970-01-01 of a date of the Gregorian calendar, extended backwards: the algorithm of Hinnant,
-/// "chrono-compatible low-level date algorithms".
+/// Days from 1970-01-01 of a date of the Gregorian calendar, extended backwards: the algorithm of
+/// Hinnant, "chrono-compatible low-level date algorithms".
 pub fn days(year: i64, month: u32, day: u32) -> i64 {
     let year = if month <= 2 { year - 1 } else { year };
     let era = year.div_euclid(400);
@@ -30,7 +31,8 @@ pub fn date(days: i64) -> (i64, u32, u32) {
     (year_of_era + era * 400 + i64::from(month <= 2), month, day)
 }
 
-/// Seconds from 1970-01-01 00:00 UTC of WRF's "YYYY-MM-DD_HH:MM:SS"; None of all that is no such time.
+/// Seconds from 1970-01-01 00:00 UTC of WRF's "YYYY-MM-DD_HH:MM:SS"; None of all that is no such
+/// time.
 pub fn parse(text: &str) -> Option<f64> {
     let bytes = text.as_bytes();
     let separators = [(4, b'-'), (7, b'-'), (13, b':'), (16, b':')];
@@ -41,19 +43,27 @@ pub fn parse(text: &str) -> Option<f64> {
         return None;
     }
     let number = |from: usize, to: usize| -> Option<u32> {
-        bytes[from..to].iter().try_fold(0, |n, b| b.is_ascii_digit().then(|| n * 10 + u32::from(b - b'0')))
+        bytes[from..to]
+            .iter()
+            .try_fold(0, |n, b| b.is_ascii_digit().then(|| n * 10 + u32::from(b - b'0')))
     };
     let (year, month, day) = (i64::from(number(0, 4)?), number(5, 7)?, number(8, 10)?);
     let (hour, minute, second) = (number(11, 13)?, number(14, 16)?, number(17, 19)?);
     let of_date = days(year, month, day);
     // What is no date, such as 30 February, is another one when it is told back.
-    if !(1..=12).contains(&month) || date(of_date) != (year, month, day) || hour > 23 || minute > 59 || second > 60 {
+    if !(1..=12).contains(&month)
+        || date(of_date) != (year, month, day)
+        || hour > 23
+        || minute > 59
+        || second > 60
+    {
         return None;
     }
     Some(of_date as f64 * SECONDS_A_DAY + f64::from(hour * 3600 + minute * 60 + second))
 }
 
-/// "YYYY-MM-DD HH:MM:SS" (UTC) of such a time, to the nearest second; what is beyond the years 0 to 9999 as seconds.
+/// "YYYY-MM-DD HH:MM:SS" (UTC) of such a time, to the nearest second; what is beyond the years 0 to
+/// 9999 as seconds.
 pub fn format(time_s: f64) -> String {
     let whole = time_s.round();
     if !whole.is_finite() {
@@ -83,8 +93,8 @@ pub struct Between {
 }
 
 /// Between which of the steps at `times_s`, rising, `t_s` lies: linear where they are at most
-/// [`LONGEST_INTERPOLATED_S`] apart, else the one before. The first step stands for all before it, the last for all
-/// after it. None of no steps or of NaN.
+/// [`LONGEST_INTERPOLATED_S`] apart, else the one before. The first step stands for all before it,
+/// the last for all after it. None of no steps or of NaN.
 pub fn between(times_s: &[f64], t_s: f64) -> Option<Between> {
     if times_s.is_empty() || t_s.is_nan() {
         return None;
@@ -114,7 +124,12 @@ mod tests {
         assert_eq!(parse("2000-02-29_23:59:59"), Some(951_868_799.0));
         // The idealised cases begin in the year 1: 719162 days before 1970.
         assert_eq!(parse("0001-01-01_00:46:00"), Some(-719_162.0 * 86_400.0 + 2760.0));
-        for text in ["2005-08-28_12:00:00", "0001-01-01_00:46:00", "1999-12-31_23:59:59", "2400-02-29_00:00:00"] {
+        for text in [
+            "2005-08-28_12:00:00",
+            "0001-01-01_00:46:00",
+            "1999-12-31_23:59:59",
+            "2400-02-29_00:00:00",
+        ] {
             assert_eq!(format(parse(text).unwrap()), text.replace('_', " "));
         }
         let wrong = [

@@ -1,6 +1,6 @@
-//! Where the sun stands: the low-precision formulas of the Astronomical Almanac as Michalsky, "The Astronomical
-//! Almanac's algorithm for approximate solar position (1950–2050)", Solar Energy 40 (1988), gives them: 0.01° in those
-//! years. No refraction and no parallax.
+//! Where the sun stands: the low-precision formulas of the Astronomical Almanac as Michalsky, "The
+//! Astronomical Almanac's algorithm for approximate solar position (1950–2050)", Solar Energy 40
+//! (1988), gives them: 0.01° in those years. No refraction and no parallax.
 
 use glam::DVec3;
 
@@ -18,8 +18,8 @@ pub fn equatorial(time_s: f64) -> (f64, f64) {
     (ascension.rem_euclid(std::f64::consts::TAU), (obliquity.sin() * ecliptic.sin()).asin())
 }
 
-/// The unit vector toward the sun, x east, y up, z south, from `latitude` and `longitude` (radians, north and east
-/// positive).
+/// The unit vector toward the sun, x east, y up, z south, from `latitude` and `longitude` (radians,
+/// north and east positive).
 pub fn toward(time_s: f64, latitude: f64, longitude: f64) -> DVec3 {
     let (ascension, declination) = equatorial(time_s);
     let n = time_s / 86_400.0 - J2000_DAYS;
@@ -46,27 +46,36 @@ mod tests {
 
     #[test]
     fn published_places() {
-        // Meeus, "Astronomical Algorithms", example 25.a: 1992 October 13, 0h TD: α = 198.38083°, δ = −7.78507°.
+        // Meeus, "Astronomical Algorithms", example 25.a: 1992 October 13, 0h TD: α = 198.38083°, δ
+        // = −7.78507°.
         let (ascension, declination) = equatorial(parse("1992-10-13_00:00:00").unwrap());
         assert!((ascension.to_degrees() - 198.38083).abs() < 0.01, "{}", ascension.to_degrees());
         assert!((declination.to_degrees() + 7.78507).abs() < 0.01, "{}", declination.to_degrees());
-        // Reda and Andreas 2004 (NREL/TP-560-34302), appendix A.5: 2003 October 17, 12:30:30 at UT − 7 h, 39.742476° N,
-        // 105.1786° W: azimuth 194.34024°, elevation 39.872046° before refraction, which 0.0016° of parallax is in.
+        // Reda and Andreas 2004 (NREL/TP-560-34302), appendix A.5: 2003 October 17, 12:30:30 at UT
+        // − 7 h, 39.742476° N, 105.1786° W: azimuth 194.34024°, elevation 39.872046° before
+        // refraction, which 0.0016° of parallax is in.
         let (latitude, longitude) = (39.742476f64.to_radians(), (-105.1786f64).to_radians());
-        let (elevation, azimuth) = angles(toward(parse("2003-10-17_19:30:30").unwrap(), latitude, longitude));
+        let (elevation, azimuth) =
+            angles(toward(parse("2003-10-17_19:30:30").unwrap(), latitude, longitude));
         assert!((azimuth - 194.34024).abs() < 0.02, "{azimuth}");
         assert!((elevation - 39.872046).abs() < 0.012, "{elevation}");
     }
 
     #[test]
     fn the_sun_rises_in_the_east() {
-        let of_hour = |hour: &str| toward(parse(&format!("2005-03-20_{hour}:00:00")).unwrap(), 0.0, 0.0);
-        // The equator at an equinox: east, overhead, west; the equation of time is 7.5 minutes, 1.9°.
+        let of_hour =
+            |hour: &str| toward(parse(&format!("2005-03-20_{hour}:00:00")).unwrap(), 0.0, 0.0);
+        // The equator at an equinox: east, overhead, west; the equation of time is 7.5 minutes,
+        // 1.9°.
         assert!(of_hour("06").x > 0.99 && of_hour("12").y > 0.99 && of_hour("18").x < -0.99);
         // Noon in the northern winter stands in the south, which is +z.
         let noon = toward(parse("2005-12-21_12:00:00").unwrap(), 50f64.to_radians(), 0.0);
         let (elevation, azimuth) = angles(noon);
-        assert!(noon.z > 0.0 && (azimuth - 180.0).abs() < 2.0 && (elevation - (90.0 - 50.0 - 23.44)).abs() < 0.1);
+        assert!(
+            noon.z > 0.0
+                && (azimuth - 180.0).abs() < 2.0
+                && (elevation - (90.0 - 50.0 - 23.44)).abs() < 0.1
+        );
         assert!((noon.length() - 1.0).abs() < 1e-15);
     }
 }

@@ -23,15 +23,20 @@ pub struct Division {
 }
 
 impl Division {
-    /// `width` × `height` pixels by workgroups of so many invocations. An error where there would be too many bins.
+    /// `width` × `height` pixels by workgroups of so many invocations. An error where there would
+    /// be too many bins.
     pub fn of(width: u32, height: u32, invocations: u32) -> Result<Division> {
         let rows = if invocations <= 16 { 8 } else { 16 };
         let tile = [RUN * (invocations / rows), rows];
-        let [n_bins_x, n_bins_y] = [width.div_ceil(TILES_ACROSS * tile[0]), height.div_ceil(TILES_ACROSS * tile[1])];
+        let [n_bins_x, n_bins_y] =
+            [width.div_ceil(TILES_ACROSS * tile[0]), height.div_ceil(TILES_ACROSS * tile[1])];
         match n_bins_x.checked_mul(n_bins_y) {
-            Some(n_bins) if n_bins <= MOST_BINS => Ok(Division { width, height, invocations, tile, n_bins_x, n_bins }),
+            Some(n_bins) if n_bins <= MOST_BINS => {
+                Ok(Division { width, height, invocations, tile, n_bins_x, n_bins })
+            }
             _ => Err(Error::limit(format!(
-                "draw.path = \"tiles\": {width} x {height} pixels are more than its {MOST_BINS} bins of {} x {}; expected \"sprites\"",
+                "draw.path = \"tiles\": {width} x {height} pixels are more than its {MOST_BINS} \
+                 bins of {} x {}; expected \"sprites\"",
                 TILES_ACROSS * tile[0],
                 TILES_ACROSS * tile[1]
             ))),

@@ -1,5 +1,6 @@
-//! Adaptive cubature over triangles: Dunavant's rule of degree 8 for the value, Radon's of degree 5 beside it for the
-//! error; the cell of greatest error is halved across its longest edge until the sum of all errors is small enough.
+//! Adaptive cubature over triangles: Dunavant's rule of degree 8 for the value, Radon's of degree 5
+//! beside it for the error; the cell of greatest error is halved across its longest edge until the
+//! sum of all errors is small enough.
 
 use std::collections::BinaryHeap;
 
@@ -28,7 +29,8 @@ impl Accuracy {
     }
 }
 
-/// Radiance and irradiance, and what error they are known to have themselves: (of radiance, of irradiance, 0).
+/// Radiance and irradiance, and what error they are known to have themselves: (of radiance, of
+/// irradiance, 0).
 pub type Sample = [DVec3; 3];
 
 pub const NOTHING: Sample = [DVec3::ZERO; 3];
@@ -38,8 +40,9 @@ pub const NOTHING: Sample = [DVec3::ZERO; 3];
 pub struct Estimate {
     pub radiance: DVec3,
     pub irradiance: DVec3,
-    /// Of the radiance, greatest channel: the sum over cells of the greater of |degree 8 − degree 5|, which is the error
-    /// of the lesser rule, and half of what the last halving changed. Infinite where the evaluations ran out before every lobe, light and blob was resolved.
+    /// Of the radiance, greatest channel: the sum over cells of the greater of |degree 8 − degree
+    /// 5|, which is the error of the lesser rule, and half of what the last halving changed.
+    /// Infinite where the evaluations ran out before every lobe, light and blob was resolved.
     pub error: f64,
     /// Of the irradiance, in the same way.
     pub irradiance_error: f64,
@@ -60,8 +63,9 @@ pub trait Integrand {
     fn is_resolved(&self, cell: &Cell) -> bool;
     /// Squared length of the step `d`.
     fn length_squared(&self, i_piece: usize, d: DVec2) -> f64;
-    /// What the rules' difference is multiplied by: 1 where the integrand is smooth within cells, so that the greater
-    /// degree errs much less than the lesser; more where it bends and both err alike.
+    /// What the rules' difference is multiplied by: 1 where the integrand is smooth within cells,
+    /// so that the greater degree errs much less than the lesser; more where it bends and both err
+    /// alike.
     fn doubt(&self) -> f64 {
         1.0
     }
@@ -75,7 +79,8 @@ impl Cell {
 
     /// Halves across the longest edge.
     fn halves(&self, f: &dyn Integrand) -> [Cell; 2] {
-        let edge = |i: usize| f.length_squared(self.i_piece, self.corners[(i + 1) % 3] - self.corners[i]);
+        let edge =
+            |i: usize| f.length_squared(self.i_piece, self.corners[(i + 1) % 3] - self.corners[i]);
         let lengths = [edge(0), edge(1), edge(2)];
         let i = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
         let [a, b, c] = [self.corners[i], self.corners[(i + 1) % 3], self.corners[(i + 2) % 3]];
@@ -93,7 +98,8 @@ pub fn triangles(polygon: &Polygon, i_piece: usize) -> impl Iterator<Item = Cell
 /// Barycentric coordinates, the weight in the rule of degree 8 and in that of degree 5.
 type Node = ([f64; 3], f64, f64);
 
-/// Orbits of Dunavant's 16-point rule of degree 8 (Int. J. Numer. Meth. Engng 21, 1985): (one coordinate, another, weight).
+/// Orbits of Dunavant's 16-point rule of degree 8 (Int. J. Numer. Meth. Engng 21, 1985): (one
+/// coordinate, another, weight).
 const DEGREE_8: [(f64, f64, f64); 5] = [
     (1.0 / 3.0, 1.0 / 3.0, 0.144_315_607_677_787_2),
     (0.459_292_588_292_723_1, 0.459_292_588_292_723_1, 0.095_091_634_267_284_6),
@@ -129,7 +135,8 @@ fn orbit(nodes: &mut Vec<Node>, x: f64, y: f64, high: f64, low: f64) {
 
 /// A cell with its integral.
 struct Measured {
-    /// The greater share of the totals that the error of radiance or irradiance is: who is greatest is halved next.
+    /// The greater share of the totals that the error of radiance or irradiance is: who is greatest
+    /// is halved next.
     key: f64,
     cell: Cell,
     value: Sample,
@@ -175,8 +182,8 @@ fn measure(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> Measured {
     Measured { key: 0.0, cell, value: high.map(|v| area * v), error }
 }
 
-/// What halving a cell changed is an error too that each half may still have: where the integrand is smooth it is less than
-/// the rules' difference, across a jump it is not.
+/// What halving a cell changed is an error too that each half may still have: where the integrand
+/// is smooth it is less than the rules' difference, across a jump it is not.
 fn distrust(halves: &mut [Measured; 2], whole: &Measured) {
     for k in 0..2 {
         let change = 0.5 * (halves[0].value[k] + halves[1].value[k] - whole.value[k]).abs();
@@ -192,12 +199,19 @@ fn key(m: &Measured, scale: [f64; 2]) -> f64 {
 /// Sum of value and error over all cells, on top of what is known exactly.
 fn total<'a>(known: Sample, cells: impl Iterator<Item = &'a Measured>) -> (Sample, [DVec3; 2]) {
     cells.fold((known, [DVec3::ZERO; 2]), |(v, e), m| {
-        ([v[0] + m.value[0], v[1] + m.value[1], v[2] + m.value[2]], [e[0] + m.error[0], e[1] + m.error[1]])
+        (
+            [v[0] + m.value[0], v[1] + m.value[1], v[2] + m.value[2]],
+            [e[0] + m.error[0], e[1] + m.error[1]],
+        )
     })
 }
 
 /// Cells halved until each is resolved, and whether there was room for all.
-fn resolve(f: &dyn Integrand, cells: impl Iterator<Item = Cell>, max_cells: usize) -> (Vec<Cell>, bool) {
+fn resolve(
+    f: &dyn Integrand,
+    cells: impl Iterator<Item = Cell>,
+    max_cells: usize,
+) -> (Vec<Cell>, bool) {
     let (mut open, mut done): (Vec<Cell>, _) = (cells.collect(), Vec::new());
     while let Some(cell) = open.pop() {
         if f.is_resolved(&cell) {
@@ -214,7 +228,12 @@ fn resolve(f: &dyn Integrand, cells: impl Iterator<Item = Cell>, max_cells: usiz
 }
 
 /// ∫ over `cells`, added to `known`.
-pub fn integrate(f: &dyn Integrand, cells: impl Iterator<Item = Cell>, known: Sample, accuracy: &Accuracy) -> Estimate {
+pub fn integrate(
+    f: &dyn Integrand,
+    cells: impl Iterator<Item = Cell>,
+    known: Sample,
+    accuracy: &Accuracy,
+) -> Estimate {
     let nodes = nodes();
     let (cells, all_resolved) = resolve(f, cells, (accuracy.max_evaluations / nodes.len()).max(1));
     let mut n_evaluations = cells.len() * nodes.len();
@@ -226,8 +245,12 @@ pub fn integrate(f: &dyn Integrand, cells: impl Iterator<Item = Cell>, known: Sa
         m
     };
     let mut heap: BinaryHeap<Measured> = measured.into_iter().map(keyed).collect();
-    let met = |v: &Sample, e: &[DVec3; 2]| accuracy.is_met(v[0], e[0]) && accuracy.is_met(v[1], e[1]);
-    while all_resolved && n_evaluations + 2 * nodes.len() <= accuracy.max_evaluations && !met(&value, &error) {
+    let met =
+        |v: &Sample, e: &[DVec3; 2]| accuracy.is_met(v[0], e[0]) && accuracy.is_met(v[1], e[1]);
+    while all_resolved
+        && n_evaluations + 2 * nodes.len() <= accuracy.max_evaluations
+        && !met(&value, &error)
+    {
         let Some(worst) = heap.pop() else { break };
         if worst.key.is_nan() || worst.key <= LEAST_KEY {
             heap.push(worst);
@@ -247,7 +270,8 @@ pub fn integrate(f: &dyn Integrand, cells: impl Iterator<Item = Cell>, known: Sa
     }
     // Without the running sums' roundings.
     let (value, error) = total(known, heap.iter());
-    let known_error = |k: usize| if all_resolved { error[k].max_element() + value[2][k] } else { f64::INFINITY };
+    let known_error =
+        |k: usize| if all_resolved { error[k].max_element() + value[2][k] } else { f64::INFINITY };
     Estimate {
         radiance: value[0],
         irradiance: value[1],
@@ -302,16 +326,21 @@ mod tests {
     fn smooth_integrands_converge_with_the_rule_and_the_error_bounds_the_truth() {
         // ∫∫ e^{s + 2t} over the square = (e − 1/e)(e² − e^{−2})/2.
         let truth = 4.0 * 1f64.sinh() * 2f64.sinh() / 2.0;
-        let with = |relative| over_square(|x| (x.x + 2.0 * x.y).exp(), &Accuracy::relative(relative));
+        let with =
+            |relative| over_square(|x| (x.x + 2.0 * x.y).exp(), &Accuracy::relative(relative));
         for relative in [1e-3, 1e-6, 1e-9, 1e-12] {
             let e = with(relative);
             let off = (e.radiance.x - truth).abs();
-            assert!(off <= e.error + 1e-14 * truth && e.error <= relative * truth, "{relative} {off} {e:?}");
+            assert!(
+                off <= e.error + 1e-14 * truth && e.error <= relative * truth,
+                "{relative} {off} {e:?}"
+            );
         }
-        // Halving every edge takes 4 times the cells; the value's error falls with 2^-10 (degree 9 is odd on pairs of
-        // triangles), the estimate's with 2^-6. Four halvings of area.
+        // Halving every edge takes 4 times the cells; the value's error falls with 2^-10 (degree 9
+        // is odd on pairs of triangles), the estimate's with 2^-6. Four halvings of area.
         let fixed = |n_cells: usize| {
-            let accuracy = Accuracy { relative: 0.0, absolute: 0.0, max_evaluations: 22 * (2 * n_cells - 2) };
+            let accuracy =
+                Accuracy { relative: 0.0, absolute: 0.0, max_evaluations: 22 * (2 * n_cells - 2) };
             over_square(|x| (x.x + 2.0 * x.y).exp(), &accuracy)
         };
         let (coarse, fine) = (fixed(8), fixed(32));
@@ -323,7 +352,8 @@ mod tests {
     #[test]
     fn a_jump_is_closed_in_on_and_a_cap_is_kept_honestly() {
         // The quarter disc's edge crosses the cells: area π/4.
-        let step = |x: DVec2| if x.length_squared() < 1.0 && x.x > 0.0 && x.y > 0.0 { 1.0 } else { 0.0 };
+        let step =
+            |x: DVec2| if x.length_squared() < 1.0 && x.x > 0.0 && x.y > 0.0 { 1.0 } else { 0.0 };
         for max_evaluations in [500, 5_000, 50_000] {
             let e = over_square(step, &Accuracy { relative: 0.0, absolute: 0.0, max_evaluations });
             let off = (e.radiance.x - std::f64::consts::FRAC_PI_4).abs();

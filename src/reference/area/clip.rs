@@ -1,7 +1,7 @@
-//! Shadows as polygons. What a rectangle hides from a point is the intersection of five half-spaces, so the shadow it
-//! casts on another rectangle is a convex polygon, and what is lit or seen of that one a union of convex polygons,
-//! exactly: within each the light's integrand is smooth. Polygons lie in (s, t), the rectangle's own coordinates in half
-//! axes, [−1, 1]².
+//! Shadows as polygons. What a rectangle hides from a point is the intersection of five
+//! half-spaces, so the shadow it casts on another rectangle is a convex polygon, and what is lit or
+//! seen of that one a union of convex polygons, exactly: within each the light's integrand is
+//! smooth. Polygons lie in (s, t), the rectangle's own coordinates in half axes, [−1, 1]².
 
 use glam::{DVec2, DVec3};
 
@@ -14,7 +14,8 @@ pub type Polygon = Vec<DVec2>;
 pub const WHOLE: [DVec2; 4] =
     [DVec2::new(-1.0, -1.0), DVec2::new(1.0, -1.0), DVec2::new(1.0, 1.0), DVec2::new(-1.0, 1.0)];
 
-/// Polygons of less area are dropped: slivers a rounding wide (the whole has area 4), that hold as little light.
+/// Polygons of less area are dropped: slivers a rounding wide (the whole has area 4), that hold as
+/// little light.
 const LEAST_AREA: f64 = 1e-20;
 
 /// The line g₀ + g₁ s + g₂ t = 0 in a rectangle's coordinates; inside where it is positive.
@@ -62,7 +63,8 @@ pub fn area(polygon: &[DVec2]) -> f64 {
     (1..polygon.len().saturating_sub(1)).map(fan).sum::<f64>().abs() * 0.5
 }
 
-/// The lines that bound the shadow of `blocker` on `rect`, lit or seen from `source`; none where there is no shadow.
+/// The lines that bound the shadow of `blocker` on `rect`, lit or seen from `source`; none where
+/// there is no shadow.
 pub fn shadow(rect: &Rect, blocker: &Rect, source: Source) -> Option<[Line; 5]> {
     let side = match source {
         Source::At(a) => blocker.side_of(a),
@@ -81,10 +83,16 @@ pub fn shadow(rect: &Rect, blocker: &Rect, source: Source) -> Option<[Line; 5]> 
         };
         let normal = along.cross(toward);
         // The blocker's own centre is inside.
-        let line = Line::of_plane(rect, if normal.dot(out) < 0.0 { normal } else { -normal }, middle);
+        let line =
+            Line::of_plane(rect, if normal.dot(out) < 0.0 { normal } else { -normal }, middle);
         let reach = rect.center.distance(middle) + rect.u.length() + rect.v.length();
-        // A plane that the rectangle lies in: it touches the shadow's side, as a wall under the sky does its ceiling's.
-        if line.greatest() <= AT_EDGE * reach * normal.length() { Line([1.0, 0.0, 0.0]) } else { line }
+        // A plane that the rectangle lies in: it touches the shadow's side, as a wall under the sky
+        // does its ceiling's.
+        if line.greatest() <= AT_EDGE * reach * normal.length() {
+            Line([1.0, 0.0, 0.0])
+        } else {
+            line
+        }
     };
     let behind = Line::of_plane(rect, -side.signum() * blocker.normal, blocker.center);
     let (u, v) = (blocker.u, blocker.v);
@@ -133,11 +141,15 @@ mod tests {
         let floor = rect(DVec3::ZERO, 4.0 * DVec3::Z, 4.0 * DVec3::X);
         let blocker = rect(DVec3::Y, 0.5 * DVec3::Z, DVec3::X);
         let shadow_of = |r: &Rect, source| {
-            shadow(&floor, r, source).map_or(0.0, |lines| area(&split(WHOLE.to_vec(), &lines).0) * 16.0)
+            shadow(&floor, r, source)
+                .map_or(0.0, |lines| area(&split(WHOLE.to_vec(), &lines).0) * 16.0)
         };
-        // From a lamp at twice its height the shadow has twice the edges; from the sun the edges of the blocker.
+        // From a lamp at twice its height the shadow has twice the edges; from the sun the edges of
+        // the blocker.
         assert!((shadow_of(&blocker, Source::At(2.0 * DVec3::Y)) - 8.0).abs() < 1e-14);
-        assert!((shadow_of(&blocker, Source::Toward(DVec3::new(0.6, 0.8, 0.0))) - 2.0).abs() < 1e-14);
+        assert!(
+            (shadow_of(&blocker, Source::Toward(DVec3::new(0.6, 0.8, 0.0))) - 2.0).abs() < 1e-14
+        );
         // A lamp between blocker and floor, one in the blocker's plane, a sun from below.
         assert_eq!(shadow_of(&blocker, Source::At(0.5 * DVec3::Y)), 0.0);
         assert_eq!(shadow_of(&blocker, Source::At(DVec3::new(3.0, 1.0, 0.0))), 0.0);
@@ -145,24 +157,36 @@ mod tests {
         // Half of it beyond the floor's edge.
         let edge = rect(DVec3::new(4.0, 1.0, 0.0), 0.5 * DVec3::Z, DVec3::X);
         assert!((shadow_of(&edge, Source::Toward(DVec3::Y)) - 1.0).abs() < 1e-14);
-        // A wall that stands across the floor hides from a lamp on the left what is right of it, up to where the ray
-        // over its edge lands: lamp at (−2, 2), edge at (0, 1): x = 2; in z it spreads from ±1 to ±2: trapezium of 6.
+        // A wall that stands across the floor hides from a lamp on the left what is right of it, up
+        // to where the ray over its edge lands: lamp at (−2, 2), edge at (0, 1): x = 2; in z it
+        // spreads from ±1 to ±2: trapezium of 6.
         let wall = rect(DVec3::ZERO, DVec3::Y, DVec3::Z);
         assert!((shadow_of(&wall, Source::At(DVec3::new(-2.0, 2.0, 0.0))) - 6.0).abs() < 1e-13);
         // One lying in the floor's plane shades nothing there.
-        assert_eq!(shadow_of(&rect(DVec3::ZERO, DVec3::Z, DVec3::X), Source::Toward(DVec3::Y)), 0.0);
+        assert_eq!(
+            shadow_of(&rect(DVec3::ZERO, DVec3::Z, DVec3::X), Source::Toward(DVec3::Y)),
+            0.0
+        );
     }
 
     #[test]
     fn a_polygon_agrees_with_the_test_of_its_points() {
-        // A skew blocker and a skew floor: every point of a grid is in the shadow's polygon or outside as `met` has it.
-        let floor = rect(DVec3::ZERO, DVec3::new(2.0, 0.3, 0.0), DVec3::new(-0.45, 3.0, 0.0).rotate_y(0.4));
+        // A skew blocker and a skew floor: every point of a grid is in the shadow's polygon or
+        // outside as `met` has it.
+        let floor =
+            rect(DVec3::ZERO, DVec3::new(2.0, 0.3, 0.0), DVec3::new(-0.45, 3.0, 0.0).rotate_y(0.4));
         let floor = Rect { v: floor.normal.cross(floor.u), ..floor };
-        let blocker = rect(DVec3::new(0.2, 0.4, 0.7), DVec3::new(0.5, 0.1, 0.4), DVec3::new(-0.1, 0.5, 0.0));
-        for source in [Source::At(DVec3::new(0.3, -0.2, 3.0)), Source::Toward(DVec3::new(0.2, 0.3, 0.9).normalize())] {
+        let blocker =
+            rect(DVec3::new(0.2, 0.4, 0.7), DVec3::new(0.5, 0.1, 0.4), DVec3::new(-0.1, 0.5, 0.0));
+        for source in [
+            Source::At(DVec3::new(0.3, -0.2, 3.0)),
+            Source::Toward(DVec3::new(0.2, 0.3, 0.9).normalize()),
+        ] {
             let lines = shadow(&floor, &blocker, source).expect("there is a shadow");
             let (inside, outside) = split(WHOLE.to_vec(), &lines);
-            assert!((area(&inside) + outside.iter().map(|p| area(p)).sum::<f64>() - 4.0).abs() < 1e-14);
+            assert!(
+                (area(&inside) + outside.iter().map(|p| area(p)).sum::<f64>() - 4.0).abs() < 1e-14
+            );
             let mut n_inside = 0;
             for i in 0..10_000u32 {
                 let x = DVec2::new(f64::from(i % 100), f64::from(i / 100)) * 0.02 - 0.99;

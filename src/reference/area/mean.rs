@@ -11,8 +11,9 @@ use crate::model::surface::Surface;
 /// Of the error asked for, the inner integral's share: it adds to the outer one's.
 const INNER_SHARE: f64 = 0.1;
 
-/// Of L2 over a surface: it bends wherever a corner appears behind an edge, and there the two rules' errors are numbers of
-/// one size and no fixed sign, of whose difference one is seldom more than three times.
+/// Of L2 over a surface: it bends wherever a corner appears behind an edge, and there the two
+/// rules' errors are numbers of one size and no fixed sign, of whose difference one is seldom more
+/// than three times.
 const DOUBT: f64 = 3.0;
 
 /// A rectangle within a surface's (s, t).
@@ -50,7 +51,13 @@ impl Window {
 
 impl Scenery<'_> {
     /// Mean of L1 toward the eye at `eye`, and of I_d.
-    pub fn mean_first(&self, i_surface: usize, window: &Window, eye: DVec3, accuracy: &Accuracy) -> Estimate {
+    pub fn mean_first(
+        &self,
+        i_surface: usize,
+        window: &Window,
+        eye: DVec3,
+        accuracy: &Accuracy,
+    ) -> Estimate {
         let pieces = &self.pieces[i_surface];
         let mean = Mean { scenery: self, i_surface, eye, window, of: Of::First, accuracy };
         let cells = pieces
@@ -61,7 +68,13 @@ impl Scenery<'_> {
     }
 
     /// Mean of L2 toward the eye at `eye`, and of I_i.
-    pub fn mean_second(&self, i_surface: usize, window: &Window, eye: DVec3, accuracy: &Accuracy) -> Estimate {
+    pub fn mean_second(
+        &self,
+        i_surface: usize,
+        window: &Window,
+        eye: DVec3,
+        accuracy: &Accuracy,
+    ) -> Estimate {
         let inner = Accuracy {
             relative: INNER_SHARE * accuracy.relative,
             absolute: INNER_SHARE * accuracy.absolute,
@@ -98,7 +111,11 @@ impl Integrand for Mean<'_, '_> {
                 self.scenery.first_on_piece(self.i_surface, lit, p, toward)
             }
             Of::Second => {
-                let e = self.scenery.second(&self.scenery.on_surface(self.i_surface, p), toward, self.accuracy);
+                let e = self.scenery.second(
+                    &self.scenery.on_surface(self.i_surface, p),
+                    toward,
+                    self.accuracy,
+                );
                 [e.radiance, e.irradiance, DVec3::new(e.error, e.irradiance_error, 0.0)]
             }
         };
@@ -107,9 +124,13 @@ impl Integrand for Mean<'_, '_> {
 
     fn is_resolved(&self, cell: &Cell) -> bool {
         match self.of {
-            Of::First => {
-                resolve::mean_is_resolved(self.scenery, self.i_surface, self.eye, cell, self.accuracy.relative)
-            }
+            Of::First => resolve::mean_is_resolved(
+                self.scenery,
+                self.i_surface,
+                self.eye,
+                cell,
+                self.accuracy.relative,
+            ),
             Of::Second => resolve::mirror_is_resolved(self.scenery, self.i_surface, self.eye, cell),
         }
     }

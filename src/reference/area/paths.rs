@@ -1,6 +1,7 @@
-//! Any number of reflections by random paths: an estimate with a standard error, and of the second reflection one that
-//! shares no quadrature with `Scenery::second`. Each path starts at the receiver, goes where its BRDF sends it (or to
-//! one of the discs) and collects L1 at every vertex; V is tested point by point.
+//! Any number of reflections by random paths: an estimate with a standard error, and of the second
+//! reflection one that shares no quadrature with `Scenery::second`. Each path starts at the
+//! receiver, goes where its BRDF sends it (or to one of the discs) and collects L1 at every vertex;
+//! V is tested point by point.
 
 use std::f64::consts::{FRAC_1_PI, TAU};
 
@@ -20,9 +21,10 @@ const PATHS_A_JOB: u32 = 1024;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reflected {
     pub radiance: DVec3,
-    /// One standard error of the mean, every channel; 0 for the first reflection, which needs no chance. It is of the
-    /// same paths: too small where few of them met the light, 0 where none did. Below a tenth of the radiance, which
-    /// takes a hundred paths that meet it, differences from the truth are normal numbers of it (`tests/area.rs`).
+    /// One standard error of the mean, every channel; 0 for the first reflection, which needs no
+    /// chance. It is of the same paths: too small where few of them met the light, 0 where none
+    /// did. Below a tenth of the radiance, which takes a hundred paths that meet it, differences
+    /// from the truth are normal numbers of it (`tests/area.rs`).
     pub error: DVec3,
 }
 
@@ -39,8 +41,15 @@ pub struct Chance {
 type Sums = Vec<(DVec3, DVec3)>;
 
 impl Scenery<'_> {
-    /// Radiance toward the unit vector `toward` after exactly 1, 2, … `k` reflections, and last of all together.
-    pub fn reflections(&self, at: &Receiver, toward: DVec3, k: usize, chance: Chance) -> Vec<Reflected> {
+    /// Radiance toward the unit vector `toward` after exactly 1, 2, … `k` reflections, and last of
+    /// all together.
+    pub fn reflections(
+        &self,
+        at: &Receiver,
+        toward: DVec3,
+        k: usize,
+        chance: Chance,
+    ) -> Vec<Reflected> {
         let first = Reflected { radiance: self.first(at, toward), error: DVec3::ZERO };
         let n_more = k.saturating_sub(1);
         let n_jobs = chance.n_paths.div_ceil(PATHS_A_JOB);
@@ -63,10 +72,12 @@ impl Scenery<'_> {
         let n = f64::from(chance.n_paths);
         let of = |(sum, squares): (DVec3, DVec3)| {
             let radiance = sum / n;
-            let variance = (squares / n - radiance * radiance).max(DVec3::ZERO) / (n - 1.0).max(1.0);
+            let variance =
+                (squares / n - radiance * radiance).max(DVec3::ZERO) / (n - 1.0).max(1.0);
             Reflected { radiance, error: variance.powf(0.5) }
         };
-        let mut all: Vec<Reflected> = std::iter::once(first).chain(sums.into_iter().map(of)).collect();
+        let mut all: Vec<Reflected> =
+            std::iter::once(first).chain(sums.into_iter().map(of)).collect();
         // The last sum is that of all beyond the first; without paths there is none.
         all.resize(k.max(1) + 1, Reflected { radiance: DVec3::ZERO, error: DVec3::ZERO });
         all[k.max(1)].radiance += first.radiance;
@@ -74,13 +85,23 @@ impl Scenery<'_> {
     }
 
     /// What one path finds at its vertices: the second reflection, the third, …
-    fn path(&self, at: &Receiver, toward: DVec3, n_more: usize, (chance, i_path): (Chance, u32)) -> Vec<DVec3> {
+    fn path(
+        &self,
+        at: &Receiver,
+        toward: DVec3,
+        n_more: usize,
+        (chance, i_path): (Chance, u32),
+    ) -> Vec<DVec3> {
         let (mut at, mut toward, mut weight) = (*at, toward, DVec3::ONE);
         let mut found = vec![DVec3::ZERO; n_more];
         for (i, l) in found.iter_mut().enumerate() {
-            let draw =
-                |turn: u32| philox4x32_10([chance.seed, KEY], [i_path, i as u32, turn, chance.i_sample]).map(uniform);
-            let Some((next, direction, w)) = self.step(&at, toward, draw(0), draw(1)) else { break };
+            let draw = |turn: u32| {
+                philox4x32_10([chance.seed, KEY], [i_path, i as u32, turn, chance.i_sample])
+                    .map(uniform)
+            };
+            let Some((next, direction, w)) = self.step(&at, toward, draw(0), draw(1)) else {
+                break;
+            };
             weight *= w;
             *l = weight * self.first(&next, -direction);
             (at, toward) = (next, -direction);
@@ -89,7 +110,13 @@ impl Scenery<'_> {
     }
 
     /// The next vertex, the direction there, and f cos θ V over the probability.
-    fn step(&self, at: &Receiver, toward: DVec3, u: [f64; 4], more: [f64; 4]) -> Option<(Receiver, DVec3, DVec3)> {
+    fn step(
+        &self,
+        at: &Receiver,
+        toward: DVec3,
+        u: [f64; 4],
+        more: [f64; 4],
+    ) -> Option<(Receiver, DVec3, DVec3)> {
         let to_discs = match (self.discs.is_empty(), self.rects.is_empty()) {
             (true, _) => 0.0,
             (false, true) => 1.0,
@@ -114,11 +141,18 @@ impl Scenery<'_> {
         Some((self.on_surface(i, position), direction, w))
     }
 
-    /// The same to one of the discs, drawn by how much light each would bring if all shone alike and nothing lay
-    /// between; the choice fell on discs with probability `chosen`.
-    fn step_to_disc(&self, at: &Receiver, toward: DVec3, u: f64, chosen: f64) -> Option<(Receiver, DVec3, DVec3)> {
-        let pairs: Vec<f64> =
-            (0..self.discs.len()).map(|i| if at.i_disc == Some(i) { 0.0 } else { self.pair(i, at) }).collect();
+    /// The same to one of the discs, drawn by how much light each would bring if all shone alike
+    /// and nothing lay between; the choice fell on discs with probability `chosen`.
+    fn step_to_disc(
+        &self,
+        at: &Receiver,
+        toward: DVec3,
+        u: f64,
+        chosen: f64,
+    ) -> Option<(Receiver, DVec3, DVec3)> {
+        let pairs: Vec<f64> = (0..self.discs.len())
+            .map(|i| if at.i_disc == Some(i) { 0.0 } else { self.pair(i, at) })
+            .collect();
         let sum: f64 = pairs.iter().sum();
         let mut left = u * sum;
         let drawn = pairs.iter().position(|pair| {
@@ -142,14 +176,16 @@ fn nearest(rects: &[Rect], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
     rects.iter().enumerate().filter_map(met).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Share of directions drawn from the lobe: none for an eye behind. It sees no lobe, and its half vectors about the
-/// normal lead before the surface also where `density`, whose half vectors turn toward the eye, knows nothing of them.
+/// Share of directions drawn from the lobe: none for an eye behind. It sees no lobe, and its half
+/// vectors about the normal lead before the surface also where `density`, whose half vectors turn
+/// toward the eye, knows nothing of them.
 fn lobe_share(brdf: &Brdf, normal: DVec3, toward: DVec3) -> f64 {
     let (d, s) = (brdf.kd.max_element(), brdf.ks.max_element());
     if s > 0.0 && normal.dot(toward) > 0.0 { s / (d + s) } else { 0.0 }
 }
 
-/// About the normal by cos θ/π, or about the mirror direction by a half vector of density (n_s+1)/2π cos^{n_s} γ.
+/// About the normal by cos θ/π, or about the mirror direction by a half vector of density
+/// (n_s+1)/2π cos^{n_s} γ.
 fn direction(brdf: &Brdf, normal: DVec3, toward: DVec3, u: [f64; 4]) -> DVec3 {
     // 1 − u is never 0.
     let (x, phi) = (1.0 - u[0], TAU * u[1]);

@@ -1,6 +1,6 @@
-//! Which cells are too large for their cubature to see all that there is in them. A rule of 22 points takes a cell that a
-//! lobe, a near light or a small blob falls between for an empty one, and reports no error; such cells are halved before
-//! any is measured.
+//! Which cells are too large for their cubature to see all that there is in them. A rule of 22
+//! points takes a cell that a lobe, a near light or a small blob falls between for an empty one,
+//! and reports no error; such cells are halved before any is measured.
 
 use glam::DVec3;
 
@@ -11,8 +11,8 @@ use super::{Reach, Scenery, Seen};
 use crate::model::light::{LEAST_PENUMBRA, Light};
 use crate::reference::Blob;
 
-/// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no feature narrower than d,
-/// and no node of the rules is further than 0.5 radii from the next.
+/// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no
+/// feature narrower than d, and no node of the rules is further than 0.5 radii from the next.
 const NEAREST: f64 = 0.7;
 /// How closely a lobe is looked at, in widths 1/√n_s.
 struct Detail {
@@ -24,17 +24,21 @@ struct Detail {
 
 /// Neighbouring nodes lie within a width; e^{−8²/2} = 1.3e-14 of the peak.
 const LOBE: Detail = Detail { widths: 1.5, reach: 8.0 };
-/// In a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it is of no weight in a mean.
+/// In a mean of L2: nodes within 1.5 widths meet every peak, and e^{−4²/2} = 3e-4 of it is of no
+/// weight in a mean.
 const MIRROR: Detail = Detail { widths: 3.0, reach: 4.0 };
-/// The same of a blob, in σ: radius of a cell, and e^{−4²/2} = 3e-4 of its depth, that varies over σ.
+/// The same of a blob, in σ: radius of a cell, and e^{−4²/2} = 3e-4 of its depth, that varies over
+/// σ.
 const BLOB_WIDTHS: f64 = 1.5;
 const BLOB_REACH: f64 = 4.0;
-/// Greatest angular radius of a cell in a spot's penumbra, in widths of that: no node is further than a third of the
-/// penumbra from the next. What lies between nodes unseen along an edge of it falls with the square (inner edge) and the
-/// cube (outer) of that radius; at this radius it was measured as 6e-6 of a cone's flux.
+/// Greatest angular radius of a cell in a spot's penumbra, in widths of that: no node is further
+/// than a third of the penumbra from the next. What lies between nodes unseen along an edge of it
+/// falls with the square (inner edge) and the cube (outer) of that radius; at this radius it was
+/// measured as 6e-6 of a cone's flux.
 const PENUMBRA_WIDTHS: f64 = 0.7;
 const PENUMBRA_TOLERANCE: f64 = 1e-4;
-/// Cells that look smaller than this are as small as they need be: a lobe at grazing angles can ask for no end.
+/// Cells that look smaller than this are as small as they need be: a lobe at grazing angles can ask
+/// for no end.
 const LEAST_ANGLE: f64 = 1e-9;
 
 /// The ball about a cell's centroid, of which the rest is cones.
@@ -61,22 +65,35 @@ pub(super) fn seen_is_resolved(seen: &Seen, cell: &Cell) -> bool {
         return true;
     }
     let gloss = &at.brdf;
-    (gloss.ks == DVec3::ZERO || lobe_is_resolved(gloss.ns, at.normal, seen.toward, from, spread, LOBE))
+    (gloss.ks == DVec3::ZERO
+        || lobe_is_resolved(gloss.ns, at.normal, seen.toward, from, spread, LOBE))
         && first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), seen.relative)
         && blobs_are_resolved(scenery, &ball, Source::At(at.position), seen.relative)
 }
 
 /// Whether a cell of a mean of L1 toward `eye` is small enough.
-pub(super) fn mean_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3, cell: &Cell, relative: f64) -> bool {
+pub(super) fn mean_is_resolved(
+    scenery: &Scenery,
+    i_surface: usize,
+    eye: DVec3,
+    cell: &Cell,
+    relative: f64,
+) -> bool {
     let ball = Ball::of(&scenery.rects[i_surface], cell);
     let lit = &scenery.pieces[i_surface][cell.i_piece].lit;
     let Some((from, spread)) = cone(&ball, eye) else { return false };
-    spread < LEAST_ANGLE || first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), relative)
+    spread < LEAST_ANGLE
+        || first_is_resolved(scenery, i_surface, lit, &ball, (-from, spread), relative)
 }
 
-/// Whether a cell of a mean of L2 toward `eye` is small enough: against its distance from every other surface, or that
-/// one's size, and for the lobe in which it mirrors what lights it.
-pub(super) fn mirror_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3, cell: &Cell) -> bool {
+/// Whether a cell of a mean of L2 toward `eye` is small enough: against its distance from every
+/// other surface, or that one's size, and for the lobe in which it mirrors what lights it.
+pub(super) fn mirror_is_resolved(
+    scenery: &Scenery,
+    i_surface: usize,
+    eye: DVec3,
+    cell: &Cell,
+) -> bool {
     let (rect, brdf) = (&scenery.rects[i_surface], &scenery.brdfs[i_surface]);
     let ball = Ball::of(rect, cell);
     let view = ball.center.distance(eye);
@@ -84,7 +101,8 @@ pub(super) fn mirror_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3
     if glossy && ball.radius > NEAREST * view {
         return false;
     }
-    let (toward, turn) = ((eye - ball.center).normalize_or_zero(), (ball.radius / view).min(1.0).asin());
+    let (toward, turn) =
+        ((eye - ball.center).normalize_or_zero(), (ball.radius / view).min(1.0).asin());
     let others = scenery.rects.iter().enumerate().filter(|(_, other)| !lies_behind(rect, other));
     others.into_iter().all(|(i, other)| {
         let way = other.nearest(ball.center) - ball.center;
@@ -93,7 +111,8 @@ pub(super) fn mirror_is_resolved(scenery: &Scenery, i_surface: usize, eye: DVec3
         if ball.radius > NEAREST * reach {
             return false;
         }
-        // The lobe and what it mirrors blur each other: their features are as wide as the wider of both.
+        // The lobe and what it mirrors blur each other: their features are as wide as the wider of
+        // both.
         let ns = brdf.ns.min((reach / narrow).powi(2));
         let spread = (ball.radius / reach).asin() + turn;
         let dark = scenery.pieces[i].is_empty();
@@ -106,7 +125,8 @@ fn lies_behind(rect: &Rect, other: &Rect) -> bool {
     WHOLE.iter().all(|x| rect.side_of(other.point(x.x, x.y)) <= 0.0)
 }
 
-/// The first reflection from the ball toward whoever sees it along `view`, a direction and how far it turns.
+/// The first reflection from the ball toward whoever sees it along `view`, a direction and how far
+/// it turns.
 fn first_is_resolved(
     scenery: &Scenery,
     i_surface: usize,
@@ -125,15 +145,16 @@ fn first_is_resolved(
     })
 }
 
-/// Direction of a ball's centre from `p` and half angle of the cone about the ball; nothing where it is too near.
+/// Direction of a ball's centre from `p` and half angle of the cone about the ball; nothing where
+/// it is too near.
 fn cone(ball: &Ball, p: DVec3) -> Option<(DVec3, f64)> {
     let way = ball.center - p;
     let distance = way.length();
     (ball.radius <= NEAREST * distance).then(|| (way / distance, (ball.radius / distance).asin()))
 }
 
-/// Direction toward a light from the ball's centre and how far it turns within the ball; nothing where the ball is too
-/// large for the light's distance or cone.
+/// Direction toward a light from the ball's centre and how far it turns within the ball; nothing
+/// where the ball is too large for the light's distance or cone.
 fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)> {
     let arrival = light.arrival(ball.center);
     if arrival.distance.is_infinite() {
@@ -147,8 +168,9 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
         if off_axis - spread > outer {
             return Some((toward, spread));
         }
-        // Light ends within the penumbra, and what a cell there has of it may lie between its nodes: a strip as wide as
-        // the cell along the outer edge, where light sets in with the square, along the inner one, where it bends.
+        // Light ends within the penumbra, and what a cell there has of it may lie between its
+        // nodes: a strip as wide as the cell along the outer edge, where light sets in with the
+        // square, along the inner one, where it bends.
         let strict = (relative / PENUMBRA_TOLERANCE).min(1.0);
         let crosses = |edge: f64| (off_axis - edge).abs() < spread;
         let finer = if crosses(inner) {
@@ -165,13 +187,20 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
     (ball.radius <= NEAREST * arrival.distance).then_some((toward, spread))
 }
 
-/// Whether over directions within `spread` of `a` and `b` together the half vector of both turns little against the lobe's
-/// width, or stays where the lobe is nothing.
-fn lobe_is_resolved(ns: f64, normal: DVec3, a: DVec3, b: DVec3, spread: f64, detail: Detail) -> bool {
+/// Whether over directions within `spread` of `a` and `b` together the half vector of both turns
+/// little against the lobe's width, or stays where the lobe is nothing.
+fn lobe_is_resolved(
+    ns: f64,
+    normal: DVec3,
+    a: DVec3,
+    b: DVec3,
+    spread: f64,
+    detail: Detail,
+) -> bool {
     let width = 1.0 / ns.max(1.0).sqrt();
     let sum = a + b;
-    // The half vector turns by ½ of what one direction does along the arc between both, and across it by
-    // 1/(2 cos(θ/2)), θ the angle between them.
+    // The half vector turns by ½ of what one direction does along the arc between both, and across
+    // it by 1/(2 cos(θ/2)), θ the angle between them.
     let half_angle = (0.5 * sum.length()).min(1.0).acos() + 0.5 * spread;
     if half_angle >= std::f64::consts::FRAC_PI_2 {
         return spread <= LEAST_ANGLE;
@@ -184,7 +213,8 @@ fn lobe_is_resolved(ns: f64, normal: DVec3, a: DVec3, b: DVec3, spread: f64, det
     gamma - turn > detail.reach * width
 }
 
-/// Whether every blob that casts a shadow between the ball and `end` is wide against the rays from the ball there.
+/// Whether every blob that casts a shadow between the ball and `end` is wide against the rays from
+/// the ball there.
 fn blobs_are_resolved(scenery: &Scenery, ball: &Ball, end: Source, relative: f64) -> bool {
     let (way, length) = match end {
         Source::At(q) => ((q - ball.center).normalize_or_zero(), ball.center.distance(q)),
@@ -198,7 +228,8 @@ fn blobs_are_resolved(scenery: &Scenery, ball: &Ball, end: Source, relative: f64
         let offset = blob.position - ball.center;
         let reach = BLOB_REACH * blob.widest();
         let along = offset.dot(way);
-        // Rays from the ball to a point close in on it; those to a direction stay as wide as the ball.
+        // Rays from the ball to a point close in on it; those to a direction stay as wide as the
+        // ball.
         let radius = ball.radius * (1.0 - along.clamp(0.0, length) / length);
         let before = along > -reach - ball.radius;
         let before_end = along < length + reach;

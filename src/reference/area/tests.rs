@@ -42,13 +42,15 @@ fn close(e: &Estimate, irradiance: f64, relative: f64) {
 
 #[test]
 fn form_factors_from_an_element() {
-    // To a unit square at unit distance, opposite its centre: 4/π · A/√(1+A²) atan(A/√(1+A²)), A = ½ (Howell, B-3).
+    // To a unit square at unit distance, opposite its centre: 4/π · A/√(1+A²) atan(A/√(1+A²)), A =
+    // ½ (Howell, B-3).
     let (f, error) = form_factor(&ceiling(1.0), DVec3::ZERO, UP, &FINE);
     assert!((f - 0.239_456).abs() < 5e-7 && error < 1e-9);
     let h = 0.2f64.sqrt();
     assert!((f - 4.0 / PI * h * h.atan()).abs() <= error, "{f} {error}");
-    // To a unit square standing across the element's plane, half a unit away, opposite the middle of its lower edge:
-    // twice Howell's B-4 with X = 2, Y = 1. These are the floor's centre and a wall of a unit cube.
+    // To a unit square standing across the element's plane, half a unit away, opposite the middle
+    // of its lower edge: twice Howell's B-4 with X = 2, Y = 1. These are the floor's centre and a
+    // wall of a unit cube.
     let wall = rect(at(-0.5, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
     let (w, error) = form_factor(&wall, DVec3::ZERO, UP, &FINE);
     assert!((w - 0.190_136).abs() < 5e-7 && (w - (PI / 4.0 - h * h.atan()) / PI).abs() <= error);
@@ -60,13 +62,17 @@ fn form_factors_from_an_element() {
 
 #[test]
 fn a_receiver_that_touches_what_it_sees_converges() {
-    // B-4 as the element nears the wall's foot: F = ½ − Y/2 …, by its closed form with X = 2, Y = 2c.
+    // B-4 as the element nears the wall's foot: F = ½ − Y/2 …, by its closed form with X = 2, Y =
+    // 2c.
     let wall = rect(at(0.0, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
     for c in [1e-2f64, 1e-4, 1e-5] {
         let (y, r) = (2.0 * c, (4.0 + 4.0 * c * c).sqrt());
         let truth = ((1.0 / y).atan() - y / r * (1.0 / r).atan()) / PI;
         let (f, error) = form_factor(&wall, at(c, 0.0, 0.0), UP, &Accuracy::relative(1e-7));
-        assert!((f - truth).abs() <= error + 1e-15 && error <= 1e-7 * f, "{c}: {f} {truth} {error}");
+        assert!(
+            (f - truth).abs() <= error + 1e-15 && error <= 1e-7 * f,
+            "{c}: {f} {truth} {error}"
+        );
     }
     // In the wall's plane nothing of it is seen.
     assert_eq!(form_factor(&wall, DVec3::ZERO, UP, &FINE).0, 0.0);
@@ -78,21 +84,35 @@ fn a_receiver_that_touches_what_it_sees_converges() {
 #[test]
 fn form_factors_between_squares() {
     let accuracy = Accuracy::relative(1e-6);
-    // Howell's C-11, directly opposed at unit distance, and C-14, across an edge that both share: 7 digits.
+    // Howell's C-11, directly opposed at unit distance, and C-14, across an edge that both share: 7
+    // digits.
     let floor = rect(DVec3::ZERO, 0.5 * DVec3::Z, 0.5 * DVec3::X);
     let wall = rect(at(-0.5, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
     assert_eq!((floor.normal(), wall.normal(), ceiling(1.0).normal()), (UP, DVec3::X, -UP));
     for (receiver, published) in [(floor, 0.199_824_9), (wall, 0.200_043_8)] {
-        let s = Scenery::new(&[receiver, ceiling(1.0)], &[matte(0.5), matte(1.0)], &[GLOW], &[], 0.0, &[]);
+        let s = Scenery::new(
+            &[receiver, ceiling(1.0)],
+            &[matte(0.5), matte(1.0)],
+            &[GLOW],
+            &[],
+            0.0,
+            &[],
+        );
         let e = s.mean_second(0, &Window::WHOLE, at(9.0, 9.0, 9.0), &accuracy);
         let f = e.irradiance.x / PI;
         assert!((f - published).abs() < 5.1e-8 + e.irradiance_error, "{f} {e:?}");
-        assert!(e.irradiance_error <= 1.2e-6 * e.irradiance.x && (e.radiance.x - 0.5 * f).abs() < 1e-14);
+        assert!(
+            e.irradiance_error <= 1.2e-6 * e.irradiance.x && (e.radiance.x - 0.5 * f).abs() < 1e-14
+        );
     }
 }
 
 fn cube(albedo: Brdf) -> (Vec<Surface>, Vec<Brdf>) {
-    let axes = [(DVec3::X, DVec3::Y, DVec3::Z), (DVec3::Y, DVec3::Z, DVec3::X), (DVec3::Z, DVec3::X, DVec3::Y)];
+    let axes = [
+        (DVec3::X, DVec3::Y, DVec3::Z),
+        (DVec3::Y, DVec3::Z, DVec3::X),
+        (DVec3::Z, DVec3::X, DVec3::Y),
+    ];
     let faces = axes.iter().flat_map(|&(n, u, v)| [rect(-n, u, v), rect(n, v, u)]);
     (faces.collect(), vec![albedo; 6])
 }
@@ -114,7 +134,12 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
     }
     // Paths drawn by the cosine carry the albedo itself: no chance is left.
     let receiver = s.on_surface(2, faces[2].center + 0.3 * faces[2].u);
-    let found = s.reflections(&receiver, receiver.normal, 5, Chance { n_paths: 2000, seed: 1, i_sample: 0 });
+    let found = s.reflections(
+        &receiver,
+        receiver.normal,
+        5,
+        Chance { n_paths: 2000, seed: 1, i_sample: 0 },
+    );
     for (k, l) in found[..5].iter().enumerate() {
         assert!((l.radiance.x - 0.7f64.powi(k as i32 + 1)).abs() < 1e-12, "{k} {l:?}");
     }
@@ -128,11 +153,13 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
     let s = Scenery::new(&faces, &brdfs, &[GLOW], &[], 0.0, &[]);
     let receiver = s.on_surface(0, faces[0].center + 0.3 * faces[0].u);
     for depth in [0.03, 0.3, 1.0] {
-        let toward = (receiver.normal.any_orthonormal_vector() - depth * receiver.normal).normalize();
+        let toward =
+            (receiver.normal.any_orthonormal_vector() - depth * receiver.normal).normalize();
         let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
         assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
         // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
-        let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 2000, seed: 1, i_sample: 0 });
+        let found =
+            s.reflections(&receiver, toward, 2, Chance { n_paths: 2000, seed: 1, i_sample: 0 });
         for (l, truth) in found.iter().zip([0.5, 0.35, 0.85]) {
             assert!((l.radiance.x - truth).abs() < 1e-12, "{depth} {l:?}");
         }
@@ -156,7 +183,8 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
         close(&s.second(&receiver, UP, &FINE), 0.5 * free.irradiance.x, 1e-9);
         assert!(!visible(&[lamp, blocker], DVec3::ZERO, lamp.center + 0.2 * DVec3::X));
     }
-    // A wide blob, seen through its centre by every ray within a small lamp: e^{−τ}, τ hardly varying with direction.
+    // A wide blob, seen through its centre by every ray within a small lamp: e^{−τ}, τ hardly
+    // varying with direction.
     let small = rect(at(0.0, 200.0, 0.0), 0.1 * DVec3::X, 0.1 * DVec3::Z);
     let blob = Blob { aspect: 1.0, position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
     let ratio = second(&[small], &[blob]).irradiance.x / second(&[small], &[]).irradiance.x;
@@ -166,8 +194,9 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
 
 #[test]
 fn a_lobe_of_any_width_is_found() {
-    // Eye along the normal, a lamp that fills the lobe: ∫ K_s (n+2)/2π cos^n γ cos 2γ · 4 cos γ dω_h
-    // = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1); below cos 22.5° there is nothing left.
+    // Eye along the normal, a lamp that fills the lobe: ∫ K_s (n+2)/2π cos^n γ cos 2γ · 4 cos γ
+    // dω_h = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1); below cos 22.5° there
+    // is nothing left.
     let lamp = rect(UP, DVec3::X, DVec3::Z);
     let sun = [Light::Directional { direction: UP, irradiance: DVec3::ONE }];
     let nothing = matte(0.0);
@@ -176,8 +205,12 @@ fn a_lobe_of_any_width_is_found() {
         let mirror = Receiver::new(DVec3::ZERO, UP, glossy(0.0, 0.3, ns));
         let s = Scenery::new(&[lamp], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
         let e = s.second(&mirror, UP, &Accuracy::relative(1e-8));
-        assert!((e.radiance.x - albedo).abs() <= e.error + 1e-12 && e.error <= 1e-8 * albedo, "{ns} {e:?}");
-        // The same lobe on the lamp's side: a sun from below, straight up, and a receiver that looks at it.
+        assert!(
+            (e.radiance.x - albedo).abs() <= e.error + 1e-12 && e.error <= 1e-8 * albedo,
+            "{ns} {e:?}"
+        );
+        // The same lobe on the lamp's side: a sun from below, straight up, and a receiver that
+        // looks at it.
         let s = Scenery::new(&[lamp], &[glossy(0.0, 0.3, ns)], &sun, &[], 0.0, &[]);
         let e = s.second(&Receiver::new(DVec3::ZERO, UP, nothing), UP, &Accuracy::relative(1e-8));
         close(&e, albedo, 1e-8);
@@ -204,7 +237,8 @@ fn means_of_the_first_reflection_hold_the_lights_flux() {
         let (cos_inner, cos_outer) = (inner.to_radians().cos(), outer.to_radians().cos());
         let position = at(0.3, 0.5, -0.6);
         let (direction, intensity) = (-UP, DVec3::ONE);
-        let light = Light::Spot { position, direction, intensity, radius: 0.0, cos_inner, cos_outer };
+        let light =
+            Light::Spot { position, direction, intensity, radius: 0.0, cos_inner, cos_outer };
         let truth = 2.0 * PI * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0);
         for relative in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
             check(light, truth, relative);
@@ -252,22 +286,40 @@ fn quadrature_and_paths_agree_in_random_scenes() {
         Blob { aspect: 1.0, position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
     ];
     let discs = [
-        Disc { position: at(0.1, 1.9, 0.2), normal: at(0.6, -0.8, 0.0), area: 0.4, kd: at(0.9, 0.8, 0.7) },
-        Disc { position: at(-1.4, 0.1, 0.9), normal: at(0.0, 0.0, -1.0), area: 0.2, kd: at(0.5, 0.8, 0.7) },
+        Disc {
+            position: at(0.1, 1.9, 0.2),
+            normal: at(0.6, -0.8, 0.0),
+            area: 0.4,
+            kd: at(0.9, 0.8, 0.7),
+        },
+        Disc {
+            position: at(-1.4, 0.1, 0.9),
+            normal: at(0.0, 0.0, -1.0),
+            area: 0.2,
+            kd: at(0.5, 0.8, 0.7),
+        },
     ];
     let (mut n, mut chi2) = (0.0, 0.0);
     for seed in 0..3 {
         let (surfaces, brdfs, lights) = random_scene(seed);
         let s = Scenery::new(&surfaces, &brdfs, &lights, &blobs, 0.2, &discs);
-        let mut receivers: Vec<Receiver> = (0..12).map(|i| s.on_surface(i, surfaces[i].facet_center(19))).collect();
+        let mut receivers: Vec<Receiver> =
+            (0..12).map(|i| s.on_surface(i, surfaces[i].facet_center(19))).collect();
         receivers.extend((0..2).map(|i| s.on_disc(i)));
         for receiver in receivers {
-            let toward = (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
+            let toward =
+                (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
             let e = s.second(&receiver, toward, &Accuracy::relative(1e-4));
-            let found = s.reflections(&receiver, toward, 2, Chance { n_paths: 20_000, seed, i_sample: 0 })[1];
+            let found =
+                s.reflections(&receiver, toward, 2, Chance { n_paths: 20_000, seed, i_sample: 0 })
+                    [1];
             for c in 0..3 {
-                // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the sample's variance.
-                let (off, sigma) = ((e.radiance[c] - found.radiance[c]).abs(), found.error[c].hypot(e.error) + 5e-5);
+                // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the
+                // sample's variance.
+                let (off, sigma) = (
+                    (e.radiance[c] - found.radiance[c]).abs(),
+                    found.error[c].hypot(e.error) + 5e-5,
+                );
                 if e.radiance[c] > 0.0 {
                     // 126 normal numbers: beyond 5 of them one in 2e-5 such tests.
                     assert!(off < 5.0 * sigma, "{seed} {receiver:?} {e:?} {found:?}");
@@ -276,7 +328,8 @@ fn quadrature_and_paths_agree_in_random_scenes() {
             }
         }
     }
-    // The channels of one receiver are nearly one number, so the sum has a third of the freedom: 5 √(2/(n/3)).
+    // The channels of one receiver are nearly one number, so the sum has a third of the freedom: 5
+    // √(2/(n/3)).
     let expected: f64 = 1.0;
     assert!(n > 60.0 && chi2 / n < expected + 5.0 * (6.0 / n).sqrt(), "{chi2} of {n}");
 }
@@ -293,7 +346,11 @@ fn the_error_bounds_what_a_finer_integral_finds() {
             let e = s.second(&receiver, toward, &Accuracy::relative(relative));
             let off = (e.radiance - truth.radiance).abs().max_element();
             let off_e = (e.irradiance - truth.irradiance).abs().max_element();
-            assert!(off <= e.error + truth.error && off_e <= e.irradiance_error + truth.irradiance_error, "{i} {e:?}");
+            assert!(
+                off <= e.error + truth.error
+                    && off_e <= e.irradiance_error + truth.irradiance_error,
+                "{i} {e:?}"
+            );
             assert!(e.error <= relative * e.radiance.max_element());
         }
         truth.irradiance.x
@@ -307,25 +364,34 @@ fn a_mean_is_that_of_its_facets() {
     let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     let (eye, accuracy) = (at(3.0, 4.0, 5.0), Accuracy::relative(1e-3));
     let surface = Surface { subdivide: [2, 2], ..surfaces[1] };
-    let mean = |w: &Window| [s.mean_first(1, w, eye, &accuracy), s.mean_second(1, w, eye, &accuracy)];
+    let mean =
+        |w: &Window| [s.mean_first(1, w, eye, &accuracy), s.mean_second(1, w, eye, &accuracy)];
     let facets = each(4, |i| mean(&Window::facet(&surface, i as u32)));
     for (k, whole) in mean(&Window::WHOLE).iter().enumerate() {
         let of_facets = facets.iter().map(|f| f[k].irradiance).sum::<DVec3>() / 4.0;
-        let error = whole.irradiance_error + facets.iter().map(|f| f[k].irradiance_error).sum::<f64>() / 4.0;
-        assert!(whole.irradiance.x > 0.0 && (whole.irradiance - of_facets).abs().max_element() <= error, "{k}");
+        let error = whole.irradiance_error
+            + facets.iter().map(|f| f[k].irradiance_error).sum::<f64>() / 4.0;
+        assert!(
+            whole.irradiance.x > 0.0 && (whole.irradiance - of_facets).abs().max_element() <= error,
+            "{k}"
+        );
     }
 }
 
 #[test]
 fn a_pair_of_discs_by_hand() {
-    // Sun straight down with E = π on a white disc of area π facing up at the origin; a receiver one above it, facing
-    // down: E = L A/(d² + A/π) = π/2.
+    // Sun straight down with E = π on a white disc of area π facing up at the origin; a receiver
+    // one above it, facing down: E = L A/(d² + A/π) = π/2.
     let disc = Disc { position: DVec3::ZERO, normal: UP, area: PI, kd: DVec3::ONE };
     let sun = [Light::Directional { direction: at(0.0, -1.0, 0.0), irradiance: DVec3::splat(PI) }];
     let discs = [disc, Disc { position: UP, normal: -UP, ..disc }];
     let s = Scenery::new(&[], &[], &sun, &[], 0.0, &discs);
     let e = s.second(&s.on_disc(1), -UP, &FINE);
-    assert!((e.irradiance.x - PI / 2.0).abs() < 1e-15 && (e.radiance.x - 0.5).abs() < 1e-15 && e.error == 0.0);
+    assert!(
+        (e.irradiance.x - PI / 2.0).abs() < 1e-15
+            && (e.radiance.x - 0.5).abs() < 1e-15
+            && e.error == 0.0
+    );
     // Its own light does not fall on itself.
     assert_eq!(s.second(&s.on_disc(0), UP, &FINE).irradiance, DVec3::ZERO);
     assert_eq!(s.irradiance(&s.on_disc(0)), DVec3::splat(PI));
@@ -349,7 +415,10 @@ fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
             let off = (e.radiance - truth.radiance).abs().max_element();
             assert!(off <= e.error + truth.error, "{i} {window:?} {off} {e:?} {truth:?}");
             let off = (e.irradiance - truth.irradiance).abs().max_element();
-            assert!(off <= e.irradiance_error + truth.irradiance_error, "{i} {window:?} {off} {e:?} {truth:?}");
+            assert!(
+                off <= e.irradiance_error + truth.irradiance_error,
+                "{i} {window:?} {off} {e:?} {truth:?}"
+            );
         }
     };
     let (surfaces, brdfs, lights) = random_scene(0);
@@ -360,7 +429,14 @@ fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
     let lamp = |x: f64, y: f64, half: f64| rect(at(x, y, 0.37), half * DVec3::X, half * DVec3::Z);
     let surfaces = [floor, lamp(0.5, 1.0, 0.01), lamp(-1.2, 0.02, 0.05)];
     for ns in [1.0, 1e3] {
-        let s = Scenery::new(&surfaces, &[glossy(0.1, 0.3, ns), matte(1.0), matte(1.0)], &[GLOW], &[], 0.0, &[]);
+        let s = Scenery::new(
+            &surfaces,
+            &[glossy(0.1, 0.3, ns), matte(1.0), matte(1.0)],
+            &[GLOW],
+            &[],
+            0.0,
+            &[],
+        );
         check(&s, 0, &Window::WHOLE);
     }
 }

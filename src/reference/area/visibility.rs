@@ -1,5 +1,5 @@
-//! What lies between two points, or between a point and a light: rectangles, which hide or do not, and blobs, which let
-//! e^{−(1−g)τ} through (model.md §7, §8).
+//! What lies between two points, or between a point and a light: rectangles, which hide or do not,
+//! and blobs, which let e^{−(1−g)τ} through (model.md §7, §8).
 
 use glam::{DVec2, DVec3};
 
@@ -8,12 +8,13 @@ use crate::model::surface::Surface;
 use crate::reference::Blob;
 use crate::reference::grid::optical_depth_exact;
 
-/// A point nearer to a rectangle's plane than this share of its distance |x|+|y|+|z| from the centre lies in it, and what
-/// lies in it is not hidden by it: the model's rule, wide enough for coordinates rounded to f32 (a few 2^-24).
+/// A point nearer to a rectangle's plane than this share of its distance |x|+|y|+|z| from the
+/// centre lies in it, and what lies in it is not hidden by it: the model's rule, wide enough for
+/// coordinates rounded to f32 (a few 2^-24).
 pub const IN_PLANE: f64 = 1.0 / (1u32 << 20) as f64;
 
-/// Its edges belong to a rectangle, whatever their rounding: so walls that meet let nothing through. Some thousand f64
-/// roundings of a coordinate.
+/// Its edges belong to a rectangle, whatever their rounding: so walls that meet let nothing
+/// through. Some thousand f64 roundings of a coordinate.
 pub const AT_EDGE: f64 = 1e-12;
 
 /// A surface with what every test of it needs.
@@ -58,7 +59,8 @@ impl Rect {
 
     /// The rectangle's point nearest to `p`.
     pub fn nearest(&self, p: DVec3) -> DVec3 {
-        let along = |axis: DVec3| ((p - self.center).dot(axis) / axis.length_squared()).clamp(-1.0, 1.0);
+        let along =
+            |axis: DVec3| ((p - self.center).dot(axis) / axis.length_squared()).clamp(-1.0, 1.0);
         self.point(along(self.u), along(self.v))
     }
 
@@ -68,7 +70,8 @@ impl Rect {
         within(self.u) && within(self.v)
     }
 
-    /// Where on the way from `p` (0) to `source` (1, or in lengths where it is infinitely far) the rectangle is met.
+    /// Where on the way from `p` (0) to `source` (1, or in lengths where it is infinitely far) the
+    /// rectangle is met.
     pub fn met(&self, p: DVec3, source: Source) -> Option<f64> {
         let a = self.side_of(p);
         let (b, way) = match source {
@@ -118,7 +121,9 @@ pub fn transmittance(blobs: &[Blob], forward: f64, p: DVec3, source: Source) -> 
 pub fn source_of(light: &Light) -> Source {
     match *light {
         Light::Point { position, .. } | Light::Spot { position, .. } => Source::At(position),
-        Light::Directional { .. } | Light::Sky { .. } => Source::Toward(light.arrival(DVec3::ZERO).toward),
+        Light::Directional { .. } | Light::Sky { .. } => {
+            Source::Toward(light.arrival(DVec3::ZERO).toward)
+        }
     }
 }
 
@@ -141,10 +146,19 @@ mod tests {
     fn a_rectangle_hides_what_is_behind_it_from_both_sides_and_nothing_in_its_plane() {
         let s = [floor(1.0)];
         let at = |x, y, z| DVec3::new(x, y, z);
-        assert!(!visible(&s, at(0.0, 0.0, 0.0), at(0.0, 2.0, 0.0)) && !visible(&s, at(0.0, 2.0, 0.0), DVec3::ZERO));
+        assert!(
+            !visible(&s, at(0.0, 0.0, 0.0), at(0.0, 2.0, 0.0))
+                && !visible(&s, at(0.0, 2.0, 0.0), DVec3::ZERO)
+        );
         // Half way up the ray from x = 0 to x = 3.9 passes at 1.95, to x = 4.1 at 2.05, outside.
-        assert!(!visible(&s, DVec3::ZERO, at(3.9, 2.0, 0.0)) && visible(&s, DVec3::ZERO, at(4.1, 2.0, 0.0)));
-        assert!(visible(&s, DVec3::ZERO, at(0.0, 0.99, 0.0)) && visible(&s, DVec3::ZERO, at(0.0, 1.0, 0.0)));
+        assert!(
+            !visible(&s, DVec3::ZERO, at(3.9, 2.0, 0.0))
+                && visible(&s, DVec3::ZERO, at(4.1, 2.0, 0.0))
+        );
+        assert!(
+            visible(&s, DVec3::ZERO, at(0.0, 0.99, 0.0))
+                && visible(&s, DVec3::ZERO, at(0.0, 1.0, 0.0))
+        );
         // Off the plane by less than 2^-20 of the distance, then by more.
         assert!(visible(&s, DVec3::ZERO, at(1.0, 1.0 + 0.9 * IN_PLANE, 0.0)));
         assert!(!visible(&s, DVec3::ZERO, at(1.0, 1.0 + 1.1 * IN_PLANE, 0.0)));
@@ -153,7 +167,8 @@ mod tests {
         assert_eq!(rects[0].met(DVec3::ZERO, Source::At(4.0 * DVec3::Y)), Some(0.25));
         assert!(is_open(&rects, DVec3::ZERO, Source::Toward(DVec3::NEG_Y)));
         // A lamp under the rectangle is seen, one above is not; the sun from above is not.
-        let lamp = |y| Light::Point { position: at(0.0, y, 0.0), intensity: DVec3::ONE, radius: 0.0 };
+        let lamp =
+            |y| Light::Point { position: at(0.0, y, 0.0), intensity: DVec3::ONE, radius: 0.0 };
         let v = |light| in_light(&rects, &[], 0.0, DVec3::ZERO, &light);
         let sun = Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::ONE };
         assert_eq!((v(lamp(0.9)), v(lamp(1.1)), v(sun)), (1.0, 0.0, 0.0));
@@ -168,9 +183,12 @@ mod tests {
         let far = DVec3::new(-100.0, 0.0, 0.0);
         assert!((depth(far, Source::Toward(DVec3::X)) - whole).abs() < 1e-14);
         assert!((depth(DVec3::ZERO, Source::Toward(DVec3::Y)) - whole / 2.0).abs() < 1e-14);
-        // Within ±σ: erf(1/√2) = 0.6826894921370859; passing at b = σ: e^{−1/2} = 0.6065306597126334 of it.
+        // Within ±σ: erf(1/√2) = 0.6826894921370859; passing at b = σ: e^{−1/2} =
+        // 0.6065306597126334 of it.
         let passing = depth(DVec3::new(-2.0, 2.0, 0.0), Source::At(DVec3::new(2.0, 2.0, 0.0)));
-        assert!((passing - whole * 0.682_689_492_137_085_9 * 0.606_530_659_712_633_4).abs() < 1e-14);
+        assert!(
+            (passing - whole * 0.682_689_492_137_085_9 * 0.606_530_659_712_633_4).abs() < 1e-14
+        );
         // Droplets that scatter forward count for 1 − g.
         let v = transmittance(&[blob, blob], 0.85, far, Source::Toward(DVec3::X));
         assert!((v - (-0.3 * whole).exp()).abs() < 1e-14);

@@ -38,7 +38,8 @@ impl View<'_> {
         let b = side / way.d2.sqrt();
         let b = Known { value: b, error: b * ROUNDINGS * way.turn };
         let wide = Decision::above(b.value, COARSE * x.pairs.size, b.error);
-        let open = self.faces(&way, side).and(wide.or(self.facet_meets_lobe(i, &way, q, b, CELL_STEP)));
+        let open =
+            self.faces(&way, side).and(wide.or(self.facet_meets_lobe(i, &way, q, b, CELL_STEP)));
         if cell.level == x.pairs.levels {
             let count = |is: bool| f64::from(u8::from(is));
             let (n_unresolved, n_doubted) = (count(open.taken), count(!open.sure));
@@ -56,13 +57,18 @@ impl View<'_> {
             let edges = Edges::new(r, Source::At(p), patch, x.slack());
             (!edges.is_nothing()).then_some((edges, *counts))
         };
-        let occluders: Vec<_> = self.before[x.facets[i].i_region].iter().filter_map(edges).collect();
-        let shares: Vec<_> = (0..x.lights.len()).map(|k| x.shares_of(i, k, sender, cell, patch)).collect();
+        let occluders: Vec<_> =
+            self.before[x.facets[i].i_region].iter().filter_map(edges).collect();
+        let shares: Vec<_> =
+            (0..x.lights.len()).map(|k| x.shares_of(i, k, sender, cell, patch)).collect();
         let mut sums = vec![[Known::NOTHING; 4]; x.lights.len()];
         for (n, at) in Patch::middles().enumerate() {
             let place = patch.point(at);
-            let seen = occluders.iter().map(|(e, counts)| e.hidden(at).where_or(*counts, Known::NOTHING).rest());
-            let form = seen.fold(self.way(i, place).part_form(0.25 * patch.u, 0.25 * patch.v), Known::times);
+            let seen = occluders
+                .iter()
+                .map(|(e, counts)| e.hidden(at).where_or(*counts, Known::NOTHING).rest());
+            let form = seen
+                .fold(self.way(i, place).part_form(0.25 * patch.u, 0.25 * patch.v), Known::times);
             if form.is_nothing() {
                 continue;
             }

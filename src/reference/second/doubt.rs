@@ -50,7 +50,10 @@ impl Known {
     }
 
     pub fn is_positive(self) -> Decision {
-        Decision { taken: self.value > 0.0, sure: self.error == 0.0 || self.error < self.value.abs() }
+        Decision {
+            taken: self.value > 0.0,
+            sure: self.error == 0.0 || self.error < self.value.abs(),
+        }
     }
 }
 

@@ -12,7 +12,8 @@ pub struct Gathered {
     pub(super) glossy: DVec3,
     pub second: DVec3,
     pub n_unresolved: f64,
-    /// What rounding may change of I_i and L2 (before K_d and K_s), and what decisions within rounding may.
+    /// What rounding may change of I_i and L2 (before K_d and K_s), and what decisions within
+    /// rounding may.
     pub(super) error: [DVec3; 2],
     pub indirect_error: DVec3,
     pub second_error: DVec3,
@@ -39,7 +40,11 @@ impl Gathered {
     }
 
     /// `is` where `d`, else `other`; both where rounding may turn it.
-    pub(super) fn by(d: Decision, is: impl Fn() -> Gathered, other: impl Fn() -> Gathered) -> Gathered {
+    pub(super) fn by(
+        d: Decision,
+        is: impl Fn() -> Gathered,
+        other: impl Fn() -> Gathered,
+    ) -> Gathered {
         match (d.taken, d.sure) {
             (true, true) => is(),
             (false, true) => other(),

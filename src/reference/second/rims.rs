@@ -1,4 +1,5 @@
-//! The shadows of rectangles on balls, and which rectangles come into question: model.md §11 "second", *Rims*.
+//! The shadows of rectangles on balls, and which rectangles come into question: model.md §11
+//! "second", *Rims*.
 
 use std::f64::consts::SQRT_2;
 
@@ -13,7 +14,8 @@ pub const OF_UNITS: f64 = 8.0 * super::U;
 /// No divisor is less: what it divides ends beyond all bounds, in either sense.
 const LEAST: f64 = 1e-30;
 
-/// The ball about a facet or cluster; `slack`: what the distance of its middle from a plane is known to.
+/// The ball about a facet or cluster; `slack`: what the distance of its middle from a plane is
+/// known to.
 #[derive(Debug, Clone, Copy)]
 pub struct Ball {
     pub at: DVec3,
@@ -35,9 +37,14 @@ pub struct Shadow {
 /// Signs of a plane's side that may be found where it is `raw`, known to `slack`; the law's first.
 pub fn signs(raw: f64, tolerance: f64, slack: f64) -> Vec<f64> {
     let law = if raw.abs() > tolerance { raw.signum() } else { 0.0 };
-    let possible =
-        [(1.0, raw + slack > tolerance), (-1.0, raw - slack < -tolerance), (0.0, raw.abs() <= tolerance + slack)];
-    std::iter::once(law).chain(possible.into_iter().filter(|(s, is)| *is && *s != law).map(|(s, _)| s)).collect()
+    let possible = [
+        (1.0, raw + slack > tolerance),
+        (-1.0, raw - slack < -tolerance),
+        (0.0, raw.abs() <= tolerance + slack),
+    ];
+    std::iter::once(law)
+        .chain(possible.into_iter().filter(|(s, is)| *is && *s != law).map(|(s, _)| s))
+        .collect()
 }
 
 /// The plane's side of `p`, and its signs.
@@ -58,7 +65,8 @@ pub fn sides_of(r: &Rectangle, source: Source, slack: f64) -> (f64, Vec<f64>) {
     }
 }
 
-/// Where the way to `q` meets the plane; known to what; and how much larger than the ball its image is there.
+/// Where the way to `q` meets the plane; known to what; and how much larger than the ball its image
+/// is there.
 fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Known) {
     match source {
         Source::At(p) => {
@@ -68,7 +76,11 @@ fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Kn
             let t_error = slack * (a.abs() + b.abs()) / (apart * apart);
             let slant_error = (2.0 * slant + 1.0) * slack / apart.abs();
             let stretch = Known { value: slant.max(1.0), error: slant_error };
-            (p + d * t, slack + length * t_error, Known { value: t.abs(), error: t_error }.times(stretch))
+            (
+                p + d * t,
+                slack + length * t_error,
+                Known { value: t.abs(), error: t_error }.times(stretch),
+            )
         }
         Source::Toward(w) => {
             let slope = if a.abs() < LEAST { LEAST } else { a };
@@ -93,7 +105,8 @@ pub fn shadow(r: &Rectangle, source: Source, ball: &Ball) -> Shadow {
     let parts = Decision::of(of_a.iter().map(|x| *x != 0.0));
     let near = Decision::above(radius.value, b.abs(), slack + radius.error);
     let across = Known { value: m.value.abs(), ..m };
-    let torn = parts.and(apart.and(Decision::greater(reach, across)).or(near.and(Decision::greater(reach, m))));
+    let torn = parts
+        .and(apart.and(Decision::greater(reach, across)).or(near.and(Decision::greater(reach, m))));
     let half = (SQRT_2 * reach.value).max(f64::MIN_POSITIVE);
     let ramp = |m: f64| (0.5 - m / half).clamp(0.0, 1.0);
     let off = m.error + reach.error / SQRT_2;
@@ -109,36 +122,43 @@ fn corners(r: &Rectangle) -> [DVec3; 4] {
     [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, y)| r.center + x * r.u + y * r.v)
 }
 
-/// Face k of the pyramid over `rim`: what is within is on the positive side of its normal; and its edges' lengths.
+/// Face k of the pyramid over `rim`: what is within is on the positive side of its normal; and its
+/// edges' lengths.
 fn face(rim: &[DVec3; 4], k: usize, middle: DVec3) -> (DVec3, [f64; 2]) {
     let (a, b) = (rim[k], rim[(k + 1) % 4]);
     let plane = a.cross(b);
     (plane * plane.dot(middle).signum(), [a.length(), b.length()])
 }
 
-/// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor `r`'s plane, has all of
-/// `e`'s corners outside.
+/// Whether the pyramid from `p` over `r` may hold a point of `e` behind `r`: no face of it, nor
+/// `r`'s plane, has all of `e`'s corners outside.
 pub fn meets(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
     // All of `far` below 0 of a plane through `p`, corners and normal known as their products are.
     let outside = |k: usize| {
         let (inward, [a, b]) = face(&rim, k, r.center - p);
-        let below = |c: &DVec3| Decision::above(0.0, inward.dot(*c), 2.0 * slack * (a * b + (a + b) * c.length()));
+        let below = |c: &DVec3| {
+            Decision::above(0.0, inward.dot(*c), 2.0 * slack * (a * b + (a + b) * c.length()))
+        };
         far.iter().map(below).fold(Decision::YES, Decision::and)
     };
     let (_, of_p) = sides(r, p, slack);
     let behind = |c: &DVec3| {
         let side = r.normal.dot(*c + p - r.center);
-        Decision::of(of_p.iter().flat_map(|s| [side, side + slack, side - slack].map(|x| x * s < 0.0)))
+        Decision::of(
+            of_p.iter().flat_map(|s| [side, side + slack, side - slack].map(|x| x * s < 0.0)),
+        )
     };
     let out = (0..4).map(outside).fold(Decision::NO, Decision::or);
     out.not().and(far.iter().map(behind).fold(Decision::NO, Decision::or))
 }
 
-/// Planes through a point hold what they are said to hold by this share of the lengths that make them up.
+/// Planes through a point hold what they are said to hold by this share of the lengths that make
+/// them up.
 const TRUST: f64 = 1e-5;
 
-/// Whether `r` alone hides all of `e` from `p`: its corners are within the pyramid from `p` over `r`, and beyond `r`.
+/// Whether `r` alone hides all of `e` from `p`: its corners are within the pyramid from `p` over
+/// `r`, and beyond `r`.
 pub fn hides_all(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision {
     let (rim, far) = (corners(r).map(|c| c - p), corners(e).map(|c| c - p));
     let inside = |k: usize| {
@@ -153,10 +173,9 @@ pub fn hides_all(r: &Rectangle, e: &Rectangle, p: DVec3, slack: f64) -> Decision
     let beyond = |c: &DVec3| {
         let o = *c + p - r.center;
         let depth = r.normal.dot(o);
-        Decision::of(
-            of_p.iter()
-                .flat_map(|s| [0.0, slack, -slack].map(|off| -s * (depth + off) > TRUST * o.abs().element_sum())),
-        )
+        Decision::of(of_p.iter().flat_map(|s| {
+            [0.0, slack, -slack].map(|off| -s * (depth + off) > TRUST * o.abs().element_sum())
+        }))
     };
     (0..4).map(inside).chain(far.iter().map(beyond)).fold(Decision::YES, Decision::and)
 }

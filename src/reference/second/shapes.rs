@@ -10,8 +10,8 @@ use crate::model::basis::evaluate;
 
 /// Half vectors of opposite ways turn with any rounding.
 const OPPOSITE: f64 = 1e-6;
-/// What the mean's bracket {…}·2/(3d²) turns with its ways: of widths up to the distance (|u|, |v| ≤ d/2) at most
-/// 2/3 · 2 · (6 + 2 + 1)/4 · 2.
+/// What the mean's bracket {…}·2/(3d²) turns with its ways: of widths up to the distance (|u|, |v|
+/// ≤ d/2) at most 2/3 · 2 · (6 + 2 + 1)/4 · 2.
 const BENDING: f64 = 6.0;
 
 /// From receiver `n_j` to emitter `n_i` along the unit `way`, d long and known to `turn`.
@@ -52,8 +52,11 @@ impl Way {
         if c_j <= -self.turn {
             return Known::NOTHING;
         }
-        let along = |a: DVec3| c_j * (6.0 * a.dot(way).powi(2) - a.length_squared()) - 2.0 * n_j.dot(a) * a.dot(way);
-        let form = self.product(c_j + 2.0 / (3.0 * d2) * (along(u) + along(v)), BENDING).scaled(1.0 / d2);
+        let along = |a: DVec3| {
+            c_j * (6.0 * a.dot(way).powi(2) - a.length_squared()) - 2.0 * n_j.dot(a) * a.dot(way)
+        };
+        let form =
+            self.product(c_j + 2.0 / (3.0 * d2) * (along(u) + along(v)), BENDING).scaled(1.0 / d2);
         if c_j > 0.0 {
             form.where_or(Known { value: c_j, error: self.turn }.is_positive(), Known::NOTHING)
         } else {
@@ -62,10 +65,14 @@ impl Way {
     }
 }
 
-/// Angle |n − h| between `n` and the half vector of two unit vectors, which are off by `turn` together.
+/// Angle |n − h| between `n` and the half vector of two unit vectors, which are off by `turn`
+/// together.
 pub fn half_angle(n: DVec3, a: DVec3, b: DVec3, turn: f64) -> Known {
     let sum = a + b;
-    Known { value: (n - sum.normalize_or_zero()).length(), error: 2.0 * turn / sum.length().max(OPPOSITE) }
+    Known {
+        value: (n - sum.normalize_or_zero()).length(),
+        error: 2.0 * turn / sum.length().max(OPPOSITE),
+    }
 }
 
 pub fn width(ns: f64) -> f64 {
@@ -75,7 +82,10 @@ pub fn width(ns: f64) -> f64 {
 /// The lobe at an angle.
 pub fn lobe(table: &[f64], angle: Known) -> Known {
     let at = |a: f64| evaluate(table, 0.5 * a * a);
-    let (value, low, high) =
-        (at(angle.value), at((angle.value - angle.error).max(0.0)), at((angle.value + angle.error).min(2.0)));
+    let (value, low, high) = (
+        at(angle.value),
+        at((angle.value - angle.error).max(0.0)),
+        at((angle.value + angle.error).min(2.0)),
+    );
     Known { value, error: (value - low).abs().max((value - high).abs()) }
 }

@@ -1,4 +1,5 @@
-//! What a facet has of the lights and sends on, and how it lies in the lights' shadows: model.md §11 "second".
+//! What a facet has of the lights and sends on, and how it lies in the lights' shadows: model.md
+//! §11 "second".
 
 use super::stencil::{Edges, Patch};
 use super::*;
@@ -37,9 +38,15 @@ impl Exchange<'_> {
     }
 
     fn lit(&self, i: usize, i_light: usize) -> Lit<'_> {
-        let (facet, ball, source) = (&self.facets[i], self.ball(i), source_of(&self.lights[i_light]));
+        let (facet, ball, source) =
+            (&self.facets[i], self.ball(i), source_of(&self.lights[i_light]));
         let Some((u, v)) = self.axes(i) else {
-            let mean = self.share_at(i, i_light, facet.position, self.known(self.transmittance, i, i_light));
+            let mean = self.share_at(
+                i,
+                i_light,
+                facet.position,
+                self.known(self.transmittance, i, i_light),
+            );
             return Lit { torn: Decision::NO, rectangles: vec![], source, points: vec![], mean };
         };
         let shadows = self.others(facet.i_region, facet.i_region);
@@ -68,7 +75,8 @@ impl Exchange<'_> {
         Patch::middles().map(at).collect()
     }
 
-    /// g_l at a cell's points: its own where a shadow tears its facet, else those of the facet's sixteenths.
+    /// g_l at a cell's points: its own where a shadow tears its facet, else those of the facet's
+    /// sixteenths.
     pub(super) fn shares_of(
         &self,
         i: usize,
@@ -104,22 +112,36 @@ impl Exchange<'_> {
         let arrival = light.arrival(x);
         let own = |v: f64| light.share(n, &arrival, v);
         let cone = match light {
-            Light::Spot { cos_inner, cos_outer, .. } => 2.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA),
+            Light::Spot { cos_inner, cos_outer, .. } => {
+                2.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA)
+            }
             _ => 0.0,
         };
         let turned = self.turn(arrival.distance) * v.value * arrival.falloff * (2.0 + cone);
         // A lamp so far behind the facet that no rounding brings it before.
         let behind = !light.is_sky() && n.dot(arrival.toward) < -self.turn(arrival.distance);
-        let error = if behind { 0.0 } else { v.error * (own(1.0) - own(0.0)) + ROUNDINGS * U * own(v.value) + turned };
+        let error = if behind {
+            0.0
+        } else {
+            v.error * (own(1.0) - own(0.0)) + ROUNDINGS * U * own(v.value) + turned
+        };
         Known { value: own(v.value), error }
     }
 
-    /// Between the unit normal at the end of `way` and the half vector of a light that is not the sky and the way back;
-    /// `q`, that end, is off by `moved`.
-    pub(super) fn light_angle(&self, i_light: usize, q: DVec3, way: &Way, moved: f64) -> Option<Known> {
+    /// Between the unit normal at the end of `way` and the half vector of a light that is not the
+    /// sky and the way back; `q`, that end, is off by `moved`.
+    pub(super) fn light_angle(
+        &self,
+        i_light: usize,
+        q: DVec3,
+        way: &Way,
+        moved: f64,
+    ) -> Option<Known> {
         let light = &self.lights[i_light];
         let arrival = light.arrival(q);
-        let turn = way.turn + self.turn(arrival.distance) + 2.0 * moved / arrival.distance.max(LEAST_DISTANCE);
+        let turn = way.turn
+            + self.turn(arrival.distance)
+            + 2.0 * moved / arrival.distance.max(LEAST_DISTANCE);
         (!light.is_sky()).then(|| half_angle(way.n_i, arrival.toward, -way.way, turn))
     }
 
@@ -128,12 +150,15 @@ impl Exchange<'_> {
         let source = &self.facets[i];
         let region = &self.regions[source.i_region];
         let (mut sum, mut error) = (DVec3::ZERO, DVec3::ZERO);
-        for (k, (light, g)) in self.lights.iter().zip(g).enumerate().filter(|(_, (_, g))| !g.is_nothing()) {
+        for (k, (light, g)) in
+            self.lights.iter().zip(g).enumerate().filter(|(_, (_, g))| !g.is_nothing())
+        {
             let glossy = region.lobe.as_ref().zip(self.light_angle(k, q, way, 0.0));
             let glossy = glossy.map_or(Known::NOTHING, |(table, angle)| lobe(table, angle));
             let f = region.brdf.kd * source.color / PI + region.brdf.ks * glossy.value;
             sum += light.energy() * f * g.value;
-            error += light.energy() * (f.abs() * g.error + region.brdf.ks * glossy.error * (g.value + g.error));
+            error += light.energy()
+                * (f.abs() * g.error + region.brdf.ks * glossy.error * (g.value + g.error));
         }
         (sum, error)
     }

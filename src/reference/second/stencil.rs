@@ -1,5 +1,5 @@
-//! What a rectangle hides of a cell's parts: model.md §11 "second", *Edges*. Functions that are positive behind it and
-//! within its edges, linear over the cell, as ramps along each part.
+//! What a rectangle hides of a cell's parts: model.md §11 "second", *Edges*. Functions that are
+//! positive behind it and within its edges, linear over the cell, as ramps along each part.
 
 use glam::{DVec2, DVec3};
 
@@ -53,15 +53,19 @@ impl Linear {
     /// The share of the part about `at` where it is positive, with `off` more.
     fn share(&self, at: DVec2, off: f64) -> f64 {
         let (f, half) = (self.at_q + self.gain.dot(at) + off, HALF_PART * self.gain.length());
-        if half > 0.0 { (0.5 + f / (2.0 * half)).clamp(0.0, 1.0) } else { f64::from(u8::from(f > 0.0)) }
+        if half > 0.0 {
+            (0.5 + f / (2.0 * half)).clamp(0.0, 1.0)
+        } else {
+            f64::from(u8::from(f > 0.0))
+        }
     }
 }
 
 /// The plane, and two pairs of opposite edges.
 type Five = [Linear; 5];
 
-/// What a rectangle hides of a cell from where it is seen: by the law, and what rounding may make of it; none where the
-/// eye is in its plane.
+/// What a rectangle hides of a cell from where it is seen: by the law, and what rounding may make
+/// of it; none where the eye is in its plane.
 #[derive(Debug, Clone)]
 pub struct Edges(Vec<Option<Five>>);
 
@@ -69,7 +73,8 @@ impl Edges {
     /// `slack`: what the distance of a point from a plane is known to.
     pub fn new(r: &Rectangle, source: Source, patch: &Patch, slack: f64) -> Edges {
         let (side, signs) = sides_of(r, source, slack);
-        let of = |sign: &f64| (*sign != 0.0).then(|| five(r, source, patch, side.abs(), *sign, slack));
+        let of =
+            |sign: &f64| (*sign != 0.0).then(|| five(r, source, patch, side.abs(), *sign, slack));
         Edges(signs.iter().map(of).collect())
     }
 
@@ -80,7 +85,8 @@ impl Edges {
 
     /// h of the part about `at`.
     pub fn hidden(&self, at: DVec2) -> Known {
-        let by = |five: &Option<Five>, off: f64| five.as_ref().map_or(0.0, |five| share(five, at, off));
+        let by =
+            |five: &Option<Five>, off: f64| five.as_ref().map_or(0.0, |five| share(five, at, off));
         let value = by(&self.0[0], 0.0);
         let least = self.0.iter().map(|f| by(f, -1.0)).fold(value, f64::min);
         let most = self.0.iter().map(|f| by(f, 1.0)).fold(value, f64::max);
@@ -107,20 +113,23 @@ fn five(r: &Rectangle, source: Source, patch: &Patch, side: f64, sign: f64, slac
     // D |w|² ± X, D's constant |a| counted where `x` is a place and not a step.
     let edge = |w: DVec3, turn: f64, x: DVec3, place: f64| {
         let e = depth(x);
-        (place * side + is_near * e) * w.length_squared() + turn * (side * w.dot(x) + e * w.dot(from))
+        (place * side + is_near * e) * w.length_squared()
+            + turn * (side * w.dot(x) + e * w.dot(from))
     };
     let linear = |f: &dyn Fn(DVec3, f64) -> f64, slack: f64| {
         let gain = DVec2::new(f(patch.u, 0.0), f(patch.v, 0.0));
         Linear { at_q: f(to_q, 1.0), gain, slack }
     };
-    // Sides and lengths along w are known to `slack`, unit ways and their slopes to a few roundings; half of what the
-    // gains are known to is the ramp's.
+    // Sides and lengths along w are known to `slack`, unit ways and their slopes to a few
+    // roundings; half of what the gains are known to is the ramp's.
     let size = patch.u.length() + patch.v.length();
     let reach = to_q.length() + 2.0 * size;
     let of_edge = |w: DVec3| {
-        let (side_slack, of_source) = if is_near > 0.0 { (slack, slack) } else { (OF_UNITS, OF_UNITS) };
+        let (side_slack, of_source) =
+            if is_near > 0.0 { (slack, slack) } else { (OF_UNITS, OF_UNITS) };
         let of_depth = slack * (from.length() + is_near * w.length());
-        w.length() * (side_slack * (w.length() + reach) + side * slack + of_depth + reach * of_source)
+        w.length()
+            * (side_slack * (w.length() + reach) + side * slack + of_depth + reach * of_source)
     };
     let of = |w: DVec3, turn: f64| linear(&|x, place| edge(w, turn, x, place), of_edge(w));
     let plane = linear(&|x, place| depth(x) - place * tolerance, slack + OF_UNITS * size);

@@ -29,10 +29,12 @@ struct Scene {
 
 impl Scene {
     fn of_surfaces(surfaces: &[Surface], brdf: Brdf) -> Scene {
-        let region = |s| Region { rectangle: Some(Rectangle::new(s, DVec3::ZERO)), brdf, lobe: None };
+        let region =
+            |s| Region { rectangle: Some(Rectangle::new(s, DVec3::ZERO)), brdf, lobe: None };
         let facets = surfaces.iter().enumerate().flat_map(|(i_region, s)| {
             let area = s.area() / s.n_facets() as f64;
-            (0..s.n_facets() as u32).map(move |i| disc(s.facet_center(i), s.normal(), area, i_region))
+            (0..s.n_facets() as u32)
+                .map(move |i| disc(s.facet_center(i), s.normal(), area, i_region))
         });
         Scene {
             facets: facets.collect(),
@@ -48,7 +50,10 @@ impl Scene {
     }
 
     fn of_discs(facets: &[Facet]) -> Scene {
-        let regions = facets.iter().map(|_| Region { rectangle: None, brdf: matte(1.0), lobe: None }).collect();
+        let regions = facets
+            .iter()
+            .map(|_| Region { rectangle: None, brdf: matte(1.0), lobe: None })
+            .collect();
         Scene { facets: facets.to_vec(), regions, pairings: pairings(&[], facets.len()) }
     }
 
@@ -95,7 +100,8 @@ fn eye_on_the_floor() -> Surface {
 
 #[test]
 fn two_discs_face_to_face() {
-    // Area π one above the other: 1/(1 + 1), times L = 1 of a white one under irradiance π, times A = π.
+    // Area π one above the other: 1/(1 + 1), times L = 1 of a white one under irradiance π, times A
+    // = π.
     let facets = [disc(DVec3::ZERO, DVec3::Y, PI, 0), disc(DVec3::Y, DVec3::NEG_Y, PI, 1)];
     let sun = [Light::Directional { direction: DVec3::NEG_Y, irradiance: DVec3::splat(PI) }];
     let scene = Scene::of_discs(&facets);
@@ -105,7 +111,8 @@ fn two_discs_face_to_face() {
     assert_eq!(scene.gather(&sun, 1.0, 0).indirect, DVec3::ZERO);
     // Turned by 60° each about one axis the cosines are ½.
     let tilted = DVec3::new(0.0, 0.5, 0.75f64.sqrt());
-    let scene = Scene::of_discs(&[disc(DVec3::ZERO, tilted, 1e-6, 0), disc(DVec3::Y, -tilted, 1e-6, 1)]);
+    let scene =
+        Scene::of_discs(&[disc(DVec3::ZERO, tilted, 1e-6, 0), disc(DVec3::Y, -tilted, 1e-6, 1)]);
     let turned = scene.gather(&sun, 1.0, 1).indirect.x;
     assert!((turned / (0.5 * 1e-6 * 0.25) - 1.0).abs() < 1e-6);
 }
@@ -120,17 +127,23 @@ fn of_a_ceiling() -> f64 {
 fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
     let ceiling = |n| plane(DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, n);
     let found = |surfaces: &[Surface]| {
-        Scene::of_surfaces(surfaces, matte(1.0)).with_facets_of(2).gather(&[GLOW], 0.0, 0).indirect.x
+        Scene::of_surfaces(surfaces, matte(1.0))
+            .with_facets_of(2)
+            .gather(&[GLOW], 0.0, 0)
+            .indirect
+            .x
     };
-    // The ceiling faces down: half of nothing above, and the constant share: L = 1. Second derivatives leave (1/8)^4.
+    // The ceiling faces down: half of nothing above, and the constant share: L = 1. Second
+    // derivatives leave (1/8)^4.
     let open = found(&[eye_on_the_floor(), ceiling(8)]);
     assert!((open / (PI * of_a_ceiling()) - 1.0).abs() < 3e-4, "{open}");
-    // Of one facet, as wide as its distance, 4 × 4 points: of the second derivatives a disc leaves 4 (u·w)²/d² along each
-    // axis, u·w = 3/8·1/8 for parts at the edge.
+    // Of one facet, as wide as its distance, 4 × 4 points: of the second derivatives a disc leaves
+    // 4 (u·w)²/d² along each axis, u·w = 3/8·1/8 for parts at the edge.
     let points = found(&[eye_on_the_floor(), ceiling(1)]);
     assert!((points / open - 1.0).abs() < 1e-2, "{points} {open}");
-    // An edge through the axis, and one at x = 1/40, whose shadow at 1/20 runs through a part of a facet: it takes
-    // what the strip between has, by values in the middles of parts: cos⁴ is 1 − 2x² there, x = 1/8 of one facet.
+    // An edge through the axis, and one at x = 1/40, whose shadow at 1/20 runs through a part of a
+    // facet: it takes what the strip between has, by values in the middles of parts: cos⁴ is 1 −
+    // 2x² there, x = 1/8 of one facet.
     for n in [1, 8] {
         let all = found(&[eye_on_the_floor(), ceiling(n)]);
         let with = |x: f64| {
@@ -148,12 +161,14 @@ fn a_ceiling_has_its_form_factor_and_a_blocker_takes_its_share() {
 
 #[test]
 fn a_whole_is_seen_as_far_as_its_ball() {
-    // Half axes 1/100 at distance 2, seen past an edge half way: m = 1/500 in the blocker's plane, where the ball's radius is
-    // √2/200: hidden by ½ − m·100 = 0.3. As wide as 1/100 of the distance it is torn but not looked at closely.
+    // Half axes 1/100 at distance 2, seen past an edge half way: m = 1/500 in the blocker's plane,
+    // where the ball's radius is √2/200: hidden by ½ − m·100 = 0.3. As wide as 1/100 of the
+    // distance it is torn but not looked at closely.
     let facet = plane(2.0 * DVec3::Y, 0.01 * DVec3::X, 0.01 * DVec3::Z, 1);
     let found = |x: f64| {
         let blocker = plane(DVec3::new(1.0 + x, 1.0, 0.0), DVec3::X, DVec3::Z, 1);
-        let scene = Scene::of_surfaces(&[eye_on_the_floor(), facet, blocker], matte(1.0)).with_facets_of(2);
+        let scene =
+            Scene::of_surfaces(&[eye_on_the_floor(), facet, blocker], matte(1.0)).with_facets_of(2);
         scene.gather(&[GLOW], 0.0, 0).indirect.x
     };
     let open = found(0.1);
@@ -167,14 +182,16 @@ fn a_whole_is_seen_as_far_as_its_ball() {
 fn a_corner_is_that_of_the_areas() {
     let floor = plane(DVec3::ZERO, DVec3::Z, DVec3::X, 8);
     let wall = plane(DVec3::new(0.0, 1.0, -1.0), DVec3::X, DVec3::Y, 8);
-    let sun = [Light::Directional { direction: DVec3::new(0.0, -0.8, -0.6), irradiance: DVec3::ONE }];
+    let sun =
+        [Light::Directional { direction: DVec3::new(0.0, -0.8, -0.6), irradiance: DVec3::ONE }];
     let scene = Scene::of_surfaces(&[floor, wall], matte(0.5));
     let truth = Scenery::new(&[floor, wall], &[matte(0.5); 2], &sun, &[], 0.0, &[]);
     for j in [0, 7, 27, 63, 64, 91, 120] {
         let at = Receiver::new(scene.facets[j].position, scene.facets[j].normal, matte(0.5));
         let e = truth.second(&at, at.normal, &Accuracy::relative(1e-7));
-        // Wholes are at most half as wide as their distance: fourth order of ½·½, some 3 parts in a thousand. Parts, at most
-        // 3/8 and some nearer a half, are discs: 4 (u·w)²/d² = 4/16² of them at their widest.
+        // Wholes are at most half as wide as their distance: fourth order of ½·½, some 3 parts in a
+        // thousand. Parts, at most 3/8 and some nearer a half, are discs: 4 (u·w)²/d² = 4/16² of
+        // them at their widest.
         let off = (scene.gather(&sun, 1.0, j).indirect.x / e.irradiance.x - 1.0).abs();
         assert!(off < 1.5e-2, "{j} {off}");
     }
@@ -189,19 +206,21 @@ fn what_lies_in_a_plane_hides_nothing() {
     };
     let alone = found(&[]);
     assert!(alone.indirect.x > 0.0);
-    // Over half of the ceiling, in its plane and within f32's rounding of it; and in the receiver's plane.
+    // Over half of the ceiling, in its plane and within f32's rounding of it; and in the receiver's
+    // plane.
     for off in [0.0, 1e-7, -1e-7] {
         let lies = plane(DVec3::new(0.5, 1.0 + off, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
-        // It only has the ceiling looked at closely: wholes half as wide as their distance are right to some 3 parts in a
-        // thousand.
+        // It only has the ceiling looked at closely: wholes half as wide as their distance are
+        // right to some 3 parts in a thousand.
         assert!((found(&[lies]).indirect.x / alone.indirect.x - 1.0).abs() < 3e-3, "{off}");
         let wall = plane(DVec3::new(off, 0.5, 0.0), DVec3::Y, DVec3::Z, 1);
         let clear = (found(&[wall]).indirect.x / alone.indirect.x - 1.0).abs();
-        // Through the receiver's own place there is no side from which it could hide; its shadow of the sky has the ceiling
-        // looked at by its parts.
+        // Through the receiver's own place there is no side from which it could hide; its shadow of
+        // the sky has the ceiling looked at by its parts.
         assert!(clear < 3e-3, "{off}: {clear}");
     }
-    // A thousandth before the ceiling it hides half, less what is seen past its edge: a hundredth of the half width.
+    // A thousandth before the ceiling it hides half, less what is seen past its edge: a hundredth
+    // of the half width.
     let before = plane(DVec3::new(0.5, 0.999, 0.0), 0.5 * DVec3::X, DVec3::Z, 1);
     assert!((found(&[before]).indirect.x / alone.indirect.x - 0.5).abs() < 1e-3);
 }
@@ -215,11 +234,12 @@ fn what_is_too_wide_at_the_last_level_is_counted() {
         let pairs = Pairs { levels, ..PAIRS };
         at(&Exchange { pairs, ..scene.exchange(&[GLOW], &[0.0; 2]) }, 0)
     };
-    // Quarters' centres are at 0.354: half a width over that is 1.41, no wider than 1.5 in all four.
+    // Quarters' centres are at 0.354: half a width over that is 1.41, no wider than 1.5 in all
+    // four.
     assert_eq!([0, 1].map(|l| found(l).n_unresolved), [1.0, 0.0]);
     assert_eq!(found(6).n_doubted, 0.0);
-    // At pair_size 1/8 quarters are cut again: of 16 the innermost four at 0.177 are 1.41 wide, those at the edges' middle
-    // (1/8, 3/8) 0.63 and the corners 0.47, all more than 3/8.
+    // At pair_size 1/8 quarters are cut again: of 16 the innermost four at 0.177 are 1.41 wide,
+    // those at the edges' middle (1/8, 3/8) 0.63 and the corners 0.47, all more than 3/8.
     let pairs = Pairs { size: 0.125, levels: 2, ..PAIRS };
     let fine = at(&Exchange { pairs, ..scene.exchange(&[GLOW], &[0.0; 2]) }, 0);
     assert_eq!(fine.n_unresolved, 16.0);
@@ -227,7 +247,8 @@ fn what_is_too_wide_at_the_last_level_is_counted() {
 
 #[test]
 fn lobes_are_met_within_their_reach_and_ask_for_narrow_cells() {
-    // 0.3 wide at distance 1, the receiver's half vector `alpha` off its normal; or the emitter's, by a sun.
+    // 0.3 wide at distance 1, the receiver's half vector `alpha` off its normal; or the emitter's,
+    // by a sun.
     let ceiling = plane(DVec3::Y, 0.15 * DVec3::X, 0.15 * DVec3::Z, 1);
     let count = |i_glossy: usize, ns: f64, alpha: f64| {
         let mut scene = Scene::of_surfaces(&[eye_on_the_floor(), ceiling], matte(1.0));
@@ -240,8 +261,8 @@ fn lobes_are_met_within_their_reach_and_ask_for_narrow_cells() {
         at(&Exchange { eye, pairs, ..scene.exchange(&sun, &[1.0; 2]) }, 0).n_unresolved
     };
     for i in [0, 1] {
-        // 4.5·½/√56.25 is 0.3: of a cell more is asked for from there on. Met is what is nearer than 0.75·0.3 + 4/√100 =
-        // 0.625, a chord of 0.6357.
+        // 4.5·½/√56.25 is 0.3: of a cell more is asked for from there on. Met is what is nearer
+        // than 0.75·0.3 + 4/√100 = 0.625, a chord of 0.6357.
         assert_eq!([56.0, 56.5].map(|ns| count(i, ns, 0.0)), [0.0, 1.0], "{i}");
         assert_eq!([0.63, 0.64].map(|alpha| count(i, 100.0, alpha)), [1.0, 0.0], "{i}");
     }

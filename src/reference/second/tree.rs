@@ -65,7 +65,10 @@ fn trace(m: &DMat3) -> f64 {
 }
 
 fn sum_of(channels: DVec3, error: DVec3) -> Known {
-    Known { value: channels.element_sum(), error: error.element_sum() + 3.0 * U * channels.element_sum() }
+    Known {
+        value: channels.element_sum(),
+        error: error.element_sum() + 3.0 * U * channels.element_sum(),
+    }
 }
 
 impl Exchange<'_> {
@@ -79,18 +82,32 @@ impl Exchange<'_> {
             })
             .collect();
         let mut facets = vec![usize::MAX; tree.n_nodes.len()];
-        tree.leaves.iter().zip(order).for_each(|(node, facet)| facets[*node as usize] = *facet as usize);
+        tree.leaves
+            .iter()
+            .zip(order)
+            .for_each(|(node, facet)| facets[*node as usize] = *facet as usize);
         // Children stand behind their parents.
         let mut nodes: Vec<Option<Cluster>> = vec![None; facets.len()];
         for region in &regions {
             for node in region.clone().rev() {
-                let below: Vec<&Cluster> = children(&tree.n_nodes, node).filter_map(|c| nodes[c].as_ref()).collect();
+                let below: Vec<&Cluster> =
+                    children(&tree.n_nodes, node).filter_map(|c| nodes[c].as_ref()).collect();
                 let i_facet = facets[node];
-                let made = if below.is_empty() { self.leaf(i_facet, &senders[i_facet]) } else { self.merged(&below) };
+                let made = if below.is_empty() {
+                    self.leaf(i_facet, &senders[i_facet])
+                } else {
+                    self.merged(&below)
+                };
                 nodes[node] = Some(made);
             }
         }
-        Clusters { theta, n_nodes: tree.n_nodes, nodes: nodes.into_iter().flatten().collect(), facets, regions }
+        Clusters {
+            theta,
+            n_nodes: tree.n_nodes,
+            nodes: nodes.into_iter().flatten().collect(),
+            facets,
+            regions,
+        }
     }
 
     /// I_i and L2 of facet `j` from clusters.
@@ -107,10 +124,15 @@ impl Exchange<'_> {
         let kd = facet.area * FRAC_1_PI * self.regions[facet.i_region].brdf.kd * facet.color;
         let lights: Vec<Known> = sender.lights.iter().map(|l| l.mean.scaled(facet.area)).collect();
         let by = |of: &dyn Fn(&Known) -> f64| -> DVec3 {
-            self.lights.iter().zip(&sender.lights).map(|(light, l)| light.energy() * of(&l.mean)).sum()
+            self.lights
+                .iter()
+                .zip(&sender.lights)
+                .map(|(light, l)| light.energy() * of(&l.mean))
+                .sum()
         };
         let flux = kd * by(&|g| g.value);
-        let moments = self.axes(i).map_or(DMat3::ZERO, |(u, v)| (square(u) + square(v)) * (1.0 / 3.0));
+        let moments =
+            self.axes(i).map_or(DMat3::ZERO, |(u, v)| (square(u) + square(v)) * (1.0 / 3.0));
         Cluster {
             position: facet.position,
             moved: 0.0,
@@ -154,9 +176,11 @@ impl Exchange<'_> {
         let spread: f64 = all().map(|(k, c)| off(k) * c.normal.distance(normal)).sum();
         let turned = if is_one { 0.0 } else { spread + most(&|c| c.turned) + ROUNDINGS * U };
         let spread = |c: &Cluster| c.moments + square(c.position - position);
-        let of_spread =
-            |c: &Cluster| c.moments_error + 2.0 * (c.position.distance(position) + moved) * (c.moved + moved);
-        let moments = all().fold(DMat3::ZERO, |sum, (k, c)| sum + spread(c) * (weights[k].value * inverse));
+        let of_spread = |c: &Cluster| {
+            c.moments_error + 2.0 * (c.position.distance(position) + moved) * (c.moved + moved)
+        };
+        let moments =
+            all().fold(DMat3::ZERO, |sum, (k, c)| sum + spread(c) * (weights[k].value * inverse));
         let reach = |c: &Cluster| c.position.distance(position) + c.radius.value;
         let radius = most(&reach);
         let grown = 1.0 + ROUNDINGS * U;
@@ -165,7 +189,10 @@ impl Exchange<'_> {
             moved,
             normal: if is_one { below[0].normal } else { normal },
             turned,
-            radius: Known { value: radius, error: moved + most(&|c| c.moved + c.radius.error) + 8.0 * U * radius },
+            radius: Known {
+                value: radius,
+                error: moved + most(&|c| c.moved + c.radius.error) + 8.0 * U * radius,
+            },
             area: below.iter().map(|c| c.area).sum(),
             moments,
             moments_error: all().map(|(k, c)| off(k) * trace(&spread(c))).sum::<f64>()

@@ -1,4 +1,5 @@
-//! One ray through overlapping blobs, piece by piece: what has a closed form in closed form, the rest by Gauss–Kronrod.
+//! One ray through overlapping blobs, piece by piece: what has a closed form in closed form, the
+//! rest by Gauss–Kronrod.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -8,14 +9,16 @@ use libm::erfc;
 use super::Passed;
 use crate::model::cloud::SQRT_TAU;
 
-/// A piece may be so many σ of the narrowest blob in it long before the rules are asked: over 3 σ a Gaussian has a third
-/// of a bend a point of the rule of 7, which so cannot miss it.
+/// A piece may be so many σ of the narrowest blob in it long before the rules are asked: over 3 σ a
+/// Gaussian has a third of a bend a point of the rule of 7, which so cannot miss it.
 const RESOLVED_SIGMAS: f64 = 3.0;
-/// And so deep: e^{−τ} falls to 2 %, and the first of the rules' points (at 0.4 % and 2.5 % of the piece) see its beginning.
+/// And so deep: e^{−τ} falls to 2 %, and the first of the rules' points (at 0.4 % and 2.5 % of the
+/// piece) see its beginning.
 const RESOLVED_DEPTH: f64 = 4.0;
 /// Halvings: below 2⁻⁴⁸ of a range view depths have no digits left to tell a piece's ends apart by.
 const MAX_LEVEL: u32 = 48;
-/// Least share of a ray's accuracy that a piece is held to, so that narrow pieces do not chase their own rounding.
+/// Least share of a ray's accuracy that a piece is held to, so that narrow pieces do not chase
+/// their own rounding.
 const LEAST_SHARE: f64 = 1e-6;
 /// Of a piece's share what may be lost to blobs that its points do not look at.
 const SHARE_OF_FAINT: f64 = 0.1;
@@ -88,12 +91,14 @@ impl March {
         let (tolerance, length) = accuracy;
         let share = tolerance * ((b - a) / length).max(LEAST_SHARE);
         // What the blobs' order can change within the piece, at most.
-        let bound = through * self.active.iter().map(|k| k.tau * k.excess.abs().max_element()).sum::<f64>();
+        let bound =
+            through * self.active.iter().map(|k| k.tau * k.excess.abs().max_element()).sum::<f64>();
         let found = if bound <= share {
             Some((DVec3::ZERO, bound))
         } else {
             let left_out = self.leave_out_faint(through, bound, share);
-            let narrowest = self.active.iter().map(|k| passed[k.i].width).fold(f64::INFINITY, f64::min);
+            let narrowest =
+                self.active.iter().map(|k| passed[k.i].width).fold(f64::INFINITY, f64::min);
             let is_resolved = b - a <= RESOLVED_SIGMAS * narrowest && tau <= RESOLVED_DEPTH;
             if is_resolved || level == MAX_LEVEL {
                 let (value, error) = self.quadrature(passed, (a, b), ray.tau);
@@ -121,7 +126,8 @@ impl March {
         self.lists.truncate(own);
     }
 
-    /// Fills `active` with the blobs listed from `first` on, over [a, b]; their mean radiance and optical depth there.
+    /// Fills `active` with the blobs listed from `first` on, over [a, b]; their mean radiance and
+    /// optical depth there.
     fn look(&mut self, passed: &[Passed], a: f64, b: f64, first: usize) -> (DVec3, f64) {
         self.active.clear();
         let (mut tau, mut weighted) = (0.0, DVec3::ZERO);
@@ -140,8 +146,8 @@ impl March {
         (mean, tau)
     }
 
-    /// Takes out of `active` blobs that are faint: as light they are their share of the `bound`, as shadow their optical depth
-    /// times all of it. What that may change.
+    /// Takes out of `active` blobs that are faint: as light they are their share of the `bound`, as
+    /// shadow their optical depth times all of it. What that may change.
     fn leave_out_faint(&mut self, through: f64, bound: f64, share: f64) -> f64 {
         let faint = SHARE_OF_FAINT * share / self.active.len().max(1) as f64;
         let mut left_out = 0.0;
@@ -154,7 +160,8 @@ impl March {
         left_out
     }
 
-    /// ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and what the two rules differ by.
+    /// ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and what the two rules
+    /// differ by.
     fn quadrature(&self, passed: &[Passed], (a, b): (f64, f64), tau: f64) -> (DVec3, f64) {
         let half = 0.5 * (b - a);
         let at = |x: f64| self.source(passed, 0.5 * (a + b) + half * x, tau);
@@ -188,13 +195,14 @@ impl March {
     }
 }
 
-/// Share of the unit normal distribution below `x`, with all digits where it is small: in front of a dense blob.
+/// Share of the unit normal distribution below `x`, with all digits where it is small: in front of
+/// a dense blob.
 fn below(x: f64) -> f64 {
     0.5 * erfc(-x * FRAC_1_SQRT_2)
 }
 
-/// Gauss–Kronrod (7, 15) as in QUADPACK (Piessens et al. 1983), dqk15: positive nodes from the outermost on, the weights of
-/// both rules, the middle's last. Every second node is Gauss's.
+/// Gauss–Kronrod (7, 15) as in QUADPACK (Piessens et al. 1983), dqk15: positive nodes from the
+/// outermost on, the weights of both rules, the middle's last. Every second node is Gauss's.
 const NODES: [f64; 7] = [
     0.991_455_371_120_812_6,
     0.949_107_912_342_758_5,
@@ -214,8 +222,12 @@ const KRONROD: [f64; 8] = [
     0.204_432_940_075_298_9,
     0.209_482_141_084_727_83,
 ];
-const GAUSS: [f64; 4] =
-    [0.129_484_966_168_869_7, 0.279_705_391_489_276_64, 0.381_830_050_505_118_9, 0.417_959_183_673_469_4];
+const GAUSS: [f64; 4] = [
+    0.129_484_966_168_869_7,
+    0.279_705_391_489_276_64,
+    0.381_830_050_505_118_9,
+    0.417_959_183_673_469_4,
+];
 
 #[cfg(test)]
 mod tests {
@@ -223,7 +235,8 @@ mod tests {
 
     #[test]
     fn the_rules_are_exact_to_their_degrees() {
-        // Gauss's 7 points to degree 13, Kronrod's 15 to degree 22 (by symmetry 23), and no farther.
+        // Gauss's 7 points to degree 13, Kronrod's 15 to degree 22 (by symmetry 23), and no
+        // farther.
         let rule = |weights: &dyn Fn(usize) -> f64, middle: f64, power: i32| {
             let sides: f64 = (0..7).map(|i| 2.0 * weights(i) * NODES[i].powi(power)).sum();
             sides + if power == 0 { middle } else { 0.0 }

@@ -1,4 +1,5 @@
-//! The volume against cases with a closed form, against thin sprites where they are the same, and against plain sums.
+//! The volume against cases with a closed form, against thin sprites where they are the same, and
+//! against plain sums.
 
 use glam::DVec3;
 
@@ -7,7 +8,8 @@ use crate::model::camera::Pose;
 use crate::model::cloud::SQRT_TAU;
 use crate::reference::sprites;
 
-/// Eye at the origin, looking along −z. Of one pixel or of three by three the middle one's ray is the axis.
+/// Eye at the origin, looking along −z. Of one pixel or of three by three the middle one's ray is
+/// the axis.
 fn view(n: u32) -> View {
     View {
         width: n,
@@ -37,7 +39,10 @@ fn alone(blobs: &[Blob], colors: &[DVec3]) -> Pixel {
 }
 
 fn assert_is(pixel: Pixel, color: DVec3, alpha: f64, tolerance: f64) {
-    let off = (DVec3::from_slice(&pixel.color) - color).abs().max_element().max((pixel.color[3] - alpha).abs());
+    let off = (DVec3::from_slice(&pixel.color) - color)
+        .abs()
+        .max_element()
+        .max((pixel.color[3] - alpha).abs());
     assert!(off <= tolerance, "{pixel:?} against {color} {alpha}: {off:e}");
 }
 
@@ -64,10 +69,12 @@ fn one_blob_is_one_minus_e_to_the_minus_tau() {
 
 #[test]
 fn an_eye_inside_sees_what_lies_before_it() {
-    // From the centre on half of it; from 1 σ behind the centre the share below +1 σ, 0.8413447460685429. The near
-    // plane is at 1e-3: less by 1e-3/0.4 of a σ, of the density there.
+    // From the centre on half of it; from 1 σ behind the centre the share below +1 σ,
+    // 0.8413447460685429. The near plane is at 1e-3: less by 1e-3/0.4 of a σ, of the density there.
     let near = |x: f64| 1e-3 / 0.4 * (-0.5 * x * x).exp() / SQRT_TAU;
-    for (z, share) in [(0.0, 0.5), (0.4, 0.841_344_746_068_542_9), (-0.4, 1.0 - 0.841_344_746_068_542_9)] {
+    for (z, share) in
+        [(0.0, 0.5), (0.4, 0.841_344_746_068_542_9), (-0.4, 1.0 - 0.841_344_746_068_542_9)]
+    {
         let tau = 2.0 * (share - near(z / 0.4));
         let covered = -f64::exp_m1(-tau);
         // The density changes over the 1e-3 by 1e-3/0.4 of itself: (1e-3/0.4)² of τ.
@@ -77,7 +84,8 @@ fn an_eye_inside_sees_what_lies_before_it() {
 
 #[test]
 fn blobs_of_one_colour_hide_their_order() {
-    let blobs = [blob(22.0, 0.5, 0.7), blob(22.3, 0.2, 3.0), blob(22.2, 0.9, 0.1), blob(29.0, 2.0, 0.5)];
+    let blobs =
+        [blob(22.0, 0.5, 0.7), blob(22.3, 0.2, 3.0), blob(22.2, 0.9, 0.1), blob(29.0, 2.0, 0.5)];
     let covered = -f64::exp_m1(-4.3);
     let pixel = alone(&blobs, &[COLOR; 4]);
     assert_is(pixel, covered * COLOR, covered, 1e-11);
@@ -97,7 +105,8 @@ fn concentric_blobs_mix_their_colours_by_their_extinction() {
 #[test]
 fn far_apart_blobs_are_thin_sprites() {
     // More than 8 σ of both between them: what overlaps is below 1e-14.
-    let blobs = [blob(4.0, 0.2, 0.8), blob(8.0, 0.25, 1.7), blob(20.0, 0.6, 3.0), blob(30.0, 0.5, 0.02)];
+    let blobs =
+        [blob(4.0, 0.2, 0.8), blob(8.0, 0.25, 1.7), blob(20.0, 0.6, 3.0), blob(30.0, 0.5, 0.02)];
     let colors = [RED, BLUE, COLOR, DVec3::ONE];
     let thin = sprites::render(&view(3), &blobs, &colors, &[3, 2, 1, 0]);
     let thick = render(&view(3), &[Behind::NOTHING; 9], &blobs, &colors);
@@ -120,16 +129,21 @@ fn a_surface_within_a_blob_hides_its_half() {
     assert_is(hidden, DVec3::new(0.5, 0.25, 1.0), 1.0, 1e-11);
 }
 
-/// The definition by the midpoint rule in `n` steps from the near plane to `end`, from the extinction alone: no erf.
+/// The definition by the midpoint rule in `n` steps from the near plane to `end`, from the
+/// extinction alone: no erf.
 fn by_steps(blobs: &[Blob], colors: &[DVec3], ray: DVec3, end: f64, n: u32) -> (DVec3, f64) {
     let (near, length) = (view(1).near, ray.length());
     let step = (end - near) / f64::from(n);
     let (mut color, mut tau) = (DVec3::ZERO, 0f64);
     for k in 0..n {
         let x = (near + (f64::from(k) + 0.5) * step) * ray;
-        let at = |b: &Blob| b.kappa * (-0.5 * ((x - b.position) / b.sigma).length_squared()).exp() * length * step;
-        let (own, sum) =
-            blobs.iter().zip(colors).fold((0.0, DVec3::ZERO), |(t, s), (b, l)| (t + at(b), s + at(b) * *l));
+        let at = |b: &Blob| {
+            b.kappa * (-0.5 * ((x - b.position) / b.sigma).length_squared()).exp() * length * step
+        };
+        let (own, sum) = blobs
+            .iter()
+            .zip(colors)
+            .fold((0.0, DVec3::ZERO), |(t, s), (b, l)| (t + at(b), s + at(b) * *l));
         // Within a step extinction and colour are constant.
         if own > 0.0 {
             color += (-tau).exp() * -f64::exp_m1(-own) / own * sum;
@@ -147,7 +161,10 @@ fn crowd(n: u32, scale: f64) -> (Vec<Blob>, Vec<DVec3>) {
         let position = DVec3::new(x, y, -(2.0 + 2.0 * lot(k, 2)));
         let sigma = 0.03 + 0.5 * lot(k, 3) * lot(k, 3);
         let kappa = scale * lot(k, 4) / (SQRT_TAU * sigma);
-        (Blob { aspect: 1.0, position, sigma, kappa }, 3.0 * DVec3::new(lot(k, 5), lot(k, 6), lot(k, 5) * lot(k, 2)))
+        (
+            Blob { aspect: 1.0, position, sigma, kappa },
+            3.0 * DVec3::new(lot(k, 5), lot(k, 6), lot(k, 5) * lot(k, 2)),
+        )
     };
     (0..n).map(one).unzip()
 }
@@ -173,8 +190,8 @@ fn overlapping_blobs_are_what_small_steps_make_of_them() {
 
 #[test]
 fn dense_blobs_around_the_eye_are_resolved() {
-    // τ = 10⁶ on either side: light comes from the first hundred-thousandth of σ, and what it is made of is what is at
-    // the near plane: κ g of the red one over that of both.
+    // τ = 10⁶ on either side: light comes from the first hundred-thousandth of σ, and what it is
+    // made of is what is at the near plane: κ g of the red one over that of both.
     let (red, blue) = (blob(0.3, 0.4, 1e6), blob(-0.2, 0.4, 2e6));
     let density = |b: &Blob| b.kappa * (-0.5 * ((b.position.z + 1e-3) / b.sigma).powi(2)).exp();
     let share = density(&red) / (density(&red) + density(&blue));
@@ -186,7 +203,8 @@ fn dense_blobs_around_the_eye_are_resolved() {
 
 #[test]
 fn what_is_no_blob_is_not_there() {
-    let nothing = [blob(3.0, 0.5, 0.0), Blob { sigma: 0.0, ..blob(3.0, 0.5, 1.0) }, blob(-30.0, 0.5, 1.0)];
+    let nothing =
+        [blob(3.0, 0.5, 0.0), Blob { sigma: 0.0, ..blob(3.0, 0.5, 1.0) }, blob(-30.0, 0.5, 1.0)];
     assert_is(alone(&nothing, &[COLOR; 3]), DVec3::ZERO, 0.0, 0.0);
     assert_is(alone(&[], &[]), DVec3::ZERO, 0.0, 0.0);
     let among = [nothing[0], blob(5.0, 0.5, 1.0), nothing[1]];

@@ -43,7 +43,8 @@ fn case(k: usize, ms: f64) -> Case {
     }
 }
 
-/// The time of case `k` as the part from `first` on has it: that of the first case tells who timed it.
+/// The time of case `k` as the part from `first` on has it: that of the first case tells who timed
+/// it.
 fn ms(k: usize, first: usize) -> f64 {
     10.0 + k as f64 + if k == 0 { first as f64 / 10.0 } else { 0.0 }
 }
@@ -78,8 +79,9 @@ fn part(range: Range<usize>) -> Part {
     let (numbers, first) = (numbers(&range), range.start);
     let mut block_order = Vec::new();
     for round in 0..N_ROUNDS {
-        let blocks = (0..numbers.len())
-            .flat_map(|case| LOOPS.map(|threading| Block { case, threading: threading.to_owned(), skip: true }));
+        let blocks = (0..numbers.len()).flat_map(|case| {
+            LOOPS.map(|threading| Block { case, threading: threading.to_owned(), skip: true })
+        });
         let mut blocks: Vec<Block> = blocks.collect();
         if round % 2 == 1 {
             blocks.reverse();
@@ -104,7 +106,9 @@ fn part(range: Range<usize>) -> Part {
     });
     let run: Run = serde_json::from_value(run).unwrap();
     let cases: Vec<Case> = numbers.iter().map(|k| case(*k, ms(*k, first))).collect();
-    let text = |case: &Case| if cases.len() > 1 { format!("{}: path", case.name()) } else { "path".to_owned() };
+    let text = |case: &Case| {
+        if cases.len() > 1 { format!("{}: path", case.name()) } else { "path".to_owned() }
+    };
     let chosen = cases.iter().map(text).collect();
     let pictures = (0..cases.len()).map(picture_file).collect();
     Part {
@@ -124,7 +128,10 @@ fn three() -> Vec<Part> {
 
 #[test]
 fn a_part_has_the_first_case_once() {
-    assert_eq!((numbers(&(0..3)), numbers(&(3..5)), numbers(&(0..1))), (vec![0, 1, 2], vec![0, 3, 4], vec![0]));
+    assert_eq!(
+        (numbers(&(0..3)), numbers(&(3..5)), numbers(&(0..1))),
+        (vec![0, 1, 2], vec![0, 3, 4], vec![0])
+    );
 }
 
 #[test]
@@ -135,7 +142,8 @@ fn parts_together_are_the_whole() {
     assert_eq!((pass_names, &run.chosen), (whole.pass_names, &whole.run.chosen));
     // The same blocks and rows, in another order; every row is of the block that its number says.
     let blocks = |run: &Run| {
-        let mut all: Vec<_> = run.block_order.iter().map(|b| (b.case, b.threading.clone(), b.skip)).collect();
+        let mut all: Vec<_> =
+            run.block_order.iter().map(|b| (b.case, b.threading.clone(), b.skip)).collect();
         all.sort();
         all
     };
@@ -149,13 +157,19 @@ fn parts_together_are_the_whole() {
     };
     assert_eq!(told(&rows), told(&whole.rows));
     let numbers: Vec<usize> = rows.iter().map(|row| row.block).collect();
-    assert!(numbers.is_sorted() && numbers.last() == Some(&(run.block_order.len() - 1)), "{numbers:?}");
+    assert!(
+        numbers.is_sorted() && numbers.last() == Some(&(run.block_order.len() - 1)),
+        "{numbers:?}"
+    );
     // Of each block as many as it had.
     for block in 0..run.block_order.len() {
         assert_eq!(numbers.iter().filter(|n| **n == block).count(), N_WARM_UP + N_FRAMES);
     }
     let of = |i_part, from, to| Moved { i_part, from: picture_file(from), to: picture_file(to) };
-    assert_eq!(pictures, [of(0, 0, 0), of(1, 1, 1), of(1, 2, 2), of(1, 3, 3), of(2, 1, 4), of(2, 2, 5)]);
+    assert_eq!(
+        pictures,
+        [of(0, 0, 0), of(1, 1, 1), of(1, 2, 2), of(1, 3, 3), of(2, 1, 4), of(2, 2, 5)]
+    );
     assert!(!run.interrupted);
 }
 
@@ -164,9 +178,13 @@ fn a_reader_sees_who_timed_what() {
     let mut parts = three();
     parts[1].run.date = "2024-03-01T00:00:00Z".to_owned();
     let run = join(&parts).unwrap().run;
-    let seen: Vec<_> = run.parts.iter().map(|p| (p.first, p.end, &p.node[..], p.clocks.overhead_ns)).collect();
+    let seen: Vec<_> =
+        run.parts.iter().map(|p| (p.first, p.end, &p.node[..], p.clocks.overhead_ns)).collect();
     assert_eq!(seen, [(0, 1, "node-0", 20.0), (1, 4, "node-1", 21.0), (4, 6, "node-4", 24.0)]);
-    assert_eq!((&run.parts[1].date[..], &run.date[..]), ("2024-03-01T00:00:00Z", "2024-02-29T12:34:56Z"));
+    assert_eq!(
+        (&run.parts[1].date[..], &run.date[..]),
+        ("2024-03-01T00:00:00Z", "2024-02-29T12:34:56Z")
+    );
     let base: Vec<_> = run.parts[2].base.iter().map(|b| (&b.threading[..], b.p50_ms)).collect();
     assert_eq!(base, [("serial", Some(10.4)), ("parallel", Some(10.4))]);
     let spread = base_spread(&run.parts);
@@ -209,13 +227,19 @@ type Change = (&'static str, fn(&mut Part));
 
 const CHANGES: [Change; 21] = [
     ("version: 0.1.0 of shard 0, 0.2.0 of shard 4", |p| p.run.nimbus = "0.2.0".to_owned()),
-    ("build: 0123456789ab of shard 0, 0123456789ab-dirty of shard 4", |p| p.run.revision += "-dirty"),
+    ("build: 0123456789ab of shard 0, 0123456789ab-dirty of shard 4", |p| {
+        p.run.revision += "-dirty"
+    }),
     ("scene: ", |p| p.run.scene_hash = "cd".repeat(32)),
-    ("device: llvmpipe (Mesa, ", |p| p.run.device = Device { name: "another".to_owned(), ..p.run.device.clone() }),
+    ("device: llvmpipe (Mesa, ", |p| {
+        p.run.device = Device { name: "another".to_owned(), ..p.run.device.clone() }
+    }),
     ("device: ", |p| p.run.device.driver += " 2"),
     ("device: ", |p| p.run.device.api = "1.4.0".to_owned()),
     ("processor: ", |p| p.run.cpu = Cpu { model: "another".to_owned(), ..p.run.cpu.clone() }),
-    ("processor: a processor, 2 cores of shard 0, a processor, 4 cores", |p| p.run.cpu.logical_cores = 4),
+    ("processor: a processor, 2 cores of shard 0, a processor, 4 cores", |p| {
+        p.run.cpu.logical_cores = 4
+    }),
     ("environment: ", |p| p.run.environment = BTreeMap::new()),
     ("validation: false of shard 0, true", |p| p.run.command.push("--validation".to_owned())),
     ("poison: ", |p| p.run.command.push("--poison".to_owned())),
@@ -226,7 +250,9 @@ const CHANGES: [Change; 21] = [
     ("size of the first case: 8x6 of shard 0, 8x7", |p| p.run.cases[0].height += 1),
     ("loops of the first case: ", |p| p.run.cases[0].modes[0].frames += 1),
     ("loops of the first case: ", |p| p.run.cases[0].modes[0].simulate = "cpu".to_owned()),
-    ("last frames of the first case: ", |p| p.run.cases[0].modes[1].image_hash = Some("ef".repeat(32))),
+    ("last frames of the first case: ", |p| {
+        p.run.cases[0].modes[1].image_hash = Some("ef".repeat(32))
+    }),
     ("blocks of a loop: 2 of shard 0, 2 and 3", |p| p.run.cases[1].modes[0].blocks = 3),
     ("warm-up frames of a block: 1 of shard 0, 1 and 9", |p| p.run.cases[1].modes[0].warm_up = 9),
 ];
@@ -249,7 +275,9 @@ fn whatever_differs_is_noticed() {
     for change in OF_LOOPS {
         let mut parts = three();
         change(&mut parts[1]);
-        assert!(differences(&parts).iter().any(|what| what.starts_with("loops of the first case: ")));
+        assert!(
+            differences(&parts).iter().any(|what| what.starts_with("loops of the first case: "))
+        );
     }
     // What nodes may differ in.
     let mut parts = three();
@@ -261,16 +289,24 @@ fn whatever_differs_is_noticed() {
 #[test]
 fn a_part_that_is_missing_or_twice_there_is_noticed() {
     assert_eq!(differences(&[]), ["there is no part"]);
-    assert_eq!(differences(&[part(0..2), part(4..6)]), ["cases: shard 4 begins with case 4, expected 2"]);
+    assert_eq!(
+        differences(&[part(0..2), part(4..6)]),
+        ["cases: shard 4 begins with case 4, expected 2"]
+    );
     assert_eq!(differences(&[part(1..2)]), ["cases: shard 1 begins with case 1, expected 0"]);
-    assert_eq!(differences(&[part(0..2), part(1..2)]), ["cases: shard 1 begins with case 1, expected 2"]);
+    assert_eq!(
+        differences(&[part(0..2), part(1..2)]),
+        ["cases: shard 1 begins with case 1, expected 2"]
+    );
 }
 
 #[test]
 fn what_is_read_is_what_was_written_and_of_its_range() {
     let dir = tempfile::tempdir().unwrap();
     let Part { run, pass_names, rows, name, node, range, .. } = part(2..4);
-    let write = |rows: &[FrameRow]| write_results_with(dir.path(), &run, &pass_names, rows, &Default::default());
+    let write = |rows: &[FrameRow]| {
+        write_results_with(dir.path(), &run, &pass_names, rows, &Default::default())
+    };
     let read = |range: Range<usize>| Part::read(dir.path(), name.clone(), node.clone(), range);
     write(&rows).unwrap();
     std::fs::write(dir.path().join("case-1.png"), "a picture").unwrap();

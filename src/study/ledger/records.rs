@@ -1,5 +1,5 @@
-//! `ledger.json`: what `nimbus ledger` found. Its form is docs/ledger.schema.json; a change of meaning, or of a key, raises
-//! [`SCHEMA_VERSION`].
+//! `ledger.json`: what `nimbus ledger` found. Its form is docs/ledger.schema.json; a change of
+//! meaning, or of a key, raises [`SCHEMA_VERSION`].
 
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
-//! The pictures of a ledger, from the one that is drawn down to the whole model, each compared with the next; and the
-//! times of those that the device draws, in turn.
+//! The pictures of a ledger, from the one that is drawn down to the whole model, each compared with
+//! the next; and the times of those that the device draws, in turn.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -81,7 +81,9 @@ impl Setup<'_> {
             let picture = Shown { rgba: self.picked(&players.picture(i)?), own_error: 0.0 };
             match i.checked_sub(1).map(|i| &on_device[i]) {
                 None => chain.pictures.push(picture),
-                Some(Step { name, from, to, .. }) => chain.add(name, [from.clone(), to.clone()], true, picture),
+                Some(Step { name, from, to, .. }) => {
+                    chain.add(name, [from.clone(), to.clone()], true, picture)
+                }
             }
             if i + 1 == scenes.len() {
                 self.references(&mut players, i, scene, &mut chain, listener)?;
@@ -104,12 +106,13 @@ impl Setup<'_> {
     }
 
     fn picked(&self, rgba: &[f32]) -> Vec<[f64; 4]> {
-        let whole: Vec<[f64; 4]> = rgba.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|k| f64::from(p[k]))).collect();
+        let whole: Vec<[f64; 4]> =
+            rgba.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|k| f64::from(p[k]))).collect();
         self.pixels.pick(&whole)
     }
 
-    /// The pictures in f64, below the one that player `i` drew of `scene`, which nothing but what follows makes
-    /// inexact.
+    /// The pictures in f64, below the one that player `i` drew of `scene`, which nothing but what
+    /// follows makes inexact.
     fn references(
         &self,
         players: &mut Players<'_>,
@@ -138,7 +141,12 @@ impl Setup<'_> {
             return Ok(());
         }
         if scene.n_particles() > 0 {
-            chain.add("thin sprites", words("sprites", "volume"), false, draw(&by_device, Drawing::Volume));
+            chain.add(
+                "thin sprites",
+                words("sprites", "volume"),
+                false,
+                draw(&by_device, Drawing::Volume),
+            );
         }
         if !is_lit || self.is_stopped() {
             return Ok(());
@@ -146,7 +154,8 @@ impl Setup<'_> {
         self.light(scene, &truth, &by_device, chain, listener)
     }
 
-    /// The pictures that differ in light alone, from the device's, which `by_device` has, to that of more reflections.
+    /// The pictures that differ in light alone, from the device's, which `by_device` has, to that
+    /// of more reflections.
     fn light(
         &self,
         scene: &Scene,
@@ -156,24 +165,43 @@ impl Setup<'_> {
         listener: Listener,
     ) -> Result<()> {
         let (time_s, pixels) = (self.frames.time_s, self.pixels);
-        let draw =
-            |truth: &Truth| Shown::of(of_scene_light(scene, truth, Drawing::Volume, pixels, Sample::CENTER, listener));
-        let first = Truth { second: by_device.second.clone(), second_error: Vec::new(), ..truth.clone() };
+        let draw = |truth: &Truth| {
+            Shown::of(of_scene_light(
+                scene,
+                truth,
+                Drawing::Volume,
+                pixels,
+                Sample::CENTER,
+                listener,
+            ))
+        };
+        let first =
+            Truth { second: by_device.second.clone(), second_error: Vec::new(), ..truth.clone() };
         // The reference of surfaces' light knows no density grid.
         let on_both = scene.n_particles() > 0 && !scene.surfaces.is_empty();
-        let of_first = if on_both { words("f32, grid", "f64, closed form on surfaces") } else { words("f32", "f64") };
+        let of_first = if on_both {
+            words("f32, grid", "f64, closed form on surfaces")
+        } else {
+            words("f32", "f64")
+        };
         chain.add("first reflection", of_first, false, draw(&first));
         if reflections_of(scene) > 1 {
-            chain.add("second reflection", words("pairs in f32", "areas in f64"), false, draw(truth));
+            chain.add(
+                "second reflection",
+                words("pairs in f32", "areas in f64"),
+                false,
+                draw(truth),
+            );
         }
         let k = reflections_of(scene);
-        let mut model = |name: &str, [from, to]: [String; 2], by_facet: bool, n: u32| -> Result<()> {
-            if !self.is_stopped() {
-                let drawn = of_model(scene, time_s, Some(n), by_facet, pixels, listener)?;
-                chain.add(name, [from, to], false, Shown::of(drawn));
-            }
-            Ok(())
-        };
+        let mut model =
+            |name: &str, [from, to]: [String; 2], by_facet: bool, n: u32| -> Result<()> {
+                if !self.is_stopped() {
+                    let drawn = of_model(scene, time_s, Some(n), by_facet, pixels, listener)?;
+                    chain.add(name, [from, to], false, Shown::of(drawn));
+                }
+                Ok(())
+            };
         if scene.n_particles() > 0 {
             model("density grid", words("grid and march", "closed form"), true, k)?;
         }
@@ -181,7 +209,12 @@ impl Setup<'_> {
             model("facets of surfaces", words("between facets", "every pixel"), false, k)?;
         }
         if self.n_reflections > k {
-            model("reflections", [k.to_string(), self.n_reflections.to_string()], false, self.n_reflections)?;
+            model(
+                "reflections",
+                [k.to_string(), self.n_reflections.to_string()],
+                false,
+                self.n_reflections,
+            )?;
         }
         Ok(())
     }
@@ -197,7 +230,10 @@ impl Setup<'_> {
             if i_round % 2 == 1 {
                 order.reverse();
             }
-            let mut turns = order.into_iter().map(|i| players.turn(i, i_round)).collect::<Result<Vec<Turn>>>()?;
+            let mut turns = order
+                .into_iter()
+                .map(|i| players.turn(i, i_round))
+                .collect::<Result<Vec<Turn>>>()?;
             turns.sort_by_key(|turn| turn.i_configuration);
             rounds.push(turns);
         }
@@ -233,12 +269,21 @@ impl Setup<'_> {
         };
         let rows: Vec<Row> = chain.between.iter().zip(&errors).enumerate().map(row).collect();
         let (total, _) = compare(first, last)?;
-        // A root mean square is a norm: of differences that follow each other the sum's is at most the sum of theirs,
-        // but for the rounding of both.
+        // A root mean square is a norm: of differences that follow each other the sum's is at most
+        // the sum of theirs, but for the rounding of both.
         let holds = total.value <= sum * (1.0 + 1e-9) + 1e-15;
         let interrupted = self.is_stopped();
         let quadrature = errors.iter().map(|(error, _)| error.value.powi(2)).sum::<f64>().sqrt();
-        Ok(Ledger { magnitude, rows, total, sum, quadrature, holds, interrupted, ..self.empty(made, nothing) })
+        Ok(Ledger {
+            magnitude,
+            rows,
+            total,
+            sum,
+            quadrature,
+            holds,
+            interrupted,
+            ..self.empty(made, nothing)
+        })
     }
 
     fn empty(&self, made: Provenance, nothing: Figure) -> Ledger {
@@ -271,12 +316,18 @@ fn words(from: &str, to: &str) -> [String; 2] {
     [from.to_owned(), to.to_owned()]
 }
 
-/// Time of player `i` by that of player `i + 1`, which does without one more; in every round they are neighbours.
+/// Time of player `i` by that of player `i + 1`, which does without one more; in every round they
+/// are neighbours.
 fn ratio(rounds: &[Vec<Turn>], i: usize) -> Option<Figure> {
     let ms = |turn: &Turn| median(&turn.gpu_ms).or_else(|| median(&turn.frame_ms));
-    let of =
-        |round: &Vec<Turn>| ms(round.get(i)?).zip(ms(round.get(i + 1)?)).filter(|(_, b)| *b > 0.0).map(|(a, b)| a / b);
+    let of = |round: &Vec<Turn>| {
+        ms(round.get(i)?).zip(ms(round.get(i + 1)?)).filter(|(_, b)| *b > 0.0).map(|(a, b)| a / b)
+    };
     let ratios: Vec<f64> = rounds.iter().filter_map(of).collect();
     let interval = Bootstrap::default().median(&ratios);
-    median(&ratios).map(|value| Figure { value, low: interval.map(|i| i.low.max(0.0)), high: interval.map(|i| i.high) })
+    median(&ratios).map(|value| Figure {
+        value,
+        low: interval.map(|i| i.low.max(0.0)),
+        high: interval.map(|i| i.high),
+    })
 }

@@ -1,5 +1,5 @@
-//! The approximations that the device itself can leave out, one after the other: what each is in a scene, and what it stands
-//! for.
+//! The approximations that the device itself can leave out, one after the other: what each is in a
+//! scene, and what it stands for.
 
 use crate::frame::exchange::{gathers_from_tree, is_glossy};
 use crate::model::basis::MAX_BASES;
@@ -31,7 +31,12 @@ pub fn steps(scene: &Scene) -> Vec<Step> {
         let mut without = now.clone();
         lift(&mut without);
         if without != now {
-            steps.push(Step { name, from: describe(&now), to: describe(&without), without: without.clone() });
+            steps.push(Step {
+                name,
+                from: describe(&now),
+                to: describe(&without),
+                without: without.clone(),
+            });
             now = without;
         }
     }
@@ -65,8 +70,18 @@ type Lift = fn(&mut Scene);
 
 /// From what is drawn last up to what light is made of.
 const ALL: [(&str, What, Describe, Lift); 10] = [
-    ("resolution", What::Particles, |s| s.draw.resolution.name().into(), |s| s.draw.resolution = Resolution::Full),
-    ("smallest", What::Particles, |s| format!("{} px", s.draw.smallest.bound()), |s| s.draw.smallest = Least::Of(0.0)),
+    (
+        "resolution",
+        What::Particles,
+        |s| s.draw.resolution.name().into(),
+        |s| s.draw.resolution = Resolution::Full,
+    ),
+    (
+        "smallest",
+        What::Particles,
+        |s| format!("{} px", s.draw.smallest.bound()),
+        |s| s.draw.smallest = Least::Of(0.0),
+    ),
     (
         "threshold",
         What::Particles,
@@ -121,7 +136,11 @@ const ALL: [(&str, What, Describe, Lift); 10] = [
 ];
 
 fn format_of(scene: &Scene) -> String {
-    FilmFormat::NAMES.iter().find(|(_, format)| *format == scene.film.format).map_or("", |(name, _)| name).to_owned()
+    FilmFormat::NAMES
+        .iter()
+        .find(|(_, format)| *format == scene.film.format)
+        .map_or("", |(name, _)| name)
+        .to_owned()
 }
 
 /// The step from groups of particles to a facet a particle, where `scene` has such.
@@ -132,7 +151,8 @@ pub fn ungrouped(scene: &Scene) -> Option<Step> {
         without.lighting.facets_per_cloud = None;
         // Whichever light is gathered by, it stays.
         if without.lighting.gather == Gather::Auto {
-            without.lighting.gather = if gathers_from_tree(scene) { Gather::Tree } else { Gather::Exact };
+            without.lighting.gather =
+                if gathers_from_tree(scene) { Gather::Tree } else { Gather::Exact };
         }
         let n = |s: &Scene| format!("{} facets", s.n_facets());
         Step { name: "facet groups", from: n(scene), to: n(&without), without }

@@ -28,10 +28,17 @@ const MARGIN: f64 = 0.06;
 const LEAST_MARGIN: f64 = 0.08;
 
 impl Axis {
-    /// Of the positive among `values`; `with_zero`: what is 0 is drawn too, below a gap. About `n_ticks` at most.
-    pub fn log(name: &str, values: impl Iterator<Item = f64>, with_zero: bool, n_ticks: usize) -> Axis {
+    /// Of the positive among `values`; `with_zero`: what is 0 is drawn too, below a gap. About
+    /// `n_ticks` at most.
+    pub fn log(
+        name: &str,
+        values: impl Iterator<Item = f64>,
+        with_zero: bool,
+        n_ticks: usize,
+    ) -> Axis {
         let of_log = values.filter(|v| v.is_finite() && *v > 0.0).map(f64::log10);
-        let (mut low, mut high) = of_log.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let (mut low, mut high) =
+            of_log.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         if low > high {
             (low, high) = (-1.0, 1.0);
         }
@@ -57,8 +64,17 @@ impl Axis {
     /// A row for every name, the first on top.
     pub fn rows(names: &[String]) -> Axis {
         let n = names.len();
-        let ticks = names.iter().enumerate().map(|(i, name)| Tick { at: row_middle(i, n), text: name.clone() });
-        Axis { name: String::new(), range: 0.0..n.max(1) as f64, ticks: ticks.collect(), is_log: false, zero: None }
+        let ticks = names
+            .iter()
+            .enumerate()
+            .map(|(i, name)| Tick { at: row_middle(i, n), text: name.clone() });
+        Axis {
+            name: String::new(),
+            range: 0.0..n.max(1) as f64,
+            ticks: ticks.collect(),
+            is_log: false,
+            zero: None,
+        }
     }
 
     /// Where `value` lies; None of what has no place.
@@ -88,10 +104,12 @@ pub fn row_middle(i: usize, n: usize) -> f64 {
     (n - i) as f64 - 0.5
 }
 
-/// Ticks of an axis of logarithms: every unit of every decade, or fewer of them, or decades, or every so many.
+/// Ticks of an axis of logarithms: every unit of every decade, or fewer of them, or decades, or
+/// every so many.
 fn log_ticks(range: Range<f64>, n_most: usize) -> Vec<Tick> {
     let n_most = n_most.max(2);
-    const UNITS: [&[f64]; 4] = [&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
+    const UNITS: [&[f64]; 4] =
+        [&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0], &[1.0, 2.0, 5.0], &[1.0, 3.0], &[1.0]];
     let decades = range.start.floor() as i32..=range.end.floor() as i32;
     let of = |units: &[f64], step: i32| -> Vec<f64> {
         let decades = decades.clone().filter(|d| d.rem_euclid(step) == 0);
@@ -118,10 +136,15 @@ fn linear_steps(low: f64, high: f64, n_most: usize) -> Vec<f64> {
     let steps = [1.0, 2.0, 5.0, 10.0, 20.0].map(|unit| unit * decade);
     let multiples = |step: f64| {
         // A hair of tolerance: 0.3 / 0.1 is below 3.
-        let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+        let (first, last) =
+            ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
         (first..=last).map(|i| i as f64 * step).collect::<Vec<f64>>()
     };
-    steps.into_iter().map(multiples).find(|values| values.len() <= n_most.max(2)).unwrap_or_default()
+    steps
+        .into_iter()
+        .map(multiples)
+        .find(|values| values.len() <= n_most.max(2))
+        .unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -148,8 +171,14 @@ mod tests {
         assert_eq!(axis.at(10.0), Some(1.0));
         assert!(axis.at(0.0).is_some_and(|zero| zero < -0.1 && zero > axis.range.start));
         assert_eq!((axis.at(f64::NAN), axis.at(f64::INFINITY), axis.at(-1.0)), (None, None, None));
-        assert_eq!((axis.end_at(f64::INFINITY), axis.end_at(-3.0)), (axis.range.end, axis.range.start));
-        assert_eq!((axis.shows(10.0), axis.shows(0.0), axis.shows(1e9), axis.shows(-3.0)), (true, true, false, false));
+        assert_eq!(
+            (axis.end_at(f64::INFINITY), axis.end_at(-3.0)),
+            (axis.range.end, axis.range.start)
+        );
+        assert_eq!(
+            (axis.shows(10.0), axis.shows(0.0), axis.shows(1e9), axis.shows(-3.0)),
+            (true, true, false, false)
+        );
         assert_eq!(texts(&axis)[0], "0");
         let without = Axis::log("x", std::iter::empty(), false, 8);
         assert_eq!((without.range.start < without.range.end, without.at(0.0)), (true, None));

@@ -27,10 +27,16 @@ pub fn bar<DB: DrawingBackend>(
     if plane.look.characters {
         let cell = super::look::CELL.0;
         let row = plane.pixel(from, y).1;
-        // A cell belongs to the bar that covers its middle, so that bars beside each other share none.
-        let (first, end) = ((left + cell / 2).div_euclid(cell), (right + cell / 2).div_euclid(cell));
+        // A cell belongs to the bar that covers its middle, so that bars beside each other share
+        // none.
+        let (first, end) =
+            ((left + cell / 2).div_euclid(cell), (right + cell / 2).div_euclid(cell));
         return (first..end).try_for_each(|column| plane.glyph(glyph, (column * cell, row), color));
     }
     let (upper, lower) = span(plane, i, n);
-    if right > left { plane.rectangle([left, upper, right, lower], color.mix(opacity).filled()) } else { Ok(()) }
+    if right > left {
+        plane.rectangle([left, upper, right, lower], color.mix(opacity).filled())
+    } else {
+        Ok(())
+    }
 }

@@ -1,4 +1,5 @@
-//! Long runs drawn honestly: of neighbouring frames the least, the middle and the greatest, and none left out.
+//! Long runs drawn honestly: of neighbouring frames the least, the middle and the greatest, and
+//! none left out.
 
 use std::ops::RangeInclusive;
 
@@ -21,14 +22,16 @@ impl Bin {
     }
 }
 
-/// Of (frame, ms) pairs in any order, `n_most` bins at most of equally many frames of `range`. Where there is room for all,
-/// a frame is a bin. What is not finite is left out; a bin without a time is not there.
+/// Of (frame, ms) pairs in any order, `n_most` bins at most of equally many frames of `range`.
+/// Where there is room for all, a frame is a bin. What is not finite is left out; a bin without a
+/// time is not there.
 pub fn bins(samples: &[(u32, f64)], range: RangeInclusive<u32>, n_most: usize) -> Vec<Bin> {
     let n_frames = u64::from(range.end().saturating_sub(*range.start())) + 1;
     let width = n_frames.div_ceil(n_most.max(1) as u64).max(1);
     let n_bins = n_frames.div_ceil(width) as usize;
     let mut times: Vec<Vec<f64>> = vec![Vec::new(); n_bins];
-    for (frame, ms) in samples.iter().filter(|(frame, ms)| ms.is_finite() && range.contains(frame)) {
+    for (frame, ms) in samples.iter().filter(|(frame, ms)| ms.is_finite() && range.contains(frame))
+    {
         times[(u64::from(frame - range.start()) / width) as usize].push(*ms);
     }
     let of = |(i, times): (usize, Vec<f64>)| {
@@ -57,7 +60,10 @@ mod tests {
         samples[617].1 = 99.0;
         let bins = bins(&samples, 0..=999, 100);
         assert_eq!((bins.len(), bins.iter().map(|b| b.n).sum::<usize>()), (100, 1000));
-        assert_eq!(bins.iter().filter(|b| b.max == 99.0).map(|b| (b.first, b.last)).collect::<Vec<_>>(), [(610, 619)]);
+        assert_eq!(
+            bins.iter().filter(|b| b.max == 99.0).map(|b| (b.first, b.last)).collect::<Vec<_>>(),
+            [(610, 619)]
+        );
         assert!(bins.iter().all(|b| b.min == 1.0 && (1.5..=2.5).contains(&b.median)));
     }
 

@@ -3,7 +3,9 @@
 use std::convert::Infallible;
 
 use plotters_backend::text_anchor::{HPos, VPos};
-use plotters_backend::{BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind};
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
+};
 
 use super::look::{CELL, PLAIN, SERIES};
 
@@ -30,7 +32,11 @@ impl Characters {
 
     fn cell(&mut self, column: i32, row: i32) -> Option<&mut Cell> {
         let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
-        if column >= self.n_columns { None } else { self.cells.get_mut(row * self.n_columns + column) }
+        if column >= self.n_columns {
+            None
+        } else {
+            self.cells.get_mut(row * self.n_columns + column)
+        }
     }
 
     fn dot(&mut self, (x, y): BackendCoord, color: BackendColor) {
@@ -112,22 +118,39 @@ impl DrawingBackend for Brush<'_> {
         Ok(())
     }
 
-    fn draw_line<S: BackendStyle>(&mut self, from: BackendCoord, to: BackendCoord, style: &S) -> Drawn {
+    fn draw_line<S: BackendStyle>(
+        &mut self,
+        from: BackendCoord,
+        to: BackendCoord,
+        style: &S,
+    ) -> Drawn {
         let (dx, dy) = (to.0 - from.0, to.1 - from.1);
         let n = dx.abs().max(dy.abs()).max(1);
         for i in 0..=n {
-            let at = |from: i32, d: i32| from + (f64::from(d) * f64::from(i) / f64::from(n)).round() as i32;
+            let at = |from: i32, d: i32| {
+                from + (f64::from(d) * f64::from(i) / f64::from(n)).round() as i32
+            };
             self.draw_pixel((at(from.0, dx), at(from.1, dy)), style.color())?;
         }
         Ok(())
     }
 
-    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(&mut self, path: I, style: &S) -> Drawn {
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
         let points: Vec<BackendCoord> = path.into_iter().collect();
         points.windows(2).try_for_each(|pair| self.draw_line(pair[0], pair[1], style))
     }
 
-    fn draw_rect<S: BackendStyle>(&mut self, a: BackendCoord, b: BackendCoord, style: &S, fill: bool) -> Drawn {
+    fn draw_rect<S: BackendStyle>(
+        &mut self,
+        a: BackendCoord,
+        b: BackendCoord,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
         for y in a.1..=b.1 {
             for x in a.0..=b.0 {
                 let is_edge = x == a.0 || x == b.0 || y == a.1 || y == b.1;
@@ -139,7 +162,13 @@ impl DrawingBackend for Brush<'_> {
         Ok(())
     }
 
-    fn draw_circle<S: BackendStyle>(&mut self, center: BackendCoord, _: u32, style: &S, fill: bool) -> Drawn {
+    fn draw_circle<S: BackendStyle>(
+        &mut self,
+        center: BackendCoord,
+        _: u32,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
         let at = (center.0.div_euclid(CELL.0), center.1.div_euclid(CELL.1));
         self.0.glyph(at, if fill { '●' } else { '○' }, style.color());
         Ok(())
@@ -183,7 +212,8 @@ mod tests {
     fn dots_marks_and_text_lie_where_they_were_put() {
         let mut characters = Characters::new(6, 2);
         let area = Brush(&mut characters).into_drawing_area();
-        // The top dot of every column of the first row; the bottom right dot of the second row's last cell.
+        // The top dot of every column of the first row; the bottom right dot of the second row's
+        // last cell.
         area.draw(&PathElement::new(vec![(0, 0), (11, 0)], INK)).unwrap();
         area.draw(&Pixel::new((11, 7), INK)).unwrap();
         area.draw(&Circle::new((4, 5), 3, series(0).filled())).unwrap();

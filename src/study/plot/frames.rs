@@ -14,8 +14,8 @@ use crate::study::cases::sweep_text;
 use crate::study::recorded::Recorded;
 use crate::study::records::FrameRow;
 
-/// Where single frames take more than so many times the 99th percentile, they do not flatten all others: the axis ends
-/// below, and a note counts them.
+/// Where single frames take more than so many times the 99th percentile, they do not flatten all
+/// others: the axis ends below, and a note counts them.
 const CUT_ABOVE: f64 = 3.0;
 /// Where it then ends, by the 99th percentile.
 const CUT_AT: f64 = 1.5;
@@ -53,7 +53,8 @@ pub fn charts_of_rows(rows: &[FrameRow]) -> Vec<FrameChart> {
     for row in rows.iter().filter(|row| !row.warm_up) {
         let loop_name = loop_name(&row.threading, row.skip);
         let (sweep, phase) = (row.sweep.as_str(), row.phase.as_str());
-        let sample = Sample { sweep, phase, loop_name: &loop_name, frame: row.frame, ms: row.frame_ms };
+        let sample =
+            Sample { sweep, phase, loop_name: &loop_name, frame: row.frame, ms: row.frame_ms };
         add(&mut charts, &sample);
     }
     charts
@@ -63,12 +64,19 @@ pub fn charts_of_rows(rows: &[FrameRow]) -> Vec<FrameChart> {
 pub fn charts_of(recorded: &Recorded) -> Vec<FrameChart> {
     let mut charts = Vec::new();
     // Loops without a timed frame are not in `recorded.modes`.
-    let timed = recorded.run.cases.iter().flat_map(|c| c.modes.iter().filter(|m| m.frames > 0).map(move |m| (c, m)));
+    let timed = recorded
+        .run
+        .cases
+        .iter()
+        .flat_map(|c| c.modes.iter().filter(|m| m.frames > 0).map(move |m| (c, m)));
     for ((case, mode), times) in timed.zip(&recorded.modes) {
         let (sweep, loop_name) = (sweep_text(&case.sweep), loop_name(&mode.threading, mode.skip));
         let phase = case.phase.as_deref().unwrap_or_default();
         for (frame, ms) in times.frames.iter().zip(times.blocks.iter().flatten()) {
-            add(&mut charts, &Sample { sweep: &sweep, phase, loop_name: &loop_name, frame: *frame, ms: *ms });
+            add(
+                &mut charts,
+                &Sample { sweep: &sweep, phase, loop_name: &loop_name, frame: *frame, ms: *ms },
+            );
         }
     }
     charts
@@ -106,7 +114,8 @@ impl FrameChart {
         let times = self.times();
         let most = times.iter().copied().fold(0.0, f64::max);
         let usual = percentile(&times, 0.99).unwrap_or(0.0);
-        let top = if most > CUT_ABOVE * usual && usual > 0.0 { CUT_AT * usual } else { 1.05 * most };
+        let top =
+            if most > CUT_ABOVE * usual && usual > 0.0 { CUT_AT * usual } else { 1.05 * most };
         (top, times.iter().filter(|ms| **ms > top).count())
     }
 
@@ -157,13 +166,17 @@ impl FrameChart {
         let [_, upper, right, _] = plane.bounds();
         let mut phases = self.phases.clone();
         phases.sort();
-        for (i, (first, name)) in phases.iter().enumerate().filter(|(_, (_, name))| !name.is_empty()) {
+        for (i, (first, name)) in
+            phases.iter().enumerate().filter(|(_, (_, name))| !name.is_empty())
+        {
             let x = f64::from(*first) - 0.5;
             if *first > range.0 {
                 plane.line(&[(x, 0.0), (x, top)], MUTED.stroke_width(1))?;
             }
             let begin = plane.pixel(x, 0.0).0;
-            let end = phases.get(i + 1).map_or(right, |(next, _)| plane.pixel(f64::from(*next) - 0.5, 0.0).0);
+            let end = phases
+                .get(i + 1)
+                .map_or(right, |(next, _)| plane.pixel(f64::from(*next) - 0.5, 0.0).0);
             let (gap, down) = (plane.look.across(5, 1), plane.look.down(9, 0));
             if begin + gap + plane.look.width_of(name) <= end {
                 plane.write(name, (begin + gap, upper + down), MUTED, HPos::Left)?;
@@ -175,24 +188,37 @@ impl FrameChart {
 
 impl Plot for FrameChart {
     fn title(&self) -> String {
-        if self.sweep.is_empty() { "Frame time".to_owned() } else { format!("Frame time, {}", self.sweep) }
+        if self.sweep.is_empty() {
+            "Frame time".to_owned()
+        } else {
+            format!("Frame time, {}", self.sweep)
+        }
     }
 
     fn keys(&self, _: Look) -> Vec<Key> {
-        let key = |(i, l): (usize, &Loop)| Key { color: series(i), glyph: glyph(i), name: l.name.clone(), mark: None };
+        let key = |(i, l): (usize, &Loop)| Key {
+            color: series(i),
+            glyph: glyph(i),
+            name: l.name.clone(),
+            mark: None,
+        };
         self.loops.iter().enumerate().map(key).collect()
     }
 
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![
-            "middle: median of a frame's blocks, or of neighbouring frames; about it: least to greatest".to_owned(),
+            "middle: median of a frame's blocks, or of neighbouring frames; about it: \
+             least to greatest"
+                .to_owned(),
         ];
         let (top, n_above) = self.top();
         if n_above > 0 {
             let most = self.times().into_iter().fold(0.0, f64::max);
             let (top, most) = (number(top), number(most));
-            notes
-                .push(format!("{n_above} of {} frames took longer than {top} ms, up to {most} ms", self.times().len()));
+            notes.push(format!(
+                "{n_above} of {} frames took longer than {top} ms, up to {most} ms",
+                self.times().len()
+            ));
         }
         notes
     }
@@ -210,7 +236,12 @@ impl Plot for FrameChart {
         let (first, last) = self.range();
         let (top, _) = self.top();
         let n_ticks = (width / place.look.across(70, 9)) as usize;
-        let mut x = Axis::linear("frame of the scene", f64::from(first) - 0.5, f64::from(last) + 0.5, n_ticks);
+        let mut x = Axis::linear(
+            "frame of the scene",
+            f64::from(first) - 0.5,
+            f64::from(last) + 0.5,
+            n_ticks,
+        );
         // Frames are whole.
         x.ticks.retain(|tick| tick.at.fract() == 0.0);
         let y = Axis::linear("ms", 0.0, top, (height / place.look.down(36, 2)) as usize);

@@ -5,15 +5,16 @@ use super::look::Look;
 /// Upper left and lower right corner, px.
 type Rect = [i32; 4];
 
-/// Where each text goes, its left end and the middle of its height; None where there is no room. Earlier ones choose
-/// first. `points`: what may not be covered, with its radius.
+/// Where each text goes, its left end and the middle of its height; None where there is no room.
+/// Earlier ones choose first. `points`: what may not be covered, with its radius.
 pub fn placed(
     look: Look,
     texts: &[((i32, i32), String)],
     points: &[((i32, i32), i32)],
     bounds: [i32; 4],
 ) -> Vec<Option<(i32, i32)>> {
-    let mut taken: Vec<Rect> = points.iter().map(|((x, y), r)| [x - r, y - r, x + r, y + r]).collect();
+    let mut taken: Vec<Rect> =
+        points.iter().map(|((x, y), r)| [x - r, y - r, x + r, y + r]).collect();
     let mut places = Vec::new();
     for ((x, y), text) in texts {
         let (width, half) = (look.width_of(text), look.down(8, 1) / 2);
@@ -36,7 +37,10 @@ pub fn placed(
         let rect = |(left, middle): (i32, i32)| [left, middle - half, left + width, middle + half];
         let is_free = |place: &(i32, i32)| {
             let of = rect(*place);
-            let is_within = of[0] >= bounds[0] && of[1] >= bounds[1] && of[2] <= bounds[2] && of[3] <= bounds[3];
+            let is_within = of[0] >= bounds[0]
+                && of[1] >= bounds[1]
+                && of[2] <= bounds[2]
+                && of[3] <= bounds[3];
             is_within && taken.iter().all(|other| !overlap(of, *other))
         };
         let place = sides.into_iter().find(is_free);
@@ -57,7 +61,8 @@ mod tests {
     #[test]
     fn no_label_lies_on_another_or_on_a_point() {
         let at: Vec<(i32, i32)> = (0..30).map(|i| (100 + i * 7 % 50, 100 + i * 11 % 60)).collect();
-        let texts: Vec<_> = at.iter().enumerate().map(|(i, at)| (*at, (i + 1).to_string())).collect();
+        let texts: Vec<_> =
+            at.iter().enumerate().map(|(i, at)| (*at, (i + 1).to_string())).collect();
         let points: Vec<_> = at.iter().map(|at| (*at, 5)).collect();
         let places = placed(Look::PICTURE, &texts, &points, [0, 0, 300, 300]);
         let rects: Vec<Rect> = places
@@ -76,6 +81,9 @@ mod tests {
         // A point alone has its label; one in a corner has it within.
         assert!(placed(Look::PICTURE, &texts[..1], &points[..1], [0, 0, 300, 300])[0].is_some());
         let corner = [((299, 1), "12".to_owned())];
-        assert!(placed(Look::PICTURE, &corner, &[((299, 1), 5)], [0, 0, 300, 300])[0].is_some_and(|(x, _)| x < 290));
+        assert!(
+            placed(Look::PICTURE, &corner, &[((299, 1), 5)], [0, 0, 300, 300])[0]
+                .is_some_and(|(x, _)| x < 290)
+        );
     }
 }

@@ -40,7 +40,10 @@ fn says(row: &Row) -> String {
 impl LedgerChart {
     fn errors(&self) -> impl Iterator<Item = f64> + '_ {
         let of_rows = self.rows.iter().flat_map(|r| [Some(r.error.value), r.error.high]);
-        of_rows.chain([Some(self.total.value), self.total.high]).flatten().filter(|v| v.is_finite() && *v > 0.0)
+        of_rows
+            .chain([Some(self.total.value), self.total.high])
+            .flatten()
+            .filter(|v| v.is_finite() && *v > 0.0)
     }
 }
 
@@ -56,7 +59,8 @@ impl Plot for LedgerChart {
     }
 
     fn keys(&self, _: Look) -> Vec<Key> {
-        let key = |color, glyph, name: &str| Key { color, glyph, name: name.to_owned(), mark: None };
+        let key =
+            |color, glyph, name: &str| Key { color, glyph, name: name.to_owned(), mark: None };
         let mut keys = vec![key(series(0), '█', "one approximation")];
         if self.rows.iter().any(|r| !r.is_resolved) {
             keys.push(key(MUTED, '░', "not resolved: its references are no better"));
@@ -84,8 +88,9 @@ impl Plot for LedgerChart {
         let least = self.errors().fold(f64::INFINITY, f64::min);
         let most = self.errors().fold(0.0, f64::max);
         // Behind the longest bar there is room for its number.
-        let room =
-            ((most / least).log10().max(1.0) * f64::from(look.across(110, 12)) / f64::from(width.max(1))).max(0.1);
+        let room = ((most / least).log10().max(1.0) * f64::from(look.across(110, 12))
+            / f64::from(width.max(1)))
+        .max(0.1);
         let values = [least * 10f64.powf(-BELOW - 0.25), most * 10f64.powf(room)].into_iter();
         let x = Axis::log("RMSE", values, false, (width / look.across(80, 10)) as usize);
         let plane = Plane::new(place, &x, &Axis::rows(&names), Behind::Vertical)?;
@@ -94,11 +99,19 @@ impl Plot for LedgerChart {
             let (y, (upper, lower)) = (row_middle(i, n), span(&plane, i, n));
             let middle = plane.pixel(0.0, y).1;
             let [left, _, right, _] = plane.bounds();
-            marks.push(Mark { place: [left, upper, right - left, (lower - upper).max(1)], says: says(row) });
+            marks.push(Mark {
+                place: [left, upper, right - left, (lower - upper).max(1)],
+                says: says(row),
+            });
             let Some(end) = x.at(row.error.value) else {
                 let why = number(row.error.value);
                 let n_letters = ((right - left) / look.width_of("m")).max(2) as usize;
-                plane.write(&shortened(&why, n_letters), (left + look.across(6, 1), middle), MUTED, HPos::Left)?;
+                plane.write(
+                    &shortened(&why, n_letters),
+                    (left + look.across(6, 1), middle),
+                    MUTED,
+                    HPos::Left,
+                )?;
                 continue;
             };
             let (color, glyph) = if row.is_resolved { (series(0), '█') } else { (MUTED, '░') };
@@ -107,10 +120,15 @@ impl Plot for LedgerChart {
             if let (Some(low), Some(high)) = (row.error.low, row.error.high) {
                 last = x.end_at(high);
                 if !look.characters {
-                    plane.whisker([(x.end_at(low), y), (last, y)], [low, high].map(|v| x.shows(v)), INK)?;
+                    plane.whisker(
+                        [(x.end_at(low), y), (last, y)],
+                        [low, high].map(|v| x.shows(v)),
+                        INK,
+                    )?;
                 }
             }
-            let at = plane.pixel(if look.characters { end } else { last.max(end) }, y).0 + look.across(7, 2);
+            let at = plane.pixel(if look.characters { end } else { last.max(end) }, y).0
+                + look.across(7, 2);
             let at = beside(
                 at,
                 look.width_of(&number(row.error.value)),

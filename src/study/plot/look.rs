@@ -18,8 +18,8 @@ pub struct Shade {
     pub sgr: u8,
 }
 
-/// Colours of series, told apart by the colour-blind too (after Okabe and Ito 2008), each 3 : 1 or more against the paper
-/// on either page (WCAG 2.1, 1.4.11).
+/// Colours of series, told apart by the colour-blind too (after Okabe and Ito 2008), each 3 : 1 or
+/// more against the paper on either page (WCAG 2.1, 1.4.11).
 pub const SERIES: [Shade; 8] = [
     Shade { light: RGBColor(0x00, 0x5F, 0xA3), dark: "#5BB4F0", sgr: 34 },
     Shade { light: RGBColor(0xC2, 0x4E, 0x00), dark: "#FF9B52", sgr: 31 },
@@ -79,7 +79,8 @@ impl Look {
         if self.characters { rows * CELL.1 } else { px }
     }
 
-    /// What `text` takes, at most: letters of sans-serif fonts are 0.5 to 0.6 of their size wide on average.
+    /// What `text` takes, at most: letters of sans-serif fonts are 0.5 to 0.6 of their size wide on
+    /// average.
     pub fn width_of(self, text: &str) -> i32 {
         let n = text.chars().count() as i32;
         if self.characters { n * CELL.0 } else { (f64::from(n) * 0.6 * FONT_PX).ceil() as i32 }
@@ -95,7 +96,8 @@ impl Look {
     }
 
     pub fn title(self) -> TextStyle<'static> {
-        let font = ("sans-serif", 15.0 * PLOTTERS_FONT, plotters::style::FontStyle::Bold).into_font();
+        let font =
+            ("sans-serif", 15.0 * PLOTTERS_FONT, plotters::style::FontStyle::Bold).into_font();
         font.color(&INK)
     }
 }

@@ -1,4 +1,5 @@
-//! Charts of results: SVG for a page, characters for a terminal, both drawn by the same lines through plotters.
+//! Charts of results: SVG for a page, characters for a terminal, both drawn by the same lines
+//! through plotters.
 
 pub mod axis;
 pub mod bars;
@@ -87,7 +88,8 @@ pub trait Plot {
     /// Draws the chart without its title, and says what can be pointed at.
     fn draw<DB: DrawingBackend>(&self, place: &Place<'_, DB>) -> DrawResult<Vec<Mark>, DB>;
 
-    /// An SVG document: on white paper, its text text, every mark focusable and with a title of its own.
+    /// An SVG document: on white paper, its text text, every mark focusable and with a title of its
+    /// own.
     fn svg(&self, (width, height): (u32, u32)) -> Result<String> {
         let look = Look::PICTURE;
         let (keys, notes) = (self.keys(look), self.notes());
@@ -106,7 +108,13 @@ pub trait Plot {
                     let y = 32 + *line as i32 * look.line_height();
                     let swatch = [(MARGIN + x, y), (MARGIN + x + SWATCH, y + SWATCH)];
                     match key.mark {
-                        Some(fill) => marker(&root, (MARGIN + x + SWATCH / 2, y + SWATCH / 2), 5, fill, key.color)?,
+                        Some(fill) => marker(
+                            &root,
+                            (MARGIN + x + SWATCH / 2, y + SWATCH / 2),
+                            5,
+                            fill,
+                            key.color,
+                        )?,
                         None => root.draw(&Rectangle::new(swatch, key.color.filled()))?,
                     }
                     root.draw_text(&key.name, &look.text(INK), (MARGIN + x + SWATCH + 5, y))?;
@@ -119,7 +127,9 @@ pub trait Plot {
                 root.present()?;
                 Ok(marks)
             };
-            all().map_err(|cause| Error::Fault { what: format!("a chart could not be drawn: {cause}") })?
+            all().map_err(|cause| Error::Fault {
+                what: format!("a chart could not be drawn: {cause}"),
+            })?
         };
         // No XML has a place for them.
         text.retain(|c| !c.is_control() || c == '\n');
@@ -133,7 +143,9 @@ pub trait Plot {
             let root = Brush(&mut characters).into_drawing_area();
             let place = Place { root: &root, look: Look::TERMINAL, top: 0, bottom: 0 };
             let drawn: DrawResult<Vec<Mark>, Brush<'_>> = self.draw(&place);
-            let failed = |cause: DrawingAreaErrorKind<Infallible>| Error::Fault { what: format!("a chart: {cause}") };
+            let failed = |cause: DrawingAreaErrorKind<Infallible>| Error::Fault {
+                what: format!("a chart: {cause}"),
+            };
             drawn.map_err(failed)?;
         }
         // What a file brought along is no command to the terminal.
@@ -151,8 +163,11 @@ pub trait Plot {
                 "\n"
             };
             let sgr = sgr_of((key.color.0, key.color.1, key.color.2));
-            let glyph =
-                if colored && sgr != 39 { format!("\x1b[{sgr}m{}\x1b[39m", key.glyph) } else { key.glyph.into() };
+            let glyph = if colored && sgr != 39 {
+                format!("\x1b[{sgr}m{}\x1b[39m", key.glyph)
+            } else {
+                key.glyph.into()
+            };
             let _ = write!(out, "{before}{glyph} {}", plain(&key.name));
         }
         out += if keys.is_empty() { "" } else { "\n" };
@@ -198,8 +213,10 @@ fn with_marks(mut text: String, title: &str, marks: &[Mark]) -> String {
         let says = escaped(says).replace('\n', "&#10;");
         let _ = writeln!(
             over,
-            "<g class=\"mark\" tabindex=\"0\" role=\"img\" aria-label=\"{says}\"><title>{says}</title>\
-             <rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"2\" fill=\"none\" pointer-events=\"all\"/></g>"
+            "<g class=\"mark\" tabindex=\"0\" role=\"img\" \
+             aria-label=\"{says}\"><title>{says}</title>\
+             <rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"2\" \
+             fill=\"none\" pointer-events=\"all\"/></g>"
         );
     }
     if let Some(end) = text.rfind("</svg>") {
@@ -208,7 +225,8 @@ fn with_marks(mut text: String, title: &str, marks: &[Mark]) -> String {
     text
 }
 
-/// For XML and HTML, in text and in quotes. What XML has no place for at all (control characters) is left out.
+/// For XML and HTML, in text and in quotes. What XML has no place for at all (control characters)
+/// is left out.
 pub fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

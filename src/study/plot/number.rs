@@ -1,6 +1,7 @@
 //! Numbers as people read them.
 
-/// Three significant digits at most; powers of ten beyond what is read at a glance: "0", "0.025", "1.5×10⁻⁶", "∞".
+/// Three significant digits at most; powers of ten beyond what is read at a glance: "0", "0.025",
+/// "1.5×10⁻⁶", "∞".
 pub fn number(value: f64) -> String {
     significant(value, 3)
 }
@@ -35,7 +36,8 @@ pub fn significant(value: f64, n: usize) -> String {
 
 /// Without zeros behind the point, and with a true minus.
 fn trimmed(text: &str) -> String {
-    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text };
+    let text =
+        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text };
     text.replace('-', "−")
 }
 

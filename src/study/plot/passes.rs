@@ -32,7 +32,8 @@ struct Bar {
     says: String,
 }
 
-/// ms that an average frame spends in a pass: its median while it runs, in the share of the frames that run it.
+/// ms that an average frame spends in a pass: its median while it runs, in the share of the frames
+/// that run it.
 pub fn ms_of_frame(pass: &Pass) -> Option<f64> {
     let n = pass.n_run as f64 + pass.n_skipped as f64;
     pass.p50_ms.filter(|ms| ms.is_finite() && n > 0.0).map(|ms| ms * pass.n_run as f64 / n)
@@ -40,10 +41,15 @@ pub fn ms_of_frame(pass: &Pass) -> Option<f64> {
 
 /// The chart of a run; None where no pass was timed.
 pub fn chart(run: &Run) -> Option<PassChart> {
-    let loops: Vec<(String, &Mode)> =
-        run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (row_name(&c.name(), m), m))).collect();
+    let loops: Vec<(String, &Mode)> = run
+        .cases
+        .iter()
+        .flat_map(|c| c.modes.iter().map(move |m| (row_name(&c.name(), m), m)))
+        .collect();
     let mut sums: Vec<(String, f64)> = Vec::new();
-    for (pass, ms) in loops.iter().flat_map(|(_, m)| &m.passes).filter_map(|p| Some((p, ms_of_frame(p)?))) {
+    for (pass, ms) in
+        loops.iter().flat_map(|(_, m)| &m.passes).filter_map(|p| Some((p, ms_of_frame(p)?)))
+    {
         match sums.iter_mut().find(|(name, _)| *name == pass.name) {
             Some((_, sum)) => *sum += ms,
             None => sums.push((pass.name.clone(), ms)),
@@ -63,8 +69,11 @@ pub fn chart(run: &Run) -> Option<PassChart> {
     if passes.is_empty() {
         return None;
     }
-    let timed = loops.into_iter().filter(|(_, mode)| mode.passes.iter().any(|p| ms_of_frame(p).is_some()));
-    let bars = timed.map(|(name, mode)| Bar { parts: parts(mode, &passes), says: says(&name, mode), name }).collect();
+    let timed =
+        loops.into_iter().filter(|(_, mode)| mode.passes.iter().any(|p| ms_of_frame(p).is_some()));
+    let bars = timed
+        .map(|(name, mode)| Bar { parts: parts(mode, &passes), says: says(&name, mode), name })
+        .collect();
     Some(PassChart { passes, bars })
 }
 
@@ -75,9 +84,12 @@ pub fn row_name(case: &str, mode: &Mode) -> String {
 }
 
 fn parts(mode: &Mode, passes: &[String]) -> Vec<f64> {
-    let of = |name: &String| mode.passes.iter().find(|p| p.name == *name).and_then(ms_of_frame).unwrap_or(0.0);
+    let of = |name: &String| {
+        mode.passes.iter().find(|p| p.name == *name).and_then(ms_of_frame).unwrap_or(0.0)
+    };
     let named: Vec<f64> = passes.iter().map(of).collect();
-    let others = mode.passes.iter().filter(|p| !passes.contains(&p.name)).filter_map(ms_of_frame).sum();
+    let others =
+        mode.passes.iter().filter(|p| !passes.contains(&p.name)).filter_map(ms_of_frame).sum();
     named.into_iter().chain([others]).collect()
 }
 
@@ -85,10 +97,17 @@ fn says(name: &str, mode: &Mode) -> String {
     let line = |p: &Pass| {
         let ms = ms_of_frame(p).filter(|ms| *ms > 0.0)?;
         let n = p.n_run.saturating_add(p.n_skipped);
-        let ran = if p.n_skipped > 0 { format!(", ran in {} of {n} frames", p.n_run) } else { String::new() };
+        let ran = if p.n_skipped > 0 {
+            format!(", ran in {} of {n} frames", p.n_run)
+        } else {
+            String::new()
+        };
         Some(format!("{}: {} ms{ran}", p.name, number(ms)))
     };
-    std::iter::once(name.to_owned()).chain(mode.passes.iter().filter_map(line)).collect::<Vec<_>>().join("\n")
+    std::iter::once(name.to_owned())
+        .chain(mode.passes.iter().filter_map(line))
+        .collect::<Vec<_>>()
+        .join("\n")
 }
 
 impl PassChart {
@@ -96,7 +115,8 @@ impl PassChart {
         self.bars.iter().map(|b| b.parts.iter().sum()).fold(0.0, f64::max)
     }
 
-    /// In a terminal a part is a row of its pass' first letter; of two passes with one letter the second takes its next.
+    /// In a terminal a part is a row of its pass' first letter; of two passes with one letter the
+    /// second takes its next.
     fn letters(&self) -> Vec<char> {
         let mut letters: Vec<char> = Vec::new();
         for name in &self.passes {
@@ -136,7 +156,10 @@ impl Plot for PassChart {
     }
 
     fn notes(&self) -> Vec<String> {
-        vec!["of every pass the median while it runs, times the share of the frames that run it".to_owned()]
+        vec![
+            "of every pass the median while it runs, times the share of the frames that run it"
+                .to_owned(),
+        ]
     }
 
     fn size(&self) -> (u32, u32) {
@@ -153,7 +176,8 @@ impl Plot for PassChart {
         let names: Vec<String> = self.bars.iter().map(|b| shortened(&b.name, N_LETTERS)).collect();
         let room = look.across(70, 10);
         // Room for the sum behind the longest bar.
-        let end = self.longest() * (1.0 + f64::from(room) / f64::from((width - look.across(200, 30)).max(1)));
+        let end = self.longest()
+            * (1.0 + f64::from(room) / f64::from((width - look.across(200, 30)).max(1)));
         let x = Axis::linear("ms of a frame", 0.0, end, (width / look.across(80, 10)) as usize);
         let plane = Plane::new(place, &x, &Axis::rows(&names), Behind::Vertical)?;
         let letters = self.letters();
@@ -167,8 +191,16 @@ impl Plot for PassChart {
             }
             let (upper, lower) = span(&plane, i, n);
             let (left, right) = (plane.pixel(0.0, 0.0).0, plane.pixel(from, 0.0).0);
-            plane.write(&number(from), (right + look.across(6, 2), (upper + lower) / 2), INK, HPos::Left)?;
-            marks.push(Mark { place: [left, upper, (right - left).max(4), lower - upper], says: of.says.clone() });
+            plane.write(
+                &number(from),
+                (right + look.across(6, 2), (upper + lower) / 2),
+                INK,
+                HPos::Left,
+            )?;
+            marks.push(Mark {
+                place: [left, upper, (right - left).max(4), lower - upper],
+                says: of.says.clone(),
+            });
         }
         Ok(marks)
     }

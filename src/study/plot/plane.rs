@@ -38,10 +38,16 @@ pub enum Fill {
 
 impl<'a, DB: DrawingBackend> Plane<'a, DB> {
     /// Draws the axes.
-    pub fn new(place: &Place<'a, DB>, x: &Axis, y: &Axis, behind: Behind) -> DrawResult<Plane<'a, DB>, DB> {
+    pub fn new(
+        place: &Place<'a, DB>,
+        x: &Axis,
+        y: &Axis,
+        behind: Behind,
+    ) -> DrawResult<Plane<'a, DB>, DB> {
         let look = place.look;
         let widest = y.ticks.iter().map(|t| look.width_of(&t.text)).max().unwrap_or(0);
-        // Beside the ticks' text: the tick, and the axis' name, which is written upwards in a picture.
+        // Beside the ticks' text: the tick, and the axis' name, which is written upwards in a
+        // picture.
         let left = widest + look.across(if y.name.is_empty() { 22 } else { 40 }, 1);
         let name_above = look.characters && !y.name.is_empty();
         let top = place.top + if name_above { look.line_height() } else { look.down(6, 0) };
@@ -51,7 +57,10 @@ impl<'a, DB: DrawingBackend> Plane<'a, DB> {
             .margin_right(look.across(18, 2))
             .margin_left(look.across(10, 0))
             .set_label_area_size(LabelAreaPosition::Left, left)
-            .set_label_area_size(LabelAreaPosition::Bottom, look.down(46, if x.name.is_empty() { 2 } else { 3 }))
+            .set_label_area_size(
+                LabelAreaPosition::Bottom,
+                look.down(46, if x.name.is_empty() { 2 } else { 3 }),
+            )
             .build_cartesian_2d(x.clone(), y.clone())?;
         let line = if look.characters { PAPER.mix(0.0) } else { GRID.to_rgba() };
         let mut mesh = chart.configure_mesh();
@@ -94,12 +103,16 @@ impl<'a, DB: DrawingBackend> Plane<'a, DB> {
     }
 
     /// A line through points, px.
-    pub fn line_px(&self, pixels: Vec<(i32, i32)>, style: impl Into<ShapeStyle>) -> DrawResult<(), DB> {
+    pub fn line_px(
+        &self,
+        pixels: Vec<(i32, i32)>,
+        style: impl Into<ShapeStyle>,
+    ) -> DrawResult<(), DB> {
         self.root.draw(&PathElement::new(pixels, style))
     }
 
-    /// A line from one place to another along x or along y, with a foot at either end that `has_foot`: where an interval goes
-    /// on beyond the axis it has none.
+    /// A line from one place to another along x or along y, with a foot at either end that
+    /// `has_foot`: where an interval goes on beyond the axis it has none.
     pub fn whisker(
         &self,
         [from, to]: [(f64, f64); 2],
@@ -113,7 +126,9 @@ impl<'a, DB: DrawingBackend> Plane<'a, DB> {
         }
         self.line_px(vec![a, b], style)?;
         let (dx, dy) = if a.1 == b.1 { (0, FOOT_PX) } else { (FOOT_PX, 0) };
-        for ((x, y), _) in [a, b].into_iter().zip(has_foot).filter(|(_, has)| *has && !self.look.characters) {
+        for ((x, y), _) in
+            [a, b].into_iter().zip(has_foot).filter(|(_, has)| *has && !self.look.characters)
+        {
             self.line_px(vec![(x - dx, y - dy), (x + dx, y + dy)], style)?;
         }
         Ok(())
@@ -125,12 +140,22 @@ impl<'a, DB: DrawingBackend> Plane<'a, DB> {
     }
 
     /// From one corner to the other, px.
-    pub fn rectangle(&self, [x0, y0, x1, y1]: [i32; 4], style: impl Into<ShapeStyle>) -> DrawResult<(), DB> {
+    pub fn rectangle(
+        &self,
+        [x0, y0, x1, y1]: [i32; 4],
+        style: impl Into<ShapeStyle>,
+    ) -> DrawResult<(), DB> {
         self.root.draw(&Rectangle::new([(x0, y0), (x1, y1)], style))
     }
 
     /// A mark of `radius` px; in a terminal a character, whatever the radius.
-    pub fn point(&self, at: (i32, i32), radius: i32, fill: Fill, color: RGBColor) -> DrawResult<(), DB> {
+    pub fn point(
+        &self,
+        at: (i32, i32),
+        radius: i32,
+        fill: Fill,
+        color: RGBColor,
+    ) -> DrawResult<(), DB> {
         if self.look.characters {
             let glyph = match fill {
                 Fill::Full => '●',
@@ -148,7 +173,13 @@ impl<'a, DB: DrawingBackend> Plane<'a, DB> {
     }
 
     /// Text whose middle line is at a point, px; in a terminal in its row.
-    pub fn write(&self, text: &str, at: (i32, i32), color: RGBColor, anchor: HPos) -> DrawResult<(), DB> {
+    pub fn write(
+        &self,
+        text: &str,
+        at: (i32, i32),
+        color: RGBColor,
+        anchor: HPos,
+    ) -> DrawResult<(), DB> {
         self.root.draw_text(text, &self.look.text(color).pos(Pos::new(anchor, VPos::Center)), at)
     }
 }
@@ -169,7 +200,8 @@ pub fn marker<DB: DrawingBackend>(
     if fill == Fill::Half {
         let angles = (0..=16).map(|i| std::f64::consts::PI * (0.5 + f64::from(i) / 16.0));
         let along = |v: f64| (f64::from(radius) * v).round() as i32;
-        let half = angles.map(|a| (at.0 + along(a.cos()), at.1 + along(a.sin()))).collect::<Vec<_>>();
+        let half =
+            angles.map(|a| (at.0 + along(a.cos()), at.1 + along(a.sin()))).collect::<Vec<_>>();
         on.draw(&Polygon::new(half, color.filled()))?;
     }
     on.draw(&Circle::new(at, radius, color.stroke_width(2)))
@@ -186,7 +218,11 @@ impl Ranged for Axis {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        if hint.weight().allow_light_points() { vec![] } else { self.ticks.iter().map(|tick| tick.at).collect() }
+        if hint.weight().allow_light_points() {
+            vec![]
+        } else {
+            self.ticks.iter().map(|tick| tick.at).collect()
+        }
     }
 
     fn range(&self) -> std::ops::Range<f64> {
@@ -201,7 +237,8 @@ impl ValueFormatter<f64> for Axis {
 
     /// What the tick nearest to a place says: the axis is handed back the place it told.
     fn format_ext(&self, at: &f64) -> String {
-        let nearest = self.ticks.iter().min_by(|a, b| (a.at - at).abs().total_cmp(&(b.at - at).abs()));
+        let nearest =
+            self.ticks.iter().min_by(|a, b| (a.at - at).abs().total_cmp(&(b.at - at).abs()));
         nearest.map(|tick| tick.text.clone()).unwrap_or_default()
     }
 }

@@ -1,4 +1,5 @@
-//! Time against error: every configuration of a study with its intervals, and the front of those that none beats in both.
+//! Time against error: every configuration of a study with its intervals, and the front of those
+//! that none beats in both.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
@@ -18,7 +19,8 @@ const N_NAMED: usize = 14;
 const N_LETTERS: usize = 112;
 /// Of the intervals of what is behind the front.
 const FAINT: f64 = 0.55;
-/// Ends of intervals do not stretch an axis beyond this factor of the outermost values: they run to its end.
+/// Ends of intervals do not stretch an axis beyond this factor of the outermost values: they run to
+/// its end.
 const INTERVAL_REACH: f64 = 3.0;
 
 #[derive(Debug, Clone)]
@@ -47,15 +49,32 @@ pub fn chart(study: &Study) -> TradeoffChart {
     let numbers = front_numbers(study);
     let of = |(i, c): (usize, &Configuration)| {
         let (time, error) = (time_of(study, c)?, error_of(study, c)?);
-        let can_be_drawn = time.value.is_finite() && time.value > 0.0 && error.value.is_finite() && error.value >= 0.0;
+        let can_be_drawn = time.value.is_finite()
+            && time.value > 0.0
+            && error.value.is_finite()
+            && error.value >= 0.0;
         let (name, front) = (c.name.clone(), c.front);
-        can_be_drawn.then(|| Point { name, time, error, front, number: numbers[i], is_base: i == 0 })
+        can_be_drawn.then(|| Point {
+            name,
+            time,
+            error,
+            front,
+            number: numbers[i],
+            is_base: i == 0,
+        })
     };
     let points: Vec<Point> = study.configurations.iter().enumerate().filter_map(of).collect();
     TradeoffChart {
         title: "Time against error".to_owned(),
-        time_name: format!("{} of a frame, ms", if study.time == "gpu" { "GPU time" } else { "time" }),
-        error_name: format!("{} from the reference \"{}\"", metric_name(&study.metric), study.reference.against),
+        time_name: format!(
+            "{} of a frame, ms",
+            if study.time == "gpu" { "GPU time" } else { "time" }
+        ),
+        error_name: format!(
+            "{} from the reference \"{}\"",
+            metric_name(&study.metric),
+            study.reference.against
+        ),
         n_left_out: study.configurations.len() - points.len(),
         points,
     }
@@ -87,9 +106,11 @@ pub fn error_of(study: &Study, configuration: &Configuration) -> Option<Figure> 
     configuration.error.map(of)
 }
 
-/// For each configuration its number in the chart: those on the front, from the fastest, count from 1.
+/// For each configuration its number in the chart: those on the front, from the fastest, count from
+/// 1.
 pub fn front_numbers(study: &Study) -> Vec<Option<usize>> {
-    let time = |i: usize| time_of(study, &study.configurations[i]).map_or(f64::INFINITY, |t| t.value);
+    let time =
+        |i: usize| time_of(study, &study.configurations[i]).map_or(f64::INFINITY, |t| t.value);
     let on = |i: &usize| study.configurations[*i].front == Front::On;
     let mut front: Vec<usize> = (0..study.configurations.len()).filter(on).collect();
     front.sort_by(|a, b| time(*a).total_cmp(&time(*b)));
@@ -111,7 +132,11 @@ impl Point {
         };
         let Point { name, time, error, .. } = self;
         let (time_name, error_name) = (chart.time_name.trim_end_matches(", ms"), &chart.error_name);
-        format!("{name}\n{time_name}: {} ms\n{error_name}: {}\n{place}", figure(*time), figure(*error))
+        format!(
+            "{name}\n{time_name}: {} ms\n{error_name}: {}\n{place}",
+            figure(*time),
+            figure(*error)
+        )
     }
 
     fn look(&self) -> (Fill, RGBColor, i32) {
@@ -134,8 +159,12 @@ impl TradeoffChart {
     fn axes(&self, look: Look, (width, height): (i32, i32)) -> (Axis, Axis) {
         let axis = |name: &str, of: fn(&Point) -> Figure, with_zero: bool, n_ticks: i32| {
             let values = || self.points.iter().map(of).filter(|f| f.value > 0.0);
-            let (least, most) = values().fold((f64::INFINITY, 0.0f64), |(l, m), f| (l.min(f.value), m.max(f.value)));
-            let ends = values().flat_map(|f| [f.low, f.high]).flatten().filter(|v| *v > 0.0 && v.is_finite());
+            let (least, most) = values()
+                .fold((f64::INFINITY, 0.0f64), |(l, m), f| (l.min(f.value), m.max(f.value)));
+            let ends = values()
+                .flat_map(|f| [f.low, f.high])
+                .flatten()
+                .filter(|v| *v > 0.0 && v.is_finite());
             let ends = ends.map(|v| v.clamp(least / INTERVAL_REACH, most * INTERVAL_REACH));
             Axis::log(name, values().map(|f| f.value).chain(ends), with_zero, n_ticks as usize)
         };
@@ -153,7 +182,12 @@ impl Plot for TradeoffChart {
     }
 
     fn keys(&self, _: Look) -> Vec<Key> {
-        let key = |color, glyph, name: &str, fill| Key { color, glyph, name: name.to_owned(), mark: Some(fill) };
+        let key = |color, glyph, name: &str, fill| Key {
+            color,
+            glyph,
+            name: name.to_owned(),
+            mark: Some(fill),
+        };
         vec![
             key(series(0), '●', "on the front: none is faster and nearer", Fill::Full),
             key(series(1), '◐', "near it, within the intervals", Fill::Half),
@@ -165,7 +199,12 @@ impl Plot for TradeoffChart {
         let front = self.front();
         let line = |p: &&Point| {
             let Point { name, time, error, number: n, .. } = p;
-            let line = format!("{}) {} ms, {}: {name}", n.unwrap_or(0), number(time.value), number(error.value));
+            let line = format!(
+                "{}) {} ms, {}: {name}",
+                n.unwrap_or(0),
+                number(time.value),
+                number(error.value)
+            );
             shortened(&line, N_LETTERS)
         };
         let mut notes: Vec<String> = front.iter().take(N_NAMED).map(line).collect();
@@ -175,7 +214,9 @@ impl Plot for TradeoffChart {
         match self.n_left_out {
             0 => {}
             1 => notes.push("1 configuration has no time or no error and is not drawn".to_owned()),
-            n => notes.push(format!("{n} configurations have no time or no error and are not drawn")),
+            n => {
+                notes.push(format!("{n} configurations have no time or no error and are not drawn"))
+            }
         }
         notes
     }
@@ -191,7 +232,8 @@ impl Plot for TradeoffChart {
             return Ok(vec![]);
         }
         let at = |p: &Point| Some((x.at(p.time.value)?, y.at(p.error.value)?));
-        let drawn: Vec<(&Point, (f64, f64))> = self.points.iter().filter_map(|p| Some((p, at(p)?))).collect();
+        let drawn: Vec<(&Point, (f64, f64))> =
+            self.points.iter().filter_map(|p| Some((p, at(p)?))).collect();
         // What matters most is drawn last, over the rest.
         let mut order: Vec<usize> = (0..drawn.len()).collect();
         let rank = |p: &Point| match p.front {
@@ -235,9 +277,14 @@ impl Plot for TradeoffChart {
             Some(number) => Some(number.to_string()),
             None => p.is_base.then(|| p.name.clone()),
         };
-        let texts: Vec<_> =
-            drawn.iter().filter_map(|(p, at)| Some((plane.pixel(at.0, at.1), named(p)?))).rev().collect();
-        for (place, (_, text)) in placed(look, &texts, &round, plane.bounds()).into_iter().zip(&texts) {
+        let texts: Vec<_> = drawn
+            .iter()
+            .filter_map(|(p, at)| Some((plane.pixel(at.0, at.1), named(p)?)))
+            .rev()
+            .collect();
+        for (place, (_, text)) in
+            placed(look, &texts, &round, plane.bounds()).into_iter().zip(&texts)
+        {
             if let Some(place) = place {
                 plane.write(text, place, INK, HPos::Left)?;
             }

@@ -30,16 +30,21 @@ pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
     let run = &recorded.run;
     let mut charts = Vec::new();
     for frames in frames::charts_of(recorded) {
-        charts.push(chart(&frames, "Time from the end of one frame to the end of the next; below is better.")?);
+        charts.push(chart(
+            &frames,
+            "Time from the end of one frame to the end of the next; below is better.",
+        )?);
     }
     let passes = passes::chart(run);
-    let passes =
-        passes.map(|passes| chart(&passes, "What the device's time goes to; shorter is better.")).transpose()?;
+    let passes = passes
+        .map(|passes| chart(&passes, "What the device's time goes to; shorter is better."))
+        .transpose()?;
     let mut shown = Vec::new();
     for i in 0..run.cases.len() {
         let name = case_name(run, i);
         let caption = format!("The last frame of {name}");
-        shown.extend(Png::read(folder, &picture_file(i))?.map(|png| png.figure(&caption, &caption)));
+        shown
+            .extend(Png::read(folder, &picture_file(i))?.map(|png| png.figure(&caption, &caption)));
     }
     Ok(html! {
         (provenance::section(&Made::of_run(run)))
@@ -54,7 +59,8 @@ pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
         @for chart in &charts { (chart) }
         (cases(run))
         h3 { "Passes" }
-        @match &passes { Some(passes) => { (passes) } None => { p { "No pass was timed: the device has no timestamps." } } }
+        @match &passes { Some(passes) => { (passes) } None => { p { "No pass was timed: the device \
+            has no timestamps." } } }
         (pass_table(run))
     })
 }
@@ -76,7 +82,8 @@ fn loops(run: &Run) -> Markup {
             value(mode.frame_lows.map(|l| l.slowest_mean_fps)),
         ]
     };
-    let rows: Vec<Vec<Cell>> = run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| row((c, m)))).collect();
+    let rows: Vec<Vec<Cell>> =
+        run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| row((c, m)))).collect();
     let header = [
         "case and loop",
         "frames",
@@ -90,7 +97,8 @@ fn loops(run: &Run) -> Markup {
         "latency p50, ms",
         "1 % low, frames/s",
     ];
-    let caption = "Every loop: medians with their 95 % intervals; \"1 % low\" is the mean of the slowest 1 %";
+    let caption =
+        "Every loop: medians with their 95 % intervals; \"1 % low\" is the mean of the slowest 1 %";
     table(caption, &header, &rows)
 }
 
@@ -103,11 +111,20 @@ fn parts(run: &Run) -> Markup {
             .chain(times)
             .collect()
     };
-    let loops: Vec<String> =
-        run.parts.iter().take(1).flat_map(|part| part.base.iter().map(|base| format!("{}, ms", base.name()))).collect();
-    let header: Vec<&str> = ["cases", "node", "begun"].into_iter().chain(loops.iter().map(String::as_str)).collect();
+    let loops: Vec<String> = run
+        .parts
+        .iter()
+        .take(1)
+        .flat_map(|part| part.base.iter().map(|base| format!("{}, ms", base.name())))
+        .collect();
+    let header: Vec<&str> =
+        ["cases", "node", "begun"].into_iter().chain(loops.iter().map(String::as_str)).collect();
     let rows: Vec<Vec<Cell>> = run.parts.iter().map(row).collect();
-    table("Who timed what, and the median frame time of the first case there: how far nodes differ", &header, &rows)
+    table(
+        "Who timed what, and the median frame time of the first case there: how far nodes differ",
+        &header,
+        &rows,
+    )
 }
 
 /// The cases, and what overlap and skipping gained in each.
@@ -140,7 +157,11 @@ fn cases(run: &Run) -> Markup {
         "without skipping, ms",
         "same picture, to the byte",
     ];
-    table("The cases, and what overlap and skipping gained", &header, &run.cases.iter().map(row).collect::<Vec<_>>())
+    table(
+        "The cases, and what overlap and skipping gained",
+        &header,
+        &run.cases.iter().map(row).collect::<Vec<_>>(),
+    )
 }
 
 fn pass_table(run: &Run) -> Markup {
@@ -162,7 +183,9 @@ fn pass_table(run: &Run) -> Markup {
     for case in &run.cases {
         for mode in &case.modes {
             // What never ran anywhere is no news.
-            rows.extend(mode.passes.iter().filter(|p| p.n_run > 0).map(|pass| row(case, mode, pass)));
+            rows.extend(
+                mode.passes.iter().filter(|p| p.n_run > 0).map(|pass| row(case, mode, pass)),
+            );
         }
     }
     let header = [

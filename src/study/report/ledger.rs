@@ -12,15 +12,18 @@ use crate::study::plot::{self};
 
 pub fn section(ledger: &Ledger) -> Result<Markup> {
     let total = with_interval(ledger.total.value, ledger.total.low, ledger.total.high);
-    let caption =
-        "RMSE of two pictures that differ in that approximation alone. Lines across a bar's end are 95 % intervals.";
+    let caption = "RMSE of two pictures that differ in that approximation alone. Lines across a \
+        bar's end are 95 % intervals.";
     Ok(html! {
         (provenance::section(&Made::of(&ledger.made, ledger.interrupted)))
         dl class="made" {
             dt { "Picture" } dd { "frame " (ledger.frame) " at " (number(ledger.time_s)) " s, " (ledger.width) "×" (ledger.height) " pixels, compared at " (ledger.n_pixels) }
-            dt { "Magnitude" } dd { (number(ledger.magnitude)) ", root mean square of the last row's truth" }
-            dt { "All together" } dd { (total) " RMSE; the rows' sum is " (number(ledger.sum)) ", in quadrature " (number(ledger.quadrature)) }
-            dt { "Total at most the sum" } dd { @if ledger.holds { "yes" } @else { strong { "no: something is wrong" } } }
+            dt { "Magnitude" } dd { (number(ledger.magnitude)) ", root mean square of the \
+                last row's truth" }
+            dt { "All together" } dd { (total) " RMSE; the rows' sum is " (number(ledger.sum)) ", \
+                in quadrature " (number(ledger.quadrature)) }
+            dt { "Total at most the sum" } dd { @if ledger.holds { "yes" } @else { strong { "no: \
+                something is wrong" } } }
         }
         h3 { "Rows" }
         (chart(&plot::ledger::chart(ledger), caption)?)
@@ -30,7 +33,8 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
 
 fn rows(ledger: &Ledger) -> Markup {
     let row = |r: &Row| -> Vec<Cell> {
-        let resolved = if r.is_resolved { "" } else { "not resolved: the references are no better" };
+        let resolved =
+            if r.is_resolved { "" } else { "not resolved: the references are no better" };
         vec![
             text(&r.name),
             text(&r.from),

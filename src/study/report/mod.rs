@@ -1,5 +1,5 @@
-//! Results as one HTML page that needs nothing else: no network, no font, no file beside it. Tables say everything; the
-//! script adds only what is done with a pointer: hints, sliders, sorting.
+//! Results as one HTML page that needs nothing else: no network, no font, no file beside it. Tables
+//! say everything; the script adds only what is done with a pointer: hints, sliders, sorting.
 
 mod bench;
 mod ledger;
@@ -23,16 +23,22 @@ const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 
 /// Nothing may be loaded, from anywhere.
-const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+const POLICY: &str =
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
-/// The page of `sources`, in their order; later benches and studies are compared with the first of their kind.
+/// The page of `sources`, in their order; later benches and studies are compared with the first of
+/// their kind.
 pub fn page(sources: &[Source]) -> Result<String> {
     let mut sections = Vec::new();
     for (i, source) in sources.iter().enumerate() {
         sections.push((heading(source), format!("run-{i}"), section(source)?));
     }
     for (i, (a, b)) in source::pairs(sources).into_iter().enumerate() {
-        sections.push((format!("{} against {}", b.name, a.name), format!("versus-{i}"), versus::section(a, b)?));
+        sections.push((
+            format!("{} against {}", b.name, a.name),
+            format!("versus-{i}"),
+            versus::section(a, b)?,
+        ));
     }
     let title = sources.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
     let markup = html! {
@@ -91,7 +97,8 @@ fn chart(plot: &impl Plot, caption: &str) -> Result<Markup> {
     Ok(html! { figure class="chart" { (PreEscaped(svg)) figcaption { (caption) } } })
 }
 
-/// The colours that charts are drawn in as variables, so that a dark page has its own. A rule is stronger than an attribute.
+/// The colours that charts are drawn in as variables, so that a dark page has its own. A rule is
+/// stronger than an attribute.
 fn colors() -> String {
     let all = || SERIES.iter().chain(&PLAIN).enumerate();
     let hex = |s: &Shade| format!("#{:02X}{:02X}{:02X}", s.light.0, s.light.1, s.light.2);
@@ -103,12 +110,16 @@ fn colors() -> String {
     };
     let rules = all().fold(String::new(), |mut text, (i, shade)| {
         let hex = hex(shade);
-        let _ =
-            write!(text, ".chart [fill=\"{hex}\"]{{fill:var(--c{i})}}.chart [stroke=\"{hex}\"]{{stroke:var(--c{i})}}");
+        let _ = write!(
+            text,
+            ".chart [fill=\"{hex}\"]{{fill:var(--c{i})}}.chart \
+                [stroke=\"{hex}\"]{{stroke:var(--c{i})}}"
+        );
         text
     });
     format!(
-        ":root{{{}}}@media (prefers-color-scheme:dark){{:root{{{}}}}}@media print{{:root{{{}}}}}{rules}",
+        ":root{{{}}}@media (prefers-color-scheme:dark){{:root{{{}}}}}@media \
+         print{{:root{{{}}}}}{rules}",
         variables(&hex),
         variables(&|s| s.dark.to_owned()),
         variables(&hex)

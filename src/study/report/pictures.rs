@@ -27,7 +27,10 @@ impl Png {
         // A name that leads elsewhere would put any file of the machine into the page.
         let path = folder.join(name);
         if Path::new(name).file_name() != Some(name.as_ref()) {
-            return Err(Error::io(folder, format!("names the picture \"{name}\"; expected a file in that folder")));
+            return Err(Error::io(
+                folder,
+                format!("names the picture \"{name}\"; expected a file in that folder"),
+            ));
         }
         match fs::read(&path) {
             Ok(bytes) => Png::of(bytes).map(Some).ok_or_else(|| Error::io(&path, "is no PNG file")),
@@ -36,7 +39,8 @@ impl Png {
         }
     }
 
-    /// None where they do not begin as a PNG does: signature, and width and height in the first chunk.
+    /// None where they do not begin as a PNG does: signature, and width and height in the first
+    /// chunk.
     fn of(bytes: Vec<u8>) -> Option<Png> {
         let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
         let is_png = bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(12..16)? == b"IHDR";
@@ -55,10 +59,15 @@ impl Png {
     }
 }
 
-/// Two picture files, by folder and name: side by side, and with a script one over the other behind a slider; and where
-/// they differ. None where one is not there.
-pub fn versus(label: &str, [(folder_a, a), (folder_b, b)]: [(&Path, &str); 2]) -> Result<Option<Markup>> {
-    let (Some(png_a), Some(png_b)) = (Png::read(folder_a, a)?, Png::read(folder_b, b)?) else { return Ok(None) };
+/// Two picture files, by folder and name: side by side, and with a script one over the other behind
+/// a slider; and where they differ. None where one is not there.
+pub fn versus(
+    label: &str,
+    [(folder_a, a), (folder_b, b)]: [(&Path, &str); 2],
+) -> Result<Option<Markup>> {
+    let (Some(png_a), Some(png_b)) = (Png::read(folder_a, a)?, Png::read(folder_b, b)?) else {
+        return Ok(None);
+    };
     let apart = apart(&folder_a.join(a), &folder_b.join(b))?;
     let of = |name: &str| format!("{label}, {name}");
     Ok(Some(html! {
@@ -67,7 +76,8 @@ pub fn versus(label: &str, [(folder_a, a), (folder_b, b)]: [(&Path, &str); 2]) -
             (png_b.figure(&of("B"), &of("B")))
             @match &apart {
                 Some(apart) => {
-                    (apart.map.figure(&format!("{label}: FLIP error of every pixel, dark for none"), &apart.caption()))
+                    (apart.map.figure(&format!("{label}: FLIP error of every pixel, \
+                        dark for none"), &apart.caption()))
                 }
                 None => { p { "A has " (png_a.width) "×" (png_a.height) " pixels, B " (png_b.width) "×" (png_b.height) ": not compared." } }
             }
@@ -89,7 +99,8 @@ impl Apart {
         let Errors { rmse, max_abs, .. } = self.errors;
         let [flip, rmse, most] = [self.flip, rmse, max_abs].map(number);
         format!(
-            "where they differ: FLIP error, dark for none, mean {flip}; of display values RMSE {rmse}, greatest {most}"
+            "where they differ: FLIP error, dark for none, mean {flip}; of display values RMSE \
+             {rmse}, greatest {most}"
         )
     }
 }
@@ -136,14 +147,21 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let write = |name: &str, width: u32, value: u8| {
             let path = dir.path().join(name);
-            fs::write(&path, png_bytes(width, 20, &vec![value; width as usize * 60]).unwrap()).unwrap();
+            fs::write(&path, png_bytes(width, 20, &vec![value; width as usize * 60]).unwrap())
+                .unwrap();
             path
         };
-        let (a, b, wide) = (write("a.png", 30, 100), write("b.png", 30, 151), write("c.png", 31, 100));
+        let (a, b, wide) =
+            (write("a.png", 30, 100), write("b.png", 30, 151), write("c.png", 31, 100));
         let same = apart(&a, &a).unwrap().unwrap();
         assert_eq!((same.errors.rmse, same.flip), (0.0, 0.0));
         let other = apart(&a, &b).unwrap().unwrap();
-        assert!((other.errors.rmse - 0.2).abs() < 1e-12 && other.flip > 0.01, "{} {}", other.errors.rmse, other.flip);
+        assert!(
+            (other.errors.rmse - 0.2).abs() < 1e-12 && other.flip > 0.01,
+            "{} {}",
+            other.errors.rmse,
+            other.flip
+        );
         assert_eq!((other.map.width, other.map.height), (30, 20));
         assert!(apart(&a, &wide).unwrap().is_none());
     }

@@ -64,11 +64,18 @@ impl<'a> Made<'a> {
 pub fn section(made: &Made<'_>) -> Markup {
     let Device { name, driver, api, kind, uuid } = made.device;
     let scene = serde_json::to_string_pretty(made.scene).unwrap_or_default();
-    let period = made.clocks.timestamp_period_ns.map_or("none".to_owned(), |ns| format!("{} ns a tick", number(ns)));
-    let pass = made.clocks.timestamp_overhead_ns.map(|ns| format!(", {} ns for an empty pass", number(ns)));
+    let period = made
+        .clocks
+        .timestamp_period_ns
+        .map_or("none".to_owned(), |ns| format!("{} ns a tick", number(ns)));
+    let pass = made
+        .clocks
+        .timestamp_overhead_ns
+        .map(|ns| format!(", {} ns for an empty pass", number(ns)));
     html! {
         @if made.interrupted {
-            p class="warning" { strong { "Interrupted:" } " what was finished is here, and nothing else." }
+            p class="warning" { strong { "Interrupted:" } " what was finished is here, and \
+                nothing else." }
         }
         dl class="made" {
             dt { "Device" } dd { (name) " (" (kind) ")" }
@@ -76,7 +83,8 @@ pub fn section(made: &Made<'_>) -> Markup {
             dt { "Device UUID" } dd { code { (uuid) } }
             dt { "Processor" } dd { (made.cpu.model) ", " (made.cpu.logical_cores) " logical cores" }
             dt { "Environment" } dd {
-                @if made.environment.is_empty() { "none of the variables that change what drivers do" }
+                @if made.environment.is_empty() { "none of the variables that change \
+                    what drivers do" }
                 @for (key, value) in made.environment { code { (key) "=" (value) } " " }
             }
             dt { "Clocks" } dd {

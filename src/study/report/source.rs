@@ -1,4 +1,5 @@
-//! What a report is made of: results on disk, whole and of this nimbus' schema, or one message that says what is wrong.
+//! What a report is made of: results on disk, whole and of this nimbus' schema, or one message that
+//! says what is wrong.
 
 use std::path::{Path, PathBuf};
 
@@ -37,7 +38,10 @@ pub fn read(path: &Path) -> Result<Vec<Source>> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let Some(file) = FILES.into_iter().find(|file| *file == name) else {
             let what = format!("expected a results folder, or in one {}", FILES.join(", "));
-            return Err(Error::io(path, if path.exists() { what } else { format!("no such file or folder; {what}") }));
+            return Err(Error::io(
+                path,
+                if path.exists() { what } else { format!("no such file or folder; {what}") },
+            ));
         };
         let folder = path.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
         return Ok(vec![source(folder, file, path.display().to_string())?]);
@@ -45,7 +49,10 @@ pub fn read(path: &Path) -> Result<Vec<Source>> {
     let there: Vec<&str> = FILES.into_iter().filter(|file| path.join(file).exists()).collect();
     if there.is_empty() {
         let what = format!("holds no results: none of {}", FILES.join(", "));
-        return Err(Error::io(path, format!("{what}; expected a folder that bench, error or ledger wrote with --out")));
+        return Err(Error::io(
+            path,
+            format!("{what}; expected a folder that bench, error or ledger wrote with --out"),
+        ));
     }
     let name = |file: &str| if there.len() == 1 { path.to_owned() } else { path.join(file) };
     there.iter().map(|file| source(path, file, name(file).display().to_string())).collect()
@@ -69,11 +76,17 @@ pub fn parse_ledger(text: &str, path: &Path) -> Result<Ledger> {
     match value.get("schema").and_then(Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}
         Some(version) => {
-            return Err(Error::io(path, format!("a ledger of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
+            return Err(Error::io(
+                path,
+                format!("a ledger of schema {version}; this nimbus reads {SCHEMA_VERSION}"),
+            ));
         }
-        None => return Err(Error::io(path, "not a ledger.json of nimbus: it names no schema version")),
+        None => {
+            return Err(Error::io(path, "not a ledger.json of nimbus: it names no schema version"));
+        }
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a ledger.json of nimbus: {cause}")))
+    serde_json::from_value(value)
+        .map_err(|cause| Error::io(path, format!("not a ledger.json of nimbus: {cause}")))
 }
 
 /// Later benches and studies, each beside the first of its kind.

@@ -17,7 +17,11 @@ pub fn text(text: &str) -> Cell {
     // A few words are one thing to the eye.
     const N_SHORT: usize = 18;
     let is_short = text.chars().count() <= N_SHORT;
-    Cell { content: html! { span class=[is_short.then_some("short")] { (text) } }, value: None, is_number: false }
+    Cell {
+        content: html! { span class=[is_short.then_some("short")] { (text) } },
+        value: None,
+        is_number: false,
+    }
 }
 
 pub fn markup(content: Markup) -> Cell {
@@ -39,7 +43,10 @@ pub fn ms(value: Option<f64>) -> Cell {
 }
 
 pub fn percent(value: Option<f64>) -> Cell {
-    shown(value, value.filter(|v| v.is_finite()).map_or("—".to_owned(), |v| format!("{:.1} %", 100.0 * v)))
+    shown(
+        value,
+        value.filter(|v| v.is_finite()).map_or("—".to_owned(), |v| format!("{:.1} %", 100.0 * v)),
+    )
 }
 
 pub fn figure(figure: Option<Figure>) -> Cell {

@@ -19,8 +19,10 @@ use crate::study::tradeoff::records::{Configuration, Front, PictureError, Study}
 pub const REFERENCE_FILE: &str = "reference.png";
 
 pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
-    let caption = "Up and to the right is worse in both. Bars are 95 % intervals; the line joins the configurations that no other \
-                   beats in time and error at once. Point at one, or step through them with the Tab key, to see its settings.";
+    let caption = "Up and to the right is worse in both. Bars are 95 % intervals; the line joins \
+        the configurations that no other \
+                   beats in time and error at once. Point at one, or step through them with the \
+                   Tab key, to see its settings.";
     Ok(html! {
         (provenance::section(&Made::of(&study.made, study.interrupted)))
         (reference(study))
@@ -42,9 +44,11 @@ fn reference(study: &Study) -> Markup {
             dt { "Known at" } dd { @if r.n_pixels as u64 == all { "every pixel" } @else { (r.n_pixels) " of " (all) " pixels" } }
             dt { "Its own error" } dd { @if let Some(rmse) = r.own_error { (number(rmse)) " RMSE: " } @else { "no bound: " } (r.accuracy) }
             dt { "Magnitude" } dd { (number(r.magnitude)) ", root mean square" }
-            dt { "Computed in" } dd { (number(r.seconds)) " s" @if r.from_cache { ", earlier, and kept" } }
+            dt { "Computed in" } dd { (number(r.seconds)) " s" @if r.from_cache { ", \
+                earlier, and kept" } }
             dt { "Reference hash" } dd { code { (r.hash) } }
-            dt { "Times" } dd { (study.rounds) " rounds of " (study.frames) " frames of every configuration in turn" }
+            dt { "Times" } dd { (study.rounds) " rounds of " (study.frames) " frames of every \
+                configuration in turn" }
         }
     }
 }
@@ -66,11 +70,22 @@ fn configurations(study: &Study) -> Markup {
         ]
     };
     let rows: Vec<Vec<Cell>> = study.configurations.iter().zip(&numbers).map(row).collect();
-    let header =
-        ["configuration", "№", "front", "GPU, ms", "frame, ms", "by the scene's", "RMSE", "max", "relMSE", "remark"];
+    let header = [
+        "configuration",
+        "№",
+        "front",
+        "GPU, ms",
+        "frame, ms",
+        "by the scene's",
+        "RMSE",
+        "max",
+        "relMSE",
+        "remark",
+    ];
     let decides = if study.time == "gpu" { "GPU time" } else { "frame time" };
     let caption = format!(
-        "Every configuration with 95 % intervals; {decides} and {} decide who is on the front, № is the number in the plot",
+        "Every configuration with 95 % intervals; {decides} and {} decide who is on the front, № \
+         is the number in the plot",
         metric_name(&study.metric)
     );
     table(&caption, &header, &rows)
@@ -130,16 +145,19 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
     let mut shown = Vec::new();
     for c in &study.configurations {
         let (picture, map) = (read(&c.picture)?, read(&c.error_map)?);
-        let map =
-            map.map(|map| map.figure(&format!("Where {} differs from the reference", c.name), "where they differ"));
-        let error = error_of(study, c)
-            .map_or(String::new(), |e: Figure| format!(", {} {}", metric_name(&study.metric), number(e.value)));
+        let map = map.map(|map| {
+            map.figure(&format!("Where {} differs from the reference", c.name), "where they differ")
+        });
+        let error = error_of(study, c).map_or(String::new(), |e: Figure| {
+            format!(", {} {}", metric_name(&study.metric), number(e.value))
+        });
         match (picture, &reference) {
             (Some(picture), Some(reference)) => {
                 // The reference stands once in the page: the script takes it from there.
                 let caption = format!("{}{error}", c.name);
                 shown.push(html! {
-                    div class="pair against-reference" data-label=(c.name) data-width=(reference.width) {
+                    div class="pair \
+                        against-reference" data-label=(c.name) data-width=(reference.width) {
                         (picture.figure(&caption, &caption))
                         @if let Some(map) = &map { (map) }
                     }
@@ -173,7 +191,9 @@ pub fn versus(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<
         }
     }
     let both = || {
-        a.configurations.iter().filter_map(|of_a| Some((of_a, b.configurations.iter().find(|c| c.name == of_a.name)?)))
+        a.configurations
+            .iter()
+            .filter_map(|of_a| Some((of_a, b.configurations.iter().find(|c| c.name == of_a.name)?)))
     };
     let row = |(of_a, of_b): (&Configuration, &Configuration)| -> Vec<Cell> {
         let times = time_of(a, of_a).zip(time_of(b, of_b));
@@ -194,10 +214,13 @@ pub fn versus(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<
             shown.extend(pictures::versus(&of_a.name, [(folder_a, name_a), (folder_b, name_b)])?);
         }
     }
-    let header = ["configuration", "A, ms", "B, ms", "B / A", "A, error", "B, error", "front in A / B"];
+    let header =
+        ["configuration", "A, ms", "B, ms", "B / A", "A, error", "B, error", "front in A / B"];
     Ok(html! {
         @if !remarks.is_empty() { ul class="remarks" { @for remark in &remarks { li { (remark) } } } }
-        @if rows.is_empty() { p { "A and B have no configuration in common." } } @else { (table("Configurations that both have", &header, &rows)) }
+        @if rows.is_empty() { p { "A and B have no \
+            configuration in common." } } @else { (table("Configurations \
+                that both have", &header, &rows)) }
         @for pair in &shown { (pair) }
     })
 }

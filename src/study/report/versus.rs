@@ -11,7 +11,9 @@ use super::table::{Cell, count, ms, table, text, value};
 use super::tradeoff;
 use crate::error::Result;
 use crate::study::beside::picture_file;
-use crate::study::compare::{Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks};
+use crate::study::compare::{
+    Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks,
+};
 use crate::study::difference::{Difference, differences, remarks};
 use crate::study::plot::number::with_interval;
 use crate::study::recorded::Recorded;
@@ -19,7 +21,9 @@ use crate::study::recorded::Recorded;
 pub fn section(a: &Source, b: &Source) -> Result<Markup> {
     let inner = match (&a.found, &b.found) {
         (Found::Bench(of_a), Found::Bench(of_b)) => benches(of_a, of_b, [&a.folder, &b.folder])?,
-        (Found::Study(of_a), Found::Study(of_b)) => tradeoff::versus(of_a, of_b, [&a.folder, &b.folder])?,
+        (Found::Study(of_a), Found::Study(of_b)) => {
+            tradeoff::versus(of_a, of_b, [&a.folder, &b.folder])?
+        }
         _ => html! {},
     };
     Ok(html! {
@@ -40,7 +44,8 @@ fn benches(a: &Recorded, b: &Recorded, folders: [&Path; 2]) -> Result<Markup> {
         @for mode in &modes { (headline(mode)) }
         @if !modes.is_empty() {
             (ratios(&modes))
-            p { (HEADLINE) " decides; the other rows are not corrected for many comparisons: of twenty equal ones, one will seem to differ. "
+            p { (HEADLINE) " decides; the other rows are not corrected for many comparisons: of \
+                twenty equal ones, one will seem to differ. "
                 "The intervals know the noise within the runs, not from one start to the next." }
         }
         (pictures_of(a, b, folders)?)
@@ -61,7 +66,8 @@ fn headline(mode: &ComparedMode) -> Markup {
     html! {
         p {
             strong { (mode.name) } ": "
-            @if let Some(r) = of.b_by_a { "a frame of B takes " (with_interval(r.estimate, Some(r.low), Some(r.high))) " of A's time: " }
+            @if let Some(r) = of.b_by_a { "a \
+                frame of B takes " (with_interval(r.estimate, Some(r.low), Some(r.high))) " of A's time: " }
             (of.verdict.text())
         }
     }
@@ -82,8 +88,20 @@ fn ratios(modes: &[ComparedMode]) -> Markup {
             text(m.verdict.text()),
         ]
     };
-    let rows: Vec<Vec<Cell>> = modes.iter().flat_map(|mode| mode.measures.iter().map(move |m| row(mode, m))).collect();
-    let header = ["measure", "loop", "A p50, ms", "B p50, ms", "B / A", "95 % low", "high", "n of A", "n of B", "B is"];
+    let rows: Vec<Vec<Cell>> =
+        modes.iter().flat_map(|mode| mode.measures.iter().map(move |m| row(mode, m))).collect();
+    let header = [
+        "measure",
+        "loop",
+        "A p50, ms",
+        "B p50, ms",
+        "B / A",
+        "95 % low",
+        "high",
+        "n of A",
+        "n of B",
+        "B is",
+    ];
     table("Medians, their ratios and 95 % intervals", &header, &rows)
 }
 
@@ -91,7 +109,9 @@ fn ratios(modes: &[ComparedMode]) -> Markup {
 fn pictures_of(a: &Recorded, b: &Recorded, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
     let mut shown = Vec::new();
     for (i, of_a) in a.run.cases.iter().enumerate() {
-        let Some(j) = b.run.cases.iter().position(|of_b| of_b.name() == of_a.name()) else { continue };
+        let Some(j) = b.run.cases.iter().position(|of_b| of_b.name() == of_a.name()) else {
+            continue;
+        };
         let files = [(folder_a, picture_file(i)), (folder_b, picture_file(j))];
         let [file_a, file_b] = [0, 1].map(|k| (files[k].0, files[k].1.as_str()));
         shown.extend(pictures::versus(&case_name(&a.run, i), [file_a, file_b])?);

@@ -1,5 +1,5 @@
-//! Materials and their basis: opposite ways, grazing light, exponents from 0 to a million, no reflection and too much, bases of
-//! lobes that do not differ.
+//! Materials and their basis: opposite ways, grazing light, exponents from 0 to a million, no
+//! reflection and too much, bases of lobes that do not differ.
 
 use glam::DVec3;
 
@@ -16,7 +16,8 @@ use crate::reference::rounding::U_F32;
 pub const CASES: &[Case] = &[
     Case {
         name: "brdf/opposite",
-        what: "light from where it is looked to, so that there is no half vector: half of the normal's square",
+        what: "light from where it is looked to, so that there is no half vector: half of the \
+            normal's square",
         bound: "0",
         run: opposite,
     },
@@ -32,7 +33,12 @@ pub const CASES: &[Case] = &[
         bound: "0",
         run: reciprocity,
     },
-    Case { name: "brdf/black", what: "a material that reflects nothing: L1 and L2 of 0", bound: "0", run: black },
+    Case {
+        name: "brdf/black",
+        what: "a material that reflects nothing: L1 and L2 of 0",
+        bound: "0",
+        run: black,
+    },
     Case {
         name: "brdf/too-bright",
         what: "K_d + 4 K_s of 5: what the formula says, and nothing is cut",
@@ -77,19 +83,22 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "brdf/negative",
-        what: "L1 of three bases for exponents from 1 to 1000, whose lobe of n = 300 is negative in places: negative it comes out",
+        what: "L1 of three bases for exponents from 1 to 1000, whose lobe of n = 300 is negative \
+            in places: negative it comes out",
         bound: "h^2/8 max |f''| of the table, rounding",
         run: negative,
     },
     Case {
         name: "brdf/albedo",
-        what: "the lobe's albedo by quadrature over the hemisphere, n from 0 to 100: its closed form from above, at most 4 elsewhere",
+        what: "the lobe's albedo by quadrature over the hemisphere, n from 0 to 100: its closed \
+            form from above, at most 4 elsewhere",
         bound: "1e-3 of 360 000 midpoints",
         run: albedo,
     },
 ];
 
-/// The gap of docs/model.md §6 of unit ways a and b, in the plane of the normal z: both as angles from it.
+/// The gap of docs/model.md §6 of unit ways a and b, in the plane of the normal z: both as angles
+/// from it.
 const GAP: &str = "vec3 a = vec3(x.x, 0.0, x.y), b = vec3(x.z, 0.0, x.w), n = vec3(0.0, 0.0, 1.0); \
     return vec4(half_vector_gap(n, a, b), half_vector_gap(n, b, a), lobe_at(0u, 0.0), 0.0);";
 
@@ -121,8 +130,10 @@ fn grazing(desk: &mut Desk) -> Result<Found> {
     let inputs: Vec<[f32; 4]> = (0..40_000)
         .map(|i| {
             let off = 1e-7 * 1e4f64.powf(f64::from(i / 4) / 10_000.0);
-            let (a, b) =
-                ([FRAC_PI_2 - off, FRAC_PI_2 + off][i as usize % 2], [0.3, FRAC_PI_2 - 2.0 * off][i as usize / 2 % 2]);
+            let (a, b) = (
+                [FRAC_PI_2 - off, FRAC_PI_2 + off][i as usize % 2],
+                [0.3, FRAC_PI_2 - 2.0 * off][i as usize / 2 % 2],
+            );
             let ([ax, az], [bx, bz]) = (way(a), way(b));
             [ax, az, bx, bz]
         })
@@ -134,7 +145,9 @@ fn grazing(desk: &mut Desk) -> Result<Found> {
         let length = hx.hypot(hz);
         let chord = (hx / length).hypot(1.0 - hz / length);
         let (truth, off) = (0.5 * chord * chord, 15.6 * U_F32);
-        c.add(f64::from(y[0]), truth, chord * off + 0.5 * off * off + 4.0 * U_F32 * truth, || format!("gap of {x:?}"));
+        c.add(f64::from(y[0]), truth, chord * off + 0.5 * off * off + 4.0 * U_F32 * truth, || {
+            format!("gap of {x:?}")
+        });
     }
     Ok(c.into())
 }
@@ -142,7 +155,8 @@ fn grazing(desk: &mut Desk) -> Result<Found> {
 fn reciprocity(desk: &mut Desk) -> Result<Found> {
     let inputs: Vec<[f32; 4]> = (0..40_000)
         .map(|i| {
-            let ([ax, az], [bx, bz]) = (way(f64::from(i) * 7.7e-5), way(f64::from(i % 997) * -1.5e-3));
+            let ([ax, az], [bx, bz]) =
+                (way(f64::from(i) * 7.7e-5), way(f64::from(i % 997) * -1.5e-3));
             [ax, az, bx, bz]
         })
         .collect();
@@ -155,8 +169,10 @@ fn reciprocity(desk: &mut Desk) -> Result<Found> {
 
 /// A floor of many facets under a lamp near by, so that every facet has another half vector.
 fn floor(desk: &Desk, [kd, ks, ns]: [f64; 3]) -> Result<Scene> {
-    let material = format!("kd = [{kd:?}, {kd:?}, {kd:?}]\nks = [{ks:?}, {ks:?}, {ks:?}]\nns = {ns:?}\n");
-    let lamp = "[[light]]\nkind = 'point'\nposition = [0.2, 1.5, -2.0]\nintensity = [4, 4, 4]\nradius = 0.01\n";
+    let material =
+        format!("kd = [{kd:?}, {kd:?}, {kd:?}]\nks = [{ks:?}, {ks:?}, {ks:?}]\nns = {ns:?}\n");
+    let lamp = "[[light]]\nkind = 'point'\nposition = [0.2, 1.5, -2.0]\nintensity = [4, 4, \
+        4]\nradius = 0.01\n";
     let floor = plate([0.0; 3], [0.0, 0.0, 2.0], [2.0, 0.0, 0.0], 14);
     room(desk, "gather = 'exact'\nbases = 16", lamp, &material, vec![floor])
 }
@@ -184,11 +200,18 @@ fn first(desk: &mut Desk, of: [f64; 3]) -> Result<Found> {
 }
 
 /// L1 of `scene`'s floor against that of a lobe as it is at the nodes, each facet at its own bound.
-fn first_of(desk: &mut Desk, scene: &Scene, [kd, ks, ns]: [f64; 3], lobe: &[f64]) -> Result<Comparison> {
+fn first_of(
+    desk: &mut Desk,
+    scene: &Scene,
+    [kd, ks, ns]: [f64; 3],
+    lobe: &[f64],
+) -> Result<Comparison> {
     let played = desk.play(scene, 0)?;
-    let table = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling).lobe(ns);
+    let table = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling)
+        .lobe(ns);
     let exact = (0..N_NODES).all(|i| lobe[i] == Brdf::lobe(ns, node(i)));
-    let (surface, light, eye) = (&scene.surfaces[0], &scene.lights[0], scene.camera.keys[0].position);
+    let (surface, light, eye) =
+        (&scene.surfaces[0], &scene.lights[0], scene.camera.keys[0].position);
     let mut c = Comparison::default();
     for (i, lit) in (0u32..).zip(&played.lit) {
         let (p, n) = (surface.facet_center(i), surface.normal());
@@ -198,18 +221,23 @@ fn first_of(desk: &mut Desk, scene: &Scene, [kd, ks, ns]: [f64; 3], lobe: &[f64]
         let w = 0.5 * (n - h).length_squared();
         let of_lobe = if exact { Brdf::lobe(ns, w) } else { evaluate(lobe, w) };
         let truth = irradiance * (kd * std::f64::consts::FRAC_1_PI + ks * of_lobe);
-        // Where of the table the half vector is: its entries' error, how the lobe bends there, and the rounding of the place.
+        // Where of the table the half vector is: its entries' error, how the lobe bends there, and
+        // the rounding of the place.
         let t = w.sqrt().sqrt() * (N_NODES - 1) as f64;
         let here = (t as usize).saturating_sub(1)..((t as usize) + 3).min(N_NODES);
         let entry = here.clone().map(|k| (table[k] - lobe[k]).abs()).fold(0.0, f64::max);
-        let bend = lobe[here.clone()].windows(3).map(|w| (w[2] - 2.0 * w[1] + w[0]).abs()).fold(0.0, f64::max);
+        let bend = lobe[here.clone()]
+            .windows(3)
+            .map(|w| (w[2] - 2.0 * w[1] + w[0]).abs())
+            .fold(0.0, f64::max);
         let steep = table[here].windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
-        // The gap is off by 15.6 u |chord|, and by as much as the ways' own 9 u turn it: 31 u |chord| moves t by 16 u/|chord| of
-        // itself; its roots by 16 u.
+        // The gap is off by 15.6 u |chord|, and by as much as the ways' own 9 u turn it: 31 u
+        // |chord| moves t by 16 u/|chord| of itself; its roots by 16 u.
         let chord = (n - h).length();
         let off = (16.0 + 16.0 / chord.max(1e-3)) * U_F32 * t.max(1.0);
         let rounding = 8.0 * U_F32 * table.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        let bound = irradiance * ks * (entry + 1.5 * bend / 8.0 + off * steep + rounding) + 32.0 * U_F32 * truth.abs();
+        let bound = irradiance * ks * (entry + 1.5 * bend / 8.0 + off * steep + rounding)
+            + 32.0 * U_F32 * truth.abs();
         c.add(f64::from(lit.first[0]), truth, bound, || format!("L1 of facet {i}"));
     }
     Ok(c)
@@ -229,7 +257,8 @@ fn huge_exponent(_: &mut Desk) -> Result<Found> {
             n >>= 1;
         }
         let truth = (N + 2.0) / std::f64::consts::TAU * power;
-        // 1 - w is rounded once, and raised to n; each product rounds, and is squared with the rest.
+        // 1 - w is rounded once, and raised to n; each product rounds, and is squared with the
+        // rest.
         let bound = 4.0 * N * 2f64.powi(-53) * truth + f64::MIN_POSITIVE;
         c.add(Brdf::lobe(N, w), truth, bound, || format!("lobe at node {i}"));
     }
@@ -261,7 +290,9 @@ fn more_than_samples(_: &mut Desk) -> Result<Found> {
             }
         }
         let odd = basis.vectors().iter().flatten().filter(|v| !v.is_finite()).count();
-        c.add(odd as f64, 0.0, 0.0, || format!("numbers of vectors that are not finite, {range:?}"));
+        c.add(odd as f64, 0.0, 0.0, || {
+            format!("numbers of vectors that are not finite, {range:?}")
+        });
         for ns in basis.spread(9) {
             // Every vector that differs is there: what is left is the sampling's.
             c.holds(basis.error(ns) < 1e-3, || format!("error of n = {ns}: {:e}", basis.error(ns)));
@@ -275,7 +306,8 @@ fn negative(desk: &mut Desk) -> Result<Found> {
     let mut scene = floor(desk, [0.0, 0.2, NS])?;
     scene.lighting.mode = LightingMode::First;
     (scene.lighting.exponents, scene.lighting.bases) = ([1.0, 1000.0], 3);
-    let table = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling).lobe(NS);
+    let table = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling)
+        .lobe(NS);
     let c = first_of(desk, &scene, [0.0, 0.2, NS], &table)?;
     let mut c = c;
     let n_negative = (0..N_NODES).filter(|i| table[*i] < 0.0).count();
@@ -295,13 +327,23 @@ fn albedo(_: &mut Desk) -> Result<Found> {
             for i in 0..N {
                 for j in 0..N {
                     // Midpoints over cos^2 and the turn: dw cos = d(cos^2)/2 dphi.
-                    let (s, turn) = ((f64::from(i) + 0.5) / f64::from(N), (f64::from(j) + 0.5) / f64::from(N));
-                    let (cos, sin, phi) = (s.sqrt(), (1.0 - s).sqrt(), turn * std::f64::consts::TAU);
-                    sum += reflectance(&brdf, n, from, DVec3::new(sin * phi.cos(), sin * phi.sin(), cos)).x;
+                    let (s, turn) =
+                        ((f64::from(i) + 0.5) / f64::from(N), (f64::from(j) + 0.5) / f64::from(N));
+                    let (cos, sin, phi) =
+                        (s.sqrt(), (1.0 - s).sqrt(), turn * std::f64::consts::TAU);
+                    sum += reflectance(
+                        &brdf,
+                        n,
+                        from,
+                        DVec3::new(sin * phi.cos(), sin * phi.sin(), cos),
+                    )
+                    .x;
                 }
             }
             let albedo = sum * std::f64::consts::PI / f64::from(N * N);
-            c.add((albedo - 4.0).max(0.0), 0.0, 4e-3, || format!("albedo of n = {ns} at {theta} beyond 4"));
+            c.add((albedo - 4.0).max(0.0), 0.0, 4e-3, || {
+                format!("albedo of n = {ns} at {theta} beyond 4")
+            });
             if theta == 0.0 {
                 // With x = cos gamma, cos = 2 x^2 - 1 and dw = 8 pi x dx from 1/sqrt 2 to 1.
                 let part = |k: f64| (1.0 - 2f64.powf(-0.5 * k)) / k;

@@ -152,9 +152,12 @@ mod tests {
 
     #[test]
     fn what_is_no_number_is_beyond_every_bound() {
-        for (value, truth) in
-            [(f64::NAN, 1.0), (1.0, f64::NAN), (f64::INFINITY, 1.0), (f64::INFINITY, f64::NEG_INFINITY)]
-        {
+        for (value, truth) in [
+            (f64::NAN, 1.0),
+            (1.0, f64::NAN),
+            (f64::INFINITY, 1.0),
+            (f64::INFINITY, f64::NEG_INFINITY),
+        ] {
             let mut c = Comparison::default();
             c.add(value, truth, 1e300, String::new);
             c.add(value, truth, f64::INFINITY, String::new);

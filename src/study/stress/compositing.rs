@@ -1,5 +1,6 @@
-//! Layers over layers: very many, opaque ones, equal depths, subnormal numbers, either order. A pixel of one layer shows its
-//! opacity as the device has it; laws of many are told by that, so that only composing is judged.
+//! Layers over layers: very many, opaque ones, equal depths, subnormal numbers, either order. A
+//! pixel of one layer shows its opacity as the device has it; laws of many are told by that, so
+//! that only composing is judged.
 
 use glam::DVec3;
 
@@ -36,7 +37,12 @@ pub const CASES: &[Case] = &[
         bound: "0",
         run: |desk| opaque(desk, SPRITES),
     },
-    Case { name: "compositing/opaque-tiles", what: "the same by tiles", bound: "0", run: |desk| opaque(desk, TILES) },
+    Case {
+        name: "compositing/opaque-tiles",
+        what: "the same by tiles",
+        bound: "0",
+        run: |desk| opaque(desk, TILES),
+    },
     Case {
         name: "compositing/alternating",
         what: "200 layers, opaque and thin by turns: the nearest opaque one and what is before it",
@@ -63,7 +69,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "compositing/subnormal-colour",
-        what: "layers whose colour is subnormal: no number is odd, and none is more than the colour",
+        what: "layers whose colour is subnormal: no number is odd, and none is more \
+            than the colour",
         bound: "1e-39 and 2^-126 a layer",
         run: subnormal_colour,
     },
@@ -75,7 +82,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "compositing/saturated-half",
-        what: "radiances of 1e6 in a target of 16 bits, which holds 65504: infinite or that, alpha right",
+        what: "radiances of 1e6 in a target of 16 bits, which holds 65504: infinite or \
+            that, alpha right",
         bound: "0 in alpha; infinity or 65504 in colour",
         run: saturated_half,
     },
@@ -119,15 +127,19 @@ fn thin(desk: &mut Desk, path: &str) -> Result<Found> {
         let n = f64::from(N);
         let passed = n * (-a).ln_1p();
         let truth = -passed.exp_m1();
-        // Blending: of every layer what is written is rounded, by 2 u of it, and (1 - a) of that goes on: no more than 2 u/a of it, and as much again by second orders.
-        // Tiles: A + (1 - A) a, whose sum is rounded as what it is; 1 - A and the product by 2 u of what is added, all of them once.
+        // Blending: of every layer what is written is rounded, by 2 u of it, and (1 - a) of that
+        // goes on: no more than 2 u/a of it, and as much again by second orders. Tiles: A + (1 - A)
+        // a, whose sum is rounded as what it is; 1 - A and the product by 2 u of what is added, all
+        // of them once.
         let bound = match is_tiled {
             false => (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth,
             true => (U_F32 * n + 4.0 * U_F32) * truth,
         };
         c.add(channel(&all, i, 3), truth, bound, || format!("alpha, opacity {a:e} each"));
         for (k, light) in [0.75, 0.5, 0.25].into_iter().enumerate() {
-            c.add(channel(&all, i, k), light * truth, bound, || format!("channel {k}, opacity {a:e} each"));
+            c.add(channel(&all, i, k), light * truth, bound, || {
+                format!("channel {k}, opacity {a:e} each")
+            });
         }
     }
     Ok(c.into())
@@ -153,7 +165,11 @@ fn alternating(desk: &mut Desk) -> Result<Found> {
     let of = |i: u32| {
         let z = -4.0 + 0.02 * f64::from(i);
         let is_thin = i % 2 == 1;
-        let color = if is_thin { DVec3::new(0.0, 1.0, 0.0) } else { DVec3::new(1.0, 0.0, f64::from(i) / 256.0) };
+        let color = if is_thin {
+            DVec3::new(0.0, 1.0, 0.0)
+        } else {
+            DVec3::new(1.0, 0.0, f64::from(i) / 256.0)
+        };
         Particle { color, ..blob([0.0, 0.0, z], 0.5, if is_thin { 0.01 } else { 1e4 }) }
     };
     let all: Vec<Particle> = (0..200).map(of).collect();
@@ -165,7 +181,9 @@ fn alternating(desk: &mut Desk) -> Result<Found> {
         let last = all[198].color;
         let truth = [(1.0 - thin) * last.x, thin, (1.0 - thin) * last.z, 1.0];
         for (k, truth) in truth.into_iter().enumerate() {
-            c.add(channel(&played, MIDDLE, k), truth, 2.0 * 2f64.powi(-23), || format!("{path}, channel {k}"));
+            c.add(channel(&played, MIDDLE, k), truth, 2.0 * 2f64.powi(-23), || {
+                format!("{path}, channel {k}")
+            });
         }
     }
     Ok(c.into())
@@ -173,7 +191,8 @@ fn alternating(desk: &mut Desk) -> Result<Found> {
 
 fn equal_depths(desk: &mut Desk) -> Result<Found> {
     let colors = [DVec3::X, DVec3::Y, DVec3::Z];
-    let all: Vec<Particle> = (0..30).map(|i| Particle { color: colors[i % 3], ..blob([0.0; 3], 0.5, 0.4) }).collect();
+    let all: Vec<Particle> =
+        (0..30).map(|i| Particle { color: colors[i % 3], ..blob([0.0; 3], 0.5, 0.4) }).collect();
     let mut c = Comparison::default();
     for path in [SPRITES, TILES] {
         let a = channel(&draw(desk, path, vec![all[0]])?, MIDDLE, 3);
@@ -195,8 +214,10 @@ fn one_colour(n: u32) -> Vec<Particle> {
 fn reversed(desk: &mut Desk) -> Result<Found> {
     const N: u32 = 100;
     // All at one depth: the order of the list is that of the layers.
-    let forwards: Vec<Particle> =
-        one_colour(N).into_iter().map(|p| Particle { position: p.position * DVec3::new(1.0, 1.0, 0.0), ..p }).collect();
+    let forwards: Vec<Particle> = one_colour(N)
+        .into_iter()
+        .map(|p| Particle { position: p.position * DVec3::new(1.0, 1.0, 0.0), ..p })
+        .collect();
     let backwards: Vec<Particle> = forwards.iter().rev().copied().collect();
     let mut c = Comparison::default();
     for path in [SPRITES, TILES] {
@@ -226,14 +247,19 @@ fn subnormal_colour(desk: &mut Desk) -> Result<Found> {
     const LIGHT: f64 = 1e-39;
     let mut c = Comparison::default();
     for path in [SPRITES, TILES] {
-        let all: Vec<Particle> = heap(300).into_iter().map(|p| Particle { color: DVec3::splat(LIGHT), ..p }).collect();
+        let all: Vec<Particle> =
+            heap(300).into_iter().map(|p| Particle { color: DVec3::splat(LIGHT), ..p }).collect();
         let played = draw(desk, path, all)?;
         for i in 0..WIDTH * 49 {
             for k in 0..3 {
                 let bound = LIGHT + 300.0 * f64::from(f32::MIN_POSITIVE);
-                c.add(channel(&played, i, k), 0.0, bound, || format!("{path}, pixel {i}, channel {k}"));
+                c.add(channel(&played, i, k), 0.0, bound, || {
+                    format!("{path}, pixel {i}, channel {k}")
+                });
             }
-            c.holds((0.0..=1.0).contains(&channel(&played, i, 3)), || format!("{path}, alpha of pixel {i}"));
+            c.holds((0.0..=1.0).contains(&channel(&played, i, 3)), || {
+                format!("{path}, alpha of pixel {i}")
+            });
         }
     }
     Ok(c.into())
@@ -247,7 +273,9 @@ fn bright(desk: &mut Desk) -> Result<Found> {
         let played = draw(desk, path, vec![layer])?;
         for i in 0..WIDTH * 49 {
             let truth = f64::from(LIGHT as f32) * channel(&played, i, 3);
-            c.add(channel(&played, i, 0), truth, 2f64.powi(-22) * truth, || format!("{path}, pixel {i}"));
+            c.add(channel(&played, i, 0), truth, 2f64.powi(-22) * truth, || {
+                format!("{path}, pixel {i}")
+            });
         }
     }
     Ok(c.into())
@@ -274,16 +302,19 @@ fn saturated_half(desk: &mut Desk) -> Result<Found> {
 fn paths(desk: &mut Desk) -> Result<Found> {
     const N: u32 = 800;
     // At 8 sigma the step at a sprite's rim is nothing, and it does not matter who has it.
-    let [a, b] =
-        ["path = 'sprites'\ncutoff = 8", "path = 'tiles'\ncutoff = 8"].map(|drawing| draw(desk, drawing, heap(N)));
+    let [a, b] = ["path = 'sprites'\ncutoff = 8", "path = 'tiles'\ncutoff = 8"]
+        .map(|drawing| draw(desk, drawing, heap(N)));
     let (a, b) = (a?, b?);
     let mut c = Comparison::default();
     for i in 0..WIDTH * 49 {
-        // What the opacities' errors can do is bounded by the depth of all of them, which alpha tells where it is not full.
+        // What the opacities' errors can do is bounded by the depth of all of them, which alpha
+        // tells where it is not full.
         let tau = -(1.0 - channel(&a, i, 3)).max(1e-7).ln();
         let bound = f64::from(N) * 2f64.powi(-22) + (2e-6 + 64.0 * U_F32) * tau;
         for k in 0..4 {
-            c.add(channel(&a, i, k), channel(&b, i, k), bound, || format!("pixel {i}, channel {k}"));
+            c.add(channel(&a, i, k), channel(&b, i, k), bound, || {
+                format!("pixel {i}, channel {k}")
+            });
         }
     }
     Ok(c.into())

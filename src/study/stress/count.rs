@@ -1,4 +1,5 @@
-//! Count by distance, C (4) to (6), at the edge: no distance and an endless one, no size, as many as 32 bits hold, one for all.
+//! Count by distance, C (4) to (6), at the edge: no distance and an endless one, no size, as many
+//! as 32 bits hold, one for all.
 
 use glam::DVec3;
 
@@ -44,13 +45,15 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "count/weights",
-        what: "each particle's factor against the reference, from all of them to a millionth of one",
+        what: "each particle's factor against the reference, from all of them to a \
+            millionth of one",
         bound: "3 u of f32's factors, and 2^-52 of the count",
         run: each_weight,
     },
     Case {
         name: "count/drawn",
-        what: "opacity of coincident blobs as the device draws fewer of them: what all together have",
+        what: "opacity of coincident blobs as the device draws fewer of them: what all \
+            together have",
         bound: "(1e-6 + 16 u) tau, and 2^-23 a layer",
         run: drawn,
     },
@@ -134,7 +137,9 @@ fn most(_: &mut Desk) -> Result<Found> {
         });
     }
     for d in [0.0, -1e9] {
-        c.add(f64::from(COUNT.drawn(n, COUNT.share(1e9, d)).n), f64::from(n), 0.0, || format!("all, at {d:e}"));
+        c.add(f64::from(COUNT.drawn(n, COUNT.share(1e9, d)).n), f64::from(n), 0.0, || {
+            format!("all, at {d:e}")
+        });
     }
     Ok(c.into())
 }
@@ -151,7 +156,9 @@ fn conserved(_: &mut Desk) -> Result<Found> {
             let (end, scale, last) = told(n, &COUNT.drawn(n, share));
             let sum = scale * (f64::from(end) - 1.0 + last);
             // The factor and the weight are rounded to f32, and the weight is 1 at most.
-            c.add(sum, f64::from(n), 3.0 * U_F32 * f64::from(n), || format!("{n} particles, share {share:e}"));
+            c.add(sum, f64::from(n), 3.0 * U_F32 * f64::from(n), || {
+                format!("{n} particles, share {share:e}")
+            });
         }
     }
     Ok(c.into())
@@ -193,7 +200,10 @@ fn drawn(desk: &mut Desk) -> Result<Found> {
     for path in ["sprites", "tiles"] {
         // Of C's formula with d0 = 1 the eye at 10 sees e^{-10/a}: from all to one.
         for a in [1e9, 20.0, 5.0, 3.0, 2.45] {
-            let text = format!("{PLAIN}[draw]\npath = '{path}'\ncount = 'distance'\ncount_a = {a:?}\ncount_d0 = 1.0\n");
+            let text = format!(
+                "{PLAIN}[draw]\npath = '{path}'\ncount = 'distance'\ncount_a = \
+                 {a:?}\ncount_d0 = 1.0\n"
+            );
             let scene = with_particles(desk, &text, vec![blob([0.0; 3], 0.5, TAU); N as usize])?;
             let played = desk.play(&scene, 0)?;
             let middle = played.rgba[4 * (24 * 65 + 32) + 3];

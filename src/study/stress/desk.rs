@@ -1,4 +1,5 @@
-//! What cases are run on: a device with nimbus's shaders, for single functions of them and for whole scenes.
+//! What cases are run on: a device with nimbus's shaders, for single functions of them and for
+//! whole scenes.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -84,15 +85,23 @@ impl Desk {
         Ok(Desk { commands, sources, choice: choice.clone(), bed })
     }
 
-    /// Another one on the same device whose shaders, where they take workgroups of 64, take `n`. (Others' are made of subgroups, or of
-    /// what shared memory holds.)
+    /// Another one on the same device whose shaders, where they take workgroups of 64, take `n`.
+    /// (Others' are made of subgroups, or of what shared memory holds.)
     pub fn in_workgroups_of(&self, n: u32) -> Result<Desk> {
-        let names: Vec<String> =
-            self.sources.names().filter(|name| name.ends_with(".comp")).map(str::to_owned).collect();
+        let names: Vec<String> = self
+            .sources
+            .names()
+            .filter(|name| name.ends_with(".comp"))
+            .map(str::to_owned)
+            .collect();
         let mut sources = self.sources.clone();
         let mut n_changed = 0;
         for name in names {
-            n_changed += u32::from(sources.replace(&name, "local_size_x = 64", &format!("local_size_x = {n}")));
+            n_changed += u32::from(sources.replace(
+                &name,
+                "local_size_x = 64",
+                &format!("local_size_x = {n}"),
+            ));
         }
         if n_changed < LEAST_CHANGED {
             return Err(Error::usage(format!(
@@ -123,19 +132,32 @@ impl Desk {
         bed.close()
     }
 
-    /// A kernel of a text of the suite's own, which may include what nimbus's shaders include, and its macros.
-    pub fn kernel(&self, name: &str, text: &str, push: &[Field], macros: &[(&str, u32)]) -> Result<Kernel> {
+    /// A kernel of a text of the suite's own, which may include what nimbus's shaders include, and
+    /// its macros.
+    pub fn kernel(
+        &self,
+        name: &str,
+        text: &str,
+        push: &[Field],
+        macros: &[(&str, u32)],
+    ) -> Result<Kernel> {
         let sources = self.sources.clone().with_text(&format!("{name}.comp"), text);
         let compiler = Compiler::new(sources, Compiler::default_cache())?;
         Kernel::with_macros(&self.bed.device, &compiler, name, push, &[], macros)
     }
 
     /// `body`, the inside of a GLSL function `vec4 probe(vec4 x)`, of every one of `inputs`.
-    pub fn probe(&mut self, includes: &[&str], body: &str, inputs: &[[f32; 4]]) -> Result<Vec<[f32; 4]>> {
+    pub fn probe(
+        &mut self,
+        includes: &[&str],
+        body: &str,
+        inputs: &[[f32; 4]],
+    ) -> Result<Vec<[f32; 4]>> {
         self.probe_beside(&[], includes, body, inputs)
     }
 
-    /// The same with tables: each a declaration's name, a `samplerBuffer` that the includes and `body` may read, and what it holds.
+    /// The same with tables: each a declaration's name, a `samplerBuffer` that the includes and
+    /// `body` may read, and what it holds.
     pub fn probe_beside(
         &mut self,
         tables: &[(&str, &[f32])],
@@ -144,14 +166,17 @@ impl Desk {
         inputs: &[[f32; 4]],
     ) -> Result<Vec<[f32; 4]>> {
         let declared = tables.iter().enumerate();
-        let declared =
-            declared.map(|(i, (name, _))| format!("layout(binding = {}) uniform samplerBuffer {name};\n", i + 2));
-        let included = ["each.glsl"].iter().chain(includes).map(|name| format!("#include \"{name}\"\n"));
+        let declared = declared.map(|(i, (name, _))| {
+            format!("layout(binding = {}) uniform samplerBuffer {name};\n", i + 2)
+        });
+        let included =
+            ["each.glsl"].iter().chain(includes).map(|name| format!("#include \"{name}\"\n"));
         let above: String = declared.chain(included).collect();
         let text = PROBE.replace("ABOVE", &above).replace("BODY", body);
         let kernel = self.kernel("probe", &text, ProbePush::FIELDS, &[])?;
         let (x, y) = (self.upload(inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
-        let tables = tables.iter().map(|(_, table)| self.upload(table)).collect::<Result<Vec<Buffer>>>()?;
+        let tables =
+            tables.iter().map(|(_, table)| self.upload(table)).collect::<Result<Vec<Buffer>>>()?;
         let buffers: Vec<&Buffer> = [&x, &y].into_iter().chain(&tables).collect();
         let push = ProbePush { n: inputs.len() as u32 };
         self.run(|rec| rec.dispatch(&kernel, &buffers, &push, push.n))?;
@@ -166,7 +191,8 @@ impl Desk {
 
     /// A device buffer that holds `data`.
     pub fn upload<T: Pod>(&mut self, data: &[T]) -> Result<Buffer> {
-        let mut staging = Buffer::new::<T>(&self.bed.device, "stress.staging", data.len() as u64, Place::Upload)?;
+        let mut staging =
+            Buffer::new::<T>(&self.bed.device, "stress.staging", data.len() as u64, Place::Upload)?;
         staging.write(data)?;
         let buffer = self.buffer::<T>(data.len())?;
         self.run(|rec| {
@@ -183,7 +209,8 @@ impl Desk {
 
     /// The first `n` records of a device buffer.
     pub fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Result<Vec<T>> {
-        let readback = Buffer::new::<T>(&self.bed.device, "stress.readback", n as u64, Place::Readback)?;
+        let readback =
+            Buffer::new::<T>(&self.bed.device, "stress.readback", n as u64, Place::Readback)?;
         self.run(|rec| {
             rec.copy(buffer, &readback);
             Ok(())

@@ -1,5 +1,5 @@
-//! The same bytes whatever way a frame is made: again, in workgroups of other sizes, on one thread or two, with what is left out
-//! and without, alone or after others, from memory that holds NaN.
+//! The same bytes whatever way a frame is made: again, in workgroups of other sizes, on one thread
+//! or two, with what is left out and without, alone or after others, from memory that holds NaN.
 
 use super::case::{Case, Comparison, Found};
 use super::desk::Desk;
@@ -12,7 +12,12 @@ use crate::model::scene::{Scene, Threading};
 use crate::study::stress::scenes::cloud_of;
 
 pub const CASES: &[Case] = &[
-    Case { name: "determinism/runs", what: "a frame of everything, made twice", bound: "0: the same bytes", run: runs },
+    Case {
+        name: "determinism/runs",
+        what: "a frame of everything, made twice",
+        bound: "0: the same bytes",
+        run: runs,
+    },
     Case {
         name: "determinism/workgroups-32",
         what: "shaders that work by single records in workgroups of 32 and not 64",
@@ -55,11 +60,15 @@ pub const CASES: &[Case] = &[
 fn everything(desk: &Desk, path: &str) -> Result<Scene> {
     let text = LIT.replace("mode = 'first'", "mode = 'two-reflection'\nfacets_per_cloud = 48");
     let text = format!(
-        "{text}[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 4]\nv = [4, 0, 0]\nsubdivide = [3, 3]\nmaterial = 'cloud'\n\
+        "{text}[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 4]\nv = [4, 0, 0]\nsubdivide = [3, \
+         3]\nmaterial = 'cloud'\n\
          [time]\nstep_s = 0.25\n[draw]\npath = '{path}'\n"
     );
-    let mut scene =
-        with_boxes(desk, &text, vec![one_box(150, [2.0, 1.0, 2.0], 0.8), one_box(80, [1.0, 2.0, 1.0], 0.5)])?;
+    let mut scene = with_boxes(
+        desk,
+        &text,
+        vec![one_box(150, [2.0, 1.0, 2.0], 0.8), one_box(80, [1.0, 2.0, 1.0], 0.5)],
+    )?;
     scene.clouds[0].gust = Gust { amplitude: 0.2, length: 2.0, period_s: 3.0, n_waves: 8 };
     let mut list = cloud_of(CloudSource::Particles(heap(60)));
     list.wind = glam::DVec3::new(0.3, 0.0, -0.1);
@@ -120,7 +129,9 @@ fn compare(desk: &Desk, a: (Threading, bool), b: (Threading, bool)) -> Result<Fo
         for (i, (a, b)) in a.iter().zip(&b).enumerate() {
             c.same(a, b, &format!("bytes of frame {i}, {path}"));
         }
-        c.holds(a.len() == N_FRAMES as usize && a[0] != a[1], || "frames that differ from each other".to_owned());
+        c.holds(a.len() == N_FRAMES as usize && a[0] != a[1], || {
+            "frames that differ from each other".to_owned()
+        });
     }
     Ok(c.into())
 }

@@ -12,11 +12,17 @@ use crate::reference::rounding::{DIVISION_ERROR, SINE_ERROR, U_F32, erf_bound};
 pub const CASES: &[Case] = &[
     Case {
         name: "functions/rounding",
-        what: "sums, differences and products over 60 binades, as all other bounds take them to be rounded",
+        what: "sums, differences and products over 60 binades, as all other bounds take them \
+            to be rounded",
         bound: "0: rounded to nearest",
         run: rounding,
     },
-    Case { name: "functions/division", what: "quotients over 60 binades", bound: "2.5 ulp (Vulkan)", run: division },
+    Case {
+        name: "functions/division",
+        what: "quotients over 60 binades",
+        bound: "2.5 ulp (Vulkan)",
+        run: division,
+    },
     Case {
         name: "functions/square-root",
         what: "sqrt from 1e-30 to 1e30",
@@ -85,7 +91,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "functions/half-vector",
-        what: "1 - cos of the angle to the half vector, without acos, from 1e-6 of a radian to a right angle",
+        what: "1 - cos of the angle to the half vector, without acos, from 1e-6 of a radian to \
+            a right angle",
         bound: "|chord| 15.6 u and its square",
         run: half_vector,
     },
@@ -115,7 +122,8 @@ pub(super) fn ulp(x: f64) -> f64 {
     (exponent - 23.0).exp2()
 }
 
-/// `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to `high`.
+/// `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to
+/// `high`.
 fn sweep(low: f64, high: f64, n: usize) -> Vec<f32> {
     let share = |i: usize| (i as f64 + 0.5) / n as f64;
     let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -145,23 +153,27 @@ fn compare(
     Ok(c.into())
 }
 
-/// Pairs of numbers whose sums, products and quotients are normal numbers, many of nearly the same size.
+/// Pairs of numbers whose sums, products and quotients are normal numbers, many of nearly the same
+/// size.
 fn pairs() -> Vec<[f32; 4]> {
     let (a, b) = (sweep(1e-9, 1e9, 60_013), sweep(1e-9, 1e9, 60_013));
     let far = a.iter().zip(b.iter().rev()).map(|(a, b)| [*a, *b, 0.0, 0.0]);
     // The same exponent, other digits: what cancels.
-    let near = a.iter().enumerate().map(|(i, a)| [*a, -a * (1.0 + 1e-4 * (i % 977) as f32), 0.0, 0.0]);
+    let near =
+        a.iter().enumerate().map(|(i, a)| [*a, -a * (1.0 + 1e-4 * (i % 977) as f32), 0.0, 0.0]);
     far.chain(near).collect()
 }
 
 fn rounding(desk: &mut Desk) -> Result<Found> {
     let pairs = pairs();
-    let body = "precise float s = x.x + x.y, d = x.x - x.y, p = x.x * x.y; return vec4(s, d, p, 0.0);";
+    let body =
+        "precise float s = x.x + x.y, d = x.x - x.y, p = x.x * x.y; return vec4(s, d, p, 0.0);";
     let found = desk.probe(&[], body, &pairs)?;
     let mut c = Comparison::default();
     for ([a, b, ..], y) in pairs.iter().zip(found) {
         let (a, b) = (f64::from(*a), f64::from(*b));
-        for (k, (sign, exact)) in [("+", a + b), ("-", a - b), ("*", a * b)].into_iter().enumerate() {
+        for (k, (sign, exact)) in [("+", a + b), ("-", a - b), ("*", a * b)].into_iter().enumerate()
+        {
             // f64 rounds first, which changes nothing: it has more than twice the digits and two.
             let truth = f64::from(exact as f32);
             c.add(f64::from(y[k]), truth, 0.0, || format!("{a:e} {sign} {b:e}"));
@@ -191,25 +203,47 @@ fn square_root(desk: &mut Desk) -> Result<Found> {
 
 fn inverse_root(desk: &mut Desk) -> Result<Found> {
     let x = positive(1e-30, 1e30, 200_000);
-    compare(desk, &[], "return vec4(inversesqrt(x.x));", &x, |x| 1.0 / x.sqrt(), |_, t| 2.0 * ulp(t))
+    compare(
+        desk,
+        &[],
+        "return vec4(inversesqrt(x.x));",
+        &x,
+        |x| 1.0 / x.sqrt(),
+        |_, t| 2.0 * ulp(t),
+    )
 }
 
 fn exponential(desk: &mut Desk) -> Result<Found> {
     let mut x = positive(1e-30, 87.0, 200_000);
     x.push(0.0);
-    compare(desk, &[], "return vec4(exp(-x.x));", &x, |x| (-x).exp(), |x, t| (3.0 + 2.0 * x) * ulp(t))
+    compare(
+        desk,
+        &[],
+        "return vec4(exp(-x.x));",
+        &x,
+        |x| (-x).exp(),
+        |x, t| (3.0 + 2.0 * x) * ulp(t),
+    )
 }
 
 fn exponential_end(desk: &mut Desk) -> Result<Found> {
     let mut x = positive(88.0, 1e38, 20_000);
     x.extend([f32::MAX, f32::INFINITY]);
-    compare(desk, &[], "return vec4(exp(-x.x));", &x, |x| (-x).exp(), |_, _| f64::from(f32::MIN_POSITIVE))
+    compare(
+        desk,
+        &[],
+        "return vec4(exp(-x.x));",
+        &x,
+        |x| (-x).exp(),
+        |_, _| f64::from(f32::MIN_POSITIVE),
+    )
 }
 
 fn logarithm(desk: &mut Desk) -> Result<Found> {
     let mut x = positive(1e-30, 1e30, 200_000);
     x.extend((0..100_000).map(|i| 0.5 + 1.5 * i as f32 / 100_000.0));
-    let bound = |x: f64, t: f64| if (0.5..=2.0).contains(&x) { (-21f64).exp2() } else { 3.0 * ulp(t) };
+    let bound =
+        |x: f64, t: f64| if (0.5..=2.0).contains(&x) { (-21f64).exp2() } else { 3.0 * ulp(t) };
     compare(desk, &[], "return vec4(log(x.x));", &x, f64::ln, bound)
 }
 
@@ -222,7 +256,8 @@ fn sine(desk: &mut Desk) -> Result<Found> {
         x.extend([at.next_down(), at, at.next_up()]);
     }
     let bound = |x: f64, _: f64| {
-        // The arguments are exact, and so is what the first part of pi leaves; three more subtractions round what is at most pi/2.
+        // The arguments are exact, and so is what the first part of pi leaves; three more
+        // subtractions round what is at most pi/2.
         let e = if x.abs() > FRAC_PI_2 { 5.0 * U_F32 } else { 0.0 };
         SINE_ERROR + x.cos().abs() * e + 0.5 * e * e
     };
@@ -240,8 +275,9 @@ fn sine_far(desk: &mut Desk) -> Result<Found> {
 }
 
 fn unit_vectors(desk: &mut Desk) -> Result<Found> {
-    let x: Vec<[f32; 4]> =
-        (-(1 << 19)..=1 << 19).map(|i| [(f64::from(i) / f64::from(1 << 20)) as f32, 0.0, 0.0, 0.0]).collect();
+    let x: Vec<[f32; 4]> = (-(1 << 19)..=1 << 19)
+        .map(|i| [(f64::from(i) / f64::from(1 << 20)) as f32, 0.0, 0.0, 0.0])
+        .collect();
     let found = desk.probe(&FUNCTIONS, "return vec4(unit_at(x.x), 0.0, 0.0);", &x)?;
     let mut c = Comparison::default();
     for ([x, ..], y) in x.iter().zip(found) {
@@ -264,32 +300,47 @@ fn power_of_two(desk: &mut Desk) -> Result<Found> {
         let at = 0.5 * k as f32;
         [at.next_down(), at, at.next_up()]
     }));
-    compare(desk, &FUNCTIONS, "return vec4(power_of_two(x.x));", &x, f64::exp2, |_, t| (7.5e-8 + 3.7 * U_F32) * t)
+    compare(desk, &FUNCTIONS, "return vec4(power_of_two(x.x));", &x, f64::exp2, |_, t| {
+        (7.5e-8 + 3.7 * U_F32) * t
+    })
 }
 
 fn one_minus_exp(desk: &mut Desk) -> Result<Found> {
     let mut x = positive(1e-30, 1e38, 200_000);
     x.extend([0.0, 0.5f32.next_down(), 0.5, 1.0, f32::MAX]);
-    compare(desk, &FUNCTIONS, "return vec4(one_minus_exp(x.x));", &x, |x| -(-x).exp_m1(), |_, t| 1e-6 * t)
+    compare(
+        desk,
+        &FUNCTIONS,
+        "return vec4(one_minus_exp(x.x));",
+        &x,
+        |x| -(-x).exp_m1(),
+        |_, t| 1e-6 * t,
+    )
 }
 
 /// What lobe.glsl has with no table of its own.
 const NO_TABLE: [(&str, &[f32]); 1] = [("table", &[0.0; 2])];
 
 fn half_vector(desk: &mut Desk) -> Result<Found> {
-    // The normal (0, 0, 1), and two ways in the xz plane on either side of one at an angle to it: near to each other, and, at each
-    // fourth place, next to opposite, so that their sum is down to 1e-6 long. Rounded.
+    // The normal (0, 0, 1), and two ways in the xz plane on either side of one at an angle to it:
+    // near to each other, and, at each fourth place, next to opposite, so that their sum is down to
+    // 1e-6 long. Rounded.
     let inputs: Vec<[f32; 4]> = (0..100_000)
         .map(|i| {
             let share = f64::from(i) / 100_000.0;
             let angle = 1e-6 * (PI / 2.0 * 1e6f64).powf(share);
-            let apart = if i % 4 == 0 { FRAC_PI_2 - 1e-6 * 1e5f64.powf(share) } else { 0.3 * f64::from(i % 7) };
+            let apart = if i % 4 == 0 {
+                FRAC_PI_2 - 1e-6 * 1e5f64.powf(share)
+            } else {
+                0.3 * f64::from(i % 7)
+            };
             let (a, b) = (angle + apart, angle - apart);
             [a.sin() as f32, a.cos() as f32, b.sin() as f32, b.cos() as f32]
         })
         .collect();
     // The table stays bound where it is looked at.
-    let body = "float gap = half_vector_gap(vec3(0.0, 0.0, 1.0), vec3(x.x, 0.0, x.y), vec3(x.z, 0.0, x.w)); \
+    let body = "float gap = half_vector_gap(vec3(0.0, 0.0, 1.0), vec3(x.x, 0.0, x.y), vec3(x.z, \
+        0.0, x.w)); \
         return vec4(gap, lobe_at(0u, 0.0), 0.0, 0.0);";
     let found = desk.probe_beside(&NO_TABLE, &["lobe.glsl"], body, &inputs)?;
     let mut c = Comparison::default();
@@ -315,24 +366,35 @@ fn lobe(desk: &mut Desk) -> Result<Found> {
         let table: Vec<f64> = (0..N_NODES).map(|i| lobe(node(i))).collect();
         let rounded: Vec<f32> = table.iter().map(|v| *v as f32).collect();
         // w = t^4, the nodes evenly over t.
-        let inputs: Vec<[f32; 4]> =
-            (0..20_000).map(|i| [((f64::from(i) + 0.37) / 20_000.0).powi(4) as f32, 0.0, 0.0, 0.0]).collect();
-        let found =
-            desk.probe_beside(&[("table", &rounded)], &["lobe.glsl"], "return vec4(lobe_at(0u, x.x));", &inputs)?;
+        let inputs: Vec<[f32; 4]> = (0..20_000)
+            .map(|i| [((f64::from(i) + 0.37) / 20_000.0).powi(4) as f32, 0.0, 0.0, 0.0])
+            .collect();
+        let found = desk.probe_beside(
+            &[("table", &rounded)],
+            &["lobe.glsl"],
+            "return vec4(lobe_at(0u, x.x));",
+            &inputs,
+        )?;
         for ([w, ..], y) in inputs.iter().zip(found) {
             let w = f64::from(*w);
             let t = w.sqrt().sqrt() * (N_NODES - 1) as f64;
-            // Two roots, each 9.1 u of itself and the first one halved in the second, and two products: 16 u of t, which is in nodes.
+            // Two roots, each 9.1 u of itself and the first one halved in the second, and two
+            // products: 16 u of t, which is in nodes.
             let off = 16.0 * U_F32 * t.max(1.0);
             let i = (t as usize).clamp(1, N_NODES - 2);
             // Steepest of the three pieces about; rounding of entries, and of the mixture.
-            let (before, here) = (i.saturating_sub(1), &table[i.saturating_sub(1)..(i + 3).min(N_NODES)]);
+            let (before, here) =
+                (i.saturating_sub(1), &table[i.saturating_sub(1)..(i + 3).min(N_NODES)]);
             let steep = here.windows(2).map(|p| (p[1] - p[0]).abs()).fold(0.0, f64::max);
             let most = table[before].abs().max(table[i].abs());
             let rounding = off * steep + 4.0 * U_F32 * most + f64::from(f32::MIN_POSITIVE);
-            c.add(f64::from(y[0]), evaluate(&table, w), rounding, || format!("table of n = {ns:e} at w = {w:e}"));
-            // Between nodes the function bends: its second difference is h^2 |f''| but for the next order, here a half of it at most.
-            let bend = here.windows(3).map(|p| (p[2] - 2.0 * p[1] + p[0]).abs()).fold(0.0, f64::max);
+            c.add(f64::from(y[0]), evaluate(&table, w), rounding, || {
+                format!("table of n = {ns:e} at w = {w:e}")
+            });
+            // Between nodes the function bends: its second difference is h^2 |f''| but for the next
+            // order, here a half of it at most.
+            let bend =
+                here.windows(3).map(|p| (p[2] - 2.0 * p[1] + p[0]).abs()).fold(0.0, f64::max);
             c.add(f64::from(y[0]), lobe(w), rounding + 1.5 * bend / 8.0, || {
                 format!("cos^n of n = {ns:e} at w = {w:e}")
             });
@@ -362,8 +424,11 @@ fn normalize(desk: &mut Desk) -> Result<Found> {
         let v = glam::DVec3::new(f64::from(x[0]), f64::from(x[1]), f64::from(x[2]));
         let truth = v / v.length();
         for k in 0..3 {
-            // The square has three roundings of its own terms and two sums, halved by the root; the root 4 u, the product 1.
-            c.add(f64::from(y[k]), truth[k], 9.0 * U_F32 * truth[k].abs() + 1e-37, || format!("of {v}"));
+            // The square has three roundings of its own terms and two sums, halved by the root; the
+            // root 4 u, the product 1.
+            c.add(f64::from(y[k]), truth[k], 9.0 * U_F32 * truth[k].abs() + 1e-37, || {
+                format!("of {v}")
+            });
         }
     }
     Ok(c.into())

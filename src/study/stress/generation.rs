@@ -1,4 +1,5 @@
-//! Particles of boxes at the edge: without extent, huge, needles and plates, far away, with no radius or a huge one.
+//! Particles of boxes at the edge: without extent, huge, needles and plates, far away, with no
+//! radius or a huge one.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -37,13 +38,15 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "generation/huge",
-        what: "a box of 1e30, where sines are of arguments that mean nothing: where the uniforms say, and inside",
+        what: "a box of 1e30, where sines are of arguments that mean nothing: where the uniforms \
+            say, and inside",
         bound: "3 pi/4 of the sines, and 4 u of the box",
         run: |desk| spread(desk, one_box(500, [1e30; 3], 1.0)),
     },
     Case {
         name: "generation/wide",
-        what: "a box of 2000, where f32 and f64 decide differently: where the uniforms of the attempt say, and inside",
+        what: "a box of 2000, where f32 and f64 decide differently: where the uniforms of the \
+            attempt say, and inside",
         bound: "3 pi/4 of the sines, and 4 u of the box",
         run: |desk| spread(desk, one_box(4000, [2000.0; 3], 1.0)),
     },
@@ -61,7 +64,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "generation/folded",
-        what: "a box in which 64 attempts fail: folds are counted as the reference counts them, and lie inside",
+        what: "a box in which 64 attempts fail: folds are counted as the reference counts them, \
+            and lie inside",
         bound: "0 in the count of what is surely folded; |offset| <= half of the box",
         run: folded,
     },
@@ -89,7 +93,12 @@ pub const CASES: &[Case] = &[
         bound: "that of the same box at 0, and 2^-52 of 1e7",
         run: |desk| far(desk, 1e7),
     },
-    Case { name: "generation/none", what: "no particle at all: a picture of nothing", bound: "0", run: none },
+    Case {
+        name: "generation/none",
+        what: "no particle at all: a picture of nothing",
+        bound: "0",
+        run: none,
+    },
     Case {
         name: "generation/one",
         what: "one particle",
@@ -98,7 +107,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "generation/too-many",
-        what: "2^31 particles: refused with the limit that they break, and nothing is left allocated",
+        what: "2^31 particles: refused with the limit that they break, and nothing is \
+            left allocated",
         bound: "an error of the kind \"limit\"",
         run: too_many,
     },
@@ -111,7 +121,8 @@ fn made(desk: &mut Desk, b: CloudBox) -> Result<(Vec<ParticleRecord>, Vec<u32>)>
     player.renderer.generate_now(desk.device())
 }
 
-/// Every particle against the reference, each at its own bound; where rounding may decide otherwise only that it is inside.
+/// Every particle against the reference, each at its own bound; where rounding may decide otherwise
+/// only that it is inside.
 fn particles(desk: &mut Desk, b: CloudBox) -> Result<Found> {
     let (records, status) = made(desk, b)?;
     let mut c = Comparison::default();
@@ -139,7 +150,9 @@ fn particles(desk: &mut Desk, b: CloudBox) -> Result<Found> {
         });
     }
     // Of a box without extent it decides all; of any other something must be left to compare.
-    c.holds(n_open < records.len() || b.extent == DVec3::ZERO, || "that not all is left to rounding".to_owned());
+    c.holds(n_open < records.len() || b.extent == DVec3::ZERO, || {
+        "that not all is left to rounding".to_owned()
+    });
     Ok(c.remark(format!("{n_folded} folded; of {n_open} rounding decides")).into())
 }
 
@@ -152,14 +165,17 @@ fn is_inside(c: &mut Comparison, record: &ParticleRecord, b: &CloudBox, i: u32) 
     }
 }
 
-/// Of a box so wide that sines are nothing beside it: what the uniforms of the attempt that was kept say.
+/// Of a box so wide that sines are nothing beside it: what the uniforms of the attempt that was
+/// kept say.
 fn spread(desk: &mut Desk, b: CloudBox) -> Result<Found> {
     let (records, status) = made(desk, b)?;
     let mut c = Comparison::default();
     let mut n_folded = 0;
     for (i, (record, status)) in (0u32..).zip(records.iter().zip(&status)) {
         is_inside(&mut c, record, &b, i);
-        c.holds(record.sigma.is_finite() && record.kappa.is_finite(), || format!("a finite particle {i}"));
+        c.holds(record.sigma.is_finite() && record.kappa.is_finite(), || {
+            format!("a finite particle {i}")
+        });
         if status & FOLDED != 0 {
             n_folded += 1;
             continue;
@@ -169,7 +185,9 @@ fn spread(desk: &mut Desk, b: CloudBox) -> Result<Found> {
             // P (6): |P_x| is pi/2 and, by P (5), pi at most, and half of it is added.
             let truth = 0.5 * (2.0 * u - 1.0) * b.extent[axis];
             let bound = 0.75 * std::f64::consts::PI * 1.001 + 4.0 * U_F32 * b.extent[axis];
-            c.add(f64::from(record.position[axis]), truth, bound, || format!("place of particle {i}, axis {axis}"));
+            c.add(f64::from(record.position[axis]), truth, bound, || {
+                format!("place of particle {i}, axis {axis}")
+            });
         }
     }
     Ok(c.remark(format!("{n_folded} of {} folded", status.len())).into())
@@ -185,7 +203,9 @@ fn folded(desk: &mut Desk) -> Result<Found> {
         c.holds(status & !FOLDED <= MAX_ATTEMPTS, || format!("attempts of particle {i}"));
         if particle_bound(&b, 0, SEED, Form::Centred, i, U_F32).decided {
             found += u32::from(status & FOLDED != 0);
-            expected += u32::from(generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i).folded);
+            expected += u32::from(
+                generate_particle(&b, 0, SEED, Form::Centred, OPTICAL_DEPTH, 1.0, i).folded,
+            );
         }
     }
     c.add(f64::from(found), f64::from(expected), 0.0, || "folded particles".to_owned());
@@ -216,9 +236,13 @@ fn huge_radius(desk: &mut Desk) -> Result<Found> {
         let [.., u] = uniforms(SEED, 0, i, attempt);
         let r = u * b.radius_max;
         let by_sine = r < 16_383.0 * std::f64::consts::PI;
-        // Where the sine can be reduced it is P (10)'s; beyond, |pi/2 sin| <= pi/2 (1 + 4 u), and the roundings of a number of 1e6.
+        // Where the sine can be reduced it is P (10)'s; beyond, |pi/2 sin| <= pi/2 (1 + 4 u), and
+        // the roundings of a number of 1e6.
         let (truth, bound) = match by_sine {
-            true => (radius_shape(r), radius_bound(Form::Centred, b.radius_max, u, U_F32) / factor + 4.0 * U_F32 * r),
+            true => (
+                radius_shape(r),
+                radius_bound(Form::Centred, b.radius_max, u, U_F32) / factor + 4.0 * U_F32 * r,
+            ),
             false => (r, FRAC_PI_2 * (1.0 + 4.0 * U_F32) + 6.0 * U_F32 * r),
         };
         let radius = f64::from(record.sigma) / (factor * SIGMA_PER_RADIUS);
@@ -229,7 +253,8 @@ fn huge_radius(desk: &mut Desk) -> Result<Found> {
 
 fn far(desk: &mut Desk, at: f64) -> Result<Found> {
     let b = one_box(1500, [2.0, 1.5, 1.0], 1.0);
-    let mut scene = with_boxes(desk, PLAIN, vec![CloudBox { center: DVec3::new(at, at, -at), ..b }])?;
+    let mut scene =
+        with_boxes(desk, PLAIN, vec![CloudBox { center: DVec3::new(at, at, -at), ..b }])?;
     for key in &mut scene.camera.keys {
         key.position += DVec3::new(at, at, -at);
         key.target += DVec3::new(at, at, -at);
@@ -243,7 +268,8 @@ fn far(desk: &mut Desk, at: f64) -> Result<Found> {
             continue;
         }
         // The box's centre is the origin of all that is lit, but for f64's rounding of 1e7.
-        let bound = placed_bound(bound.position, DVec3::ZERO, truth, U_F32) + DVec3::splat(2f64.powi(-52) * at.abs());
+        let bound = placed_bound(bound.position, DVec3::ZERO, truth, U_F32)
+            + DVec3::splat(2f64.powi(-52) * at.abs());
         for axis in 0..3 {
             c.add(f64::from(place.position[axis]), truth[axis], bound[axis], || {
                 format!("place of particle {i}, axis {axis}")
@@ -262,7 +288,9 @@ fn none(desk: &mut Desk) -> Result<Found> {
         let scene = with_boxes(desk, PLAIN, boxes)?;
         let played = desk.play(&scene, 0)?;
         let n_other = played.rgba.iter().filter(|v| **v != 0.0).count();
-        c.add(n_other as f64, 0.0, 0.0, || format!("numbers that are not 0 in a picture of {n} empty boxes"));
+        c.add(n_other as f64, 0.0, 0.0, || {
+            format!("numbers that are not 0 in a picture of {n} empty boxes")
+        });
     }
     Ok(c.into())
 }
@@ -277,6 +305,8 @@ fn too_many(desk: &mut Desk) -> Result<Found> {
     };
     let mut c = Comparison::default();
     c.holds(refused.is_some(), || "that it is refused".to_owned());
-    c.add(desk.device().allocated_bytes() as f64, before as f64, 0.0, || "bytes that are left allocated".to_owned());
+    c.add(desk.device().allocated_bytes() as f64, before as f64, 0.0, || {
+        "bytes that are left allocated".to_owned()
+    });
     Ok(c.remark(refused.unwrap_or_default()).into())
 }

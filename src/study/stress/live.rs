@@ -13,19 +13,22 @@ use crate::reference::rounding::U_F32;
 pub const CASES: &[Case] = &[
     Case {
         name: "live/late",
-        what: "ages of 1000 slots, told by the wind, from -1e12 to 1e12 s, by periods of 1e-3 to 1e6 s",
+        what: "ages of 1000 slots, told by the wind, from -1e12 to 1e12 s, by periods of \
+            1e-3 to 1e6 s",
         bound: "4 u of the way that a period is",
         run: late,
     },
     Case {
         name: "live/dead",
-        what: "particles at their birth, and past the end of lives that end early: their kappa is 0, and that of no others",
+        what: "particles at their birth, and past the end of lives that end early: their kappa is \
+            0, and that of no others",
         bound: "0",
         run: dead,
     },
     Case {
         name: "live/extreme",
-        what: "laws with the least and the greatest numbers that a scene may have: all finite, inside the bounds, nothing negative",
+        what: "laws with the least and the greatest numbers that a scene may have: all finite, \
+            inside the bounds, nothing negative",
         bound: "16 u of the bounds",
         run: extreme,
     },
@@ -72,7 +75,9 @@ fn dead(desk: &mut Desk) -> Result<Found> {
     for time_s in [0.0, 3.3, 1e6] {
         let (scene, played) = at(desk, scene(desk, law)?, time_s)?;
         let cloud = &scene.clouds[0];
-        for (i, (p, truth)) in (0..).zip(played.particles.iter().zip(crate::reference::live::cloud(cloud, time_s))) {
+        for (i, (p, truth)) in
+            (0..).zip(played.particles.iter().zip(crate::reference::live::cloud(cloud, time_s)))
+        {
             let share = age(10.0, time_s, i).share;
             n_dead += u32::from(truth.kappa == 0.0);
             // Neither new nor at its very end, where f32 may see it a rounding earlier or later.
@@ -104,18 +109,25 @@ fn extreme(desk: &mut Desk) -> Result<Found> {
         "base = 1e15\nbase_over = 1e-15\nbase_lift = 1e15",
         "base = -1e15\nbase_over = 1e15\nbase_lift = 0",
         "radius = 4e14\nwind = [1e13, -1e13, 1e13]",
-        "lifetime_spread = 0.9\nsigma_spread = 0.9\nwarmth_spread = 1\nwarmth_core = 1\nfade_in = 0.01\nfade_out = 0.01",
+        "lifetime_spread = 0.9\nsigma_spread = 0.9\nwarmth_spread = 1\nwarmth_core = 1\nfade_in = \
+         0.01\nfade_out = 0.01",
     ] {
         let (scene, played) = at(desk, scene(desk, keys)?, 12.3)?;
         let group = scene.groups()[0];
         for (i, p) in played.particles.iter().enumerate() {
             let place = Vec3::from(p.position).as_dvec3();
             let most = group.half_extent + 16.0 * U_F32 * (group.half_extent + group.center.abs());
-            c.holds(place.abs().cmple(most).all(), || format!("place {place} of particle {i} of {keys}"));
+            c.holds(place.abs().cmple(most).all(), || {
+                format!("place {place} of particle {i} of {keys}")
+            });
             let [sigma, kappa] = [p.sigma, p.kappa].map(f64::from);
             let room = 1.0 + 16.0 * U_F32;
-            c.holds(sigma > 0.0 && sigma <= group.sigma_max * room, || format!("sigma {sigma:e} of {i} of {keys}"));
-            c.holds(kappa >= 0.0 && kappa <= group.kappa_max * room, || format!("kappa {kappa:e} of {i} of {keys}"));
+            c.holds(sigma > 0.0 && sigma <= group.sigma_max * room, || {
+                format!("sigma {sigma:e} of {i} of {keys}")
+            });
+            c.holds(kappa >= 0.0 && kappa <= group.kappa_max * room, || {
+                format!("kappa {kappa:e} of {i} of {keys}")
+            });
         }
         c.holds(played.n_odd() == 0, || format!("a finite picture of {keys}"));
     }

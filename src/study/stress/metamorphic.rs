@@ -1,4 +1,5 @@
-//! Scenes that must look like each other: twice the light, turned about, listed in another order, with surfaces cut in two.
+//! Scenes that must look like each other: twice the light, turned about, listed in another order,
+//! with surfaces cut in two.
 
 use glam::DVec3;
 
@@ -15,7 +16,8 @@ use crate::reference::rounding::U_F32;
 pub const CASES: &[Case] = &[
     Case {
         name: "metamorphic/double-light",
-        what: "twice the light of every lamp, sun and sky: twice the radiance of every facet and pixel",
+        what: "twice the light of every lamp, sun and sky: twice the radiance of every \
+            facet and pixel",
         bound: "0",
         run: |desk| brighter(desk, 2.0),
     },
@@ -33,7 +35,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "metamorphic/turned",
-        what: "all of a room turned by a right angle about what is up: the same light on every facet",
+        what: "all of a room turned by a right angle about what is up: the same light \
+            on every facet",
         bound: "256 u of the greatest",
         run: turned,
     },
@@ -45,7 +48,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "metamorphic/permuted-picture",
-        what: "particles at depths that differ, listed in another order: the same picture, to the byte",
+        what: "particles at depths that differ, listed in another order: the same \
+            picture, to the byte",
         bound: "0",
         run: permuted_picture,
     },
@@ -71,15 +75,23 @@ pub const CASES: &[Case] = &[
 
 /// A corner of two walls and a floor, and a sun and a lamp.
 fn corner(desk: &Desk) -> Result<Scene> {
-    let lights = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1, -0.75]\nirradiance = [1, 0.75, 0.5]\n\
-        [[light]]\nkind = 'point'\nposition = [0.25, 0.5, 0.5]\nintensity = [1, 1, 1]\nradius = 0.0625\n\
+    let lights = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1, -0.75]\nirradiance = [1, \
+        0.75, 0.5]\n\
+        [[light]]\nkind = 'point'\nposition = [0.25, 0.5, 0.5]\nintensity = [1, 1, 1]\nradius = \
+        0.0625\n\
         [[light]]\nkind = 'sky'\nirradiance = [0.25, 0.25, 0.5]\nconstant = 0.25\n";
     let walls = vec![
         plate([0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], 6),
         plate([0.0, 1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 6),
         plate([-1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], 6),
     ];
-    room(desk, "gather = 'exact'", lights, &format!("{DULL}ks = [0.125, 0.125, 0.125]\nns = 20.0\n"), walls)
+    room(
+        desk,
+        "gather = 'exact'",
+        lights,
+        &format!("{DULL}ks = [0.125, 0.125, 0.125]\nns = 20.0\n"),
+        walls,
+    )
 }
 
 fn cloud(desk: &Desk) -> Result<Scene> {
@@ -91,7 +103,9 @@ fn with_light(scene: &Scene, factor: f64) -> Scene {
     let mut scene = scene.clone();
     for light in &mut scene.lights {
         match light {
-            Light::Directional { irradiance: e, .. } | Light::Sky { irradiance: e, .. } => *e *= factor,
+            Light::Directional { irradiance: e, .. } | Light::Sky { irradiance: e, .. } => {
+                *e *= factor
+            }
             Light::Point { intensity: e, .. } | Light::Spot { intensity: e, .. } => *e *= factor,
         }
     }
@@ -105,12 +119,16 @@ fn brighter(desk: &mut Desk, factor: f64) -> Result<Found> {
         let (one, other) = (desk.play(&scene, 0)?, desk.play(&with_light(&scene, factor), 0)?);
         for (i, (a, b)) in one.lit.iter().zip(&other.lit).enumerate() {
             for (a, b) in a.first.iter().chain(&a.second).zip(b.first.iter().chain(&b.second)) {
-                c.add(f64::from(*b), factor * f64::from(*a), 0.0, || format!("facet {i} of {what}"));
+                c.add(f64::from(*b), factor * f64::from(*a), 0.0, || {
+                    format!("facet {i} of {what}")
+                });
             }
         }
         for (i, (a, b)) in one.rgba.chunks_exact(4).zip(other.rgba.chunks_exact(4)).enumerate() {
             for k in 0..3 {
-                c.add(f64::from(b[k]), factor * f64::from(a[k]), 0.0, || format!("pixel {i} of {what}"));
+                c.add(f64::from(b[k]), factor * f64::from(a[k]), 0.0, || {
+                    format!("pixel {i} of {what}")
+                });
             }
         }
     }
@@ -125,20 +143,34 @@ fn turn(v: DVec3) -> DVec3 {
 fn turned(desk: &mut Desk) -> Result<Found> {
     let scene = corner(desk)?;
     let mut other = scene.clone();
-    other.surfaces =
-        scene.surfaces.iter().map(|s| Surface { center: turn(s.center), u: turn(s.u), v: turn(s.v), ..*s }).collect();
+    other.surfaces = scene
+        .surfaces
+        .iter()
+        .map(|s| Surface { center: turn(s.center), u: turn(s.u), v: turn(s.v), ..*s })
+        .collect();
     for light in &mut other.lights {
         match light {
             Light::Directional { direction, .. } => *direction = turn(*direction),
-            Light::Point { position, .. } | Light::Spot { position, .. } => *position = turn(*position),
+            Light::Point { position, .. } | Light::Spot { position, .. } => {
+                *position = turn(*position)
+            }
             Light::Sky { .. } => {}
         }
     }
-    other.camera.keys.iter_mut().for_each(|k| (k.position, k.target) = (turn(k.position), turn(k.target)));
+    other
+        .camera
+        .keys
+        .iter_mut()
+        .for_each(|k| (k.position, k.target) = (turn(k.position), turn(k.target)));
     let (one, other) = (desk.play(&scene, 0)?, desk.play(&other, 0)?);
     let mut c = Comparison::default();
-    let light =
-        |p: &Played| p.lit.iter().flat_map(|l| l.first.into_iter().chain(l.second)).map(f64::from).collect::<Vec<_>>();
+    let light = |p: &Played| {
+        p.lit
+            .iter()
+            .flat_map(|l| l.first.into_iter().chain(l.second))
+            .map(f64::from)
+            .collect::<Vec<_>>()
+    };
     let (one, other) = (light(&one), light(&other));
     let most = one.iter().copied().fold(0.0, f64::max);
     for (i, (a, b)) in one.iter().zip(&other).enumerate() {
@@ -165,7 +197,8 @@ fn permuted(desk: &mut Desk) -> Result<Found> {
     let mut scene = cloud(desk)?;
     scene.lighting.mode = crate::model::scene::LightingMode::First;
     let (one, other) = (desk.play(&scene, 0)?, desk.play(&permute(&scene), 0)?);
-    let expected: Vec<_> = order(one.lit.len()).map(|i| (one.lit[i].first, one.lit[i].direct)).collect();
+    let expected: Vec<_> =
+        order(one.lit.len()).map(|i| (one.lit[i].first, one.lit[i].direct)).collect();
     let found: Vec<_> = other.lit.iter().map(|l| (l.first, l.direct)).collect();
     let mut c = Comparison::default();
     c.same(&found, &expected, "light of facets");
@@ -187,9 +220,14 @@ fn split(desk: &mut Desk) -> Result<Found> {
     let mut other = scene.clone();
     let floor = scene.surfaces[0];
     // Along v: halves of 6 x 3 facets.
-    let half =
-        |s: f64| Surface { center: floor.center + s * 0.5 * floor.v, v: 0.5 * floor.v, subdivide: [6, 3], ..floor };
-    other.surfaces = [half(-1.0), half(1.0)].into_iter().chain(scene.surfaces[1..].iter().copied()).collect();
+    let half = |s: f64| Surface {
+        center: floor.center + s * 0.5 * floor.v,
+        v: 0.5 * floor.v,
+        subdivide: [6, 3],
+        ..floor
+    };
+    other.surfaces =
+        [half(-1.0), half(1.0)].into_iter().chain(scene.surfaces[1..].iter().copied()).collect();
     let (one, other) = (desk.play(&scene, 0)?, desk.play(&other, 0)?);
     let mut c = Comparison::default();
     let most = one.lit.iter().map(|l| l.second[0]).fold(0.0, f32::max);
@@ -202,7 +240,9 @@ fn split(desk: &mut Desk) -> Result<Found> {
         let found = other.facets.iter().position(same);
         c.holds(found.is_some(), || format!("a facet at {:?}", f.position));
         for (a, b) in found.iter().flat_map(|&i| l.second.iter().zip(&other.lit[i].second)) {
-            c.add(f64::from(*b), f64::from(*a), bound, || format!("L2 of the facet at {:?}", f.position));
+            c.add(f64::from(*b), f64::from(*a), bound, || {
+                format!("L2 of the facet at {:?}", f.position)
+            });
         }
     }
     Ok(c.into())
@@ -227,7 +267,9 @@ fn mirrored(desk: &mut Desk) -> Result<Found> {
                 let tau = -(1.0 - f64::from(a[3])).max(1e-7).ln();
                 let bound = f64::from(N) * 2f64.powi(-22) + (2e-6 + 64.0 * U_F32) * tau;
                 for (a, b) in a.iter().zip(b) {
-                    c.add(f64::from(*b), f64::from(*a), bound, || format!("{path}, pixel {i}, {j}"));
+                    c.add(f64::from(*b), f64::from(*a), bound, || {
+                        format!("{path}, pixel {i}, {j}")
+                    });
                 }
             }
         }

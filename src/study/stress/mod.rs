@@ -1,5 +1,5 @@
-//! `nimbus stress`: whether a device computes at the edges what nimbus claims, case by case, each with a bound that is derived
-//! (docs/stability.md) from the precision that Vulkan promises.
+//! `nimbus stress`: whether a device computes at the edges what nimbus claims, case by case, each
+//! with a bound that is derived (docs/stability.md) from the precision that Vulkan promises.
 
 mod brdf;
 mod case;

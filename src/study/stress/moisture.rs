@@ -1,27 +1,33 @@
-//! Humidity from 0 K to temperatures without end, of dry air and of air that holds more than it can.
+//! Humidity from 0 K to temperatures without end, of dry air and of air that holds more than it
+//! can.
 
 use super::case::{Case, Comparison, Found};
 use super::desk::Desk;
 use crate::error::Result;
-use crate::model::moisture::{E0_PA, LATENT_HEAT, LATENT_HEAT_FALL, LATENT_HEAT_T0, R_VAPOUR, T0_K};
+use crate::model::moisture::{
+    E0_PA, LATENT_HEAT, LATENT_HEAT_FALL, LATENT_HEAT_T0, R_VAPOUR, T0_K,
+};
 use crate::model::moisture::{Parcel, Saturation, Vapour};
 
 pub const CASES: &[Case] = &[
     Case {
         name: "moisture/saturation",
-        what: "E from 180 to 400 K by constant and linear L, boiling among them, against the integral of dE/E = L/(R_v T^2) dT",
+        what: "E from 180 to 400 K by constant and linear L, boiling among them, against the \
+            integral of dE/E = L/(R_v T^2) dT",
         bound: "1e-11, relative: Simpson's rule of 20 000 steps, and its sum",
         run: by_integral,
     },
     Case {
         name: "moisture/cold",
-        what: "T to 0 K, 0 and below it, by every law: nothing evaporates, moist air is saturated beyond all bounds, nothing is NaN",
+        what: "T to 0 K, 0 and below it, by every law: nothing evaporates, moist air is saturated \
+            beyond all bounds, nothing is NaN",
         bound: "0",
         run: cold,
     },
     Case {
         name: "moisture/hot",
-        what: "T from boiling to infinity: E stays below E_0 e^(L/(R_v T_0)), that of 1332 K where L falls to 0, E_0 e^17.67",
+        what: "T from boiling to infinity: E stays below E_0 e^(L/(R_v T_0)), that of 1332 K where \
+            L falls to 0, E_0 e^17.67",
         bound: "1e-14 of it",
         run: hot,
     },
@@ -34,7 +40,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "moisture/underflow",
-        what: "temperatures at which E is below f64's least number and e/E is not beyond its greatest",
+        what: "temperatures at which E is below f64's least number and e/E is not beyond \
+            its greatest",
         bound: "2^-42, relative: an exponent of 700",
         run: underflow,
     },
@@ -46,15 +53,18 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "moisture/lifted",
-        what: "parcels from 200 to 320 K, of humidities from 1e-300 to 1, lifted to where they condense: f = 1 there, by every law",
-        bound: "2^-38: T is exact to 2^-52, and ln f changes by some 20 times the exponents of up to 700 with it",
+        what: "parcels from 200 to 320 K, of humidities from 1e-300 to 1, lifted to where they \
+            condense: f = 1 there, by every law",
+        bound: "2^-38: T is exact to 2^-52, and ln f changes by some 20 times the exponents of up \
+            to 700 with it",
         run: lifted,
     },
 ];
 
 /// Every law, over water alone and over ice below 0 °C.
 fn laws() -> impl Iterator<Item = Vapour> {
-    let both = |(_, saturation): (&str, Saturation)| [false, true].map(|ice| Vapour { saturation, ice });
+    let both =
+        |(_, saturation): (&str, Saturation)| [false, true].map(|ice| Vapour { saturation, ice });
     Saturation::NAMES.into_iter().flat_map(both)
 }
 
@@ -70,7 +80,8 @@ fn by_integral(_: &mut Desk) -> Result<Found> {
             let at = |i: u32| T0_K + h * f64::from(i);
             let slope = |i: u32| latent(at(i)) / (R_VAPOUR * at(i).powi(2));
             let weight = |i: u32| if i == 0 || i == N { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
-            let truth = E0_PA * ((0..=N).map(|i| weight(i) * slope(i)).sum::<f64>() * h / 3.0).exp();
+            let truth =
+                E0_PA * ((0..=N).map(|i| weight(i) * slope(i)).sum::<f64>() * h / 3.0).exp();
             let found = Vapour { saturation, ice: false }.saturation(t);
             c.add(found, truth, 1e-11 * truth, || format!("E at {t} K, {saturation}"));
         }
@@ -83,7 +94,9 @@ fn cold(_: &mut Desk) -> Result<Found> {
     for law in laws() {
         for t in [5e-324, 1e-300, 1e-3, 1.0, 0.0, -0.0, -1.0, -273.15, f64::NEG_INFINITY] {
             c.add(law.saturation(t), 0.0, 0.0, || format!("E at {t:e} K, {law:?}"));
-            c.add(law.relative_humidity(1e-3, t), f64::INFINITY, 0.0, || format!("f at {t:e} K, {law:?}"));
+            c.add(law.relative_humidity(1e-3, t), f64::INFINITY, 0.0, || {
+                format!("f at {t:e} K, {law:?}")
+            });
         }
         // Ever less the colder it is.
         let temperatures: Vec<f64> = (1..=2000).map(|i| 0.2 * f64::from(i)).collect();
@@ -105,7 +118,9 @@ fn hot(_: &mut Desk) -> Result<Found> {
             c.add((law.saturation(t) - end).max(0.0), 0.0, 1e-14 * end, || {
                 format!("E at {t:e} K beyond its end, {law:?}")
             });
-            c.holds(law.relative_humidity(1e5, t).is_finite(), || format!("f at {t:e} K, finite, {law:?}"));
+            c.holds(law.relative_humidity(1e5, t).is_finite(), || {
+                format!("f at {t:e} K, finite, {law:?}")
+            });
         }
     }
     Ok(c.into())
@@ -144,7 +159,9 @@ fn underflow(_: &mut Desk) -> Result<Found> {
         let vapour = 1e-20;
         let truth = (exponent + (vapour / E0_PA).ln()).exp();
         // T itself is rounded, and its share of the exponent with it.
-        c.add(law.relative_humidity(vapour, t), truth, 2f64.powi(-42) * truth, || format!("f at {t} K"));
+        c.add(law.relative_humidity(vapour, t), truth, 2f64.powi(-42) * truth, || {
+            format!("f at {t} K")
+        });
     }
     Ok(c.into())
 }
@@ -173,10 +190,16 @@ fn lifted(_: &mut Desk) -> Result<Found> {
                 let parcel = Parcel { t_k, pressure_pa: 9e4, humidity };
                 let level = parcel.condensation(law);
                 // Of e by its logarithm, as e itself may be below what f64 holds.
-                let log_e = humidity.ln() + law.log_saturation(t_k) + (level.pressure_pa / parcel.pressure_pa).ln();
+                let log_e = humidity.ln()
+                    + law.log_saturation(t_k)
+                    + (level.pressure_pa / parcel.pressure_pa).ln();
                 let f = (log_e - law.log_saturation(level.t_k)).exp();
-                c.add(f, 1.0, 2f64.powi(-38), || format!("f at the level of {t_k} K and {humidity:e}, {law:?}"));
-                c.holds(level.height_m >= 0.0, || format!("that the level of {t_k} K and {humidity:e} is not below"));
+                c.add(f, 1.0, 2f64.powi(-38), || {
+                    format!("f at the level of {t_k} K and {humidity:e}, {law:?}")
+                });
+                c.holds(level.height_m >= 0.0, || {
+                    format!("that the level of {t_k} K and {humidity:e} is not below")
+                });
             }
         }
     }

@@ -13,11 +13,13 @@ use crate::model::surface::Surface;
 use crate::model::texture::Texture;
 
 /// An odd number of pixels, so that there is one in the middle; numbers are kept as they are.
-pub const PLAIN: &str = "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
+pub const PLAIN: &str = "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, \
+    0]\n\
     [camera]\nposition = [0, 0, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = 'none'\n";
 
 /// The same lit by a sun and the sky.
-pub const LIT: &str = "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
+pub const LIT: &str = "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, \
+    0]\n\
     [camera]\nposition = [0, 0, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = 'first'\ngrid = 24\n\
     [[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\nirradiance = [3, 2.9, 2.7]\n\
     [[light]]\nkind = 'sky'\nirradiance = [0.8, 0.87, 1]\nconstant = 0.25\n\
@@ -45,7 +47,12 @@ pub fn cloud_of(source: CloudSource) -> Cloud {
 
 /// `text` with a cloud of boxes.
 pub fn with_boxes(desk: &Desk, text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
-    let source = CloudSource::Boxes { boxes, form: Form::Centred, optical_depth: OPTICAL_DEPTH, radius_scale: 1.0 };
+    let source = CloudSource::Boxes {
+        boxes,
+        form: Form::Centred,
+        optical_depth: OPTICAL_DEPTH,
+        radius_scale: 1.0,
+    };
     let mut scene = desk.scene(text)?;
     scene.clouds.push(cloud_of(source));
     Ok(scene)
@@ -78,8 +85,11 @@ pub fn heap(n: u32) -> Vec<Particle> {
     let of = |i: u32| {
         let t = f64::from(i);
         let share = |k: f64| (k * t).fract();
-        let (z, turn, r) =
-            (2.0 * share(0.618_033_988_7) - 1.0, 2.399_963_229_7 * t, 2.0 * share(0.754_877_666_2).cbrt());
+        let (z, turn, r) = (
+            2.0 * share(0.618_033_988_7) - 1.0,
+            2.399_963_229_7 * t,
+            2.0 * share(0.754_877_666_2).cbrt(),
+        );
         let across = (1.0 - z * z).sqrt();
         let at = [r * across * turn.cos(), r * z, r * across * turn.sin()];
         let color = DVec3::new(0.5 + 0.5 * share(0.3), 0.5 + 0.5 * share(0.7), 1.0);
@@ -95,14 +105,22 @@ pub fn plate(center: [f64; 3], u: [f64; 3], v: [f64; 3], n: u32) -> Surface {
 }
 
 /// A sun from above, straight down.
-pub const NOON: &str = "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
+pub const NOON: &str =
+    "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
 pub const DULL: &str = "kd = [0.5, 0.5, 0.5]\n";
 
 /// Rectangles of one material under `lights`, by two reflections; `lighting`: further keys of it.
-pub fn room(desk: &Desk, lighting: &str, lights: &str, material: &str, surfaces: Vec<Surface>) -> Result<Scene> {
+pub fn room(
+    desk: &Desk,
+    lighting: &str,
+    lights: &str,
+    material: &str,
+    surfaces: Vec<Surface>,
+) -> Result<Scene> {
     let text = format!(
         "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
-         [camera]\nposition = [0.3, 4, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = 'two-reflection'\n{lighting}\n{lights}\
+         [camera]\nposition = [0.3, 4, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = \
+         'two-reflection'\n{lighting}\n{lights}\
          [[material]]\nname = 'm'\n{material}"
     );
     let mut scene = desk.scene(&text)?;

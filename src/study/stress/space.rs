@@ -1,4 +1,5 @@
-//! Far places, late times, narrow and wide views, small and large targets, cameras that look nowhere.
+//! Far places, late times, narrow and wide views, small and large targets, cameras that look
+//! nowhere.
 
 use glam::DVec3;
 
@@ -70,7 +71,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "space/near-plane",
-        what: "blobs whose centres lie before and behind the near plane by 1e-5 of it, wide as they are",
+        what: "blobs whose centres lie before and behind the near plane by 1e-5 of it, \
+            wide as they are",
         bound: "0: drawn or not; finite",
         run: near_plane,
     },
@@ -94,13 +96,15 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "space/large-target",
-        what: "a target of 8192 x 8192 pixels of 8 bits: drawn where the blob is, or refused with the limit",
+        what: "a target of 8192 x 8192 pixels of 8 bits: drawn where the blob is, or refused \
+            with the limit",
         bound: "0",
         run: large_target,
     },
     Case {
         name: "space/no-camera",
-        what: "cameras with NaN, infinite places, no direction, or along what is up: an error and no frame",
+        what: "cameras with NaN, infinite places, no direction, or along what is up: an error \
+            and no frame",
         bound: "an error",
         run: no_camera,
     },
@@ -111,7 +115,11 @@ fn moved(scene: &Scene, by: DVec3) -> Scene {
     let mut scene = scene.clone();
     scene.clouds.iter_mut().for_each(|c| c.position += by);
     scene.surfaces.iter_mut().for_each(|s| s.center += by);
-    scene.camera.keys.iter_mut().for_each(|k| (k.position, k.target) = (k.position + by, k.target + by));
+    scene
+        .camera
+        .keys
+        .iter_mut()
+        .for_each(|k| (k.position, k.target) = (k.position + by, k.target + by));
     scene
 }
 
@@ -135,12 +143,15 @@ fn far_exactly(desk: &mut Desk) -> Result<Found> {
 
 fn far(desk: &mut Desk) -> Result<Found> {
     let scene = lit_heap(desk)?;
-    let (here, there) = (desk.play(&scene, 0)?, desk.play(&moved(&scene, DVec3::new(1e7, -1e7, 1e7)), 0)?);
+    let (here, there) =
+        (desk.play(&scene, 0)?, desk.play(&moved(&scene, DVec3::new(1e7, -1e7, 1e7)), 0)?);
     let mut c = Comparison::default();
     for (i, (a, b)) in here.placed.iter().zip(&there.placed).enumerate() {
         for k in 0..3 {
             let (a, b) = (f64::from(a.position[k]), f64::from(b.position[k]));
-            c.add(b, a, 2.0 * U_F32 * a.abs() + 2f64.powi(-51) * 1e7, || format!("place of particle {i}, axis {k}"));
+            c.add(b, a, 2.0 * U_F32 * a.abs() + 2f64.powi(-51) * 1e7, || {
+                format!("place of particle {i}, axis {k}")
+            });
         }
     }
     c.add(there.n_odd() as f64, 0.0, 0.0, || "numbers that are not finite".to_owned());
@@ -157,24 +168,35 @@ fn late_wind(desk: &mut Desk) -> Result<Found> {
     for (i, (a, b)) in early.placed.iter().zip(&late.placed).enumerate() {
         for k in 0..3 {
             let (a, b) = (f64::from(a.position[k]), f64::from(b.position[k]));
-            c.add(b, a, 2.0 * U_F32 * a.abs() + 2f64.powi(-50) * way, || format!("place of particle {i}, axis {k}"));
+            c.add(b, a, 2.0 * U_F32 * a.abs() + 2f64.powi(-50) * way, || {
+                format!("place of particle {i}, axis {k}")
+            });
         }
     }
     Ok(c.into())
 }
 
 /// The device's places of frame `i_frame` against the reference's, within `bound` of each.
-fn places(desk: &mut Desk, scene: &Scene, i_frame: u32, bound: impl Fn(DVec3) -> f64) -> Result<Comparison> {
+fn places(
+    desk: &mut Desk,
+    scene: &Scene,
+    i_frame: u32,
+    bound: impl Fn(DVec3) -> f64,
+) -> Result<Comparison> {
     let truth = Truth::unlit(scene, scene.time.at(i_frame))?;
     let played = desk.play(scene, i_frame)?;
     let mut c = Comparison::default();
     for (i, (place, blob)) in played.placed.iter().zip(&truth.blobs).enumerate() {
         for k in 0..3 {
             let value = f64::from(place.position[k]);
-            c.add(value, blob.position[k], bound(blob.position), || format!("place of particle {i}, axis {k}"));
+            c.add(value, blob.position[k], bound(blob.position), || {
+                format!("place of particle {i}, axis {k}")
+            });
         }
         // Rounded, and multiplied by a rounded scale.
-        c.add(f64::from(place.sigma), blob.sigma, 4.0 * U_F32 * blob.sigma, || format!("sigma of particle {i}"));
+        c.add(f64::from(place.sigma), blob.sigma, 4.0 * U_F32 * blob.sigma, || {
+            format!("sigma of particle {i}")
+        });
     }
     c.add(played.n_odd() as f64, 0.0, 0.0, || "numbers that are not finite".to_owned());
     Ok(c)
@@ -186,13 +208,15 @@ fn gusts(desk: &mut Desk, time_s: f64) -> Result<Found> {
     scene.time.start_s = time_s;
     let modes = scene.clouds[0].gust.modes(scene.clouds[0].seed);
     let bound = |p: DVec3| {
-        // The phase at this time is reduced in f64 and rounded once; k and a are rounded, and k.x has three products and two sums.
+        // The phase at this time is reduced in f64 and rounded once; k and a are rounded, and k.x
+        // has three products and two sums.
         let wave = |m: &crate::model::gust::Mode| {
             let argument = m.k.abs().dot(p.abs() + DVec3::splat(2.0)) + std::f64::consts::TAU;
             m.a.length() * (SINE_ERROR + 10.0 * U_F32 * argument)
         };
         let sum: f64 = modes.iter().map(|m| m.a.length()).sum();
-        modes.iter().map(wave).sum::<f64>() + (modes.len() as f64 + 4.0) * U_F32 * (p.length() + sum)
+        modes.iter().map(wave).sum::<f64>()
+            + (modes.len() as f64 + 4.0) * U_F32 * (p.length() + sum)
     };
     Ok(places(desk, &scene, 0, bound)?.into())
 }
@@ -210,20 +234,31 @@ fn last_frame(desk: &mut Desk) -> Result<Found> {
     scene.clouds[0].wind = DVec3::new(1e-3, 0.0, 0.0);
     scene.time.step_s = 1.0 / 60.0;
     let way = scene.clouds[0].wind.x * scene.time.at(u32::MAX);
-    Ok(places(desk, &scene, u32::MAX, |p| 4.0 * U_F32 * p.abs().max_element() + 2f64.powi(-50) * way)?.into())
+    Ok(places(desk, &scene, u32::MAX, |p| {
+        4.0 * U_F32 * p.abs().max_element() + 2f64.powi(-50) * way
+    })?
+    .into())
 }
 
-/// What the pixel in the middle may be off of a blob's opacity through its centre: what 1 - e^-t promises, two products and two
-/// roundings of the depth, an exponential of nearly nothing.
+/// What the pixel in the middle may be off of a blob's opacity through its centre: what 1 - e^-t
+/// promises, two products and two roundings of the depth, an exponential of nearly nothing.
 const MIDDLE_OFF: f64 = 1e-6 + 24.0 * U_F32;
 
 /// A blob at the origin, seen through the middle of a pixel: its opacity.
-fn middle(c: &mut Comparison, desk: &mut Desk, text: &str, i_pixel: usize, what: &str) -> Result<()> {
+fn middle(
+    c: &mut Comparison,
+    desk: &mut Desk,
+    text: &str,
+    i_pixel: usize,
+    what: &str,
+) -> Result<()> {
     const TAU: f64 = 0.8;
     let scene = with_particles(desk, text, vec![blob([0.0; 3], 0.5, TAU)])?;
     let played = desk.play(&scene, 0)?;
     let truth = -(-TAU).exp_m1();
-    c.add(f64::from(played.rgba[4 * i_pixel + 3]), truth, MIDDLE_OFF * truth, || format!("alpha, {what}"));
+    c.add(f64::from(played.rgba[4 * i_pixel + 3]), truth, MIDDLE_OFF * truth, || {
+        format!("alpha, {what}")
+    });
     c.add(played.n_odd() as f64, 0.0, 0.0, || format!("numbers that are not finite, {what}"));
     Ok(())
 }
@@ -251,8 +286,12 @@ fn near_plane(desk: &mut Desk) -> Result<Found> {
                 )?;
                 let played = desk.play(&scene, 0)?;
                 let found = played.rgba.iter().any(|v| *v != 0.0);
-                c.holds(found == drawn, || format!("{path}, near {near}: drawn {found} at {beyond:e} beyond"));
-                c.add(played.n_odd() as f64, 0.0, 0.0, || format!("numbers that are not finite, {path}, near {near}"));
+                c.holds(found == drawn, || {
+                    format!("{path}, near {near}: drawn {found} at {beyond:e} beyond")
+                });
+                c.add(played.n_odd() as f64, 0.0, 0.0, || {
+                    format!("numbers that are not finite, {path}, near {near}")
+                });
             }
         }
     }
@@ -265,11 +304,18 @@ fn eye_inside(desk: &mut Desk) -> Result<Found> {
         for sigma in [1e-3, 0.1, 1.0, 30.0, 1e3] {
             let around: Vec<Particle> = heap(60)
                 .into_iter()
-                .map(|p| Particle { sigma, kappa: 0.3 / sigma, position: p.position + DVec3::Z * 10.0, ..p })
+                .map(|p| Particle {
+                    sigma,
+                    kappa: 0.3 / sigma,
+                    position: p.position + DVec3::Z * 10.0,
+                    ..p
+                })
                 .collect();
             let scene = with_particles(desk, &format!("{PLAIN}[draw]\npath = '{path}'\n"), around)?;
             let played = desk.play(&scene, 0)?;
-            c.add(played.n_odd() as f64, 0.0, 0.0, || format!("numbers that are not finite, {path}, sigma {sigma}"));
+            c.add(played.n_odd() as f64, 0.0, 0.0, || {
+                format!("numbers that are not finite, {path}, sigma {sigma}")
+            });
             let within = played.rgba.chunks_exact(4).all(|p| (0.0..=1.0).contains(&p[3]));
             c.holds(within, || format!("alpha within 0 and 1, {path}, sigma {sigma}"));
         }
@@ -293,14 +339,19 @@ fn long_targets(desk: &mut Desk) -> Result<Found> {
             let text = PLAIN
                 .replace("width = 65", &format!("width = {width}"))
                 .replace("height = 49", &format!("height = {height}"));
-            let scene =
-                with_particles(desk, &format!("{text}[draw]\npath = '{path}'\n"), vec![blob([0.0; 3], 0.5, 2.0)])?;
+            let scene = with_particles(
+                desk,
+                &format!("{text}[draw]\npath = '{path}'\n"),
+                vec![blob([0.0; 3], 0.5, 2.0)],
+            )?;
             let played = desk.play(&scene, 0)?;
             let alpha = |i: usize| played.rgba[4 * i + 3];
             c.add(played.n_odd() as f64, 0.0, 0.0, || {
                 format!("numbers that are not finite, {path}, {width} x {height}")
             });
-            c.holds(alpha(4095) > 0.5, || format!("a blob in the middle, {path}, {width} x {height}"));
+            c.holds(alpha(4095) > 0.5, || {
+                format!("a blob in the middle, {path}, {width} x {height}")
+            });
             c.holds(alpha(0) == 0.0 && alpha(8190) == 0.0, || {
                 format!("nothing at the ends, {path}, {width} x {height}")
             });
@@ -311,9 +362,15 @@ fn long_targets(desk: &mut Desk) -> Result<Found> {
 
 fn large_target(desk: &mut Desk) -> Result<Found> {
     const SIDE: usize = 8192;
-    let text =
-        PLAIN.replace("width = 65", "width = 8192").replace("height = 49", "height = 8192").replace("rgba32f", "rgba8");
-    let scene = with_particles(desk, &format!("{text}[draw]\npath = 'sprites'\n"), vec![blob([0.0; 3], 0.01, 50.0)])?;
+    let text = PLAIN
+        .replace("width = 65", "width = 8192")
+        .replace("height = 49", "height = 8192")
+        .replace("rgba32f", "rgba8");
+    let scene = with_particles(
+        desk,
+        &format!("{text}[draw]\npath = 'sprites'\n"),
+        vec![blob([0.0; 3], 0.01, 50.0)],
+    )?;
     let mut c = Comparison::default();
     let mut player = match desk.player(&scene, false) {
         Ok(player) => player,
@@ -347,9 +404,12 @@ fn no_camera(desk: &mut Desk) -> Result<Found> {
     for (position, target, what) in places {
         let mut scene = scene.clone();
         scene.camera.keys.iter_mut().for_each(|k| (k.position, k.target) = (position, target));
-        let frame = desk.player(&scene, false).and_then(|mut player| player.game.step(0).map(|_| ()));
+        let frame =
+            desk.player(&scene, false).and_then(|mut player| player.game.step(0).map(|_| ()));
         // Bad input, and no fault of the device.
-        c.holds(frame.is_err_and(|e| e.exit_code() == 2), || format!("an error of a camera of {what}"));
+        c.holds(frame.is_err_and(|e| e.exit_code() == 2), || {
+            format!("an error of a camera of {what}")
+        });
     }
     Ok(c.into())
 }

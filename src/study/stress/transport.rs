@@ -1,5 +1,5 @@
-//! Light between facets: at one place, touching, in one plane, back to back, tiny, huge and far away; sums of a million terms; a
-//! closed box, in which no energy may come to be.
+//! Light between facets: at one place, touching, in one plane, back to back, tiny, huge and far
+//! away; sums of a million terms; a closed box, in which no energy may come to be.
 
 use std::f64::consts::PI;
 
@@ -43,7 +43,8 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "transport/crossing",
-        what: "two rectangles through each other's middle: some light, finite, no more than all that is sent",
+        what: "two rectangles through each other's middle: some light, finite, no more than all \
+            that is sent",
         bound: "1e-3 of the brightest L1",
         run: crossing,
     },
@@ -67,13 +68,15 @@ pub const CASES: &[Case] = &[
     },
     Case {
         name: "transport/touching-facets",
-        what: "facets of a cloud at two points, to each other at distance 0, over a floor: finite, lit by it, not negative",
+        what: "facets of a cloud at two points, to each other at distance 0, over a floor: finite, \
+            lit by it, not negative",
         bound: "0",
         run: one_point,
     },
     Case {
         name: "transport/tree-one-point",
-        what: "a tree of facets at two points and a floor, opened to its leaves: as gathered from every pair",
+        what: "a tree of facets at two points and a floor, opened to its leaves: as gathered \
+            from every pair",
         bound: "2 (n + 32) u of the greatest",
         run: tree_one_point,
     },
@@ -158,7 +161,8 @@ fn back_to_back(desk: &mut Desk) -> Result<Found> {
 
 fn touching(desk: &mut Desk) -> Result<Found> {
     let wall = plate([0.0, 1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 7);
-    let lights = "[[light]]\nkind = 'directional'\ndirection = [0.2, -1, -0.7]\nirradiance = [1, 1, 1]\n";
+    let lights =
+        "[[light]]\nkind = 'directional'\ndirection = [0.2, -1, -0.7]\nirradiance = [1, 1, 1]\n";
     let scene = room(desk, "gather = 'exact'", lights, DULL, vec![floor([0.0; 3], 7), wall])?;
     let played = desk.play(&scene, 0)?;
     let truth = Truth::of(&scene, 0.0)?;
@@ -184,7 +188,9 @@ fn crossing(desk: &mut Desk) -> Result<Found> {
     // Of a hemisphere of the brightest L1 a facet receives pi of it.
     let brightest = played.lit.iter().map(|l| f64::from(l.first[0])).fold(0.0, f64::max);
     let lit = second(&mut c, &played);
-    c.holds(lit.iter().any(|l| *l > 0.01 * brightest), || "that there is a second reflection".to_owned());
+    c.holds(lit.iter().any(|l| *l > 0.01 * brightest), || {
+        "that there is a second reflection".to_owned()
+    });
     for (i, l) in lit.into_iter().enumerate() {
         c.add((l - 0.5 * brightest).max(0.0), 0.0, 1e-3 * brightest, || {
             format!("L2 of facet {i} beyond K_d of the brightest")
@@ -202,9 +208,14 @@ fn corner(desk: &Desk, k: i32) -> Result<Scene> {
         plate([-1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], 5),
     ];
     let scaled = surfaces.map(|p| Surface { center: s * p.center, u: s * p.u, v: s * p.v, ..p });
-    let lights = "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1, -0.7]\nirradiance = [1, 1, 1]\n";
+    let lights =
+        "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1, -0.7]\nirradiance = [1, 1, 1]\n";
     let mut scene = room(desk, "gather = 'exact'", lights, DULL, scaled.to_vec())?;
-    scene.camera.keys.iter_mut().for_each(|key| (key.position, key.target) = (s * key.position, s * key.target));
+    scene
+        .camera
+        .keys
+        .iter_mut()
+        .for_each(|key| (key.position, key.target) = (s * key.position, s * key.target));
     scene.camera.near *= s;
     Ok(scene)
 }
@@ -213,7 +224,8 @@ fn scaled(desk: &mut Desk, k: i32) -> Result<Found> {
     let (one, other) = (corner(desk, 0)?, corner(desk, k)?);
     let (one, other) = (desk.play(&one, 0)?, desk.play(&other, 0)?);
     let mut c = Comparison::default();
-    let light = |p: &Played| p.lit.iter().map(|l| (l.first, l.second, l.indirect)).collect::<Vec<_>>();
+    let light =
+        |p: &Played| p.lit.iter().map(|l| (l.first, l.second, l.indirect)).collect::<Vec<_>>();
     c.same(&light(&one), &light(&other), "light of facets");
     let lit = second(&mut c, &one);
     c.holds(lit.iter().any(|l| *l > 0.0), || "that there is a second reflection".to_owned());
@@ -224,7 +236,8 @@ fn far(desk: &mut Desk) -> Result<Found> {
     const D: f64 = 1e9;
     // Fronts toward each other; the sun comes from beside the ceiling and meets the floor alone.
     let ceiling = plate([0.0, D, 0.0], FLOOR.1, FLOOR.0, 1);
-    let lights = "[[light]]\nkind = 'directional'\ndirection = [0.6, -0.8, 0]\nirradiance = [1, 1, 1]\n";
+    let lights =
+        "[[light]]\nkind = 'directional'\ndirection = [0.6, -0.8, 0]\nirradiance = [1, 1, 1]\n";
     let scene = room(desk, "gather = 'exact'", lights, DULL, vec![floor([0.0; 3], 1), ceiling])?;
     let played = desk.play(&scene, 0)?;
     let mut c = Comparison::default();
@@ -238,8 +251,12 @@ fn far(desk: &mut Desk) -> Result<Found> {
 
 /// Blobs at one point.
 fn heaped(desk: &Desk, gather: &str, n: u32) -> Result<Scene> {
-    let text = LIT.replace("mode = 'first'", &format!("mode = 'two-reflection'\ngather = '{gather}'\ntheta = 0.0"));
-    // Two points, so that the cloud's facets look away from each other, over a floor that all of them see.
+    let text = LIT.replace(
+        "mode = 'first'",
+        &format!("mode = 'two-reflection'\ngather = '{gather}'\ntheta = 0.0"),
+    );
+    // Two points, so that the cloud's facets look away from each other, over a floor that all of
+    // them see.
     let at = |i: u32| [if i.is_multiple_of(2) { 1.0 } else { -1.0 }, 0.0, 0.0];
     let mut scene = with_particles(desk, &text, (0..n).map(|i| blob(at(i), 0.2, 0.5)).collect())?;
     scene.surfaces.push(plate([0.0, -2.0, 0.0], [0.0, 0.0, 5.0], [5.0, 0.0, 0.0], 6));
@@ -253,7 +270,9 @@ fn one_point(desk: &mut Desk) -> Result<Found> {
     let lit = second(&mut c, &played);
     // Surfaces' facets come first.
     c.holds(lit[36..].iter().all(|l| *l > 0.0), || "that the floor lights all of them".to_owned());
-    c.add(played.n_odd() as f64, 0.0, 0.0, || "numbers of the picture that are not finite".to_owned());
+    c.add(played.n_odd() as f64, 0.0, 0.0, || {
+        "numbers of the picture that are not finite".to_owned()
+    });
     Ok(c.into())
 }
 
@@ -281,24 +300,34 @@ fn closed_box(desk: &mut Desk) -> Result<Found> {
         ([0.0, 0.0, -1.0], x, y),
         ([0.0, 0.0, 1.0], y, x),
     ];
-    let lamp = "[[light]]\nkind = 'point'\nposition = [0.1, 0.2, -0.1]\nintensity = [1, 1, 1]\nradius = 0.05\n";
+    let lamp = "[[light]]\nkind = 'point'\nposition = [0.1, 0.2, -0.1]\nintensity = [1, 1, \
+        1]\nradius = 0.05\n";
     let surfaces = walls.map(|(at, u, v)| plate(at, u, v, 6)).to_vec();
     let scene = room(desk, "gather = 'exact'", lamp, "kd = [1, 1, 1]\n", surfaces)?;
     let played = desk.play(&scene, 0)?;
     let mut c = Comparison::default();
     second(&mut c, &played);
     let flux = |of: fn(&crate::layout::facet::LitRecord) -> f32| -> f64 {
-        played.facets.iter().zip(&played.lit).map(|(f, l)| f64::from(f.area) * f64::from(of(l))).sum()
+        played
+            .facets
+            .iter()
+            .zip(&played.lit)
+            .map(|(f, l)| f64::from(f.area) * f64::from(of(l)))
+            .sum()
     };
     let (sent, received) = (flux(|l| l.direct[0]), flux(|l| l.indirect[0]));
-    c.add(received, sent, 0.01 * sent, || "all that is received of the second reflection, by what was sent".to_owned());
-    // Of the lamp what its facets' centres receive, and that is its power but for the midpoint rule.
+    c.add(received, sent, 0.01 * sent, || {
+        "all that is received of the second reflection, by what was sent".to_owned()
+    });
+    // Of the lamp what its facets' centres receive, and that is its power but for the midpoint
+    // rule.
     let lamp = DVec3::new(0.1, 0.2, -0.1);
     let at = |s: &Surface, i: u32| {
         let way = lamp - s.facet_center(i);
         s.area() / s.n_facets() as f64 * s.normal().dot(way) / way.length().powi(3)
     };
-    let truth: f64 = scene.surfaces.iter().flat_map(|s| (0..s.n_facets() as u32).map(move |i| at(s, i))).sum();
+    let truth: f64 =
+        scene.surfaces.iter().flat_map(|s| (0..s.n_facets() as u32).map(move |i| at(s, i))).sum();
     c.add(sent, truth, 64.0 * U_F32 * truth, || "all that is received of the lamp".to_owned());
     c.add(sent, 4.0 * PI, 0.02 * 4.0 * PI, || "the lamp's power".to_owned());
     Ok(c.into())
@@ -328,7 +357,8 @@ void main() {
 
 const N_TERMS: u32 = 1_000_000;
 
-/// Of both signs, over 40 binades; and one beside which each of the others by itself is rounded away.
+/// Of both signs, over 40 binades; and one beside which each of the others by itself is rounded
+/// away.
 fn terms() -> [Vec<f32>; 2] {
     let share = |i: u32, k: f64| (f64::from(i) * k).fract();
     let wide = |i: u32| {

@@ -1,4 +1,5 @@
-//! How far a picture is from a reference, with an interval: over the parts of the picture, and by the reference's own error.
+//! How far a picture is from a reference, with an interval: over the parts of the picture, and by
+//! the reference's own error.
 
 use super::records::PictureError;
 use crate::measure::bootstrap::Bootstrap;
@@ -6,14 +7,14 @@ use crate::measure::picture::errors;
 use crate::study::pixels::Pixels;
 use crate::study::provenance::Figure;
 
-/// Parts of a picture along its longer side. What a blob is off by it is off by all over its disc: single pixels are no
-/// independent draws, parts as large as blobs nearly are.
+/// Parts of a picture along its longer side. What a blob is off by it is off by all over its disc:
+/// single pixels are no independent draws, parts as large as blobs nearly are.
 const N_PARTS: u32 = 12;
 /// The reference's own error must be this many times smaller than what it judges.
 pub const RESOLVED: f64 = 10.0;
 
-/// Of a device's picture, pixel by pixel of `pixels`, by `reference`, which is itself off by `own_error`, root mean square.
-/// None where some value of either is no finite number.
+/// Of a device's picture, pixel by pixel of `pixels`, by `reference`, which is itself off by
+/// `own_error`, root mean square. None where some value of either is no finite number.
 pub fn picture_error(
     pixels: &Pixels,
     picture: &[[f64; 4]],
@@ -25,7 +26,8 @@ pub fn picture_error(
     let whole = errors(pairs).filter(|_| squares.iter().all(|s| s.is_finite()))?;
     let parts = parts(pixels, &squares);
     let root = |rows: &[usize]| {
-        let (sum, n) = rows.iter().map(|&r| parts[r]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let (sum, n) =
+            rows.iter().map(|&r| parts[r]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
         if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
     };
     let interval = Bootstrap::default().interval([parts.len()], |[rows]| root(rows));
@@ -65,11 +67,18 @@ mod tests {
         let (a, b) = (vec![[0.5; 4]; 288], vec![[0.4; 4]; 288]);
         let e = picture_error(&pixels, &a, &b, 0.0).unwrap();
         let (low, high) = (e.rmse.low.unwrap(), e.rmse.high.unwrap());
-        assert!((e.rmse.value - 0.1).abs() < 1e-15 && (low - 0.1).abs() < 1e-12 && (high - 0.1).abs() < 1e-12);
+        assert!(
+            (e.rmse.value - 0.1).abs() < 1e-15
+                && (low - 0.1).abs() < 1e-12
+                && (high - 0.1).abs() < 1e-12
+        );
         assert!(e.is_resolved && (e.max - 0.1).abs() < 1e-15);
         // The reference's own error widens it, and decides what it can judge.
         let e = picture_error(&pixels, &a, &b, 0.02).unwrap();
-        assert!((e.rmse.low.unwrap() - 0.08).abs() < 1e-12 && (e.rmse.high.unwrap() - 0.12).abs() < 1e-12);
+        assert!(
+            (e.rmse.low.unwrap() - 0.08).abs() < 1e-12
+                && (e.rmse.high.unwrap() - 0.12).abs() < 1e-12
+        );
         assert!(!e.is_resolved && picture_error(&pixels, &a, &b, 0.009).unwrap().is_resolved);
     }
 
@@ -79,7 +88,8 @@ mod tests {
         let zero = vec![[0.0; 4]; 48 * 48];
         let with = |n: usize| {
             let mut picture = zero.clone();
-            // n parts of 4 × 4 pixels, spread over the picture, each as wrong as makes the same RMSE.
+            // n parts of 4 × 4 pixels, spread over the picture, each as wrong as makes the same
+            // RMSE.
             for k in 0..n {
                 let (i, j) = (4 * (k * 5 % 12), 4 * (k / 12 * 3 % 12));
                 for y in j..j + 4 {
@@ -100,6 +110,9 @@ mod tests {
     fn what_is_no_number_has_no_error() {
         let pixels = Pixels::all(2, 1);
         let (zero, bad) = ([[0.0; 4]; 2], [[0.0; 4], [f64::NAN, 0.0, 0.0, 0.0]]);
-        assert_eq!((picture_error(&pixels, &bad, &zero, 0.0), picture_error(&pixels, &zero, &bad, 0.0)), (None, None));
+        assert_eq!(
+            (picture_error(&pixels, &bad, &zero, 0.0), picture_error(&pixels, &zero, &bad, 0.0)),
+            (None, None)
+        );
     }
 }

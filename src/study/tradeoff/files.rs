@@ -1,5 +1,6 @@
-//! A study on disk: `study.json`, `configurations.csv`, `times.csv` and pictures. Written after every round, so that whatever
-//! ends a run early leaves what was finished, and a later run goes on from there.
+//! A study on disk: `study.json`, `configurations.csv`, `times.csv` and pictures. Written after
+//! every round, so that whatever ends a run early leaves what was finished, and a later run goes on
+//! from there.
 
 use std::fs;
 use std::io::Write;
@@ -35,7 +36,8 @@ pub fn write(folder: &Path, study: &Study, found: &Found) -> Result<()> {
         write_times(&folder.join(TIMES_FILE), study, &found.turns)?;
         write_csv(&folder.join(CONFIGURATIONS_FILE), study.configurations.iter().map(csv_row))?;
         let path = folder.join(STUDY_FILE);
-        let mut text = serde_json::to_string_pretty(study).map_err(|cause| Error::io(&path, cause))?;
+        let mut text =
+            serde_json::to_string_pretty(study).map_err(|cause| Error::io(&path, cause))?;
         text.push('\n');
         write_atomic(&path, |file| file.write_all(text.as_bytes()))
     })
@@ -46,7 +48,8 @@ pub fn remove_earlier(folder: &Path) -> Result<()> {
     let is_ours = |name: &str| {
         let number = |begin| name.strip_prefix(begin).and_then(|rest| rest.strip_suffix(".png"));
         let of_configuration = number("picture-").or(number("error-"));
-        of_configuration.is_some_and(|n| n.parse::<usize>().is_ok()) || ["front.svg", "reference.png"].contains(&name)
+        of_configuration.is_some_and(|n| n.parse::<usize>().is_ok())
+            || ["front.svg", "reference.png"].contains(&name)
     };
     for entry in fs::read_dir(folder).map_err(|cause| Error::io(folder, cause))? {
         let entry = entry.map_err(|cause| Error::io(folder, cause))?;
@@ -59,7 +62,10 @@ pub fn remove_earlier(folder: &Path) -> Result<()> {
 
 fn write_times(path: &Path, study: &Study, turns: &[Turn]) -> Result<()> {
     let of_turn = |(i_turn, turn): (usize, &Turn)| {
-        let name = study.configurations.get(turn.i_configuration).map_or(String::new(), |c| c.name.clone());
+        let name = study
+            .configurations
+            .get(turn.i_configuration)
+            .map_or(String::new(), |c| c.name.clone());
         let row = |(k, frame_ms): (usize, &f64)| TimeRow {
             round: turn.i_round,
             turn: i_turn,
@@ -141,7 +147,12 @@ fn check_row(row: &TimeRow) -> std::result::Result<(), String> {
         return Err(format!("turn {}: expected a finite time in ms, found {ms}", row.turn));
     }
     if u32::try_from(row.round).is_err() {
-        return Err(format!("turn {}: expected a round from 0 to {}, found {}", row.turn, u32::MAX, row.round));
+        return Err(format!(
+            "turn {}: expected a round from 0 to {}, found {}",
+            row.turn,
+            u32::MAX,
+            row.round
+        ));
     }
     Ok(())
 }
@@ -154,16 +165,22 @@ pub fn read_study(folder: &Path) -> Result<Study> {
 
 /// A `study.json` from its text; `path` is for messages.
 pub fn parse_study(text: &str, path: &Path) -> Result<Study> {
-    let value: serde_json::Value =
-        serde_json::from_str(text).map_err(|cause| Error::io(path, format!("not JSON, or not all of it: {cause}")))?;
+    let value: serde_json::Value = serde_json::from_str(text)
+        .map_err(|cause| Error::io(path, format!("not JSON, or not all of it: {cause}")))?;
     match value.get("schema").and_then(serde_json::Value::as_u64) {
         Some(version) if version == u64::from(SCHEMA_VERSION) => {}
         Some(version) => {
-            return Err(Error::io(path, format!("a study of schema {version}; this nimbus reads {SCHEMA_VERSION}")));
+            return Err(Error::io(
+                path,
+                format!("a study of schema {version}; this nimbus reads {SCHEMA_VERSION}"),
+            ));
         }
-        None => return Err(Error::io(path, "not a study.json of nimbus: it names no schema version")),
+        None => {
+            return Err(Error::io(path, "not a study.json of nimbus: it names no schema version"));
+        }
     }
-    serde_json::from_value(value).map_err(|cause| Error::io(path, format!("not a study.json of nimbus: {cause}")))
+    serde_json::from_value(value)
+        .map_err(|cause| Error::io(path, format!("not a study.json of nimbus: {cause}")))
 }
 
 /// What an earlier run in `folder` found, to be gone on with.

@@ -57,9 +57,10 @@ fn is_better(a: &Both, b: &Both) -> bool {
     t && e && (a.time.value < b.time.value || a.error.value < b.error.value)
 }
 
-/// Says of every configuration where it lies. On the front no other is better, as the figures stand: at most as long and at most
-/// as far off, and one of the two less. Another one is off it where one that is better is faster by more than the intervals, and
-/// near it where none is: errors are those of one picture, the same in every run, and it is the times that chance has a part in.
+/// Says of every configuration where it lies. On the front no other is better, as the figures
+/// stand: at most as long and at most as far off, and one of the two less. Another one is off it
+/// where one that is better is faster by more than the intervals, and near it where none is: errors
+/// are those of one picture, the same in every run, and it is the times that chance has a part in.
 /// Times are `by_base`, which drifts take no part in.
 pub fn place(configurations: &mut [Configuration], metric: Metric) {
     let both: Vec<Option<Both>> = configurations
@@ -84,13 +85,27 @@ pub fn place(configurations: &mut [Configuration], metric: Metric) {
 }
 
 /// The least error within `ms`, as the figures stand; of equal ones the faster.
-pub fn best_within_ms(configurations: &[Configuration], metric: Metric, ms: f64, is_gpu: bool) -> Best {
+pub fn best_within_ms(
+    configurations: &[Configuration],
+    metric: Metric,
+    ms: f64,
+    is_gpu: bool,
+) -> Best {
     let within = |time: f64, _: f64| time <= ms;
-    Best { budget: "ms".into(), value: ms, configuration: best(configurations, metric, is_gpu, within, |t, e| (e, t)) }
+    Best {
+        budget: "ms".into(),
+        value: ms,
+        configuration: best(configurations, metric, is_gpu, within, |t, e| (e, t)),
+    }
 }
 
 /// The least time within an error, as the figures stand; of equal ones the more exact.
-pub fn best_within_error(configurations: &[Configuration], metric: Metric, error: f64, is_gpu: bool) -> Best {
+pub fn best_within_error(
+    configurations: &[Configuration],
+    metric: Metric,
+    error: f64,
+    is_gpu: bool,
+) -> Best {
     let within = |_: f64, e: f64| e <= error;
     Best {
         budget: "error".into(),
@@ -127,8 +142,11 @@ mod tests {
     use super::*;
 
     fn found(time: (f64, f64), error: f64) -> Configuration {
-        let figure =
-            |(value, spread): (f64, f64)| Figure { value, low: Some(value - spread), high: Some(value + spread) };
+        let figure = |(value, spread): (f64, f64)| Figure {
+            value,
+            low: Some(value - spread),
+            high: Some(value + spread),
+        };
         Configuration {
             name: name_of(&[]),
             settings: Vec::new(),
@@ -137,7 +155,12 @@ mod tests {
             frame_ms: None,
             by_base: Some(figure(time)),
             n_turns: 8,
-            error: Some(PictureError { rmse: figure((error, 0.0)), max: error, relmse: error, is_resolved: true }),
+            error: Some(PictureError {
+                rmse: figure((error, 0.0)),
+                max: error,
+                relmse: error,
+                is_resolved: true,
+            }),
             front: Front::Unknown,
             failure: None,
             picture: None,
@@ -154,13 +177,20 @@ mod tests {
     fn off_only_where_something_better_is_surely_faster() {
         use Front::{Near, Off, On};
         // 0.8 is beaten by 0.5 surely, 0.52 by it not.
-        let all =
-            vec![found((1.0, 0.0), 0.1), found((0.5, 0.05), 0.2), found((0.8, 0.05), 0.3), found((0.52, 0.05), 0.25)];
+        let all = vec![
+            found((1.0, 0.0), 0.1),
+            found((0.5, 0.05), 0.2),
+            found((0.8, 0.05), 0.3),
+            found((0.52, 0.05), 0.25),
+        ];
         assert_eq!(placed(all), [On, On, Off, Near]);
         // Who is surely faster but further off, by however little, beats nobody.
         assert_eq!(placed(vec![found((1.0, 0.0), 0.1), found((0.5, 0.01), 0.1000001)]), [On, On]);
         // Equals do not beat each other; what has no figures is nowhere.
         let bare = Configuration { error: None, ..found((0.1, 0.0), 0.0) };
-        assert_eq!(placed(vec![found((1.0, 0.0), 0.1), found((1.0, 0.1), 0.1), bare]), [On, On, Front::Unknown]);
+        assert_eq!(
+            placed(vec![found((1.0, 0.0), 0.1), found((1.0, 0.1), 0.1), bare]),
+            [On, On, Front::Unknown]
+        );
     }
 }

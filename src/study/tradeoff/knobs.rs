@@ -16,18 +16,34 @@ const KNOBS: [Knob; 17] = [
     Knob { key: "draw.path", values: &["sprites", "tiles"], applies: has_particles },
     Knob { key: "draw.resolution", values: &["1.0", "0.5", "0.25"], applies: has_particles },
     Knob { key: "draw.cutoff", values: &["2.0", "2.5", "3.0", "4.0"], applies: has_particles },
-    Knob { key: "draw.threshold", values: &["0.0", "0.001", "0.01", "0.03"], applies: has_particles },
+    Knob {
+        key: "draw.threshold",
+        values: &["0.0", "0.001", "0.01", "0.03"],
+        applies: has_particles,
+    },
     Knob { key: "draw.sort_bits", values: &["16", "32"], applies: has_particles },
     Knob { key: "draw.count", values: &["all", "distance"], applies: has_particles },
     Knob { key: "film.format", values: &["rgba8", "rgba16f", "rgba32f"], applies: |_| true },
     Knob { key: "lighting.grid", values: &["16", "32", "64", "128"], applies: marches },
     Knob { key: "lighting.step", values: &["0.5", "1.0", "2.0", "4.0"], applies: marches },
     Knob { key: "lighting.facets_per_cloud", values: &["32", "128", "512", "0"], applies: marches },
-    Knob { key: "lighting.mode", values: &["first", "two-reflection"], applies: |scene| reflections(scene) == 2 },
+    Knob {
+        key: "lighting.mode",
+        values: &["first", "two-reflection"],
+        applies: |scene| reflections(scene) == 2,
+    },
     Knob { key: "lighting.gather", values: &["exact", "tree"], applies: gathers },
     Knob { key: "lighting.theta", values: &["0.2", "0.4", "0.8"], applies: gathers_from_tree },
-    Knob { key: "lighting.pair_size", values: &["0.25", "0.5", "1.0"], applies: |s| gathers(s) && has_surfaces(s) },
-    Knob { key: "surface.*.subdivide", values: &["[4,4]", "[6,6]", "[8,8]", "[12,12]"], applies: is_lit_surface },
+    Knob {
+        key: "lighting.pair_size",
+        values: &["0.25", "0.5", "1.0"],
+        applies: |s| gathers(s) && has_surfaces(s),
+    },
+    Knob {
+        key: "surface.*.subdivide",
+        values: &["[4,4]", "[6,6]", "[8,8]", "[12,12]"],
+        applies: is_lit_surface,
+    },
     Knob { key: "lighting.bases", values: &["3", "4", "8", "16"], applies: is_glossy },
     Knob { key: "lighting.sampling", values: &["log", "uniform"], applies: is_glossy },
 ];
@@ -77,6 +93,7 @@ fn is_lit_surface(scene: &Scene) -> bool {
 
 /// Whether a lobe is gathered, for which the basis is.
 fn is_glossy(scene: &Scene) -> bool {
-    let shines = |i: usize| scene.region_material(i).keys.iter().any(|key| key.brdf.ks != DVec3::ZERO);
+    let shines =
+        |i: usize| scene.region_material(i).keys.iter().any(|key| key.brdf.ks != DVec3::ZERO);
     gathers(scene) && (0..scene.n_regions()).any(shines)
 }

@@ -1,4 +1,5 @@
-//! The configurations on a device: made ready when their turn comes, and kept as long as they fit side by side.
+//! The configurations on a device: made ready when their turn comes, and kept as long as they fit
+//! side by side.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -19,11 +20,13 @@ pub struct Frames {
     pub time_s: f64,
     /// Timed frames of a turn.
     pub n_frames: u32,
-    /// Frames leave out what the scene lets them leave out; else everything that can move is done anew in each.
+    /// Frames leave out what the scene lets them leave out; else everything that can move is done
+    /// anew in each.
     pub as_played: bool,
 }
 
-/// Untimed frames before a turn's: one that a driver and its caches warm up in, and two more of what was just made.
+/// Untimed frames before a turn's: one that a driver and its caches warm up in, and two more of
+/// what was just made.
 const N_WARM: u32 = 1;
 const N_WARM_NEW: u32 = 3;
 /// Share of the device's memory that what is kept may take.
@@ -64,7 +67,9 @@ impl<'a> Players<'a> {
                 let limits = self.bed.device.limits();
                 let n_bytes = limits::check(scene, limits)?;
                 let most = (MEMORY_SHARE * limits.device_memory_bytes as f64) as u64;
-                while !self.kept.is_empty() && self.kept.iter().map(|k| k.n_bytes).sum::<u64>() + n_bytes > most {
+                while !self.kept.is_empty()
+                    && self.kept.iter().map(|k| k.n_bytes).sum::<u64>() + n_bytes > most
+                {
                     self.kept.remove(0);
                 }
                 let mut player = self.bed.player(scene.clone(), true)?;
@@ -110,9 +115,11 @@ impl Subject for Players<'_> {
         let (player, is_new) = self.player(i)?;
         player.renderer.reset();
         let n_warm = if is_new { N_WARM_NEW } else { N_WARM };
-        let mut turn = Turn { i_configuration: i, i_round, gpu_ms: Vec::new(), frame_ms: Vec::new() };
+        let mut turn =
+            Turn { i_configuration: i, i_round, gpu_ms: Vec::new(), frame_ms: Vec::new() };
         for k in 0..n_warm + frames.n_frames {
-            // The same frames in every turn, whatever came before them; what leads up to them runs backwards in time.
+            // The same frames in every turn, whatever came before them; what leads up to them runs
+            // backwards in time.
             let i_frame = frames.i_frame.saturating_add(k.abs_diff(n_warm));
             let begin = Instant::now();
             let packet = player.game.step(i_frame)?;

@@ -1,5 +1,5 @@
-//! `study.json`: what `nimbus error` found. Its form is docs/study.schema.json; a change of meaning, or of a key, raises
-//! [`SCHEMA_VERSION`].
+//! `study.json`: what `nimbus error` found. Its form is docs/study.schema.json; a change of
+//! meaning, or of a key, raises [`SCHEMA_VERSION`].
 
 use serde::{Deserialize, Serialize};
 
@@ -43,7 +43,8 @@ pub struct Configuration {
     pub settings: Vec<Setting>,
     /// SHA-256 of its resolved scene and files.
     pub hash: String,
-    /// ms of a frame: that of the scene as it stands times `by_base`; none where the device has no timestamps.
+    /// ms of a frame: that of the scene as it stands times `by_base`; none where the device has no
+    /// timestamps.
     pub gpu_ms: Option<Figure>,
     /// ms of a frame, game step to finished picture, in the same way.
     pub frame_ms: Option<Figure>,
@@ -64,7 +65,8 @@ pub struct Configuration {
 /// How far a picture is from the reference, over premultiplied linear red, green, blue and alpha.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PictureError {
-    /// Root mean square; its interval is over the picture's parts, and no narrower than the reference's own error.
+    /// Root mean square; its interval is over the picture's parts, and no narrower than the
+    /// reference's own error.
     pub rmse: Figure,
     pub max: f64,
     /// Mean of squares relative to the reference's (`measure::picture`).
@@ -77,7 +79,8 @@ pub struct PictureError {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Front {
-    /// None is better, as the figures stand: at most as long and as far off, and one of the two less.
+    /// None is better, as the figures stand: at most as long and as far off, and one of the two
+    /// less.
     On,
     /// Some are, but none is faster by more than the intervals.
     Near,

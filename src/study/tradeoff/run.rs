@@ -1,4 +1,5 @@
-//! A study from its knobs to its front: configurations are drawn, compared, timed in turn, put together, and placed.
+//! A study from its knobs to its front: configurations are drawn, compared, timed in turn, put
+//! together, and placed.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -78,19 +79,23 @@ pub struct Setup<'a> {
 }
 
 impl Setup<'_> {
-    /// Runs what `found` does not have yet, and says where every configuration lies; whether it ran to its end.
+    /// Runs what `found` does not have yet, and says where every configuration lies; whether it ran
+    /// to its end.
     pub fn run(
         &self,
         subject: &mut dyn Subject,
         found: &mut Found,
         on: &mut dyn FnMut(Event<'_>) -> Result<()>,
     ) -> Result<bool> {
-        // Those of an earlier run come first, in their order; what is asked for and not among them follows.
+        // Those of an earlier run come first, in their order; what is asked for and not among them
+        // follows.
         for configuration in &found.configurations {
             let Loaded { scene, hash } = (self.load)(&configuration.settings)?;
             if hash != configuration.hash {
                 let name = &configuration.name;
-                return Err(Error::usage(format!("{name}: its scene or files have changed since the study began")));
+                return Err(Error::usage(format!(
+                    "{name}: its scene or files have changed since the study began"
+                )));
             }
             subject.add(&scene);
         }
@@ -150,9 +155,12 @@ impl Setup<'_> {
         on: &mut dyn FnMut(Event<'_>) -> Result<()>,
     ) -> Result<bool> {
         let is_open = |c: &Configuration| c.error.is_none() && c.failure.is_none();
-        let open: Vec<usize> = (0..found.configurations.len()).filter(|&i| is_open(&found.configurations[i])).collect();
+        let open: Vec<usize> = (0..found.configurations.len())
+            .filter(|&i| is_open(&found.configurations[i]))
+            .collect();
         let late = |i: usize, found: &Found| n_turns(&found.turns, i) < self.plan.n_rounds;
-        let mut late: Vec<usize> = (1..found.configurations.len()).filter(|&i| late(i, found)).collect();
+        let mut late: Vec<usize> =
+            (1..found.configurations.len()).filter(|&i| late(i, found)).collect();
         on(Event::More(open.len() + late.len() * self.plan.n_rounds))?;
         for i in open {
             if self.stop.load(Ordering::Relaxed) {
@@ -195,11 +203,18 @@ impl Setup<'_> {
                 let whole: Vec<[f64; 4]> =
                     rgba.chunks_exact(4).map(|p| [0, 1, 2, 3].map(|k| f64::from(p[k]))).collect();
                 let drawn = self.pixels.pick(&whole);
-                let error = picture_error(self.pixels, &drawn, &self.reference.rgba, self.reference.own_error);
+                let error = picture_error(
+                    self.pixels,
+                    &drawn,
+                    &self.reference.rgba,
+                    self.reference.own_error,
+                );
                 match error {
                     Some(error) => found.configurations[i].error = Some(error),
                     None if i > 0 => found.configurations[i].failure = Some(NOT_FINITE.to_owned()),
-                    None => return Err(Error::usage(format!("the scene as it stands: {NOT_FINITE}"))),
+                    None => {
+                        return Err(Error::usage(format!("the scene as it stands: {NOT_FINITE}")));
+                    }
                 }
                 on(Event::Picture { i, rgba: &rgba, found })
             }

@@ -1,6 +1,6 @@
-//! Times in turn: rounds in which every configuration has a turn of a few frames, and the scene as it stands one every
-//! few others, so that each is compared with what the scene took just before and just after it. Whatever a shared
-//! machine does over minutes falls on both alike.
+//! Times in turn: rounds in which every configuration has a turn of a few frames, and the scene as
+//! it stands one every few others, so that each is compared with what the scene took just before
+//! and just after it. Whatever a shared machine does over minutes falls on both alike.
 
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
@@ -54,14 +54,17 @@ pub fn order(others: &[usize], i_round: usize) -> Vec<usize> {
     order
 }
 
-/// Of configuration `i` every turn's time by that of the scene's turns around it (their geometric mean).
+/// Of configuration `i` every turn's time by that of the scene's turns around it (their geometric
+/// mean).
 fn ratios(turns: &[Turn], i: usize, time: Time) -> Vec<f64> {
     let base = |turn: &&Turn| turn.i_configuration == 0;
     let mut found = Vec::new();
     for (k, turn) in turns.iter().enumerate().filter(|(_, turn)| turn.i_configuration == i) {
         let same_round = |other: &&Turn| other.i_round == turn.i_round;
-        let before = turns[..k].iter().rev().take_while(same_round).find(base).and_then(|t| time.of(t));
-        let after = turns[k + 1..].iter().take_while(same_round).find(base).and_then(|t| time.of(t));
+        let before =
+            turns[..k].iter().rev().take_while(same_round).find(base).and_then(|t| time.of(t));
+        let after =
+            turns[k + 1..].iter().take_while(same_round).find(base).and_then(|t| time.of(t));
         // A round that was cut short has none after it.
         let around: Vec<f64> = before.into_iter().chain(after).filter(|ms| *ms > 0.0).collect();
         let mean = (around.iter().map(|ms| ms.ln()).sum::<f64>() / around.len() as f64).exp();
@@ -83,13 +86,15 @@ fn figure(values: &[f64]) -> Option<Figure> {
 pub struct Timed {
     /// Its time by that of the scene as it stands.
     pub by_base: Figure,
-    /// That times the median of the scene as it stands, ms; of that itself its median, whose interval knows the drift.
+    /// That times the median of the scene as it stands, ms; of that itself its median, whose
+    /// interval knows the drift.
     pub ms: Figure,
 }
 
 /// None where it has no turn, or there are no such times.
 pub fn timed(turns: &[Turn], i: usize, time: Time) -> Option<Timed> {
-    let of_base: Vec<f64> = turns.iter().filter(|t| t.i_configuration == 0).filter_map(|t| time.of(t)).collect();
+    let of_base: Vec<f64> =
+        turns.iter().filter(|t| t.i_configuration == 0).filter_map(|t| time.of(t)).collect();
     let base = figure(&of_base)?;
     if i == 0 {
         let one = Figure { value: 1.0, low: Some(1.0), high: Some(1.0) };
@@ -111,7 +116,12 @@ mod tests {
     use super::*;
 
     fn turn(i_configuration: usize, i_round: usize, ms: f64) -> Turn {
-        Turn { i_configuration, i_round, gpu_ms: vec![ms], frame_ms: vec![ms + 1.0, ms + 1.0, ms + 90.0] }
+        Turn {
+            i_configuration,
+            i_round,
+            gpu_ms: vec![ms],
+            frame_ms: vec![ms + 1.0, ms + 1.0, ms + 90.0],
+        }
     }
 
     #[test]
@@ -123,8 +133,8 @@ mod tests {
 
     #[test]
     fn a_drift_falls_on_both() {
-        // A machine that gets slower from turn to turn by 3 %, and one configuration that takes 0.8 of the scene's
-        // time.
+        // A machine that gets slower from turn to turn by 3 %, and one configuration that takes 0.8
+        // of the scene's time.
         let mut turns = Vec::new();
         for i_round in 0..10 {
             for i in order(&[1, 2], i_round) {
@@ -135,7 +145,10 @@ mod tests {
         for (i, ratio) in [(1, 0.8), (2, 2.0)] {
             let found = timed(&turns, i, Time::Gpu).unwrap();
             assert!((found.by_base.value / ratio - 1.0).abs() < 0.02, "{found:?}");
-            assert!(found.by_base.low.unwrap() <= ratio * 1.02 && found.by_base.high.unwrap() >= ratio * 0.98);
+            assert!(
+                found.by_base.low.unwrap() <= ratio * 1.02
+                    && found.by_base.high.unwrap() >= ratio * 0.98
+            );
             let base = timed(&turns, 0, Time::Gpu).unwrap();
             assert!((found.ms.value - base.ms.value * found.by_base.value).abs() < 1e-12);
             assert_eq!(base.by_base.value, 1.0);
@@ -152,7 +165,10 @@ mod tests {
         // A geometric mean of one rounds.
         assert!((found.by_base.value - 0.5).abs() < 1e-15 && found.by_base.low.is_none());
         assert_eq!((timed(&cut, 2, Time::Gpu), timed(&[], 0, Time::Gpu)), (None, None));
-        let none = [Turn { gpu_ms: vec![], ..turn(0, 0, 1.0) }, Turn { gpu_ms: vec![], ..turn(1, 0, 1.0) }];
+        let none = [
+            Turn { gpu_ms: vec![], ..turn(0, 0, 1.0) },
+            Turn { gpu_ms: vec![], ..turn(1, 0, 1.0) },
+        ];
         assert_eq!(timed(&none, 1, Time::Gpu), None);
         assert!(timed(&none, 1, Time::Frame).is_some());
         // The scene of another round is not around it.

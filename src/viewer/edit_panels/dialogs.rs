@@ -1,4 +1,5 @@
-//! What stands in the middle of the window: the question about unsaved changes, a file to choose, the keys.
+//! What stands in the middle of the window: the question about unsaved changes, a file to choose,
+//! the keys.
 
 use std::path::PathBuf;
 
@@ -26,7 +27,12 @@ impl Choosing {
     }
 }
 
-pub fn show(ui: &mut Ui, shown: &Shown<'_>, choosing: &mut Option<Choosing>, inputs: &mut Vec<Input>) {
+pub fn show(
+    ui: &mut Ui,
+    shown: &Shown<'_>,
+    choosing: &mut Option<Choosing>,
+    inputs: &mut Vec<Input>,
+) {
     if let Some(wish) = shown.desk.session().asked() {
         question(ui, wish, inputs);
     } else if let Some(mut now) = choosing.take() {
@@ -51,7 +57,9 @@ fn question(ui: &Ui, wish: &Wish, inputs: &mut Vec<Input>) {
     Modal::new(Id::new("question")).show(ui.ctx(), |ui| {
         ui.label(format!("Save changes before {before}?"));
         ui.horizontal(|ui| {
-            for (text, answer) in [("Save", Answer::Save), ("Discard", Answer::Discard), ("Cancel", Answer::Cancel)] {
+            for (text, answer) in
+                [("Save", Answer::Save), ("Discard", Answer::Discard), ("Cancel", Answer::Cancel)]
+            {
                 if ui.button(text).clicked() {
                     inputs.push(Input::Event(Event::Answer(answer)));
                 }
@@ -66,11 +74,14 @@ fn choose(ui: &Ui, now: &mut Choosing, recent: &[PathBuf]) -> Option<Option<Path
     Modal::new(Id::new("file")).show(ui.ctx(), |ui| {
         ui.set_width(360.0);
         ui.label(if now.saves { "Save as" } else { "Open" });
-        let response = ui.add(TextEdit::singleline(&mut now.text).hint_text("path").desired_width(f32::INFINITY));
+        let response = ui.add(
+            TextEdit::singleline(&mut now.text).hint_text("path").desired_width(f32::INFINITY),
+        );
         if !std::mem::replace(&mut now.has_focus, true) {
             response.request_focus();
         }
-        let (enter, escape) = ui.input(|input| (input.key_pressed(Key::Enter), input.key_pressed(Key::Escape)));
+        let (enter, escape) =
+            ui.input(|input| (input.key_pressed(Key::Enter), input.key_pressed(Key::Escape)));
         let path = |text: &str| Some(Some(PathBuf::from(text.trim())));
         if !now.saves {
             for place in recent.iter().filter_map(|p| p.to_str()) {
@@ -97,7 +108,9 @@ fn help(ui: &Ui) {
         Grid::new("keys").num_columns(2).spacing([12.0, 1.0]).show(ui, |ui| {
             let keys = SHORTCUTS.iter().map(|s| (s.chord.to_string(), s.description));
             let mouse = MOUSE.iter().map(|(what, does)| ((*what).to_owned(), *does));
-            for (key, does) in keys.chain([("Enter".to_owned(), "type the active box's numbers")]).chain(mouse) {
+            for (key, does) in
+                keys.chain([("Enter".to_owned(), "type the active box's numbers")]).chain(mouse)
+            {
                 ui.label(RichText::new(key).monospace());
                 ui.label(does);
                 ui.end_row();

@@ -1,4 +1,5 @@
-//! The active box's numbers: what is typed takes the place of what is there, and holds for all selected boxes.
+//! The active box's numbers: what is typed takes the place of what is there, and holds for all
+//! selected boxes.
 
 use std::collections::HashMap;
 
@@ -28,8 +29,9 @@ pub fn show(ui: &mut Ui, desk: &Desk, typing: &mut Typing, inputs: &mut Vec<Inpu
     let editor = desk.editor();
     let active = editor.active_box().map(|(_, b)| b);
     let number = |v: f64| format!("{v}");
-    let of_axis =
-        |of: fn(&crate::model::boxes::CloudBox) -> glam::DVec3, axis: Axis| active.map(|b| number(of(b)[axis.index()]));
+    let of_axis = |of: fn(&crate::model::boxes::CloudBox) -> glam::DVec3, axis: Axis| {
+        active.map(|b| number(of(b)[axis.index()]))
+    };
     let extent = |axis| (Field::Extent(axis), of_axis(|b| b.extent, axis));
     let center = |axis| (Field::Center(axis), of_axis(|b| b.center, axis));
     let rows = [
@@ -51,11 +53,17 @@ pub fn show(ui: &mut Ui, desk: &Desk, typing: &mut Typing, inputs: &mut Vec<Inpu
             (Field::Seed, Some(editor.document().seed.to_string())),
             "of the cloud's particles; no part of the file",
         ),
-        ("grid step", (Field::SnapStep, Some(number(editor.settings().snap.step))), "of the grid that drags snap to"),
+        (
+            "grid step",
+            (Field::SnapStep, Some(number(editor.settings().snap.step))),
+            "of the grid that drags snap to",
+        ),
     ];
     let n_selected = editor.selection().boxes().len();
     match editor.active_box() {
-        Some((i, _)) if n_selected > 1 => ui.label(format!("box {i} (of {n_selected} that change with it)")),
+        Some((i, _)) if n_selected > 1 => {
+            ui.label(format!("box {i} (of {n_selected} that change with it)"))
+        }
         Some((i, _)) => ui.label(format!("box {i} (Enter: type)")),
         None => ui.weak("no box is selected"),
     };
@@ -70,12 +78,19 @@ pub fn show(ui: &mut Ui, desk: &Desk, typing: &mut Typing, inputs: &mut Vec<Inpu
 
 const LENGTH: &str = "in scene units, or 1.5 m, 150 cm, 2 km";
 
-fn one(ui: &mut Ui, typing: &mut Typing, (field, now): (Field, Option<String>), inputs: &mut Vec<Input>) {
+fn one(
+    ui: &mut Ui,
+    typing: &mut Typing,
+    (field, now): (Field, Option<String>),
+    inputs: &mut Vec<Input>,
+) {
     let is_there = now.is_some();
     let now = now.unwrap_or_default();
-    // A field that was taken is empty, and what it was stands behind: what is typed is all there is.
+    // A field that was taken is empty, and what it was stands behind: what is typed is all there
+    // is.
     let mut text = typing.texts.get(&field).cloned().unwrap_or_else(|| now.clone());
-    let edit = TextEdit::singleline(&mut text).id(Id::new(field)).desired_width(110.0).hint_text(now);
+    let edit =
+        TextEdit::singleline(&mut text).id(Id::new(field)).desired_width(110.0).hint_text(now);
     let response = ui.add_enabled(is_there, edit);
     if typing.wants_focus && is_there {
         typing.wants_focus = false;

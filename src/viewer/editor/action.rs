@@ -56,14 +56,16 @@ pub enum Edit {
 
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Select {
-    /// As found by [`super::viewport::pick`] or [`super::viewport::pick_rectangle`]; the last one becomes active.
+    /// As found by [`super::viewport::pick`] or [`super::viewport::pick_rectangle`]; the last one
+    /// becomes active.
     Boxes {
         boxes: Vec<usize>,
         how: How,
     },
     All,
     None,
-    /// The box after the active one in the list alone, the first where none is; the last is followed by the first.
+    /// The box after the active one in the list alone, the first where none is; the last is
+    /// followed by the first.
     Next,
     Previous,
 }

@@ -1,6 +1,7 @@
-//! What hands do at the window, and what comes of it: (desk, input) → (desk, requests). Pointer and keys become the
-//! session's events here, and motions of the camera; a window has only to tell what happened, to draw what the desk
-//! holds, and to do what is asked of it. [`hand`] is what the pointer does.
+//! What hands do at the window, and what comes of it: (desk, input) → (desk, requests). Pointer and
+//! keys become the session's events here, and motions of the camera; a window has only to tell what
+//! happened, to draw what the desk holds, and to do what is asked of it. [`hand`] is what the
+//! pointer does.
 
 mod hand;
 
@@ -46,7 +47,8 @@ pub struct Screen {
     pub fov_y_rad: f64,
 }
 
-/// What happened at the window. Pixels are counted from the picture's upper left corner, as [`Viewport`] has them.
+/// What happened at the window. Pixels are counted from the picture's upper left corner, as
+/// [`Viewport`] has them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Input {
     PointerMoved {
@@ -171,7 +173,8 @@ impl Desk {
             Input::Resized { size_px, px_per_point } => {
                 // Of a window that has no pixels nothing can be said.
                 if size_px.min_element() > 0.0 && *px_per_point > 0.0 {
-                    self.screen = Screen { size_px: *size_px, px_per_point: *px_per_point, ..self.screen };
+                    self.screen =
+                        Screen { size_px: *size_px, px_per_point: *px_per_point, ..self.screen };
                 }
             }
             Input::FocusLost => self.let_go(),
@@ -234,7 +237,9 @@ impl Desk {
             Event::Failed(error) => self.said = Some(error.to_string()),
             Event::Saved { path, .. } => self.said = Some(format!("saved {}", path.display())),
             // Refused where something would be lost by it.
-            Event::Opened { .. } if self.session.asked().is_none() && !self.editor().document().is_same(&before) => {
+            Event::Opened { .. }
+                if self.session.asked().is_none() && !self.editor().document().is_same(&before) =>
+            {
                 self.said = None;
                 self.frame();
             }
@@ -251,14 +256,18 @@ impl Desk {
             Command::Quit => self.event(&Event::Wish(Wish::Quit), requests),
             Command::Help => self.shows_help = !self.shows_help,
             Command::Cancel if self.shows_help => self.shows_help = false,
-            Command::Cancel if matches!(self.hold, Hold::Rectangle { .. }) => self.hold = Hold::Nothing,
+            Command::Cancel if matches!(self.hold, Hold::Rectangle { .. }) => {
+                self.hold = Hold::Nothing
+            }
             Command::Frame if self.hold.is_drag() => {}
             Command::Frame => {
                 if !self.frame() {
                     self.said = Some("there is no box to look at".to_owned());
                 }
             }
-            Command::Add => self.act(Action::Edit(Edit::Add(self.editor().new_box(self.place_for_new())))),
+            Command::Add => {
+                self.act(Action::Edit(Edit::Add(self.editor().new_box(self.place_for_new()))))
+            }
             Command::Move => self.begin_by_key(Handle::MoveView),
             Command::Scale => self.begin_by_key(Handle::ScaleAll),
             _ => {
@@ -289,14 +298,18 @@ impl Desk {
         }))
     }
 
-    /// Under the pointer, as far off as what the camera turns about; there where the pointer says nothing.
+    /// Under the pointer, as far off as what the camera turns about; there where the pointer says
+    /// nothing.
     fn place_for_new(&self) -> DVec3 {
         let view = self.viewport();
-        let under = self.pointer.and_then(|pixel| view.ray(pixel).on_plane(self.flight.target(), view.pose.forward));
+        let under = self
+            .pointer
+            .and_then(|pixel| view.ray(pixel).on_plane(self.flight.target(), view.pose.forward));
         under.unwrap_or_else(|| self.flight.target())
     }
 
-    /// The camera goes where the selection fills the picture, or everything; false where there is nothing.
+    /// The camera goes where the selection fills the picture, or everything; false where there is
+    /// nothing.
     fn frame(&mut self) -> bool {
         let Some((low, high)) = self.editor().bounds() else { return false };
         let (pose, Screen { size_px, fov_y_rad, .. }) = (self.flight.pose(), self.screen);

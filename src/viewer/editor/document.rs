@@ -1,19 +1,20 @@
-//! What is edited: the boxes of one cloud and its seed; what can be read off them; which particles a change asks for.
+//! What is edited: the boxes of one cloud and its seed; what can be read off them; which particles
+//! a change asks for.
 
 use crate::io::box_file;
 use crate::model::boxes::CloudBox;
 
 use super::action::Refusal;
 
-/// So many lines are read again whatever their numbers: none is longer than 192 bytes (10 digits, seven numbers of at
-/// most 24 characters, 14 of separators), and a box file may have 64 MiB.
+/// So many lines are read again whatever their numbers: none is longer than 192 bytes (10 digits,
+/// seven numbers of at most 24 characters, 14 of separators), and a box file may have 64 MiB.
 pub const MOST_BOXES: usize = 1 << 18;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Document {
     pub boxes: Vec<CloudBox>,
-    /// Of the cloud's particles. A box file has no place for it: it is the scene's, and not compared when asked whether
-    /// there is anything to save.
+    /// Of the cloud's particles. A box file has no place for it: it is the scene's, and not
+    /// compared when asked whether there is anything to save.
     pub seed: u32,
 }
 
@@ -32,13 +33,20 @@ impl Document {
         self.seed == other.seed && same_boxes(&self.boxes, &other.boxes)
     }
 
-    /// An error at the first box that has become what the box file's reader refuses, and where boxes were added beyond
-    /// [`MOST_BOXES`].
+    /// An error at the first box that has become what the box file's reader refuses, and where
+    /// boxes were added beyond [`MOST_BOXES`].
     pub(super) fn check(&self, before: &Document) -> Result<(), Refusal> {
         if self.boxes.len() > MOST_BOXES.max(before.boxes.len()) {
-            return Err(Refusal(format!("expected at most {MOST_BOXES} boxes, found {}", self.boxes.len())));
+            return Err(Refusal(format!(
+                "expected at most {MOST_BOXES} boxes, found {}",
+                self.boxes.len()
+            )));
         }
-        let wrong = self.boxes.iter().enumerate().find_map(|(i, b)| box_file::wrong(b).map(|what| (i, what)));
+        let wrong = self
+            .boxes
+            .iter()
+            .enumerate()
+            .find_map(|(i, b)| box_file::wrong(b).map(|what| (i, what)));
         wrong.map_or(Ok(()), |(i, what)| Err(Refusal(format!("box {i}: {what}"))))
     }
 }
@@ -66,20 +74,22 @@ pub fn volume(b: &CloudBox) -> f64 {
     b.extent.element_product()
 }
 
-/// Particles in a cubic scene unit; none of a box without a volume, or with one that f64 takes for none.
+/// Particles in a cubic scene unit; none of a box without a volume, or with one that f64 takes for
+/// none.
 pub fn density(b: &CloudBox) -> Option<f64> {
     let density = f64::from(b.n_particles) / volume(b);
     density.is_finite().then_some(density)
 }
 
-/// What a change asks for. A particle follows from the cloud's seed, its box's number (its place in the list) and the
-/// box, its place relative to the box's centre from all but that centre (docs/model.md §1). So boxes are compared by
-/// their number: what is added at the end touches nothing else, and what is deleted touches every later box, because
-/// they get other numbers, save those that are like the box that had their number. All others keep their particles to
-/// the bit.
+/// What a change asks for. A particle follows from the cloud's seed, its box's number (its place in
+/// the list) and the box, its place relative to the box's centre from all but that centre
+/// (docs/model.md §1). So boxes are compared by their number: what is added at the end touches
+/// nothing else, and what is deleted touches every later box, because they get other numbers, save
+/// those that are like the box that had their number. All others keep their particles to the bit.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Touched {
-    /// Numbers of boxes whose particles have to be generated anew, rising; new boxes are among them.
+    /// Numbers of boxes whose particles have to be generated anew, rising; new boxes are among
+    /// them.
     pub generate: Vec<usize>,
     /// Numbers of boxes whose particles are the same relative to their centre, which has moved.
     pub moved: Vec<usize>,
@@ -129,9 +139,12 @@ mod tests {
         new.boxes[2].extent.z *= 1.25;
         new.boxes.push(CloudBox { center: DVec3::X, ..unit_box() });
         let touched = Touched::between(&old, &new);
-        let expected = Touched { generate: vec![2, 4], moved: vec![1], n_boxes: 5, is_resized: true };
+        let expected =
+            Touched { generate: vec![2, 4], moved: vec![1], n_boxes: 5, is_resized: true };
         assert_eq!(touched, expected);
-        let of = |d: &Document, i: usize| generate_box(&d.boxes[i], i as u32, d.seed, Form::Centred, 1.0, 1.0);
+        let of = |d: &Document, i: usize| {
+            generate_box(&d.boxes[i], i as u32, d.seed, Form::Centred, 1.0, 1.0)
+        };
         for i in [0, 1, 3] {
             assert_eq!(of(&old, i), of(&new, i));
         }
@@ -164,7 +177,12 @@ mod tests {
     #[test]
     fn no_line_is_longer_than_is_reckoned_with() {
         let v = -1.234_567_890_123_456_7e-300;
-        let b = CloudBox { n_particles: u32::MAX, extent: DVec3::splat(-v), center: DVec3::splat(v), radius_max: -v };
+        let b = CloudBox {
+            n_particles: u32::MAX,
+            extent: DVec3::splat(-v),
+            center: DVec3::splat(v),
+            radius_max: -v,
+        };
         let line = box_file::format(&[b]).lines().nth(2).map(str::len);
         assert!(line.is_some_and(|n| n < 192), "{line:?}");
         const { assert!(MOST_BOXES as u64 * 192 + 64 <= crate::io::text_file::DATA_LIMIT) };

@@ -1,5 +1,6 @@
-//! From the press of a button to its release. What a drag makes of the document follows from where it began and where
-//! the pointer is now, never from the way between, so that no error adds up and the way back leads back.
+//! From the press of a button to its release. What a drag makes of the document follows from where
+//! it began and where the pointer is now, never from the way between, so that no error adds up and
+//! the way back leads back.
 
 use glam::DVec3;
 
@@ -26,9 +27,11 @@ pub struct Drag {
     now: (Ray, Modifiers),
 }
 
-/// Of the distance from the eye: a drag that begins nearer to the middle than this cannot scale by the distance from it.
+/// Of the distance from the eye: a drag that begins nearer to the middle than this cannot scale by
+/// the distance from it.
 const LEAST_DISTANCE: f64 = 1e-2;
-/// Coordinates that move by less than this part of the way do not move: rounding of a drag along the others.
+/// Coordinates that move by less than this part of the way do not move: rounding of a drag along
+/// the others.
 const STILL: f64 = 1e-9;
 /// Factors snap to tenths.
 const FACTOR_STEP: f64 = 0.1;
@@ -75,10 +78,13 @@ impl Drag {
             Handle::ScaleFace(axis, side) => {
                 let face = active.center + 0.5 * side.sign() * active.extent * axis.unit();
                 let outwards = side.sign() * along(face, axis)?;
-                let scaling = if modifiers.scaling { settings.scaling.other() } else { settings.scaling };
+                let scaling =
+                    if modifiers.scaling { settings.scaling.other() } else { settings.scaling };
                 Some(self.grown(axis, outwards, scaling, side.sign(), snap))
             }
-            Handle::ScaleAll => Some(scaled(document, selection, DVec3::splat(self.factor(ray, snap)?))),
+            Handle::ScaleAll => {
+                Some(scaled(document, selection, DVec3::splat(self.factor(ray, snap)?)))
+            }
             Handle::ScaleAxis(axis) => {
                 let mut factors = DVec3::ONE;
                 factors[axis.index()] = self.factor(ray, snap)?;
@@ -104,15 +110,25 @@ impl Drag {
             b.center = shifted(b.center, offset);
             if let (Some(snap), true) = (snap, Some(*i) == selection.active()) {
                 // c + (v − c) is not always v.
-                let on_grid = |k: usize| if offset[k] == 0.0 { b.center[k] } else { snap.coordinate(b.center[k]) };
+                let on_grid = |k: usize| {
+                    if offset[k] == 0.0 { b.center[k] } else { snap.coordinate(b.center[k]) }
+                };
                 b.center = DVec3::new(on_grid(0), on_grid(1), on_grid(2));
             }
         }
         new
     }
 
-    /// The face of every selected box that looks where the dragged one does goes outwards by as much.
-    fn grown(&self, axis: Axis, outwards: f64, scaling: Scaling, sign: f64, snap: Option<Snap>) -> Document {
+    /// The face of every selected box that looks where the dragged one does goes outwards by as
+    /// much.
+    fn grown(
+        &self,
+        axis: Axis,
+        outwards: f64,
+        scaling: Scaling,
+        sign: f64,
+        snap: Option<Snap>,
+    ) -> Document {
         let Snapshot { document, selection } = &self.before;
         let mut new = Document::clone(document);
         if outwards == 0.0 {
@@ -123,13 +139,15 @@ impl Drag {
             let b = &mut new.boxes[*i];
             let length = b.extent[axis.index()] + more;
             // Faces meet and do not pass each other.
-            let length = snap.map_or(if length < LEAST_EXTENT { 0.0 } else { length }, |snap| snap.size(length));
+            let length = snap
+                .map_or(if length < LEAST_EXTENT { 0.0 } else { length }, |snap| snap.size(length));
             resize(b, axis, length, scaling, sign);
         }
         new
     }
 
-    /// The pointer's distance from the middle over that at the beginning, in the plane that the camera looks at.
+    /// The pointer's distance from the middle over that at the beginning, in the plane that the
+    /// camera looks at.
     fn factor(&self, ray: Ray, snap: Option<Snap>) -> Option<f64> {
         let middle = middle(&self.before.document, &self.before.selection)?;
         let distance = |ray: Ray| Some(ray.on_plane(middle, self.forward)?.distance(middle));
@@ -151,7 +169,9 @@ impl Editor {
         let Some(drag) = self.drag.clone() else { return Ok(self.clone()) };
         match *action {
             DragAction::Begin { .. } => Ok(self.clone()),
-            DragAction::To { ray, modifiers } => self.with_drag(Drag { now: (ray, modifiers), ..drag }),
+            DragAction::To { ray, modifiers } => {
+                self.with_drag(Drag { now: (ray, modifiers), ..drag })
+            }
             DragAction::Constrain(axis) => self.with_drag(drag.constrained(axis)),
             DragAction::Cancel => {
                 let Snapshot { document, selection } = drag.before;
@@ -174,7 +194,8 @@ impl Editor {
         if self.selection.is_empty() {
             return Err(Refusal("nothing is selected".to_owned()));
         }
-        let before = Snapshot { document: self.document.clone(), selection: self.selection.clone() };
+        let before =
+            Snapshot { document: self.document.clone(), selection: self.selection.clone() };
         let now = (ray, Modifiers::default());
         let drag = Drag { free: handle, handle, began: ray, forward, before, now };
         Ok(Editor { drag: Some(drag), ..self.clone() })

@@ -1,5 +1,5 @@
-//! What becomes of the boxes: (document, selection, edit) → (document, selection). Numbers of a box that an edit is not
-//! about keep their bits.
+//! What becomes of the boxes: (document, selection, edit) → (document, selection). Numbers of a box
+//! that an edit is not about keep their bits.
 
 use glam::DVec3;
 
@@ -19,7 +19,8 @@ pub(super) fn edited(
     settings: &Settings,
     edit: &Edit,
 ) -> Result<(Document, Selection), Refusal> {
-    let all = |change: &dyn Fn(&mut CloudBox)| Ok((each(document, selection, change), selection.clone()));
+    let all =
+        |change: &dyn Fn(&mut CloudBox)| Ok((each(document, selection, change), selection.clone()));
     match edit {
         Edit::Add(b) => {
             let mut new = document.clone();
@@ -29,13 +30,17 @@ pub(super) fn edited(
         Edit::Duplicate => Ok(duplicated(document, selection)),
         Edit::Delete => Ok((deleted(document, selection), Selection::default())),
         Edit::Count(n) => all(&|b| b.n_particles = *n),
-        Edit::Density(density) => Ok((with_density(document, selection, *density)?, selection.clone())),
+        Edit::Density(density) => {
+            Ok((with_density(document, selection, *density)?, selection.clone()))
+        }
         Edit::Extent(axis, v) => all(&|b| resize(b, *axis, *v, settings.scaling, 1.0)),
         Edit::Center(axis, v) => all(&|b| b.center[axis.index()] = *v),
         Edit::Radius(v) => all(&|b| b.radius_max = *v),
         Edit::MoveBy(offset) => all(&|b| b.center = shifted(b.center, *offset)),
         Edit::ScaleBy(factors) => Ok((scaled(document, selection, *factors), selection.clone())),
-        Edit::Mirror { axis, plane, outcome } => Ok(mirrored(document, selection, *axis, *plane, *outcome)),
+        Edit::Mirror { axis, plane, outcome } => {
+            Ok(mirrored(document, selection, *axis, *plane, *outcome))
+        }
         Edit::SnapToGrid => all(&|b| {
             b.center = settings.snap.place(b.center);
             b.extent = DVec3::from_array(b.extent.to_array().map(|v| settings.snap.size(v)));
@@ -69,18 +74,26 @@ fn deleted(document: &Document, selection: &Selection) -> Document {
     Document { boxes: kept.map(|(b, _)| *b).collect(), seed: document.seed }
 }
 
-fn with_density(document: &Document, selection: &Selection, density: f64) -> Result<Document, Refusal> {
+fn with_density(
+    document: &Document,
+    selection: &Selection,
+    density: f64,
+) -> Result<Document, Refusal> {
     let mut new = document.clone();
     for i in selection.boxes() {
         let b = &mut new.boxes[*i];
         let volume = volume(b);
         if volume == 0.0 {
-            return Err(Refusal(format!("box {i} has no volume, so that no density gives it particles")));
+            return Err(Refusal(format!(
+                "box {i} has no volume, so that no density gives it particles"
+            )));
         }
         let n = (density * volume).round();
         if !(0.0..=f64::from(u32::MAX)).contains(&n) {
             let most = u32::MAX;
-            return Err(Refusal(format!("box {i}: density times volume: expected 0 to {most}, found {n}")));
+            return Err(Refusal(format!(
+                "box {i}: density times volume: expected 0 to {most}, found {n}"
+            )));
         }
         b.n_particles = n as u32;
     }
@@ -93,8 +106,8 @@ pub(super) fn shifted(c: DVec3, offset: DVec3) -> DVec3 {
     DVec3::new(add(c.x, offset.x), add(c.y, offset.y), add(c.z, offset.z))
 }
 
-/// Gives the edge along an axis its new length; the face on the side of `sign` moves, and the other one too where
-/// scaling is symmetric.
+/// Gives the edge along an axis its new length; the face on the side of `sign` moves, and the other
+/// one too where scaling is symmetric.
 pub(super) fn resize(b: &mut CloudBox, axis: Axis, length: f64, scaling: Scaling, sign: f64) {
     let k = axis.index();
     let more = length - b.extent[k];

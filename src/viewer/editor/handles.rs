@@ -1,5 +1,5 @@
-//! What the hand takes hold of at the active box: an arrow along each axis to move, a handle on each face to scale, and
-//! the centre to move in the view's plane.
+//! What the hand takes hold of at the active box: an arrow along each axis to move, a handle on
+//! each face to scale, and the centre to move in the view's plane.
 
 use glam::{DVec2, DVec3};
 
@@ -19,7 +19,8 @@ pub enum Handle {
     /// In the plane through the centre that the camera looks at.
     MoveView,
     ScaleFace(Axis, Side),
-    /// All selected boxes and the distances between them, about their middle: by the pointer's distance from it.
+    /// All selected boxes and the distances between them, about their middle: by the pointer's
+    /// distance from it.
     ScaleAll,
     /// The same along one axis.
     ScaleAxis(Axis),
@@ -33,13 +34,14 @@ pub struct Placed {
     pub to: DVec3,
 }
 
-/// From a face to its arrow, so that the face's own handle lies free; logical points, as are the next two.
+/// From a face to its arrow, so that the face's own handle lies free; logical points, as are the
+/// next two.
 pub const GAP_POINTS: f64 = 16.0;
 pub const ARROW_POINTS: f64 = 64.0;
 /// A handle is under the pointer at most so far from it: what a hand hits well.
 pub const REACH_POINTS: f64 = 8.0;
-/// Handles of an axis that is seen nearly from its end are not shown: below this sine (6°) the pointer's place along the
-/// axis is magnified more than tenfold.
+/// Handles of an axis that is seen nearly from its end are not shown: below this sine (6°) the
+/// pointer's place along the axis is magnified more than tenfold.
 const LEAST_SINE: f64 = 0.1;
 
 impl Side {
@@ -64,13 +66,16 @@ impl Handle {
 
     pub fn axis(self) -> Option<Axis> {
         match self {
-            Handle::MoveAxis(axis) | Handle::ScaleFace(axis, _) | Handle::ScaleAxis(axis) => Some(axis),
+            Handle::MoveAxis(axis) | Handle::ScaleFace(axis, _) | Handle::ScaleAxis(axis) => {
+                Some(axis)
+            }
             Handle::MoveView | Handle::ScaleAll => None,
         }
     }
 }
 
-/// The handles of a box as they are to be drawn, all at the same size on the screen wherever the box is.
+/// The handles of a box as they are to be drawn, all at the same size on the screen wherever the
+/// box is.
 pub fn placed(b: &CloudBox, view: &Viewport) -> Vec<Placed> {
     let mut placed = vec![Placed { handle: Handle::MoveView, from: b.center, to: b.center }];
     let sight = (b.center - view.pose.position).normalize_or(view.pose.forward);
@@ -86,7 +91,8 @@ pub fn placed(b: &CloudBox, view: &Viewport) -> Vec<Placed> {
         }
         let face = b.center + half * unit;
         let point = view.units_per_point(face);
-        let (from, to) = (face + GAP_POINTS * point * unit, face + (GAP_POINTS + ARROW_POINTS) * point * unit);
+        let (from, to) =
+            (face + GAP_POINTS * point * unit, face + (GAP_POINTS + ARROW_POINTS) * point * unit);
         placed.push(Placed { handle: Handle::MoveAxis(axis), from, to });
     }
     // What is not before the eye cannot be taken hold of.
@@ -96,7 +102,8 @@ pub fn placed(b: &CloudBox, view: &Viewport) -> Vec<Placed> {
 
 /// The handle nearest to a pixel, if one is within [`REACH_POINTS`].
 pub fn pick(placed: &[Placed], view: &Viewport, pixel: DVec2) -> Option<Handle> {
-    let distance = |p: &Placed| Some(from_segment(pixel, view.project(p.from)?, view.project(p.to)?));
+    let distance =
+        |p: &Placed| Some(from_segment(pixel, view.project(p.from)?, view.project(p.to)?));
     let reached = placed.iter().filter_map(|p| Some((p.handle, distance(p)?)));
     let nearest = reached.min_by(|a, b| a.1.total_cmp(&b.1))?;
     (nearest.1 <= REACH_POINTS * view.px_per_point).then_some(nearest.0)
@@ -105,7 +112,11 @@ pub fn pick(placed: &[Placed], view: &Viewport, pixel: DVec2) -> Option<Handle> 
 fn from_segment(point: DVec2, a: DVec2, b: DVec2) -> f64 {
     let along = b - a;
     let length_squared = along.length_squared();
-    let t = if length_squared > 0.0 { ((point - a).dot(along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
+    let t = if length_squared > 0.0 {
+        ((point - a).dot(along) / length_squared).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
     point.distance(a + t * along)
 }
 

@@ -1,5 +1,6 @@
-//! Steps that can be undone and redone. A step keeps the whole document as it was: documents are small beside what is
-//! drawn of them, and nothing has to be undone by arithmetic, which would not give the same bits.
+//! Steps that can be undone and redone. A step keeps the whole document as it was: documents are
+//! small beside what is drawn of them, and nothing has to be undone by arithmetic, which would not
+//! give the same bits.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

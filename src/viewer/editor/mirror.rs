@@ -1,5 +1,6 @@
-//! Mirroring across a plane that is perpendicular to an axis. A box is its own mirror image, so that only its centre
-//! moves; its particles are drawn by lot anew where it is a copy, and are not mirrored.
+//! Mirroring across a plane that is perpendicular to an axis. A box is its own mirror image, so
+//! that only its centre moves; its particles are drawn by lot anew where it is a copy, and are not
+//! mirrored.
 
 use super::Axis;
 use super::document::{Document, is_same};
@@ -18,8 +19,8 @@ pub enum Plane {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     Move,
-    /// Images at the end of the list, which are selected then. A box that is its own image has none: two boxes in one
-    /// place would have twice its particles.
+    /// Images at the end of the list, which are selected then. A box that is its own image has
+    /// none: two boxes in one place would have twice its particles.
     Copy,
 }
 
@@ -37,12 +38,17 @@ pub(super) fn mirrored(
     let mut new = document.clone();
     match outcome {
         Outcome::Move => {
-            selection.boxes().iter().for_each(|i| new.boxes[*i] = image(&document.boxes[*i], axis, twice));
+            selection
+                .boxes()
+                .iter()
+                .for_each(|i| new.boxes[*i] = image(&document.boxes[*i], axis, twice));
             (new, selection.clone())
         }
         Outcome::Copy => {
-            let images =
-                selection.boxes().iter().map(|i| (document.boxes[*i], image(&document.boxes[*i], axis, twice)));
+            let images = selection
+                .boxes()
+                .iter()
+                .map(|i| (document.boxes[*i], image(&document.boxes[*i], axis, twice)));
             let images: Vec<CloudBox> =
                 images.filter(|(b, image)| !is_same(b, image)).map(|(_, image)| image).collect();
             if images.is_empty() {
@@ -56,12 +62,14 @@ pub(super) fn mirrored(
     }
 }
 
-/// Low and high side together. Of one box it is twice its centre, to the bit, so that nothing moves.
+/// Low and high side together. Of one box it is twice its centre, to the bit, so that nothing
+/// moves.
 fn twice_the_middle(document: &Document, selection: &Selection, axis: Axis) -> f64 {
     let k = axis.index();
     match selection.boxes() {
         [i] => 2.0 * document.boxes[*i].center[k],
-        several => bounds(several.iter().map(|i| &document.boxes[*i])).map_or(0.0, |(low, high)| low[k] + high[k]),
+        several => bounds(several.iter().map(|i| &document.boxes[*i]))
+            .map_or(0.0, |(low, high)| low[k] + high[k]),
     }
 }
 

@@ -1,12 +1,14 @@
-//! The cloud macrostructure editor (P, Figs. 2, 3 and 5) without its window: what a cloud is shaped by is a list of
-//! boxes, and every change of it is a function from one state to the next.
+//! The cloud macrostructure editor (P, Figs. 2, 3 and 5) without its window: what a cloud is shaped
+//! by is a list of boxes, and every change of it is a function from one state to the next.
 //!
-//! [`session`] has the file: what is open, what is saved, what would be lost. [`state`] has what is edited: the
-//! [`document`], what is selected of it, the drag that is under way and the steps that can be undone. It takes an
-//! [`action`]; [`edits`], [`mirror`] and [`drag`] say what becomes of the boxes. A window draws what the state holds,
-//! asks [`viewport`] and [`handles`] what lies under the pointer, [`shortcuts`] what a key means and [`numbers`] what was
-//! typed, and computes anew what [`document::Touched`] names. [`desk`] does the asking: what pointer and keys do there
-//! becomes the session's events. [`scenery`] is the scene whose cloud is edited, [`sketch`] what is drawn over it.
+//! [`session`] has the file: what is open, what is saved, what would be lost. [`state`] has what is
+//! edited: the [`document`], what is selected of it, the drag that is under way and the steps that
+//! can be undone. It takes an [`action`]; [`edits`], [`mirror`] and [`drag`] say what becomes of
+//! the boxes. A window draws what the state holds, asks [`viewport`] and [`handles`] what lies
+//! under the pointer, [`shortcuts`] what a key means and [`numbers`] what was typed, and computes
+//! anew what [`document::Touched`] names. [`desk`] does the asking: what pointer and keys do there
+//! becomes the session's events. [`scenery`] is the scene whose cloud is edited, [`sketch`] what is
+//! drawn over it.
 
 pub mod acceptance;
 pub mod action;

@@ -19,8 +19,8 @@ const UNITS: [Unit; 4] = [
 /// Most characters of what was typed that a message repeats.
 const SHOWN: usize = 40;
 
-/// "1.5", "1.5 m", "150cm", "2 km": scene units of `metres_per_unit` metres each. Whether it is too great is for the
-/// edit that takes it to say.
+/// "1.5", "1.5 m", "150cm", "2 km": scene units of `metres_per_unit` metres each. Whether it is too
+/// great is for the edit that takes it to say.
 pub fn length(text: &str, metres_per_unit: f64) -> Result<f64, Refusal> {
     let expected = "a length such as 1.5, 1.5 m, 150 cm or 2 km";
     let (number, unit) = split(text);
@@ -45,7 +45,8 @@ pub fn density(text: &str, metres_per_unit: f64) -> Result<f64, Refusal> {
     let Some(name) = cubed else { return Err(unexpected(expected, text)) };
     let unit = unit_named(name.trim(), text)?;
     // By whichever of the edges is a whole number of the other: 12 /m³ are 12000 in a cube of 10 m.
-    let (edge, inverse) = (unit.metres / unit.per / metres_per_unit, metres_per_unit * unit.per / unit.metres);
+    let (edge, inverse) =
+        (unit.metres / unit.per / metres_per_unit, metres_per_unit * unit.per / unit.metres);
     let v = if edge < 1.0 { v * inverse.powi(3) } else { v / edge.powi(3) };
     within(v, expected, text)
 }
@@ -120,7 +121,8 @@ mod tests {
     #[test]
     fn what_is_no_length_is_refused_in_one_sentence() {
         let example = "expected a length such as 1.5, 1.5 m, 150 cm or 2 km, found ";
-        for text in ["", "m", "1,5", "nan", "inf", "-inf m", "1e999", "1 2", "0x10", "--1", "1 2 m"] {
+        for text in ["", "m", "1,5", "nan", "inf", "-inf m", "1e999", "1 2", "0x10", "--1", "1 2 m"]
+        {
             assert_eq!(length(text, 1.0), Err(Refusal(format!("{example}`{text}`"))));
         }
         let unit = "expected mm, cm, m, km or no unit after the number, found ";

@@ -11,8 +11,8 @@ pub struct Ray {
     pub direction: DVec3,
 }
 
-/// Sine squared of the angle between a ray and an axis below which no place on the axis is near the ray more than others:
-/// at 0.01 rad the pointer's place is magnified 10⁴ times.
+/// Sine squared of the angle between a ray and an axis below which no place on the axis is near the
+/// ray more than others: at 0.01 rad the pointer's place is magnified 10⁴ times.
 const LEAST_SINE_SQUARED: f64 = 1e-4;
 /// And of that between a ray and a plane.
 const LEAST_SINE: f64 = 1e-2;
@@ -22,8 +22,9 @@ impl Ray {
         self.origin + t * self.direction
     }
 
-    /// Where the ray meets the box's surface, by slabs, faces included: the first time from outside, and from inside
-    /// where it leaves, so that a box around the eye does not hide what lies in it.
+    /// Where the ray meets the box's surface, by slabs, faces included: the first time from
+    /// outside, and from inside where it leaves, so that a box around the eye does not hide what
+    /// lies in it.
     pub fn hit(&self, b: &CloudBox) -> Option<f64> {
         let (origin, half) = ((self.origin - b.center).to_array(), (0.5 * b.extent).to_array());
         let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -44,8 +45,9 @@ impl Ray {
         is_hit.then_some(if enter > 0.0 { enter } else { leave })
     }
 
-    /// The place s on the line `point` + s `axis` (a unit vector) that the ray passes nearest to. None where the two are
-    /// nearly parallel, and where that place lies behind the eye: the pointer says nothing about it then.
+    /// The place s on the line `point` + s `axis` (a unit vector) that the ray passes nearest to.
+    /// None where the two are nearly parallel, and where that place lies behind the eye: the
+    /// pointer says nothing about it then.
     pub fn nearest_on_axis(&self, point: DVec3, axis: DVec3) -> Option<f64> {
         let to_point = point - self.origin;
         let cosine = axis.dot(self.direction);
@@ -77,7 +79,10 @@ mod tests {
     use super::*;
 
     fn ray(origin: [f64; 3], direction: [f64; 3]) -> Ray {
-        Ray { origin: DVec3::from_array(origin), direction: DVec3::from_array(direction).normalize() }
+        Ray {
+            origin: DVec3::from_array(origin),
+            direction: DVec3::from_array(direction).normalize(),
+        }
     }
 
     #[test]
@@ -116,8 +121,10 @@ mod tests {
         let r = ray([4.0, -1.0, 9.0], [-0.4, 0.3, -0.8]);
         let s = r.nearest_on_axis(point, axis).unwrap();
         let distance = |s: f64| (point + s * axis - r.origin).cross(r.direction).length();
-        let least = (-4000..4000).map(|i| distance(f64::from(i) * 1e-3)).fold(f64::INFINITY, f64::min);
-        // The scan's nearest step is at most half a step from the minimum, where a distance d grows by h²/2d.
+        let least =
+            (-4000..4000).map(|i| distance(f64::from(i) * 1e-3)).fold(f64::INFINITY, f64::min);
+        // The scan's nearest step is at most half a step from the minimum, where a distance d grows
+        // by h²/2d.
         assert!(distance(s) < least + 1e-12 && least - distance(s) < 1e-6, "{s}");
     }
 
@@ -125,8 +132,15 @@ mod tests {
     fn parallel_lines_and_places_behind_the_eye_say_nothing() {
         let r = ray([0.0, 0.0, 5.0], [0.0, 1e-3, -1.0]);
         assert_eq!(r.nearest_on_axis(DVec3::ZERO, DVec3::Z), None);
-        assert!(ray([0.0, 1.0, 5.0], [0.0, -0.1, -1.0]).nearest_on_axis(DVec3::ZERO, DVec3::Z).is_some());
-        assert_eq!(ray([0.0, 0.0, 5.0], [0.0, 0.0, 1.0]).nearest_on_axis(DVec3::ZERO, DVec3::X), None);
+        assert!(
+            ray([0.0, 1.0, 5.0], [0.0, -0.1, -1.0])
+                .nearest_on_axis(DVec3::ZERO, DVec3::Z)
+                .is_some()
+        );
+        assert_eq!(
+            ray([0.0, 0.0, 5.0], [0.0, 0.0, 1.0]).nearest_on_axis(DVec3::ZERO, DVec3::X),
+            None
+        );
         assert_eq!(r.nearest_on_axis(DVec3::NAN, DVec3::X), None);
         assert_eq!(
             ray([1.0, 1.0, 5.0], [0.0, 0.0, -1.0]).on_plane(DVec3::ZERO, DVec3::Z),

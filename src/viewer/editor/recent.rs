@@ -15,8 +15,8 @@ pub struct Recent {
     paths: Vec<PathBuf>,
 }
 
-/// Where the list is kept: `$XDG_CONFIG_HOME/nimbus/recent.json`, else `~/.config/nimbus/recent.json`; on Windows
-/// `%APPDATA%\nimbus\recent.json`.
+/// Where the list is kept: `$XDG_CONFIG_HOME/nimbus/recent.json`, else
+/// `~/.config/nimbus/recent.json`; on Windows `%APPDATA%\nimbus\recent.json`.
 pub fn default_place() -> Option<PathBuf> {
     place(&|name| std::env::var_os(name))
 }
@@ -79,7 +79,8 @@ mod tests {
         let mut recent = Recent::default();
         files.iter().for_each(|file| recent.push(file));
         recent.push(&files[5]);
-        let expected: Vec<PathBuf> = [5, 11, 10, 9, 8, 7, 6, 4, 3, 2].map(|i| files[i].clone()).to_vec();
+        let expected: Vec<PathBuf> =
+            [5, 11, 10, 9, 8, 7, 6, 4, 3, 2].map(|i| files[i].clone()).to_vec();
         assert_eq!(recent.paths(), expected);
         let place = folder.path().join("new").join("recent.json");
         recent.save(&place).unwrap();
@@ -110,12 +111,17 @@ mod tests {
     #[cfg(unix)]
     fn the_list_lies_where_configuration_does() {
         let of = |set: &[(&str, &str)]| {
-            place(&|name| set.iter().find(|(n, _)| *n == name).map(|(_, value)| OsString::from(value)))
+            place(&|name| {
+                set.iter().find(|(n, _)| *n == name).map(|(_, value)| OsString::from(value))
+            })
         };
         let at = |path: &str| Some(PathBuf::from(path));
         assert_eq!(of(&[("HOME", "/h")]), at("/h/.config/nimbus/recent.json"));
         assert_eq!(of(&[("HOME", "/h"), ("XDG_CONFIG_HOME", "/x")]), at("/x/nimbus/recent.json"));
-        assert_eq!(of(&[("HOME", "/h"), ("XDG_CONFIG_HOME", "x")]), at("/h/.config/nimbus/recent.json"));
+        assert_eq!(
+            of(&[("HOME", "/h"), ("XDG_CONFIG_HOME", "x")]),
+            at("/h/.config/nimbus/recent.json")
+        );
         assert_eq!(of(&[]), None);
     }
 }

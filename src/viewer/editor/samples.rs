@@ -14,7 +14,11 @@ pub fn unit_box() -> CloudBox {
 
 /// Boxes that differ: of 10, 11, 12 … particles, at x = 0, 4, 8 …
 pub fn document(n: u32) -> Document {
-    let of = |i: u32| CloudBox { n_particles: 10 + i, center: DVec3::X * 4.0 * f64::from(i), ..unit_box() };
+    let of = |i: u32| CloudBox {
+        n_particles: 10 + i,
+        center: DVec3::X * 4.0 * f64::from(i),
+        ..unit_box()
+    };
     Document::new((0..n).map(of).collect())
 }
 

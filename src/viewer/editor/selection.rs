@@ -1,5 +1,5 @@
-//! Which boxes an action goes to. The one that was selected last is active (P, Fig. 3: drawn red): gizmos stand on it,
-//! and a panel shows its numbers.
+//! Which boxes an action goes to. The one that was selected last is active (P, Fig. 3: drawn red):
+//! gizmos stand on it, and a panel shows its numbers.
 
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -71,7 +71,8 @@ impl Selection {
         }
     }
 
-    /// The box `by` places after the active one among `n`, alone; from none the first forwards and the last backwards.
+    /// The box `by` places after the active one among `n`, alone; from none the first forwards and
+    /// the last backwards.
     pub(super) fn neighbour(&self, n: usize, by: isize) -> Selection {
         let Ok(count) = isize::try_from(n) else { return Selection::default() };
         if count == 0 {
@@ -104,7 +105,8 @@ mod tests {
 
     #[test]
     fn neighbours_go_round() {
-        let of = |boxes: &[usize], by| Selection::new(boxes.iter().copied()).neighbour(3, by).active();
+        let of =
+            |boxes: &[usize], by| Selection::new(boxes.iter().copied()).neighbour(3, by).active();
         assert_eq!([of(&[], 1), of(&[0, 2], 1), of(&[1], 1)], [Some(0), Some(0), Some(2)]);
         assert_eq!([of(&[], -1), of(&[0], -1), of(&[2], -1)], [Some(2), Some(2), Some(1)]);
         assert_eq!(Selection::new([1]).neighbour(0, 1), Selection::default());

@@ -1,6 +1,7 @@
-//! The file around the editor: what is open, what of it is saved, and the question that stands between unsaved changes
-//! and their loss. (session, event) → (session, request): what has to be done with files and dialogs is asked of the
-//! window, which answers with an event; [`perform`] does what needs no dialog.
+//! The file around the editor: what is open, what of it is saved, and the question that stands
+//! between unsaved changes and their loss. (session, event) → (session, request): what has to be
+//! done with files and dialogs is asked of the window, which answers with an event; [`perform`]
+//! does what needs no dialog.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -132,7 +133,8 @@ impl Session {
         self.path.as_deref()
     }
 
-    /// Whether the boxes are others than the file's, to the bit: what is undone to what was saved is not.
+    /// Whether the boxes are others than the file's, to the bit: what is undone to what was saved
+    /// is not.
     pub fn is_dirty(&self) -> bool {
         !same_boxes(self.editor.boxes(), &self.saved.boxes)
     }
@@ -146,7 +148,11 @@ impl Session {
     pub fn after(&self, event: &Event) -> Result<Turn, Refusal> {
         if let Event::Act(action) = event {
             let (editor, touched) = self.editor.after(action)?;
-            return Ok(Turn { session: Session { editor, ..self.clone() }, touched, request: None });
+            return Ok(Turn {
+                session: Session { editor, ..self.clone() },
+                touched,
+                request: None,
+            });
         }
         let mut session = self.clone();
         // What the hand holds is let go where it is: undo takes it back.
@@ -232,7 +238,8 @@ impl Session {
 
     fn open(&mut self, path: &Path, boxes: &[CloudBox], waiting: &Waiting) -> Option<Request> {
         // What changed while a dialog was open nobody has been asked about.
-        let is_agreed = matches!(waiting, Waiting::File(document) if self.editor.document().is_same(document));
+        let is_agreed =
+            matches!(waiting, Waiting::File(document) if self.editor.document().is_same(document));
         if !is_agreed && self.is_dirty() {
             return self.wish(Wish::Open(Some(path.to_owned())));
         }

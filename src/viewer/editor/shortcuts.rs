@@ -1,4 +1,5 @@
-//! What the keys do: one table, which a window looks keys up in and lists where it is asked what they do.
+//! What the keys do: one table, which a window looks keys up in and lists where it is asked what
+//! they do.
 
 use std::fmt;
 
@@ -84,7 +85,8 @@ const fn with_alt(shortcut: Shortcut) -> Shortcut {
     Shortcut { chord: Chord { alt: true, ..shortcut.chord }, ..shortcut }
 }
 
-/// In the order of a list for reading; of two chords for one command the first is the one to show beside it.
+/// In the order of a list for reading; of two chords for one command the first is the one to show
+/// beside it.
 pub const SHORTCUTS: [Shortcut; 30] = [
     ctrl('n', Command::New, "new cloud"),
     ctrl('o', Command::Open, "open a box file"),
@@ -109,8 +111,16 @@ pub const SHORTCUTS: [Shortcut; 30] = [
     shortcut(Key::Char('y'), Command::Axis(Axis::Y), "along y only; the axis to mirror by"),
     shortcut(Key::Char('z'), Command::Axis(Axis::Z), "along z only; the axis to mirror by"),
     shortcut(Key::Char('m'), Command::Mirror, "mirror the selection across 0"),
-    with_shift(shortcut(Key::Char('m'), Command::MirrorCopy, "mirror a copy of the selection across 0")),
-    with_alt(shortcut(Key::Char('m'), Command::MirrorMiddle, "mirror the selection across its middle")),
+    with_shift(shortcut(
+        Key::Char('m'),
+        Command::MirrorCopy,
+        "mirror a copy of the selection across 0",
+    )),
+    with_alt(shortcut(
+        Key::Char('m'),
+        Command::MirrorMiddle,
+        "mirror the selection across its middle",
+    )),
     with_shift(shortcut(Key::Char('s'), Command::ToggleSnap, "snap to the grid, or do not")),
     shortcut(Key::Char('1'), Command::View(View::Boxes), "show the boxes"),
     shortcut(Key::Char('2'), Command::View(View::Cloud), "show the cloud"),
@@ -125,7 +135,8 @@ pub fn command(chord: Chord) -> Option<Command> {
 }
 
 impl Chord {
-    /// Letters small, and shift only where it does not decide what is written: "?" takes one on some keyboards.
+    /// Letters small, and shift only where it does not decide what is written: "?" takes one on
+    /// some keyboards.
     fn normal(self) -> Chord {
         match self.key {
             Key::Char(c) if c.is_alphabetic() => {
@@ -139,12 +150,13 @@ impl Chord {
 }
 
 impl Command {
-    /// What it does to the editor; none of those that take a file, a camera or a pointer, which are for the window and
-    /// the session.
+    /// What it does to the editor; none of those that take a file, a camera or a pointer, which are
+    /// for the window and the session.
     pub fn action(self, editor: &Editor) -> Option<Action> {
         let is_dragging = editor.dragged_handle().is_some();
         let settings = editor.settings();
-        let mirror = |plane, outcome| Action::Edit(Edit::Mirror { axis: settings.axis, plane, outcome });
+        let mirror =
+            |plane, outcome| Action::Edit(Edit::Mirror { axis: settings.axis, plane, outcome });
         Some(match self {
             Command::Undo => Action::Undo,
             Command::Redo => Action::Redo,
@@ -160,7 +172,9 @@ impl Command {
             Command::Mirror => mirror(Plane::Zero, Outcome::Move),
             Command::MirrorCopy => mirror(Plane::Zero, Outcome::Copy),
             Command::MirrorMiddle => mirror(Plane::Middle, Outcome::Move),
-            Command::ToggleSnap => Action::Set(Setting::Snap(Snap { on: !settings.snap.on, ..settings.snap })),
+            Command::ToggleSnap => {
+                Action::Set(Setting::Snap(Snap { on: !settings.snap.on, ..settings.snap }))
+            }
             Command::View(view) => Action::Set(Setting::View(view)),
             Command::New
             | Command::Open

@@ -1,6 +1,7 @@
-//! What a painter of two dimensions draws over the cloud, back to front: boxes as P, Figs. 3 and 5 have them, the active
-//! one red; the handles of that one; a ground grid, and the axes. All is cut off at the picture's edge before it is
-//! projected, so that what lies behind the eye, or around it, never shows on the wrong side.
+//! What a painter of two dimensions draws over the cloud, back to front: boxes as P, Figs. 3 and 5
+//! have them, the active one red; the handles of that one; a ground grid, and the axes. All is cut
+//! off at the picture's edge before it is projected, so that what lies behind the eye, or around
+//! it, never shows on the wrong side.
 
 mod gizmo;
 
@@ -15,7 +16,8 @@ use crate::model::boxes::CloudBox;
 /// sRGB and alpha, not premultiplied.
 pub type Color = [u8; 4];
 
-/// Pixels, as [`Viewport`] counts them. What the scene has goes no farther than [`MARGIN_POINTS`] beyond the picture.
+/// Pixels, as [`Viewport`] counts them. What the scene has goes no farther than [`MARGIN_POINTS`]
+/// beyond the picture.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shape {
     /// Convex, of three corners at least.
@@ -55,7 +57,8 @@ pub struct Pointing {
 
 /// Strokes along the picture's edge lie outside of it.
 pub const MARGIN_POINTS: f64 = 8.0;
-/// The nearest boxes that are drawn, at most, and as many of the others that are selected: a painter's milliseconds.
+/// The nearest boxes that are drawn, at most, and as many of the others that are selected: a
+/// painter's milliseconds.
 pub const MOST_DRAWN: usize = 4096;
 
 const GREY: Color = [150, 164, 188, 255];
@@ -112,7 +115,8 @@ impl Canvas<'_> {
     fn polygon(&self, places: &[DVec3]) -> Option<Vec<DVec2>> {
         let seen = places.iter().map(|place| self.view.seen(*place)).collect();
         let kept = self.sides.iter().fold(seen, |polygon, side| clipped(polygon, *side));
-        let pixels: Option<Vec<DVec2>> = kept.into_iter().map(|seen| self.view.pixel(seen)).collect();
+        let pixels: Option<Vec<DVec2>> =
+            kept.into_iter().map(|seen| self.view.pixel(seen)).collect();
         pixels.filter(|pixels| pixels.len() > 2)
     }
 
@@ -165,7 +169,8 @@ fn drawn(editor: &Editor, canvas: &Canvas<'_>) -> (Vec<usize>, Vec<bool>) {
         let distance = |i: &usize| boxes[*i].center.distance_squared(eye);
         drawn.select_nth_unstable_by(MOST_DRAWN, |a, b| distance(a).total_cmp(&distance(b)));
         // The active one first of those.
-        let mut others: Vec<usize> = drawn.split_off(MOST_DRAWN).into_iter().filter(|i| mask[*i]).collect();
+        let mut others: Vec<usize> =
+            drawn.split_off(MOST_DRAWN).into_iter().filter(|i| mask[*i]).collect();
         others.sort_by_key(|i| Some(*i) != editor.selection().active());
         others.truncate(MOST_DRAWN);
         drawn.extend(others);
@@ -173,9 +178,9 @@ fn drawn(editor: &Editor, canvas: &Canvas<'_>) -> (Vec<usize>, Vec<bool>) {
     (drawn, mask)
 }
 
-/// Opaque faces that look at the eye, the farthest first by their middles' distance. Of boxes of very different sizes that
-/// is not always the order in which they hide each other, and boxes that pass through each other have none: both are seen
-/// to be so as soon as the camera turns.
+/// Opaque faces that look at the eye, the farthest first by their middles' distance. Of boxes of
+/// very different sizes that is not always the order in which they hide each other, and boxes that
+/// pass through each other have none: both are seen to be so as soon as the camera turns.
 fn faces(editor: &Editor, canvas: &Canvas<'_>, shapes: &mut Vec<Shape>) {
     let (drawn, mask) = drawn(editor, canvas);
     let active = editor.selection().active();
@@ -188,7 +193,12 @@ fn faces(editor: &Editor, canvas: &Canvas<'_>, shapes: &mut Vec<Shape>) {
             false => (GREY, canvas.stroke(OUTLINE, 1.0)),
         };
         if surrounds_eye(b, canvas) {
-            draw_edges(b, canvas, Stroke { color: if mask[i] { color } else { EDGE }, ..outline }, shapes);
+            draw_edges(
+                b,
+                canvas,
+                Stroke { color: if mask[i] { color } else { EDGE }, ..outline },
+                shapes,
+            );
             continue;
         }
         faces.extend(facing(b, canvas).map(|(middle, normal, corners)| {
@@ -236,7 +246,10 @@ fn surrounds_eye(b: &CloudBox, canvas: &Canvas<'_>) -> bool {
 }
 
 /// Middle, normal and pixels of the faces that look at the eye.
-fn facing<'a>(b: &'a CloudBox, canvas: &'a Canvas<'_>) -> impl Iterator<Item = (DVec3, DVec3, Vec<DVec2>)> + 'a {
+fn facing<'a>(
+    b: &'a CloudBox,
+    canvas: &'a Canvas<'_>,
+) -> impl Iterator<Item = (DVec3, DVec3, Vec<DVec2>)> + 'a {
     let corners = corners(b);
     FACES.iter().enumerate().filter_map(move |(i, face)| {
         let normal = if i % 2 == 0 { -1.0 } else { 1.0 } * Axis::ALL[i / 2].unit();

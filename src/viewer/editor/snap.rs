@@ -37,14 +37,16 @@ impl Snap {
     }
 }
 
-/// k times `step` as its decimal is written: 46 · 0.1 is 4.6 and not the 4.6000000000000005 of f64, so that the file has
-/// what was meant.
+/// k times `step` as its decimal is written: 46 · 0.1 is 4.6 and not the 4.6000000000000005 of f64,
+/// so that the file has what was meant.
 fn multiple(k: f64, step: f64) -> f64 {
     let plain = k * step;
     let written = format!("{step:e}");
     let Some((digits, exponent)) = written.split_once('e') else { return plain };
     let (whole, fraction) = digits.split_once('.').unwrap_or((digits, ""));
-    let (Ok(digits), Ok(exponent)) = (format!("{whole}{fraction}").parse::<f64>(), exponent.parse::<i32>()) else {
+    let (Ok(digits), Ok(exponent)) =
+        (format!("{whole}{fraction}").parse::<f64>(), exponent.parse::<i32>())
+    else {
         return plain;
     };
     /// Whole numbers up to here are exact.
@@ -64,7 +66,10 @@ mod tests {
     #[test]
     fn multiples_are_the_decimals_one_would_write() {
         let snap = |step: f64, v| Snap { on: true, step }.coordinate(v);
-        assert_eq!([snap(0.1, 4.62), snap(0.1, -3.449), snap(0.3, 0.95), snap(0.7, 2.0)], [4.6, -3.4, 0.9, 2.1]);
+        assert_eq!(
+            [snap(0.1, 4.62), snap(0.1, -3.449), snap(0.3, 0.95), snap(0.7, 2.0)],
+            [4.6, -3.4, 0.9, 2.1]
+        );
         assert_eq!(
             [snap(0.25, 1.1), snap(5.0, 12.4), snap(1e-3, 0.123_456), snap(1e3, 2600.0)],
             [1.0, 10.0, 0.123, 3e3]
@@ -80,6 +85,9 @@ mod tests {
     fn sizes_are_never_nothing() {
         let snap = Snap { on: true, step: 0.5 };
         assert_eq!([snap.size(0.1), snap.size(-3.0), snap.size(1.3)], [0.5, 0.5, 1.5]);
-        assert!(!Snap { on: true, step: 0.0 }.is_possible() && !Snap { on: true, step: f64::NAN }.is_possible());
+        assert!(
+            !Snap { on: true, step: 0.0 }.is_possible()
+                && !Snap { on: true, step: f64::NAN }.is_possible()
+        );
     }
 }

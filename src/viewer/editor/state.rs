@@ -66,12 +66,18 @@ impl Scaling {
 
 impl Default for Settings {
     fn default() -> Self {
-        Settings { view: View::default(), snap: Snap::default(), scaling: Scaling::default(), axis: Axis::X }
+        Settings {
+            view: View::default(),
+            snap: Snap::default(),
+            scaling: Scaling::default(),
+            axis: Axis::X,
+        }
     }
 }
 
 /// P's commonest box.
-pub const NEW_BOX: CloudBox = CloudBox { n_particles: 10, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.0 };
+pub const NEW_BOX: CloudBox =
+    CloudBox { n_particles: 10, extent: DVec3::ONE, center: DVec3::ZERO, radius_max: 2.0 };
 
 impl Editor {
     /// Nothing selected, nothing to undo.
@@ -84,13 +90,16 @@ impl Editor {
         Editor { document: document.into(), selection, settings, history, drag: None }
     }
 
-    /// The state after an action, and the boxes whose particles are touched by it. An error changes nothing: an action
-    /// that the box file's reader would not let pass, or one that does not fit into a drag that is under way.
+    /// The state after an action, and the boxes whose particles are touched by it. An error changes
+    /// nothing: an action that the box file's reader would not let pass, or one that does not fit
+    /// into a drag that is under way.
     pub fn after(&self, action: &Action) -> Result<(Editor, Touched), Refusal> {
         let next = match action {
             Action::Drag(drag) => self.dragged(drag)?,
             Action::Set(setting) => self.set(*setting)?,
-            _ if self.drag.is_some() => return Err(Refusal("a drag is under way: end or cancel it first".to_owned())),
+            _ if self.drag.is_some() => {
+                return Err(Refusal("a drag is under way: end or cancel it first".to_owned()));
+            }
             Action::Edit(edit) => self.edited(edit)?,
             Action::Select(select) => Editor { selection: self.selected(select)?, ..self.clone() },
             Action::Undo => self.travelled(History::undo),
@@ -148,7 +157,10 @@ impl Editor {
         match setting {
             Setting::View(view) => settings.view = view,
             Setting::Snap(snap) if !snap.is_possible() => {
-                return Err(Refusal(format!("grid step: expected a number above 0, found {}", snap.step)));
+                return Err(Refusal(format!(
+                    "grid step: expected a number above 0, found {}",
+                    snap.step
+                )));
             }
             Setting::Snap(snap) => settings.snap = snap,
             Setting::Scaling(scaling) => settings.scaling = scaling,
@@ -201,15 +213,16 @@ impl Editor {
         self.active_box().map_or_else(Vec::new, |(_, b)| placed(b, view))
     }
 
-    /// A box to [`Edit::Add`] at a place, which goes to the grid where snapping is on. It is like the active box where
-    /// there is one.
+    /// A box to [`Edit::Add`] at a place, which goes to the grid where snapping is on. It is like
+    /// the active box where there is one.
     pub fn new_box(&self, place: DVec3) -> CloudBox {
         let snap = self.settings.snap;
         let center = if snap.on { snap.place(place) } else { place };
         CloudBox { center, ..self.active_box().map_or(NEW_BOX, |(_, b)| *b) }
     }
 
-    /// Least and greatest coordinates of what is selected, of everything where nothing is: what to look at.
+    /// Least and greatest coordinates of what is selected, of everything where nothing is: what to
+    /// look at.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         if self.selection.is_empty() {
             return bounds(self.boxes());

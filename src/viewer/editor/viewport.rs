@@ -1,5 +1,5 @@
-//! Between the scene and the window's pixels: the pointer's ray, a place's pixel, what lies under a point or within a
-//! rectangle, and where to stand to see something whole.
+//! Between the scene and the window's pixels: the pointer's ray, a place's pixel, what lies under a
+//! point or within a rectangle, and where to stand to see something whole.
 
 use glam::{DVec2, DVec3};
 
@@ -7,14 +7,15 @@ use super::ray::Ray;
 use crate::model::boxes::CloudBox;
 use crate::model::camera::Pose;
 
-/// A camera and the part of a window that it fills. Pixels are counted from the upper left corner and are real numbers:
-/// the centre of the first one is (0.5, 0.5).
+/// A camera and the part of a window that it fills. Pixels are counted from the upper left corner
+/// and are real numbers: the centre of the first one is (0.5, 0.5).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Viewport {
     pub pose: Pose,
     pub fov_y_rad: f64,
     pub size_px: DVec2,
-    /// Pixels in a logical point, as the display is set: sizes of what is drawn for the hand are given in points.
+    /// Pixels in a logical point, as the display is set: sizes of what is drawn for the hand are
+    /// given in points.
     pub px_per_point: f64,
 }
 
@@ -60,8 +61,8 @@ impl Viewport {
         pixel.is_finite().then_some(pixel)
     }
 
-    /// What is seen between two pixels lies where all of these · (right, up, forward) are ≥ 0: a pyramid without end from
-    /// the eye.
+    /// What is seen between two pixels lies where all of these · (right, up, forward) are ≥ 0: a
+    /// pyramid without end from the eye.
     pub(super) fn sides(&self, corner: DVec2, opposite: DVec2) -> [DVec3; 5] {
         let (a, b) = (self.slopes(corner), self.slopes(opposite));
         let (low, high) = (a.min(b), a.max(b));
@@ -80,11 +81,12 @@ impl Viewport {
     }
 }
 
-/// All boxes that a ray meets, nearest first: a click takes the first, a further click at the same place may take the
-/// next.
+/// All boxes that a ray meets, nearest first: a click takes the first, a further click at the same
+/// place may take the next.
 pub fn pick_all(boxes: &[CloudBox], ray: &Ray) -> Vec<Hit> {
     let hits = boxes.iter().enumerate();
-    let mut hits: Vec<Hit> = hits.filter_map(|(i_box, b)| Some(Hit { i_box, distance: ray.hit(b)? })).collect();
+    let mut hits: Vec<Hit> =
+        hits.filter_map(|(i_box, b)| Some(Hit { i_box, distance: ray.hit(b)? })).collect();
     hits.sort_by(|a, b| a.distance.total_cmp(&b.distance));
     hits
 }
@@ -95,9 +97,15 @@ pub fn pick(boxes: &[CloudBox], ray: &Ray) -> Option<Hit> {
 }
 
 /// Every box of which a part is seen in the rectangle between two pixels, hidden or not.
-pub fn pick_rectangle(boxes: &[CloudBox], view: &Viewport, corner: DVec2, opposite: DVec2) -> Vec<usize> {
+pub fn pick_rectangle(
+    boxes: &[CloudBox],
+    view: &Viewport,
+    corner: DVec2,
+    opposite: DVec2,
+) -> Vec<usize> {
     let sides = view.sides(corner, opposite);
-    // From a place within both one can go on within the pyramid until the box ends, at a face: faces are all to be asked.
+    // From a place within both one can go on within the pyramid until the box ends, at a face:
+    // faces are all to be asked.
     let is_seen = |b: &CloudBox| {
         let corners = corners(b).map(|corner| view.seen(corner));
         FACES.iter().any(|face| {
@@ -117,8 +125,20 @@ pub fn corners(b: &CloudBox) -> [DVec3; 8] {
 }
 
 /// Pairs of corners.
-pub const EDGES: [[usize; 2]; 12] =
-    [[0, 1], [2, 3], [4, 5], [6, 7], [0, 2], [1, 3], [4, 6], [5, 7], [0, 4], [1, 5], [2, 6], [3, 7]];
+pub const EDGES: [[usize; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
 
 /// Corners around each face: those of the low and the high side along x, y and z.
 pub(super) const FACES: [[usize; 4]; 6] =
@@ -146,9 +166,15 @@ pub fn bounds<'a>(boxes: impl IntoIterator<Item = &'a CloudBox>) -> Option<(DVec
     each.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// Where the eye has to be, looking along `forward`, to see all between `low` and `high`; the middle of that is what it
-/// looks at then.
-pub fn framing(low: DVec3, high: DVec3, forward: DVec3, fov_y_rad: f64, aspect: f64) -> (DVec3, DVec3) {
+/// Where the eye has to be, looking along `forward`, to see all between `low` and `high`; the
+/// middle of that is what it looks at then.
+pub fn framing(
+    low: DVec3,
+    high: DVec3,
+    forward: DVec3,
+    fov_y_rad: f64,
+    aspect: f64,
+) -> (DVec3, DVec3) {
     let middle = 0.5 * (low + high);
     let half_fov = (0.5 * fov_y_rad).min(((0.5 * fov_y_rad).tan() * aspect).atan());
     // The ball around the box; what has no size is looked at from 1 unit.

@@ -23,11 +23,17 @@ pub fn show(ui: &mut Ui, timeline: &Timeline) {
     let painter = ui.painter();
     let (begin, end) = (oldest.game[0], newest.end.max(oldest.game[0] + 1e-3));
     let names = 46.0;
-    let x = |t: f64| room.left() + names + ((t - begin) / (end - begin)) as f32 * (room.width() - names);
+    let x = |t: f64| {
+        room.left() + names + ((t - begin) / (end - begin)) as f32 * (room.width() - names)
+    };
     let stretch = |lane: usize, [from, to]: Span, color: Color32| {
         let y = room.top() + lane as f32 * LANE;
         let right = x(to).max(x(from) + 0.5);
-        painter.rect_filled(Rect::from_min_max(pos2(x(from), y + 1.0), pos2(right, y + LANE - 1.0)), 0.0, color);
+        painter.rect_filled(
+            Rect::from_min_max(pos2(x(from), y + 1.0), pos2(right, y + LANE - 1.0)),
+            0.0,
+            color,
+        );
     };
     for (lane, name) in ["game", "record", "device"].into_iter().enumerate() {
         let at = pos2(room.left(), room.top() + (lane as f32 + 0.5) * LANE);
@@ -50,20 +56,42 @@ pub fn bars(ui: &mut Ui, timeline: &Timeline) {
     let of_host = |name, color, of: fn(&crate::viewer::timeline::Frame) -> f64| {
         timeline.summary(of).map(|s| (name, s.p50, 1.0, color))
     };
-    let host = [of_host("game step", GAME, |f| f.game_ms), of_host("recording", RECORD, |f| f.record_ms + f.submit_ms)];
-    let device = passes.iter().map(|(name, ms, share)| (*name, *ms, *share, color_of(&passes, name)));
+    let host = [
+        of_host("game step", GAME, |f| f.game_ms),
+        of_host("recording", RECORD, |f| f.record_ms + f.submit_ms),
+    ];
+    let device =
+        passes.iter().map(|(name, ms, share)| (*name, *ms, *share, color_of(&passes, name)));
     let rows: Vec<_> = host.into_iter().flatten().chain(device).collect();
     let longest = rows.iter().map(|row| row.1).fold(1e-3, f64::max);
     for (name, p50, share, color) in rows {
-        let (room, response) = ui.allocate_exact_size(vec2(ui.available_width(), BAR), Sense::hover());
-        // Without a clip of its own: each one is a draw, and draws are what a software device pays for.
+        let (room, response) =
+            ui.allocate_exact_size(vec2(ui.available_width(), BAR), Sense::hover());
+        // Without a clip of its own: each one is a draw, and draws are what a software device pays
+        // for.
         let painter = ui.painter();
         let length = (p50 / longest) as f32 * room.width();
-        painter.rect_filled(Rect::from_min_size(room.min, vec2(length, BAR - 1.0)), 0.0, color.gamma_multiply(0.6));
+        painter.rect_filled(
+            Rect::from_min_size(room.min, vec2(length, BAR - 1.0)),
+            0.0,
+            color.gamma_multiply(0.6),
+        );
         let font = FontId::proportional(11.0);
-        painter.text(room.left_center() + vec2(3.0, 0.0), Align2::LEFT_CENTER, name, font.clone(), Color32::WHITE);
+        painter.text(
+            room.left_center() + vec2(3.0, 0.0),
+            Align2::LEFT_CENTER,
+            name,
+            font.clone(),
+            Color32::WHITE,
+        );
         let text = format!("{} ms", ms(p50));
-        painter.text(room.right_center() - vec2(3.0, 0.0), Align2::RIGHT_CENTER, text, font, Color32::WHITE);
+        painter.text(
+            room.right_center() - vec2(3.0, 0.0),
+            Align2::RIGHT_CENTER,
+            text,
+            font,
+            Color32::WHITE,
+        );
         response.on_hover_text(format!("in {:.0} % of the last frames", 100.0 * share));
     }
     if passes.is_empty() && timeline.frames().len() > 0 {

@@ -56,7 +56,10 @@ pub fn playback(ui: &mut Ui, wanted: &Wanted, seen: &Seen, commands: &mut Vec<Co
         commands.push(Command::Play(Action::Seek(i_frame)));
     }
     if let Some(last) = &seen.last {
-        ui.label(format!("{:.3} s, {} of {} particles drawn", last.time_s, last.n_shown, last.n_particles));
+        ui.label(format!(
+            "{:.3} s, {} of {} particles drawn",
+            last.time_s, last.n_shown, last.n_particles
+        ));
     }
     ui.label(RichText::new(&seen.device).color(DIM).small());
 }
@@ -113,10 +116,18 @@ pub fn counters(ui: &mut Ui, seen: &Seen, commands: &mut Vec<Command>) {
 pub fn compare(ui: &mut Ui, wanted: &Wanted, seen: &Seen, commands: &mut Vec<Command>) {
     ui.horizontal_wrapped(|ui| {
         let held = wanted.other.is_some();
-        if ui.selectable_label(held, "B").on_hover_text("keeps what is set as B, or forgets it (m)").clicked() {
+        if ui
+            .selectable_label(held, "B")
+            .on_hover_text("keeps what is set as B, or forgets it (m)")
+            .clicked()
+        {
             commands.push(Command::Hold);
         }
-        let ways = [("split", Beside::Split(0.5)), ("difference", Beside::Difference(8.0)), ("B alone", Beside::Other)];
+        let ways = [
+            ("split", Beside::Split(0.5)),
+            ("difference", Beside::Difference(8.0)),
+            ("B alone", Beside::Other),
+        ];
         for (text, way) in ways {
             let is_now = std::mem::discriminant(&way) == std::mem::discriminant(&wanted.beside);
             if ui.add_enabled_ui(held, |ui| ui.selectable_label(is_now, text)).inner.clicked() {
@@ -140,7 +151,8 @@ pub fn compare(ui: &mut Ui, wanted: &Wanted, seen: &Seen, commands: &mut Vec<Com
             Beside::Other => {}
         }
         for knob in Knob::ALL {
-            let other = wanted.other.as_ref().map(|other| knob.value(&other.scene)).unwrap_or_default();
+            let other =
+                wanted.other.as_ref().map(|other| knob.value(&other.scene)).unwrap_or_default();
             let here = knob.value(&wanted.scene);
             if here != other {
                 ui.label(format!("{}: A {here}, B {other}", knob.key()));
@@ -151,7 +163,8 @@ pub fn compare(ui: &mut Ui, wanted: &Wanted, seen: &Seen, commands: &mut Vec<Com
         }
     }
     let mut judges = wanted.judges;
-    let hover = "RMSE and greatest difference from the f64 reference, while the eye and the frame stand still (j)";
+    let hover = "RMSE and greatest difference from the f64 reference, while the eye and the frame \
+        stand still (j)";
     if ui.checkbox(&mut judges, "error against the reference").on_hover_text(hover).clicked() {
         commands.push(Command::Judge);
     }
@@ -169,7 +182,8 @@ fn errors(ui: &mut Ui, wanted: &Wanted, judged: &Judged) {
             }
         }
         let cached = if known.from_cache { ", kept from before" } else { "" };
-        let text = format!("at {} pixels, against {}{cached}", known.pixels.at.len(), known.view.against);
+        let text =
+            format!("at {} pixels, against {}{cached}", known.pixels.at.len(), known.view.against);
         ui.label(RichText::new(text).color(DIM).small());
     } else if !wanted.playback.is_paused() {
         ui.weak("pause (space) to measure");

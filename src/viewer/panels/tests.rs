@@ -18,7 +18,9 @@ fn run(context: &Context, events: Vec<Event>, seen: &Seen) -> (Vec<Command>, Vec
     let mut output = context.run_ui(input, |ui| commands = show(ui, &wanted, seen).0);
     output.textures_delta.clear();
     let text = |shape: &egui::epaint::ClippedShape| match &shape.shape {
-        egui::Shape::Text(t) => Some((t.galley.text().to_owned(), t.visual_bounding_rect().center())),
+        egui::Shape::Text(t) => {
+            Some((t.galley.text().to_owned(), t.visual_bounding_rect().center()))
+        }
         _ => None,
     };
     (commands, output.shapes.iter().filter_map(text).collect())
@@ -44,7 +46,10 @@ fn a_click_is_a_key() {
     for _ in 0..20 {
         texts = run(&context, vec![], &seen).1;
     }
-    let (_, at) = texts.iter().find(|(text, _)| text == "two-reflection").unwrap_or_else(|| panic!("{texts:?}"));
+    let (_, at) = texts
+        .iter()
+        .find(|(text, _)| text == "two-reflection")
+        .unwrap_or_else(|| panic!("{texts:?}"));
     let mut commands = vec![];
     for events in click(*at) {
         commands.extend(run(&context, events, &seen).0);

@@ -45,12 +45,20 @@ fn graph(ui: &mut Ui, timeline: &Timeline, of_frames: &Summary) {
     painter.rect_filled(room, 2.0, egui::Color32::from_gray(12));
     let top = 1.05 * of_frames.max.max(1e-3);
     let y = |value: f64| room.bottom() - (value / top) as f32 * room.height();
-    let x = |i: usize| room.right() - (timeline.frames().len() - 1 - i) as f32 * room.width() / (KEPT - 1) as f32;
+    let x = |i: usize| {
+        room.right() - (timeline.frames().len() - 1 - i) as f32 * room.width() / (KEPT - 1) as f32
+    };
     for value in [of_frames.p50, of_frames.p99] {
         painter.hline(room.x_range(), y(value), Stroke::new(1.0, DIM.gamma_multiply(0.4)));
     }
     let points = timeline.frames().enumerate().map(|(i, f)| pos2(x(i), y(f.frame_ms))).collect();
     painter.line(points, Stroke::new(1.0, PASSES[0]));
     let font = egui::FontId::proportional(10.0);
-    painter.text(room.left_top() + vec2(3.0, 1.0), egui::Align2::LEFT_TOP, format!("{} ms", ms(top)), font, DIM);
+    painter.text(
+        room.left_top() + vec2(3.0, 1.0),
+        egui::Align2::LEFT_TOP,
+        format!("{} ms", ms(top)),
+        font,
+        DIM,
+    );
 }

@@ -51,8 +51,8 @@ fn edges_along_the_axes_hide_exactly_what_is_behind_them() {
         let rectangle = Rectangle::new(&leans, DVec3::ZERO);
         assert!((hidden(&rectangle, EYE, &above()) - 0.3).abs() < 1e-13, "{lean}");
     }
-    // Through the cell's plane: what stands across it at x = 0.1 hides nothing on this side, all beyond that does not count as
-    // of its plane: 2⁻²⁰.
+    // Through the cell's plane: what stands across it at x = 0.1 hides nothing on this side, all
+    // beyond that does not count as of its plane: 2⁻²⁰.
     let across = plane(DVec3::new(0.1, 2.0, 0.0), 9.0 * DVec3::Y, 9.0 * DVec3::Z, 1);
     let aside = Source::At(DVec3::NEG_X);
     assert!((hidden(&Rectangle::new(&across, DVec3::ZERO), aside, &above()) - 0.4).abs() < 1e-6);
@@ -66,7 +66,10 @@ fn directions_cast_shadows_along_themselves() {
     for k in 0..40 {
         let x = 0.2 + 0.03 * f64::from(k);
         let half = table(1.0, [x, -9.0], [9.0, 9.0]);
-        assert!((hidden(&half, sun, &floor) - (0.5 + 0.75 - x).clamp(0.0, 1.0)).abs() < 1e-13, "{x}");
+        assert!(
+            (hidden(&half, sun, &floor) - (0.5 + 0.75 - x).clamp(0.0, 1.0)).abs() < 1e-13,
+            "{x}"
+        );
     }
     // Below, or along the light, nothing is in its way.
     assert_eq!(hidden(&table(-1.0, [-9.0; 2], [9.0; 2]), sun, &floor), 0.0);
@@ -91,7 +94,9 @@ fn planes_of_cells_and_eyes_hide_nothing() {
 fn what_random_rectangles_hide_is_near_their_shadow_s_area() {
     let (mut squares, mut worst, mut n) = (0.0, 0.0f64, 0.0);
     for k in 0..3000 {
-        let mut of = (0..3).flat_map(|c| philox4x32_10([5, 9], [k, c, 0, 0]).map(uniform)).map(|x| 2.0 * x - 1.0);
+        let mut of = (0..3)
+            .flat_map(|c| philox4x32_10([5, 9], [k, c, 0, 0]).map(uniform))
+            .map(|x| 2.0 * x - 1.0);
         let mut next = || of.next().unwrap_or(0.0);
         let mut vector = || DVec3::new(next(), next(), next());
         let (u, w, c) = (vector().normalize(), vector(), vector());
@@ -100,7 +105,9 @@ fn what_random_rectangles_hide_is_near_their_shadow_s_area() {
         let ceiling = plane(2.0 * DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 1);
         for source in [EYE, Source::Toward(DVec3::new(0.28, -0.96, 0.0))] {
             let shadow = clip::shadow(&Rect::of(&ceiling), &Rect::of(&blocker), source);
-            let area = shadow.map_or(0.0, |lines| clip::area(&clip::split(clip::WHOLE.to_vec(), &lines).0) / 4.0);
+            let area = shadow.map_or(0.0, |lines| {
+                clip::area(&clip::split(clip::WHOLE.to_vec(), &lines).0) / 4.0
+            });
             let found = hidden(&Rectangle::new(&blocker, DVec3::ZERO), source, &above());
             if area > 0.0 || found > 0.0 {
                 squares += (found - area).powi(2);
@@ -109,23 +116,27 @@ fn what_random_rectangles_hide_is_near_their_shadow_s_area() {
             }
         }
     }
-    // A ramp is off by 0.043 of a part at most (an edge at 45°), by either sign and some 0.02 on average: of some 16 rim
-    // parts 0.02·4/16. A corner within a part is off by up to ¼ of it, some 0.1: four of them 0.1·2/16. At worst all at once:
-    // 16·0.043/16 + 4·¼/16.
+    // A ramp is off by 0.043 of a part at most (an edge at 45°), by either sign and some 0.02 on
+    // average: of some 16 rim parts 0.02·4/16. A corner within a part is off by up to ¼ of it, some
+    // 0.1: four of them 0.1·2/16. At worst all at once: 16·0.043/16 + 4·¼/16.
     let rms = (squares / n).sqrt();
     assert!(n > 2000.0 && rms < 0.0135 && worst < 0.106, "{n} {rms} {worst}");
 }
 
 #[test]
 fn bounds_hold_what_rounding_does_and_no_more() {
-    // An edge that rounding moves by 1e-7 hides as much more or less as the bound says, and it says little.
+    // An edge that rounding moves by 1e-7 hides as much more or less as the bound says, and it says
+    // little.
     let at = |x: f64| table(1.0, [x, -0.2], [9.0, 0.3]);
     let edges = |x: f64| Edges::new(&at(x), EYE, &above(), SLACK);
     for k in 0..20 {
         let x = -0.2 + 0.021 * f64::from(k);
         for part in Patch::middles() {
             let (is, other) = (edges(x).hidden(part), edges(x + 1e-7).hidden(part));
-            assert!((is.value - other.value).abs() <= is.error && is.error < 1e-3, "{x} {is:?} {other:?}");
+            assert!(
+                (is.value - other.value).abs() <= is.error && is.error < 1e-3,
+                "{x} {is:?} {other:?}"
+            );
         }
     }
 }

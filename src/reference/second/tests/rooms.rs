@@ -18,7 +18,8 @@ struct Room {
     eye: DVec3,
 }
 
-/// Twelve rectangles of half axes 0.3…0.8 in a box of half edge 1.5, a third of them glossy; a sun, a lamp and a sky.
+/// Twelve rectangles of half axes 0.3…0.8 in a box of half edge 1.5, a third of them glossy; a sun,
+/// a lamp and a sky.
 fn random(seed: u32) -> Room {
     let mut n = 0;
     let mut next = || {
@@ -37,7 +38,8 @@ fn random(seed: u32) -> Room {
         brdfs.push(Brdf { kd, ks: DVec3::splat(ks), ns: 50f64.powf(next()) });
     }
     let direction = DVec3::new(next() - 0.5, -1.0, next() - 0.5).normalize();
-    // Off the rectangles: of a lamp nearer than a facet is wide no pair of facets tells where its light lies on it.
+    // Off the rectangles: of a lamp nearer than a facet is wide no pair of facets tells where its
+    // light lies on it.
     let position = DVec3::new(4.0 * next() - 2.0, 2.6 + next(), 4.0 * next() - 2.0);
     let lights = vec![
         Light::Directional { direction, irradiance: DVec3::new(3.0, 2.9, 2.7) },
@@ -48,7 +50,8 @@ fn random(seed: u32) -> Room {
 }
 
 impl Room {
-    /// Every `stride`-th facet: its number and what it gathers, of places and shapes as `rounded` has them.
+    /// Every `stride`-th facet: its number and what it gathers, of places and shapes as `rounded`
+    /// has them.
     fn gather_as(&self, stride: usize, rounded: impl Fn(DVec3) -> DVec3) -> Vec<(usize, Gathered)> {
         let mut scene = Scene::of_surfaces(&self.surfaces, matte(1.0));
         let basis = Basis::new([1.0, 100.0], 8, Sampling::Log);
@@ -57,11 +60,21 @@ impl Room {
             region.lobe = (brdf.ks != DVec3::ZERO).then(|| basis.lobe(brdf.ns));
         }
         let rectangles: Vec<_> = scene.regions.iter().filter_map(|r| r.rectangle).collect();
-        let obstacles = Obstacles { spec: &SPEC, cells: &[0.0], rectangles: &rectangles, step: 1.0, forward: 1.0 };
-        let places = scene.facets.iter().map(|f| Place { position: f.position, i_region: f.i_region as u32 });
+        let obstacles = Obstacles {
+            spec: &SPEC,
+            cells: &[0.0],
+            rectangles: &rectangles,
+            step: 1.0,
+            forward: 1.0,
+        };
+        let places = scene
+            .facets
+            .iter()
+            .map(|f| Place { position: f.position, i_region: f.i_region as u32 });
         let through = obstacles.through(&places.collect::<Vec<_>>(), &self.lights);
         for r in scene.regions.iter_mut().filter_map(|r| r.rectangle.as_mut()) {
-            (r.center, r.u, r.v, r.normal) = (rounded(r.center), rounded(r.u), rounded(r.v), rounded(r.normal));
+            (r.center, r.u, r.v, r.normal) =
+                (rounded(r.center), rounded(r.u), rounded(r.v), rounded(r.normal));
             r.facet = (rounded(r.facet.0), rounded(r.facet.1));
         }
         for f in &mut scene.facets {
@@ -69,7 +82,9 @@ impl Room {
         }
         let exchange = Exchange { eye: self.eye, ..scene.exchange(&self.lights, &through) };
         let senders = exchange.senders();
-        each(scene.facets.len().div_ceil(stride), |k| (k * stride, exchange.gather(k * stride, &senders)))
+        each(scene.facets.len().div_ceil(stride), |k| {
+            (k * stride, exchange.gather(k * stride, &senders))
+        })
     }
 
     fn gather(&self, stride: usize) -> Vec<(usize, Gathered)> {
@@ -78,7 +93,8 @@ impl Room {
 
     fn mirrored(&self) -> Room {
         let over = |v: DVec3| DVec3::new(-v.x, v.y, v.z);
-        let surface = |s: &Surface| Surface { center: over(s.center), u: over(s.v), v: over(s.u), ..*s };
+        let surface =
+            |s: &Surface| Surface { center: over(s.center), u: over(s.v), v: over(s.u), ..*s };
         let light = |l: &Light| match *l {
             Light::Directional { direction, irradiance } => {
                 Light::Directional { direction: over(direction), irradiance }
@@ -118,13 +134,15 @@ fn rooms_are_those_of_the_areas_and_their_bounds_small() {
             }
         }
         let greatest = found.iter().map(|(_, g)| g.second.max_element()).fold(0.0, f64::max);
-        let loose = found.iter().filter(|(_, g)| g.second_error.max_element() > 1e-3 * greatest).count();
+        let loose =
+            found.iter().filter(|(_, g)| g.second_error.max_element() > 1e-3 * greatest).count();
         assert!(loose * 20 <= found.len());
     }
     let relative = [0, 1].map(|k| f64::sqrt(error[k] / value[k]));
     println!("L2 and I_i {relative:?}");
-    // 1.02 and 1.12 % over 48 such rooms, nearly all of it where a receiver touches what it sees: parts are discs there, a few
-    // percent too dark. In eight rooms one such receiver makes some tenths more.
+    // 1.02 and 1.12 % over 48 such rooms, nearly all of it where a receiver touches what it sees:
+    // parts are discs there, a few percent too dark. In eight rooms one such receiver makes some
+    // tenths more.
     assert!(relative.iter().all(|r| *r < 0.015), "{relative:?}");
 }
 
@@ -153,7 +171,9 @@ fn roundings_stay_within_the_bounds() {
         let rounded = |v: DVec3| v.as_vec3().as_dvec3();
         let mut worst = 0.0f64;
         for ((j, a), (_, b)) in room.gather(5).into_iter().zip(room.gather_as(5, rounded)) {
-            for (a, b, error) in [(a.indirect, b.indirect, a.indirect_error), (a.second, b.second, a.second_error)] {
+            for (a, b, error) in
+                [(a.indirect, b.indirect, a.indirect_error), (a.second, b.second, a.second_error)]
+            {
                 let off = ((a - b).abs() / (error + 1e-300)).max_element();
                 assert!(off <= 1.0, "{seed} {j}: {a} {b} {error}");
                 worst = worst.max(off);

@@ -18,8 +18,8 @@ const MIXED: f64 = 0.5;
 const EVEN: f64 = 0.9999;
 /// No nearer counts a surface's cluster its nearest point.
 const NEAREST: f64 = 0.01;
-/// Of the deviation, what an f32 evaluation of the positive part may err: an erf that is known to 2.5e-6, times half of
-/// up to six deviations, less the farther out.
+/// Of the deviation, what an f32 evaluation of the positive part may err: an erf that is known to
+/// 2.5e-6, times half of up to six deviations, less the farther out.
 const OF_POSITIVE_PART: f64 = 3e-6;
 
 /// A cluster as a receiver sees it.
@@ -76,14 +76,17 @@ impl Sight<'_> {
             of_i.times(of_j).plus(self.bend().where_or(both, Known::NOTHING))
         };
         let value = sum.value.max(0.0);
-        let error =
-            if sum.value + sum.error > 0.0 { sum.error + value * (self.of_inverse + ROUNDINGS * U) } else { 0.0 };
+        let error = if sum.value + sum.error > 0.0 {
+            sum.error + value * (self.of_inverse + ROUNDINGS * U)
+        } else {
+            0.0
+        };
         Known { value, error }.scaled(1.0 / self.way.d2)
     }
 
-    /// Half the second derivatives times the moments. Its terms are products of the cosines and of N with unit vectors,
-    /// each at most tr N: they change by 14 (c_i) + 14 (c_j) + 24 + 20 turns of the way at most, by 14 + 4 + 5 of the
-    /// normal's, and by 12 + 2 + 8 + 1 of N's error.
+    /// Half the second derivatives times the moments. Its terms are products of the cosines and of
+    /// N with unit vectors, each at most tr N: they change by 14 (c_i) + 14 (c_j) + 24 + 20 turns
+    /// of the way at most, by 14 + 4 + 5 of the normal's, and by 12 + 2 + 8 + 1 of N's error.
     fn bend(&self) -> Known {
         let Sight { cluster, way, .. } = self;
         let (c_i, c_j) = (self.c_i().value, self.c_j().value);
@@ -112,7 +115,8 @@ impl Sight<'_> {
             };
             let at_receiver = (c_j.value + s * c_j.error + rho).clamp(0.0, 1.0);
             let at_cluster = (c_i.value + s * c_i.error).max(0.0) + 1.0 - length;
-            h * at_receiver * at_cluster * cluster.area / self.way.d2 * (1.0 + s * (self.of_inverse + ROUNDINGS * U))
+            h * at_receiver * at_cluster * cluster.area / self.way.d2
+                * (1.0 + s * (self.of_inverse + ROUNDINGS * U))
         };
         let theta = if self.is_surface { theta } else { CLOUD_THETA * theta };
         let known = Known::between(wrong(-1.0), wrong(0.0), wrong(1.0));
@@ -121,7 +125,9 @@ impl Sight<'_> {
 }
 
 fn positive(mean: Known, variance: Known) -> Known {
-    let at = |s: f64| positive_part(mean.value + s * mean.error, (variance.value + s * variance.error).max(0.0));
+    let at = |s: f64| {
+        positive_part(mean.value + s * mean.error, (variance.value + s * variance.error).max(0.0))
+    };
     let known = Known::between(at(-1.0), at(0.0), at(1.0));
     // Nor is a deviation less than 1e-6 told from that.
     let of_evaluation = OF_POSITIVE_PART * (variance.value + variance.error).max(0.0).sqrt() + 1e-6;
@@ -136,11 +142,17 @@ impl View<'_> {
             return if i == j { Gathered::default() } else { self.of_facet(i) };
         }
         let sight = self.sight(&clusters.nodes[node], i_region);
-        let below = || clusters.children(node).map(|c| self.of_node(j, clusters, i_region, c)).collect();
+        let below =
+            || clusters.children(node).map(|c| self.of_node(j, clusters, i_region, c)).collect();
         let cluster = sight.cluster;
-        let ball = Ball { at: cluster.position, radius: cluster.radius, slack: self.exchange.slack() + cluster.moved };
+        let ball = Ball {
+            at: cluster.position,
+            radius: cluster.radius,
+            slack: self.exchange.slack() + cluster.moved,
+        };
         let form = sight.form();
-        let torn = match form.is_positive().and(above(sight.rho.scaled(2.0), TORN * clusters.theta)) {
+        let torn = match form.is_positive().and(above(sight.rho.scaled(2.0), TORN * clusters.theta))
+        {
             Decision { taken: false, sure: true } => Decision::NO,
             reached => reached.and(self.is_torn(i_region, &ball)),
         };
@@ -159,20 +171,27 @@ impl View<'_> {
         Sight {
             cluster,
             is_surface: x.regions[i_region].rectangle.is_some(),
-            way: Way { n_j: self.receiver.normal, n_i: cluster.normal, way: o.normalize_or_zero(), d2: d * d, turn },
+            way: Way {
+                n_j: self.receiver.normal,
+                n_i: cluster.normal,
+                way: o.normalize_or_zero(),
+                d2: d * d,
+                turn,
+            },
             rho: Known { value: rho, error: cluster.radius.error / d + 2.0 * rho * of_distance },
             of_inverse: 3.0 * of_distance,
         }
     }
 
-    /// Some of it may be before the receiver and the receiver before it, and it is too near, too coarse, or too wide
-    /// for a lobe.
+    /// Some of it may be before the receiver and the receiver before it, and it is too near, too
+    /// coarse, or too wide for a lobe.
     fn is_wide(&self, sight: &Sight, i_region: usize, theta: f64) -> Decision {
         let (x, cluster) = (self.exchange, sight.cluster);
         let length = sight.way.n_i.length();
         let mixed = Decision::above(EVEN, length, cluster.turned + 8.0 * U);
         let c_j = sight.c_j();
-        let before = Decision::above(c_j.value, -2.0 * sight.rho.value, c_j.error + 2.0 * sight.rho.error);
+        let before =
+            Decision::above(c_j.value, -2.0 * sight.rho.value, c_j.error + 2.0 * sight.rho.error);
         let sends = before.and(above(sight.c_i(), 0.0).or(mixed));
         let near = above(sight.rho, 1.0);
         if !sends.is_possible() || (near == Decision::YES) {
@@ -182,9 +201,11 @@ impl View<'_> {
         let way = sight.unit_way();
         let angles = (0..x.lights.len()).filter_map(|k| {
             let shines = cluster.lights[k].is_positive();
-            Some((shines, x.light_angle(k, cluster.position, &way, cluster.moved)?)).filter(|_| shines.is_possible())
+            Some((shines, x.light_angle(k, cluster.position, &way, cluster.moved)?))
+                .filter(|_| shines.is_possible())
         });
-        let lobes = self.meets_lobe(i_region, angles, &way, sight.rho.scaled(2.0), LOBE_STEP * theta_of);
+        let lobes =
+            self.meets_lobe(i_region, angles, &way, sight.rho.scaled(2.0), LOBE_STEP * theta_of);
         sends.and(near.or(sight.is_coarse(theta)).or(lobes))
     }
 
@@ -196,9 +217,13 @@ impl View<'_> {
         let (x, cluster, region) = (self.exchange, sight.cluster, &self.exchange.regions[i_region]);
         let way = sight.unit_way();
         let (mut sent, mut error) = (cluster.flux, cluster.flux_error);
-        for (k, (light, g)) in x.lights.iter().zip(&cluster.lights).enumerate().filter(|(_, (_, g))| !g.is_nothing()) {
-            let glossy = region.lobe.as_ref().zip(x.light_angle(k, cluster.position, &way, cluster.moved));
-            let glossy = glossy.map_or(Known::NOTHING, |(table, angle)| lobe(table, angle)).times(*g);
+        for (k, (light, g)) in
+            x.lights.iter().zip(&cluster.lights).enumerate().filter(|(_, (_, g))| !g.is_nothing())
+        {
+            let glossy =
+                region.lobe.as_ref().zip(x.light_angle(k, cluster.position, &way, cluster.moved));
+            let glossy =
+                glossy.map_or(Known::NOTHING, |(table, angle)| lobe(table, angle)).times(*g);
             sent += light.energy() * region.brdf.ks * glossy.value;
             error += light.energy() * region.brdf.ks * glossy.error;
         }

@@ -75,7 +75,8 @@ impl Desk {
                 let (by, pans) = (pixel - std::mem::replace(at, pixel), *pans);
                 self.turn_eye(by, pans);
             }
-            Hold::Handle { is_pulled: false, from, .. } if is_near(*from, pixel, self.screen.px_per_point) => {}
+            Hold::Handle { is_pulled: false, from, .. }
+                if is_near(*from, pixel, self.screen.px_per_point) => {}
             Hold::Handle { is_pulled, .. } => {
                 *is_pulled = true;
                 self.pull(pixel, held);
@@ -143,11 +144,13 @@ impl Desk {
         }
     }
 
-    /// Selects what lies under a pixel: the nearest box, or where the last click was the one behind the active box.
-    /// False where there is none.
+    /// Selects what lies under a pixel: the nearest box, or where the last click was the one behind
+    /// the active box. False where there is none.
     fn click(&mut self, pixel: DVec2, held: Held) -> bool {
-        let (hits, how) = (pick_all(self.editor().boxes(), &self.viewport().ray(pixel)), held.how());
-        let again = self.clicked.is_some_and(|at| is_near(at, pixel, self.screen.px_per_point)) && how == How::Replace;
+        let (hits, how) =
+            (pick_all(self.editor().boxes(), &self.viewport().ray(pixel)), held.how());
+        let again = self.clicked.is_some_and(|at| is_near(at, pixel, self.screen.px_per_point))
+            && how == How::Replace;
         self.clicked = Some(pixel);
         let active = self.editor().selection().active().filter(|_| again);
         let i_active = active.and_then(|active| hits.iter().position(|hit| hit.i_box == active));
@@ -167,7 +170,11 @@ impl Desk {
 
     fn begin(&mut self, handle: Handle, pixel: DVec2) {
         let view = self.viewport();
-        self.act(Action::Drag(DragAction::Begin { handle, ray: view.ray(pixel), forward: view.pose.forward }));
+        self.act(Action::Drag(DragAction::Begin {
+            handle,
+            ray: view.ray(pixel),
+            forward: view.pose.forward,
+        }));
     }
 
     /// The pointer went so many pixels to the right and down.

@@ -18,7 +18,12 @@ fn desk_of(boxes: Vec<CloudBox>) -> Desk {
     let position = DVec3::new(2.0, 0.0, 10.0);
     let pose = Pose { position, right: DVec3::X, up: DVec3::Y, forward: -DVec3::Z };
     let target = DVec3::new(2.0, 0.0, 0.0);
-    Desk::new(Session::opened(Path::new("b.dat"), boxes), (&pose, DVec3::Y, target), screen(), 250.0)
+    Desk::new(
+        Session::opened(Path::new("b.dat"), boxes),
+        (&pose, DVec3::Y, target),
+        screen(),
+        250.0,
+    )
 }
 
 /// Unit boxes at x = 0 and 4.
@@ -177,7 +182,11 @@ fn a_drag_is_one_step_that_undo_takes_back() {
     assert_eq!((touched.moved, touched.generate), (vec![0], vec![]));
     hand.moves(from + 1.5 * px_per_unit * DVec2::X, NONE);
     hand.releases(Button::Left);
-    assert!((hand.boxes()[0].center - DVec3::X * 1.5).length() < 1e-12, "{}", hand.boxes()[0].center);
+    assert!(
+        (hand.boxes()[0].center - DVec3::X * 1.5).length() < 1e-12,
+        "{}",
+        hand.boxes()[0].center
+    );
     assert_eq!(hand.0.editor().history().n_undo(), 1);
     hand.with_ctrl('z');
     assert!(hand.0.editor().document().is_same(&before));
@@ -309,7 +318,12 @@ fn what_is_typed_is_taken_with_its_unit_or_refused_with_its_reason() {
     hand.types(Field::Count, "12");
     hand.types(Field::Seed, "77");
     hand.types(Field::SnapStep, "0.25");
-    let expected = CloudBox { n_particles: 12, extent: DVec3::new(1.0, 1.0, 2.0), radius_max: 1.5, ..hand.boxes()[0] };
+    let expected = CloudBox {
+        n_particles: 12,
+        extent: DVec3::new(1.0, 1.0, 2.0),
+        radius_max: 1.5,
+        ..hand.boxes()[0]
+    };
     assert_eq!((hand.boxes()[0], hand.0.editor().document().seed), (expected, 77));
     assert_eq!((hand.0.said(), hand.0.editor().settings().snap.step), (None, 0.25));
     hand.types(Field::Center(Axis::X), "1 furlong");
@@ -331,7 +345,10 @@ fn nothing_is_lost_unasked_and_nothing_else_is_answered_meanwhile() {
     hand.clicks(DVec2::new(400.0, 20.0), NONE);
     hand.types(Field::Radius, "3");
     hand.does(Input::Wheel(1.0));
-    assert_eq!((hand.boxes().len(), hand.selected().len(), hand.boxes()[0].radius_max), (2, 2, 1.0));
+    assert_eq!(
+        (hand.boxes().len(), hand.selected().len(), hand.boxes()[0].radius_max),
+        (2, 2, 1.0)
+    );
     assert_eq!(hand.0.flight().position(), desk().flight().position());
     hand.escape();
     assert_eq!(hand.0.session().asked(), None);
@@ -370,7 +387,10 @@ fn settings_help_and_the_window_change_no_box() {
     hand.key('3');
     assert_eq!(hand.0.editor().settings().view, View::Both);
     hand.does(Input::Resized { size_px: DVec2::new(400.0, 200.0), px_per_point: 2.0 });
-    assert_eq!((hand.0.viewport().size_px, hand.0.viewport().px_per_point), (DVec2::new(400.0, 200.0), 2.0));
+    assert_eq!(
+        (hand.0.viewport().size_px, hand.0.viewport().px_per_point),
+        (DVec2::new(400.0, 200.0), 2.0)
+    );
     hand.does(Input::Resized { size_px: DVec2::ZERO, px_per_point: 2.0 });
     assert_eq!(hand.0.viewport().size_px, DVec2::new(400.0, 200.0));
     hand.moves(DVec2::NAN, NONE);

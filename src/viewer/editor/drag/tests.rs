@@ -44,7 +44,10 @@ fn a_drag_of_many_moves_is_one_step() {
     actions.extend((1..200).map(|i| to(0.3 + 0.01 * f64::from(i), 5.0)));
     actions.extend([to(1.3, 0.0), END]);
     let e = after(&start, &actions);
-    assert_eq!((x_of(&e), e.history().n_undo(), e.history().undo_label()), (vec![1.0, 5.0, 8.0], 1, Some("move")));
+    assert_eq!(
+        (x_of(&e), e.history().n_undo(), e.history().undo_label()),
+        (vec![1.0, 5.0, 8.0], 1, Some("move"))
+    );
     // The way between leaves nothing.
     assert!(after(&e, &[Action::Undo]).document().is_same(start.document()));
     assert!(e.boxes().iter().all(|b| b.center.y == 0.0));
@@ -65,7 +68,8 @@ fn a_drag_goes_to_the_grid_with_the_active_box() {
     let mut boxes = editor(2).boxes().to_vec();
     boxes[0].center = DVec3::new(0.25, 0.1, -0.600_002);
     let start = snapping(&selected(&Editor::new(boxes), &[0, 1]));
-    // The active one from (4, 0) by (0.6, 0.9) to (4.5, 1); what lies beside it keeps beside it, and z as it was.
+    // The active one from (4, 0) by (0.6, 0.9) to (4.5, 1); what lies beside it keeps beside it,
+    // and z as it was.
     let e = after(&start, &[begin(Handle::MoveView, 1.0, 1.0), to(1.6, 1.9), END]);
     assert_eq!(e.boxes()[1].center, DVec3::new(4.5, 1.0, 0.0));
     assert_eq!(e.boxes()[0].center, DVec3::new(0.75, 1.1, -0.600_002));
@@ -78,10 +82,14 @@ fn a_drag_goes_to_the_grid_with_the_active_box() {
 #[test]
 fn a_drag_may_be_held_to_an_axis_and_freed() {
     let constrain = |axis| Action::Drag(DragAction::Constrain(axis));
-    let grabbed = after(&selected(&editor(1), &[0]), &[begin(Handle::MoveView, 0.0, 0.0), to(2.0, 3.0)]);
+    let grabbed =
+        after(&selected(&editor(1), &[0]), &[begin(Handle::MoveView, 0.0, 0.0), to(2.0, 3.0)]);
     assert_eq!(grabbed.boxes()[0].center, DVec3::new(2.0, 3.0, 0.0));
     let along = after(&grabbed, &[constrain(Axis::Y)]);
-    assert_eq!((along.boxes()[0].center, along.dragged_handle()), (DVec3::Y * 3.0, Some(Handle::MoveAxis(Axis::Y))));
+    assert_eq!(
+        (along.boxes()[0].center, along.dragged_handle()),
+        (DVec3::Y * 3.0, Some(Handle::MoveAxis(Axis::Y)))
+    );
     let other = after(&along, &[constrain(Axis::X)]);
     assert_eq!(other.boxes()[0].center, DVec3::X * 2.0);
     let free = after(&other, &[constrain(Axis::X)]);
@@ -125,8 +133,12 @@ fn all_scales_by_the_distance_from_the_middle() {
     // They fill −0.5 to 4.5: about 2.
     let e = after(&start, &[begin(Handle::ScaleAll, 3.0, 0.0), to(2.0, 1.5), END]);
     assert_eq!((x_of(&e), e.boxes()[1].extent), (vec![-1.0, 5.0, 8.0], DVec3::splat(1.5)));
-    let one_axis =
-        [begin(Handle::ScaleAll, 3.0, 0.0), Action::Drag(DragAction::Constrain(Axis::X)), to(4.04, 0.0), END];
+    let one_axis = [
+        begin(Handle::ScaleAll, 3.0, 0.0),
+        Action::Drag(DragAction::Constrain(Axis::X)),
+        to(4.04, 0.0),
+        END,
+    ];
     let e = after(&snapping(&start), &one_axis);
     // 2.04 goes to tenths.
     assert_eq!((x_of(&e), e.boxes()[1].extent), (vec![-2.0, 6.0, 8.0], DVec3::new(2.0, 1.0, 1.0)));
@@ -137,8 +149,14 @@ fn all_scales_by_the_distance_from_the_middle() {
 
 #[test]
 fn during_a_drag_other_actions_are_refused_and_after_it_moves_do_nothing() {
-    let grabbed = after(&selected(&editor(2), &[0]), &[begin(Handle::MoveView, 0.0, 0.0), to(1.0, 0.0)]);
-    for action in [Action::Undo, Action::Edit(Edit::Delete), Action::Select(Select::All), begin(HIGH_X, 0.0, 0.0)] {
+    let grabbed =
+        after(&selected(&editor(2), &[0]), &[begin(Handle::MoveView, 0.0, 0.0), to(1.0, 0.0)]);
+    for action in [
+        Action::Undo,
+        Action::Edit(Edit::Delete),
+        Action::Select(Select::All),
+        begin(HIGH_X, 0.0, 0.0),
+    ] {
         assert!(grabbed.after(&action).is_err(), "{action:?}");
     }
     let cancelled = after(&grabbed, &[CANCEL, to(7.0, 7.0), END]);

@@ -29,7 +29,10 @@ fn numbers_go_to_every_selected_box_and_to_no_other() {
     let was = editor(4);
     for i in [1, 3] {
         let b = e.boxes()[i];
-        assert_eq!((b.n_particles, b.radius_max, b.center.z, b.extent.y), (77, 1.25, -0.600002, 1.07048));
+        assert_eq!(
+            (b.n_particles, b.radius_max, b.center.z, b.extent.y),
+            (77, 1.25, -0.600002, 1.07048)
+        );
         assert_eq!((b.center.x, b.extent.x), (was.boxes()[i].center.x, 1.0));
     }
     assert_eq!((e.boxes()[0], e.boxes()[2]), (was.boxes()[0], was.boxes()[2]));
@@ -61,10 +64,16 @@ fn a_density_sets_the_count() {
             + &format!("{}", (1e300 * document::volume(&e.boxes()[0])).round())
     );
     for wrong in [-1.0, f64::NAN, f64::INFINITY] {
-        assert!(refused(&e, Edit::Density(wrong)).starts_with("box 0: density times volume: expected 0 to"));
+        assert!(
+            refused(&e, Edit::Density(wrong))
+                .starts_with("box 0: density times volume: expected 0 to")
+        );
     }
     let flat = edited(&e, Edit::Extent(Axis::Z, 0.0));
-    assert_eq!(refused(&flat, Edit::Density(1.0)), "box 0 has no volume, so that no density gives it particles");
+    assert_eq!(
+        refused(&flat, Edit::Density(1.0)),
+        "box 0 has no volume, so that no density gives it particles"
+    );
 }
 
 #[test]
@@ -118,16 +127,26 @@ fn mirrored_boxes_come_back() {
 fn mirrored_copies_are_new_boxes_but_for_those_on_the_plane() {
     let e = after(&editor(3), &[Action::Select(Select::All)]);
     let e = edited(&e, Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Copy });
-    assert_eq!(e.boxes().iter().map(|b| b.center.x).collect::<Vec<_>>(), [0.0, 4.0, 8.0, -4.0, -8.0]);
+    assert_eq!(
+        e.boxes().iter().map(|b| b.center.x).collect::<Vec<_>>(),
+        [0.0, 4.0, 8.0, -4.0, -8.0]
+    );
     assert_eq!(e.selection().boxes(), [3, 4]);
     let on_plane = selected(&e, &[0]);
-    let copied = edited(&on_plane, Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Copy });
+    let copied = edited(
+        &on_plane,
+        Edit::Mirror { axis: Axis::X, plane: Plane::Zero, outcome: Outcome::Copy },
+    );
     assert_eq!((copied.boxes().len(), copied.history().n_undo()), (5, 1));
 }
 
 #[test]
 fn boxes_go_to_the_grid() {
-    let b = CloudBox { center: DVec3::new(0.26, -3.301, 0.04), extent: DVec3::new(0.01, 1.07, 2.0), ..unit_box() };
+    let b = CloudBox {
+        center: DVec3::new(0.26, -3.301, 0.04),
+        extent: DVec3::new(0.01, 1.07, 2.0),
+        ..unit_box()
+    };
     let e = selected(&Editor::new(vec![b]), &[0]);
     let e = edited(&set(&e, Setting::Snap(Snap { on: false, step: 0.1 })), Edit::SnapToGrid);
     assert_eq!(e.boxes()[0].center, DVec3::new(0.3, -3.3, 0.0));
@@ -138,10 +157,19 @@ fn boxes_go_to_the_grid() {
 fn what_the_reader_refuses_is_refused_in_one_sentence_and_changes_nothing() {
     let e = selected(&editor(3), &[0, 2]);
     for (edit, message) in [
-        (Edit::Center(Axis::X, f64::NAN), "box 0: x: expected a number from -1e15 to 1e15, found NaN"),
-        (Edit::MoveBy(DVec3::Y * 1e300), "box 0: y: expected a number from -1e15 to 1e15, found 1e300"),
+        (
+            Edit::Center(Axis::X, f64::NAN),
+            "box 0: x: expected a number from -1e15 to 1e15, found NaN",
+        ),
+        (
+            Edit::MoveBy(DVec3::Y * 1e300),
+            "box 0: y: expected a number from -1e15 to 1e15, found 1e300",
+        ),
         (Edit::Radius(-2.0), "box 0: radius: expected a number from 0 to 1e15, found -2"),
-        (Edit::Extent(Axis::Z, 1e-31), "box 0: z extent: expected 0 or a number from 1e-30 to 1e15, found 1e-31"),
+        (
+            Edit::Extent(Axis::Z, 1e-31),
+            "box 0: z extent: expected 0 or a number from 1e-30 to 1e15, found 1e-31",
+        ),
         (
             Edit::Add(CloudBox { extent: DVec3::splat(f64::INFINITY), ..unit_box() }),
             "box 3: x extent: expected 0 or a number from 1e-30 to 1e15, found inf",
@@ -150,9 +178,13 @@ fn what_the_reader_refuses_is_refused_in_one_sentence_and_changes_nothing() {
         assert_eq!(refused(&e, edit), message);
     }
     let wrong = Action::Select(Select::Boxes { boxes: vec![1, 3], how: How::Add });
-    assert_eq!(e.after(&wrong).map(|_| ()), Err(Refusal("box: expected a number below 3, found 3".to_owned())));
+    assert_eq!(
+        e.after(&wrong).map(|_| ()),
+        Err(Refusal("box: expected a number below 3, found 3".to_owned()))
+    );
     assert!(e.after(&Action::Set(Setting::Snap(Snap { on: true, step: 0.0 }))).is_err());
     // The copies of as many boxes as there may be are too many.
-    let full = after(&Editor::new(vec![unit_box(); document::MOST_BOXES]), &[Action::Select(Select::All)]);
+    let full =
+        after(&Editor::new(vec![unit_box(); document::MOST_BOXES]), &[Action::Select(Select::All)]);
     assert_eq!(refused(&full, Edit::Duplicate), "expected at most 262144 boxes, found 524288");
 }

@@ -69,7 +69,10 @@ fn each_wish_that_would_lose_changes_is_asked_about() {
         // Saved first, then what was wished for.
         let (saving, request) = answer(&asking, Answer::Save);
         let document = dirty.editor().shared_document();
-        assert_eq!(request, Some(Request::Save { path: "a.dat".into(), document: document.clone() }));
+        assert_eq!(
+            request,
+            Some(Request::Save { path: "a.dat".into(), document: document.clone() })
+        );
         let (_, request) = turn(&saving, Event::Saved { path: "a.dat".into(), document });
         assert_eq!(request, discarded);
         // A save that fails leaves all as it is.
@@ -91,7 +94,10 @@ fn a_new_cloud_is_saved_where_a_dialog_says_and_then_the_wish_is_granted() {
     let (saving, request) = turn(&saving, Event::ChosenToSave(Some("n.dat".into())));
     let Some(Request::Save { path, document }) = request else { panic!("{request:?}") };
     let (saved, request) = turn(&saving, Event::Saved { path, document });
-    assert_eq!((saved.path(), saved.is_dirty(), request), (Some(Path::new("n.dat")), false, Some(Request::Quit)));
+    assert_eq!(
+        (saved.path(), saved.is_dirty(), request),
+        (Some(Path::new("n.dat")), false, Some(Request::Quit))
+    );
     // After a cancelled dialog a later save does not quit.
     let (session, _) = turn(&answer(&asking, Answer::Save).0, Event::ChosenToSave(None));
     let document = session.editor().shared_document();
@@ -105,7 +111,10 @@ fn what_changed_behind_a_dialog_is_asked_about() {
     let choosing = turn(&opened(), Event::Wish(Wish::Open(None))).0;
     let (session, _) = turn(&choosing, Event::ChosenToOpen(Some("b.dat".into())));
     let (session, request) = turn(&session, arrives());
-    assert_eq!((session.editor().boxes().len(), session.path(), request), (5, Some(Path::new("b.dat")), None));
+    assert_eq!(
+        (session.editor().boxes().len(), session.path(), request),
+        (5, Some(Path::new("b.dat")), None)
+    );
     let (kept, request) = turn(&changed(&choosing), arrives());
     assert_eq!(request, Some(Request::Ask(Wish::Open(Some("b.dat".into())))));
     assert_eq!((kept.editor().boxes().len(), kept.is_dirty()), (2, true));
@@ -126,7 +135,10 @@ fn files_are_opened_and_saved_whole() {
     let path = folder.path().join("c.dat");
     let document = Arc::new(document(4));
     let request = Request::Save { path: path.clone(), document: document.clone() };
-    assert_eq!(perform(&request), Some(Event::Saved { path: path.clone(), document: document.clone() }));
+    assert_eq!(
+        perform(&request),
+        Some(Event::Saved { path: path.clone(), document: document.clone() })
+    );
     let opened = perform(&Request::Open(path.clone()));
     assert_eq!(opened, Some(Event::Opened { path, boxes: document.boxes.clone() }));
     let missing = perform(&Request::Open(folder.path().join("d.dat")));
@@ -138,7 +150,8 @@ fn files_are_opened_and_saved_whole() {
 
 #[test]
 fn a_scenes_seed_is_no_change() {
-    let session = Session::opened(Path::new("a.dat"), vec![super::super::samples::unit_box()]).seeded(9);
+    let session =
+        Session::opened(Path::new("a.dat"), vec![super::super::samples::unit_box()]).seeded(9);
     assert_eq!((session.editor().document().seed, session.is_dirty()), (9, false));
     assert_eq!((session.editor().history().n_undo(), session.editor().boxes().len()), (0, 1));
     assert_eq!(session.path(), Some(Path::new("a.dat")));

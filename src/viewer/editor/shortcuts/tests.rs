@@ -24,7 +24,8 @@ fn no_two_are_the_same_and_all_can_be_typed() {
 
 #[test]
 fn todays_habits_are_kept() {
-    let named = |chord: &str| SHORTCUTS.iter().find(|s| s.chord.to_string() == chord).map(|s| s.command);
+    let named =
+        |chord: &str| SHORTCUTS.iter().find(|s| s.chord.to_string() == chord).map(|s| s.command);
     for (chord, command) in [
         ("Ctrl+Z", Command::Undo),
         ("Ctrl+Shift+Z", Command::Redo),
@@ -87,6 +88,9 @@ fn while_dragging_axes_and_escape_are_the_drags() {
     let ray = Ray { origin: DVec3::Z * 5.0, direction: -DVec3::Z };
     let begin = DragAction::Begin { handle: Handle::MoveView, ray, forward: -DVec3::Z };
     let e = after(&selected(&editor(1), &[0]), &[Action::Drag(begin)]);
-    assert_eq!(Command::Axis(Axis::X).action(&e), Some(Action::Drag(DragAction::Constrain(Axis::X))));
+    assert_eq!(
+        Command::Axis(Axis::X).action(&e),
+        Some(Action::Drag(DragAction::Constrain(Axis::X)))
+    );
     assert_eq!(Command::Cancel.action(&e), Some(Action::Drag(DragAction::Cancel)));
 }

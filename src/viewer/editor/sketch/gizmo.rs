@@ -26,7 +26,12 @@ pub fn is_of_handle(fill: Color) -> bool {
 }
 
 /// Those of the active box; along a constraint, the line that it goes by.
-pub fn handles(editor: &Editor, canvas: &Canvas<'_>, hovered: Option<Handle>, shapes: &mut Vec<Shape>) {
+pub fn handles(
+    editor: &Editor,
+    canvas: &Canvas<'_>,
+    hovered: Option<Handle>,
+    shapes: &mut Vec<Shape>,
+) {
     let Some((i, b)) = editor.active_box() else { return };
     let dragged = editor.dragged_handle();
     if let Some(axis) = dragged.and_then(Handle::axis) {
@@ -51,16 +56,26 @@ pub fn handles(editor: &Editor, canvas: &Canvas<'_>, hovered: Option<Handle>, sh
 
 fn handle(p: &Placed, canvas: &Canvas<'_>, is_lit: bool, shapes: &mut Vec<Shape>) {
     let view = canvas.view;
-    let color = if is_lit { LIT } else { p.handle.axis().map_or(CENTER, |axis| AXES[axis.index()]) };
+    let color =
+        if is_lit { LIT } else { p.handle.axis().map_or(CENTER, |axis| AXES[axis.index()]) };
     let Some([from, to]) = canvas.line(p.from, p.to) else { return };
     let Handle::MoveAxis(axis) = p.handle else {
         let half = SQUARE_POINTS * view.px_per_point;
         let corner = |x: f64, y: f64| from + half * DVec2::new(x, y);
-        let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-        shapes.push(Shape::Polygon { corners, fill: color, stroke: Some(canvas.stroke(super::OUTLINE, 1.0)) });
+        let corners =
+            vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+        shapes.push(Shape::Polygon {
+            corners,
+            fill: color,
+            stroke: Some(canvas.stroke(super::OUTLINE, 1.0)),
+        });
         return;
     };
-    shapes.push(Shape::Line { from, to, stroke: canvas.stroke(color, if is_lit { 3.5 } else { 2.5 }) });
+    shapes.push(Shape::Line {
+        from,
+        to,
+        stroke: canvas.stroke(color, if is_lit { 3.5 } else { 2.5 }),
+    });
     let along = (to - from).normalize_or(DVec2::X);
     let head = HEAD_POINTS * view.px_per_point;
     let (base, aside) = (to - head * along, 0.4 * head * along.perp());
@@ -70,7 +85,8 @@ fn handle(p: &Placed, canvas: &Canvas<'_>, is_lit: bool, shapes: &mut Vec<Shape>
     shapes.push(Shape::Label { at, text: ["x", "y", "z"][axis.index()].to_owned(), color });
 }
 
-/// How far apart the grid's lines are: a power of ten that suits the way from the eye to the scene's origin.
+/// How far apart the grid's lines are: a power of ten that suits the way from the eye to the
+/// scene's origin.
 fn step(canvas: &Canvas<'_>) -> Option<f64> {
     let far = canvas.view.pose.position.length();
     let step = 10f64.powf((far / 4.0).log10().floor());
@@ -97,6 +113,11 @@ pub fn axes(canvas: &Canvas<'_>, shapes: &mut Vec<Shape>) {
         // Of y less: it stands before everything.
         let lines = if axis == Axis::Y { 1.0 } else { f64::from(N_LINES) };
         let reach = lines * step * axis.unit();
-        canvas.draw_line(-reach, reach, canvas.stroke(with_alpha(AXES[axis.index()], 150), 1.0), shapes);
+        canvas.draw_line(
+            -reach,
+            reach,
+            canvas.stroke(with_alpha(AXES[axis.index()], 150), 1.0),
+            shapes,
+        );
     }
 }

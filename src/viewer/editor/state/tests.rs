@@ -14,7 +14,10 @@ fn undo_and_redo_restore_boxes_and_selection() {
     assert_eq!(moved.history().undo_label(), Some("move"));
     let undone = after(&moved, &[Action::Undo, Action::Undo]);
     assert!(undone.document().is_same(start.document()));
-    assert_eq!((undone.selection(), undone.history().redo_label()), (start.selection(), Some("duplicate")));
+    assert_eq!(
+        (undone.selection(), undone.history().redo_label()),
+        (start.selection(), Some("duplicate"))
+    );
     let redone = after(&undone, &[Action::Redo, Action::Redo]);
     assert!(redone.document().is_same(moved.document()) && redone.selection() == moved.selection());
     // Nothing left, nothing done.
@@ -28,7 +31,8 @@ fn a_new_step_forgets_what_was_undone_and_one_that_changes_nothing_does_not() {
     let undone = after(&e, &[Action::Undo]);
     let nothing = edited(&undone, Edit::Count(10));
     assert_eq!((nothing.history().n_undo(), nothing.history().n_redo()), (0, 1));
-    let selection = after(&undone, &[Action::Select(Select::All), Action::Set(Setting::View(View::Both))]);
+    let selection =
+        after(&undone, &[Action::Select(Select::All), Action::Set(Setting::View(View::Both))]);
     assert_eq!((selection.history().n_undo(), selection.history().n_redo()), (0, 1));
     let other = edited(&undone, Edit::Count(6));
     assert_eq!((other.history().n_undo(), other.history().n_redo()), (1, 0));
@@ -52,7 +56,8 @@ fn views_and_settings_are_not_undone() {
 
 #[test]
 fn selections_end_with_the_active_box() {
-    let select = |boxes: &[usize], how| Action::Select(Select::Boxes { boxes: boxes.to_vec(), how });
+    let select =
+        |boxes: &[usize], how| Action::Select(Select::Boxes { boxes: boxes.to_vec(), how });
     let e = after(&editor(4), &[select(&[2], How::Replace), select(&[0], How::Toggle)]);
     assert_eq!(e.active_box().map(|(i, _)| i), Some(0));
     let e = after(&e, &[Action::Select(Select::All)]);
@@ -79,7 +84,10 @@ fn the_seed_touches_every_box_and_is_a_step() {
 fn a_new_box_is_like_the_active_one_and_on_the_grid_where_that_is_on() {
     let place = DVec3::new(0.12, 0.0, 1.3);
     assert_eq!(editor(0).new_box(place), CloudBox { center: place, ..NEW_BOX });
-    let e = after(&selected(&editor(3), &[2]), &[Action::Set(Setting::Snap(Snap { on: true, step: 0.5 }))]);
+    let e = after(
+        &selected(&editor(3), &[2]),
+        &[Action::Set(Setting::Snap(Snap { on: true, step: 0.5 }))],
+    );
     let center = DVec3::new(0.0, 0.0, 1.5);
     assert_eq!(e.new_box(place), CloudBox { n_particles: 12, center, ..unit_box() });
 }

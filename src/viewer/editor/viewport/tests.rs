@@ -1,10 +1,16 @@
-//! Places, pixels, points and rectangles: what is found is compared with what a dense bundle of rays finds.
+//! Places, pixels, points and rectangles: what is found is compared with what a dense bundle of
+//! rays finds.
 
 use super::super::samples::unit_box;
 use super::*;
 
 fn view() -> Viewport {
-    let pose = Pose { position: DVec3::new(0.0, 0.0, 10.0), right: DVec3::X, up: DVec3::Y, forward: -DVec3::Z };
+    let pose = Pose {
+        position: DVec3::new(0.0, 0.0, 10.0),
+        right: DVec3::X,
+        up: DVec3::Y,
+        forward: -DVec3::Z,
+    };
     Viewport { pose, fov_y_rad: 1.0, size_px: DVec2::new(800.0, 600.0), px_per_point: 1.0 }
 }
 
@@ -12,7 +18,8 @@ fn view() -> Viewport {
 fn turned_view() -> Viewport {
     let forward = DVec3::new(-0.4, -0.3, -0.8).normalize();
     let right = forward.cross(DVec3::Y).normalize();
-    let pose = Pose { position: DVec3::new(4.0, 3.0, 8.0), right, up: right.cross(forward), forward };
+    let pose =
+        Pose { position: DVec3::new(4.0, 3.0, 8.0), right, up: right.cross(forward), forward };
     Viewport { pose, ..view() }
 }
 
@@ -64,7 +71,11 @@ fn a_rectangle_finds_what_its_rays_find() {
         .map(|i| {
             let f = |k: f64| (f64::from(i) * k).sin();
             let center = 5.0 * DVec3::new(f(1.7), f(2.9), f(4.3));
-            CloudBox { extent: DVec3::new(1.2 + f(0.7), 1.2 + f(1.1), 1.2 + f(1.9)), center, ..unit_box() }
+            CloudBox {
+                extent: DVec3::new(1.2 + f(0.7), 1.2 + f(1.1), 1.2 + f(1.9)),
+                center,
+                ..unit_box()
+            }
         })
         .chain([CloudBox { extent: DVec3::splat(60.0), ..unit_box() }])
         .collect();
@@ -75,8 +86,8 @@ fn a_rectangle_finds_what_its_rays_find() {
         (DVec2::new(0.0, 0.0), DVec2::new(60.0, 600.0)),
     ] {
         let found = pick_rectangle(&boxes, &view, corner, opposite);
-        // Boxes are 9 pixels wide or more, and rays 2.5 pixels apart or less: what reaches 12 pixels into the rectangle is
-        // hit by one.
+        // Boxes are 9 pixels wide or more, and rays 2.5 pixels apart or less: what reaches 12
+        // pixels into the rectangle is hit by one.
         let inwards = 12.0 * (opposite - corner).signum();
         let surely = pick_rectangle(&boxes, &view, corner + inwards, opposite - inwards);
         for (i, b) in boxes.iter().enumerate() {
@@ -97,15 +108,23 @@ fn a_rectangle_finds_what_its_rays_find() {
 #[test]
 fn what_is_framed_is_seen_whole_and_fills_the_picture() {
     for (aspect, size_px) in [(2.0, DVec2::new(800.0, 400.0)), (0.5, DVec2::new(300.0, 600.0))] {
-        let b = CloudBox { extent: DVec3::new(3.0, 2.0, 4.0), center: DVec3::new(7.0, -2.0, 1.0), ..unit_box() };
+        let b = CloudBox {
+            extent: DVec3::new(3.0, 2.0, 4.0),
+            center: DVec3::new(7.0, -2.0, 1.0),
+            ..unit_box()
+        };
         let (low, high) = bounds([&b]).unwrap();
         let turned = turned_view();
         let (position, target) = framing(low, high, turned.pose.forward, turned.fov_y_rad, aspect);
         assert_eq!(target, b.center);
         let view = Viewport { pose: Pose { position, ..turned.pose }, size_px, ..turned };
         let pixels = corners(&b).map(|corner| view.project(corner).unwrap());
-        assert!(pixels.iter().all(|p| p.cmpge(DVec2::ZERO).all() && p.cmple(size_px).all()), "{pixels:?}");
-        let (least, most) = pixels.iter().fold((size_px, DVec2::ZERO), |(a, b), p| (a.min(*p), b.max(*p)));
+        assert!(
+            pixels.iter().all(|p| p.cmpge(DVec2::ZERO).all() && p.cmple(size_px).all()),
+            "{pixels:?}"
+        );
+        let (least, most) =
+            pixels.iter().fold((size_px, DVec2::ZERO), |(a, b), p| (a.min(*p), b.max(*p)));
         assert!((most - least).max_element() > 0.4 * size_px.min_element());
     }
     assert_eq!(bounds([]), None);

@@ -4,21 +4,25 @@
 //!
 //! `io` turns text into a `model` (plain f64 data and mathematics); `layout` turns the model into
 //! the f32 records that the GPU reads; `passes` are the GPU's stages, one a room, on `gpu`, which
-//! knows Vulkan and no cloud; `frame` runs them (game step → packet → render step); `study`
-//! measures; `viewer` shows and is what is changed by hand; `cli` is what was typed. `reference`
-//! holds the f64 twin of every pass, written from the mathematics, and meets the passes only in
-//! tests and studies.
+//! knows Vulkan and no cloud; `frame` runs them (game step → packet → render step). `timing`,
+//! `studies` and `stress` measure frames; `report` draws charts and pages from their records;
+//! `viewer` shows scenes in windows; `farm` spreads work over machines; `cli` parses the command
+//! line. `reference` holds the f64 twin of every pass, written from the mathematics.
 
 pub mod cli;
 pub mod error;
 pub mod farm;
 pub mod frame;
 pub mod gpu;
+pub mod inspect;
 pub mod io;
 pub mod layout;
 pub mod measure;
 pub mod model;
 pub mod passes;
 pub mod reference;
-pub mod study;
+pub mod report;
+pub mod stress;
+pub mod studies;
+pub mod timing;
 pub mod viewer;

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use source::{Source, Token};
 
 /// Who may import whom. Every room may import itself and `error`.
-const MAY_IMPORT: [(&str, &[&str]); 14] = [
+const MAY_IMPORT: [(&str, &[&str]); 18] = [
     ("error", &[]),
     ("model", &[]),
     ("io", &["model"]),
@@ -21,12 +21,42 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
     ("passes", &["layout", "gpu"]),
     ("frame", &["passes", "layout", "gpu", "model"]),
     ("measure", &[]),
-    ("study", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure"]),
+    ("inspect", &["model", "io", "layout", "reference", "gpu", "passes", "frame"]),
+    ("timing", &["model", "io", "gpu", "frame", "measure"]),
+    ("studies", &["model", "io", "layout", "reference", "gpu", "frame", "measure", "timing"]),
+    ("stress", &["model", "io", "layout", "reference", "gpu", "passes", "frame"]),
+    ("report", &["io", "measure", "timing", "studies"]),
     (
         "viewer",
-        &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"],
+        &[
+            "model",
+            "io",
+            "layout",
+            "reference",
+            "gpu",
+            "passes",
+            "frame",
+            "measure",
+            "timing",
+            "studies",
+        ],
     ),
-    ("farm", &["model", "io", "layout", "reference", "gpu", "passes", "frame", "measure", "study"]),
+    (
+        "farm",
+        &[
+            "model",
+            "io",
+            "layout",
+            "reference",
+            "gpu",
+            "passes",
+            "frame",
+            "measure",
+            "timing",
+            "studies",
+            "report",
+        ],
+    ),
     (
         "cli",
         &[
@@ -38,7 +68,11 @@ const MAY_IMPORT: [(&str, &[&str]); 14] = [
             "passes",
             "frame",
             "measure",
-            "study",
+            "inspect",
+            "timing",
+            "studies",
+            "stress",
+            "report",
             "viewer",
             "farm",
         ],
@@ -239,7 +273,7 @@ fn a_tree_in_order_is_passed() {
         ("src/passes/sprites.rs", "pub use ash::vk;"),
         ("src/reference/sort.rs", "use crate::model::{boxes, camera as eye};"),
         ("src/reference/sprites/mod.rs", ""),
-        ("src/cli/bench.rs", "fn f() { let e = crate::study::records::cpu(); e.unwrap_or(1); }"),
+        ("src/cli/bench.rs", "fn f() { let e = crate::timing::records::cpu(); e.unwrap_or(1); }"),
         ("tests/pass_sort.rs", ""),
         ("tests/pass_sprites.rs", ""),
         ("shaders/sort_scatter.comp", ""),

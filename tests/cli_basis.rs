@@ -3,8 +3,8 @@
 use std::fs;
 
 use assert_cmd::Command;
+use nimbus::inspect::basis::basis_warnings;
 use nimbus::io::scene_file;
-use nimbus::study::basis::basis_warnings;
 use serde_json::Value;
 
 /// Exit code, stdout, stderr. A device is never asked for: the loader is told of none.

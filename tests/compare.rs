@@ -9,8 +9,8 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use nimbus::measure::stats::Summary;
-use nimbus::study::recorded::read_results;
-use nimbus::study::records::{FRAMES_FILE, FrameRow, RUN_FILE, Run, write_results};
+use nimbus::timing::recorded::read_results;
+use nimbus::timing::records::{FRAMES_FILE, FrameRow, RUN_FILE, Run, write_results};
 use serde_json::{Value, json};
 
 const N_FRAMES: u32 = 60;

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use nimbus::study::bench_parts::base_spread;
-use nimbus::study::recorded::read_results;
-use nimbus::study::records::{FRAMES_FILE, FrameRow, Run};
-use nimbus::study::rows::read_rows;
+use nimbus::timing::parts::base_spread;
+use nimbus::timing::recorded::read_results;
+use nimbus::timing::records::{FRAMES_FILE, FrameRow, Run};
+use nimbus::timing::rows::read_rows;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -63,7 +63,7 @@ fn names(folder: &Path) -> BTreeSet<String> {
 
 /// What of a run's cases does not depend on the machine's mood.
 fn exact(run: &Run) -> Vec<String> {
-    let of = |c: &nimbus::study::records::Case| {
+    let of = |c: &nimbus::timing::records::Case| {
         let modes = c.modes.iter().map(|m| {
             let hash = m.image_hash.as_deref().expect("a last frame");
             let passes: Vec<_> =
@@ -113,7 +113,7 @@ fn parts_together_are_the_bench_of_one_process() {
     // Readers check that rows and records fit.
     let [ours, theirs] = [&merged, &alone].map(|folder| read_results(folder).expect("results"));
     assert_eq!(exact(&ours.run), exact(&theirs.run));
-    let modes = |of: &nimbus::study::recorded::Recorded| -> Vec<_> {
+    let modes = |of: &nimbus::timing::recorded::Recorded| -> Vec<_> {
         of.modes.iter().map(|m| (m.name.clone(), m.frames.clone(), m.blocks.len())).collect()
     };
     assert_eq!((modes(&ours), ours.modes.len()), (modes(&theirs), 18));

@@ -14,7 +14,7 @@ use nimbus::frame::render::Renderer;
 use nimbus::frame::{parallel, serial};
 use nimbus::io::scene_file;
 use nimbus::model::scene::{Scene, Threading};
-use nimbus::study::picture::{Drawing, picture};
+use nimbus::reference::picture::whole::{Drawing, picture};
 
 const N_FRAMES: u32 = 32;
 const N_PIXELS: usize = 320 * 240;

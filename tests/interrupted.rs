@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use nimbus::study::recorded::{Recorded, read_results};
+use nimbus::timing::recorded::{Recorded, read_results};
 use serde_json::Value;
 
 /// Frames of a block. On two cores of a software device they take a second or more.

@@ -13,9 +13,9 @@ use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
 use nimbus::model::least::Least;
 use nimbus::model::scene::{LightingMode, Scene, Threading};
-use nimbus::study::against::Against;
-use nimbus::study::picture::{Drawing, Work, picture};
-use nimbus::study::pixels::Pixels;
+use nimbus::reference::picture::kind::ReferenceKind;
+use nimbus::reference::picture::pixels::Pixels;
+use nimbus::reference::picture::whole::{Drawing, Work, picture};
 use nimbus::viewer::judge::{Judge, Progress, Standing, View};
 
 /// hello.toml, plain, from aside.
@@ -31,9 +31,10 @@ fn view(set: &[&str]) -> View {
 
 /// As `Renderer::image` would give it, of an exact device.
 fn exact_picture(view: &View) -> Vec<f32> {
-    let drawing = if view.against == Against::Thin { Drawing::Thin } else { Drawing::Volume };
-    let rgba =
-        picture(&Against::of_scene(&view.exact()), view.time_s, drawing, &|_, _| ()).unwrap().rgba;
+    let drawing = if view.against == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
+    let rgba = picture(&ReferenceKind::of_scene(&view.exact()), view.time_s, drawing, &|_, _| ())
+        .unwrap()
+        .rgba;
     rgba.iter().flatten().map(|v| *v as f32).collect()
 }
 
@@ -55,7 +56,7 @@ const LONG: Duration = Duration::from_secs(1000);
 fn right_pictures_are_right_and_others_are_not() {
     let dir = tempfile::tempdir().unwrap();
     for (set, against) in
-        [(&[][..], Against::Volume), (&["cloud.0.texture=\"2\""][..], Against::Thin)]
+        [(&[][..], ReferenceKind::Volume), (&["cloud.0.texture=\"2\""][..], ReferenceKind::Thin)]
     {
         let view = view(set);
         assert_eq!(view.against, against);
@@ -122,8 +123,8 @@ fn a_short_time_is_kept_to_by_few_pixels() {
 #[test]
 fn a_few_pixels_are_those_of_the_whole_picture() {
     for set in [&["lighting.mode=first", "cloud.0.texture=\"2\""][..], &["lighting.mode=none"]] {
-        let view = View { size: [61, 47], against: Against::Thin, ..view(set) };
-        let scene = Against::of_scene(&view.exact());
+        let view = View { size: [61, 47], against: ReferenceKind::Thin, ..view(set) };
+        let scene = ReferenceKind::of_scene(&view.exact());
         let whole = picture(&scene, 0.0, Drawing::Thin, &|_, _| ()).unwrap().rgba;
         for n in [1, 30, 200, usize::MAX] {
             let pixels = Pixels::sample(61, 47, n);
@@ -135,7 +136,7 @@ fn a_few_pixels_are_those_of_the_whole_picture() {
                     );
                 }
             };
-            let found = Against::Thin.reference(&scene, 0.0, &pixels, &listener).unwrap();
+            let found = ReferenceKind::Thin.reference(&scene, 0.0, &pixels, &listener).unwrap();
             assert_eq!(found.rgba, pixels.pick(&whole), "{n}");
             assert_eq!(rows.into_inner(), pixels.n_rows() as usize);
         }
@@ -206,7 +207,7 @@ fn what_is_under_way_says_how_far_it_is_and_stops() {
 #[test]
 fn what_has_no_reference_says_why() {
     let judge = Judge::new(None, LONG).unwrap();
-    judge.ask(View { against: Against::Volume, ..view(&["cloud.0.texture=\"1\""]) });
+    judge.ask(View { against: ReferenceKind::Volume, ..view(&["cloud.0.texture=\"1\""]) });
     let Standing { known, failed, .. } = settled(&judge);
     assert!(known.is_none() && failed.unwrap().contains("is textured"));
     // And nothing is lost by that.
@@ -227,12 +228,12 @@ fn the_devices_picture_is_judged_as_it_was_seen() {
         (&[], LIT),
     ] {
         let mut view = view(set);
-        view.against = Against::Thin;
+        view.against = ReferenceKind::Thin;
         let judge = Judge::new(None, LONG).unwrap();
         judge.ask(view.clone());
         // As the truth is drawn, of which nothing is left out; only the device's f32 and f16 are
         // between them.
-        let exact = Against::of_scene(&view.exact());
+        let exact = ReferenceKind::of_scene(&view.exact());
         let pose = exact.camera.pose(0.0).unwrap();
         let size = view.size;
         let scene_of_window = Scene { camera: view.scene.camera.clone(), ..exact };

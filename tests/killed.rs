@@ -10,8 +10,8 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use nimbus::measure::stats::Summary;
-use nimbus::study::recorded::read_results;
-use nimbus::study::records::{
+use nimbus::timing::recorded::read_results;
+use nimbus::timing::records::{
     FRAMES_FILE, FrameRow, Measured, Mode, RUN_FILE, Run, write_frames, write_results, write_run,
 };
 use serde_json::json;

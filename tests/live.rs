@@ -19,7 +19,7 @@ use nimbus::model::cloud::CloudSource;
 use nimbus::model::disc::Disc;
 use nimbus::model::scene::{Scene, Simulate, Threading};
 use nimbus::reference::live::alive;
-use nimbus::study::truth::Truth;
+use nimbus::reference::picture::stages::FrameReference;
 
 /// The puff, small, with fewer particles.
 fn scene(overrides: &[&str]) -> Scene {
@@ -127,7 +127,7 @@ fn the_device_has_what_the_reference_says_for_a_scene() {
         ["threads.simulate='cpu'", "time.start_s=1e6"],
     ] {
         let scene = scene(&how);
-        let truth = Truth::unlit(&scene, scene.time.at(3)).expect("a reference");
+        let truth = FrameReference::unlit(&scene, scene.time.at(3)).expect("a reference");
         let (mut renderer, mut game) = started(&gpu, &gpu.compiler, scene.clone(), true);
         renderer.step(game.step(3).expect("a packet")).expect("a frame");
         let placed = renderer.placed(&gpu.device).expect("places");

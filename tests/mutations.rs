@@ -3,7 +3,7 @@
 
 use nimbus::frame::stage::DeviceChoice;
 use nimbus::passes;
-use nimbus::study::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
+use nimbus::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
 
 /// What is wrong, in which file, a text of it and what stands in its place, and the case that
 /// fails.

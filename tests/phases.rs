@@ -7,8 +7,8 @@ use std::path::Path;
 use assert_cmd::Command;
 use nimbus::io::scene_file::{LoadedScene, load};
 use nimbus::model::scene::{LightingMode, Threading};
-use nimbus::study::recorded::read_results;
-use nimbus::study::records::read_run;
+use nimbus::timing::recorded::read_results;
+use nimbus::timing::records::read_run;
 use serde_json::{Value, json};
 
 const SCENE: &str = r#"

@@ -6,11 +6,11 @@ mod results;
 #[path = "harness/studies.rs"]
 mod studies;
 
-use nimbus::study::ledger::records::Ledger;
-use nimbus::study::plot::{Plot, frames, ledger, passes, tradeoff};
-use nimbus::study::provenance::Figure;
-use nimbus::study::records::{FrameRow, Pass, Run};
-use nimbus::study::tradeoff::records::{Front, Study};
+use nimbus::report::charts::{Plot, frames, ledger, passes, tradeoff};
+use nimbus::studies::error::records::{Front, Study};
+use nimbus::studies::ledger::records::Ledger;
+use nimbus::studies::provenance::Figure;
+use nimbus::timing::records::{FrameRow, Pass, Run};
 use roxmltree::{Document, Node};
 use studies::{configuration, row, study, usual_ledger, usual_study};
 

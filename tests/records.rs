@@ -6,13 +6,13 @@ mod results;
 use std::fs;
 use std::path::Path;
 
+use nimbus::frame::counts::Counts;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
-use nimbus::study::bench_parts::{BaseTime, PartRecord};
-use nimbus::study::counts::Counts;
-use nimbus::study::machine::{Cpu, cpu, environment, revision, utc_now};
-use nimbus::study::overlap::{Overlap, SerialFrame};
-use nimbus::study::records::{
+use nimbus::timing::machine::{Cpu, cpu, environment, revision, utc_now};
+use nimbus::timing::overlap::{Overlap, SerialFrame};
+use nimbus::timing::parts::{BaseTime, PartRecord};
+use nimbus::timing::records::{
     Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, Setting,
     Skipping, prepare_out_dir, read_run, write_results, write_run,
 };

@@ -14,8 +14,8 @@ use std::time::Duration;
 use nimbus::error::Error;
 use nimbus::io::weather::wrf;
 use nimbus::io::{box_file, particle_file, scene_file};
-use nimbus::study::report::source;
-use nimbus::study::tradeoff::files::read_found;
+use nimbus::report::pages::source;
+use nimbus::studies::error::files::read_found;
 
 type Reader = fn(&[u8]) -> Result<(), String>;
 

@@ -7,9 +7,9 @@ use std::sync::atomic::AtomicBool;
 use nimbus::error::Error;
 use nimbus::io::scene_file;
 use nimbus::model::scene::Scene;
-use nimbus::study::against::Against;
-use nimbus::study::pixels::{Pixels, Tile};
-use nimbus::study::samples::{Mean, N_VALUES, Pairs, Subject, Sums, sums};
+use nimbus::reference::picture::kind::ReferenceKind;
+use nimbus::reference::picture::pixels::{Pixels, Tile};
+use nimbus::reference::picture::samples::{Mean, N_VALUES, Pairs, Subject, Sums, sums};
 
 fn loaded(scene: &str, set: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
@@ -164,7 +164,7 @@ fn differ(a: &Mean, b: &Mean) -> f64 {
 fn more_samples_are_nearer_and_say_so() {
     let size = ["film.width=8", "film.height=6"];
     let scene = loaded("scenes/study-light.toml", &size);
-    let subject = Subject { of: Against::Reflections(3), scene: &scene, time_s: 0.0 };
+    let subject = Subject { of: ReferenceKind::Reflections(3), scene: &scene, time_s: 0.0 };
     let pixels = Pixels::all(8, 6);
     // Others than those that are judged.
     let truth = of(&subject, &pixels, 1000..1064).mean();
@@ -183,7 +183,7 @@ fn more_samples_are_nearer_and_say_so() {
 #[test]
 fn it_ends_when_it_is_asked_to() {
     let scene = loaded("scenes/hello.toml", &["film.width=8", "film.height=6"]);
-    let subject = Subject { of: Against::Thin, scene: &scene, time_s: 0.0 };
+    let subject = Subject { of: ReferenceKind::Thin, scene: &scene, time_s: 0.0 };
     let stop = AtomicBool::new(true);
     let ended = sums(&subject, &Pixels::all(8, 6), 0..1_000_000, &stop, &|_, _| ());
     assert!(matches!(ended, Err(Error::Interrupted)), "{ended:?}");

@@ -5,7 +5,7 @@ mod program;
 
 use std::collections::BTreeSet;
 
-use nimbus::study::stress::cases;
+use nimbus::stress::cases;
 use serde_json::Value;
 
 fn stress(args: &[&str]) -> (Option<i32>, String, String) {

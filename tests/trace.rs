@@ -11,9 +11,9 @@ use nimbus::gpu::{ClockFit, ClockPair};
 use nimbus::io::scene_file;
 use nimbus::measure::zones::{Collected, Zones};
 use nimbus::model::scene::Threading;
-use nimbus::study::bench::{self, BenchPlan, Sample};
-use nimbus::study::cases::cases;
-use nimbus::study::trace::{self, Beside};
+use nimbus::timing::bench::{self, BenchPlan, Sample};
+use nimbus::timing::cases::cases;
+use nimbus::timing::trace::{self, Beside};
 use serde_json::Value;
 use tracing_subscriber::layer::SubscriberExt;
 

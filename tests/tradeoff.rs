@@ -13,15 +13,15 @@ use nimbus::error::{Error, Result};
 use nimbus::io::scene_file::load;
 use nimbus::model::scene::Scene;
 use nimbus::model::sort_bits::SortBits;
-use nimbus::study::against::Reference;
-use nimbus::study::cases::Axis;
-use nimbus::study::pixels::Pixels;
-use nimbus::study::records::Setting;
-use nimbus::study::tradeoff::design::Design;
-use nimbus::study::tradeoff::front::{Metric, best_within_error, best_within_ms};
-use nimbus::study::tradeoff::records::{Configuration, Front};
-use nimbus::study::tradeoff::run::{Event, Found, Loaded, Setup, StudyPlan, Subject};
-use nimbus::study::tradeoff::turns::{Time, Turn};
+use nimbus::reference::picture::kind::Reference;
+use nimbus::reference::picture::pixels::Pixels;
+use nimbus::studies::error::design::Design;
+use nimbus::studies::error::front::{Metric, best_within_error, best_within_ms};
+use nimbus::studies::error::records::{Configuration, Front};
+use nimbus::studies::error::run::{Event, Found, Loaded, Setup, StudyPlan, Subject};
+use nimbus::studies::error::turns::{Time, Turn};
+use nimbus::timing::cases::Axis;
+use nimbus::timing::records::Setting;
 
 /// A subject of quality q: q ms a frame, and a picture that is off by 0.2/q² everywhere but for a
 /// pattern of its own; with `waste` it takes half as long again for nothing. All on a machine that

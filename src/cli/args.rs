@@ -13,8 +13,8 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
-use crate::study::against::Against;
-use crate::study::samples::MOST_SAMPLES;
+use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::samples::MOST_SAMPLES;
 pub use farm::{
     CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs,
     LocalArgs, MergeArgs, PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,
@@ -238,7 +238,7 @@ pub struct RenderArgs {
     /// (what they stand for), model, or reflections=K
     #[arg(long, value_name = "WHICH")]
     #[arg(conflicts_with_all = ["device", "shaders", "validation", "no_skip"])]
-    pub reference: Option<Against>,
+    pub reference: Option<ReferenceKind>,
     /// Samples of every pixel of a reference: the first through its centre, the others spread over
     /// it
     #[arg(long, value_name = "N", default_value_t = 1, requires = "reference", value_parser = parse_samples)]

@@ -18,14 +18,14 @@ use crate::gpu::ClockFit;
 use crate::io::atomic;
 use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
-use crate::study::bench::{self, BenchPlan, Outcome, Ran};
-use crate::study::bench_parts::numbers;
-use crate::study::beside::Beside;
-use crate::study::cases::{Axis, Case, Loop, SIZE_KEY, cases, overrides, points, sweep_text};
-use crate::study::machine;
-use crate::study::outcome::pass_names;
-use crate::study::records::{self, FrameRow, Run};
-use crate::study::trace;
+use crate::timing::bench::{self, BenchPlan, Outcome, Ran};
+use crate::timing::cases::{Axis, Case, Loop, SIZE_KEY, cases, overrides, points, sweep_text};
+use crate::timing::companions::Beside;
+use crate::timing::machine;
+use crate::timing::outcome::pass_names;
+use crate::timing::parts::numbers;
+use crate::timing::records::{self, FrameRow, Run};
+use crate::timing::trace;
 
 /// Of the device's clock beside the host's, before the frames and after them.
 const N_CLOCK_READINGS: usize = 8;

@@ -4,9 +4,9 @@ use clap::ColorChoice;
 
 use super::output;
 use crate::error::Result;
-use crate::study::beside::{PASSES_CHART, frames_chart};
-use crate::study::plot::{Plot, frames, passes};
-use crate::study::records::{FrameRow, Run};
+use crate::report::charts::{Plot, frames, passes};
+use crate::timing::companions::{PASSES_CHART, frames_chart};
+use crate::timing::records::{FrameRow, Run};
 
 /// For the terminal: frame times of every point of a sweep, and what the device's time goes to.
 pub fn text(run: &Run, rows: &[FrameRow], color: ColorChoice) -> Result<String> {

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::output;
 use crate::measure::lows::fps;
-use crate::study::machine::Clocks;
-use crate::study::overlap::Overlap;
-use crate::study::records::{Block, Case, Measured, Mode, Ratio, Run, Skipping};
+use crate::timing::machine::Clocks;
+use crate::timing::overlap::Overlap;
+use crate::timing::records::{Block, Case, Measured, Mode, Ratio, Run, Skipping};
 
 /// The whole of it. `same`: of each case whether all its last frames are the same, to the byte.
 /// `verbose`: every table of every case.

@@ -8,12 +8,12 @@ use super::args::{CompareArgs, SamenessArg};
 use super::{compare_pictures, output};
 use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
-use crate::study::compare::{
+use crate::timing::compare::{
     Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks,
 };
-use crate::study::difference::{Difference, Sameness, differences, remarks};
-use crate::study::recorded::{Recorded, read_results};
-use crate::study::records::Run;
+use crate::timing::difference::{Difference, Sameness, differences, remarks};
+use crate::timing::recorded::{Recorded, read_results};
+use crate::timing::records::Run;
 
 /// What `--json` prints. A change of meaning, or of a key, raises `schema`.
 #[derive(Debug, Serialize)]

@@ -10,8 +10,8 @@ use super::bench;
 use super::farm_cut::Amounts;
 use crate::error::{Error, Result};
 use crate::farm::plan::Work;
-use crate::study::bench_parts::base_spread;
-use crate::study::records::read_run;
+use crate::timing::parts::base_spread;
+use crate::timing::records::read_run;
 
 /// The cases that `nimbus bench` would time, told the same; `set` is the plan's.
 pub(super) fn work(args: &PlanArgs, set: &[String]) -> Result<(Work, Amounts)> {

@@ -7,13 +7,13 @@ use crate::farm::cost::Work as Counted;
 use crate::farm::plan::{PictureFormat, Work};
 use crate::farm::reference;
 use crate::io::scene_file::LoadedScene;
-use crate::study::against::Against;
+use crate::reference::picture::kind::ReferenceKind;
 
 /// Pixels along a side of a tile, and samples of a range, where nothing is known of what they take.
 const USUAL_TILE: u32 = 256;
 const USUAL_RANGE: u32 = 16;
 
-pub(super) fn cut(args: &PlanArgs, of: Against, loaded: &LoadedScene) -> Result<Cut> {
+pub(super) fn cut(args: &PlanArgs, of: ReferenceKind, loaded: &LoadedScene) -> Result<Cut> {
     let model = args.model.as_deref().map(Model::read).transpose()?;
     let film = loaded.clone().at_frame(args.frame).film;
     let (n_samples, whole) = (args.samples, [film.width, film.height]);

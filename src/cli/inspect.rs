@@ -4,8 +4,8 @@ use super::args::{BasisArg, InspectArgs};
 use super::{check_time, device_choice, load, output, say_notes, say_sizes};
 use crate::error::Result;
 use crate::frame::stage::Stage;
+use crate::inspect::{air, basis, stages as inspect};
 use crate::model::scene::Scene;
-use crate::study::{air, basis, inspect};
 
 /// Frames that `--plan` shows: the first does everything, the second shows what a step of time
 /// changes, the third that it goes on so.

@@ -12,17 +12,17 @@ use crate::error::{Error, Result};
 use crate::frame::limits;
 use crate::frame::stage::Bed;
 use crate::io::atomic::{check_place, write_atomic};
-use crate::study::against::Against;
-use crate::study::ledger::records::{LEDGER_FILE, Ledger, Row, SCHEMA_VERSION};
-use crate::study::ledger::run::Setup;
-use crate::study::machine;
-use crate::study::model_light::reflections_of;
-use crate::study::picture::Work;
-use crate::study::pixels::Pixels;
-use crate::study::plot;
-use crate::study::provenance::{Figure, Provenance};
-use crate::study::records::prepare_out_dir;
-use crate::study::tradeoff::players::Frames;
+use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::model_light::reflections_of;
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::whole::Work;
+use crate::report::charts;
+use crate::studies::error::players::Frames;
+use crate::studies::ledger::records::{LEDGER_FILE, Ledger, Row, SCHEMA_VERSION};
+use crate::studies::ledger::run::Setup;
+use crate::studies::provenance::{Figure, Provenance};
+use crate::timing::machine;
+use crate::timing::records::prepare_out_dir;
 
 /// `graceful`: set, as rows that are finished are kept on Ctrl-C.
 pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
@@ -41,7 +41,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     let time_s = loaded.scene.time.at(args.frame);
     let scene = loaded.clone().at_frame(args.frame).exact().into_owned();
     super::check_time(&scene, time_s)?;
-    Against::Model.check(&scene, time_s).map_err(|error| match error {
+    ReferenceKind::Model.check(&scene, time_s).map_err(|error| match error {
         Error::Usage { what } if what.contains("textured") => {
             Error::usage(format!("{what}, or --plain for all clouds"))
         }

@@ -38,14 +38,14 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 
 use crate::error::{Error, Result};
+use crate::frame::light_notes::light_notes;
 use crate::frame::limits::advice;
 use crate::frame::stage::{DeviceChoice, Stage};
+use crate::inspect::basis::basis_warnings;
 use crate::io::atomic;
 use crate::io::magnitude::{GREATEST, is_carried_place, shortest};
 use crate::io::scene_file::{self, LoadedScene};
 use crate::model::scene::Scene;
-use crate::study::basis::basis_warnings;
-use crate::study::inspect::light_notes;
 use args::{Args, Command, SceneArgs};
 
 /// Set by Ctrl-C where [`GRACEFUL`] is: the command looks at it between frames.

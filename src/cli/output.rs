@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
-use crate::study::plot::Plot;
+use crate::report::charts::Plot;
 
 /// `error: …` on stderr.
 pub fn error(error: &Error, color: ColorChoice) {

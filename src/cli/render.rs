@@ -8,13 +8,13 @@ use super::{
     say_sizes,
 };
 use crate::error::Result;
+use crate::frame::counts::Counts;
 use crate::frame::plan::Pass;
 use crate::frame::render::Rendered;
 use crate::frame::stage::Stage;
 use crate::io::image::{self, ImageKind, image_hash};
 use crate::model::film::FilmFormat;
-use crate::study::counts::Counts;
-use crate::study::machine::device_record;
+use crate::timing::machine::device_record;
 
 pub fn run(args: &RenderArgs) -> Result<()> {
     // All that can be known to be wrong is said before any work.

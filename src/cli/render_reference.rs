@@ -14,23 +14,23 @@ use crate::io::atomic;
 use crate::io::image::{self, image_hash};
 use crate::model::film::FilmFormat;
 use crate::model::scene::Scene;
-use crate::study::against::Against;
-use crate::study::picture::{Drawing, Picture, Work, picture};
-use crate::study::pixels::Pixels;
-use crate::study::samples::{self, Subject};
+use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::samples::{self, Subject};
+use crate::reference::picture::whole::{Drawing, Picture, Work, picture};
 
 /// The picture of `reference`, of so many samples as were asked for.
-pub fn run(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) -> Result<()> {
+pub fn run(args: &RenderArgs, reference: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
     // What may take minutes is not begun where it could not be kept.
     atomic::check_place(&args.output)?;
     if args.options.verbose {
         say_sizes(scene, None);
     }
     match reference {
-        Against::Thin if args.samples == 1 => {
+        ReferenceKind::Thin if args.samples == 1 => {
             centered(args, reference, Drawing::Thin, scene, time_s)
         }
-        Against::Volume if args.samples == 1 => {
+        ReferenceKind::Volume if args.samples == 1 => {
             centered(args, reference, Drawing::Volume, scene, time_s)
         }
         _ => sampled(args, reference, scene, time_s),
@@ -40,7 +40,7 @@ pub fn run(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) ->
 /// Of one sample, and what of the drawing there is to be said.
 fn centered(
     args: &RenderArgs,
-    reference: Against,
+    reference: ReferenceKind,
     drawing: Drawing,
     scene: &Scene,
     time_s: f64,
@@ -71,7 +71,7 @@ fn centered(
 }
 
 /// Of any number of samples, in the order and with the sums that parts of it have.
-fn sampled(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) -> Result<()> {
+fn sampled(args: &RenderArgs, reference: ReferenceKind, scene: &Scene, time_s: f64) -> Result<()> {
     let (film, never) = (scene.film, AtomicBool::new(false));
     let pixels = Pixels::all(film.width, film.height);
     let shown = Progress::new(args.options.quiet);
@@ -93,7 +93,7 @@ fn sampled(args: &RenderArgs, reference: Against, scene: &Scene, time_s: f64) ->
 }
 
 fn write(
-    (args, reference): (&RenderArgs, Against),
+    (args, reference): (&RenderArgs, ReferenceKind),
     scene: &Scene,
     time_s: f64,
     rgba: &[[f64; 4]],

@@ -6,7 +6,7 @@ use super::args::ReportArgs;
 use super::{output, refuse_existing};
 use crate::error::{Error, Result};
 use crate::io::atomic;
-use crate::study::report::{self, source};
+use crate::report::pages::{self, source};
 
 pub fn run(args: &ReportArgs) -> Result<()> {
     // All that can be known to be wrong is said before any work.

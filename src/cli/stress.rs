@@ -8,8 +8,8 @@ use super::args::StressArgs;
 use super::output;
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
-use crate::study::machine::{self, Cpu, Device};
-use crate::study::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
+use crate::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
+use crate::timing::machine::{self, Cpu, Device};
 
 /// What `--json` prints; its form is docs/stress.schema.json.
 #[derive(Debug, Serialize)]

@@ -20,22 +20,22 @@ use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
-use crate::study::cases::{Axis, SIZE_KEY, overrides};
-use crate::study::kept::{self, Kept};
-use crate::study::machine;
-use crate::study::picture::Work;
-use crate::study::pixels::Pixels;
-use crate::study::plot::{self, Plot};
-use crate::study::provenance::{Provenance, ReferenceRecord};
-use crate::study::records::{Setting, prepare_out_dir};
-use crate::study::tradeoff::design::{Design, name_of, settings};
-use crate::study::tradeoff::files;
-use crate::study::tradeoff::front::{Metric, best_within_error, best_within_ms};
-use crate::study::tradeoff::knobs::default_axes;
-use crate::study::tradeoff::players::{Frames, Players, frames_of_turns};
-use crate::study::tradeoff::records::{Configuration, SCHEMA_VERSION, Study};
-use crate::study::tradeoff::run::{Event, Found, Loaded, Setup, StudyPlan};
-use crate::study::tradeoff::turns::{BETWEEN, Time};
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::whole::Work;
+use crate::report::charts::{self, Plot};
+use crate::studies::error::design::{Design, name_of, settings};
+use crate::studies::error::files;
+use crate::studies::error::front::{Metric, best_within_error, best_within_ms};
+use crate::studies::error::knobs::default_axes;
+use crate::studies::error::players::{Frames, Players, frames_of_turns};
+use crate::studies::error::records::{Configuration, SCHEMA_VERSION, Study};
+use crate::studies::error::run::{Event, Found, Loaded, Setup, StudyPlan};
+use crate::studies::error::turns::{BETWEEN, Time};
+use crate::studies::provenance::{Provenance, ReferenceRecord};
+use crate::studies::reference_cache::{self, Kept};
+use crate::timing::cases::{Axis, SIZE_KEY, overrides};
+use crate::timing::machine;
+use crate::timing::records::{Setting, prepare_out_dir};
 
 /// `graceful`: set once there is something to keep on Ctrl-C.
 pub fn run(

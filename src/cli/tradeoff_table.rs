@@ -1,9 +1,9 @@
 //! What `nimbus error` prints for people.
 
 use super::output;
-use crate::study::provenance::{Figure, ReferenceRecord};
-use crate::study::tradeoff::front::Metric;
-use crate::study::tradeoff::records::{Best, Configuration, Front, Study};
+use crate::studies::error::front::Metric;
+use crate::studies::error::records::{Best, Configuration, Front, Study};
+use crate::studies::provenance::{Figure, ReferenceRecord};
 
 /// The whole of it.
 pub fn report(study: &Study) -> String {

@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use super::cost::Work;
 use crate::error::Result;
+use crate::farm::cells::Visits;
+use crate::farm::layers::Layers;
 use crate::frame::game::Game;
 use crate::frame::plan::{Pass, Plan, Tensors, Traits, plan};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
-use crate::study::cells::Visits;
-use crate::study::layers::Layers;
-use crate::study::truth::Truth;
+use crate::reference::picture::stages::FrameReference;
 
 /// What a frame would make work of, part by part.
 struct Parts {
@@ -25,7 +25,7 @@ struct Parts {
 
 impl Parts {
     fn of(scene: &Scene, time_s: f64) -> Result<Parts> {
-        let (truth, n_facets) = (Truth::unlit(scene, time_s)?, scene.n_facets() as f64);
+        let (truth, n_facets) = (FrameReference::unlit(scene, time_s)?, scene.n_facets() as f64);
         let is_second = scene.lighting.mode == LightingMode::TwoReflection;
         // A pair is an exchange, and a test of every rectangle that may stand between.
         let n_tests = 1.0 + scene.surfaces.len() as f64;

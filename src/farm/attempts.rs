@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::failing::of_io;
 use super::synced;
 use crate::error::Result;
-use crate::study::machine;
+use crate::timing::machine;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Attempt {

@@ -9,10 +9,10 @@ use super::plan::{Plan, Shard};
 use super::store::{Manifest, Workplace};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
-use crate::study::bench_parts::{Part, differences, join, numbers};
-use crate::study::beside::{Beside, picture_file};
-use crate::study::machine::Device;
-use crate::study::records::{self, FRAMES_FILE, RUN_FILE, prepare_out_dir, write_results_with};
+use crate::timing::companions::{Beside, picture_file};
+use crate::timing::machine::Device;
+use crate::timing::parts::{Part, differences, join, numbers};
+use crate::timing::records::{self, FRAMES_FILE, RUN_FILE, prepare_out_dir, write_results_with};
 
 /// Files that the part of `shard` has.
 pub fn files(shard: &Shard) -> Vec<String> {

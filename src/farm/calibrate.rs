@@ -17,7 +17,7 @@ use super::synced;
 use crate::error::{Error, Result};
 use crate::io::scene_file;
 use crate::io::text_file::{RECORD_LIMIT, read_result};
-use crate::study::machine::{self, Cpu, Device};
+use crate::timing::machine::{self, Cpu, Device};
 
 pub const SCHEMA_VERSION: u32 = 1;
 

@@ -10,7 +10,7 @@ use crate::frame::stage::{Bed, DeviceChoice, Player};
 use crate::io::image::{ImageKind, encoded};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::Scene;
-use crate::study::machine::{Device, device_record};
+use crate::timing::machine::{Device, device_record};
 
 /// Draws the frames of `shard` that are not there yet, and tells of each; which device did.
 pub fn draw(

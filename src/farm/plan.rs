@@ -13,7 +13,7 @@ use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::{self, LoadedScene};
 use crate::io::text_file::{RECORD_LIMIT, read_result};
 use crate::model::scene::Impostors;
-use crate::study::machine;
+use crate::timing::machine;
 
 pub const SCHEMA_VERSION: u32 = 1;
 pub const PLAN_FILE: &str = "plan.json";

@@ -16,18 +16,18 @@ use super::plan::{PictureFormat, Plan, Shard};
 use super::store::{Manifest, Store, Workplace};
 use super::synced;
 use crate::error::{Error, Result};
+use crate::farm::cells::Visits;
+use crate::farm::layers::Layers;
 use crate::io::folder::replace_files;
 use crate::io::image::{ImageKind, encoded, image_hash};
 use crate::io::scene_file::LoadedScene;
 use crate::model::scene::{LightingMode, Scene};
-use crate::study::against::Against;
-use crate::study::cells::Visits;
-use crate::study::layers::Layers;
-use crate::study::machine::{self, Device};
-use crate::study::model_light::reflections_of;
-use crate::study::pixels::{Pixels, Tile};
-use crate::study::samples::{self, MOST_SAMPLES, Pairs, Subject, Sums};
-use crate::study::truth::Truth;
+use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::model_light::reflections_of;
+use crate::reference::picture::pixels::{Pixels, Tile};
+use crate::reference::picture::samples::{self, MOST_SAMPLES, Pairs, Subject, Sums};
+use crate::reference::picture::stages::FrameReference;
+use crate::timing::machine::{self, Device};
 
 /// Most pieces of a picture: a plan of as many shards is about as large as one can be.
 const MOST_PIECES: u64 = 40_000;
@@ -45,7 +45,7 @@ pub struct Seen {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cut {
-    /// As [`Against`] is written.
+    /// As [`ReferenceKind`] is written.
     pub of: String,
     pub frame: u32,
     /// Of the picture, pixels.
@@ -62,7 +62,7 @@ pub struct Cut {
 impl Cut {
     /// What is wrong with it.
     pub fn check(&self) -> std::result::Result<(), String> {
-        self.of.parse::<Against>()?;
+        self.of.parse::<ReferenceKind>()?;
         let Cut { width, height, tile, n_samples, range, .. } = self;
         if [*width, *height, tile[0], tile[1]].contains(&0) {
             return Err("a picture or a tile without pixels".into());
@@ -123,7 +123,7 @@ impl Cut {
         Pixels::tile(self.width, self.height, tile)
     }
 
-    fn against(&self) -> Result<Against> {
+    fn against(&self) -> Result<ReferenceKind> {
         self.of.parse().map_err(Error::usage)
     }
 
@@ -133,10 +133,11 @@ impl Cut {
         // Where a blob has lost all but a thousandth of its depth; integrals end nowhere, and
         // little is left there.
         const REACH: f64 = 4.0;
-        let (of, truth) = (self.against()?, Truth::unlit(&scene, scene.time.at(self.frame))?);
-        let reach = if of == Against::Thin { scene.draw.cutoff } else { REACH };
+        let (of, truth) =
+            (self.against()?, FrameReference::unlit(&scene, scene.time.at(self.frame))?);
+        let reach = if of == ReferenceKind::Thin { scene.draw.cutoff } else { REACH };
         // The others' light knows no grid.
-        let by_grid = matches!(of, Against::Thin | Against::Volume);
+        let by_grid = matches!(of, ReferenceKind::Thin | ReferenceKind::Volume);
         let visits = if by_grid { Visits::of(&scene, &truth) } else { Visits::default() };
         Ok(Seen { layers: Layers::of(&scene, &truth, reach), visits })
     }
@@ -146,12 +147,12 @@ impl Cut {
         let scene = loaded.clone().at_frame(self.frame);
         let of = self.against()?;
         let n_particles = scene.n_particles() as f64;
-        let by_model = matches!(of, Against::Model | Against::Reflections(_));
+        let by_model = matches!(of, ReferenceKind::Model | ReferenceKind::Reflections(_));
         let n_facets = if by_model { n_particles } else { scene.n_facets() as f64 };
         // Light comes from particles' facets, and from surfaces' areas.
         let n_emitters = n_facets + scene.surfaces.len() as f64;
         let n_reflections =
-            if let Against::Reflections(k) = of { k } else { reflections_of(&scene) };
+            if let ReferenceKind::Reflections(k) = of { k } else { reflections_of(&scene) };
         let tile = |i: u32| self.piece(i * self.n_ranges()).0;
         let n_tiles = self.n_pieces() as u32 / self.n_ranges();
         let layers = &seen.layers;

@@ -14,7 +14,7 @@ use super::{bench, child, reference, study};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::scene_file::LoadedScene;
-use crate::study::machine;
+use crate::timing::machine;
 
 /// How a shard came to be there.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,7 @@ use super::ask::{Unanswered, ask};
 use super::status::ranges;
 use super::synced;
 use crate::error::{Error, Result};
-use crate::study::machine;
+use crate::timing::machine;
 
 const FILE: &str = "submitted.jsonl";
 /// Jobs' names: all shards have one, all merges the other. What tells jobs apart is their comment.

@@ -14,7 +14,7 @@ use super::failing::of_io;
 use super::plan::{Plan, Shard};
 use super::synced;
 use crate::error::{Error, Result};
-use crate::study::machine::{Cpu, Device};
+use crate::timing::machine::{Cpu, Device};
 
 pub const MANIFEST_FILE: &str = "shard.json";
 /// In a folder that is not finished: a [`FileRecord`] a line, of each file that is.

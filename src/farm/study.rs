@@ -12,12 +12,12 @@ use super::store::{Manifest, Workplace};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::atomic::write_atomic;
-use crate::study::machine::Device;
-use crate::study::plot::{self, Plot};
-use crate::study::records::prepare_out_dir;
-use crate::study::tradeoff::files::{self, CONFIGURATIONS_FILE};
-use crate::study::tradeoff::parts::{Part, differences, join};
-use crate::study::tradeoff::records::{STUDY_FILE, TIMES_FILE};
+use crate::report::charts::{self, Plot};
+use crate::studies::error::files::{self, CONFIGURATIONS_FILE};
+use crate::studies::error::parts::{Part, differences, join};
+use crate::studies::error::records::{STUDY_FILE, TIMES_FILE};
+use crate::timing::machine::Device;
+use crate::timing::records::prepare_out_dir;
 
 /// Files that every part has; pictures come on top.
 pub const FILES: [&str; 3] = [CONFIGURATIONS_FILE, STUDY_FILE, TIMES_FILE];

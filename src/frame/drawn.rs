@@ -3,10 +3,10 @@
 
 use glam::DVec3;
 
-use super::game::Setting;
 use crate::layout::particle::DrawnRecord;
 use crate::model::cloud::Group;
 use crate::model::count::Drawn;
+use crate::model::frame_state::FrameState;
 use crate::model::scene::Scene;
 use crate::model::visibility::Frustum;
 
@@ -15,7 +15,7 @@ use crate::model::visibility::Frustum;
 pub fn drawn(
     scene: &Scene,
     groups: &[Group],
-    setting: &Setting,
+    setting: &FrameState,
     culls: bool,
 ) -> (Vec<DrawnRecord>, u32) {
     let frustum = Frustum::of(&scene.camera, &setting.pose, &scene.film, scene.widening());

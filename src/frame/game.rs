@@ -19,6 +19,7 @@ use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRec
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
 use crate::model::cloud::{Group, heaviest_blob, mass};
+use crate::model::frame_state::FrameState;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, GridSpec};
 use crate::model::gust::Mode;
 use crate::model::gust_lanes::{LANES, Lanes, Waves};
@@ -47,42 +48,6 @@ pub struct Game {
 /// Asked for at every step, on the thread that plays; the width of the view and the near plane are
 /// the scene's.
 pub type Viewpoint = Box<dyn Fn() -> Pose + Send>;
-
-/// What a frame's time says of the scene, before it becomes records: shared with the references.
-#[derive(Debug, Clone)]
-pub struct Setting {
-    pub time_s: f64,
-    pub pose: Pose,
-    /// The lighting origin O: centre of the scene's bounds (docs/model.md §11).
-    pub light_origin: DVec3,
-    /// The density grid, relative to O.
-    pub grid: GridSpec,
-    /// Half the diagonal of the bounds.
-    pub radius: f64,
-}
-
-impl Setting {
-    /// The scene at `time_s`; an error where the camera looks nowhere.
-    pub fn at(scene: &Scene, groups: &[Group], time_s: f64) -> Result<Setting> {
-        let pose = scene.camera.pose(time_s).ok_or_else(|| {
-            let at = Place { source: "camera".into(), line: 0, column: 0 };
-            Error::scene(
-                at,
-                format!(
-                    "has no direction at time {time_s} s; expected a target apart from the \
-                     position, off the up axis"
-                ),
-            )
-        })?;
-        let (low, high) = scene
-            .lighting_bounds(groups, time_s, DEPOSIT_CUT_SIGMA)
-            .unwrap_or((DVec3::ZERO, DVec3::ZERO));
-        let light_origin = 0.5 * (low + high);
-        let half = 0.5 * (high - low);
-        let grid = scene.density_grid(groups, half);
-        Ok(Setting { time_s, pose, light_origin, grid, radius: half.length() })
-    }
-}
 
 impl Game {
     /// `rest` are all particles in order, given where the game thread is to move them (`simulate =
@@ -148,7 +113,7 @@ impl Game {
         let begin = Instant::now();
         let _zone = info_span!("game step").entered();
         let mut setting =
-            info_span!("setting").in_scope(|| Setting::at(&self.scene, &self.groups, time_s))?;
+            info_span!("setting").in_scope(|| FrameState::at(&self.scene, &self.groups, time_s))?;
         if let Some(viewpoint) = &self.viewpoint {
             setting.pose = viewpoint();
         }
@@ -251,7 +216,7 @@ impl Game {
     }
 
     /// Where each region's Morton cells lie.
-    fn bounds(&self, setting: &Setting) -> Vec<RegionBoundsRecord> {
+    fn bounds(&self, setting: &FrameState) -> Vec<RegionBoundsRecord> {
         let bits = KeyBits::of(self.scene.n_regions() as u32);
         let of = |b| RegionBoundsRecord::new(b, setting.light_origin, bits);
         self.scene

@@ -5,6 +5,7 @@
 pub mod buffers;
 pub mod choice;
 pub mod chunks;
+pub mod counts;
 mod culling;
 mod drawing;
 mod drawn;
@@ -13,6 +14,7 @@ pub mod feed;
 pub mod game;
 pub mod grouping;
 mod impostors;
+pub mod light_notes;
 pub mod limits;
 pub mod lives;
 pub mod packet;

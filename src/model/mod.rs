@@ -9,6 +9,7 @@ pub mod cloud;
 pub mod count;
 pub mod disc;
 pub mod film;
+pub mod frame_state;
 pub mod grid;
 pub mod growth;
 pub mod gust;

@@ -20,12 +20,12 @@ use crate::measure::picture::flip;
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::film::Film;
 use crate::model::scene::Scene;
-use crate::study::against::{Against, Reference};
-use crate::study::kept;
-use crate::study::picture::Work;
-use crate::study::pixels::Pixels;
-use crate::study::tradeoff::errors::picture_error;
-use crate::study::tradeoff::records::PictureError;
+use crate::reference::picture::kind::{Reference, ReferenceKind};
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::whole::Work;
+use crate::studies::error::errors::picture_error;
+use crate::studies::error::records::PictureError;
+use crate::studies::reference_cache;
 
 /// What is seen, and what it is measured by.
 #[derive(Debug, Clone)]
@@ -37,17 +37,17 @@ pub struct View {
     pub time_s: f64,
     /// Of the picture: columns and rows.
     pub size: [u32; 2],
-    pub against: Against,
+    pub against: ReferenceKind,
 }
 
 impl View {
     /// What `scene` can be measured by: the integral over its blobs, or, where they are textured,
     /// thin sprites.
-    pub fn against(scene: &Scene) -> Against {
+    pub fn against(scene: &Scene) -> ReferenceKind {
         if scene.clouds.iter().any(|c| !c.texture.is_none()) {
-            Against::Thin
+            ReferenceKind::Thin
         } else {
-            Against::Volume
+            ReferenceKind::Volume
         }
     }
 

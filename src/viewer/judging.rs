@@ -9,8 +9,8 @@ use super::judge::{Judge, Known, Standing, View};
 use super::screen::{Read, Shared, lock};
 use super::seen::{Judged, SharedSeen, lock as lock_seen};
 use super::wanted::Wanted;
-use crate::study::kept::default_folder;
-use crate::study::tradeoff::records::PictureError;
+use crate::studies::error::records::PictureError;
+use crate::studies::reference_cache::default_folder;
 
 /// What of the time of a view is spent on its reference, in all.
 const BUDGET: Duration = Duration::from_secs(10);

@@ -12,6 +12,7 @@ use super::seen::{OF_DRAWING, SharedSeen, lock as lock_seen};
 use super::wanted::{Keep, Other, Wanted};
 use super::widgets::SharedFace;
 use crate::error::{Error, Result};
+use crate::frame::counts::Counts;
 use crate::frame::game::Game;
 use crate::frame::render::Renderer;
 use crate::frame::stage::{DeviceChoice, Player};
@@ -20,7 +21,6 @@ use crate::gpu::{Compiler, Instance, PresentMode, Surface};
 use crate::measure::stats::Summary;
 use crate::model::film::Film;
 use crate::model::scene::{Scene, Threading};
-use crate::study::counts::Counts;
 
 /// What hands want, and the thread that draws.
 pub type Shared = Arc<Mutex<Wanted>>;

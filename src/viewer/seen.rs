@@ -5,11 +5,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use super::judge::Standing;
 use super::timeline::Timeline;
 use crate::frame::FrameTimes;
+use crate::frame::counts::Counts;
 use crate::frame::plan::Plan;
 use crate::gpu::PresentMode;
 use crate::model::scene::Threading;
-use crate::study::counts::Counts;
-use crate::study::tradeoff::records::PictureError;
+use crate::studies::error::records::PictureError;
 
 #[derive(Debug, Clone, Default)]
 pub struct Seen {

@@ -410,7 +410,7 @@ mod tests {
         w.release("w");
         w.fly(1.0);
         assert_eq!(w.flight.position() - from, ahead);
-        // Against each other they stand still.
+        // ReferenceKind each other they stand still.
         w.press("a");
         w.press("d");
         w.fly(1.0);

@@ -3,10 +3,10 @@
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 use glam::DVec3;
-use nimbus::frame::game::Setting;
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::{FacetRecord, KeyBits, RegionBoundsRecord};
 use nimbus::model::basis::Basis;
+use nimbus::model::frame_state::FrameState;
 use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
@@ -23,7 +23,7 @@ use crate::rooms::{Frame, frame_by};
 /// Every facet's light in f64: facets as the device has them, all else from the scene.
 pub fn reference(f: &Frame) -> Vec<Gathered> {
     let scene = &*f.scene;
-    let setting = Setting::at(scene, &scene.groups(), 0.0).unwrap();
+    let setting = FrameState::at(scene, &scene.groups(), 0.0).unwrap();
     let origin = setting.light_origin;
     let basis = Basis::new(scene.lighting.exponents, scene.lighting.bases, scene.lighting.sampling);
     let region = |i: usize| {

@@ -13,12 +13,12 @@ use nimbus::io::scene_file::{LoadedScene, parse_beside};
 use nimbus::io::weather::{netcdf, wrf};
 use nimbus::io::{box_file, particle_file};
 use nimbus::model::weather::particles::Layout;
-use nimbus::study::compare::compare_modes;
-use nimbus::study::recorded;
-use nimbus::study::records::parse_run;
-use nimbus::study::report::page;
-use nimbus::study::report::source::{Found, Source, parse_ledger};
-use nimbus::study::tradeoff::files::{parse_found, parse_study};
+use nimbus::report::pages::page;
+use nimbus::report::pages::source::{Found, Source, parse_ledger};
+use nimbus::studies::error::files::{parse_found, parse_study};
+use nimbus::timing::compare::compare_modes;
+use nimbus::timing::recorded;
+use nimbus::timing::records::parse_run;
 use serde_json::Value;
 
 /// A folder that does not exist: what is read here names files, and none may be found.

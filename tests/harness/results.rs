@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use nimbus::study::machine::{Clocks, Cpu, Device};
-use nimbus::study::records::{Block, Case, FrameRow, Mode, Run, SCHEMA_VERSION};
+use nimbus::timing::machine::{Clocks, Cpu, Device};
+use nimbus::timing::records::{Block, Case, FrameRow, Mode, Run, SCHEMA_VERSION};
 use serde_json::json;
 
 /// A loop of `frames` timed frames, of which nothing is said.

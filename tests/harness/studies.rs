@@ -4,13 +4,13 @@
 
 use std::collections::BTreeMap;
 
-use nimbus::study::ledger::records::{Ledger, Row};
-use nimbus::study::machine::{Clocks, Cpu, Device};
-use nimbus::study::provenance::{Figure, Provenance, ReferenceRecord};
-use nimbus::study::records::Setting;
-use nimbus::study::tradeoff::records::{
+use nimbus::studies::error::records::{
     Best, Configuration, Front, PictureError, SCHEMA_VERSION, Study,
 };
+use nimbus::studies::ledger::records::{Ledger, Row};
+use nimbus::studies::provenance::{Figure, Provenance, ReferenceRecord};
+use nimbus::timing::machine::{Clocks, Cpu, Device};
+use nimbus::timing::records::Setting;
 use serde_json::json;
 
 pub fn provenance() -> Provenance {

@@ -12,7 +12,7 @@ use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::scene::Scene;
 use nimbus::model::texture::Texture;
-use nimbus::study::stress::Desk;
+use nimbus::stress::Desk;
 use proptest::collection::vec;
 use proptest::prelude::*;
 

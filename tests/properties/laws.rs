@@ -10,7 +10,7 @@ use nimbus::model::count::{Count, Drawn};
 use nimbus::model::film::{Film, FilmFormat, ToneMap, srgb_encode};
 use nimbus::model::grid::{GridSpec, MARGIN_CELLS, MAX_CELLS};
 use nimbus::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
-use nimbus::study::pixels::Pixels;
+use nimbus::reference::picture::pixels::Pixels;
 use proptest::collection::vec;
 use proptest::prelude::*;
 

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
 use super::parse_size;
-use crate::study::against::Against;
-use crate::study::samples::MOST_SAMPLES;
+use crate::reference::picture::kind::ReferenceKind;
+use crate::reference::picture::samples::MOST_SAMPLES;
 
 #[derive(Debug, ClapArgs)]
 pub struct FarmArgs {
@@ -87,7 +87,7 @@ pub struct PlanArgs {
     /// A picture in f64 in place of frames, as `nimbus render --reference` draws it: thin, volume,
     /// model or reflections=K
     #[arg(long, value_name = "WHICH", conflicts_with_all = ["frames", "shard_frames", "error", "bench"])]
-    pub reference: Option<Against>,
+    pub reference: Option<ReferenceKind>,
     /// The reference's frame
     #[arg(long, value_name = "N", default_value_t = 0, requires = "reference")]
     pub frame: u32,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args as ClapArgs, ValueEnum};
 
 use super::{SceneArgs, parse_positive};
-use crate::study::against::Against;
+use crate::reference::picture::kind::ReferenceKind;
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Examples:\n  \
@@ -29,7 +29,7 @@ pub struct ErrorArgs {
     pub grid: bool,
     /// What pictures are compared with: thin, volume, model or reflections=K
     #[arg(long, value_name = "WHAT", default_value = "model", help_heading = "Error")]
-    pub against: Against,
+    pub against: ReferenceKind,
     /// Draw every cloud without its texture, which no volume and no light knows
     #[arg(long, help_heading = "Error")]
     pub plain: bool,

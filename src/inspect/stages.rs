@@ -1,0 +1,335 @@
+//! A stage's buffer as rows: what the device holds, or what the f64 reference says.
+
+use glam::{DVec3, Vec3};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+use crate::frame::plan::Pass;
+use crate::frame::stage::Stage;
+use crate::model::cloud::{CloudSource, Group, SIGMA_PER_RADIUS};
+use crate::model::frame_state::FrameState;
+use crate::model::scene::{LightingMode, Scene};
+use crate::model::terrain::Terrain;
+use crate::passes::generate::FOLDED;
+use crate::reference::generate::Generated;
+use crate::reference::picture::stages::{FrameReference, colors};
+
+/// A particle in the scene's coordinates.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParticleRow {
+    pub index: usize,
+    pub cloud: usize,
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub radius: f64,
+    pub sigma: f64,
+    pub kappa: f64,
+    pub r: f64,
+    pub g: f64,
+    pub b: f64,
+}
+
+/// A facet in the scene's coordinates. I_d, I_i: irradiance; L1, L2: radiance toward the camera,
+/// which a surface's back does not have. I_i and L2 are zero where lighting.mode is "first".
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FacetRow {
+    pub index: usize,
+    pub region: u32,
+    pub x: f64,
+    pub y: f64,
+    pub z: f64,
+    pub nx: f64,
+    pub ny: f64,
+    pub nz: f64,
+    pub area: f64,
+    pub id_r: f64,
+    pub id_g: f64,
+    pub id_b: f64,
+    pub ii_r: f64,
+    pub ii_g: f64,
+    pub ii_b: f64,
+    pub l1_r: f64,
+    pub l1_g: f64,
+    pub l1_b: f64,
+    pub l2_r: f64,
+    pub l2_g: f64,
+    pub l2_b: f64,
+}
+
+/// What a box made of its particles.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BoxRow {
+    pub cloud: usize,
+    pub r#box: usize,
+    pub particles: u32,
+    pub attempts: u64,
+    /// Particles over attempts; none for an empty box.
+    pub acceptance: Option<f64>,
+    pub folded: u32,
+}
+
+/// One pass of one frame.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlanRow {
+    pub frame: u32,
+    pub pass: &'static str,
+    pub run: bool,
+    pub reason: String,
+}
+
+/// Particles of `i_frame` as the device has them.
+pub fn particles(stage: &mut Stage, i_frame: u32) -> Result<Vec<ParticleRow>> {
+    let packet = stage.game.step(i_frame)?;
+    let time_s = packet.time_s;
+    stage.renderer.step(packet)?;
+    let placed = stage.renderer.placed(&stage.device)?;
+    let records = stage.renderer.generate_now(&stage.device)?.0;
+    let groups = stage.scene.groups();
+    let origin = FrameState::at(&stage.scene, &groups, time_s)?.light_origin;
+    let rows = placed.iter().zip(&records).enumerate().map(|(i, (p, r))| {
+        let position = Vec3::from(p.position).as_dvec3() + origin;
+        let color = Vec3::from(r.color).as_dvec3();
+        particle_row(
+            i,
+            cloud_of(&groups, i),
+            position,
+            f64::from(p.sigma),
+            f64::from(r.kappa),
+            color,
+        )
+    });
+    Ok(rows.collect())
+}
+
+/// The same from the reference.
+pub fn particles_reference(scene: &Scene, i_frame: u32) -> Result<Vec<ParticleRow>> {
+    let mut unlit = scene.clone();
+    unlit.lighting.mode = LightingMode::None;
+    let truth = FrameReference::of(&unlit, scene.time.at(i_frame))?;
+    let colors = colors(scene);
+    let rows = truth.blobs.iter().zip(&colors).enumerate().map(|(i, (b, color))| {
+        let position = b.position + truth.setting.light_origin;
+        particle_row(i, cloud_of(&truth.groups, i), position, b.sigma, b.kappa, *color)
+    });
+    Ok(rows.collect())
+}
+
+/// Facets of `i_frame` as the device has them.
+pub fn facets(stage: &mut Stage, i_frame: u32) -> Result<Vec<FacetRow>> {
+    check_lit(&stage.scene)?;
+    let packet = stage.game.step(i_frame)?;
+    let time_s = packet.time_s;
+    stage.renderer.step(packet)?;
+    let (facets, lit) = stage.renderer.facets(&stage.device)?;
+    let setting = FrameState::at(&stage.scene, &stage.scene.groups(), time_s)?;
+    let (origin, eye) = (setting.light_origin, setting.pose.position);
+    let rgb = |v: [f32; 3]| Vec3::from(v).as_dvec3();
+    let rows = facets.iter().zip(&lit).enumerate().map(|(i, (f, l))| {
+        let place = Vec3::from(f.position).as_dvec3() + origin;
+        let normal = Vec3::from(f.normal).as_dvec3();
+        let lit = [rgb(l.direct), rgb(l.indirect), rgb(l.first), rgb(l.second)];
+        let lit = toward_camera(&stage.scene, f.i_region, eye - place, normal, lit);
+        facet_row(i, f.i_region, [place, normal], f64::from(f.area), lit)
+    });
+    Ok(rows.collect())
+}
+
+/// The same from the reference.
+pub fn facets_reference(scene: &Scene, i_frame: u32) -> Result<Vec<FacetRow>> {
+    check_lit(scene)?;
+    let truth = FrameReference::of(scene, scene.time.at(i_frame))?;
+    let rows = truth.facets.iter().enumerate().map(|(i, f)| {
+        let place = f.position + truth.setting.light_origin;
+        let or_dark = |of: &[DVec3]| of.get(i).copied().unwrap_or(DVec3::ZERO);
+        let lit = [
+            truth.irradiance[i],
+            or_dark(&truth.indirect),
+            truth.radiance[i],
+            or_dark(&truth.second),
+        ];
+        let lit =
+            toward_camera(scene, f.region, truth.setting.pose.position - place, f.normal, lit);
+        facet_row(i, f.region, [place, f.normal], f.area, lit)
+    });
+    Ok(rows.collect())
+}
+
+/// The area means of the facets of each surface and ground, a row each; its index, region, centre,
+/// normal and whole area.
+pub fn per_surface(scene: &Scene, rows: &[FacetRow]) -> Vec<FacetRow> {
+    let of_ground = |t: &Terrain| {
+        let (low, high) = t.bounds();
+        [
+            0.5 * (low + high),
+            t.facets().map(|f| f.area * f.normal).sum::<DVec3>().normalize_or(DVec3::Y),
+        ]
+    };
+    let surfaces = scene.surfaces.iter().map(|s| [s.center, s.normal()]);
+    let mean = |(i, place): (usize, [DVec3; 2])| {
+        let own: Vec<&FacetRow> = rows.iter().filter(|r| r.region as usize == i).collect();
+        let area: f64 = own.iter().map(|r| r.area).sum();
+        let of =
+            |value: fn(&FacetRow) -> f64| own.iter().map(|r| r.area * value(r)).sum::<f64>() / area;
+        let rgb = |r: fn(&FacetRow) -> f64, g: fn(&FacetRow) -> f64, b: fn(&FacetRow) -> f64| {
+            DVec3::new(of(r), of(g), of(b))
+        };
+        let lit = [
+            rgb(|r| r.id_r, |r| r.id_g, |r| r.id_b),
+            rgb(|r| r.ii_r, |r| r.ii_g, |r| r.ii_b),
+            rgb(|r| r.l1_r, |r| r.l1_g, |r| r.l1_b),
+            rgb(|r| r.l2_r, |r| r.l2_g, |r| r.l2_b),
+        ];
+        facet_row(i, i as u32, place, area, lit)
+    };
+    surfaces.chain(scene.terrains.iter().map(of_ground)).enumerate().map(mean).collect()
+}
+
+/// Attempts and folded particles of every box, from the device.
+pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
+    let status = stage.renderer.generate_now(&stage.device)?.1;
+    let tries =
+        status.iter().map(|s| (u64::from(s & !FOLDED), s & FOLDED != 0)).collect::<Vec<_>>();
+    Ok(box_rows(&stage.scene, &tries))
+}
+
+/// The same from the reference.
+pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
+    let tried = |g: Generated| (u64::from(g.n_attempts), g.folded);
+    let tries: Vec<_> =
+        scene.clouds.iter().flat_map(crate::reference::generate::cloud).map(tried).collect();
+    box_rows(scene, &tries)
+}
+
+fn box_rows(scene: &Scene, tries: &[(u64, bool)]) -> Vec<BoxRow> {
+    let mut rows: Vec<BoxRow> = Vec::new();
+    let mut n_before = 0;
+    for group in scene.groups() {
+        if !matches!(scene.clouds[group.i_cloud].source, CloudSource::Boxes { .. }) {
+            continue;
+        }
+        let first = group.i_first as usize;
+        let mine = &tries[first..first + group.n_particles as usize];
+        let attempts: u64 = mine.iter().map(|t| t.0).sum();
+        let folded = mine.iter().filter(|t| t.1).count() as u32;
+        let accepted = f64::from(group.n_particles - folded);
+        if rows.last().is_some_and(|r| r.cloud != group.i_cloud) {
+            n_before = rows.len();
+        }
+        let i_box = rows.len() - n_before;
+        let acceptance = (attempts > 0).then(|| accepted / attempts as f64);
+        rows.push(BoxRow {
+            cloud: group.i_cloud,
+            r#box: i_box,
+            particles: group.n_particles,
+            attempts,
+            acceptance,
+            folded,
+        });
+    }
+    rows
+}
+
+/// What frames `0..n_frames` run and leave out, and why.
+pub fn plans(stage: &mut Stage, n_frames: u32) -> Result<Vec<PlanRow>> {
+    let mut rows = Vec::new();
+    let on_frame = &mut |times: crate::frame::FrameTimes, _: &mut _| {
+        rows.extend(Pass::ALL.iter().map(|pass| {
+            let decision = times.plan.decision(*pass);
+            PlanRow {
+                frame: times.i_frame,
+                pass: pass.name(),
+                run: decision.run,
+                reason: decision.reason.to_string(),
+            }
+        }));
+        Ok(true)
+    };
+    let mode = stage.scene.threads.mode;
+    stage.run(mode, 0..n_frames, on_frame)?;
+    Ok(rows)
+}
+
+fn check_lit(scene: &Scene) -> Result<()> {
+    match scene.lighting.mode {
+        LightingMode::None => {
+            Err(Error::usage("the scene has no facets: lighting.mode is \"none\""))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Groups are in order of their particles, so the last that begins at or before i holds it (empty
+/// ones begin where the next does, and come before it).
+fn cloud_of(groups: &[Group], i: usize) -> usize {
+    let after = groups.partition_point(|g| g.i_first as usize <= i);
+    groups[after.saturating_sub(1)].i_cloud
+}
+
+fn particle_row(
+    index: usize,
+    cloud: usize,
+    p: DVec3,
+    sigma: f64,
+    kappa: f64,
+    c: DVec3,
+) -> ParticleRow {
+    let radius = sigma / SIGMA_PER_RADIUS;
+    ParticleRow {
+        index,
+        cloud,
+        x: p.x,
+        y: p.y,
+        z: p.z,
+        radius,
+        sigma,
+        kappa,
+        r: c.x,
+        g: c.y,
+        b: c.z,
+    }
+}
+
+/// L1 and L2 (the last two) are zero where the camera sees a surface's or the ground's back.
+fn toward_camera(
+    scene: &Scene,
+    region: u32,
+    to_eye: DVec3,
+    normal: DVec3,
+    lit: [DVec3; 4],
+) -> [DVec3; 4] {
+    let is_back = (region as usize) < scene.n_solids() && normal.dot(to_eye) <= 0.0;
+    if is_back { [lit[0], lit[1], DVec3::ZERO, DVec3::ZERO] } else { lit }
+}
+
+fn facet_row(
+    index: usize,
+    region: u32,
+    [p, n]: [DVec3; 2],
+    area: f64,
+    [id, ii, l1, l2]: [DVec3; 4],
+) -> FacetRow {
+    FacetRow {
+        index,
+        region,
+        x: p.x,
+        y: p.y,
+        z: p.z,
+        nx: n.x,
+        ny: n.y,
+        nz: n.z,
+        area,
+        id_r: id.x,
+        id_g: id.y,
+        id_b: id.z,
+        ii_r: ii.x,
+        ii_g: ii.y,
+        ii_b: ii.z,
+        l1_r: l1.x,
+        l1_g: l1.y,
+        l1_b: l1.z,
+        l2_r: l2.x,
+        l2_g: l2.y,
+        l2_b: l2.z,
+    }
+}

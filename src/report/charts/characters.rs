@@ -1,0 +1,235 @@
+//! A terminal as something to draw on: braille dots for lines, whole characters for marks and text.
+
+use std::convert::Infallible;
+
+use plotters_backend::text_anchor::{HPos, VPos};
+use plotters_backend::{
+    BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
+};
+
+use super::look::{CELL, PLAIN, SERIES};
+
+type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Cell {
+    /// The bits of U+2800 and on.
+    dots: u8,
+    glyph: Option<char>,
+    rgb: (u8, u8, u8),
+}
+
+/// Characters in rows; what lies outside is not drawn.
+pub struct Characters {
+    n_columns: usize,
+    cells: Vec<Cell>,
+}
+
+impl Characters {
+    pub fn new(n_columns: usize, n_rows: usize) -> Characters {
+        Characters { n_columns, cells: vec![Cell::default(); n_columns * n_rows] }
+    }
+
+    fn cell(&mut self, column: i32, row: i32) -> Option<&mut Cell> {
+        let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
+        if column >= self.n_columns {
+            None
+        } else {
+            self.cells.get_mut(row * self.n_columns + column)
+        }
+    }
+
+    fn dot(&mut self, (x, y): BackendCoord, color: BackendColor) {
+        const BITS: [[u8; 2]; 4] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+        let bit = BITS[y.rem_euclid(CELL.1) as usize][x.rem_euclid(CELL.0) as usize];
+        if let Some(cell) = self.cell(x.div_euclid(CELL.0), y.div_euclid(CELL.1)) {
+            cell.dots |= bit;
+            if cell.glyph.is_none() {
+                cell.rgb = color.rgb;
+            }
+        }
+    }
+
+    fn glyph(&mut self, (column, row): (i32, i32), glyph: char, color: BackendColor) {
+        if let Some(cell) = self.cell(column, row) {
+            let glyph = if glyph.is_control() { '\u{FFFD}' } else { glyph };
+            (cell.glyph, cell.rgb) = (Some(glyph), color.rgb);
+        }
+    }
+
+    /// Rows without blanks at their ends; `colored`: with the codes of an ANSI terminal.
+    pub fn text(&self, colored: bool) -> String {
+        let mut out = String::new();
+        for row in self.cells.chunks(self.n_columns.max(1)) {
+            let n = row.iter().rposition(|cell| shown(cell) != ' ').map_or(0, |last| last + 1);
+            let mut sgr = 39;
+            for cell in &row[..n] {
+                let wanted = if shown(cell) == ' ' { sgr } else { sgr_of(cell.rgb) };
+                if colored && wanted != sgr {
+                    out += &format!("\x1b[{wanted}m");
+                    sgr = wanted;
+                }
+                out.push(shown(cell));
+            }
+            out += if sgr == 39 { "\n" } else { "\x1b[39m\n" };
+        }
+        out
+    }
+}
+
+fn shown(cell: &Cell) -> char {
+    match (cell.glyph, cell.dots) {
+        (Some(glyph), _) => glyph,
+        (None, 0) => ' ',
+        (None, dots) => char::from_u32(0x2800 + u32::from(dots)).unwrap_or(' '),
+    }
+}
+
+/// The terminal's colour for one of ours; its own text colour for any other.
+pub fn sgr_of(rgb: (u8, u8, u8)) -> u8 {
+    let all = SERIES.iter().chain(&PLAIN);
+    all.into_iter().find(|s| (s.light.0, s.light.1, s.light.2) == rgb).map_or(39, |shade| shade.sgr)
+}
+
+/// A brush on characters that outlive it.
+pub struct Brush<'a>(pub &'a mut Characters);
+
+impl DrawingBackend for Brush<'_> {
+    type ErrorType = Infallible;
+
+    fn get_size(&self) -> (u32, u32) {
+        let (columns, n) = (self.0.n_columns, self.0.cells.len());
+        (columns as u32 * CELL.0 as u32, (n / columns.max(1)) as u32 * CELL.1 as u32)
+    }
+
+    fn ensure_prepared(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn present(&mut self) -> Drawn {
+        Ok(())
+    }
+
+    fn draw_pixel(&mut self, point: BackendCoord, color: BackendColor) -> Drawn {
+        // What is half transparent in a picture would hide what lies under it here.
+        if color.alpha > 0.5 {
+            self.0.dot(point, color);
+        }
+        Ok(())
+    }
+
+    fn draw_line<S: BackendStyle>(
+        &mut self,
+        from: BackendCoord,
+        to: BackendCoord,
+        style: &S,
+    ) -> Drawn {
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let n = dx.abs().max(dy.abs()).max(1);
+        for i in 0..=n {
+            let at = |from: i32, d: i32| {
+                from + (f64::from(d) * f64::from(i) / f64::from(n)).round() as i32
+            };
+            self.draw_pixel((at(from.0, dx), at(from.1, dy)), style.color())?;
+        }
+        Ok(())
+    }
+
+    fn draw_path<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
+        &mut self,
+        path: I,
+        style: &S,
+    ) -> Drawn {
+        let points: Vec<BackendCoord> = path.into_iter().collect();
+        points.windows(2).try_for_each(|pair| self.draw_line(pair[0], pair[1], style))
+    }
+
+    fn draw_rect<S: BackendStyle>(
+        &mut self,
+        a: BackendCoord,
+        b: BackendCoord,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
+        for y in a.1..=b.1 {
+            for x in a.0..=b.0 {
+                let is_edge = x == a.0 || x == b.0 || y == a.1 || y == b.1;
+                if fill || is_edge {
+                    self.draw_pixel((x, y), style.color())?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn draw_circle<S: BackendStyle>(
+        &mut self,
+        center: BackendCoord,
+        _: u32,
+        style: &S,
+        fill: bool,
+    ) -> Drawn {
+        let at = (center.0.div_euclid(CELL.0), center.1.div_euclid(CELL.1));
+        self.0.glyph(at, if fill { '●' } else { '○' }, style.color());
+        Ok(())
+    }
+
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, at: BackendCoord) -> Drawn {
+        let n = text.chars().count() as i32;
+        let column = at.0.div_euclid(CELL.0);
+        let column = match style.anchor().h_pos {
+            HPos::Left => column,
+            HPos::Center => column - n / 2,
+            HPos::Right => column - n,
+        };
+        let row = match style.anchor().v_pos {
+            VPos::Top | VPos::Center => at.1.div_euclid(CELL.1),
+            VPos::Bottom => (at.1 - 1).div_euclid(CELL.1),
+        };
+        for (i, glyph) in (0..).zip(text.chars()) {
+            // Text is not cut by the left edge but moved within.
+            self.0.glyph((column.max(0) + i, row), glyph, style.color());
+        }
+        Ok(())
+    }
+
+    fn estimate_text_size<S: BackendTextStyle>(
+        &self,
+        text: &str,
+        _: &S,
+    ) -> Result<(u32, u32), DrawingErrorKind<Infallible>> {
+        Ok((text.chars().count() as u32 * CELL.0 as u32, CELL.1 as u32))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::charts::look::{INK, Look, series};
+    use plotters::prelude::*;
+
+    #[test]
+    fn dots_marks_and_text_lie_where_they_were_put() {
+        let mut characters = Characters::new(6, 2);
+        let area = Brush(&mut characters).into_drawing_area();
+        // The top dot of every column of the first row; the bottom right dot of the second row's
+        // last cell.
+        area.draw(&PathElement::new(vec![(0, 0), (11, 0)], INK)).unwrap();
+        area.draw(&Pixel::new((11, 7), INK)).unwrap();
+        area.draw(&Circle::new((4, 5), 3, series(0).filled())).unwrap();
+        area.draw_text("ab", &Look::TERMINAL.text(INK), (0, 4)).unwrap();
+        drop(area);
+        assert_eq!(characters.text(false), "⠉⠉⠉⠉⠉⠉\nab●  ⢀\n");
+        assert_eq!(characters.text(true), "⠉⠉⠉⠉⠉⠉\nab\x1b[34m●  \x1b[39m⢀\n");
+    }
+
+    #[test]
+    fn what_lies_outside_is_left_out() {
+        let mut characters = Characters::new(2, 1);
+        let area = Brush(&mut characters).into_drawing_area();
+        area.draw(&PathElement::new(vec![(-5, 1), (40, 1)], INK)).unwrap();
+        area.draw_text("long text", &Look::TERMINAL.text(INK), (2, 40)).unwrap();
+        drop(area);
+        assert_eq!(characters.text(false), "⠒⠒\n");
+    }
+}

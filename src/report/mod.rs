@@ -1,0 +1,4 @@
+//! Charts and pages, made from the records of results alone.
+
+pub mod charts;
+pub mod pages;

@@ -1,0 +1,207 @@
+//! A bench's times, tables and charts, and the last frame of every case.
+
+use std::path::Path;
+
+use maud::{Markup, html};
+
+use super::chart;
+use super::pictures::Png;
+use super::provenance::{self, Made};
+use super::table::{Cell, count, median, ms, percent, table, text, value};
+use crate::error::Result;
+use crate::report::charts::number::{number, with_interval};
+use crate::report::charts::{frames, passes};
+use crate::timing::companions::picture_file;
+use crate::timing::parts::PartRecord;
+use crate::timing::recorded::Recorded;
+use crate::timing::records::{Case, Mode, Pass, Run};
+
+/// What a case's last frame is called.
+pub fn case_name(run: &Run, i: usize) -> String {
+    named(&run.cases[i])
+}
+
+fn named(case: &Case) -> String {
+    let name = case.name();
+    if name.is_empty() { "the scene".to_owned() } else { name }
+}
+
+pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
+    let run = &recorded.run;
+    let mut charts = Vec::new();
+    for frames in frames::charts_of(recorded) {
+        charts.push(chart(
+            &frames,
+            "Time from the end of one frame to the end of the next; below is better.",
+        )?);
+    }
+    let passes = passes::chart(run);
+    let passes = passes
+        .map(|passes| chart(&passes, "What the device's time goes to; shorter is better."))
+        .transpose()?;
+    let mut shown = Vec::new();
+    for i in 0..run.cases.len() {
+        let name = case_name(run, i);
+        let caption = format!("The last frame of {name}");
+        shown
+            .extend(Png::read(folder, &picture_file(i))?.map(|png| png.figure(&caption, &caption)));
+    }
+    Ok(html! {
+        (provenance::section(&Made::of_run(run)))
+        @if !run.chosen.is_empty() {
+            h3 { "What \"auto\" came to" }
+            ul { @for chosen in &run.chosen { li { (chosen) } } }
+        }
+        @if !run.parts.is_empty() { h3 { "Parts" } (parts(run)) }
+        @if !shown.is_empty() { h3 { "Pictures" } div class="gallery" { @for figure in &shown { (figure) } } }
+        h3 { "Frames" }
+        (loops(run))
+        @for chart in &charts { (chart) }
+        (cases(run))
+        h3 { "Passes" }
+        @match &passes { Some(passes) => { (passes) } None => { p { "No pass was timed: the device \
+            has no timestamps." } } }
+        (pass_table(run))
+    })
+}
+
+fn loops(run: &Run) -> Markup {
+    let row = |(case, mode): (&Case, &Mode)| -> Vec<Cell> {
+        let of = |m: Option<crate::timing::records::Measured>| m.map(|m| m.of);
+        vec![
+            text(&passes::row_name(&case.name(), mode)),
+            count(mode.frames),
+            median(mode.frame_ms),
+            ms(of(mode.frame_ms).map(|s| s.p95)),
+            ms(of(mode.frame_ms).map(|s| s.p99)),
+            ms(of(mode.frame_ms).map(|s| s.max)),
+            median(mode.game_ms),
+            median(mode.render_ms),
+            median(mode.gpu_ms),
+            median(mode.latency_ms),
+            value(mode.frame_lows.map(|l| l.slowest_mean_fps)),
+        ]
+    };
+    let rows: Vec<Vec<Cell>> =
+        run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| row((c, m)))).collect();
+    let header = [
+        "case and loop",
+        "frames",
+        "frame p50, ms",
+        "p95",
+        "p99",
+        "max",
+        "game p50, ms",
+        "render p50, ms",
+        "GPU p50, ms",
+        "latency p50, ms",
+        "1 % low, frames/s",
+    ];
+    let caption =
+        "Every loop: medians with their 95 % intervals; \"1 % low\" is the mean of the slowest 1 %";
+    table(caption, &header, &rows)
+}
+
+/// Which node timed what, and how long the first case took there.
+fn parts(run: &Run) -> Markup {
+    let row = |part: &PartRecord| -> Vec<Cell> {
+        let times = part.base.iter().map(|base| ms(base.p50_ms));
+        [text(&format!("{}..{}", part.first, part.end)), text(&part.node), text(&part.date)]
+            .into_iter()
+            .chain(times)
+            .collect()
+    };
+    let loops: Vec<String> = run
+        .parts
+        .iter()
+        .take(1)
+        .flat_map(|part| part.base.iter().map(|base| format!("{}, ms", base.name())))
+        .collect();
+    let header: Vec<&str> =
+        ["cases", "node", "begun"].into_iter().chain(loops.iter().map(String::as_str)).collect();
+    let rows: Vec<Vec<Cell>> = run.parts.iter().map(row).collect();
+    table(
+        "Who timed what, and the median frame time of the first case there: how far nodes differ",
+        &header,
+        &rows,
+    )
+}
+
+/// The cases, and what overlap and skipping gained in each.
+fn cases(run: &Run) -> Markup {
+    let row = |case: &Case| -> Vec<Cell> {
+        let ratio = case.ratio.map(|r| with_interval(r.parallel_by_serial, r.low, r.high));
+        let skipping = case.skipping;
+        vec![
+            text(&named(case)),
+            count(case.particles as usize),
+            text(&format!("{}×{}", case.width, case.height)),
+            text(ratio.as_deref().unwrap_or("—")),
+            ms(case.overlap.as_ref().map(|o| o.bound_ms)),
+            ms(skipping.map(|s| s.gpu_ms)),
+            ms(skipping.map(|s| s.gpu_no_skip_ms)),
+            text(match skipping.and_then(|s| s.same_bytes) {
+                Some(true) => "yes",
+                Some(false) => "no",
+                None => "—",
+            }),
+        ]
+    };
+    let header = [
+        "case",
+        "particles",
+        "pixels",
+        "parallel / serial",
+        "best of overlap, ms",
+        "GPU mean, ms",
+        "without skipping, ms",
+        "same picture, to the byte",
+    ];
+    table(
+        "The cases, and what overlap and skipping gained",
+        &header,
+        &run.cases.iter().map(row).collect::<Vec<_>>(),
+    )
+}
+
+fn pass_table(run: &Run) -> Markup {
+    let row = |case: &Case, mode: &Mode, pass: &Pass| -> Vec<Cell> {
+        let reasons = pass.reasons.iter().map(|r| format!("{} ({})", r.reason, number(r.n as f64)));
+        vec![
+            text(&pass.name),
+            text(&passes::row_name(&case.name(), mode)),
+            ms(pass.p50_ms),
+            ms(passes::ms_of_frame(pass)),
+            percent(pass.share),
+            count(pass.n_run),
+            count(pass.n_skipped),
+            ms(pass.saved_ms),
+            text(&reasons.collect::<Vec<_>>().join("; ")),
+        ]
+    };
+    let mut rows = Vec::new();
+    for case in &run.cases {
+        for mode in &case.modes {
+            // What never ran anywhere is no news.
+            rows.extend(
+                mode.passes.iter().filter(|p| p.n_run > 0).map(|pass| row(case, mode, pass)),
+            );
+        }
+    }
+    let header = [
+        "pass",
+        "case and loop",
+        "p50, ms",
+        "of a frame, ms",
+        "share",
+        "ran",
+        "skipped",
+        "saved, ms",
+        "why skipped (frames)",
+    ];
+    if rows.is_empty() {
+        html! {}
+    } else {
+        table("Passes that ran", &header, &rows)
+    }
+}

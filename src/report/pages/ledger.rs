@@ -1,0 +1,66 @@
+//! A ledger: what every approximation is off by, as bars and as a table.
+
+use maud::{Markup, html};
+
+use super::chart;
+use super::provenance::{self, Made};
+use super::table::{Cell, figure, percent, table, text, value};
+use crate::error::Result;
+use crate::report::charts::number::{number, with_interval};
+use crate::report::charts::{self};
+use crate::studies::ledger::records::{Ledger, Row};
+
+pub fn section(ledger: &Ledger) -> Result<Markup> {
+    let total = with_interval(ledger.total.value, ledger.total.low, ledger.total.high);
+    let caption = "RMSE of two pictures that differ in that approximation alone. Lines across a \
+        bar's end are 95 % intervals.";
+    Ok(html! {
+        (provenance::section(&Made::of(&ledger.made, ledger.interrupted)))
+        dl class="made" {
+            dt { "Picture" } dd { "frame " (ledger.frame) " at " (number(ledger.time_s)) " s, " (ledger.width) "×" (ledger.height) " pixels, compared at " (ledger.n_pixels) }
+            dt { "Magnitude" } dd { (number(ledger.magnitude)) ", root mean square of the \
+                last row's truth" }
+            dt { "All together" } dd { (total) " RMSE; the rows' sum is " (number(ledger.sum)) ", \
+                in quadrature " (number(ledger.quadrature)) }
+            dt { "Total at most the sum" } dd { @if ledger.holds { "yes" } @else { strong { "no: \
+                something is wrong" } } }
+        }
+        h3 { "Rows" }
+        (chart(&plot::ledger::chart(ledger), caption)?)
+        (rows(ledger))
+    })
+}
+
+fn rows(ledger: &Ledger) -> Markup {
+    let row = |r: &Row| -> Vec<Cell> {
+        let resolved =
+            if r.is_resolved { "" } else { "not resolved: the references are no better" };
+        vec![
+            text(&r.name),
+            text(&r.from),
+            text(&r.to),
+            figure(Some(r.error)),
+            percent(Some(r.relative)),
+            percent(Some(r.share)),
+            value(Some(r.own_error)),
+            figure(r.time_ratio),
+            text(resolved),
+        ]
+    };
+    let header = [
+        "approximation",
+        "drawn",
+        "stands for",
+        "RMSE",
+        "relative",
+        "of the sum",
+        "references' own",
+        "time, by without",
+        "remark",
+    ];
+    table(
+        "Every approximation, each against the one below it",
+        &header,
+        &ledger.rows.iter().map(row).collect::<Vec<_>>(),
+    )
+}

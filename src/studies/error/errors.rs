@@ -1,0 +1,118 @@
+//! How far a picture is from a reference, with an interval: over the parts of the picture, and by
+//! the reference's own error.
+
+use super::records::PictureError;
+use crate::measure::bootstrap::Bootstrap;
+use crate::measure::picture::errors;
+use crate::reference::picture::pixels::Pixels;
+use crate::studies::provenance::Figure;
+
+/// Parts of a picture along its longer side. What a blob is off by it is off by all over its disc:
+/// single pixels are no independent draws, parts as large as blobs nearly are.
+const N_PARTS: u32 = 12;
+/// The reference's own error must be this many times smaller than what it judges.
+pub const RESOLVED: f64 = 10.0;
+
+/// Of a device's picture, pixel by pixel of `pixels`, by `reference`, which is itself off by
+/// `own_error`, root mean square. None where some value of either is no finite number.
+pub fn picture_error(
+    pixels: &Pixels,
+    picture: &[[f64; 4]],
+    reference: &[[f64; 4]],
+    own_error: f64,
+) -> Option<PictureError> {
+    let squares: Vec<f64> = picture.iter().zip(reference).map(|(p, r)| square(p, r)).collect();
+    let pairs = reference.iter().flatten().copied().zip(picture.iter().flatten().copied());
+    let whole = errors(pairs).filter(|_| squares.iter().all(|s| s.is_finite()))?;
+    let parts = parts(pixels, &squares);
+    let root = |rows: &[usize]| {
+        let (sum, n) =
+            rows.iter().map(|&r| parts[r]).fold((0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        if n > 0.0 { (sum / n).sqrt() } else { 0.0 }
+    };
+    let interval = Bootstrap::default().interval([parts.len()], |[rows]| root(rows));
+    let rmse = Figure {
+        value: whole.rmse,
+        low: interval.map(|i| (i.low.max(0.0) - own_error).max(0.0)),
+        high: interval.map(|i| i.high + own_error),
+    };
+    let is_resolved = own_error * RESOLVED <= whole.rmse;
+    Some(PictureError { rmse, max: whole.max_abs, relmse: whole.rel_mse, is_resolved })
+}
+
+/// Mean of the squared differences of a pixel's four numbers.
+fn square(a: &[f64; 4], b: &[f64; 4]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / 4.0
+}
+
+/// Of every part of the picture the sum of the squares in it, and their number.
+fn parts(pixels: &Pixels, squares: &[f64]) -> Vec<(f64, f64)> {
+    let side = pixels.width.max(pixels.height).div_ceil(N_PARTS).max(1);
+    let columns = pixels.width.div_ceil(side) as usize;
+    let mut parts = vec![(0.0, 0.0); columns * pixels.height.div_ceil(side) as usize];
+    for ([i, j], s) in pixels.at.iter().zip(squares) {
+        let part = &mut parts[(j / side) as usize * columns + (i / side) as usize];
+        *part = (part.0 + s, part.1 + 1.0);
+    }
+    parts
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_offset_is_its_size_everywhere() {
+        let pixels = Pixels::all(24, 12);
+        let (a, b) = (vec![[0.5; 4]; 288], vec![[0.4; 4]; 288]);
+        let e = picture_error(&pixels, &a, &b, 0.0).unwrap();
+        let (low, high) = (e.rmse.low.unwrap(), e.rmse.high.unwrap());
+        assert!(
+            (e.rmse.value - 0.1).abs() < 1e-15
+                && (low - 0.1).abs() < 1e-12
+                && (high - 0.1).abs() < 1e-12
+        );
+        assert!(e.is_resolved && (e.max - 0.1).abs() < 1e-15);
+        // The reference's own error widens it, and decides what it can judge.
+        let e = picture_error(&pixels, &a, &b, 0.02).unwrap();
+        assert!(
+            (e.rmse.low.unwrap() - 0.08).abs() < 1e-12
+                && (e.rmse.high.unwrap() - 0.12).abs() < 1e-12
+        );
+        assert!(!e.is_resolved && picture_error(&pixels, &a, &b, 0.009).unwrap().is_resolved);
+    }
+
+    #[test]
+    fn what_lies_in_few_parts_is_less_certain() {
+        let pixels = Pixels::all(48, 48);
+        let zero = vec![[0.0; 4]; 48 * 48];
+        let with = |n: usize| {
+            let mut picture = zero.clone();
+            // n parts of 4 × 4 pixels, spread over the picture, each as wrong as makes the same
+            // RMSE.
+            for k in 0..n {
+                let (i, j) = (4 * (k * 5 % 12), 4 * (k / 12 * 3 % 12));
+                for y in j..j + 4 {
+                    for x in i..i + 4 {
+                        picture[y * 48 + x] = [(144.0 / n as f64).sqrt() * 0.1; 4];
+                    }
+                }
+            }
+            picture_error(&pixels, &picture, &zero, 0.0).unwrap()
+        };
+        let (few, many) = (with(3), with(36));
+        let width = |e: &PictureError| e.rmse.high.unwrap() - e.rmse.low.unwrap();
+        assert!((few.rmse.value - 0.1).abs() < 1e-12 && (many.rmse.value - 0.1).abs() < 1e-12);
+        assert!(width(&few) > 3.0 * width(&many), "{} {}", width(&few), width(&many));
+    }
+
+    #[test]
+    fn what_is_no_number_has_no_error() {
+        let pixels = Pixels::all(2, 1);
+        let (zero, bad) = ([[0.0; 4]; 2], [[0.0; 4], [f64::NAN, 0.0, 0.0, 0.0]]);
+        assert_eq!(
+            (picture_error(&pixels, &bad, &zero, 0.0), picture_error(&pixels, &zero, &bad, 0.0)),
+            (None, None)
+        );
+    }
+}

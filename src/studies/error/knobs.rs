@@ -1,0 +1,99 @@
+//! The knobs that are turned where none is named, each where it can change anything of the scene.
+
+use glam::DVec3;
+
+use crate::model::scene::{LightingMode, Scene};
+use crate::timing::cases::Axis;
+
+/// A key of scenes, and values worth comparing.
+struct Knob {
+    key: &'static str,
+    values: &'static [&'static str],
+    applies: fn(&Scene) -> bool,
+}
+
+const KNOBS: [Knob; 17] = [
+    Knob { key: "draw.path", values: &["sprites", "tiles"], applies: has_particles },
+    Knob { key: "draw.resolution", values: &["1.0", "0.5", "0.25"], applies: has_particles },
+    Knob { key: "draw.cutoff", values: &["2.0", "2.5", "3.0", "4.0"], applies: has_particles },
+    Knob {
+        key: "draw.threshold",
+        values: &["0.0", "0.001", "0.01", "0.03"],
+        applies: has_particles,
+    },
+    Knob { key: "draw.sort_bits", values: &["16", "32"], applies: has_particles },
+    Knob { key: "draw.count", values: &["all", "distance"], applies: has_particles },
+    Knob { key: "film.format", values: &["rgba8", "rgba16f", "rgba32f"], applies: |_| true },
+    Knob { key: "lighting.grid", values: &["16", "32", "64", "128"], applies: marches },
+    Knob { key: "lighting.step", values: &["0.5", "1.0", "2.0", "4.0"], applies: marches },
+    Knob { key: "lighting.facets_per_cloud", values: &["32", "128", "512", "0"], applies: marches },
+    Knob {
+        key: "lighting.mode",
+        values: &["first", "two-reflection"],
+        applies: |scene| reflections(scene) == 2,
+    },
+    Knob { key: "lighting.gather", values: &["exact", "tree"], applies: gathers },
+    Knob { key: "lighting.theta", values: &["0.2", "0.4", "0.8"], applies: gathers_from_tree },
+    Knob {
+        key: "lighting.pair_size",
+        values: &["0.25", "0.5", "1.0"],
+        applies: |s| gathers(s) && has_surfaces(s),
+    },
+    Knob {
+        key: "surface.*.subdivide",
+        values: &["[4,4]", "[6,6]", "[8,8]", "[12,12]"],
+        applies: is_lit_surface,
+    },
+    Knob { key: "lighting.bases", values: &["3", "4", "8", "16"], applies: is_glossy },
+    Knob { key: "lighting.sampling", values: &["log", "uniform"], applies: is_glossy },
+];
+
+/// The axes of a scene for which none is named.
+pub fn default_axes(scene: &Scene) -> Vec<Axis> {
+    let axis = |knob: &Knob| Axis {
+        key: knob.key.to_owned(),
+        values: knob.values.iter().map(|value| (*value).to_owned()).collect(),
+    };
+    KNOBS.iter().filter(|knob| (knob.applies)(scene)).map(axis).collect()
+}
+
+fn has_particles(scene: &Scene) -> bool {
+    scene.n_particles() > 0
+}
+
+fn has_surfaces(scene: &Scene) -> bool {
+    !scene.surfaces.is_empty()
+}
+
+/// 0 where nothing is lit.
+fn reflections(scene: &Scene) -> u32 {
+    match scene.lighting.mode {
+        LightingMode::None => 0,
+        LightingMode::First => 1,
+        LightingMode::TwoReflection => 2,
+    }
+}
+
+/// Whether light comes through a density grid.
+fn marches(scene: &Scene) -> bool {
+    reflections(scene) > 0 && has_particles(scene)
+}
+
+fn gathers(scene: &Scene) -> bool {
+    reflections(scene) == 2 && scene.n_facets() > 1
+}
+
+fn gathers_from_tree(scene: &Scene) -> bool {
+    gathers(scene) && crate::frame::exchange::gathers_from_tree(scene)
+}
+
+fn is_lit_surface(scene: &Scene) -> bool {
+    has_surfaces(scene) && reflections(scene) > 0
+}
+
+/// Whether a lobe is gathered, for which the basis is.
+fn is_glossy(scene: &Scene) -> bool {
+    let shines =
+        |i: usize| scene.region_material(i).keys.iter().any(|key| key.brdf.ks != DVec3::ZERO);
+    gathers(scene) && (0..scene.n_regions()).any(shines)
+}

@@ -67,7 +67,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     let ledger = measure(args, &bed, &scene, time_s, made, stop)?;
     if let Some(out) = &args.out {
         write(&out.join(LEDGER_FILE), &ledger)?;
-        output::write_chart(&out.join("ledger.svg"), &plot::ledger::chart(&ledger))?;
+        output::write_chart(&out.join("ledger.svg"), &charts::ledger::chart(&ledger))?;
     }
     if args.json {
         output::object(&ledger)?;

@@ -27,7 +27,7 @@ pub fn run(args: &ReportArgs) -> Result<()> {
         sources.extend(source::read(path)?);
     }
     let spinner = output::spinner("writing", args.quiet);
-    let page = report::page(&sources)?;
+    let page = pages::page(&sources)?;
     atomic::write_atomic(&args.output, |file| file.write_all(page.as_bytes()))?;
     drop(spinner);
     Ok(())

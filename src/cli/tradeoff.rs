@@ -109,7 +109,7 @@ pub fn run(
     sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
         files::write(out, &study, &found)?;
-        output::write_chart(&out.join("front.svg"), &plot::tradeoff::chart(&study))?;
+        output::write_chart(&out.join("front.svg"), &charts::tradeoff::chart(&study))?;
     }
     done?;
     print(args, color, &study)?;
@@ -151,7 +151,7 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     if !args.plot {
         return Ok(());
     }
-    let chart = plot::tradeoff::chart(study);
+    let chart = charts::tradeoff::chart(study);
     output::text(&format!(
         "\n{}",
         chart.text(output::columns(), chart.rows(), output::colored(color))?
@@ -298,15 +298,14 @@ fn reference(args: &ErrorArgs, scene: &Scene, time_s: f64, pixels: &Pixels) -> R
     let on_part = |work: Work, n: usize| {
         shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
     };
-    let folder = kept::default_folder();
-    kept::reference(args.against, scene, time_s, pixels, folder.as_deref(), &on_part).map_err(
-        |error| match error {
+    let folder = reference_cache::default_folder();
+    reference_cache::reference(args.against, scene, time_s, pixels, folder.as_deref(), &on_part)
+        .map_err(|error| match error {
             Error::Usage { what } if what.contains("textured") => {
                 Error::usage(format!("{what}, or --plain for all clouds, or --against thin"))
             }
             other => other,
-        },
-    )
+        })
 }
 
 fn metric(arg: MetricArg) -> Metric {

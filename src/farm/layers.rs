@@ -20,7 +20,7 @@ pub struct Layers {
 impl Layers {
     /// Of a scene as it is in `truth`, lit or not; its blobs end at `reach` σ.
     pub fn of(scene: &Scene, truth: &FrameReference, reach: f64) -> Layers {
-        let view = picture::view(scene, truth);
+        let view = whole::view(scene, truth);
         let origin = truth.setting.light_origin;
         let placed: Vec<Surface> =
             scene.surfaces.iter().map(|s| Surface { center: s.center - origin, ..*s }).collect();

@@ -59,7 +59,7 @@ pub fn merge(parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<u
         fs::copy(&from, &to).map_err(|cause| of_io(&to, &cause))?;
     }
     files::write(out, &study, &found)?;
-    let chart = plot::tradeoff::chart(&study);
+    let chart = charts::tradeoff::chart(&study);
     let svg = chart.svg(chart.size())?;
     write_atomic(&out.join("front.svg"), |file| std::io::Write::write_all(file, svg.as_bytes()))?;
     Ok(study.configurations.len())

@@ -4,8 +4,8 @@
 //! In: regions (rectangles), placed particles, κ, groups, density grid, order and runs. Out:
 //! position, unit normal, area, region, colour; of runs each particle's facet. Law: rectangles'
 //! grids row by row; a particle's normal against the gradient of the density smoothed to 2σ,
-//! blended to "away from the cloud's centre" where that is ill conditioned; position on the shell p
-//! + 1.5 σ n. Source: C §2.4, docs/model.md §5, §11. Error: the normal's grows as
+//! blended to "away from the cloud's centre" where that is ill conditioned; position on the shell
+//! `p + 1.5 σ n`. Source: C §2.4, docs/model.md §5, §11. The error of the normal grows as
 //! 1/(t·conditioning).
 
 use crate::error::Result;

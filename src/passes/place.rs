@@ -1,8 +1,8 @@
 //! place: where the particles are this frame.
 //!
 //! In: particles relative to their groups, group of each, groups' offsets, gust modes. Out:
-//! position relative to the lighting origin, and σ. Law: placed = s position + offset + Σ a sin(k·x
-//! + phase), s σ. Source: docs/model.md §11 to §13. Error: an ulp of the sums and of s position; of
+//! position relative to the lighting origin, and σ. Law: placed =
+//! `s position + offset + Σ a sin(k·x + phase)`, `s σ`. Source: docs/model.md §11 to §13. Error: an ulp of the sums and of s position; of
 //! each wave |a| (3.5 ulp of the sine + the argument's rounding).
 
 use crate::error::Result;

@@ -19,6 +19,7 @@ pub mod layers;
 pub mod live;
 pub mod morton;
 pub mod occlude;
+pub mod picture;
 pub mod place;
 pub mod present;
 pub mod rounding;

@@ -300,7 +300,7 @@ pub fn write_results_with(
     rows: &[FrameRow],
     beside: &Beside,
 ) -> Result<()> {
-    let mut names = beside::names_in(out_dir);
+    let mut names = companions::names_in(out_dir);
     names.extend([FRAMES_FILE, RUN_FILE].map(str::to_owned));
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     // Those that are only now made, too: RUN_FILE stays the last.

@@ -70,7 +70,7 @@ impl View {
             && same(self.position, other.position)
             && same(self.target, other.target)
             && (Arc::ptr_eq(&self.scene, &other.scene)
-                || kept::is_same(self.against, &self.exact(), &other.exact()))
+                || reference_cache::is_same(self.against, &self.exact(), &other.exact()))
     }
 }
 
@@ -321,10 +321,11 @@ impl Worker {
             desk.standing.progress = Some(Progress { work, n_done, n, n_pixels });
         };
         let folder = self.folder.as_deref();
-        let compute =
-            || kept::reference(view.against, scene, view.time_s, &pixels, folder, &listener);
+        let compute = || {
+            reference_cache::reference(view.against, scene, view.time_s, &pixels, folder, &listener)
+        };
         let found = self.pool.install(compute)?;
-        let (view, kept::Kept { reference, from_cache, .. }) = (view.clone(), found);
+        let (view, reference_cache::Kept { reference, from_cache, .. }) = (view.clone(), found);
         let known = Arc::new(Known { view, pixels, reference, from_cache });
         let mut desk = self.shared.lock();
         if self.is_wanted(wish) {

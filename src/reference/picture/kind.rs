@@ -8,17 +8,17 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 
-use crate::reference::picture::model_light::{Doubt, reflections_of, root_mean_square};
-use crate::reference::picture::model_picture::of_model;
-use crate::reference::picture::whole::{self, Drawing, Listener, Work};
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::stages::FrameReference;
 use crate::error::{Error, Result};
 use crate::model::least::Least;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
 use crate::reference::area::mean::each;
+use crate::reference::picture::model_light::{Doubt, reflections_of, root_mean_square};
+use crate::reference::picture::model_picture::of_model;
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::whole::{self, Drawing, Listener, Work};
 use crate::reference::sprites::{self, Behind, Factor, Layers, Raster, View};
 use crate::reference::volume::{Pixel, Volume};
 
@@ -113,8 +113,10 @@ impl ReferenceKind {
     /// Refuses a scene that this reference does not know.
     pub fn check(self, scene: &Scene, time_s: f64) -> Result<()> {
         let drawing = if self == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
-        picture::check(scene, time_s, drawing)?;
-        if matches!(self, ReferenceKind::Reflections(_)) && scene.lighting.mode == LightingMode::None {
+        whole::check(scene, time_s, drawing)?;
+        if matches!(self, ReferenceKind::Reflections(_))
+            && scene.lighting.mode == LightingMode::None
+        {
             return Err(Error::usage(format!(
                 "{self}: nothing reflects where lighting.mode is \"none\"; expected thin, \
                  volume or model"
@@ -143,13 +145,17 @@ impl ReferenceKind {
         };
         let drawn = match self {
             ReferenceKind::Thin | ReferenceKind::Volume => {
-                let truth =
-                    FrameReference::of_with_listener(scene, time_s, &|n| listener(Work::Lighting, n))?;
-                let drawing = if self == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
+                let truth = FrameReference::of_with_listener(scene, time_s, &|n| {
+                    listener(Work::Lighting, n)
+                })?;
+                let drawing =
+                    if self == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
                 of_scene_light(scene, &truth, drawing, pixels, Sample::CENTER, listener)
             }
             ReferenceKind::Model => of_model(scene, time_s, None, false, pixels, listener)?,
-            ReferenceKind::Reflections(k) => of_model(scene, time_s, Some(k), false, pixels, listener)?,
+            ReferenceKind::Reflections(k) => {
+                of_model(scene, time_s, Some(k), false, pixels, listener)?
+            }
         };
         let own_error = drawn.own_error();
         Ok(Reference {
@@ -219,8 +225,8 @@ pub(crate) fn of_scene_light(
     listener: Listener,
 ) -> Drawn {
     let of_light = root_mean_square(truth.second_error.iter().copied());
-    let view = View { shift: sample.shift, ..picture::view(scene, truth) };
-    let behind = picture::behind_at(scene, truth, &view, pixels);
+    let view = View { shift: sample.shift, ..whole::view(scene, truth) };
+    let behind = whole::behind_at(scene, truth, &view, pixels);
     let of_quadrature = |quadrature: f64| Doubt { quadrature, chance: 0.0 };
     let radiance = truth.particle_radiance(scene);
     if drawing == Drawing::Thin {
@@ -245,8 +251,8 @@ fn thin(
     pixels: &Pixels,
     listener: Listener,
 ) -> Vec<[f64; 4]> {
-    let (blobs, order) = picture::drawn(scene, truth);
-    let textured = picture::sheets(scene, truth, view);
+    let (blobs, order) = whole::drawn(scene, truth);
+    let textured = whole::sheets(scene, truth, view);
     let factor = |j: usize, delta: DVec2| {
         textured.as_ref().map_or(1.0, |(pool, sheets)| sheets[j].factor(pool, delta))
     };

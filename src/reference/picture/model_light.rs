@@ -6,7 +6,6 @@ use std::ops::{Add, Mul};
 
 use glam::DVec3;
 
-use crate::reference::picture::stages::{FrameReference, ground};
 use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::scene::{LightingMode, Scene};
@@ -15,6 +14,7 @@ use crate::reference::area::adaptive::Accuracy;
 use crate::reference::area::paths::Chance;
 use crate::reference::area::{Disc, Receiver, Scenery};
 use crate::reference::facets::{self, Facet};
+use crate::reference::picture::stages::{FrameReference, ground};
 use crate::reference::place;
 
 /// What a scene's light meets at one time, relative to the lighting origin.

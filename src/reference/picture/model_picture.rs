@@ -2,15 +2,15 @@
 
 use glam::DVec3;
 
-use crate::reference::picture::kind::{Drawn, Sample, of_scene_light, volume};
-use crate::reference::picture::model_light::{Doubt, Lit, Met, ModelLight};
-use crate::reference::picture::whole::{self, Drawing, Listener, Work};
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::stages::FrameReference;
 use crate::error::Result;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::mean::each;
+use crate::reference::picture::kind::{Drawn, Sample, of_scene_light, volume};
+use crate::reference::picture::model_light::{Doubt, Lit, Met, ModelLight};
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::whole::{self, Drawing, Listener, Work};
 use crate::reference::sprites::{Behind, View};
 use crate::reference::surfaces;
 use crate::reference::volume::{Pixel, Volume};
@@ -97,7 +97,7 @@ impl Model<'_> {
         sample: Sample,
         listener: Listener,
     ) -> Drawn {
-        let view = View { shift: sample.shift, ..picture::view(self.scene, self.truth) };
+        let view = View { shift: sample.shift, ..whole::view(self.scene, self.truth) };
         let (n_discs, n_parts) = (self.met.n_discs(), self.n_parts(pixels));
         let heard = |lit| {
             listener(Work::Lighting, n_parts);
@@ -177,7 +177,7 @@ impl Model<'_> {
         let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
         let doubt = Doubt::mean(ground.iter().map(|lit| lit.doubt));
         let mut picture = vec![Behind::NOTHING; pixels.tile.n_pixels()];
-        picture::ground_over(
+        whole::ground_over(
             (&mut picture, pixels.tile),
             self.scene,
             self.truth.setting.light_origin,

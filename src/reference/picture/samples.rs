@@ -7,14 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec2;
 
-use crate::reference::picture::kind::{ReferenceKind, Drawn, Sample, of_scene_light};
-use crate::reference::picture::model_light::{Lit, Met, ModelLight, root_mean_square};
-use crate::reference::picture::model_picture::Model;
-use crate::reference::picture::whole::{Drawing, Listener, Work};
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::stages::FrameReference;
 use crate::error::{Error, Result};
 use crate::model::scene::{LightingMode, Scene};
+use crate::reference::picture::kind::{Drawn, ReferenceKind, Sample, of_scene_light};
+use crate::reference::picture::model_light::{Lit, Met, ModelLight, root_mean_square};
+use crate::reference::picture::model_picture::Model;
+use crate::reference::picture::pixels::Pixels;
+use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::whole::{Drawing, Listener, Work};
 
 /// Most samples of a picture: their numbers' last digits still tell places in a pixel apart.
 pub const MOST_SAMPLES: u32 = 1 << 20;
@@ -86,11 +86,14 @@ pub fn sums(
     let n_reflections = if let ReferenceKind::Reflections(k) = of { Some(k) } else { None };
     match of {
         ReferenceKind::Thin | ReferenceKind::Volume => {
-            let truth = FrameReference::of_with_listener(scene, time_s, &|n| inner(Work::Lighting, n))?;
+            let truth =
+                FrameReference::of_with_listener(scene, time_s, &|n| inner(Work::Lighting, n))?;
             let drawing = if of == ReferenceKind::Thin { Drawing::Thin } else { Drawing::Volume };
             each(&mut |sample| of_scene_light(scene, &truth, drawing, pixels, sample, inner))?;
         }
-        ReferenceKind::Model | ReferenceKind::Reflections(_) if scene.lighting.mode == LightingMode::None => {
+        ReferenceKind::Model | ReferenceKind::Reflections(_)
+            if scene.lighting.mode == LightingMode::None =>
+        {
             let truth = FrameReference::unlit(scene, time_s)?;
             each(&mut |sample| {
                 of_scene_light(scene, &truth, Drawing::Volume, pixels, sample, inner)

@@ -3,8 +3,8 @@
 use glam::DVec3;
 
 use crate::error::Result;
-use crate::model::frame_state::FrameState;
 use crate::model::cloud::{CloudSource, Group};
+use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::light::Light;
 use crate::model::material::Brdf;

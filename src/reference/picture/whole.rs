@@ -3,8 +3,6 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::reference::picture::pixels::{Pixels, Tile};
-use crate::reference::picture::stages::FrameReference;
 use crate::error::{Error, Result};
 use crate::model::cloud::Group;
 use crate::model::count::LEAST_DRAWN;
@@ -12,6 +10,8 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::model::terrain::Terrain;
 use crate::reference::area::mean::each;
+use crate::reference::picture::pixels::{Pixels, Tile};
+use crate::reference::picture::stages::FrameReference;
 use crate::reference::sprites::{Behind, Factor, Rounding, View};
 use crate::reference::texture::{Pool, Sheet, Textured};
 use crate::reference::threshold::{self, Cut};
@@ -70,7 +70,12 @@ pub fn picture(
 }
 
 /// `scene`, lit as `truth` has it.
-pub(crate) fn draw(scene: &Scene, truth: &FrameReference, drawing: Drawing, listener: Listener) -> Picture {
+pub(crate) fn draw(
+    scene: &Scene,
+    truth: &FrameReference,
+    drawing: Drawing,
+    listener: Listener,
+) -> Picture {
     let radiance = truth.particle_radiance(scene);
     let view = view(scene, truth);
     let behind = behind(scene, truth, &view);
@@ -158,7 +163,12 @@ pub(crate) fn view(scene: &Scene, truth: &FrameReference) -> View {
 }
 
 /// [`behind`] at some pixels.
-pub(crate) fn behind_at(scene: &Scene, truth: &FrameReference, view: &View, pixels: &Pixels) -> Vec<Behind> {
+pub(crate) fn behind_at(
+    scene: &Scene,
+    truth: &FrameReference,
+    view: &View,
+    pixels: &Pixels,
+) -> Vec<Behind> {
     let (placed, facets) = facets(scene, truth);
     if scene.terrains.is_empty() {
         return surfaces::render_at(view, &placed, &facets, pixels.at.iter().copied());
@@ -226,7 +236,11 @@ pub(crate) fn ground_over(
 }
 
 /// The pool, and what every particle shows of it; nothing where the scene is plain.
-pub(crate) fn sheets(scene: &Scene, truth: &FrameReference, view: &View) -> Option<(Pool, Vec<Sheet>)> {
+pub(crate) fn sheets(
+    scene: &Scene,
+    truth: &FrameReference,
+    view: &View,
+) -> Option<(Pool, Vec<Sheet>)> {
     if !scene.is_textured() {
         return None;
     }

@@ -26,7 +26,7 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
                 something is wrong" } } }
         }
         h3 { "Rows" }
-        (chart(&plot::ledger::chart(ledger), caption)?)
+        (chart(&charts::ledger::chart(ledger), caption)?)
         (rows(ledger))
     })
 }

@@ -27,7 +27,7 @@ pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
         (provenance::section(&Made::of(&study.made, study.interrupted)))
         (reference(study))
         h3 { "Time against error" }
-        (chart(&plot::tradeoff::chart(study), caption)?)
+        (chart(&charts::tradeoff::chart(study), caption)?)
         (configurations(study))
         (best(study))
         (gallery(study, folder)?)

@@ -2,6 +2,7 @@
 //! pass and Vulkan call) and what was expected, so that a command prints it and nothing else.
 
 use std::fmt;
+use std::io;
 use std::path::{Path, PathBuf};
 
 pub type Result<T> = std::result::Result<T, Error>;
@@ -70,6 +71,33 @@ impl Error {
         Error::Io { path: path.to_owned(), what: cause.to_string() }
     }
 
+    /// Returns [`Error::Transient`] for a failure that may pass later or on another node (a full
+    /// disk, a file server that is away), and [`Error::Io`] for any other.
+    pub fn of_io(path: &Path, cause: &io::Error) -> Self {
+        use io::ErrorKind::{
+            HostUnreachable, Interrupted, NetworkDown, NetworkUnreachable, QuotaExceeded,
+            ResourceBusy, StaleNetworkFileHandle, StorageFull, TimedOut,
+        };
+        match cause.kind() {
+            StorageFull
+            | QuotaExceeded
+            | StaleNetworkFileHandle
+            | TimedOut
+            | Interrupted
+            | ResourceBusy
+            | HostUnreachable
+            | NetworkDown
+            | NetworkUnreachable => Error::transient(path, cause),
+            // A disk or a server that answers with an error: Rust has no kind for it.
+            _ if cause.raw_os_error() == Some(EIO) => Error::transient(path, cause),
+            _ => Error::io(path, cause),
+        }
+    }
+
+    fn transient(path: &Path, cause: &io::Error) -> Self {
+        Error::Transient { what: format!("{}: {cause}", path.display()) }
+    }
+
     pub fn vulkan(call: impl Into<String>, cause: impl fmt::Display) -> Self {
         Error::Vulkan { call: call.into(), what: cause.to_string() }
     }
@@ -119,6 +147,9 @@ impl Error {
         }
     }
 }
+
+/// The system's number for an I/O error, the same on every Unix.
+const EIO: i32 = 5;
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -14,31 +14,10 @@ pub fn may_pass(error: Error) -> Error {
     }
 }
 
-/// Of a file that a shard reads or writes.
+/// The error of a file that a shard reads or writes.
 pub fn of_io(path: &Path, cause: &io::Error) -> Error {
-    use io::ErrorKind::{
-        HostUnreachable, Interrupted, NetworkDown, NetworkUnreachable, QuotaExceeded, ResourceBusy,
-        StaleNetworkFileHandle, StorageFull, TimedOut,
-    };
-    let what = format!("{}: {cause}", path.display());
-    match cause.kind() {
-        StorageFull
-        | QuotaExceeded
-        | StaleNetworkFileHandle
-        | TimedOut
-        | Interrupted
-        | ResourceBusy
-        | HostUnreachable
-        | NetworkDown
-        | NetworkUnreachable => Error::Transient { what },
-        // A disk or a server that answers with an error: Rust has no kind for it.
-        _ if cause.raw_os_error() == Some(EIO) => Error::Transient { what },
-        _ => Error::io(path, cause),
-    }
+    Error::of_io(path, cause)
 }
-
-/// The same number on every Unix.
-const EIO: i32 = 5;
 
 #[cfg(test)]
 mod tests {

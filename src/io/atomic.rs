@@ -1,44 +1,54 @@
-//! Results are written beside their place and moved into it, so that a reader, a crash or Ctrl-C
-//! meets either the old file or the new one whole; [`abandon`] is what Ctrl-C has to call for that.
+//! Files that are replaced in one step.
+//!
+//! A file is written under a temporary name in its own folder and renamed into its place, so that a
+//! reader, a crash or Ctrl-C finds the old file or the new one, whole. Ctrl-C must call
+//! [`abandon`] for that. The functions whose names end in `_synced` also wait until the content
+//! and the name are on the disk, so that the file outlasts a power cut.
 
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
-use std::io::{BufWriter, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use tempfile::Builder;
 
 use crate::error::{Error, Result};
 
-/// The temporaries that exist. Files are made, renamed and removed under its lock.
+/// Paths of the temporary files and folders that exist. They are made, renamed and removed while
+/// its lock is held.
 static IN_PROGRESS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// Locks the list of temporaries; [`abandon`] waits until the lock is free.
 pub(super) fn in_progress() -> MutexGuard<'static, Vec<PathBuf>> {
-    // A list of paths is whole at every moment, so a panic beside it leaves nothing to mistrust.
+    // A panic elsewhere cannot leave a list of paths half changed.
     IN_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what is half written, and lets no thread begin or finish a file any more: the process is
-/// to end at once.
+/// Removes every temporary and keeps all threads from beginning or finishing another file. The
+/// caller must end the process at once.
 pub fn abandon() {
     let paths = in_progress();
     paths.iter().for_each(|path| remove(path));
     std::mem::forget(paths);
 }
 
-/// A file, or a folder and all in it. What cannot be removed stays: nobody is left to be told.
+/// Removes a file, or a folder with all that it holds. One that cannot be removed stays.
 fn remove(path: &Path) {
     let is_folder = fs::symlink_metadata(path).is_ok_and(|about| about.is_dir());
     let _ = if is_folder { fs::remove_dir_all(path) } else { fs::remove_file(path) };
 }
 
-/// Writes `path` with `write`. When that fails or panics the old file stays, and nothing else is
-/// left behind.
+/// Replaces the file at `path` with what `write` writes. When `write` fails or panics, the old file
+/// stays and nothing else is left behind.
+///
+/// # Errors
+/// When the place cannot hold a file, `write` fails, or the rename fails.
 pub fn write_atomic<E: Display>(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> std::result::Result<(), E>,
 ) -> Result<()> {
-    let (temporary, file) = Temporary::beside(path)?;
+    let (temporary, file) = beside(path)?;
     let mut writer = BufWriter::new(file);
     write(&mut writer).map_err(|e| Error::io(path, e))?;
     writer.flush().map_err(|e| Error::io(path, e))?;
@@ -47,74 +57,147 @@ pub fn write_atomic<E: Display>(
     fs::rename(&temporary.path, path).map_err(|e| Error::io(path, e))
 }
 
-/// An error where `path` could not be written, known before there is anything to write.
+/// Checks that [`write_atomic`] could write `path`, before there is anything to write.
+///
+/// # Errors
+/// When the folder is missing or not writable, or `path` is not a regular file.
 pub fn check_place(path: &Path) -> Result<()> {
-    Temporary::beside(path).map(drop)
+    beside(path).map(drop)
 }
 
-/// Removes its file or folder when dropped; after the rename there is none.
+/// Replaces the file at `path` with `bytes` and waits until the disk has them.
+///
+/// # Errors
+/// When the file cannot be written; [`Error::Transient`] when another try may succeed.
+pub fn write_synced(path: &Path, bytes: &[u8]) -> Result<()> {
+    put_synced(path, bytes, |temporary| fs::rename(temporary, path))
+}
+
+/// Writes `bytes` to `path`, where no file may be yet, and waits until the disk has them.
+///
+/// # Errors
+/// As [`write_synced`], and when the file exists.
+pub fn write_new_synced(path: &Path, bytes: &[u8]) -> Result<()> {
+    // A rename would replace a file that came meanwhile; a second name for a file cannot.
+    put_synced(path, bytes, |temporary| fs::hard_link(temporary, path))
+}
+
+fn put_synced(
+    path: &Path,
+    bytes: &[u8],
+    put: impl FnOnce(&Path) -> io::Result<()>,
+) -> Result<()> {
+    let written = || {
+        let (temporary, mut file) = Temporary::file(path)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        let _lock = in_progress();
+        put(&temporary.path)
+    };
+    written().map_err(|cause| Error::of_io(path, &cause))?;
+    sync(folder_of(path))
+}
+
+/// Appends a line and waits until the disk has it. One call writes the line, so that lines of
+/// several processes on one machine do not mix.
+///
+/// # Errors
+/// As [`write_synced`].
+pub fn append_synced(path: &Path, line: &str) -> Result<()> {
+    let append = |mut file: File| {
+        file.write_all(format!("{line}\n").as_bytes()).and_then(|()| file.sync_data())
+    };
+    let file = OpenOptions::new().create(true).append(true).open(path);
+    file.and_then(append).map_err(|cause| Error::of_io(path, &cause))
+}
+
+/// Waits until the disk has a file's content or the names in a folder.
+///
+/// # Errors
+/// As [`write_synced`].
+pub fn sync(path: &Path) -> Result<()> {
+    let synced = File::open(path).and_then(|file| file.sync_all());
+    synced.map_err(|cause| Error::of_io(path, &cause))
+}
+
+/// Makes a folder and those above it.
+///
+/// # Errors
+/// As [`write_synced`].
+pub fn make_folder(path: &Path) -> Result<()> {
+    fs::create_dir_all(path).map_err(|cause| Error::of_io(path, &cause))
+}
+
+/// The folder that `path` lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."))
+}
+
+fn beside(path: &Path) -> Result<(Temporary, File)> {
+    let folder = folder_of(path);
+    if path.file_name().is_none() {
+        return Err(Error::io(path, "expected a file name"));
+    }
+    if !folder.is_dir() {
+        return Err(Error::io(path, format!("the folder {} does not exist", folder.display())));
+    }
+    // Renaming over a device such as /dev/null would replace it.
+    if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
+        return Err(Error::io(path, "exists and is not a regular file"));
+    }
+    Temporary::file(path).map_err(|e| Error::io(path, format!("cannot be written: {e}")))
+}
+
+/// A temporary file or folder. Dropping it, or [`abandon`], removes what its path names then: after
+/// a rename, nothing.
 pub(super) struct Temporary {
     pub path: PathBuf,
 }
 
 impl Temporary {
-    fn beside(path: &Path) -> Result<(Temporary, File)> {
-        let Some(name) = path.file_name() else {
-            return Err(Error::io(path, "expected a file name"));
-        };
-        let folder = match path.parent() {
-            Some(folder) if folder != Path::new("") => folder,
-            _ => Path::new("."),
-        };
-        if !folder.is_dir() {
-            return Err(Error::io(path, format!("the folder {} does not exist", folder.display())));
+    /// Makes an empty file beside `path`, with a hidden name that no other process has.
+    fn file(path: &Path) -> io::Result<(Temporary, File)> {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let prefix = format!(".{name}.");
+        let mut builder = Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // As any other new file; `tempfile` alone would keep it from other users.
+            builder.permissions(fs::Permissions::from_mode(0o666));
         }
-        // Renaming over a device such as /dev/null would replace it.
-        if fs::metadata(path).is_ok_and(|about| !about.is_file()) {
-            return Err(Error::io(path, "exists and is not a regular file"));
-        }
-        let name = format!(".{}.{}.tmp", name.to_string_lossy(), unique());
-        let create = |path: &Path| OpenOptions::new().write(true).create_new(true).open(path);
-        Temporary::create(folder.join(name), create)
-            .map_err(|e| Error::io(path, format!("cannot be written: {e}")))
+        builder.prefix(&prefix).suffix(".tmp");
+        Temporary::register(|| Ok(builder.tempfile_in(folder_of(path))?.keep()?))
+            .map(|(file, temporary)| (temporary, file))
     }
 
-    /// An empty folder in `parent` for what is to become, or stand in, the folder `name`. Unlike a
-    /// file's its name is not hidden: what a killed process leaves may hold results that were just
-    /// replaced.
-    pub(super) fn folder(parent: &Path, name: &str) -> std::io::Result<Temporary> {
-        let path = parent.join(format!("{name}.{}.nimbus.tmp", unique()));
-        Temporary::create(path, |path| fs::create_dir(path)).map(|(temporary, ())| temporary)
+    /// Makes an empty folder in `parent`, which is to become the folder `name`. Its name is not
+    /// hidden, because a process that is killed may leave results in it that it has just replaced.
+    pub(super) fn folder(parent: &Path, name: &str) -> io::Result<Temporary> {
+        let prefix = format!("{name}.");
+        let mut builder = Builder::new();
+        builder.prefix(&prefix).suffix(".nimbus.tmp");
+        Temporary::register(|| Ok(((), builder.tempdir_in(parent)?.keep())))
+            .map(|((), temporary)| temporary)
     }
 
-    fn create<T>(
-        path: PathBuf,
-        create: impl FnOnce(&Path) -> std::io::Result<T>,
-    ) -> std::io::Result<(Temporary, T)> {
+    fn register<T>(make: impl FnOnce() -> io::Result<(T, PathBuf)>) -> io::Result<(T, Temporary)> {
         let mut paths = in_progress();
-        // Nothing is removed that was there before.
-        let made = create(&path)?;
+        let (made, path) = make()?;
         paths.push(path.clone());
-        Ok((Temporary { path }, made))
+        Ok((made, Temporary { path }))
     }
 
-    /// Leaves alone what lies there now; `paths` is the list, locked.
-    pub(super) fn let_go(self, paths: &mut Vec<PathBuf>) {
+    /// Keeps what lies at the path now. `paths` is the locked list of [`in_progress`].
+    pub(super) fn keep(self, paths: &mut Vec<PathBuf>) {
         paths.retain(|path| *path != self.path);
         std::mem::forget(self);
     }
 }
 
-/// Two threads of one process may write files of one name.
-fn unique() -> String {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    format!("{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed))
-}
-
 impl Drop for Temporary {
     fn drop(&mut self) {
         let mut paths = in_progress();
-        // Gone already when all went well; otherwise the error that led here is the one to report.
         remove(&self.path);
         paths.retain(|path| *path != self.path);
     }
@@ -169,5 +252,19 @@ mod tests {
         assert!(refuse(dir.path()).ends_with("exists and is not a regular file"));
         assert!(refuse(Path::new("/")).ends_with("expected a file name"));
         assert_eq!(names(dir.path()).len(), 0);
+    }
+
+    #[test]
+    fn synced_files_replace_or_refuse_the_file_that_is_there() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.json");
+        write_new_synced(&path, b"first").unwrap();
+        assert_eq!(write_new_synced(&path, b"second").unwrap_err().exit_code(), 2);
+        assert_eq!(fs::read(&path).unwrap(), b"first");
+        write_synced(&path, b"third").unwrap();
+        append_synced(&path, " line").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"third line\n");
+        assert_eq!(names(dir.path()), ["a.json"]);
+        assert!(write_synced(&dir.path().join("gone/a.json"), b"").is_err());
     }
 }

@@ -54,7 +54,7 @@ fn one_by_one(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>
                 return Err(failed(cause));
             }
             let kept = staged.path.display().to_string();
-            staged.let_go(&mut paths);
+            staged.keep(&mut paths);
             return Err(Error::io(
                 folder,
                 format!("{cause}; what was not put there is kept in {kept}"),
@@ -113,7 +113,7 @@ fn exchanged(folder: &Path, files: &[&str], write: &dyn Fn(&Path) -> Result<()>)
     }
     // What `staged` names is the old folder now.
     beside::discard(&staged.path, &folder, files);
-    staged.let_go(&mut paths);
+    staged.keep(&mut paths);
     Ok(true)
 }
 
@@ -131,7 +131,7 @@ fn moved_in(folder: &Path, write: &dyn Fn(&Path) -> Result<()>) -> Result<bool> 
     let mut paths = in_progress();
     // What came into being meanwhile is not replaced unless it is empty.
     fs::rename(&staged.path, folder).map_err(failed)?;
-    staged.let_go(&mut paths);
+    staged.keep(&mut paths);
     Ok(true)
 }
 

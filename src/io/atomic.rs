@@ -82,11 +82,7 @@ pub fn write_new_synced(path: &Path, bytes: &[u8]) -> Result<()> {
     put_synced(path, bytes, |temporary| fs::hard_link(temporary, path))
 }
 
-fn put_synced(
-    path: &Path,
-    bytes: &[u8],
-    put: impl FnOnce(&Path) -> io::Result<()>,
-) -> Result<()> {
+fn put_synced(path: &Path, bytes: &[u8], put: impl FnOnce(&Path) -> io::Result<()>) -> Result<()> {
     let written = || {
         let (temporary, mut file) = Temporary::file(path)?;
         file.write_all(bytes)?;

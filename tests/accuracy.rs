@@ -16,7 +16,7 @@ use nimbus::model::basis::{Basis, evaluate};
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::Scene;
 use nimbus::reference::area::mean::each;
-use nimbus::reference::area::{Accuracy, Estimate, Scenery};
+use nimbus::reference::area::{Accuracy, Estimate, AreaScene};
 use rooms::{Frame, HEAD, Plate, frame, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 
@@ -54,7 +54,7 @@ fn brdfs(scene: &Scene) -> Vec<Brdf> {
 /// L2 toward the eye and I_i at every `stride`-th facet's centre, from the areas.
 fn truths(scene: &Scene, eye: DVec3, stride: usize, relative: f64) -> Vec<(usize, Estimate)> {
     let brdfs = brdfs(scene);
-    let scenery = Scenery::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
+    let scenery = AreaScene::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
     let places = places(scene);
     each(places.len().div_ceil(stride), |k| {
         let (s, i) = places[k * stride];
@@ -158,7 +158,7 @@ fn what_the_lights_bring_is_right_to_rounding() {
             f.scene.lighting.sampling,
         );
         let tables: Vec<_> = brdfs.iter().map(|b| basis.lobe(b.ns)).collect();
-        let scenery = Scenery::new(&f.scene.surfaces, &brdfs, &f.scene.lights, &[], 0.0, &[]);
+        let scenery = AreaScene::new(&f.scene.surfaces, &brdfs, &f.scene.lights, &[], 0.0, &[]);
         let mut greatest = [0f64; 2];
         for (j, (s, i)) in places(&f.scene).into_iter().enumerate() {
             let at = scenery.on_surface(s, f.scene.surfaces[s].facet_center(i));

@@ -16,8 +16,8 @@ use bounded::Random;
 use glam::DVec3;
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::Scene;
-use nimbus::reference::area::paths::Chance;
-use nimbus::reference::area::{Accuracy, Receiver, Scenery};
+use nimbus::reference::area::paths::PathSampling;
+use nimbus::reference::area::{Accuracy, Receiver, AreaScene};
 use rooms::{HEAD, Plate, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 
@@ -130,7 +130,7 @@ fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3])
     let scene = room(u64::from(seed), kind);
     let brdfs: Vec<Brdf> =
         (0..scene.n_regions()).map(|i| scene.region_material(i).at(0.0)).collect();
-    let scenery = Scenery::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
+    let scenery = AreaScene::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
     let facets = scene.surfaces.iter().enumerate();
     let facets =
         facets.flat_map(|(s, surface)| (0..surface.n_facets() as u32).map(move |i| (s, i)));
@@ -140,7 +140,7 @@ fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3])
         let e = scenery.second(&at, toward, &Accuracy::relative(1e-4));
         assert!(e.error.is_finite() && e.irradiance_error.is_finite(), "{e:?}");
         let by_paths = |at: &Receiver, seed| {
-            let l = scenery.reflections(at, toward, 2, Chance { n_paths, seed, i_sample: 0 })[1];
+            let l = scenery.reflections(at, toward, 2, PathSampling { n_paths, seed, i_sample: 0 })[1];
             [l.radiance.x, l.error.x]
         };
         let what = format!("room {seed} ({kind:?}), surface {s}, facet {i}");

@@ -7,7 +7,7 @@ use std::fmt::Write;
 use nimbus::frame::choice::{Choice, Tried};
 use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
-use nimbus::model::least::Least;
+use nimbus::model::cutoff::Cutoff;
 use nimbus::model::resolution::Resolution;
 use nimbus::model::scene::{Cull, Draw, DrawPath, Scene};
 
@@ -152,7 +152,7 @@ fn where_thresholds_help_they_are_taken_within_the_error() {
     // And nothing is where there is no error.
     let none = check(&thin, 0.0, &far);
     let is_exact = |draw: &Draw| (draw.threshold, draw.smallest, draw.resolution);
-    assert_eq!(is_exact(&none.draw), (Least::NOTHING, Least::NOTHING, Resolution::Full));
+    assert_eq!(is_exact(&none.draw), (Cutoff::NONE, Cutoff::NONE, Resolution::Full));
 }
 
 #[test]
@@ -190,7 +190,7 @@ fn other_knobs_stay_what_they_are() {
     assert_eq!(auto.draw, draw);
     assert_eq!(
         (draw.path, draw.cull, draw.threshold),
-        (DrawPath::Tiles, Cull::Off, Least::Of(0.01))
+        (DrawPath::Tiles, Cull::Off, Cutoff::At(0.01))
     );
     // Errors are by what the scene asks for: its first value has none.
     let [choice] = &auto.choices[..] else { panic!("{:?}", auto.choices) };

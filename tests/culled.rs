@@ -28,7 +28,7 @@ use nimbus::model::film::FilmFormat;
 use nimbus::model::scene::Scene;
 use nimbus::model::sort_bits::SortBits;
 use nimbus::reference::sort::order;
-use nimbus::reference::sprites::{Behind, View};
+use nimbus::reference::sprites::{OpaquePixel, View};
 use nimbus::reference::threshold::cut;
 use picture::Picture;
 
@@ -221,7 +221,7 @@ fn wrong_frames_are_noticed() {
 /// Of each of a pixel's numbers how much what is left out may change it: what is met is of
 /// radiances and of nothing.
 fn changes(picture: &Picture) -> Vec<f64> {
-    let behind = vec![Behind::NOTHING; (picture.view.width * picture.view.height) as usize];
+    let behind = vec![OpaquePixel::EMPTY; (picture.view.width * picture.view.height) as usize];
     let most = picture.radiance().into_iter().fold(DVec3::ZERO, DVec3::max).to_array();
     let cut = cut(&picture.view, &behind, &picture.blobs(), None);
     cut.iter().flat_map(|c| [most[0], most[1], most[2], 1.0].map(|s| c.share() * s)).collect()

@@ -2,7 +2,7 @@
 //! blobs: random shells, moves and turns (docs/model.md §11 "impostors").
 
 use glam::{DQuat, DVec2, DVec3};
-use nimbus::model::impostor::{Far, Shell, View};
+use nimbus::model::impostor::{FarField, Shell, View};
 use nimbus::reference::impostors::{seen, shown};
 
 /// A stream of numbers in [0, 1), the same in every run.
@@ -46,7 +46,7 @@ fn case(s: &mut Stream, move_share: f64, turn_most: f64) -> (Shell, View) {
     let sigma = nearest * s.between(0.001, 0.03);
     let tangents = DVec2::new(s.between(0.2, 0.9), s.between(0.2, 0.7));
     let eye = 10.0 * s.direction();
-    let far = Far { nearest, farthest, sigma, radius: 3.0 * sigma };
+    let far = FarField { nearest, farthest, sigma, radius: 3.0 * sigma };
     let shell = Shell { view: view(eye, turn, 1.25 * tangents), far };
     let moved = nearest * move_share * s.next() * s.direction();
     let axis = s.direction();

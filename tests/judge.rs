@@ -11,7 +11,7 @@ use nimbus::frame::game::Game;
 use nimbus::frame::render::Renderer;
 use nimbus::frame::stage::{DeviceChoice, Stage};
 use nimbus::io::scene_file;
-use nimbus::model::least::Least;
+use nimbus::model::cutoff::Cutoff;
 use nimbus::model::scene::{LightingMode, Scene, Threading};
 use nimbus::reference::picture::kind::ReferenceKind;
 use nimbus::reference::picture::pixels::Pixels;
@@ -159,7 +159,7 @@ fn what_is_asked_last_is_answered() {
     // The same again, however its frames are run, is known still, and not computed again.
     let mut same = last.view.clone();
     Arc::make_mut(&mut same.scene).threads.mode = Threading::Serial;
-    Arc::make_mut(&mut same.scene).draw.threshold = Least::Of(0.1);
+    Arc::make_mut(&mut same.scene).draw.threshold = Cutoff::At(0.1);
     judge.ask(same);
     assert!(!judge.standing().works && Arc::ptr_eq(&judge.standing().known.unwrap(), &last));
     // Another light is another truth.

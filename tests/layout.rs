@@ -438,7 +438,7 @@ fn constant(text: &str, name: &str) -> Option<f64> {
 #[test]
 fn shared_constants_have_one_value() {
     let shared = [
-        ("include/shell.glsl", "LEAST_ASPECT", nimbus::model::cloud::LEAST_ASPECT),
+        ("include/shell.glsl", "MIN_ASPECT", nimbus::model::cloud::MIN_ASPECT),
         ("include/records.glsl", "FORM_CENTRED", f64::from(FORM_CENTRED)),
         ("include/records.glsl", "FORM_PRINTED", f64::from(FORM_PRINTED)),
         ("include/records.glsl", "FORM_GIVEN", f64::from(FORM_GIVEN)),

@@ -157,7 +157,7 @@ fn host_and_reference_know_the_same_lives() {
     let (disc, seed, wind) = disc(&scene(&[]));
     for time_s in [-77.7, 0.0, 3.3, 1e6, 1e9 + 0.1] {
         for i in 0..300 {
-            let host = disc.particle(seed, wind, i, disc.turn_at(time_s));
+            let host = disc.particle(seed, wind, i, disc.cycle_at(time_s));
             let truth = alive(&disc, seed, wind, i, time_s);
             assert!((host.position - truth.position).length() < 1e-12, "{i} at {time_s}");
             assert!(

@@ -17,7 +17,7 @@ use nimbus::model::cloud::SQRT_TAU;
 use nimbus::passes::cull::{self, Cull, Order};
 use nimbus::passes::sort::{NO_COUNT, Sort, TILE};
 use nimbus::reference::Blob;
-use nimbus::reference::cull::{Fate, Slack, fate};
+use nimbus::reference::cull::{CullOutcome, CullTolerance, outcome};
 use nimbus::reference::sprites::View;
 
 type Entry = [u32; 2];
@@ -163,14 +163,14 @@ impl Scene {
         }
     }
 
-    fn fates(&self) -> Vec<Fate> {
+    fn fates(&self) -> Vec<CullOutcome> {
         // ln of a product of four, each rounded, by Vulkan's 3 ulp or 2^-21; what is kept beside
         // the silhouette, and its rounding.
         let slack =
-            Slack { depth: DEPTH, log: 2f64.powi(-20), growth: 1.01e-4, pixels: 1.01 / 16.0 };
+            CullTolerance { depth: DEPTH, log: 2f64.powi(-20), growth: 1.01e-4, pixels: 1.01 / 16.0 };
         let of = |i: usize| {
             let drawn = (i as u32) < self.drawn[self.i_group[i] as usize].end;
-            if drawn { fate(&self.view, &self.blob(i), &slack) } else { Fate::Left }
+            if drawn { outcome(&self.view, &self.blob(i), &slack) } else { CullOutcome::Culled }
         };
         (0..self.placed.len()).map(of).collect()
     }
@@ -199,9 +199,9 @@ fn complaint(scene: &Scene, keys: &[u32], found: &Found) -> Option<String> {
     }
     let mut is_kept = vec![false; keys.len()];
     entries[..n].iter().for_each(|e| is_kept[e[1] as usize] = true);
-    let wrong = |(i, fate): (usize, Fate)| match (fate, is_kept[i]) {
-        (Fate::Kept, false) | (Fate::Left, true) => {
-            Some(format!("{i}: {:?} {fate:?}", scene.placed[i]))
+    let wrong = |(i, outcome): (usize, CullOutcome)| match (outcome, is_kept[i]) {
+        (CullOutcome::Kept, false) | (CullOutcome::Culled, true) => {
+            Some(format!("{i}: {:?} {outcome:?}", scene.placed[i]))
         }
         _ => None,
     };
@@ -287,7 +287,7 @@ fn no_ray_meets_what_is_left_out() {
     for seed in 1..=16 {
         let mut scene = if seed > 8 { random_ellipsoids(seed, 400) } else { random(seed, 400) };
         scene.view.smallest = 0.0;
-        for (i, fate) in scene.fates().into_iter().enumerate() {
+        for (i, outcome) in scene.fates().into_iter().enumerate() {
             let (blob, view) = (scene.blob(i), &scene.view);
             let c = blob.position - view.pose.position;
             let drawn = (i as u32) < scene.drawn[scene.i_group[i] as usize].end;
@@ -298,8 +298,8 @@ fn no_ray_meets_what_is_left_out() {
                 && c.dot(view.pose.forward) >= view.near
                 && view.cut(blob.deepest()) > 0.0
                 && pixels.into_iter().any(|(i, j)| meets(view.ray(i, j)));
-            assert!(fate != Fate::Left || !met, "seed {seed}, {i}");
-            n_left += u32::from(fate == Fate::Left);
+            assert!(outcome != CullOutcome::Culled || !met, "seed {seed}, {i}");
+            n_left += u32::from(outcome == CullOutcome::Culled);
             n_met += u32::from(met);
         }
     }

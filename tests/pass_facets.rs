@@ -10,7 +10,7 @@ use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::FacetRecord;
 use nimbus::model::cloud::runs;
-use nimbus::reference::facets::{CONDITIONING, Facet, Members, bunch, grouped};
+use nimbus::reference::facets::{CONDITIONING, Facet, FacetSources, bunch, grouped};
 use nimbus::reference::morton;
 use nimbus::reference::rounding::DIVISION_ERROR;
 use shells::{
@@ -211,7 +211,7 @@ impl Runs {
         let regions: Vec<u32> = scene.i_group.iter().map(|g| REGIONS[*g as usize]).collect();
         let colors: Vec<DVec3> =
             scene.blobs.iter().map(|b| Vec3::from(color(b)).as_dvec3()).collect();
-        let members = Members {
+        let members = FacetSources {
             blobs: &scene.blobs,
             sigma_means: &means,
             regions: &regions,
@@ -233,7 +233,7 @@ impl Runs {
 fn run_bounds(
     scene: &Scene,
     cells: &[f64],
-    m: &Members<'_>,
+    m: &FacetSources<'_>,
     run: &[u32],
     facet: &Facet,
 ) -> [f64; 4] {

@@ -9,7 +9,7 @@ use nimbus::gpu::memory::TargetFormat;
 use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
 use nimbus::layout::facet::{LitRecord, RegionRecord};
 use nimbus::layout::frame::CameraRecord;
-use nimbus::model::impostor::{Far, Shell, View};
+use nimbus::model::impostor::{FarField, Shell, View};
 use nimbus::passes::impostors::{Impostors, Shown};
 use nimbus::passes::surfaces::Surfaces;
 use nimbus::reference::impostors::{Picture, part, place_of, sample};
@@ -53,7 +53,7 @@ fn shell() -> Shell {
             f64::from(SHELL[0]) / f64::from(SIZE[0]),
             f64::from(SHELL[1]) / f64::from(SIZE[1]),
         );
-    let far = Far { nearest: 4.0, farthest: 9.0, sigma: 0.3, radius: 0.9 };
+    let far = FarField { nearest: 4.0, farthest: 9.0, sigma: 0.3, radius: 0.9 };
     Shell { view: view(EYE, DQuat::IDENTITY, tangents), far }
 }
 

@@ -16,7 +16,7 @@ use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::texture::Texture;
 use nimbus::passes::live::Live;
-use nimbus::reference::live::{Alive, alive};
+use nimbus::reference::live::{LiveParticle, alive};
 use nimbus::reference::rounding::{DIVISION_ERROR, U_F32};
 
 /// A plume: everything varies, wind and all.
@@ -90,7 +90,7 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, clouds: &[Cloud], time_s: f64) -> Vec
     let pass = Live::new(&gpu.device, compiler).unwrap();
     let groups = groups(clouds);
     let of = |(c, g): (&Cloud, &Group)| {
-        DiscRecord::new(disc_of(c), g, c.seed, c.wind, disc_of(c).turn_at(time_s))
+        DiscRecord::new(disc_of(c), g, c.seed, c.wind, disc_of(c).cycle_at(time_s))
     };
     let records: Vec<DiscRecord> = clouds.iter().zip(&groups).map(of).collect();
     let n = groups.iter().map(|g| g.n_particles as usize).sum();
@@ -104,7 +104,7 @@ fn run(gpu: &mut Gpu, compiler: &Compiler, clouds: &[Cloud], time_s: f64) -> Vec
 
 /// What the shader makes of a particle, operation by operation, each with what it rounds: position
 /// by axis, σ, κ.
-fn bounds(cloud: &Cloud, group: &Group, p: &Alive) -> ([Bounded; 3], Bounded, Bounded) {
+fn bounds(cloud: &Cloud, group: &Group, p: &LiveParticle) -> ([Bounded; 3], Bounded, Bounded) {
     let (d, once, exact) = (disc_of(cloud), Bounded::once, Bounded::exact);
     let one = exact(1.0);
     // 2u − 1 of 24 bits is exact.

@@ -71,7 +71,7 @@ fn scene(gust: Gust, growth: Growth) -> Scene {
         CloudSource::Particles(list) => {
             list.iter().map(|p| ParticleRecord::new(p, g)).collect::<Vec<_>>()
         }
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => vec![],
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Animated(_) => vec![],
     };
     let particles = clouds.iter().zip(&groups).flat_map(|(c, g)| list(c, g)).collect();
     let i_group = groups

@@ -8,7 +8,7 @@ use nimbus::gpu::Compiler;
 use nimbus::passes::SHADERS;
 use nimbus::passes::texture::{FIELD_TEXELS, N_FIELDS, POOL_TEXELS, Texture};
 use nimbus::reference::texture::{
-    Level, N_LEVELS, Pool, QUANTUM, Sheet, Textured, amplitude, mean_squares, side,
+    Level, N_LEVELS, Pool, QUANTUM, SplatTexture, Textured, amplitude, mean_squares, side,
     sum_of_amplitudes,
 };
 
@@ -243,7 +243,7 @@ fn the_factors_mean_is_one() {
                 let of = Textured { i_field, strength, seed: 5, i_box: 2 };
                 let n_places = 4000;
                 let factor = |i: u32| {
-                    let sheet = Sheet::new(&of, i, 6.0, dense / 256.0);
+                    let sheet = SplatTexture::new(&of, i, 6.0, dense / 256.0);
                     sheet.factor(pool, glam::DVec2::ZERO)
                 };
                 means.push((0..n_places).map(factor).sum::<f64>() / f64::from(n_places));

@@ -9,9 +9,9 @@ use bounded::{Random, U, greatest_ratio};
 use harness::{Gpu, assert_within_and_say};
 use nimbus::gpu::memory::{TargetFormat, has_depth24};
 use nimbus::gpu::{Buffer, Compiler};
-use nimbus::model::resolution::{ALIKE, SmallPicture};
+use nimbus::model::resolution::{ALIKE, LowResLayout};
 use nimbus::passes::upsample::{Extents, Upsample};
-use nimbus::reference::upsample::{Summed, Under, render_alike};
+use nimbus::reference::upsample::{Summed, OpaqueLayer, render_alike};
 
 const FORMATS: [TargetFormat; 3] =
     [TargetFormat::Rgba8, TargetFormat::Rgba16f, TargetFormat::Rgba32f];
@@ -54,7 +54,7 @@ fn roundoff(format: TargetFormat, value: f64) -> f64 {
 /// A small picture of blobs, and surfaces of one of a few depths in rectangles, their edges
 /// anywhere.
 struct Case {
-    small: SmallPicture,
+    small: LowResLayout,
     format: TargetFormat,
     blobs: Vec<[f64; 4]>,
     surfaces: Option<Surfaces>,
@@ -68,7 +68,7 @@ struct Surfaces {
 
 impl Case {
     fn new(size: [u32; 2], n: u32, format: TargetFormat, behind: bool, seed: u64) -> Case {
-        let small = SmallPicture::of(size, n);
+        let small = LowResLayout::of(size, n);
         let mut random = Random(seed);
         let held = |v: [f64; 4]| {
             let v = numbers(format, &stored(format, v));
@@ -158,7 +158,7 @@ impl Case {
 
     /// The picture and its bounds. A depth that is alike to a rounding may be taken either way.
     fn truth(&self) -> (Vec<f64>, Vec<f64>) {
-        let under = self.surfaces.as_ref().map(|s| Under {
+        let under = self.surfaces.as_ref().map(|s| OpaqueLayer {
             picture: &s.picture,
             depths: &s.depths,
             small_depths: &s.small_depths,

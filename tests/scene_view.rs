@@ -38,7 +38,7 @@ fn seen(loaded: &LoadedScene) -> Vec<String> {
 fn at_rest(scene: &Scene, time_s: f64) -> Scene {
     let mut scene = scene.clone();
     for cloud in &mut scene.clouds {
-        if let CloudSource::Moving(moving) = &cloud.source {
+        if let CloudSource::Animated(moving) = &cloud.source {
             cloud.source = CloudSource::Particles(moving.mover.at(time_s).unwrap().to_vec());
         }
     }

@@ -23,9 +23,9 @@ use nimbus::gpu::memory::TargetFormat;
 use nimbus::layout::particle::{DrawnRecord, TexturedRecord};
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
-use nimbus::reference::sprites::{Behind, View};
+use nimbus::reference::sprites::{OpaquePixel, View};
 use nimbus::reference::texture::Pool;
-use nimbus::reference::threshold::{Cut, cut};
+use nimbus::reference::threshold::{Omitted, cut};
 use picture::{Picture, Tiled, Way};
 use scenery::Scenery;
 
@@ -103,9 +103,9 @@ fn truth(picture: &Picture, way: Way) -> (Vec<f64>, Vec<f64>) {
     }
 }
 
-fn cut_of(picture: &Picture) -> Vec<Cut> {
-    let behind: Vec<Behind> = match &picture.scenery {
-        None => vec![Behind::NOTHING; (picture.view.width * picture.view.height) as usize],
+fn cut_of(picture: &Picture) -> Vec<Omitted> {
+    let behind: Vec<OpaquePixel> = match &picture.scenery {
+        None => vec![OpaquePixel::EMPTY; (picture.view.width * picture.view.height) as usize],
         Some(_) => picture.behind(FORMAT.1).iter().map(|c| picture.widened(c)).collect(),
     };
     let sheets = picture.sheets();
@@ -176,7 +176,7 @@ fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
 #[test]
 fn the_number_of_layers_bounds_what_is_cut() {
     let pool = Arc::new(Pool::new(4).rounded());
-    let mut most = Cut::default();
+    let mut most = Omitted::default();
     for seed in [1, 3, 5, 7, 9] {
         let picture = random(seed, &pool);
         assert!(picture.textured.is_none());
@@ -184,7 +184,7 @@ fn the_number_of_layers_bounds_what_is_cut() {
             assert!(pixel.share() <= pixel.share_of_layers(picture.view.threshold));
             most = most.most(pixel);
         }
-        assert!(cut_of(&without(&picture)).iter().all(|c| *c == Cut::default()));
+        assert!(cut_of(&without(&picture)).iter().all(|c| *c == Omitted::default()));
     }
     assert!(most.n_layers > 3 && most.tau > 0.01, "{most:?}");
 }

@@ -7,7 +7,7 @@ use glam::DVec3;
 use nimbus::io::weather::wrf::{self, Step};
 use nimbus::model::weather::columns::{at_points, of_blobs, of_cells, transmittance_rms};
 use nimbus::model::weather::grid::{Grid, Ground, Shape};
-use nimbus::model::weather::interval::{Interval, Moment};
+use nimbus::model::weather::interval::{Interval, StepClouds};
 use nimbus::model::weather::particles::{Layout, THIN, WeatherBlob};
 
 fn step(name: &str, i_step: usize) -> Step {
@@ -23,8 +23,8 @@ fn mass(grid: &Grid, extinction: &[f64]) -> f64 {
         .sum()
 }
 
-fn moment(step: &Step) -> Moment<'_> {
-    Moment { grid: &step.grid, extinction: &step.extinction }
+fn moment(step: &Step) -> StepClouds<'_> {
+    StepClouds { grid: &step.grid, extinction: &step.extinction }
 }
 
 fn blobs_of(step: &Step, n: usize, seed: u32) -> (Layout, Vec<WeatherBlob>) {

@@ -14,7 +14,7 @@ use clap::{Args as ClapArgs, ColorChoice, Parser, Subcommand, ValueEnum};
 
 use crate::io::scene_file::MAX_SIDE;
 use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::samples::MOST_SAMPLES;
+use crate::reference::picture::samples::MAX_SAMPLES;
 pub use farm::{
     CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs,
     LocalArgs, MergeArgs, PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,
@@ -406,9 +406,9 @@ fn parse_size(text: &str) -> Result<(u32, u32), String> {
 }
 
 fn parse_samples(text: &str) -> Result<u32, String> {
-    let n = text.parse().ok().filter(|n| (1..=MOST_SAMPLES).contains(n));
+    let n = text.parse().ok().filter(|n| (1..=MAX_SAMPLES).contains(n));
     n.ok_or_else(|| {
-        format!("expected a number of samples from 1 to {MOST_SAMPLES}, found \"{text}\"")
+        format!("expected a number of samples from 1 to {MAX_SAMPLES}, found \"{text}\"")
     })
 }
 

@@ -81,7 +81,7 @@ impl Played {
 /// What frame `i_frame` runs after its neighbour. None where that follows from what the host reads
 /// while it plays.
 fn plan_of(scene: &Scene, i_frame: u32) -> Result<Option<Plan>> {
-    if scene.has_movers() {
+    if scene.is_animated() {
         return Ok(None);
     }
     let scene = Arc::new(scene.exact().into_owned());

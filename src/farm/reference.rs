@@ -25,7 +25,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::reference::picture::kind::ReferenceKind;
 use crate::reference::picture::model_light::reflections_of;
 use crate::reference::picture::pixels::{Pixels, Tile};
-use crate::reference::picture::samples::{self, MOST_SAMPLES, Pairs, Subject, Sums};
+use crate::reference::picture::samples::{self, MAX_SAMPLES, Pairs, Subject, Sums};
 use crate::reference::picture::stages::FrameReference;
 use crate::timing::machine::{self, Device};
 
@@ -67,8 +67,8 @@ impl Cut {
         if [*width, *height, tile[0], tile[1]].contains(&0) {
             return Err("a picture or a tile without pixels".into());
         }
-        if !(1..=MOST_SAMPLES).contains(n_samples) {
-            return Err(format!("{n_samples} samples, expected 1 to {MOST_SAMPLES}"));
+        if !(1..=MAX_SAMPLES).contains(n_samples) {
+            return Err(format!("{n_samples} samples, expected 1 to {MAX_SAMPLES}"));
         }
         if !range.is_power_of_two() {
             return Err(format!("ranges of {range} samples, expected a power of two"));

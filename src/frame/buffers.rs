@@ -277,7 +277,7 @@ pub(super) fn box_records(scene: &Scene, groups: &[Group]) -> Vec<BoxRecord> {
                     records.push(BoxRecord::new(b, &law, i_box, groups[records.len()].i_first));
                 }
             }
-            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => {
+            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => {
                 records.push(BoxRecord::given())
             }
         }

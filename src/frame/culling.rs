@@ -39,7 +39,7 @@ impl Culling {
         }
         let (n, variant) = (
             scene.n_particles() as u32,
-            [scene.draw.count.is_some(), scene.draw.threshold.is_some(), scene.has_ellipsoids()],
+            [scene.draw.count.is_some(), scene.draw.threshold.is_active(), scene.has_ellipsoids()],
         );
         let count = |name| Buffer::new::<KeptRecord>(device, name, 1, Place::Readback);
         let counts = [count("cull.count.even")?, count("cull.count.odd")?];

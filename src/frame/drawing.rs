@@ -84,7 +84,7 @@ impl Drawing {
         let behind = scene.has_solids();
         let counted = scene.draw.count.is_some();
         let [textured, threshold, ellipsoids] =
-            [scene.is_textured(), scene.draw.threshold.is_some(), scene.has_ellipsoids()];
+            [scene.is_textured(), scene.draw.threshold.is_active(), scene.has_ellipsoids()];
         let variant = [behind, is_grouped(scene), counted, textured, threshold, ellipsoids];
         let shells = scene.draw.impostors != ImpostorMode::Off;
         let [_, of_shells @ ..] = variant;

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use crate::layout::particle::DrawnRecord;
 use crate::model::cloud::Group;
-use crate::model::count::Drawn;
+use crate::model::count::DrawnCount;
 use crate::model::frame_state::FrameState;
 use crate::model::scene::Scene;
 use crate::model::visibility::Frustum;
@@ -33,8 +33,8 @@ pub fn drawn(
             group.half_extent + DVec3::splat(group.gust_reach) + (reach - DVec3::splat(radius));
         let in_view = !culls || frustum.may_show(origin + group.center, half, radius, lengths);
         let drawn = match scene.draw.count {
-            _ if !in_view => Drawn::NOTHING,
-            None => Drawn::all(group.n_particles),
+            _ if !in_view => DrawnCount::NOTHING,
+            None => DrawnCount::all(group.n_particles),
             Some(count) => {
                 let distance = (origin + group.cloud_center).length();
                 count.drawn(group.n_particles, count.share(group.scale, distance))

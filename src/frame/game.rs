@@ -18,7 +18,7 @@ use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::{Group, heaviest_blob, mass};
+use crate::model::cloud::{Group, max_blob_mass, mass};
 use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;
@@ -185,10 +185,10 @@ impl Game {
         let mass_of =
             |p: &ParticleRecord| mass(f64::from(p.kappa), f64::from(p.sigma)) * f64::from(p.aspect);
         let moved = lived
-            .filter(|_| self.scene.has_movers())
+            .filter(|_| self.scene.is_animated())
             .map_or(0.0, |all| all.iter().map(mass_of).fold(0.0, f64::max));
         let scale = groups.iter().map(|g| g.scale.powi(3)).fold(1.0, f64::max);
-        heaviest_blob(groups).max(scale * moved)
+        max_blob_mass(groups).max(scale * moved)
     }
 
     /// Of the sort's keys.

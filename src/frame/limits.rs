@@ -19,7 +19,7 @@ use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use crate::model::resolution::{Resolution, SmallPicture};
+use crate::model::resolution::{Resolution, LowResLayout};
 use crate::model::scene::{Chunks, DrawPath, Impostors, LightingMode, MAX_CHUNKS, Scene};
 use crate::model::sums::Precision;
 use crate::model::terrain::Terrain;
@@ -222,7 +222,7 @@ fn n_small_pixels(scene: &Scene) -> u64 {
         Resolution::Auto => Resolution::Half.divisor(),
         resolution => resolution.divisor(),
     };
-    SmallPicture::of([scene.film.width, scene.film.height], n).n_pixels()
+    LowResLayout::of([scene.film.width, scene.film.height], n).n_pixels()
 }
 
 /// Whether T1 and T2 fit into `free` bytes, and T2, the greater by far, into one binding.

@@ -22,7 +22,7 @@ pub fn discs(scene: &Scene) -> impl Iterator<Item = (usize, &Cloud, &Disc)> {
 
 /// Whether some particles are other ones in every frame.
 pub fn lives(scene: &Scene) -> bool {
-    discs(scene).next().is_some() || scene.has_movers()
+    discs(scene).next().is_some() || scene.is_animated()
 }
 
 /// Whether the game thread computes those.
@@ -34,7 +34,7 @@ pub fn lives_on_host(scene: &Scene) -> bool {
 pub fn disc_records(scene: &Scene, groups: &[Group], time_s: f64) -> Vec<DiscRecord> {
     let of = |(i, cloud, disc): (usize, &Cloud, &Disc)| {
         let group = groups.iter().find(|g| g.i_cloud == i)?;
-        Some(DiscRecord::new(disc, group, cloud.seed, cloud.wind, disc.turn_at(time_s)))
+        Some(DiscRecord::new(disc, group, cloud.seed, cloud.wind, disc.cycle_at(time_s)))
     };
     discs(scene).filter_map(of).collect()
 }
@@ -49,7 +49,7 @@ pub fn lived(
 ) -> Result<Vec<ParticleRecord>> {
     let mut lived = rest.to_vec();
     for group in groups {
-        if let CloudSource::Moving(m) = &scene.clouds[group.i_cloud].source {
+        if let CloudSource::Animated(m) = &scene.clouds[group.i_cloud].source {
             let (particles, first) = (m.mover.at(time_s)?, group.i_first as usize);
             let records = &mut lived[first..first + group.n_particles as usize];
             records
@@ -59,7 +59,7 @@ pub fn lived(
         }
     }
     for (i, cloud, disc) in discs(scene) {
-        let turn = disc.turn_at(time_s);
+        let turn = disc.cycle_at(time_s);
         for group in groups.iter().filter(|g| g.i_cloud == i) {
             let first = group.i_first as usize;
             for (slot, record) in (0..).zip(&mut lived[first..first + group.n_particles as usize]) {

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3, Vec3};
 use super::packet::{Extent, Packet};
 use crate::layout::facet::{REGION_SURFACE, REGION_TERRAIN, RegionRecord};
 use crate::layout::frame::CameraRecord;
-use crate::model::impostor::{Far, Shell, View};
+use crate::model::impostor::{FarField, Shell, View};
 use crate::model::scene::Scene;
 
 /// A shell is this share of the picture's side wider at each edge.
@@ -230,7 +230,7 @@ impl Keeper {
         if least < LEAST_SIGMA * self.pixel(now) {
             return None;
         }
-        let far = Far { nearest, farthest, sigma, radius: cutoff * sigma };
+        let far = FarField { nearest, farthest, sigma, radius: cutoff * sigma };
         // The far set's sprites must be drawn whole, and stay so.
         if nearest.is_nan()
             || nearest <= (LEAST_RADII * far.radius).max(2.0 * f64::from(packet.camera.near))

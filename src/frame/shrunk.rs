@@ -12,12 +12,12 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Place, Recorder, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::film::Film;
-use crate::model::resolution::{Resolution, SmallPicture};
+use crate::model::resolution::{Resolution, LowResLayout};
 use crate::model::scene::{Draw, DrawPath, Scene};
 use crate::passes::upsample::{Extents, Upsample};
 
 pub(super) struct Shrunk {
-    small: SmallPicture,
+    small: LowResLayout,
     /// A picture of its own, smaller, whose surfaces are black, let nothing through and are nowhere
     /// in its alpha.
     pub drawing: Drawing,
@@ -38,7 +38,7 @@ impl Shrunk {
         format: TargetFormat,
     ) -> Result<Shrunk> {
         let full = [scene.film.width, scene.film.height];
-        let small = SmallPicture::of(full, scene.draw.resolution.divisor());
+        let small = LowResLayout::of(full, scene.draw.resolution.divisor());
         let film = Film { width: small.size[0], height: small.size[1], ..scene.film };
         let draw = Draw { resolution: Resolution::Full, ..scene.draw };
         let smaller = Scene { film, draw, ..scene.clone() };

@@ -39,7 +39,7 @@ pub fn kind_of(scene: &Scene, i_region: usize) -> u32 {
     // The ground's facets are to the light what a cloud's are.
     let Some(i_cloud) = i_other.checked_sub(scene.terrains.len()) else { return REGION_TERRAIN };
     match scene.clouds[i_cloud].source {
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => REGION_CLOUD,
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Animated(_) => REGION_CLOUD,
         CloudSource::Particles(_) => REGION_COLORED,
     }
 }

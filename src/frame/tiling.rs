@@ -113,7 +113,7 @@ fn variant(scene: &Scene, format: TargetFormat) -> Variant {
     Variant {
         textured: scene.is_textured(),
         ellipsoids: scene.has_ellipsoids(),
-        threshold: scene.draw.threshold.is_some(),
+        threshold: scene.draw.threshold.is_active(),
         lit: scene.lighting.mode != LightingMode::None,
         grouped: is_grouped(scene),
         weighted: scene.draw.count.is_some(),
@@ -139,7 +139,7 @@ pub fn saturated(format: FilmFormat) -> f64 {
 
 /// No blob of the scene has a greater optical depth at any time.
 fn tau_most(scene: &Scene) -> f64 {
-    if scene.has_movers() {
+    if scene.is_animated() {
         return f64::INFINITY;
     }
     let of = |g: &Group| {

@@ -105,7 +105,7 @@ pub fn beyond(cloud: &Cloud, lines: &[usize]) -> Option<String> {
         }
         CloudSource::Disc(disc) => groups.first().and_then(|group| disc_beyond(disc, group)),
         // Of a weather file whose numbers are those of air.
-        CloudSource::Moving(_) => None,
+        CloudSource::Animated(_) => None,
         CloudSource::Particles(list) => {
             let (i, heaviest) = list
                 .iter()
@@ -155,7 +155,7 @@ pub fn grown_beyond(cloud: &Cloud) -> Option<String> {
 /// Of the blobs, or the boxes' greatest blobs, that have a size; infinite where none has.
 fn least_sigma(cloud: &Cloud) -> f64 {
     let sigmas: Vec<f64> = match &cloud.source {
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => {
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Animated(_) => {
             cloud.groups(0, 0).iter().map(|g| g.sigma_max).collect()
         }
         CloudSource::Particles(list) => list.iter().map(|p| p.sigma * p.aspect.min(1.0)).collect(),

@@ -10,7 +10,7 @@ use super::magnitude::{LEAST, rounded, wrong_coordinate, wrong_size};
 use super::suggest::{did_you_mean, list, shown};
 use super::text_file::{DATA_LIMIT, line_column, read_text};
 use crate::error::{Error, Place, Result};
-use crate::model::cloud::{LEAST_ASPECT, Particle, SIGMA_PER_RADIUS};
+use crate::model::cloud::{MIN_ASPECT, Particle, SIGMA_PER_RADIUS};
 
 const COLUMNS: [&str; 10] = ["x", "y", "z", "sigma", "radius", "sigma_y", "kappa", "r", "g", "b"];
 
@@ -238,10 +238,10 @@ impl Columns {
 /// What is expected of σ along y, where `v` is none, beside `sigma` along x and z.
 fn wrong_height(v: f64, sigma: f64) -> Option<String> {
     let expected = || {
-        let [low, high] = [LEAST_ASPECT, 1.0 / LEAST_ASPECT].map(|of| rounded(of * sigma));
+        let [low, high] = [MIN_ASPECT, 1.0 / MIN_ASPECT].map(|of| rounded(of * sigma));
         format!("a number from {low} to {high}, a thousandth to a thousand times the other")
     };
-    let within = LEAST_ASPECT * (1.0 - 1e-12)..=(1.0 + 1e-12) / LEAST_ASPECT;
+    let within = MIN_ASPECT * (1.0 - 1e-12)..=(1.0 + 1e-12) / MIN_ASPECT;
     (!within.contains(&(v / sigma))).then(expected)
 }
 

@@ -20,12 +20,12 @@ use crate::error::{Error, Result};
 use crate::model::air::Air;
 use crate::model::boxes::{CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource, Facing};
-use crate::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
+use crate::model::growth::{MAX_SCALE, Growth, MIN_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 use crate::model::scene::Simulate;
 use crate::model::terrain::Terrain;
-use crate::model::texture::{Choice, GREATEST_STRENGTH, Texture};
+use crate::model::texture::{Choice, MAX_STRENGTH, Texture};
 
 /// The files that a scene names.
 pub trait Files {
@@ -191,7 +191,7 @@ pub fn read_cloud(s: &mut Section, i_cloud: usize, reader: &mut CloudReader) -> 
             if keys.speed != 0.0 {
                 // Whichever of its steps are asked for later.
                 reader.digests.push(file.digest()?);
-                CloudSource::Moving(weather_steps::moving(file, keys, seed)?)
+                CloudSource::Animated(weather_steps::moving(file, keys, seed)?)
             } else {
                 let particles = scene_weather::particles(&file, &keys, seed)?;
                 reader.digests.push(scene_weather::digest(&particles));
@@ -249,14 +249,14 @@ fn read_texture(s: &mut Section) -> Result<Texture> {
         strength: s.f64(
             "texture_strength",
             Texture::NONE.strength,
-            Bounds::Within(0.0, GREATEST_STRENGTH),
+            Bounds::Within(0.0, MAX_STRENGTH),
         )?,
     })
 }
 
 fn read_growth(s: &mut Section) -> Result<Growth> {
     Ok(Growth {
-        to: s.f64("grow_to", Growth::NONE.to, Bounds::Within(LEAST_SCALE, GREATEST_SCALE))?,
+        to: s.f64("grow_to", Growth::NONE.to, Bounds::Within(MIN_SCALE, MAX_SCALE))?,
         time_s: s.f64("grow_time_s", Growth::NONE.time_s, DIVISOR)?,
     })
 }
@@ -299,7 +299,7 @@ pub fn deal(clouds: &mut [Cloud], n: u32) -> std::result::Result<(), String> {
 fn boxes_of(cloud: &mut Cloud) -> &mut [CloudBox] {
     match &mut cloud.source {
         CloudSource::Boxes { boxes, .. } => boxes,
-        CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => &mut [],
+        CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => &mut [],
     }
 }
 

@@ -7,7 +7,7 @@ use super::scene_air::{Base, read_base};
 use super::toml_section::{Bounds, Section};
 use crate::error::Result;
 use crate::model::air::Air;
-use crate::model::disc::{Condensation, Dilution, Disc, GREATEST_SPREAD, LEAST_FADE};
+use crate::model::disc::{Condensation, Dilution, Disc, MAX_SPREAD, MIN_FADE};
 
 /// Without growth: the particles grow themselves.
 pub const KEYS: &[&str] = &[
@@ -45,9 +45,9 @@ pub const KEYS: &[&str] = &[
     "seed",
 ];
 
-const SPREAD: Bounds = Bounds::Within(0.0, GREATEST_SPREAD);
+const SPREAD: Bounds = Bounds::Within(0.0, MAX_SPREAD);
 const SHARE: Bounds = Bounds::Within(0.0, 1.0);
-const FADE: Bounds = Bounds::Within(LEAST_FADE, 1.0);
+const FADE: Bounds = Bounds::Within(MIN_FADE, 1.0);
 
 pub fn read_disc(s: &mut Section, air: &Air) -> Result<Disc> {
     Ok(Disc {

@@ -250,7 +250,7 @@ fn numbered(s: &mut Section, key: &str, name: &str, materials: &[Material]) -> R
 
 fn warn(s: &Section, material: &Material, warnings: &mut Vec<String>) {
     let (at, name) = (s.place("ks"), shown(&material.name));
-    let albedo = material.greatest_albedo();
+    let albedo = material.max_albedo();
     if albedo > 1.0 {
         warnings.push(format!(
             "{at}: material `{name}` has K_d + 4 K_s = {albedo:.3}: above 1 it can reflect more \

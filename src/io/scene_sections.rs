@@ -11,8 +11,8 @@ use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::count::Count;
 use crate::model::film::{Film, FilmFormat, ToneMap};
-use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, least_step};
-use crate::model::least::Least;
+use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
+use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{
     Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs,
@@ -151,7 +151,7 @@ pub fn read_lighting(root: &mut Section, exponents: &[f64]) -> Result<Lighting> 
             precision: s.choice("precision", "f32", &Precision::NAMES, &[])?,
         },
     };
-    let least = least_step(lighting.grid);
+    let least = min_step(lighting.grid);
     if lighting.step < least {
         let (step, grid) = (lighting.step, lighting.grid);
         let limit = format!("a march takes {MAX_MARCH_STEPS} steps at most");
@@ -221,14 +221,14 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let threshold = read_least(&mut s, "threshold", Bounds::From(0.0, 1.0))?;
     let cull = s.choice("cull", "on", &Cull::NAMES, &[])?;
     let smallest = read_least(&mut s, "smallest", Bounds::Within(0.0, 1000.0))?;
-    if smallest != Least::NOTHING && cull == Cull::Off {
+    if smallest != Cutoff::NONE && cull == Cull::Off {
         let found =
-            if let Least::Of(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
+            if let Cutoff::At(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
         return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {found}")));
     }
     let sort_bits = read_sort_bits(&mut s)?;
     let resolution = read_resolution(&mut s)?;
-    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Least::NOTHING)
+    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Cutoff::NONE)
     {
         let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
         return Err(s.fault("impostors", what.to_owned()));
@@ -288,9 +288,9 @@ fn is_auto(s: &mut Section, key: &str) -> bool {
 }
 
 /// A bound, 0 where there is none, or "auto".
-fn read_least(s: &mut Section, key: &str, bounds: Bounds) -> Result<Least> {
+fn read_least(s: &mut Section, key: &str, bounds: Bounds) -> Result<Cutoff> {
     if is_auto(s, key) {
-        return Ok(Least::Auto);
+        return Ok(Cutoff::Auto);
     }
     if let Some(text) = s.value(key).filter(|node| matches!(&node.value, Value::String(_))) {
         return Err(s.fault(
@@ -298,7 +298,7 @@ fn read_least(s: &mut Section, key: &str, bounds: Bounds) -> Result<Least> {
             format!("expected {bounds} or \"auto\", found {}", text.value.describe()),
         ));
     }
-    Ok(Least::Of(s.f64(key, 0.0, bounds)?))
+    Ok(Cutoff::At(s.f64(key, 0.0, bounds)?))
 }
 
 /// A number that there is a way to draw in, or "auto".

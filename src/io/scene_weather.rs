@@ -9,7 +9,7 @@ use super::magnitude::GREATEST;
 use super::toml_section::{Bounds, Section};
 use super::weather::wrf::{Clouds, WeatherFile};
 use crate::error::Result;
-use crate::model::cloud::{LEAST_ASPECT, Particle};
+use crate::model::cloud::{MIN_ASPECT, Particle};
 use crate::model::scene::Simulate;
 use crate::model::terrain::Terrain;
 use crate::model::weather::particles::{Layout, WeatherBlob};
@@ -109,7 +109,7 @@ pub fn particles(file: &WeatherFile, keys: &WeatherKeys, seed: u32) -> Result<Ve
 pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     let shape = DVec3::new(1.0, exaggeration, 1.0);
     let aspect =
-        (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT);
+        (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT);
     // Where the aspect is cut the mass stays.
     let kappa = blob.kappa * blob.sigma_z / (aspect * blob.sigma_xy);
     Particle {

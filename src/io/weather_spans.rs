@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use super::weather::wrf::WeatherFile;
 use crate::error::{Error, Result};
 use crate::model::weather::grid::Grid;
-use crate::model::weather::interval::{Interval, Moment};
+use crate::model::weather::interval::{Interval, StepClouds};
 use crate::model::weather::particles::{Layout, WeatherBlob};
 use crate::model::weather::steps::LONGEST_INTERPOLATED_S;
 
@@ -67,8 +67,8 @@ struct Held {
 }
 
 impl Held {
-    fn moment(&self) -> Moment<'_> {
-        Moment { grid: &self.grid, extinction: &self.extinction }
+    fn moment(&self) -> StepClouds<'_> {
+        StepClouds { grid: &self.grid, extinction: &self.extinction }
     }
 }
 

@@ -10,8 +10,8 @@ use super::scene_weather::{WeatherKeys, particle};
 use super::weather::wrf::{Step, WeatherFile};
 use super::weather_spans::{MOST_TOGETHER, Spans};
 use crate::error::Result;
-use crate::model::cloud::{LEAST_ASPECT, Particle, mass};
-use crate::model::moving::{Mover, Moving};
+use crate::model::cloud::{MIN_ASPECT, Particle, mass};
+use crate::model::animated::{Animation, AnimatedParticles};
 use crate::model::weather::particles::Layout;
 use crate::model::weather::steps::{Between, between};
 
@@ -32,7 +32,7 @@ impl fmt::Debug for Steps {
 }
 
 /// The particles of `file` from step `keys.i_step` at time 0 on, and their bounds.
-pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32) -> Result<Moving> {
+pub fn moving(file: WeatherFile, keys: WeatherKeys, seed: u32) -> Result<AnimatedParticles> {
     moving_by(file, keys, seed, MOST_TOGETHER)
 }
 
@@ -41,7 +41,7 @@ fn moving_by(
     keys: WeatherKeys,
     seed: u32,
     most_together: usize,
-) -> Result<Moving> {
+) -> Result<AnimatedParticles> {
     let times_s = file.times_s.clone().unwrap_or_else(|| vec![0.0]);
     let is_small = file.n_steps <= most_together;
     let wanted =
@@ -59,7 +59,7 @@ fn moving_by(
         first.iter().map(of).sum::<f64>() / first.len().max(1) as f64
     };
     let greatest = |of: &dyn Fn(&Particle) -> f64| first.iter().map(of).fold(0.0, f64::max);
-    Ok(Moving {
+    Ok(AnimatedParticles {
         n_particles: keys.n_particles,
         low: bounds.low,
         high: bounds.high,
@@ -113,7 +113,7 @@ impl Bounds {
     }
 }
 
-impl Mover for Steps {
+impl Animation for Steps {
     fn at(&self, time_s: f64) -> Result<Arc<Vec<Particle>>> {
         let file_s =
             self.times_s.get(self.keys.i_step).copied().unwrap_or(0.0) + self.keys.speed * time_s;
@@ -134,7 +134,7 @@ impl Steps {
     /// Within the bounds that the scene was told, with its mass.
     fn kept_to(&self, p: Particle) -> Particle {
         let sigma = p.sigma.min(self.bounds.sigma);
-        let aspect = p.aspect.min(self.bounds.sigma_y / sigma).max(LEAST_ASPECT);
+        let aspect = p.aspect.min(self.bounds.sigma_y / sigma).max(MIN_ASPECT);
         let thinner = mass(p.kappa, p.sigma) * p.aspect / (mass(1.0, sigma) * aspect);
         Particle {
             position: p.position.clamp(self.bounds.low, self.bounds.high),

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::layout::record;
 use crate::model::cloud::Group;
-use crate::model::disc::{Disc, Turn};
+use crate::model::disc::{Disc, Cycle};
 
 record! {
     /// The law of a disc's particles, in lengths that a whole period makes of speeds, and the time.
@@ -51,7 +51,7 @@ record! {
 
 impl DiscRecord {
     /// `group`: the disc's, of a cloud of `seed` in `wind`.
-    pub fn new(disc: &Disc, group: &Group, seed: u32, wind: DVec3, turn: Turn) -> Self {
+    pub fn new(disc: &Disc, group: &Group, seed: u32, wind: DVec3, turn: Cycle) -> Self {
         let condensation = disc.condensation;
         let of =
             |f: fn(&crate::model::disc::Condensation) -> f64| condensation.as_ref().map_or(0.0, f);

@@ -6,7 +6,7 @@ use crate::layout::record;
 use crate::model::camera::{Camera, Pose};
 use crate::model::film::Film;
 use crate::model::grid::GridSpec;
-use crate::model::light::{LEAST_PENUMBRA, Light, UP};
+use crate::model::light::{MIN_PENUMBRA, Light, UP};
 
 /// Kinds of [`LightRecord`]; the shaders' `LIGHT_*`.
 pub const LIGHT_DIRECTIONAL: u32 = 0;
@@ -62,7 +62,7 @@ impl LightRecord {
                 ..record
             },
             Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
-                let scale = 1.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA);
+                let scale = 1.0 / (cos_inner - cos_outer).max(MIN_PENUMBRA);
                 LightRecord {
                     toward: f32s(-direction),
                     position: f32s(position - origin),

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::layout::record;
 use crate::model::boxes::{CloudBox, Form, radius_factor};
 use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
-use crate::model::count::Drawn;
+use crate::model::count::DrawnCount;
 use crate::model::gust::Mode;
 use crate::model::texture::Texture;
 
@@ -174,7 +174,7 @@ record! {
 
 impl DrawnRecord {
     /// `i_entry`: of the group's first drawn particle.
-    pub fn new(group: &Group, drawn: &Drawn, i_entry: u32) -> Self {
+    pub fn new(group: &Group, drawn: &DrawnCount, i_entry: u32) -> Self {
         DrawnRecord {
             shift: i_entry.wrapping_sub(group.i_first),
             end: group.i_first + drawn.n,

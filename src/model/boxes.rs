@@ -75,7 +75,7 @@ pub fn mean_radius(form: Form, radius_max: f64) -> f64 {
 }
 
 /// Greatest radius a particle of the box can have.
-pub fn greatest_radius(form: Form, radius_max: f64) -> f64 {
+pub fn max_radius(form: Form, radius_max: f64) -> f64 {
     radius_factor(form, radius_max) * radius_shape_max(radius_max)
 }
 
@@ -98,11 +98,11 @@ mod tests {
     #[test]
     fn centred_radii_obey_p9_and_printed_ones_do_not() {
         for radius_max in [1e-30, 0.5, 2.1, 3.0, 40.0] {
-            let greatest = greatest_radius(Form::Centred, radius_max);
+            let greatest = max_radius(Form::Centred, radius_max);
             assert!((greatest / radius_max - 1.0).abs() < 1e-15);
         }
-        assert!(greatest_radius(Form::Printed, 2.1) > 2.1);
-        assert_eq!(greatest_radius(Form::Centred, 0.0), 0.0);
+        assert!(max_radius(Form::Printed, 2.1) > 2.1);
+        assert_eq!(max_radius(Form::Centred, 0.0), 0.0);
     }
 
     #[test]

@@ -2,18 +2,18 @@
 
 use glam::DVec3;
 
-use super::boxes::{CloudBox, Form, greatest_radius, mean_radius};
+use super::boxes::{CloudBox, Form, max_radius, mean_radius};
 use super::disc::Disc;
 use super::growth::Growth;
 use super::gust::Gust;
-use super::moving::Moving;
+use super::animated::AnimatedParticles;
 use super::texture::Texture;
 
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).
 pub const SIGMA_PER_RADIUS: f64 = 1.0 / 3.0;
 
 /// Blobs' σ along y over those along x and z are no less, nor their inverses.
-pub const LEAST_ASPECT: f64 = 1e-3;
+pub const MIN_ASPECT: f64 = 1e-3;
 
 /// √(2π): optical depth through a blob's centre is √(2π) κ σ.
 pub const SQRT_TAU: f64 = 2.506_628_274_631_000_5;
@@ -64,7 +64,7 @@ pub enum CloudSource {
     /// Particles that are born on a disc, live and are born anew.
     Disc(Disc),
     /// Those of somebody else, anew at every time.
-    Moving(Moving),
+    Animated(AnimatedParticles),
 }
 
 /// One Gaussian blob of extinction, relative to its cloud's position.
@@ -138,7 +138,7 @@ impl Cloud {
                 list.iter().map(|p| p.position).sum::<DVec3>() / list.len() as f64
             }
             CloudSource::Disc(disc) => disc.center(self.wind),
-            CloudSource::Moving(m) => 0.5 * (m.low + m.high),
+            CloudSource::Animated(m) => 0.5 * (m.low + m.high),
         }
     }
 
@@ -159,14 +159,14 @@ impl Cloud {
             }
             CloudSource::Particles(list) => list.len() as u64,
             CloudSource::Disc(disc) => u64::from(disc.n_particles),
-            CloudSource::Moving(m) => u64::from(m.n_particles),
+            CloudSource::Animated(m) => u64::from(m.n_particles),
         }
     }
 
     pub fn n_groups(&self) -> u64 {
         match &self.source {
             CloudSource::Boxes { boxes, .. } => boxes.len() as u64,
-            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => 1,
+            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => 1,
         }
     }
 
@@ -180,7 +180,7 @@ impl Cloud {
                 .iter()
                 .map(|b| {
                     let sigma_max =
-                        greatest_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
+                        max_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
                     let kappa = box_kappa(b, *form, *optical_depth, *radius_scale);
                     let group = Group {
                         i_cloud,
@@ -223,7 +223,7 @@ impl Cloud {
                     ..disc_group(disc, self.wind, i_cloud, i_first)
                 }]
             }
-            CloudSource::Moving(m) => {
+            CloudSource::Animated(m) => {
                 vec![Group {
                     cloud_center,
                     facing_from,
@@ -292,7 +292,7 @@ pub fn mass(kappa: f64, sigma: f64) -> f64 {
 }
 
 /// Bounds the mass of every blob of `groups`.
-pub fn heaviest_blob(groups: &[Group]) -> f64 {
+pub fn max_blob_mass(groups: &[Group]) -> f64 {
     groups.iter().filter(|g| g.n_particles > 0).map(|g| g.mass_max).fold(0.0, f64::max)
 }
 
@@ -351,7 +351,7 @@ fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
     }
 }
 
-fn moving_group(m: &Moving, i_cloud: usize, i_first: u32) -> Group {
+fn moving_group(m: &AnimatedParticles, i_cloud: usize, i_first: u32) -> Group {
     Group {
         i_cloud,
         i_first,
@@ -364,7 +364,7 @@ fn moving_group(m: &Moving, i_cloud: usize, i_first: u32) -> Group {
         sigma_max: m.sigma_max,
         sigma_y_max: m.sigma_y_max,
         sigma_mean: m.sigma_mean,
-        aspects: [LEAST_ASPECT, m.aspect_mean, 1.0 / LEAST_ASPECT],
+        aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,
         gust_reach: 0.0,
@@ -480,6 +480,6 @@ mod tests {
             i_material: 0,
             seed: 1,
         };
-        assert_eq!(heaviest_blob(&cloud.groups(0, 0)), mass(2.0, 1.0));
+        assert_eq!(max_blob_mass(&cloud.groups(0, 0)), mass(2.0, 1.0));
     }
 }

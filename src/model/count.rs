@@ -4,7 +4,7 @@
 /// Of a group of which fewer than this of a particle would be drawn nothing is: at 14 a, some 3900
 /// d₀, and farther. Keeps every factor within f32; with `conserve` less than this share of the
 /// group's optical depth goes at once.
-pub const LEAST_DRAWN: f64 = 1.0 / 1_048_576.0;
+pub const MIN_DRAWN: f64 = 1.0 / 1_048_576.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Count {
@@ -19,7 +19,7 @@ pub struct Count {
 
 /// What is drawn of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Drawn {
+pub struct DrawnCount {
     /// The first so many of its particles.
     pub n: u32,
     /// Factor on the κ of all.
@@ -28,11 +28,11 @@ pub struct Drawn {
     pub last_weight: f64,
 }
 
-impl Drawn {
-    pub const NOTHING: Drawn = Drawn { n: 0, kappa_scale: 1.0, last_weight: 1.0 };
+impl DrawnCount {
+    pub const NOTHING: DrawnCount = DrawnCount { n: 0, kappa_scale: 1.0, last_weight: 1.0 };
 
-    pub fn all(n: u32) -> Drawn {
-        Drawn { n, ..Drawn::NOTHING }
+    pub fn all(n: u32) -> DrawnCount {
+        DrawnCount { n, ..DrawnCount::NOTHING }
     }
 }
 
@@ -47,16 +47,16 @@ impl Count {
     }
 
     /// What is drawn of a group of `n` particles where `share` of its cloud is.
-    pub fn drawn(&self, n: u32, share: f64) -> Drawn {
+    pub fn drawn(&self, n: u32, share: f64) -> DrawnCount {
         let x = f64::from(n) * share;
-        if x.is_nan() || x < LEAST_DRAWN {
-            return Drawn::NOTHING;
+        if x.is_nan() || x < MIN_DRAWN {
+            return DrawnCount::NOTHING;
         }
         // One particle stands for all at most: below one it fades with x, where it would otherwise
         // stay as dense as all of them until it vanished.
         let kappa_scale = if self.conserve { (1.0 / share).min(f64::from(n)) } else { 1.0 };
         let n = (x.ceil() as u32).min(n);
-        Drawn { n, kappa_scale, last_weight: x - f64::from(n - 1) }
+        DrawnCount { n, kappa_scale, last_weight: x - f64::from(n - 1) }
     }
 }
 
@@ -68,14 +68,14 @@ mod tests {
 
     #[test]
     fn all_at_the_eye_fewer_beyond_and_nothing_without_end() {
-        assert_eq!(COUNT.drawn(7, COUNT.share(1.0, 0.0)), Drawn::all(7));
-        assert_eq!(COUNT.drawn(0, 1.0), Drawn::NOTHING);
+        assert_eq!(COUNT.drawn(7, COUNT.share(1.0, 0.0)), DrawnCount::all(7));
+        assert_eq!(COUNT.drawn(0, 1.0), DrawnCount::NOTHING);
         for distance in [1e6, 1e300, f64::INFINITY, f64::NAN] {
-            assert_eq!(COUNT.drawn(1000, COUNT.share(1.0, distance)), Drawn::NOTHING, "{distance}");
+            assert_eq!(COUNT.drawn(1000, COUNT.share(1.0, distance)), DrawnCount::NOTHING, "{distance}");
         }
         // As long as anything is drawn every factor is a number that f32 has.
-        let far = COUNT.drawn(1, LEAST_DRAWN);
-        assert_eq!((far.n, far.kappa_scale, far.last_weight), (1, 1.0, LEAST_DRAWN));
+        let far = COUNT.drawn(1, MIN_DRAWN);
+        assert_eq!((far.n, far.kappa_scale, far.last_weight), (1, 1.0, MIN_DRAWN));
         assert_eq!(Count { normalised: true, ..COUNT }.share(1.0, 0.0), 1.0);
         assert!(COUNT.share(10.0, 100.0) == 1.0 && COUNT.share(0.5, 0.0) == 0.125);
     }
@@ -85,7 +85,7 @@ mod tests {
         for k in 0..2000 {
             let share = f64::from(k) / 1999.0;
             let drawn = COUNT.drawn(37, share);
-            if drawn == Drawn::NOTHING {
+            if drawn == DrawnCount::NOTHING {
                 continue;
             }
             let sum = f64::from(drawn.n - 1) + drawn.last_weight;

@@ -7,10 +7,10 @@ use super::cloud::{Particle, SIGMA_PER_RADIUS, SQRT_TAU, mass};
 use super::philox::{philox4x32_10, uniform};
 
 /// Most that a size or a lifetime may vary: what is left of either is a tenth.
-pub const GREATEST_SPREAD: f64 = 0.9;
+pub const MAX_SPREAD: f64 = 0.9;
 
 /// Least share of a life that fading in or out takes: shorter, and particles would pop.
-pub const LEAST_FADE: f64 = 0.01;
+pub const MIN_FADE: f64 = 0.01;
 
 /// Second word of the Philox key and last of the counter; boxes use their number and 0, gusts and
 /// textures their own.
@@ -93,7 +93,7 @@ pub struct Disc {
 
 /// A time by a disc's period: t = (generation + phase/2³²) L.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Turn {
+pub struct Cycle {
     /// Modulo 2³².
     pub generation: u32,
     pub phase: u32,
@@ -102,13 +102,13 @@ pub struct Turn {
 impl Disc {
     /// No steps of time are lost: the remainder of a division is exact in f64, however large the
     /// time.
-    pub fn turn_at(&self, time_s: f64) -> Turn {
+    pub fn cycle_at(&self, time_s: f64) -> Cycle {
         let age = time_s.rem_euclid(self.period_s);
         let phase = (age / self.period_s * STEPS).floor();
         let n = ((time_s - age) / self.period_s).round();
         // A time just below a whole period may round to it.
         let (n, phase) = if phase < STEPS { (n, phase) } else { (n + 1.0, 0.0) };
-        Turn { generation: n.rem_euclid(STEPS) as u32, phase: phase as u32 }
+        Cycle { generation: n.rem_euclid(STEPS) as u32, phase: phase as u32 }
     }
 
     /// κ₀, of a particle that is new, has faded in and condensed.
@@ -174,7 +174,7 @@ impl Disc {
     }
 
     /// The particle in `slot` of a cloud of `seed` in `wind`, relative to the disc's centre.
-    pub fn particle(&self, seed: u32, wind: DVec3, slot: u32, turn: Turn) -> Particle {
+    pub fn particle(&self, seed: u32, wind: DVec3, slot: u32, turn: Cycle) -> Particle {
         // The places of a van der Corput sequence: any first slots are spread evenly over all ages.
         let (phase, is_next) = turn.phase.overflowing_add(slot.reverse_bits());
         let generation = turn.generation.wrapping_add(u32::from(is_next));
@@ -252,12 +252,12 @@ mod tests {
 
     #[test]
     fn time_turns_forward_and_backward_alike() {
-        let turn = |t| DISC.turn_at(t);
-        assert_eq!(turn(0.0), Turn { generation: 0, phase: 0 });
-        assert_eq!(turn(25.0), Turn { generation: 2, phase: 1 << 31 });
-        assert_eq!(turn(-2.5), Turn { generation: u32::MAX, phase: 3 << 30 });
+        let turn = |t| DISC.cycle_at(t);
+        assert_eq!(turn(0.0), Cycle { generation: 0, phase: 0 });
+        assert_eq!(turn(25.0), Cycle { generation: 2, phase: 1 << 31 });
+        assert_eq!(turn(-2.5), Cycle { generation: u32::MAX, phase: 3 << 30 });
         // Just below a whole period, nearer to it than a step.
-        assert_eq!(turn(-1e-30), Turn { generation: 0, phase: 0 });
+        assert_eq!(turn(-1e-30), Cycle { generation: 0, phase: 0 });
         // A period later everything is the same but the generation, at any time.
         for t in [-1e6, -3.3, 0.1, 1e6 + 0.1] {
             let (a, b) = (turn(t), turn(t + 10.0));
@@ -270,7 +270,7 @@ mod tests {
     #[test]
     fn a_life_by_hand() {
         // Slot 1 of phase ½ is 7 s old at 2 s, in its first generation.
-        let p = DISC.particle(3, WIND, 1, DISC.turn_at(2.0));
+        let p = DISC.particle(3, WIND, 1, DISC.cycle_at(2.0));
         let covered = 4.0 * (1.0 - (-7.0f64 / 4.0).exp());
         // A step of time is 2 ns.
         assert!((p.position.y - 0.75 * 2.0 * covered).abs() < 1e-8);
@@ -282,19 +282,19 @@ mod tests {
         assert!((birth.x.powi(2) + birth.z.powi(2)).sqrt() <= 2.0);
         // An eighth of its life before its end it is at half, whatever is diluted.
         let disc = Disc { dilution: Dilution::Depth, ..DISC };
-        let p = disc.particle(3, WIND, 0, disc.turn_at(8.75));
+        let p = disc.particle(3, WIND, 0, disc.cycle_at(8.75));
         assert!((p.kappa * p.sigma / (disc.kappa() * 0.5) - 0.5).abs() < 1e-9);
         let none = Disc { dilution: Dilution::None, ..DISC };
-        assert!((none.particle(3, WIND, 0, none.turn_at(5.0)).kappa - DISC.kappa()).abs() < 1e-15);
+        assert!((none.particle(3, WIND, 0, none.cycle_at(5.0)).kappa - DISC.kappa()).abs() < 1e-15);
     }
 
     #[test]
     fn who_is_warmer_condenses_higher() {
         let at = |lift, base| {
             let disc = Disc { condensation: Some(Condensation { base, over: 2.0, lift }), ..DISC };
-            disc.particle(3, WIND, 0, disc.turn_at(5.0)).kappa
+            disc.particle(3, WIND, 0, disc.cycle_at(5.0)).kappa
         };
-        let p = DISC.particle(3, WIND, 0, DISC.turn_at(5.0));
+        let p = DISC.particle(3, WIND, 0, DISC.cycle_at(5.0));
         let left = 2.0 * (-5.0f64 / 4.0).exp();
         assert_eq!((at(0.0, p.position.y), at(0.0, p.position.y - 2.0)), (0.0, p.kappa));
         // Half way up: S(½) = ½.
@@ -315,7 +315,7 @@ mod tests {
         let (low, high) = disc.bounds(WIND);
         let (mut least, mut greatest) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for i in 0..40_000u32 {
-            let p = disc.particle(9, WIND, i % 64, disc.turn_at(f64::from(i) * 0.37 - 200.0));
+            let p = disc.particle(9, WIND, i % 64, disc.cycle_at(f64::from(i) * 0.37 - 200.0));
             assert!(p.position.cmpge(low).all() && p.position.cmple(high).all(), "{}", p.position);
             assert!(p.sigma <= disc.sigma_max() && p.kappa <= disc.kappa());
             assert!(mass(p.kappa, p.sigma) <= disc.mass_max() * (1.0 + 1e-12));

@@ -21,7 +21,7 @@ pub const MAX_CELLS: u32 = 512;
 pub const MAX_MARCH_STEPS: u32 = 4096;
 
 /// The finest march step, in cells, of a grid of `n` cells a side.
-pub fn least_step(n: u32) -> f64 {
+pub fn min_step(n: u32) -> f64 {
     3f64.sqrt() * f64::from(n) / f64::from(MAX_MARCH_STEPS)
 }
 

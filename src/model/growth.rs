@@ -2,8 +2,8 @@
 //! time.
 
 /// Beyond these a cloud's particles would be no blobs of the scene any more, but specks or skies.
-pub const LEAST_SCALE: f64 = 1e-3;
-pub const GREATEST_SCALE: f64 = 1e3;
+pub const MIN_SCALE: f64 = 1e-3;
+pub const MAX_SCALE: f64 = 1e3;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Growth {

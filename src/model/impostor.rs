@@ -5,7 +5,7 @@ use glam::{DMat3, DVec2, DVec3};
 
 /// A view depth over what it was when the shell was made; below it no bound is given. Shells that
 /// are used again have ratios near 1, since a bound of pixels leaves the eye no long way.
-pub const LEAST_DEPTH_RATIO: f64 = 0.9;
+pub const MIN_DEPTH_RATIO: f64 = 0.9;
 
 /// Where a picture is taken from; slopes are those of rays along (right, up, forward).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +20,7 @@ pub struct View {
 
 /// What is far, as seen when its picture was made.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Far {
+pub struct FarField {
     /// View depths of its particles' centres lie between these.
     pub nearest: f64,
     pub farthest: f64,
@@ -34,12 +34,12 @@ pub struct Far {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shell {
     pub view: View,
-    pub far: Far,
+    pub far: FarField,
 }
 
 /// How far off a shell's picture is at most.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Predicted {
+pub struct PredictedError {
     /// Slopes between where a centre is shown and where it is seen.
     pub shift: f64,
     /// Share of σ between what is shown and what is seen.
@@ -50,7 +50,7 @@ pub struct Predicted {
     pub depth_ratio: f64,
 }
 
-impl Predicted {
+impl PredictedError {
     /// Slopes by which a point one σ from its blob's centre is off: there a blob is steepest.
     pub fn slopes(&self) -> f64 {
         self.shift + self.growth * self.sigma
@@ -103,12 +103,12 @@ impl Shell {
 
     /// What the shell's picture may be off by in `now`'s view; `None` where no bound is known: the
     /// eye comes near to what is far, or turns away.
-    pub fn predict(&self, now: &View) -> Option<Predicted> {
-        let Far { nearest, farthest, sigma, radius } = self.far;
+    pub fn predict(&self, now: &View) -> Option<PredictedError> {
+        let FarField { nearest, farthest, sigma, radius } = self.far;
         let (then, t, w) = (&self.view, now.eye - self.view.eye, self.inverse_depth());
         let spread = 0.5 * (1.0 / nearest - 1.0 / farthest);
         // Centres beside the view whose sprites reach into it, at least so deep.
-        let depth = LEAST_DEPTH_RATIO * nearest;
+        let depth = MIN_DEPTH_RATIO * nearest;
         let beside = |tan: f64| tan + radius / depth * (1.0 + tan * tan).sqrt();
         let [tan_x, tan_y] = now.tangents.to_array().map(beside);
         let turned = |axis: DVec3| axis.dot(then.forward);
@@ -124,7 +124,7 @@ impl Shell {
         let (plane, along) = (most / left, t.dot(now.forward).abs());
         let depth_ratio = 1.0 / plane - spread * along;
         // NaN is no bound.
-        if depth_ratio.is_nan() || depth_ratio < LEAST_DEPTH_RATIO {
+        if depth_ratio.is_nan() || depth_ratio < MIN_DEPTH_RATIO {
             return None;
         }
         let across =
@@ -134,7 +134,7 @@ impl Shell {
         let slant = (1.0 + tan_x * tan_x + tan_y * tan_y).sqrt();
         let stretch = plane * spread * along;
         let growth = stretch * slant + shift + (1.0 + stretch) * w * across;
-        Some(Predicted {
+        Some(PredictedError {
             shift,
             growth,
             sigma: sigma * slant / (nearest * depth_ratio),

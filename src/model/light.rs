@@ -30,7 +30,7 @@ pub const UP: DVec3 = DVec3::Y;
 
 /// Least difference of a spot's cosines, as KHR_lights_punctual has it: the edge of a cone without
 /// penumbra.
-pub const LEAST_PENUMBRA: f64 = 1e-3;
+pub const MIN_PENUMBRA: f64 = 1e-3;
 
 /// How a light reaches a point where nothing is in its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +62,7 @@ impl Light {
             Light::Point { position, radius, .. } => from_point(position, radius, p),
             Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
                 let arrival = from_point(position, radius, p);
-                let width = (cos_inner - cos_outer).max(LEAST_PENUMBRA);
+                let width = (cos_inner - cos_outer).max(MIN_PENUMBRA);
                 let share = ((-arrival.toward.dot(direction) - cos_outer) / width).clamp(0.0, 1.0);
                 Arrival { falloff: arrival.falloff * share * share, ..arrival }
             }

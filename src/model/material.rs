@@ -60,7 +60,7 @@ impl Material {
     /// The greatest K_d + 4 K_s over channels and time: above 1 the material can reflect more than
     /// it receives (model.md §5: with γ from the half vector the lobe's albedo tends to 4 K_s
     /// cos²θ).
-    pub fn greatest_albedo(&self) -> f64 {
+    pub fn max_albedo(&self) -> f64 {
         self.keys.iter().map(|k| (k.brdf.kd + 4.0 * k.brdf.ks).max_element()).fold(0.0, f64::max)
     }
 }
@@ -101,7 +101,7 @@ mod tests {
         assert!(
             material.is_edited()
                 && material.is_glossy()
-                && (material.greatest_albedo() - 1.5).abs() < 1e-15
+                && (material.max_albedo() - 1.5).abs() < 1e-15
         );
     }
 

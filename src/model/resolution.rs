@@ -49,18 +49,18 @@ impl Resolution {
 /// A smaller picture about the same centre, with a margin, so that every full pixel has all of its
 /// taps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SmallPicture {
+pub struct LowResLayout {
     pub full: [u32; 2],
     pub size: [u32; 2],
     /// Full pixels along a side of a small one.
     pub n: u32,
 }
 
-impl SmallPicture {
+impl LowResLayout {
     /// For `full` pixels; `n` full ones along a side of a small one, an even number.
-    pub fn of(full: [u32; 2], n: u32) -> SmallPicture {
+    pub fn of(full: [u32; 2], n: u32) -> LowResLayout {
         let size = full.map(|pixels| (pixels.div_ceil(n) + N_TAPS).next_multiple_of(ALIGNED));
-        SmallPicture { full, size, n }
+        LowResLayout { full, size, n }
     }
 
     /// Full pixel p sits at (o + 2p)/2n small pixels from the centre of the first one.
@@ -87,7 +87,7 @@ mod tests {
     fn every_pixel_has_its_taps_and_the_centres_coincide() {
         for n in [2, 4] {
             for width in 1..70 {
-                let small = SmallPicture::of([width, 1], n);
+                let small = LowResLayout::of([width, 1], n);
                 let (o, size) = (small.offsets()[0], small.size[0]);
                 // The first tap is two before the pixel's own, the last one three after it.
                 assert!(o / (2 * n) >= 2, "{width}/{n}");
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn the_view_grows_with_the_margin() {
         // 1280/2 + 6 = 646, the next multiple of 4 is 648, as wide as 1296 full pixels.
-        let small = SmallPicture::of([1280, 720], 2);
+        let small = LowResLayout::of([1280, 720], 2);
         assert_eq!((small.size, small.offsets()), ([648, 368], [15, 15]));
         assert_eq!(small.widening(), DVec2::new(1296.0 / 1280.0, 736.0 / 720.0));
     }

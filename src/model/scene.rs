@@ -8,14 +8,14 @@ use glam::{DVec2, DVec3};
 use super::air::Air;
 use super::basis::Sampling;
 use super::camera::Camera;
-use super::cloud::{Cloud, CloudSource, Group, LEAST_ASPECT, runs};
+use super::cloud::{Cloud, CloudSource, Group, MIN_ASPECT, runs};
 use super::count::Count;
 use super::film::Film;
 use super::grid::GridSpec;
-use super::least::Least;
+use super::cutoff::Cutoff;
 use super::light::Light;
 use super::material::Material;
-use super::resolution::{Resolution, SmallPicture};
+use super::resolution::{Resolution, LowResLayout};
 use super::sort_bits::SortBits;
 use super::sums::Sums;
 use super::surface::Surface;
@@ -204,10 +204,10 @@ pub struct Draw {
     /// Sprites end at this many σ.
     pub cutoff: f64,
     /// And where their optical depth falls under this.
-    pub threshold: Least,
+    pub threshold: Cutoff,
     pub cull: Cull,
     /// Where particles are left out, also those whose σ is narrower than so many pixels.
-    pub smallest: Least,
+    pub smallest: Cutoff,
     pub sort_bits: SortBits,
     /// How many particles are drawn of a cloud; `None`: all.
     pub count: Option<Count>,
@@ -220,7 +220,7 @@ pub struct Draw {
 impl Draw {
     /// With what changes nothing in place of every "auto".
     pub fn exact(self) -> Draw {
-        let least = |l: Least| Least::Of(l.bound());
+        let least = |l: Cutoff| Cutoff::At(l.bound());
         Draw {
             path: if self.path == DrawPath::Auto { DrawPath::Sprites } else { self.path },
             chunks: if self.chunks == Chunks::Auto { Chunks::Of(0) } else { self.chunks },
@@ -309,20 +309,20 @@ impl Scene {
     pub fn widening(&self) -> DVec2 {
         match self.draw.resolution.divisor() {
             1 => DVec2::ONE,
-            n => SmallPicture::of([self.film.width, self.film.height], n).widening(),
+            n => LowResLayout::of([self.film.width, self.film.height], n).widening(),
         }
     }
 
     /// Whether somebody else moves some particles.
-    pub fn has_movers(&self) -> bool {
-        self.clouds.iter().any(|c| matches!(c.source, CloudSource::Moving(_)))
+    pub fn is_animated(&self) -> bool {
+        self.clouds.iter().any(|c| matches!(c.source, CloudSource::Animated(_)))
     }
 
     /// Whether some blobs are no balls.
     pub fn has_ellipsoids(&self) -> bool {
         let of = |c: &Cloud| match c.source {
             CloudSource::Particles(_) => c.groups(0, 0).iter().any(Group::has_ellipsoids),
-            CloudSource::Moving(_) => true,
+            CloudSource::Animated(_) => true,
             CloudSource::Boxes { .. } | CloudSource::Disc(_) => false,
         };
         self.clouds.iter().any(of)
@@ -343,7 +343,7 @@ impl Scene {
         let n: f64 = groups.iter().map(|g| f64::from(g.n_particles)).sum();
         let mean = groups.iter().map(|g| f64::from(g.n_particles) * g.aspects[1]).sum::<f64>() / n;
         let flat = extent.y / extent.x.max(extent.z);
-        if flat > 0.0 { mean.min(flat) } else { mean }.clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT)
+        if flat > 0.0 { mean.min(flat) } else { mean }.clamp(MIN_ASPECT, 1.0 / MIN_ASPECT)
     }
 
     /// Whether some cloud's particles have textures.

@@ -4,7 +4,7 @@
 pub const N_FIELDS: u32 = 8;
 
 /// Greatest `texture_strength`: n is at most 8, and exp(4 · 8) is far from f32's end.
-pub const GREATEST_STRENGTH: f64 = 4.0;
+pub const MAX_STRENGTH: f64 = 4.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Texture {

@@ -28,7 +28,7 @@ use crate::model::surface::Surface;
 
 /// A cloud's facet, diffuse.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Disc {
+pub struct DiscFacet {
     pub position: DVec3,
     pub normal: DVec3,
     pub area: f64,
@@ -53,12 +53,12 @@ enum Reach {
 }
 
 /// All that light meets.
-pub struct Scenery<'a> {
+pub struct AreaScene<'a> {
     pub lights: &'a [Light],
     pub blobs: &'a [Blob],
     /// g of model.md §8.
     pub forward: f64,
-    pub discs: &'a [Disc],
+    pub discs: &'a [DiscFacet],
     rects: Vec<Rect>,
     brdfs: Vec<Brdf>,
     pieces: Vec<Vec<Piece>>,
@@ -82,7 +82,7 @@ impl Receiver {
     }
 }
 
-impl<'a> Scenery<'a> {
+impl<'a> AreaScene<'a> {
     /// `brdfs` by surface.
     pub fn new(
         surfaces: &[Surface],
@@ -90,11 +90,11 @@ impl<'a> Scenery<'a> {
         lights: &'a [Light],
         blobs: &'a [Blob],
         forward: f64,
-        discs: &'a [Disc],
+        discs: &'a [DiscFacet],
     ) -> Self {
         let rects: Vec<Rect> = surfaces.iter().map(Rect::of).collect();
         let brdfs = brdfs.to_vec();
-        let mut scenery = Scenery {
+        let mut scenery = AreaScene {
             lights,
             blobs,
             forward,
@@ -152,7 +152,7 @@ impl<'a> Scenery<'a> {
     }
 
     pub fn on_disc(&self, i: usize) -> Receiver {
-        let Disc { position, normal, kd, .. } = self.discs[i];
+        let DiscFacet { position, normal, kd, .. } = self.discs[i];
         Receiver { position, normal, brdf: Brdf { kd, ks: DVec3::ZERO, ns: 0.0 }, i_disc: Some(i) }
     }
 
@@ -322,7 +322,7 @@ fn reflected(
 
 /// The light that a receiver sees and reflects, over the surfaces' areas.
 struct Seen<'s, 'a> {
-    scenery: &'s Scenery<'a>,
+    scenery: &'s AreaScene<'a>,
     at: &'s Receiver,
     toward: DVec3,
     /// Surface, and the lights that reach the piece.
@@ -368,7 +368,7 @@ pub fn form_factor(surface: &Surface, p: DVec3, normal: DVec3, accuracy: &Accura
     // A lamp of uniform radiance 1: white under a sky that lights everything with π.
     let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
     let white = Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 0.0 };
-    let mut scenery = Scenery::new(&[*surface], &[white], &sky, &[], 0.0, &[]);
+    let mut scenery = AreaScene::new(&[*surface], &[white], &sky, &[], 0.0, &[]);
     scenery.pieces[0] = vec![Piece { polygon: WHOLE.to_vec(), lit: vec![(0, Reach::Shaded)] }];
     let e = scenery.second(&Receiver::new(p, normal, white), normal, accuracy);
     (e.irradiance.x * FRAC_1_PI, e.irradiance_error * FRAC_1_PI)

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::sprites::Behind;
+use super::sprites::OpaquePixel;
 use super::tiles::{Composed, Composition, U, render_by};
 
 /// C ← C + (1 − A) α L, A ← A + (1 − A) α: the device keeps A, so what passes is off by a share of
@@ -29,7 +29,7 @@ fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
 }
 
 /// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
-pub fn render_over(of: &Composition<'_>, behind: &[Behind]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
     let (values, mut bounds) = render_by(of, behind, under);
     // It is blended over what stands behind in no fewer bits than the film's: source and factor are
     // rounded, too.
@@ -77,7 +77,7 @@ mod tests {
         blobs: &[Blob],
         colors: &[DVec3],
         rounding: Rounding,
-        behind: Behind,
+        behind: OpaquePixel,
     ) -> ([f64; 4], [f64; 4]) {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
         let of = Composition {
@@ -98,7 +98,7 @@ mod tests {
         // τ = ln 2 and ln 4: opacities 1/2 (near, red) and 3/4 (far, green), over blue.
         let (blobs, colors) =
             ([layer(4.0, 4f64.ln()), layer(2.0, 2f64.ln())], [DVec3::Y, DVec3::X]);
-        let behind = Behind { color: [0.0, 0.0, 1.0, 1.0], ..Behind::NOTHING };
+        let behind = OpaquePixel { color: [0.0, 0.0, 1.0, 1.0], ..OpaquePixel::EMPTY };
         let (value, bound) = drawn(&blobs, &colors, Rounding::NONE, behind);
         for (v, by_hand) in value.iter().zip([0.5, 0.375, 0.125, 1.0]) {
             assert!((v - by_hand).abs() < 1e-15, "{value:?}");
@@ -116,7 +116,7 @@ mod tests {
         let taus: Vec<f64> = (0..n).map(|i| 1e-3 * (1.0 + f64::from(i % 7))).collect();
         let blobs: Vec<Blob> = taus.iter().rev().map(|tau| layer(3.0, *tau)).collect();
         let (value, bound) =
-            drawn(&blobs, &vec![DVec3::ONE; n as usize], Rounding::NONE, Behind::NOTHING);
+            drawn(&blobs, &vec![DVec3::ONE; n as usize], Rounding::NONE, OpaquePixel::EMPTY);
         let (mut c, mut a) = (0f32, 0f32);
         for tau in &taus {
             let alpha = (-libm::expm1(-tau)) as f32;

@@ -8,16 +8,16 @@ use super::sprites::View;
 
 /// What a GPU may do with a particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fate {
+pub enum CullOutcome {
     Kept,
-    Left,
+    Culled,
     /// So near to a decision that rounding, or what is kept for its sake, makes it.
-    Either,
+    Uncertain,
 }
 
 /// How far a decision may be off.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Slack {
+pub struct CullTolerance {
     /// Of a view depth, as a share of the distance.
     pub depth: f64,
     /// Of ln(τ₀/t).
@@ -28,24 +28,24 @@ pub struct Slack {
     pub pixels: f64,
 }
 
-impl Slack {
-    pub const NONE: Slack = Slack { depth: 0.0, log: 0.0, growth: 0.0, pixels: 0.0 };
+impl CullTolerance {
+    pub const NONE: CullTolerance = CullTolerance { depth: 0.0, log: 0.0, growth: 0.0, pixels: 0.0 };
 }
 
 /// What may become of `blob`, κ with its weights.
-pub fn fate(view: &View, blob: &Blob, slack: &Slack) -> Fate {
+pub fn outcome(view: &View, blob: &Blob, slack: &CullTolerance) -> CullOutcome {
     // The silhouette is never taken to be smaller.
-    let certain = Slack { depth: -slack.depth, log: -slack.log, growth: 0.0, pixels: 0.0 };
+    let certain = CullTolerance { depth: -slack.depth, log: -slack.log, growth: 0.0, pixels: 0.0 };
     match (shows(view, blob, &certain), shows(view, blob, slack)) {
-        (true, _) => Fate::Kept,
-        (false, false) => Fate::Left,
-        (false, true) => Fate::Either,
+        (true, _) => CullOutcome::Kept,
+        (false, false) => CullOutcome::Culled,
+        (false, true) => CullOutcome::Uncertain,
     }
 }
 
 /// Whether `blob` can show where every decision is moved by `slack` toward "yes". A comparison with
 /// what is no number is "no".
-fn shows(view: &View, blob: &Blob, slack: &Slack) -> bool {
+fn shows(view: &View, blob: &Blob, slack: &CullTolerance) -> bool {
     let c = blob.position - view.pose.position;
     let (depth, off) = (c.dot(view.pose.forward), slack.depth * c.length());
     let (above, off_size) = view.above_smallest(blob, c, slack.depth);
@@ -90,32 +90,32 @@ mod tests {
         shift: glam::DVec2::ZERO,
     };
 
-    fn of(x: f64, y: f64, z: f64, sigma: f64) -> Fate {
-        fate(
+    fn of(x: f64, y: f64, z: f64, sigma: f64) -> CullOutcome {
+        outcome(
             &VIEW,
             &Blob { aspect: 1.0, position: DVec3::new(x, y, -z), sigma, kappa: 1.0 },
-            &Slack::NONE,
+            &CullTolerance::NONE,
         )
     }
 
     #[test]
     fn silhouettes_that_hold_a_centre_are_kept() {
         // Between four centres, and around one of them: at depth 10 a slope of ¼ is 2.5.
-        assert_eq!((of(0.0, 0.0, 10.0, 0.1), of(2.5, -2.5, 10.0, 0.1)), (Fate::Left, Fate::Kept));
+        assert_eq!((of(0.0, 0.0, 10.0, 0.1), of(2.5, -2.5, 10.0, 0.1)), (CullOutcome::Culled, CullOutcome::Kept));
         // Reaches from 0 to the centres at ±¼: asin(3σ/10) = atan ¼, 3σ = 10/√17.
         let sigma = 10.0 / 17f64.sqrt() / 3.0;
         assert_eq!(
             (of(0.0, 0.0, 10.0, 0.999 * sigma), of(0.0, 0.0, 10.0, 1.001 * sigma)),
-            (Fate::Left, Fate::Kept)
+            (CullOutcome::Culled, CullOutcome::Kept)
         );
         // Beside the picture, before the near plane, behind the eye, around it.
         assert_eq!(
             [of(9.0, 2.5, 10.0, 0.1), of(0.1, 0.1, 0.4, 0.1), of(2.5, 2.5, -10.0, 9.0)],
-            [Fate::Left; 3]
+            [CullOutcome::Culled; 3]
         );
-        assert_eq!([of(0.1, 0.0, 0.5, 1.0), of(30.0, 0.0, 1.0, 11.0)], [Fate::Kept; 2]);
-        assert_eq!([of(f64::NAN, 0.0, 10.0, 1.0), of(2.5, 2.5, 10.0, 0.0)], [Fate::Left; 2]);
-        assert_eq!(of(2.5, 2.5, 10.0, f64::INFINITY), Fate::Kept);
+        assert_eq!([of(0.1, 0.0, 0.5, 1.0), of(30.0, 0.0, 1.0, 11.0)], [CullOutcome::Kept; 2]);
+        assert_eq!([of(f64::NAN, 0.0, 10.0, 1.0), of(2.5, 2.5, 10.0, 0.0)], [CullOutcome::Culled; 2]);
+        assert_eq!(of(2.5, 2.5, 10.0, f64::INFINITY), CullOutcome::Kept);
     }
 
     #[test]
@@ -123,20 +123,20 @@ mod tests {
         let blob =
             Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
         let of = |view: View, slack: f64| {
-            fate(&view, &blob, &Slack { depth: slack, log: slack, growth: slack, pixels: slack })
+            outcome(&view, &blob, &CullTolerance { depth: slack, log: slack, growth: slack, pixels: slack })
         };
         let tau = crate::model::cloud::SQRT_TAU;
         let thin = |share: f64| View { threshold: share * tau, ..VIEW };
-        assert_eq!((of(thin(0.999), 0.0), of(thin(1.001), 0.0)), (Fate::Kept, Fate::Left));
-        assert_eq!((of(thin(0.999), 0.01), of(thin(1.001), 0.01)), (Fate::Either, Fate::Either));
+        assert_eq!((of(thin(0.999), 0.0), of(thin(1.001), 0.0)), (CullOutcome::Kept, CullOutcome::Culled));
+        assert_eq!((of(thin(0.999), 0.01), of(thin(1.001), 0.01)), (CullOutcome::Uncertain, CullOutcome::Uncertain));
         // A pixel at depth 10 is 5 wide, σ a fifth of that.
         let small = |smallest: f64| View { smallest, ..VIEW };
-        assert_eq!((of(small(0.199), 0.0), of(small(0.201), 0.0)), (Fate::Kept, Fate::Left));
-        assert_eq!((of(small(0.199), 0.01), of(small(0.201), 0.01)), (Fate::Either, Fate::Either));
+        assert_eq!((of(small(0.199), 0.0), of(small(0.201), 0.0)), (CullOutcome::Kept, CullOutcome::Culled));
+        assert_eq!((of(small(0.199), 0.01), of(small(0.201), 0.01)), (CullOutcome::Uncertain, CullOutcome::Uncertain));
         let near = |near: f64| View { near, ..VIEW };
         assert_eq!(
             (of(near(9.99), 0.0), of(near(10.01), 0.0), of(near(10.01), 0.01)),
-            (Fate::Kept, Fate::Left, Fate::Either)
+            (CullOutcome::Kept, CullOutcome::Culled, CullOutcome::Uncertain)
         );
     }
 }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use super::Blob;
 use super::area::mean::each;
 use super::grid::{density, sample};
-use crate::model::cloud::{LEAST_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
+use crate::model::cloud::{MIN_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
 /// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard
@@ -165,7 +165,7 @@ fn facet_of(
 /// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for
 /// [`facets`].
 #[derive(Debug, Clone, Copy)]
-pub struct Members<'a> {
+pub struct FacetSources<'a> {
     pub blobs: &'a [Blob],
     pub sigma_means: &'a [f64],
     pub regions: &'a [u32],
@@ -174,7 +174,7 @@ pub struct Members<'a> {
 
 /// What a run of particles is as one blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Bunch {
+pub struct MergedBlob {
     /// p̄ = Σ m p/Σ m, m = κσ³a.
     pub position: DVec3,
     /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m); where some blobs are ellipsoids √(Σ m (σ² + (x² +
@@ -198,7 +198,7 @@ fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 /// The particles `run` as one; `ellipsoids`: some of the scene's blobs are no balls.
-pub fn bunch(m: &Members<'_>, run: &[u32], ellipsoids: bool) -> Bunch {
+pub fn bunch(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob {
     let at = |i: &u32| m.blobs[*i as usize];
     let by_mass = weights(run.iter().map(|i| at(i).mass()));
     let areas: Vec<f64> = run.iter().map(|i| area(&at(i))).collect();
@@ -220,14 +220,14 @@ pub fn bunch(m: &Members<'_>, run: &[u32], ellipsoids: bool) -> Bunch {
             (
                 wide,
                 if wide > 0.0 {
-                    (high / wide).clamp(LEAST_ASPECT, 1.0 / LEAST_ASPECT)
+                    (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT)
                 } else {
                     1.0
                 },
             )
         }
     };
-    Bunch {
+    MergedBlob {
         position,
         sigma,
         aspect,
@@ -241,7 +241,7 @@ pub fn bunch(m: &Members<'_>, run: &[u32], ellipsoids: bool) -> Bunch {
 pub fn grouped(
     spec: &GridSpec,
     cells: &[f64],
-    members: &Members<'_>,
+    members: &FacetSources<'_>,
     cloud_centers: &[DVec3],
     order: &[u32],
     runs: &[(u64, u64)],
@@ -399,7 +399,7 @@ mod tests {
         let blobs =
             [blob(0.0, 1.0, 2.0), blob(5.0, 2.0, 1.0), blob(1.0, 0.0, 1.0), blob(3.0, 1.0, 0.0)];
         let colors = [DVec3::X, DVec3::Y, DVec3::ZERO, DVec3::ONE];
-        let members = Members {
+        let members = FacetSources {
             blobs: &blobs,
             sigma_means: &[1.0, 6.0, 2.0, 4.0],
             regions: &[0; 4],
@@ -437,7 +437,7 @@ mod tests {
         let centers = [DVec3::Y, DVec3::Z];
         let colors = [DVec3::X; 3];
         let members =
-            Members { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
+            FacetSources { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
         let single = facets(&SPEC, &cells, &blobs, &means, &regions, &centers);
         let of_runs =
             grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);

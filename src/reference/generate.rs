@@ -179,7 +179,7 @@ pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
             let groups = cloud.groups(0, 0);
             list.iter().map(|p| given(p, groups.first())).collect()
         }
-        CloudSource::Disc(_) | CloudSource::Moving(_) => super::live::cloud(cloud, 0.0),
+        CloudSource::Disc(_) | CloudSource::Animated(_) => super::live::cloud(cloud, 0.0),
     }
 }
 

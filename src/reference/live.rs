@@ -34,7 +34,7 @@ pub fn age(period_s: f64, time_s: f64, i: u32) -> Age {
 
 /// A particle of a disc, with what it was born with: for the laws that tests hold it to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alive {
+pub struct LiveParticle {
     pub age: Age,
     /// u₁ … u₇.
     pub u: [f64; 7],
@@ -51,7 +51,7 @@ pub struct Alive {
 }
 
 /// Slot `i` of a disc whose cloud has `seed` and `wind`.
-pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> Alive {
+pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> LiveParticle {
     let age = age(disc.period_s, time_s, i);
     let words = |k| philox4x32_10([seed, STREAM], [i, age.generation, k, STREAM]).map(uniform);
     let ([u1, u2, u3, u4], [u5, u6, u7, _]) = (words(0), words(1));
@@ -82,7 +82,7 @@ pub fn alive(disc: &Disc, seed: u32, wind: DVec3, i: u32, time_s: f64) -> Alive 
         None => 1.0,
     };
     let kappa = kappa_0 * diluted * faded * condensed;
-    Alive {
+    LiveParticle {
         age,
         u: [u1, u2, u3, u4, u5, u6, u7],
         birth,
@@ -110,7 +110,7 @@ pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
     let groups = cloud.groups(0, 0);
     let disc = match &cloud.source {
         CloudSource::Disc(disc) => disc,
-        CloudSource::Moving(m) => {
+        CloudSource::Animated(m) => {
             let particles = m.mover.at(time_s).unwrap_or_default();
             return particles.iter().map(|p| generate::given(p, groups.first())).collect();
         }

@@ -50,7 +50,7 @@ pub struct Rounding {
 
 /// What stands behind the sprites in a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Behind {
+pub struct OpaquePixel {
     pub color: [f64; 4],
     /// Per channel, what the target may differ from it.
     pub bound: [f64; 4],
@@ -60,9 +60,9 @@ pub struct Behind {
     pub depth_bound: f64,
 }
 
-impl Behind {
-    pub const NOTHING: Behind =
-        Behind { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
+impl OpaquePixel {
+    pub const EMPTY: OpaquePixel =
+        OpaquePixel { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
 }
 
 impl Rounding {
@@ -85,13 +85,13 @@ impl Rounding {
         Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
 
     /// What the target holds of an opaque colour.
-    pub fn stored(&self, behind: Behind) -> Behind {
+    pub fn stored(&self, behind: OpaquePixel) -> OpaquePixel {
         if self.step == 0.0 {
             return behind;
         }
         let color = behind.color.map(|v| v.clamp(0.0, 1.0));
         // To one of the two steps beside it.
-        Behind { color, bound: behind.bound.map(|e| e + self.step), ..behind }
+        OpaquePixel { color, bound: behind.bound.map(|e| e + self.step), ..behind }
     }
 }
 
@@ -164,8 +164,8 @@ struct Layered {
     behind: (f64, f64),
 }
 
-impl From<&Behind> for Layered {
-    fn from(b: &Behind) -> Layered {
+impl From<&OpaquePixel> for Layered {
+    fn from(b: &OpaquePixel) -> Layered {
         Layered { value: b.color, bound: b.bound, behind: (b.depth, b.depth_bound) }
     }
 }
@@ -223,14 +223,14 @@ pub fn render_with_bound(
     order: &[u32],
     rounding: &Rounding,
 ) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    let nothing = vec![Behind::NOTHING; view.width as usize * view.height as usize];
+    let nothing = vec![OpaquePixel::EMPTY; view.width as usize * view.height as usize];
     render_over(view, &nothing, blobs, radiance, order, rounding)
 }
 
 /// The same over `behind`, a pixel each.
 pub fn render_over(
     view: &View,
-    behind: &[Behind],
+    behind: &[OpaquePixel],
     blobs: &[Blob],
     radiance: &[DVec3],
     order: &[u32],
@@ -246,7 +246,7 @@ pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
 /// The same with a factor on each blob's τ.
 pub fn render_textured(
     view: &View,
-    behind: &[Behind],
+    behind: &[OpaquePixel],
     blobs: &[Blob],
     radiance: &[DVec3],
     order: &[u32],
@@ -308,7 +308,7 @@ pub struct Raster<'a> {
 pub fn render_at(
     view: &View,
     raster: &Raster<'_>,
-    behind: &[Behind],
+    behind: &[OpaquePixel],
     layers: &Layers<'_>,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<[f64; 4]> {
@@ -469,7 +469,7 @@ mod tests {
         let (blobs, colors) = ([at(2.0), at(4.0)], [DVec3::X, DVec3::Y]);
         let over = |depth: f64, depth_bound: f64| {
             let behind =
-                Behind { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..Behind::NOTHING };
+                OpaquePixel { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..OpaquePixel::EMPTY };
             let (value, bound) =
                 render_over(&VIEW, &[behind], &blobs, &colors, &[1, 0], &Rounding::NONE);
             (value[0], bound[0])

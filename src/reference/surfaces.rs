@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 
-use super::sprites::{Behind, View};
+use super::sprites::{OpaquePixel, View};
 use crate::model::surface::Surface;
 
 /// Where a ray meets a rectangle.
@@ -61,7 +61,7 @@ pub fn radiance(surface: &Surface, facets: &[DVec3], hit: &Hit) -> DVec3 {
 }
 
 /// Picture of `surfaces`; `facets`: the radiance of all their facets, surface after surface.
-pub fn render(view: &View, surfaces: &[Surface], facets: &[DVec3]) -> Vec<Behind> {
+pub fn render(view: &View, surfaces: &[Surface], facets: &[DVec3]) -> Vec<OpaquePixel> {
     let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| [i, j]));
     render_at(view, surfaces, facets, rows)
 }
@@ -72,7 +72,7 @@ pub fn render_at(
     surfaces: &[Surface],
     facets: &[DVec3],
     at: impl Iterator<Item = [u32; 2]>,
-) -> Vec<Behind> {
+) -> Vec<OpaquePixel> {
     at.map(|[i, j]| pixel(view, surfaces, facets, view.ray(i, j))).collect()
 }
 
@@ -84,12 +84,12 @@ pub fn seen(view: &View, surfaces: &[Surface], ray: DVec3) -> Option<(usize, Hit
     hits.reduce(|nearest, next| if next.1.depth <= nearest.1.depth { next } else { nearest })
 }
 
-fn pixel(view: &View, surfaces: &[Surface], facets: &[DVec3], ray: DVec3) -> Behind {
-    let Some((i, hit)) = seen(view, surfaces, ray) else { return Behind::NOTHING };
+fn pixel(view: &View, surfaces: &[Surface], facets: &[DVec3], ray: DVec3) -> OpaquePixel {
+    let Some((i, hit)) = seen(view, surfaces, ray) else { return OpaquePixel::EMPTY };
     let i_first: usize = surfaces[..i].iter().map(|s| s.n_facets() as usize).sum();
     let of = &facets[i_first..][..surfaces[i].n_facets() as usize];
     let color = radiance(&surfaces[i], of, &hit).extend(1.0).to_array();
-    Behind { color, depth: hit.depth, ..Behind::NOTHING }
+    OpaquePixel { color, depth: hit.depth, ..OpaquePixel::EMPTY }
 }
 
 #[cfg(test)]

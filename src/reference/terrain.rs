@@ -5,7 +5,7 @@
 use glam::{DVec2, DVec3};
 
 use super::facets::Facet;
-use super::sprites::{Behind, View};
+use super::sprites::{OpaquePixel, View};
 use super::surfaces::{Hit, meet};
 use crate::model::surface::Surface;
 use crate::model::terrain::{HALVES, Terrain};
@@ -25,15 +25,15 @@ pub fn facets(terrain: &Terrain, origin: DVec3, region: u32) -> Vec<Facet> {
 
 /// Half of a cell: corner + s u + t v, where s, t ≥ 0 and s + t ≤ 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Half {
+pub struct Triangle {
     /// Its plane: the corner, u and v.
     plane: Surface,
     /// At the corner, at the end of u, at the end of v.
     radiance: [DVec3; 3],
 }
 
-impl Half {
-    pub fn new(points: [DVec3; 3], radiance: [DVec3; 3]) -> Half {
+impl Triangle {
+    pub fn new(points: [DVec3; 3], radiance: [DVec3; 3]) -> Triangle {
         let [center, along, across] = points;
         let plane = Surface {
             center,
@@ -42,17 +42,17 @@ impl Half {
             i_material: 0,
             subdivide: [1, 1],
         };
-        Half { plane, radiance }
+        Triangle { plane, radiance }
     }
 
     /// Those of `terrain`, whose points are where `terrain.origin` puts them; `radiance` by its
     /// points.
-    pub fn of<'a>(terrain: &'a Terrain, radiance: &'a [DVec3]) -> impl Iterator<Item = Half> + 'a {
+    pub fn of<'a>(terrain: &'a Terrain, radiance: &'a [DVec3]) -> impl Iterator<Item = Triangle> + 'a {
         let of_cell = move |i: u64| {
             let corners = terrain.corners(i as u32);
             HALVES.map(|half| {
                 let numbers = half.map(|k| corners[k]);
-                Half::new(
+                Triangle::new(
                     numbers.map(|k| terrain.origin + terrain.points[k]),
                     numbers.map(|k| radiance[k]),
                 )
@@ -89,7 +89,7 @@ impl Half {
     }
 
     /// What the ray through a pixel sees of it.
-    pub fn seen(&self, view: &View, ray: DVec3) -> Option<Behind> {
+    pub fn seen(&self, view: &View, ray: DVec3) -> Option<OpaquePixel> {
         self.hit(view, ray).map(|hit| self.shown(&hit))
     }
 
@@ -106,9 +106,9 @@ impl Half {
     }
 
     /// What is seen where a ray meets it so.
-    pub fn shown(&self, hit: &Hit) -> Behind {
+    pub fn shown(&self, hit: &Hit) -> OpaquePixel {
         let color = self.radiance(hit).extend(1.0).to_array();
-        Behind { color, depth: hit.depth, ..Behind::NOTHING }
+        OpaquePixel { color, depth: hit.depth, ..OpaquePixel::EMPTY }
     }
 
     /// Columns and rows of pixels that may see it: (first, end) of each, `margin` pixels more on
@@ -149,7 +149,7 @@ pub type Window = [(u32, u32); 2];
 /// Lays over `picture`, the pixels of `window` row by row, what is nearer of `terrain`, whose
 /// points are where its origin puts them; `radiance` by its points.
 pub fn render_over(
-    (picture, window): (&mut [Behind], Window),
+    (picture, window): (&mut [OpaquePixel], Window),
     view: &View,
     terrain: &Terrain,
     radiance: &[DVec3],
@@ -157,7 +157,7 @@ pub fn render_over(
     let [(first_column, end_column), (first_row, end_row)] = window;
     /// Rounding of a corner's place in pixels must not leave a pixel out; the hit decides.
     const MARGIN: f64 = 1e-6;
-    for half in Half::of(terrain, radiance) {
+    for half in Triangle::of(terrain, radiance) {
         let [(left, right), (top, bottom)] = half.pixels(view, MARGIN);
         for j in top.max(first_row)..bottom.min(end_row) {
             for i in left.max(first_column)..right.min(end_column) {
@@ -214,8 +214,8 @@ mod tests {
         }
     }
 
-    fn picture(view: &View, terrain: &Terrain, radiance: &[DVec3]) -> Vec<Behind> {
-        let mut picture = vec![Behind::NOTHING; 9];
+    fn picture(view: &View, terrain: &Terrain, radiance: &[DVec3]) -> Vec<OpaquePixel> {
+        let mut picture = vec![OpaquePixel::EMPTY; 9];
         render_over((&mut picture, [(0, view.width), (0, view.height)]), view, terrain, radiance);
         picture
     }
@@ -256,7 +256,7 @@ mod tests {
         // At x = 1 half of the middle's radiance.
         assert!((seen[4].color[0] - 4.0).abs() < 1e-13 && (seen[5].color[0] - 2.0).abs() < 1e-13);
         // What was nearer stays, what was farther goes.
-        let before = |depth: f64| Behind { color: [9.0; 4], depth, ..Behind::NOTHING };
+        let before = |depth: f64| OpaquePixel { color: [9.0; 4], depth, ..OpaquePixel::EMPTY };
         let mut over = vec![before(1.25); 9];
         render_over((&mut over, [(0, 3), (0, 3)]), &from_above(), &hill, &radiance);
         assert!(over[4].depth < 1.25 && over[5].color == [9.0; 4]);

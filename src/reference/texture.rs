@@ -226,7 +226,7 @@ pub struct Textured {
 
 /// What one splat shows of the pool.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sheet {
+pub struct SplatTexture {
     pub i_field: usize,
     pub strength: f64,
     /// Level l, and the share of n_{l+1}.
@@ -239,9 +239,9 @@ pub struct Sheet {
     pub z_in_sigma: f64,
 }
 
-impl Sheet {
+impl SplatTexture {
     /// Of particle `i` of its box; `pixel` is the difference of slopes from a pixel to the next.
-    pub fn new(of: &Textured, i: u32, z_in_sigma: f64, pixel: f64) -> Sheet {
+    pub fn new(of: &Textured, i: u32, z_in_sigma: f64, pixel: f64) -> SplatTexture {
         let words = philox4x32_10([of.seed, of.i_box], [i, 0, 0, STREAM]);
         let [u, v, w, _] = words.map(uniform);
         // Texels of level 0 in a pixel.
@@ -250,7 +250,7 @@ impl Sheet {
         let level = (0..N_LEVELS).rev().find(|l| dense >= (1 << l) as f64).unwrap_or(0);
         let fade = (dense / (1 << level) as f64 - 1.0).min(1.0);
         let (angle, shift) = (TAU * u - PI, DVec2::new(v, w));
-        Sheet {
+        SplatTexture {
             i_field: of.i_field as usize,
             strength: of.strength,
             level,
@@ -324,18 +324,18 @@ mod tests {
         let of = Textured { i_field: 3, strength: 2.0, seed: 1, i_box: 0 };
         // A period is 6 σ: at z = 60 σ a slope of 0.1, of 0.1/pixel pixels, 256 texels.
         let at = |pixels: f64| {
-            let sheet = Sheet::new(&of, 0, 60.0, 0.1 / pixels);
+            let sheet = SplatTexture::new(&of, 0, 60.0, 0.1 / pixels);
             (sheet.level, (sheet.fade * 1e9).round() / 1e9)
         };
         assert_eq!([at(1000.0), at(256.0), at(128.0)], [(0, 0.0), (0, 0.0), (1, 0.0)]);
         assert_eq!([at(170.0 + 2.0 / 3.0), at(8.0), at(6.4)], [(0, 0.5), (5, 0.0), (5, 0.25)]);
         assert_eq!([at(4.0), at(0.01)], [(5, 1.0), (5, 1.0)]);
         // Nothing is left at the end, and nothing subtracted for it.
-        assert_eq!(Sheet::new(&of, 0, 60.0, 0.1).half_square(), 0.0);
-        let sheet = Sheet {
+        assert_eq!(SplatTexture::new(&of, 0, 60.0, 0.1).half_square(), 0.0);
+        let sheet = SplatTexture {
             angle: std::f64::consts::FRAC_PI_2,
             shift: DVec2::new(0.5, 0.25),
-            ..Sheet::new(&of, 0, 60.0, 1e-9)
+            ..SplatTexture::new(&of, 0, 60.0, 1e-9)
         };
         // A quarter turn: right becomes up; 0.025 · 60/6 = ¼ of a period.
         assert!((sheet.place(DVec2::new(0.025, 0.0)) - DVec2::new(128.0, 128.0)).length() < 1e-9);

@@ -3,18 +3,18 @@
 //! and their optical depth.
 
 use super::Blob;
-use super::sprites::{Behind, Factor, View};
+use super::sprites::{OpaquePixel, Factor, View};
 
 /// What is cut of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Cut {
+pub struct Omitted {
     /// Sprites that would be drawn there without the threshold and whatever their size.
     pub n_layers: u32,
     /// Their optical depth together.
     pub tau: f64,
 }
 
-impl Cut {
+impl Omitted {
     /// A pixel's channel changes by at most this share of the greatest difference between two
     /// radiances that it can meet.
     pub fn share(&self) -> f64 {
@@ -27,14 +27,14 @@ impl Cut {
     }
 
     /// No pixel of either has more layers or a greater depth.
-    pub fn most(self, other: Cut) -> Cut {
-        Cut { n_layers: self.n_layers.max(other.n_layers), tau: self.tau.max(other.tau) }
+    pub fn most(self, other: Omitted) -> Omitted {
+        Omitted { n_layers: self.n_layers.max(other.n_layers), tau: self.tau.max(other.tau) }
     }
 }
 
 /// The picture's pixels before `behind`. `factor` on each blob's τ, as its texture has it.
-pub fn cut(view: &View, behind: &[Behind], blobs: &[Blob], factor: Option<Factor<'_>>) -> Vec<Cut> {
-    let mut pixels = vec![Cut::default(); behind.len()];
+pub fn cut(view: &View, behind: &[OpaquePixel], blobs: &[Blob], factor: Option<Factor<'_>>) -> Vec<Omitted> {
+    let mut pixels = vec![Omitted::default(); behind.len()];
     let whole = View { threshold: 0.0, smallest: 0.0, ..*view };
     for (k, blob) in blobs.iter().enumerate() {
         let c = blob.position - view.pose.position;
@@ -98,9 +98,9 @@ mod tests {
             kappa: tau / SQRT_TAU,
         };
         let of = |blobs: &[Blob], depth: f64| {
-            cut(&view, &[Behind { depth, ..Behind::NOTHING }; 3], blobs, None)
+            cut(&view, &[OpaquePixel { depth, ..OpaquePixel::EMPTY }; 3], blobs, None)
         };
-        let nothing = Cut::default();
+        let nothing = Omitted::default();
         // τ = 0.2/e there: below the threshold. 0.3/e: not. 0.09: nowhere above it.
         let [left, middle, right] = of(&[blob(0.2), blob(0.3), blob(0.09)], 9.0)[..] else {
             panic!("three pixels")
@@ -117,7 +117,7 @@ mod tests {
         // Pixels are one slope wide, σ = 1 at depth 2 half of one.
         let of = |smallest: f64| {
             let view = View { threshold: 0.0, smallest, ..view };
-            cut(&view, &[Behind::NOTHING; 3], &[blob(0.2)], None)
+            cut(&view, &[OpaquePixel::EMPTY; 3], &[blob(0.2)], None)
                 .iter()
                 .map(|c| c.n_layers)
                 .sum::<u32>()

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::{Behind, Factor, Rounding, View, alpha};
+use super::sprites::{OpaquePixel, Factor, Rounding, View, alpha};
 
 /// Unit round-off of f32.
 pub(super) const U: f64 = 1.0 / 16_777_216.0;
@@ -47,7 +47,7 @@ impl Composed {
     /// Over what stands behind: the pixel, and its bound. `most`: the brightest radiance there is.
     fn over(
         &self,
-        under: &Behind,
+        under: &OpaquePixel,
         r: &Rounding,
         saturated: f64,
         most: f64,
@@ -93,26 +93,26 @@ pub struct Composition<'a> {
 }
 
 /// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
-pub fn render_over(of: &Composition<'_>, behind: &[Behind]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
     render_by(of, behind, Composed::under)
 }
 
 /// The same where a device composes by another form of the law, with errors of its own.
 pub(super) fn render_by(
     of: &Composition<'_>,
-    behind: &[Behind],
+    behind: &[OpaquePixel],
     layer: Layer,
 ) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
     let (view, most) =
         (of.view, of.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));
-    let pixel = |(i_pixel, under): (usize, &Behind)| {
+    let pixel = |(i_pixel, under): (usize, &OpaquePixel)| {
         let (i, j) = (i_pixel as u32 % view.width, i_pixel as u32 / view.width);
         compose(of, view.ray(i, j), under, layer).over(under, &of.rounding, of.saturated, most)
     };
     behind.iter().enumerate().map(pixel).unzip()
 }
 
-fn compose(of: &Composition<'_>, ray: DVec3, under: &Behind, layer: Layer) -> Composed {
+fn compose(of: &Composition<'_>, ray: DVec3, under: &OpaquePixel, layer: Layer) -> Composed {
     let Composition { view, blobs, radiance, order, factor, rounding: r, .. } = of;
     let mut pixel =
         Composed { color: DVec3::ZERO, passed: 1.0, off_color: DVec3::ZERO, off_passed: 0.0 };
@@ -177,8 +177,8 @@ mod tests {
         };
         let (blobs, colors) =
             ([at(0.1, 2.0, 0.7), at(-0.2, 4.0, 3.0)], [DVec3::X, DVec3::new(0.2, 1.0, 2.0)]);
-        let under = Behind { color: [0.0, 0.0, 1.0, 1.0], depth: 3.0, ..Behind::NOTHING };
-        for under in [Behind::NOTHING, Behind { depth: 9.0, ..under }, under] {
+        let under = OpaquePixel { color: [0.0, 0.0, 1.0, 1.0], depth: 3.0, ..OpaquePixel::EMPTY };
+        for under in [OpaquePixel::EMPTY, OpaquePixel { depth: 9.0, ..under }, under] {
             let behind = [under; 6];
             let none = Rounding::NONE;
             let of = Composition {

@@ -3,11 +3,11 @@
 //! full pixels see. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top, and what the
 //! terms of each sum to in magnitude.
 
-use crate::model::resolution::{ALIKE, SmallPicture};
+use crate::model::resolution::{ALIKE, LowResLayout};
 
 /// Surfaces under the blobs.
 #[derive(Debug, Clone, Copy)]
-pub struct Under<'a> {
+pub struct OpaqueLayer<'a> {
     pub picture: &'a [[f64; 4]],
     /// near/z of the full pixels, and of the small ones; 0: nothing.
     pub depths: &'a [f64],
@@ -34,15 +34,15 @@ pub fn apart(a: f64, b: f64, alike: f64) -> f64 {
 }
 
 /// The whole picture.
-pub fn render(small: &SmallPicture, blobs: &[[f64; 4]], under: Option<&Under<'_>>) -> Vec<Summed> {
+pub fn render(small: &LowResLayout, blobs: &[[f64; 4]], under: Option<&OpaqueLayer<'_>>) -> Vec<Summed> {
     render_alike(small, blobs, under, ALIKE)
 }
 
 /// The same where depths are of one surface up to another share.
 pub fn render_alike(
-    small: &SmallPicture,
+    small: &LowResLayout,
     blobs: &[[f64; 4]],
-    under: Option<&Under<'_>>,
+    under: Option<&OpaqueLayer<'_>>,
     alike: f64,
 ) -> Vec<Summed> {
     let rows = (0..small.full[1]).flat_map(|j| (0..small.full[0]).map(move |i| [i, j]));
@@ -66,9 +66,9 @@ pub fn render_alike(
 
 /// The small picture at a full pixel.
 fn interpolated(
-    small: &SmallPicture,
+    small: &LowResLayout,
     blobs: &[[f64; 4]],
-    under: Option<&Under<'_>>,
+    under: Option<&OpaqueLayer<'_>>,
     pixel: [u32; 2],
     alike: f64,
 ) -> Summed {
@@ -136,12 +136,12 @@ mod tests {
     ) -> Vec<f64> {
         // Two full pixels; 2 n = 4, o = 1 + 8·2 − 2 − 2 = 13: the pixels lie at 13/4 and 15/4 of 8
         // columns.
-        let small = SmallPicture::of([2, 1], 2);
+        let small = LowResLayout::of([2, 1], 2);
         assert_eq!((small.size, small.offsets()), ([8, 8], [13, 14]));
         let columns = || (0..64).map(|i| i % 8);
         let blobs: Vec<[f64; 4]> = columns().map(|x| [value(x); 4]).collect();
         let small_depths: Vec<f64> = columns().map(small_depth).collect();
-        let under = Under { picture: &[[0.0; 4]; 2], depths: &depths, small_depths: &small_depths };
+        let under = OpaqueLayer { picture: &[[0.0; 4]; 2], depths: &depths, small_depths: &small_depths };
         render(&small, &blobs, Some(&under)).iter().map(|(v, _)| v[0]).collect()
     }
 

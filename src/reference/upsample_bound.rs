@@ -49,7 +49,7 @@ fn exponential(q: &[f64; 7]) -> [f64; 7] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::resolution::SmallPicture;
+    use crate::model::resolution::LowResLayout;
     use crate::reference::upsample::render;
 
     #[test]
@@ -115,7 +115,7 @@ mod tests {
         for (n_blobs, tau_most, n, least) in
             [(1, 0.1, 2, 3.0), (30, 0.1, 2, 2.0), (30, 0.1, 4, 5.0), (8, 1.5, 2, 3.0)]
         {
-            let small = SmallPicture::of(full, n);
+            let small = LowResLayout::of(full, n);
             let blobs: Vec<Blob> = (0..n_blobs)
                 .map(|_| Blob {
                     at: [40.0 * uniform(), 30.0 * uniform()],

@@ -10,7 +10,7 @@ mod tests;
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::{Behind, View};
+use super::sprites::{OpaquePixel, View};
 use piece::{March, Ray};
 
 /// One pixel: premultiplied colour and alpha.
@@ -74,17 +74,17 @@ impl<'a> Volume<'a> {
     }
 
     /// Row `j` before `behind`, a pixel each.
-    pub fn row(&self, j: u32, behind: &[Behind]) -> Vec<Pixel> {
+    pub fn row(&self, j: u32, behind: &[OpaquePixel]) -> Vec<Pixel> {
         self.of_row(j, (0..self.view.width).zip(behind.iter().copied()))
     }
 
     /// Some pixels of row `j`: their columns, and what is behind each.
-    pub fn of_row(&self, j: u32, columns: impl Iterator<Item = (u32, Behind)>) -> Vec<Pixel> {
+    pub fn of_row(&self, j: u32, columns: impl Iterator<Item = (u32, OpaquePixel)>) -> Vec<Pixel> {
         let inside = |(from, to): (u32, u32), i: u32| (from..to).contains(&i);
         let of_row: Vec<usize> =
             (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
         let mut march = March::default();
-        let pixel = |(i, behind): (u32, Behind)| {
+        let pixel = |(i, behind): (u32, OpaquePixel)| {
             let ray = self.view.ray(i, j);
             let near = of_row.iter().filter(|&&k| inside(self.places[k][0], i));
             let passed = near.filter_map(|&k| self.pass(k, ray, behind.depth)).collect();
@@ -106,7 +106,7 @@ impl<'a> Volume<'a> {
         (from < to).then_some(Passed { center, width, depth, radiance: self.radiance[k], from, to })
     }
 
-    fn pixel(&self, march: &mut March, passed: Vec<Passed>, behind: &Behind) -> Pixel {
+    fn pixel(&self, march: &mut March, passed: Vec<Passed>, behind: &OpaquePixel) -> Pixel {
         let Ray { color, tau, error } = march.integrate(&passed, ACCURACY * self.brightest);
         let through = (-tau).exp();
         let [r, g, b, a] = behind.color;
@@ -128,7 +128,7 @@ fn reach(depth: f64, omitted: f64) -> f64 {
 }
 
 /// The whole picture before `behind`, a pixel each, and nothing said in between.
-pub fn render(view: &View, behind: &[Behind], blobs: &[Blob], radiance: &[DVec3]) -> Vec<Pixel> {
+pub fn render(view: &View, behind: &[OpaquePixel], blobs: &[Blob], radiance: &[DVec3]) -> Vec<Pixel> {
     let volume = Volume::new(view, blobs, radiance);
     let width = view.width as usize;
     super::area::mean::each(view.height as usize, |j| {

@@ -8,7 +8,7 @@ use super::desk::Desk;
 use super::scenes::{PLAIN, blob, with_particles};
 use crate::error::Result;
 use crate::model::cloud::Group;
-use crate::model::count::{Count, Drawn, LEAST_DRAWN};
+use crate::model::count::{Count, DrawnCount, MIN_DRAWN};
 use crate::reference::count::weights;
 use crate::reference::rounding::U_F32;
 
@@ -62,7 +62,7 @@ pub const CASES: &[Case] = &[
 const COUNT: Count = Count { a: 280.0, d0: 1.0, normalised: false, conserve: true };
 
 /// What the device is told of a group of `n`: factors on κ, particle by particle that is drawn.
-fn told(n: u32, drawn: &Drawn) -> (u32, f64, f64) {
+fn told(n: u32, drawn: &DrawnCount) -> (u32, f64, f64) {
     let record = crate::layout::particle::DrawnRecord::new(&group(n), drawn, 0);
     (record.end, f64::from(record.kappa_scale), f64::from(record.last_weight))
 }
@@ -101,7 +101,7 @@ fn at_the_eye(_: &mut Desk) -> Result<Found> {
 }
 
 /// Adds that nothing is drawn, and that what would be multiplied is finite.
-fn nothing(c: &mut Comparison, drawn: &Drawn, what: &str) {
+fn nothing(c: &mut Comparison, drawn: &DrawnCount, what: &str) {
     let (end, scale, last) = told(1000, drawn);
     c.add(f64::from(end), 0.0, 0.0, || format!("particles {what}"));
     c.holds(scale.is_finite() && last.is_finite(), || format!("finite factors {what}"));
@@ -174,7 +174,7 @@ fn each_weight(_: &mut Desk) -> Result<Found> {
                 let drawn = count.drawn(n, share);
                 let (end, scale, last) = told(n, &drawn);
                 let truth = weights(n, share, conserve);
-                if f64::from(n) * share < LEAST_DRAWN {
+                if f64::from(n) * share < MIN_DRAWN {
                     continue;
                 }
                 for (i, truth) in (0..n).zip(truth) {

@@ -66,7 +66,7 @@ impl Knob {
 
     /// Turns to the next value; an error that says why there is no other.
     pub fn turn(self, scene: &mut Scene) -> Result<(), &'static str> {
-        if self == Knob::Simulate && scene.has_movers() {
+        if self == Knob::Simulate && scene.is_animated() {
             return Err("weather that goes from step to step is moved by the game thread");
         }
         let (lighting, draw, threads) = (&mut scene.lighting, &mut scene.draw, &mut scene.threads);

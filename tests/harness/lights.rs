@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 use nimbus::layout::frame::LightRecord;
-use nimbus::model::light::{LEAST_PENUMBRA, Light};
+use nimbus::model::light::{MIN_PENUMBRA, Light};
 
 use crate::bounded::{Bounded, Random, dot, exact3};
 
@@ -27,7 +27,7 @@ pub fn arrival(light: &Light, p: [f32; 3]) -> Arrival {
         Light::Sky { .. } => return from_afar(DVec3::Y),
         Light::Point { position, radius, .. } => (position, radius, None),
         Light::Spot { position, direction, radius, cos_inner, cos_outer, .. } => {
-            let scale = 1.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA);
+            let scale = 1.0 / (cos_inner - cos_outer).max(MIN_PENUMBRA);
             (
                 position,
                 radius,

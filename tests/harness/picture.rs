@@ -17,8 +17,8 @@ use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{Behind, Rounding, View, render_textured};
-use nimbus::reference::texture::{Pool, Sheet, Textured};
+use nimbus::reference::sprites::{OpaquePixel, Rounding, View, render_textured};
+use nimbus::reference::texture::{Pool, SplatTexture, Textured};
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};
@@ -201,8 +201,8 @@ impl Picture {
     pub fn truth(&self, format: FilmFormat) -> (Vec<f64>, Vec<f64>) {
         let rounding = self.rounding(format);
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
-        let behind: Vec<Behind> = match &self.scenery {
-            None => vec![Behind::NOTHING; (self.view.width * self.view.height) as usize],
+        let behind: Vec<OpaquePixel> = match &self.scenery {
+            None => vec![OpaquePixel::EMPTY; (self.view.width * self.view.height) as usize],
             Some(_) => self.behind(format).iter().map(|c| self.widened(c)).collect(),
         };
         let sheets = self.sheets();
@@ -220,7 +220,7 @@ impl Picture {
     }
 
     /// The texture's factor on particle `j`'s τ.
-    pub fn factor(&self, sheets: &[Option<Sheet>], j: usize, delta: DVec2) -> f64 {
+    pub fn factor(&self, sheets: &[Option<SplatTexture>], j: usize, delta: DVec2) -> f64 {
         match (&sheets[j], &self.textured) {
             (Some(sheet), Some((_, _, pool))) => sheet.factor(pool, delta),
             _ => 1.0,
@@ -240,10 +240,10 @@ impl Picture {
 
     /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any
     /// bound where it is not the only candidate.
-    pub fn widened(&self, candidates: &Candidates) -> Behind {
+    pub fn widened(&self, candidates: &Candidates) -> OpaquePixel {
         let truth = candidates[0];
         if candidates.len() > 1 {
-            return Behind { bound: [f64::INFINITY; 4], ..truth };
+            return OpaquePixel { bound: [f64::INFINITY; 4], ..truth };
         }
         let near = Bounded::once(self.view.near);
         let of_sprites = self.placed.iter().filter(|p| p.sigma > 0.0).map(|p| {
@@ -254,11 +254,11 @@ impl Picture {
         // scaling of at most 1.
         let of_sprites = of_sprites.fold(0.0, f64::max) + 4.0 * U;
         // |near/z − near/z'| ≤ near (r/z + r'/z') for z' within a few r of z.
-        Behind { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
+        OpaquePixel { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
     }
 
     /// What each particle shows of the pool.
-    pub fn sheets(&self) -> Vec<Option<Sheet>> {
+    pub fn sheets(&self) -> Vec<Option<SplatTexture>> {
         let pose = &self.view.pose;
         let sheet = |(i, p): (usize, &PlacedRecord)| {
             let (i_group, textures, _) = self.textured.as_ref()?;
@@ -267,7 +267,7 @@ impl Picture {
             let strength = f64::from(of.strength);
             let textured =
                 Textured { i_field: of.i_field, strength, seed: of.seed, i_box: of.i_box };
-            Some(Sheet::new(
+            Some(SplatTexture::new(
                 &textured,
                 i as u32 - of.i_first,
                 z / f64::from(p.sigma),

@@ -11,7 +11,7 @@ use nimbus::model::material::Brdf;
 use nimbus::model::terrain::{HALVES, Terrain};
 use nimbus::reference::sprites::View;
 use nimbus::reference::surfaces::Hit;
-use nimbus::reference::terrain::Half;
+use nimbus::reference::terrain::Triangle;
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
 
@@ -110,7 +110,7 @@ impl Relief {
         ray: impl Fn(u32, u32) -> [Bounded; 2],
     ) -> Vec<Vec<Candidate>> {
         let drawn = self.halves();
-        let halves: Vec<Half> = drawn.iter().map(Drawn::half).collect();
+        let halves: Vec<Triangle> = drawn.iter().map(Drawn::half).collect();
         let seen: Vec<Seen> = drawn.iter().map(|d| Seen::new(d, view)).collect();
         let shapes: Vec<Vec<DVec2>> = halves.iter().map(|h| shape(h, view)).collect();
         let mut near_by: Vec<Vec<usize>> = vec![vec![]; (view.width * view.height) as usize];
@@ -148,7 +148,7 @@ impl Relief {
 /// infinite where nothing is.
 fn farthest<'a>(
     view: &View,
-    halves: impl Iterator<Item = &'a Half> + Clone,
+    halves: impl Iterator<Item = &'a Triangle> + Clone,
     i: u32,
     j: u32,
 ) -> f64 {
@@ -165,7 +165,7 @@ fn farthest<'a>(
 }
 
 /// What of it lies before the eye, in pixels.
-fn shape(half: &Half, view: &View) -> Vec<DVec2> {
+fn shape(half: &Triangle, view: &View) -> Vec<DVec2> {
     let pose = &view.pose;
     let at_eye = half.points().map(|p| {
         let d = p - pose.position;
@@ -206,8 +206,8 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn half(&self) -> Half {
-        Half::new(self.points.map(|p| double(self.center) + double(p)), self.radiance)
+    fn half(&self) -> Triangle {
+        Triangle::new(self.points.map(|p| double(self.center) + double(p)), self.radiance)
     }
 }
 
@@ -264,7 +264,7 @@ impl Seen {
         &self,
         hit: &Hit,
         ray: [Bounded; 3],
-        half: &Half,
+        half: &Triangle,
         drawn: &Drawn,
     ) -> Vec<Candidate> {
         let inverse = Bounded::exact(1.0).over(dot(ray, self.n));

@@ -8,7 +8,7 @@ use nimbus::layout::facet::{LitRecord, NO_LOBE, RegionRecord};
 use nimbus::model::camera::Pose;
 use nimbus::model::material::Brdf;
 use nimbus::model::surface::Surface;
-use nimbus::reference::sprites::{Behind, Rounding, View};
+use nimbus::reference::sprites::{OpaquePixel, Rounding, View};
 use nimbus::reference::surfaces::{Hit, meet, radiance, render};
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
@@ -23,7 +23,7 @@ pub struct Scenery {
 /// What a pixel may show. Most pixels have one candidate. Others have several: a ray that passes
 /// within rounding of an edge or of the near plane, and two rectangles equally near within
 /// rounding.
-pub type Candidates = Vec<Behind>;
+pub type Candidates = Vec<OpaquePixel>;
 
 fn double(v: [f32; 3]) -> DVec3 {
     DVec3::from(v.map(f64::from))
@@ -88,7 +88,7 @@ impl Scenery {
         let facets = |r: &RegionRecord| &all[r.i_first_facet as usize..][..r.n_facets as usize];
         let rows = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
         let truths = render(view, &surfaces, &all);
-        let pixel = |((i, j), truth): ((u32, u32), &Behind)| {
+        let pixel = |((i, j), truth): ((u32, u32), &OpaquePixel)| {
             let (d, [x, y]) = (view.ray(i, j), ray(i, j));
             let met = surfaces.iter().zip(&self.regions).zip(&seen).filter_map(
                 |((surface, region), seen)| {
@@ -99,7 +99,7 @@ impl Scenery {
                 },
             );
             let mut found = candidates(met.collect());
-            let is_truth = |c: &Behind| c.color == truth.color && c.depth == truth.depth;
+            let is_truth = |c: &OpaquePixel| c.color == truth.color && c.depth == truth.depth;
             let at = found.iter().position(is_truth).expect("the truth is among the candidates");
             found.swap(0, at);
             found
@@ -182,7 +182,7 @@ struct Met {
     found: Found,
     /// The geometry, to the bit: equal ones come out equally near, and the last one is seen.
     geometry: [[f32; 3]; 3],
-    sides: Vec<Behind>,
+    sides: Vec<OpaquePixel>,
 }
 
 impl Met {
@@ -204,7 +204,7 @@ impl Met {
                 2.0 * rounding.unit * (color[k].abs() + off[k]).max(rounding.least_normal)
             };
             let bound = [0, 1, 2, 3].map(|k| off[k] + stored(k));
-            Behind { color, bound, depth: hit.depth, depth_bound }
+            OpaquePixel { color, bound, depth: hit.depth, depth_bound }
         };
         let mut sides = vec![shown(hit.is_front)];
         if !found.is_side_sure {
@@ -247,7 +247,7 @@ fn candidates(met: Vec<Met>) -> Candidates {
     let open: Vec<usize> = (0..met.len()).filter(|i| !is_hidden(*i)).collect();
     let mut found: Candidates = open.iter().flat_map(|i| met[*i].sides.clone()).collect();
     if !open.iter().any(|i| met[*i].found.is_sure) {
-        found.push(Behind::NOTHING);
+        found.push(OpaquePixel::EMPTY);
     }
     found
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use nimbus::layout::particle::TexturedRecord;
-use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, Sheet, side};
+use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, SplatTexture, side};
 
 use crate::bounded::{Bounded, U};
 use crate::picture::Picture;
@@ -16,7 +16,7 @@ const UNIT_AT: f64 = 10.0 * U;
 
 /// What the vertex shader hands on of a texture.
 pub struct Paper<'a> {
-    sheet: Sheet,
+    sheet: SplatTexture,
     pool: &'a Pool,
     level: &'a Level,
     fade: Bounded,
@@ -30,7 +30,7 @@ pub struct Paper<'a> {
 
 impl Paper<'_> {
     /// `z_in_sigma`: view depth over σ; `pixel`: the slopes' difference from a pixel to the next.
-    pub fn new(sheet: Sheet, pool: &Pool, z_in_sigma: Bounded, pixel: f64) -> Paper<'_> {
+    pub fn new(sheet: SplatTexture, pool: &Pool, z_in_sigma: Bounded, pixel: f64) -> Paper<'_> {
         let dense =
             Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z_in_sigma.times(Bounded::once(pixel)));
         let level = &pool.0[sheet.i_field][sheet.level];

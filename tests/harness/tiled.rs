@@ -4,7 +4,7 @@
 
 use glam::DVec2;
 use nimbus::model::film::FilmFormat;
-use nimbus::reference::sprites::{Behind, Rounding};
+use nimbus::reference::sprites::{OpaquePixel, Rounding};
 use nimbus::reference::tiles::{self, Composition};
 use nimbus::reference::{Blob, chunks};
 
@@ -45,8 +45,8 @@ impl Picture {
         let rounding =
             Rounding { depth: crate::picture::DEPTH, ..Rounding::of(format, off_alpha, edge) };
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
-        let behind: Vec<Behind> = match &self.scenery {
-            None => vec![Behind::NOTHING; self.view.width as usize * self.view.height as usize],
+        let behind: Vec<OpaquePixel> = match &self.scenery {
+            None => vec![OpaquePixel::EMPTY; self.view.width as usize * self.view.height as usize],
             Some(_) => self.behind(format).iter().map(|c| self.widened(c)).collect(),
         };
         let sheets = self.sheets();

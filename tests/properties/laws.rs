@@ -6,10 +6,10 @@ use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::{Summary, median};
 use nimbus::model::basis::{Basis, Sampling};
 use nimbus::model::camera::{Camera, CameraKey};
-use nimbus::model::count::{Count, Drawn};
+use nimbus::model::count::{Count, DrawnCount};
 use nimbus::model::film::{Film, FilmFormat, ToneMap, srgb_encode};
 use nimbus::model::grid::{GridSpec, MARGIN_CELLS, MAX_CELLS};
-use nimbus::model::growth::{GREATEST_SCALE, Growth, LEAST_SCALE};
+use nimbus::model::growth::{MAX_SCALE, Growth, MIN_SCALE};
 use nimbus::reference::picture::pixels::Pixels;
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -40,7 +40,7 @@ fn shares_fall_with_distance_and_weights_add_up() {
             );
             for share in [near, far] {
                 let drawn = count.drawn(n, share);
-                if drawn == Drawn::NOTHING {
+                if drawn == DrawnCount::NOTHING {
                     continue;
                 }
                 prop_assert!(
@@ -69,7 +69,7 @@ fn shares_fall_with_distance_and_weights_add_up() {
 #[test]
 fn growth_stays_between_its_ends_and_goes_one_way() {
     let times = || prop_oneof![magnitude(-15, 15), -1e15..1e15, Just(0.0)];
-    let to = magnitude(-3, 3).prop_map(|to| to.clamp(LEAST_SCALE, GREATEST_SCALE));
+    let to = magnitude(-3, 3).prop_map(|to| to.clamp(MIN_SCALE, MAX_SCALE));
     check(2000, (to, magnitude(-15, 15), times(), times()), |(to, time_s, a, b)| {
         let growth = Growth { to, time_s };
         let (early, late) = (growth.at(a.min(b)), growth.at(a.max(b)));

@@ -6,7 +6,7 @@ use clap::{Args as ClapArgs, Subcommand, ValueEnum};
 
 use super::parse_size;
 use crate::reference::picture::kind::ReferenceKind;
-use crate::reference::picture::samples::MOST_SAMPLES;
+use crate::reference::picture::samples::MAX_SAMPLES;
 
 #[derive(Debug, ClapArgs)]
 pub struct FarmArgs {
@@ -398,9 +398,9 @@ pub(super) fn parse_span(text: &str) -> Result<Span, String> {
 }
 
 fn parse_power(text: &str) -> Result<u32, String> {
-    let n = text.parse().ok().filter(|n: &u32| n.is_power_of_two() && *n <= MOST_SAMPLES);
+    let n = text.parse().ok().filter(|n: &u32| n.is_power_of_two() && *n <= MAX_SAMPLES);
     n.ok_or_else(|| {
-        format!("expected a power of two such as 16, up to {MOST_SAMPLES}, found \"{text}\"")
+        format!("expected a power of two such as 16, up to {MAX_SAMPLES}, found \"{text}\"")
     })
 }
 

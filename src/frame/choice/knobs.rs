@@ -1,7 +1,7 @@
 //! The knobs that can be "auto", in the order in which they are settled.
 
 use super::rule::Tried;
-use crate::model::least::Least;
+use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors};
 
@@ -77,18 +77,18 @@ pub const KNOBS: [Knob; 6] = [
     Knob {
         key: "threshold",
         changes: Changes::Picture,
-        is_auto: |draw| draw.threshold == Least::Auto,
-        values: |draw| THRESHOLDS.map(|t| Draw { threshold: Least::Of(t), ..*draw }).to_vec(),
+        is_auto: |draw| draw.threshold == Cutoff::Auto,
+        values: |draw| THRESHOLDS.map(|t| Draw { threshold: Cutoff::At(t), ..*draw }).to_vec(),
         name: |draw| draw.threshold.bound().to_string(),
     },
     Knob {
         key: "smallest",
         changes: Changes::Picture,
-        is_auto: |draw| draw.smallest == Least::Auto,
+        is_auto: |draw| draw.smallest == Cutoff::Auto,
         // Who culls leaves them out.
         values: |draw| {
             let cull = |pixels: f64| if pixels > 0.0 { Cull::On } else { draw.cull };
-            SMALLEST.map(|w| Draw { smallest: Least::Of(w), cull: cull(w), ..*draw }).to_vec()
+            SMALLEST.map(|w| Draw { smallest: Cutoff::At(w), cull: cull(w), ..*draw }).to_vec()
         },
         name: |draw| draw.smallest.bound().to_string(),
     },
@@ -136,9 +136,9 @@ mod tests {
         error: 1e-3,
         chunks: Chunks::Auto,
         cutoff: 3.0,
-        threshold: Least::Auto,
+        threshold: Cutoff::Auto,
         cull: Cull::Auto,
-        smallest: Least::Auto,
+        smallest: Cutoff::Auto,
         sort_bits: SortBits::Wide,
         count: None,
         texture_seed: 1,

@@ -15,7 +15,7 @@ use crate::frame::readback::floats;
 use crate::frame::render::Renderer;
 use crate::frame::settings::Settings;
 use crate::gpu::{Buffer, Compiler, Device, Recorder};
-use crate::model::least::Least;
+use crate::model::cutoff::Cutoff;
 use crate::model::scene::{Cull, Draw, Scene};
 
 /// Timed turns of each value; more of frames that are so short that all turns take less than
@@ -72,12 +72,12 @@ pub struct Trial<'a> {
 
 /// What a drawing is made for; other numbers it is told.
 fn key_of_drawing(draw: &Draw) -> Draw {
-    let threshold = Least::Of(if draw.threshold.is_some() { 1.0 } else { 0.0 });
-    Draw { threshold, smallest: Least::NOTHING, cull: Cull::On, ..*draw }
+    let threshold = Cutoff::At(if draw.threshold.is_active() { 1.0 } else { 0.0 });
+    Draw { threshold, smallest: Cutoff::NONE, cull: Cull::On, ..*draw }
 }
 
 fn key_of_culling(draw: &Draw) -> (Cull, bool) {
-    (draw.cull, draw.threshold.is_some())
+    (draw.cull, draw.threshold.is_active())
 }
 
 impl<'a> Trial<'a> {

@@ -13,7 +13,7 @@ use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
 use crate::model::weather::extinction::{
-    ICE, LIQUID, Oddities, Phase, SNOW, add, single_moment_phase,
+    ICE, LIQUID, InvalidCounts, Phase, SNOW, add, single_moment_phase,
 };
 use crate::model::weather::grid::{Grid, Ground, Shape};
 
@@ -112,7 +112,7 @@ pub struct Step {
     /// Radians north and east in the domain's middle, which moves where a nest follows a storm;
     /// None of an idealised file, whose are 0.
     pub middle: Option<(f64, f64)>,
-    pub oddities: Oddities,
+    pub oddities: InvalidCounts,
 }
 
 /// Opens a WRF file; no step is read.
@@ -391,7 +391,7 @@ impl WeatherFile {
             shape,
             i_step,
         )?;
-        let mut oddities = Oddities::default();
+        let mut oddities = InvalidCounts::default();
         let vapour = match &fields.vapour {
             Some(field) => ratios(field.read(file, shape, i_step)?, &mut oddities),
             None => vec![0.0; shape.n_cells()],
@@ -468,7 +468,7 @@ impl WeatherFile {
 }
 
 /// Vapour: what is no ratio is 0 and counted.
-fn ratios(mut read: Vec<f64>, oddities: &mut Oddities) -> Vec<f64> {
+fn ratios(mut read: Vec<f64>, oddities: &mut InvalidCounts) -> Vec<f64> {
     for ratio in &mut read {
         if ratio.is_nan() || *ratio > GREATEST_RATIO {
             oddities.n_missing += 1;

@@ -14,7 +14,7 @@ pub const CRITICAL_HUMIDITY: f64 = 0.8;
 /// stratocumulus has 0.6 to 0.9 of it, cumulus half and less.
 pub const ADIABATIC_SHARE: f64 = 0.5;
 /// Most water within a cloud, kg/kg: beyond it, it rains.
-pub const GREATEST_RATIO: f64 = 0.5e-3;
+pub const MAX_WATER_RATIO: f64 = 0.5e-3;
 /// Latent heat of evaporation, J/kg, at 0 °C.
 const LATENT_HEAT: f64 = 2.501e6;
 
@@ -64,7 +64,7 @@ pub fn extinction(grid: &Grid, air: Air) -> Vec<f64> {
                 continue;
             }
             let grown = ADIABATIC_SHARE * condensed_per_metre(p, t) * grid.thickness_m(i);
-            let within = (below + 0.5 * grown).min(GREATEST_RATIO);
+            let within = (below + 0.5 * grown).min(MAX_WATER_RATIO);
             below += grown;
             extinction[i] = covered
                 * single_moment_phase(t).extinction(within, dry_density(p, t, air.vapour[i]));

@@ -31,16 +31,16 @@ pub fn single_moment_phase(t_k: f64) -> Phase {
 
 /// Values that are no mixing ratios, and what became of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Oddities {
+pub struct InvalidCounts {
     /// Below 0, which advection leaves behind: taken for 0.
     pub n_negative: u64,
     /// NaN, infinite or a fill value: taken for 0.
     pub n_missing: u64,
 }
 
-impl Oddities {
+impl InvalidCounts {
     pub fn is_none(self) -> bool {
-        self == Oddities::default()
+        self == InvalidCounts::default()
     }
 }
 
@@ -52,8 +52,8 @@ pub fn add(
     dry_density: impl Fn(usize) -> f64,
     phase_of: impl Fn(usize) -> Phase,
     is_missing: impl Fn(f64) -> bool,
-) -> Oddities {
-    let mut odd = Oddities::default();
+) -> InvalidCounts {
+    let mut odd = InvalidCounts::default();
     for (i, (beta, &ratio)) in extinction.iter_mut().zip(ratios).enumerate() {
         if !ratio.is_finite() || is_missing(ratio) {
             odd.n_missing += 1;
@@ -85,9 +85,9 @@ mod tests {
         let mut beta = vec![1.0; 6];
         let ratios = [1e-3, -1e-9, f64::NAN, f64::INFINITY, 9.969e36, 0.0];
         let odd = add(&mut beta, &ratios, |_| 1.0, |_| LIQUID, |q| q > 1e30);
-        assert_eq!(odd, Oddities { n_negative: 1, n_missing: 3 });
+        assert_eq!(odd, InvalidCounts { n_negative: 1, n_missing: 3 });
         assert!((beta[0] - 1.15).abs() < 1e-15);
         assert_eq!(beta[1..], [1.0; 5]);
-        assert!(!odd.is_none() && Oddities::default().is_none());
+        assert!(!odd.is_none() && InvalidCounts::default().is_none());
     }
 }

@@ -6,7 +6,7 @@ use super::particles::{Layout, WeatherBlob};
 
 /// What a step says of its clouds.
 #[derive(Debug, Clone, Copy)]
-pub struct Moment<'a> {
+pub struct StepClouds<'a> {
     pub grid: &'a Grid,
     /// m⁻¹, a cell each.
     pub extinction: &'a [f64],
@@ -22,7 +22,7 @@ pub struct Interval {
 impl Interval {
     /// From a step to the next one, on a grid of the same shape, or a step alone; `layout` stands
     /// for them, and maybe for more.
-    pub fn laid_out(layout: &Layout, a: Moment, b: Option<Moment>) -> Self {
+    pub fn laid_out(layout: &Layout, a: StepClouds, b: Option<StepClouds>) -> Self {
         Interval {
             from: layout.blobs(a.grid, a.extinction),
             to: b.map(|b| layout.blobs(b.grid, b.extinction)),

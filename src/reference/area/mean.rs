@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::adaptive::{self, Accuracy, Cell, Estimate, Integrand, NOTHING, Sample, triangles};
 use super::clip::{self, Line, Polygon, WHOLE};
-use super::{Scenery, resolve};
+use super::{AreaScene, resolve};
 use crate::model::surface::Surface;
 
 /// Of the error asked for, the inner integral's share: it adds to the outer one's.
@@ -49,7 +49,7 @@ impl Window {
     }
 }
 
-impl Scenery<'_> {
+impl AreaScene<'_> {
     /// Mean of L1 toward the eye at `eye`, and of I_d.
     pub fn mean_first(
         &self,
@@ -91,7 +91,7 @@ enum Of {
 }
 
 struct Mean<'s, 'a> {
-    scenery: &'s Scenery<'a>,
+    scenery: &'s AreaScene<'a>,
     i_surface: usize,
     eye: DVec3,
     window: &'s Window,

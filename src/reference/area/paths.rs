@@ -1,5 +1,5 @@
 //! Any number of reflections by random paths: an estimate with a standard error, and of the second
-//! reflection one that shares no quadrature with `Scenery::second`. Each path starts at the
+//! reflection one that shares no quadrature with `AreaScene::second`. Each path starts at the
 //! receiver, goes where its BRDF sends it (or to one of the discs) and collects L1 at every vertex;
 //! V is tested point by point.
 
@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 use glam::DVec3;
 
 use super::visibility::{Rect, Source};
-use super::{Receiver, Scenery, mean, reflectance};
+use super::{Receiver, AreaScene, mean, reflectance};
 use crate::model::material::Brdf;
 use crate::model::philox::{philox4x32_10, uniform};
 
@@ -30,7 +30,7 @@ pub struct Reflected {
 
 /// How many paths, and which.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Chance {
+pub struct PathSampling {
     pub n_paths: u32,
     pub seed: u32,
     /// Of several samples which one: they share no numbers.
@@ -40,7 +40,7 @@ pub struct Chance {
 /// Sums of one job: of every reflection beyond the first, and of all of them together (last).
 type Sums = Vec<(DVec3, DVec3)>;
 
-impl Scenery<'_> {
+impl AreaScene<'_> {
     /// Radiance toward the unit vector `toward` after exactly 1, 2, … `k` reflections, and last of
     /// all together.
     pub fn reflections(
@@ -48,7 +48,7 @@ impl Scenery<'_> {
         at: &Receiver,
         toward: DVec3,
         k: usize,
-        chance: Chance,
+        chance: PathSampling,
     ) -> Vec<Reflected> {
         let first = Reflected { radiance: self.first(at, toward), error: DVec3::ZERO };
         let n_more = k.saturating_sub(1);
@@ -90,7 +90,7 @@ impl Scenery<'_> {
         at: &Receiver,
         toward: DVec3,
         n_more: usize,
-        (chance, i_path): (Chance, u32),
+        (chance, i_path): (PathSampling, u32),
     ) -> Vec<DVec3> {
         let (mut at, mut toward, mut weight) = (*at, toward, DVec3::ONE);
         let mut found = vec![DVec3::ZERO; n_more];

@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::adaptive::Cell;
 use super::clip::WHOLE;
 use super::visibility::{Rect, Source, source_of};
-use super::{Reach, Scenery, Seen};
-use crate::model::light::{LEAST_PENUMBRA, Light};
+use super::{Reach, AreaScene, Seen};
+use crate::model::light::{MIN_PENUMBRA, Light};
 use crate::reference::Blob;
 
 /// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no
@@ -73,7 +73,7 @@ pub(super) fn seen_is_resolved(seen: &Seen, cell: &Cell) -> bool {
 
 /// Whether a cell of a mean of L1 toward `eye` is small enough.
 pub(super) fn mean_is_resolved(
-    scenery: &Scenery,
+    scenery: &AreaScene,
     i_surface: usize,
     eye: DVec3,
     cell: &Cell,
@@ -89,7 +89,7 @@ pub(super) fn mean_is_resolved(
 /// Whether a cell of a mean of L2 toward `eye` is small enough: against its distance from every
 /// other surface, or that one's size, and for the lobe in which it mirrors what lights it.
 pub(super) fn mirror_is_resolved(
-    scenery: &Scenery,
+    scenery: &AreaScene,
     i_surface: usize,
     eye: DVec3,
     cell: &Cell,
@@ -128,7 +128,7 @@ fn lies_behind(rect: &Rect, other: &Rect) -> bool {
 /// The first reflection from the ball toward whoever sees it along `view`, a direction and how far
 /// it turns.
 fn first_is_resolved(
-    scenery: &Scenery,
+    scenery: &AreaScene,
     i_surface: usize,
     lit: &[(usize, Reach)],
     ball: &Ball,
@@ -163,7 +163,7 @@ fn light_cone(light: &Light, ball: &Ball, relative: f64) -> Option<(DVec3, f64)>
     let (toward, spread) = (arrival.toward, (ball.radius / arrival.distance).min(1.0).asin());
     if let Light::Spot { direction, cos_inner, cos_outer, .. } = *light {
         let outer = cos_outer.clamp(-1.0, 1.0).acos();
-        let inner = cos_inner.min(1.0).max(cos_outer + LEAST_PENUMBRA).min(1.0).acos();
+        let inner = cos_inner.min(1.0).max(cos_outer + MIN_PENUMBRA).min(1.0).acos();
         let off_axis = (-toward).angle_between(direction);
         if off_axis - spread > outer {
             return Some((toward, spread));
@@ -215,7 +215,7 @@ fn lobe_is_resolved(
 
 /// Whether every blob that casts a shadow between the ball and `end` is wide against the rays from
 /// the ball there.
-fn blobs_are_resolved(scenery: &Scenery, ball: &Ball, end: Source, relative: f64) -> bool {
+fn blobs_are_resolved(scenery: &AreaScene, ball: &Ball, end: Source, relative: f64) -> bool {
     let (way, length) = match end {
         Source::At(q) => ((q - ball.center).normalize_or_zero(), ball.center.distance(q)),
         Source::Toward(d) => (d, f64::INFINITY),

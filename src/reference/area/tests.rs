@@ -1,7 +1,7 @@
 //! Numbers worked by hand and published ones, then agreement with paths that share no quadrature.
 
 use super::mean::{Window, each};
-use super::paths::Chance;
+use super::paths::PathSampling;
 use super::visibility::visible;
 use super::*;
 use crate::model::philox::{philox4x32_10, uniform};
@@ -90,7 +90,7 @@ fn form_factors_between_squares() {
     let wall = rect(at(-0.5, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
     assert_eq!((floor.normal(), wall.normal(), ceiling(1.0).normal()), (UP, DVec3::X, -UP));
     for (receiver, published) in [(floor, 0.199_824_9), (wall, 0.200_043_8)] {
-        let s = Scenery::new(
+        let s = AreaScene::new(
             &[receiver, ceiling(1.0)],
             &[matte(0.5), matte(1.0)],
             &[GLOW],
@@ -121,7 +121,7 @@ fn cube(albedo: Brdf) -> (Vec<Surface>, Vec<Brdf>) {
 fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
     let (faces, brdfs) = cube(matte(0.7));
     let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
-    let s = Scenery::new(&faces, &brdfs, &sky, &[], 0.0, &[]);
+    let s = AreaScene::new(&faces, &brdfs, &sky, &[], 0.0, &[]);
     for (i, face) in faces.iter().enumerate() {
         for (a, b) in [(0.0, 0.0), (0.31, -0.77), (0.999, 0.2), (-0.999_99, 0.999_99)] {
             let receiver = s.on_surface(i, face.center + a * face.u + b * face.v);
@@ -138,7 +138,7 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
         &receiver,
         receiver.normal,
         5,
-        Chance { n_paths: 2000, seed: 1, i_sample: 0 },
+        PathSampling { n_paths: 2000, seed: 1, i_sample: 0 },
     );
     for (k, l) in found[..5].iter().enumerate() {
         assert!((l.radiance.x - 0.7f64.powi(k as i32 + 1)).abs() < 1e-12, "{k} {l:?}");
@@ -150,7 +150,7 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
 fn an_eye_behind_sees_the_diffuse_part_alone() {
     let (faces, mut brdfs) = cube(matte(0.7));
     brdfs[0] = glossy(0.5, 0.3, 2.0);
-    let s = Scenery::new(&faces, &brdfs, &[GLOW], &[], 0.0, &[]);
+    let s = AreaScene::new(&faces, &brdfs, &[GLOW], &[], 0.0, &[]);
     let receiver = s.on_surface(0, faces[0].center + 0.3 * faces[0].u);
     for depth in [0.03, 0.3, 1.0] {
         let toward =
@@ -159,7 +159,7 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
         assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
         // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
         let found =
-            s.reflections(&receiver, toward, 2, Chance { n_paths: 2000, seed: 1, i_sample: 0 });
+            s.reflections(&receiver, toward, 2, PathSampling { n_paths: 2000, seed: 1, i_sample: 0 });
         for (l, truth) in found.iter().zip([0.5, 0.35, 0.85]) {
             assert!((l.radiance.x - truth).abs() < 1e-12, "{depth} {l:?}");
         }
@@ -172,14 +172,14 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
     let receiver = Receiver::new(DVec3::ZERO, UP, matte(0.5));
     let second = |surfaces: &[Surface], blobs: &[Blob]| {
         let brdfs = vec![matte(1.0); surfaces.len()];
-        Scenery::new(surfaces, &brdfs, &[GLOW], blobs, 0.0, &[]).second(&receiver, UP, &FINE)
+        AreaScene::new(surfaces, &brdfs, &[GLOW], blobs, 0.0, &[]).second(&receiver, UP, &FINE)
     };
     let free = second(&[lamp], &[]);
     // A black one with its edge through the axis, level and leaning.
     for lean in [0.0, 0.7] {
         let along = DVec3::X.rotate_z(lean);
         let blocker = rect(at(0.0, 1.0, 0.0) + 3.0 * along, 3.0 * along, 9.0 * DVec3::Z);
-        let s = Scenery::new(&[lamp, blocker], &[matte(1.0), matte(0.0)], &[GLOW], &[], 0.0, &[]);
+        let s = AreaScene::new(&[lamp, blocker], &[matte(1.0), matte(0.0)], &[GLOW], &[], 0.0, &[]);
         close(&s.second(&receiver, UP, &FINE), 0.5 * free.irradiance.x, 1e-9);
         assert!(!visible(&[lamp, blocker], DVec3::ZERO, lamp.center + 0.2 * DVec3::X));
     }
@@ -203,7 +203,7 @@ fn a_lobe_of_any_width_is_found() {
     for ns in [1e3, 1e4, 1e6] {
         let albedo = 4.0 * 0.3 * (2.0 * (ns + 2.0) / (ns + 4.0) - 1.0);
         let mirror = Receiver::new(DVec3::ZERO, UP, glossy(0.0, 0.3, ns));
-        let s = Scenery::new(&[lamp], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
+        let s = AreaScene::new(&[lamp], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
         let e = s.second(&mirror, UP, &Accuracy::relative(1e-8));
         assert!(
             (e.radiance.x - albedo).abs() <= e.error + 1e-12 && e.error <= 1e-8 * albedo,
@@ -211,7 +211,7 @@ fn a_lobe_of_any_width_is_found() {
         );
         // The same lobe on the lamp's side: a sun from below, straight up, and a receiver that
         // looks at it.
-        let s = Scenery::new(&[lamp], &[glossy(0.0, 0.3, ns)], &sun, &[], 0.0, &[]);
+        let s = AreaScene::new(&[lamp], &[glossy(0.0, 0.3, ns)], &sun, &[], 0.0, &[]);
         let e = s.second(&Receiver::new(DVec3::ZERO, UP, nothing), UP, &Accuracy::relative(1e-8));
         close(&e, albedo, 1e-8);
     }
@@ -222,7 +222,7 @@ fn means_of_the_first_reflection_hold_the_lights_flux() {
     let floor = rect(DVec3::ZERO, DVec3::Z, DVec3::X);
     let check = |light: Light, truth: f64, relative: f64| {
         let lights = [light];
-        let s = Scenery::new(&[floor], &[matte(0.5)], &lights, &[], 0.0, &[]);
+        let s = AreaScene::new(&[floor], &[matte(0.5)], &lights, &[], 0.0, &[]);
         let e = s.mean_first(0, &Window::WHOLE, at(0.0, 5.0, 0.0), &Accuracy::relative(relative));
         assert!((e.radiance.x * PI / (0.5 * e.irradiance.x) - 1.0).abs() < 1e-12);
         close(&e, truth / 4.0, relative);
@@ -286,13 +286,13 @@ fn quadrature_and_paths_agree_in_random_scenes() {
         Blob { aspect: 1.0, position: at(-1.0, 0.0, 0.7), sigma: 0.25, kappa: 2.0 },
     ];
     let discs = [
-        Disc {
+        DiscFacet {
             position: at(0.1, 1.9, 0.2),
             normal: at(0.6, -0.8, 0.0),
             area: 0.4,
             kd: at(0.9, 0.8, 0.7),
         },
-        Disc {
+        DiscFacet {
             position: at(-1.4, 0.1, 0.9),
             normal: at(0.0, 0.0, -1.0),
             area: 0.2,
@@ -302,7 +302,7 @@ fn quadrature_and_paths_agree_in_random_scenes() {
     let (mut n, mut chi2) = (0.0, 0.0);
     for seed in 0..3 {
         let (surfaces, brdfs, lights) = random_scene(seed);
-        let s = Scenery::new(&surfaces, &brdfs, &lights, &blobs, 0.2, &discs);
+        let s = AreaScene::new(&surfaces, &brdfs, &lights, &blobs, 0.2, &discs);
         let mut receivers: Vec<Receiver> =
             (0..12).map(|i| s.on_surface(i, surfaces[i].facet_center(19))).collect();
         receivers.extend((0..2).map(|i| s.on_disc(i)));
@@ -311,7 +311,7 @@ fn quadrature_and_paths_agree_in_random_scenes() {
                 (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
             let e = s.second(&receiver, toward, &Accuracy::relative(1e-4));
             let found =
-                s.reflections(&receiver, toward, 2, Chance { n_paths: 20_000, seed, i_sample: 0 })
+                s.reflections(&receiver, toward, 2, PathSampling { n_paths: 20_000, seed, i_sample: 0 })
                     [1];
             for c in 0..3 {
                 // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the
@@ -337,7 +337,7 @@ fn quadrature_and_paths_agree_in_random_scenes() {
 #[test]
 fn the_error_bounds_what_a_finer_integral_finds() {
     let (surfaces, brdfs, lights) = random_scene(7);
-    let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
+    let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     let off_by = |i: usize| {
         let receiver = s.on_surface(i % 12, surfaces[i % 12].facet_center(i as u32));
         let toward = receiver.normal;
@@ -361,7 +361,7 @@ fn the_error_bounds_what_a_finer_integral_finds() {
 #[test]
 fn a_mean_is_that_of_its_facets() {
     let (surfaces, brdfs, lights) = random_scene(3);
-    let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
+    let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     let (eye, accuracy) = (at(3.0, 4.0, 5.0), Accuracy::relative(1e-3));
     let surface = Surface { subdivide: [2, 2], ..surfaces[1] };
     let mean =
@@ -382,10 +382,10 @@ fn a_mean_is_that_of_its_facets() {
 fn a_pair_of_discs_by_hand() {
     // Sun straight down with E = π on a white disc of area π facing up at the origin; a receiver
     // one above it, facing down: E = L A/(d² + A/π) = π/2.
-    let disc = Disc { position: DVec3::ZERO, normal: UP, area: PI, kd: DVec3::ONE };
+    let disc = DiscFacet { position: DVec3::ZERO, normal: UP, area: PI, kd: DVec3::ONE };
     let sun = [Light::Directional { direction: at(0.0, -1.0, 0.0), irradiance: DVec3::splat(PI) }];
-    let discs = [disc, Disc { position: UP, normal: -UP, ..disc }];
-    let s = Scenery::new(&[], &[], &sun, &[], 0.0, &discs);
+    let discs = [disc, DiscFacet { position: UP, normal: -UP, ..disc }];
+    let s = AreaScene::new(&[], &[], &sun, &[], 0.0, &discs);
     let e = s.second(&s.on_disc(1), -UP, &FINE);
     assert!(
         (e.irradiance.x - PI / 2.0).abs() < 1e-15
@@ -399,7 +399,7 @@ fn a_pair_of_discs_by_hand() {
 
 #[test]
 fn where_evaluations_run_out_the_error_has_no_end() {
-    let s = Scenery::new(&[ceiling(1e-5)], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
+    let s = AreaScene::new(&[ceiling(1e-5)], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
     let few = Accuracy { relative: 1e-6, absolute: 0.0, max_evaluations: 200 };
     let e = s.second(&Receiver::new(DVec3::ZERO, UP, matte(1.0)), UP, &few);
     assert!(e.error.is_infinite() && e.n_evaluations <= 220);
@@ -408,7 +408,7 @@ fn where_evaluations_run_out_the_error_has_no_end() {
 #[test]
 fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
     let eye = at(3.0, 4.0, 5.0);
-    let check = |s: &Scenery, i: usize, window: &Window| {
+    let check = |s: &AreaScene, i: usize, window: &Window| {
         let truth = s.mean_second(i, window, eye, &Accuracy::relative(1e-3));
         for relative in [1e-1, 1e-2] {
             let e = s.mean_second(i, window, eye, &Accuracy::relative(relative));
@@ -422,14 +422,14 @@ fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
         }
     };
     let (surfaces, brdfs, lights) = random_scene(0);
-    let s = Scenery::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
+    let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     each(6, |i| check(&s, i, &Window::facet(&surfaces[i], 5 + 3 * i as u32)));
     // A polished floor under a small lamp that faces it, and a small lamp a hair above it.
     let floor = rect(DVec3::ZERO, 2.0 * DVec3::Z, 2.0 * DVec3::X);
     let lamp = |x: f64, y: f64, half: f64| rect(at(x, y, 0.37), half * DVec3::X, half * DVec3::Z);
     let surfaces = [floor, lamp(0.5, 1.0, 0.01), lamp(-1.2, 0.02, 0.05)];
     for ns in [1.0, 1e3] {
-        let s = Scenery::new(
+        let s = AreaScene::new(
             &surfaces,
             &[glossy(0.1, 0.3, ns), matte(1.0), matte(1.0)],
             &[GLOW],

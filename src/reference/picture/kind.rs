@@ -9,7 +9,7 @@ use std::time::Instant;
 use glam::{DVec2, DVec3};
 
 use crate::error::{Error, Result};
-use crate::model::least::Least;
+use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, Cull, Draw, DrawPath, Impostors, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
@@ -19,7 +19,7 @@ use crate::reference::picture::model_picture::of_model;
 use crate::reference::picture::pixels::Pixels;
 use crate::reference::picture::stages::FrameReference;
 use crate::reference::picture::whole::{self, Drawing, Listener, Work};
-use crate::reference::sprites::{self, Behind, Factor, Layers, Raster, View};
+use crate::reference::sprites::{self, OpaquePixel, Factor, Layers, Raster, View};
 use crate::reference::volume::{Pixel, Volume};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -100,9 +100,9 @@ impl ReferenceKind {
             resolution: Resolution::Full,
             chunks: Chunks::Of(0),
             cutoff: UNCUT,
-            threshold: Least::Of(0.0),
+            threshold: Cutoff::At(0.0),
             cull: Cull::On,
-            smallest: Least::Of(0.0),
+            smallest: Cutoff::At(0.0),
             sort_bits: SortBits::Wide,
             count: None,
             ..scene.draw
@@ -247,7 +247,7 @@ fn thin(
     scene: &Scene,
     truth: &FrameReference,
     view: &View,
-    (behind, radiance): (&[Behind], &[DVec3]),
+    (behind, radiance): (&[OpaquePixel], &[DVec3]),
     pixels: &Pixels,
     listener: Listener,
 ) -> Vec<[f64; 4]> {
@@ -268,7 +268,7 @@ fn thin(
 pub(crate) fn volume(
     volume: &Volume<'_>,
     pixels: &Pixels,
-    behind: &[Behind],
+    behind: &[OpaquePixel],
     listener: Listener,
 ) -> Vec<Pixel> {
     // Pixels of a row share what they look through.

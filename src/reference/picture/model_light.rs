@@ -11,8 +11,8 @@ use crate::model::material::Brdf;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::adaptive::Accuracy;
-use crate::reference::area::paths::Chance;
-use crate::reference::area::{Disc, Receiver, Scenery};
+use crate::reference::area::paths::PathSampling;
+use crate::reference::area::{DiscFacet, Receiver, AreaScene};
 use crate::reference::facets::{self, Facet};
 use crate::reference::picture::stages::{FrameReference, ground};
 use crate::reference::place;
@@ -23,7 +23,7 @@ pub struct Met {
     brdfs: Vec<Brdf>,
     lights: Vec<Light>,
     /// The ground's, then the particles'.
-    discs: Vec<Disc>,
+    discs: Vec<DiscFacet>,
     n_ground: usize,
     eye: DVec3,
 }
@@ -106,7 +106,7 @@ impl Met {
             facets.into_iter().map(|f| Facet { region: f.region + scene.n_solids() as u32, ..f });
         let n_ground = ground.len();
         let colors = std::iter::repeat_n(DVec3::ONE, n_ground).chain(truth.colors.iter().copied());
-        let disc = |(f, color): (Facet, DVec3)| Disc {
+        let disc = |(f, color): (Facet, DVec3)| DiscFacet {
             position: f.position,
             normal: f.normal,
             area: f.area,
@@ -139,7 +139,7 @@ impl Met {
 
 /// The light of a scene toward the eye.
 pub struct ModelLight<'a> {
-    scenery: Scenery<'a>,
+    scenery: AreaScene<'a>,
     eye: DVec3,
     n_reflections: u32,
 }
@@ -154,7 +154,7 @@ impl<'a> ModelLight<'a> {
     ) -> ModelLight<'a> {
         let forward = scene.lighting.forward;
         let scenery =
-            Scenery::new(&met.surfaces, &met.brdfs, &met.lights, &truth.blobs, forward, &met.discs);
+            AreaScene::new(&met.surfaces, &met.brdfs, &met.lights, &truth.blobs, forward, &met.discs);
         ModelLight {
             scenery,
             eye: met.eye,
@@ -211,7 +211,7 @@ impl<'a> ModelLight<'a> {
                 at,
                 toward,
                 k,
-                Chance { n_paths: N_PATHS, seed, i_sample },
+                PathSampling { n_paths: N_PATHS, seed, i_sample },
             );
             let radiance = all[2..k].iter().map(|r| r.radiance).sum::<DVec3>();
             // Of the same paths: errors of one reflection and the next may add up.

@@ -11,7 +11,7 @@ use crate::reference::picture::model_light::{Doubt, Lit, Met, ModelLight};
 use crate::reference::picture::pixels::Pixels;
 use crate::reference::picture::stages::FrameReference;
 use crate::reference::picture::whole::{self, Drawing, Listener, Work};
-use crate::reference::sprites::{Behind, View};
+use crate::reference::sprites::{OpaquePixel, View};
 use crate::reference::surfaces;
 use crate::reference::volume::{Pixel, Volume};
 
@@ -122,11 +122,11 @@ impl Model<'_> {
         let behind = self.over(behind, &view, ground, pixels);
         let radiance: Vec<DVec3> = discs.iter().map(|lit| lit.radiance).collect();
         let of_discs = Doubt::mean(discs.iter().map(|lit| lit.doubt));
-        let places: Vec<Behind> = behind.iter().map(|(b, _)| *b).collect();
+        let places: Vec<OpaquePixel> = behind.iter().map(|(b, _)| *b).collect();
         let found =
             volume(&Volume::new(&view, &self.truth.blobs, &radiance), pixels, &places, listener);
         // Of a surface or ground all may show, of particles as much as they hold back.
-        let doubt = |(p, (behind, doubt)): (&Pixel, &(Behind, Doubt))| {
+        let doubt = |(p, (behind, doubt)): (&Pixel, &(OpaquePixel, Doubt))| {
             let through = if behind.color[3] > 0.0 { 1.0 } else { 0.0 };
             let of_volume = Doubt { quadrature: p.error, chance: 0.0 };
             of_volume + *doubt * through + of_discs * p.color[3]
@@ -136,12 +136,12 @@ impl Model<'_> {
     }
 
     /// The surface in a pixel and its light; black from behind.
-    fn seen(&self, view: &View, [i, j]: [u32; 2], number: usize, i_sample: u32) -> (Behind, Lit) {
+    fn seen(&self, view: &View, [i, j]: [u32; 2], number: usize, i_sample: u32) -> (OpaquePixel, Lit) {
         const DARK: Lit =
             Lit { radiance: DVec3::ZERO, doubt: Doubt { quadrature: 0.0, chance: 0.0 } };
         let ray = view.ray(i, j);
         let Some((i_surface, hit)) = surfaces::seen(view, &self.met.surfaces, ray) else {
-            return (Behind::NOTHING, DARK);
+            return (OpaquePixel::EMPTY, DARK);
         };
         let lit = match hit.is_front {
             true => self.light.of_surface(
@@ -153,10 +153,10 @@ impl Model<'_> {
             false => DARK,
         };
         (
-            Behind {
+            OpaquePixel {
                 color: lit.radiance.extend(1.0).to_array(),
                 depth: hit.depth,
-                ..Behind::NOTHING
+                ..OpaquePixel::EMPTY
             },
             lit,
         )
@@ -166,17 +166,17 @@ impl Model<'_> {
     /// points.
     fn over(
         &self,
-        behind: Vec<(Behind, Doubt)>,
+        behind: Vec<(OpaquePixel, Doubt)>,
         view: &View,
         ground: &[Lit],
         pixels: &Pixels,
-    ) -> Vec<(Behind, Doubt)> {
+    ) -> Vec<(OpaquePixel, Doubt)> {
         if ground.is_empty() {
             return behind;
         }
         let radiance: Vec<DVec3> = ground.iter().map(|lit| lit.radiance).collect();
         let doubt = Doubt::mean(ground.iter().map(|lit| lit.doubt));
-        let mut picture = vec![Behind::NOTHING; pixels.tile.n_pixels()];
+        let mut picture = vec![OpaquePixel::EMPTY; pixels.tile.n_pixels()];
         whole::ground_over(
             (&mut picture, pixels.tile),
             self.scene,
@@ -184,7 +184,7 @@ impl Model<'_> {
             view,
             &radiance,
         );
-        let nearer = |(other, seen): ((Behind, Doubt), Behind)| {
+        let nearer = |(other, seen): ((OpaquePixel, Doubt), OpaquePixel)| {
             if seen.depth < other.0.depth { (seen, doubt) } else { other }
         };
         behind.into_iter().zip(pixels.pick_tile(&picture)).map(nearer).collect()
@@ -197,7 +197,7 @@ fn between(
     placed: &[Surface],
     facets: &[Lit],
     pixels: &Pixels,
-) -> Vec<(Behind, Doubt)> {
+) -> Vec<(OpaquePixel, Doubt)> {
     let radiance: Vec<DVec3> = facets.iter().map(|lit| lit.radiance).collect();
     let doubt = Doubt::mean(facets.iter().map(|lit| lit.doubt));
     let seen = surfaces::render_at(view, placed, &radiance, pixels.at.iter().copied());

@@ -17,7 +17,7 @@ use crate::reference::picture::stages::FrameReference;
 use crate::reference::picture::whole::{Drawing, Listener, Work};
 
 /// Most samples of a picture: their numbers' last digits still tell places in a pixel apart.
-pub const MOST_SAMPLES: u32 = 1 << 20;
+pub const MAX_SAMPLES: u32 = 1 << 20;
 
 /// Values of a pixel in [`Sums`]: premultiplied linear R, G, B, A; the sum of their squares; what
 /// quadrature leaves; and the square of the random paths' standard error.

@@ -12,8 +12,8 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::adaptive::Accuracy;
 use crate::reference::area::mean::each;
-use crate::reference::area::{Disc, Receiver, Scenery};
-use crate::reference::facets::{Facet, Members};
+use crate::reference::area::{DiscFacet, Receiver, AreaScene};
+use crate::reference::facets::{Facet, FacetSources};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;
 use crate::reference::transmit::{self, Obstacles};
@@ -65,7 +65,7 @@ impl FrameReference {
         let groups = scene.groups();
         let setting = FrameState::at(scene, &groups, time_s)?;
         for cloud in &scene.clouds {
-            if let CloudSource::Moving(m) = &cloud.source {
+            if let CloudSource::Animated(m) = &cloud.source {
                 m.mover.at(time_s)?;
             }
         }
@@ -106,7 +106,7 @@ impl FrameReference {
         let regions = reference::place::regions(&self.groups);
         let scales =
             reference::place::sigma_means(&self.groups, &scene.clouds, self.setting.time_s);
-        let members = Members {
+        let members = FacetSources {
             blobs: &self.blobs,
             sigma_means: &scales,
             regions: &regions,
@@ -182,15 +182,15 @@ impl FrameReference {
         let surfaces: Vec<Surface> = scene.surfaces.iter().map(at_origin).collect();
         let brdfs: Vec<Brdf> =
             (0..surfaces.len()).map(|i| scene.region_material(i).at(self.setting.time_s)).collect();
-        let disc = |(f, c): (&Facet, &DVec3)| Disc {
+        let disc = |(f, c): (&Facet, &DVec3)| DiscFacet {
             position: f.position,
             normal: f.normal,
             area: f.area,
             kd: kd[f.region as usize] * c,
         };
-        let discs: Vec<Disc> = self.facets.iter().zip(&self.facet_colors).map(disc).collect();
+        let discs: Vec<DiscFacet> = self.facets.iter().zip(&self.facet_colors).map(disc).collect();
         let forward = scene.lighting.forward;
-        let scenery = Scenery::new(&surfaces, &brdfs, lights, &self.blobs, forward, &discs);
+        let scenery = AreaScene::new(&surfaces, &brdfs, lights, &self.blobs, forward, &discs);
         let flat: Vec<Facet> =
             surfaces.iter().zip(0u32..).flat_map(|(s, i)| facets_of(s, i)).collect();
         let eye = self.setting.pose.position - origin;
@@ -282,7 +282,7 @@ pub fn ground(scene: &Scene, origin: DVec3) -> Vec<Facet> {
 /// Every particle's own colour.
 pub fn colors(scene: &Scene) -> Vec<DVec3> {
     let of = |cloud: &crate::model::cloud::Cloud| match &cloud.source {
-        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Moving(_) => {
+        CloudSource::Boxes { .. } | CloudSource::Disc(_) | CloudSource::Animated(_) => {
             vec![DVec3::ONE; cloud.n_particles() as usize]
         }
         CloudSource::Particles(list) => list.iter().map(|p| p.color).collect(),

@@ -5,16 +5,16 @@ use glam::{DVec2, DVec3};
 
 use crate::error::{Error, Result};
 use crate::model::cloud::Group;
-use crate::model::count::LEAST_DRAWN;
+use crate::model::count::MIN_DRAWN;
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::model::terrain::Terrain;
 use crate::reference::area::mean::each;
 use crate::reference::picture::pixels::{Pixels, Tile};
 use crate::reference::picture::stages::FrameReference;
-use crate::reference::sprites::{Behind, Factor, Rounding, View};
-use crate::reference::texture::{Pool, Sheet, Textured};
-use crate::reference::threshold::{self, Cut};
+use crate::reference::sprites::{OpaquePixel, Factor, Rounding, View};
+use crate::reference::texture::{Pool, SplatTexture, Textured};
+use crate::reference::threshold::{self, Omitted};
 use crate::reference::volume::Volume;
 use crate::reference::{Blob, count, place, sort, sprites, surfaces, terrain};
 
@@ -54,7 +54,7 @@ pub struct Picture {
     /// How many particles it shows, in view or not.
     pub n_particles: usize,
     /// Most that `draw.threshold` cuts of a pixel; of the volume, which knows none, nothing.
-    pub cut: Cut,
+    pub cut: Omitted,
 }
 
 /// The scene at `time_s`.
@@ -94,7 +94,7 @@ pub(crate) fn draw(
                 sprites::render_textured(&view, &behind, &blobs, &radiance, &order, &none, factor);
             let cut = threshold::cut(&view, &behind, &blobs, factor)
                 .into_iter()
-                .fold(Cut::default(), Cut::most);
+                .fold(Omitted::default(), Omitted::most);
             Picture { rgba, error: None, brightest, n_particles: order.len(), cut }
         }
         Drawing::Volume => {
@@ -113,7 +113,7 @@ pub(crate) fn draw(
                 error: Some(error),
                 brightest,
                 n_particles: truth.blobs.len(),
-                cut: Cut::default(),
+                cut: Omitted::default(),
             }
         }
     }
@@ -168,7 +168,7 @@ pub(crate) fn behind_at(
     truth: &FrameReference,
     view: &View,
     pixels: &Pixels,
-) -> Vec<Behind> {
+) -> Vec<OpaquePixel> {
     let (placed, facets) = facets(scene, truth);
     if scene.terrains.is_empty() {
         return surfaces::render_at(view, &placed, &facets, pixels.at.iter().copied());
@@ -177,7 +177,7 @@ pub(crate) fn behind_at(
 }
 
 /// Surfaces and ground, a pixel each.
-pub(crate) fn behind(scene: &Scene, truth: &FrameReference, view: &View) -> Vec<Behind> {
+pub(crate) fn behind(scene: &Scene, truth: &FrameReference, view: &View) -> Vec<OpaquePixel> {
     let (placed, facets) = facets(scene, truth);
     behind_from(scene, truth, view, Tile::whole(view.width, view.height), (&placed, &facets))
 }
@@ -188,7 +188,7 @@ fn behind_from(
     view: &View,
     tile: Tile,
     (placed, facets): (&[Surface], &[DVec3]),
-) -> Vec<Behind> {
+) -> Vec<OpaquePixel> {
     let (of_surfaces, of_terrains) = facets.split_at(scene.n_surface_facets() as usize);
     let mut picture = surfaces::render_at(view, placed, of_surfaces, tile.pixels());
     ground_over((&mut picture, tile), scene, truth.setting.light_origin, view, of_terrains);
@@ -219,7 +219,7 @@ fn facets(scene: &Scene, truth: &FrameReference) -> (Vec<Surface>, Vec<DVec3>) {
 
 /// Lays over `picture` what is nearer of the scene's ground; `radiance` by the points of all of it.
 pub(crate) fn ground_over(
-    (picture, tile): (&mut [Behind], Tile),
+    (picture, tile): (&mut [OpaquePixel], Tile),
     scene: &Scene,
     origin: DVec3,
     view: &View,
@@ -240,7 +240,7 @@ pub(crate) fn sheets(
     scene: &Scene,
     truth: &FrameReference,
     view: &View,
-) -> Option<(Pool, Vec<Sheet>)> {
+) -> Option<(Pool, Vec<SplatTexture>)> {
     if !scene.is_textured() {
         return None;
     }
@@ -252,9 +252,9 @@ pub(crate) fn sheets(
         let blobs = &truth.blobs[first..first + g.n_particles as usize];
         let sheet = |(b, i): (&Blob, u32)| {
             let z = (b.position - view.pose.position).dot(view.pose.forward);
-            Sheet::new(&of, i, z / b.sigma, view.pixel())
+            SplatTexture::new(&of, i, z / b.sigma, view.pixel())
         };
-        blobs.iter().zip(0u32..).map(sheet).collect::<Vec<Sheet>>()
+        blobs.iter().zip(0u32..).map(sheet).collect::<Vec<SplatTexture>>()
     };
     let boxes = truth.groups.chunk_by(|a, b| a.i_cloud == b.i_cloud);
     let sheets = boxes.flat_map(|boxes| boxes.iter().zip(0u32..).flat_map(of_box)).collect();
@@ -293,7 +293,7 @@ fn weights(scene: &Scene, truth: &FrameReference) -> Vec<f64> {
     let shares: Vec<f64> = clouds.iter().zip(&centers).map(of_cloud).collect();
     let of_group = |g: &Group| {
         let (n, share) = (g.n_particles, shares[g.i_cloud].min(1.0));
-        let is_drawn = f64::from(n) * share >= LEAST_DRAWN;
+        let is_drawn = f64::from(n) * share >= MIN_DRAWN;
         if is_drawn { count::weights(n, share, rule.conserve) } else { vec![0.0; n as usize] }
     };
     truth.groups.iter().flat_map(of_group).collect()

@@ -3,7 +3,7 @@
 
 use super::stencil::{Edges, Patch};
 use super::*;
-use crate::model::light::LEAST_PENUMBRA;
+use crate::model::light::MIN_PENUMBRA;
 
 /// Rounding of a number from 0 to 1 to 16 bits, nearest; and f32's on the way.
 const SIXTEEN_BITS: f64 = 0.5 / 65_535.0 + 4.0 * U;
@@ -113,7 +113,7 @@ impl Exchange<'_> {
         let own = |v: f64| light.share(n, &arrival, v);
         let cone = match light {
             Light::Spot { cos_inner, cos_outer, .. } => {
-                2.0 / (cos_inner - cos_outer).max(LEAST_PENUMBRA)
+                2.0 / (cos_inner - cos_outer).max(MIN_PENUMBRA)
             }
             _ => 0.0,
         };

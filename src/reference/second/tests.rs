@@ -10,7 +10,7 @@ use super::*;
 use crate::model::basis::N_NODES;
 use crate::model::pairings::pairings;
 use crate::model::surface::Surface;
-use crate::reference::area::{Accuracy, Receiver, Scenery};
+use crate::reference::area::{Accuracy, Receiver, AreaScene};
 
 const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };
@@ -185,7 +185,7 @@ fn a_corner_is_that_of_the_areas() {
     let sun =
         [Light::Directional { direction: DVec3::new(0.0, -0.8, -0.6), irradiance: DVec3::ONE }];
     let scene = Scene::of_surfaces(&[floor, wall], matte(0.5));
-    let truth = Scenery::new(&[floor, wall], &[matte(0.5); 2], &sun, &[], 0.0, &[]);
+    let truth = AreaScene::new(&[floor, wall], &[matte(0.5); 2], &sun, &[], 0.0, &[]);
     for j in [0, 7, 27, 63, 64, 91, 120] {
         let at = Receiver::new(scene.facets[j].position, scene.facets[j].normal, matte(0.5));
         let e = truth.second(&at, at.normal, &Accuracy::relative(1e-7));

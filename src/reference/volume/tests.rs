@@ -29,13 +29,13 @@ fn blob(z: f64, sigma: f64, tau: f64) -> Blob {
     Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma, kappa: tau / (SQRT_TAU * sigma) }
 }
 
-fn one_pixel(blobs: &[Blob], colors: &[DVec3], behind: Behind) -> Pixel {
+fn one_pixel(blobs: &[Blob], colors: &[DVec3], behind: OpaquePixel) -> Pixel {
     render(&view(1), &[behind], blobs, colors)[0]
 }
 
 /// What the middle pixel shows of blobs before nothing.
 fn alone(blobs: &[Blob], colors: &[DVec3]) -> Pixel {
-    one_pixel(blobs, colors, Behind::NOTHING)
+    one_pixel(blobs, colors, OpaquePixel::EMPTY)
 }
 
 fn assert_is(pixel: Pixel, color: DVec3, alpha: f64, tolerance: f64) {
@@ -58,7 +58,7 @@ fn one_blob_is_one_minus_e_to_the_minus_tau() {
     }
     // Off the axis by b: τ e^{−b²/2σ²}; nine pixels, the outer eight by the definition of b.
     let (one, view) = (blob(5.0, 0.4, 1.5), view(3));
-    let picture = render(&view, &[Behind::NOTHING; 9], &[one], &[COLOR]);
+    let picture = render(&view, &[OpaquePixel::EMPTY; 9], &[one], &[COLOR]);
     for (pixel, k) in picture.iter().zip(0..) {
         let d = view.ray(k % 3, k / 3).normalize();
         let b2 = (one.position - one.position.dot(d) * d).length_squared();
@@ -109,7 +109,7 @@ fn far_apart_blobs_are_thin_sprites() {
         [blob(4.0, 0.2, 0.8), blob(8.0, 0.25, 1.7), blob(20.0, 0.6, 3.0), blob(30.0, 0.5, 0.02)];
     let colors = [RED, BLUE, COLOR, DVec3::ONE];
     let thin = sprites::render(&view(3), &blobs, &colors, &[3, 2, 1, 0]);
-    let thick = render(&view(3), &[Behind::NOTHING; 9], &blobs, &colors);
+    let thick = render(&view(3), &[OpaquePixel::EMPTY; 9], &blobs, &colors);
     for (a, b) in thick.iter().zip(&thin) {
         assert_is(*a, DVec3::from_slice(b), b[3], a.error);
         assert!(a.error < 4e-6);
@@ -121,7 +121,7 @@ fn far_apart_blobs_are_thin_sprites() {
 
 #[test]
 fn a_surface_within_a_blob_hides_its_half() {
-    let behind = Behind { color: [0.5, 0.25, 1.0, 1.0], depth: 3.0, ..Behind::NOTHING };
+    let behind = OpaquePixel { color: [0.5, 0.25, 1.0, 1.0], depth: 3.0, ..OpaquePixel::EMPTY };
     let through = f64::exp(-0.6);
     let expected = (1.0 - through) * RED + through * DVec3::new(0.5, 0.25, 1.0);
     assert_is(one_pixel(&[blob(3.0, 0.3, 1.2)], &[RED], behind), expected, 1.0, 1e-11);
@@ -174,7 +174,7 @@ fn overlapping_blobs_are_what_small_steps_make_of_them() {
     for (n, scale) in [(2, 2.0), (40, 0.2), (40, 5.0)] {
         let (blobs, colors) = crowd(n, scale);
         let view = view(3);
-        let picture = render(&view, &[Behind::NOTHING; 9], &blobs, &colors);
+        let picture = render(&view, &[OpaquePixel::EMPTY; 9], &blobs, &colors);
         for (pixel, k) in picture.iter().zip(0..) {
             let ray = view.ray(k % 3, k / 3);
             let (fine, alpha) = by_steps(&blobs, &colors, ray, 9.0, 60_000);

@@ -4,7 +4,7 @@
 use crate::frame::exchange::{gathers_from_tree, is_glossy};
 use crate::model::basis::MAX_BASES;
 use crate::model::film::FilmFormat;
-use crate::model::least::Least;
+use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;
@@ -80,13 +80,13 @@ const ALL: [(&str, What, Describe, Lift); 10] = [
         "smallest",
         What::Particles,
         |s| format!("{} px", s.draw.smallest.bound()),
-        |s| s.draw.smallest = Least::Of(0.0),
+        |s| s.draw.smallest = Cutoff::At(0.0),
     ),
     (
         "threshold",
         What::Particles,
         |s| format!("tau {}", s.draw.threshold.bound()),
-        |s| s.draw.threshold = Least::Of(0.0),
+        |s| s.draw.threshold = Cutoff::At(0.0),
     ),
     ("format", What::Picture, format_of, |s| s.film.format = FilmFormat::Rgba32f),
     (

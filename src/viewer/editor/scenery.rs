@@ -59,7 +59,7 @@ impl Scenery {
     pub fn document(&self) -> Document {
         let boxes = match &self.cloud().source {
             CloudSource::Boxes { boxes, .. } => boxes.clone(),
-            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Moving(_) => vec![],
+            CloudSource::Particles(_) | CloudSource::Disc(_) | CloudSource::Animated(_) => vec![],
         };
         Document { boxes, seed: self.cloud().seed }
     }

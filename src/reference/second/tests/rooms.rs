@@ -118,7 +118,7 @@ fn rooms_are_those_of_the_areas_and_their_bounds_small() {
     let (mut error, mut value) = ([0.0; 2], [0.0; 2]);
     for seed in 0..8 {
         let room = random(seed);
-        let truth = Scenery::new(&room.surfaces, &room.brdfs, &room.lights, &[], 0.0, &[]);
+        let truth = AreaScene::new(&room.surfaces, &room.brdfs, &room.lights, &[], 0.0, &[]);
         let found = room.gather(13);
         let truths = each(found.len(), |k| {
             let (s, i) = (found[k].0 as u32 / (SIDE * SIDE), found[k].0 as u32 % (SIDE * SIDE));

@@ -10,9 +10,9 @@ use super::cloud::Particle;
 use crate::error::Result;
 
 /// Who moves them.
-pub trait Mover: Debug + Send + Sync {
+pub trait Animation: Debug + Send + Sync {
     /// All particles at `time_s`, relative to the cloud's position: always as many, and within the
-    /// bounds that [`Moving`] says.
+    /// bounds that [`AnimatedParticles`] says.
     ///
     /// # Errors
     /// What cannot be read.
@@ -21,8 +21,8 @@ pub trait Mover: Debug + Send + Sync {
 
 /// A cloud's particles, and what bounds them at all times.
 #[derive(Debug, Clone)]
-pub struct Moving {
-    pub mover: Arc<dyn Mover>,
+pub struct AnimatedParticles {
+    pub mover: Arc<dyn Animation>,
     pub n_particles: u32,
     /// Of the positions.
     pub low: DVec3,
@@ -38,8 +38,8 @@ pub struct Moving {
     pub mass_max: f64,
 }
 
-impl PartialEq for Moving {
-    fn eq(&self, other: &Moving) -> bool {
+impl PartialEq for AnimatedParticles {
+    fn eq(&self, other: &AnimatedParticles) -> bool {
         Arc::ptr_eq(&self.mover, &other.mover) && self.n_particles == other.n_particles
     }
 }

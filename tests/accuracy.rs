@@ -16,7 +16,7 @@ use nimbus::model::basis::{Basis, evaluate};
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::Scene;
 use nimbus::reference::area::mean::each;
-use nimbus::reference::area::{Accuracy, Estimate, AreaScene};
+use nimbus::reference::area::{Accuracy, AreaScene, Estimate};
 use rooms::{Frame, HEAD, Plate, frame, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 

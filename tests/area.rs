@@ -17,7 +17,7 @@ use glam::DVec3;
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::Scene;
 use nimbus::reference::area::paths::PathSampling;
-use nimbus::reference::area::{Accuracy, Receiver, AreaScene};
+use nimbus::reference::area::{Accuracy, AreaScene, Receiver};
 use rooms::{HEAD, Plate, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 
@@ -140,7 +140,8 @@ fn compare(seed: u32, stride: usize, n_paths: u32, found: &mut [Differences; 3])
         let e = scenery.second(&at, toward, &Accuracy::relative(1e-4));
         assert!(e.error.is_finite() && e.irradiance_error.is_finite(), "{e:?}");
         let by_paths = |at: &Receiver, seed| {
-            let l = scenery.reflections(at, toward, 2, PathSampling { n_paths, seed, i_sample: 0 })[1];
+            let l =
+                scenery.reflections(at, toward, 2, PathSampling { n_paths, seed, i_sample: 0 })[1];
             [l.radiance.x, l.error.x]
         };
         let what = format!("room {seed} ({kind:?}), surface {s}, facet {i}");

@@ -6,7 +6,7 @@ mod scene_text;
 use glam::DVec3;
 use nimbus::io::scene_file::LoadedScene;
 use nimbus::model::basis::Sampling;
-use nimbus::model::light::{MIN_PENUMBRA, Light};
+use nimbus::model::light::{Light, MIN_PENUMBRA};
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::{Gather, LightingMode, Pairs};
 use nimbus::model::sums::{Precision, Summation, Sums};
@@ -92,9 +92,7 @@ fn point_lights_and_spots() {
     // A cone without penumbra: full just inside 60 degrees, nothing just outside.
     let falloff =
         |cos: f64| edge.arrival(position + DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)).falloff;
-    assert!(
-        (falloff(0.5 + 1.01 * MIN_PENUMBRA) - 1.0).abs() < 1e-12 && falloff(0.5 - 1e-9) == 0.0
-    );
+    assert!((falloff(0.5 + 1.01 * MIN_PENUMBRA) - 1.0).abs() < 1e-12 && falloff(0.5 - 1e-9) == 0.0);
     assert_eq!(
         loaded.resolved["light"][1],
         json!({

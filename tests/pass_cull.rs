@@ -166,8 +166,12 @@ impl Scene {
     fn fates(&self) -> Vec<CullOutcome> {
         // ln of a product of four, each rounded, by Vulkan's 3 ulp or 2^-21; what is kept beside
         // the silhouette, and its rounding.
-        let slack =
-            CullTolerance { depth: DEPTH, log: 2f64.powi(-20), growth: 1.01e-4, pixels: 1.01 / 16.0 };
+        let slack = CullTolerance {
+            depth: DEPTH,
+            log: 2f64.powi(-20),
+            growth: 1.01e-4,
+            pixels: 1.01 / 16.0,
+        };
         let of = |i: usize| {
             let drawn = (i as u32) < self.drawn[self.i_group[i] as usize].end;
             if drawn { outcome(&self.view, &self.blob(i), &slack) } else { CullOutcome::Culled }

@@ -11,7 +11,7 @@ use nimbus::gpu::memory::{TargetFormat, has_depth24};
 use nimbus::gpu::{Buffer, Compiler};
 use nimbus::model::resolution::{ALIKE, LowResLayout};
 use nimbus::passes::upsample::{Extents, Upsample};
-use nimbus::reference::upsample::{Summed, OpaqueLayer, render_alike};
+use nimbus::reference::upsample::{OpaqueLayer, Summed, render_alike};
 
 const FORMATS: [TargetFormat; 3] =
     [TargetFormat::Rgba8, TargetFormat::Rgba16f, TargetFormat::Rgba32f];

@@ -56,7 +56,8 @@ fn centered(
         );
     }
     let share = (drawing == Drawing::Thin).then(|| cut.share());
-    if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_active()) {
+    if let Some(share) = share.filter(|_| args.options.verbose && scene.draw.threshold.is_active())
+    {
         let n = cut.n_layers;
         eprintln!(
             "draw.threshold cuts {n} layers of a pixel at most, and changes it by at most \

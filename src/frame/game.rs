@@ -18,7 +18,7 @@ use crate::layout::frame::{CameraRecord, GridRecord, LightRecord};
 use crate::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use crate::model::basis::{Basis, N_NODES};
 use crate::model::camera::Pose;
-use crate::model::cloud::{Group, max_blob_mass, mass};
+use crate::model::cloud::{Group, mass, max_blob_mass};
 use crate::model::frame_state::FrameState;
 use crate::model::grid::DEPOSIT_CUT_SIGMA;
 use crate::model::gust::Mode;

@@ -19,7 +19,7 @@ use crate::model::basis::N_NODES;
 use crate::model::cloud::Group;
 use crate::model::film::FilmFormat;
 use crate::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use crate::model::resolution::{Resolution, LowResLayout};
+use crate::model::resolution::{LowResLayout, Resolution};
 use crate::model::scene::{Chunks, DrawPath, Impostors, LightingMode, MAX_CHUNKS, Scene};
 use crate::model::sums::Precision;
 use crate::model::terrain::Terrain;

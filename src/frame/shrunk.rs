@@ -12,7 +12,7 @@ use crate::gpu::memory::TargetFormat;
 use crate::gpu::{Buffer, Compiler, Device, Place, Recorder, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::film::Film;
-use crate::model::resolution::{Resolution, LowResLayout};
+use crate::model::resolution::{LowResLayout, Resolution};
 use crate::model::scene::{Draw, DrawPath, Scene};
 use crate::passes::upsample::{Extents, Upsample};
 

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 use crate::model::air::Air;
 use crate::model::boxes::{CloudBox, Form};
 use crate::model::cloud::{Cloud, CloudSource, Facing};
-use crate::model::growth::{MAX_SCALE, Growth, MIN_SCALE};
+use crate::model::growth::{Growth, MAX_SCALE, MIN_SCALE};
 use crate::model::gust::{Gust, MAX_WAVES};
 use crate::model::material::Material;
 use crate::model::scene::Simulate;

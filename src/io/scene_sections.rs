@@ -10,9 +10,9 @@ use crate::error::Result;
 use crate::model::basis::{MAX_BASES, Sampling};
 use crate::model::camera::{Camera, CameraKey};
 use crate::model::count::Count;
+use crate::model::cutoff::Cutoff;
 use crate::model::film::{Film, FilmFormat, ToneMap};
 use crate::model::grid::{MAX_CELLS, MAX_MARCH_STEPS, min_step};
-use crate::model::cutoff::Cutoff;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{
     Chunks, Cull, Draw, DrawPath, Gather, Impostors, Lighting, LightingMode, Pairs,
@@ -222,14 +222,16 @@ pub fn read_draw(root: &mut Section) -> Result<Draw> {
     let cull = s.choice("cull", "on", &Cull::NAMES, &[])?;
     let smallest = read_least(&mut s, "smallest", Bounds::Within(0.0, 1000.0))?;
     if smallest != Cutoff::NONE && cull == Cull::Off {
-        let found =
-            if let Cutoff::At(found) = smallest { found.to_string() } else { "\"auto\"".to_owned() };
+        let found = if let Cutoff::At(found) = smallest {
+            found.to_string()
+        } else {
+            "\"auto\"".to_owned()
+        };
         return Err(s.fault("smallest", format!("expected 0 where cull = \"off\", found {found}")));
     }
     let sort_bits = read_sort_bits(&mut s)?;
     let resolution = read_resolution(&mut s)?;
-    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Cutoff::NONE)
-    {
+    if impostors != Impostors::Off && (resolution != Resolution::Full || smallest != Cutoff::NONE) {
         let what = "expected \"off\", or draw.resolution = 1 and draw.smallest = 0";
         return Err(s.fault("impostors", what.to_owned()));
     }

@@ -108,8 +108,7 @@ pub fn particles(file: &WeatherFile, keys: &WeatherKeys, seed: u32) -> Result<Ve
 /// stays.
 pub fn particle(blob: &WeatherBlob, exaggeration: f64) -> Particle {
     let shape = DVec3::new(1.0, exaggeration, 1.0);
-    let aspect =
-        (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT);
+    let aspect = (blob.sigma_z * exaggeration / blob.sigma_xy).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT);
     // Where the aspect is cut the mass stays.
     let kappa = blob.kappa * blob.sigma_z / (aspect * blob.sigma_xy);
     Particle {

@@ -10,8 +10,8 @@ use super::scene_weather::{WeatherKeys, particle};
 use super::weather::wrf::{Step, WeatherFile};
 use super::weather_spans::{MOST_TOGETHER, Spans};
 use crate::error::Result;
+use crate::model::animated::{AnimatedParticles, Animation};
 use crate::model::cloud::{MIN_ASPECT, Particle, mass};
-use crate::model::animated::{Animation, AnimatedParticles};
 use crate::model::weather::particles::Layout;
 use crate::model::weather::steps::{Between, between};
 

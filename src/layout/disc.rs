@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::layout::record;
 use crate::model::cloud::Group;
-use crate::model::disc::{Disc, Cycle};
+use crate::model::disc::{Cycle, Disc};
 
 record! {
     /// The law of a disc's particles, in lengths that a whole period makes of speeds, and the time.

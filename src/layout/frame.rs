@@ -6,7 +6,7 @@ use crate::layout::record;
 use crate::model::camera::{Camera, Pose};
 use crate::model::film::Film;
 use crate::model::grid::GridSpec;
-use crate::model::light::{MIN_PENUMBRA, Light, UP};
+use crate::model::light::{Light, MIN_PENUMBRA, UP};
 
 /// Kinds of [`LightRecord`]; the shaders' `LIGHT_*`.
 pub const LIGHT_DIRECTIONAL: u32 = 0;

@@ -2,11 +2,11 @@
 
 use glam::DVec3;
 
+use super::animated::AnimatedParticles;
 use super::boxes::{CloudBox, Form, max_radius, mean_radius};
 use super::disc::Disc;
 use super::growth::Growth;
 use super::gust::Gust;
-use super::animated::AnimatedParticles;
 use super::texture::Texture;
 
 /// A Gaussian blob's standard deviation from its radius: σ = R/3 (model.md §1).

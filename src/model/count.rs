@@ -71,7 +71,11 @@ mod tests {
         assert_eq!(COUNT.drawn(7, COUNT.share(1.0, 0.0)), DrawnCount::all(7));
         assert_eq!(COUNT.drawn(0, 1.0), DrawnCount::NOTHING);
         for distance in [1e6, 1e300, f64::INFINITY, f64::NAN] {
-            assert_eq!(COUNT.drawn(1000, COUNT.share(1.0, distance)), DrawnCount::NOTHING, "{distance}");
+            assert_eq!(
+                COUNT.drawn(1000, COUNT.share(1.0, distance)),
+                DrawnCount::NOTHING,
+                "{distance}"
+            );
         }
         // As long as anything is drawn every factor is a number that f32 has.
         let far = COUNT.drawn(1, MIN_DRAWN);

@@ -2,11 +2,13 @@
 //! Lengths are scene units, angles radians, times seconds, radiance and irradiance linear RGB.
 
 pub mod air;
+pub mod animated;
 pub mod basis;
 pub mod boxes;
 pub mod camera;
 pub mod cloud;
 pub mod count;
+pub mod cutoff;
 pub mod disc;
 pub mod film;
 pub mod frame_state;
@@ -15,11 +17,9 @@ pub mod growth;
 pub mod gust;
 pub mod gust_lanes;
 pub mod impostor;
-pub mod cutoff;
 pub mod light;
 pub mod material;
 pub mod moisture;
-pub mod animated;
 pub mod pairings;
 pub mod philox;
 pub mod resolution;

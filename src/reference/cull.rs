@@ -29,7 +29,8 @@ pub struct CullTolerance {
 }
 
 impl CullTolerance {
-    pub const NONE: CullTolerance = CullTolerance { depth: 0.0, log: 0.0, growth: 0.0, pixels: 0.0 };
+    pub const NONE: CullTolerance =
+        CullTolerance { depth: 0.0, log: 0.0, growth: 0.0, pixels: 0.0 };
 }
 
 /// What may become of `blob`, κ with its weights.
@@ -101,7 +102,10 @@ mod tests {
     #[test]
     fn silhouettes_that_hold_a_centre_are_kept() {
         // Between four centres, and around one of them: at depth 10 a slope of ¼ is 2.5.
-        assert_eq!((of(0.0, 0.0, 10.0, 0.1), of(2.5, -2.5, 10.0, 0.1)), (CullOutcome::Culled, CullOutcome::Kept));
+        assert_eq!(
+            (of(0.0, 0.0, 10.0, 0.1), of(2.5, -2.5, 10.0, 0.1)),
+            (CullOutcome::Culled, CullOutcome::Kept)
+        );
         // Reaches from 0 to the centres at ±¼: asin(3σ/10) = atan ¼, 3σ = 10/√17.
         let sigma = 10.0 / 17f64.sqrt() / 3.0;
         assert_eq!(
@@ -114,7 +118,10 @@ mod tests {
             [CullOutcome::Culled; 3]
         );
         assert_eq!([of(0.1, 0.0, 0.5, 1.0), of(30.0, 0.0, 1.0, 11.0)], [CullOutcome::Kept; 2]);
-        assert_eq!([of(f64::NAN, 0.0, 10.0, 1.0), of(2.5, 2.5, 10.0, 0.0)], [CullOutcome::Culled; 2]);
+        assert_eq!(
+            [of(f64::NAN, 0.0, 10.0, 1.0), of(2.5, 2.5, 10.0, 0.0)],
+            [CullOutcome::Culled; 2]
+        );
         assert_eq!(of(2.5, 2.5, 10.0, f64::INFINITY), CullOutcome::Kept);
     }
 
@@ -123,16 +130,32 @@ mod tests {
         let blob =
             Blob { aspect: 1.0, position: DVec3::new(2.5, 2.5, -10.0), sigma: 1.0, kappa: 1.0 };
         let of = |view: View, slack: f64| {
-            outcome(&view, &blob, &CullTolerance { depth: slack, log: slack, growth: slack, pixels: slack })
+            outcome(
+                &view,
+                &blob,
+                &CullTolerance { depth: slack, log: slack, growth: slack, pixels: slack },
+            )
         };
         let tau = crate::model::cloud::SQRT_TAU;
         let thin = |share: f64| View { threshold: share * tau, ..VIEW };
-        assert_eq!((of(thin(0.999), 0.0), of(thin(1.001), 0.0)), (CullOutcome::Kept, CullOutcome::Culled));
-        assert_eq!((of(thin(0.999), 0.01), of(thin(1.001), 0.01)), (CullOutcome::Uncertain, CullOutcome::Uncertain));
+        assert_eq!(
+            (of(thin(0.999), 0.0), of(thin(1.001), 0.0)),
+            (CullOutcome::Kept, CullOutcome::Culled)
+        );
+        assert_eq!(
+            (of(thin(0.999), 0.01), of(thin(1.001), 0.01)),
+            (CullOutcome::Uncertain, CullOutcome::Uncertain)
+        );
         // A pixel at depth 10 is 5 wide, σ a fifth of that.
         let small = |smallest: f64| View { smallest, ..VIEW };
-        assert_eq!((of(small(0.199), 0.0), of(small(0.201), 0.0)), (CullOutcome::Kept, CullOutcome::Culled));
-        assert_eq!((of(small(0.199), 0.01), of(small(0.201), 0.01)), (CullOutcome::Uncertain, CullOutcome::Uncertain));
+        assert_eq!(
+            (of(small(0.199), 0.0), of(small(0.201), 0.0)),
+            (CullOutcome::Kept, CullOutcome::Culled)
+        );
+        assert_eq!(
+            (of(small(0.199), 0.01), of(small(0.201), 0.01)),
+            (CullOutcome::Uncertain, CullOutcome::Uncertain)
+        );
         let near = |near: f64| View { near, ..VIEW };
         assert_eq!(
             (of(near(9.99), 0.0), of(near(10.01), 0.0), of(near(10.01), 0.01)),

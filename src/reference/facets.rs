@@ -217,14 +217,7 @@ pub fn bunch(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob 
         (_, true) => {
             let wide = spread(&|b, d| b.sigma.powi(2) + 0.5 * (d.x * d.x + d.z * d.z));
             let high = spread(&|b, d| (b.aspect * b.sigma).powi(2) + d.y * d.y);
-            (
-                wide,
-                if wide > 0.0 {
-                    (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT)
-                } else {
-                    1.0
-                },
-            )
+            (wide, if wide > 0.0 { (high / wide).clamp(MIN_ASPECT, 1.0 / MIN_ASPECT) } else { 1.0 })
         }
     };
     MergedBlob {

@@ -468,8 +468,12 @@ mod tests {
         let at = |z: f64| Blob { aspect: 1.0, position: DVec3::NEG_Z * z, sigma: 0.25, kappa };
         let (blobs, colors) = ([at(2.0), at(4.0)], [DVec3::X, DVec3::Y]);
         let over = |depth: f64, depth_bound: f64| {
-            let behind =
-                OpaquePixel { color: [0.0, 0.0, 1.0, 1.0], depth, depth_bound, ..OpaquePixel::EMPTY };
+            let behind = OpaquePixel {
+                color: [0.0, 0.0, 1.0, 1.0],
+                depth,
+                depth_bound,
+                ..OpaquePixel::EMPTY
+            };
             let (value, bound) =
                 render_over(&VIEW, &[behind], &blobs, &colors, &[1, 0], &Rounding::NONE);
             (value[0], bound[0])

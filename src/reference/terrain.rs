@@ -47,7 +47,10 @@ impl Triangle {
 
     /// Those of `terrain`, whose points are where `terrain.origin` puts them; `radiance` by its
     /// points.
-    pub fn of<'a>(terrain: &'a Terrain, radiance: &'a [DVec3]) -> impl Iterator<Item = Triangle> + 'a {
+    pub fn of<'a>(
+        terrain: &'a Terrain,
+        radiance: &'a [DVec3],
+    ) -> impl Iterator<Item = Triangle> + 'a {
         let of_cell = move |i: u64| {
             let corners = terrain.corners(i as u32);
             HALVES.map(|half| {

@@ -3,7 +3,7 @@
 //! and their optical depth.
 
 use super::Blob;
-use super::sprites::{OpaquePixel, Factor, View};
+use super::sprites::{Factor, OpaquePixel, View};
 
 /// What is cut of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -33,7 +33,12 @@ impl Omitted {
 }
 
 /// The picture's pixels before `behind`. `factor` on each blob's τ, as its texture has it.
-pub fn cut(view: &View, behind: &[OpaquePixel], blobs: &[Blob], factor: Option<Factor<'_>>) -> Vec<Omitted> {
+pub fn cut(
+    view: &View,
+    behind: &[OpaquePixel],
+    blobs: &[Blob],
+    factor: Option<Factor<'_>>,
+) -> Vec<Omitted> {
     let mut pixels = vec![Omitted::default(); behind.len()];
     let whole = View { threshold: 0.0, smallest: 0.0, ..*view };
     for (k, blob) in blobs.iter().enumerate() {

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::{OpaquePixel, Factor, Rounding, View, alpha};
+use super::sprites::{Factor, OpaquePixel, Rounding, View, alpha};
 
 /// Unit round-off of f32.
 pub(super) const U: f64 = 1.0 / 16_777_216.0;

@@ -34,7 +34,11 @@ pub fn apart(a: f64, b: f64, alike: f64) -> f64 {
 }
 
 /// The whole picture.
-pub fn render(small: &LowResLayout, blobs: &[[f64; 4]], under: Option<&OpaqueLayer<'_>>) -> Vec<Summed> {
+pub fn render(
+    small: &LowResLayout,
+    blobs: &[[f64; 4]],
+    under: Option<&OpaqueLayer<'_>>,
+) -> Vec<Summed> {
     render_alike(small, blobs, under, ALIKE)
 }
 
@@ -141,7 +145,8 @@ mod tests {
         let columns = || (0..64).map(|i| i % 8);
         let blobs: Vec<[f64; 4]> = columns().map(|x| [value(x); 4]).collect();
         let small_depths: Vec<f64> = columns().map(small_depth).collect();
-        let under = OpaqueLayer { picture: &[[0.0; 4]; 2], depths: &depths, small_depths: &small_depths };
+        let under =
+            OpaqueLayer { picture: &[[0.0; 4]; 2], depths: &depths, small_depths: &small_depths };
         render(&small, &blobs, Some(&under)).iter().map(|(v, _)| v[0]).collect()
     }
 

@@ -128,7 +128,12 @@ fn reach(depth: f64, omitted: f64) -> f64 {
 }
 
 /// The whole picture before `behind`, a pixel each, and nothing said in between.
-pub fn render(view: &View, behind: &[OpaquePixel], blobs: &[Blob], radiance: &[DVec3]) -> Vec<Pixel> {
+pub fn render(
+    view: &View,
+    behind: &[OpaquePixel],
+    blobs: &[Blob],
+    radiance: &[DVec3],
+) -> Vec<Pixel> {
     let volume = Volume::new(view, blobs, radiance);
     let width = view.width as usize;
     super::area::mean::each(view.height as usize, |j| {

@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 use nimbus::layout::frame::LightRecord;
-use nimbus::model::light::{MIN_PENUMBRA, Light};
+use nimbus::model::light::{Light, MIN_PENUMBRA};
 
 use crate::bounded::{Bounded, Random, dot, exact3};
 

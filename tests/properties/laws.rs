@@ -9,7 +9,7 @@ use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::count::{Count, DrawnCount};
 use nimbus::model::film::{Film, FilmFormat, ToneMap, srgb_encode};
 use nimbus::model::grid::{GridSpec, MARGIN_CELLS, MAX_CELLS};
-use nimbus::model::growth::{MAX_SCALE, Growth, MIN_SCALE};
+use nimbus::model::growth::{Growth, MAX_SCALE, MIN_SCALE};
 use nimbus::reference::picture::pixels::Pixels;
 use proptest::collection::vec;
 use proptest::prelude::*;

@@ -13,7 +13,7 @@ use crate::error::{Error, Place, Result};
 use crate::model::weather::air::{self, PRESSURES_PA, TEMPERATURES_K};
 use crate::model::weather::diagnosed::{self, Air};
 use crate::model::weather::extinction::{
-    ICE, LIQUID, InvalidCounts, Phase, SNOW, add, single_moment_phase,
+    ICE, InvalidCounts, LIQUID, Phase, SNOW, add, single_moment_phase,
 };
 use crate::model::weather::grid::{Grid, Ground, Shape};
 

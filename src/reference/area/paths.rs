@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 use glam::DVec3;
 
 use super::visibility::{Rect, Source};
-use super::{Receiver, AreaScene, mean, reflectance};
+use super::{AreaScene, Receiver, mean, reflectance};
 use crate::model::material::Brdf;
 use crate::model::philox::{philox4x32_10, uniform};
 

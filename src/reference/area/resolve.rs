@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::adaptive::Cell;
 use super::clip::WHOLE;
 use super::visibility::{Rect, Source, source_of};
-use super::{Reach, AreaScene, Seen};
-use crate::model::light::{MIN_PENUMBRA, Light};
+use super::{AreaScene, Reach, Seen};
+use crate::model::light::{Light, MIN_PENUMBRA};
 use crate::reference::Blob;
 
 /// Greatest radius of a cell, in its distance from what varies as 1/d². There the integrand has no

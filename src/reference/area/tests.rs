@@ -158,8 +158,12 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
         let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
         assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
         // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
-        let found =
-            s.reflections(&receiver, toward, 2, PathSampling { n_paths: 2000, seed: 1, i_sample: 0 });
+        let found = s.reflections(
+            &receiver,
+            toward,
+            2,
+            PathSampling { n_paths: 2000, seed: 1, i_sample: 0 },
+        );
         for (l, truth) in found.iter().zip([0.5, 0.35, 0.85]) {
             assert!((l.radiance.x - truth).abs() < 1e-12, "{depth} {l:?}");
         }
@@ -310,9 +314,12 @@ fn quadrature_and_paths_agree_in_random_scenes() {
             let toward =
                 (receiver.normal + 0.4 * receiver.normal.any_orthonormal_vector()).normalize();
             let e = s.second(&receiver, toward, &Accuracy::relative(1e-4));
-            let found =
-                s.reflections(&receiver, toward, 2, PathSampling { n_paths: 20_000, seed, i_sample: 0 })
-                    [1];
+            let found = s.reflections(
+                &receiver,
+                toward,
+                2,
+                PathSampling { n_paths: 20_000, seed, i_sample: 0 },
+            )[1];
             for c in 0..3 {
                 // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the
                 // sample's variance.

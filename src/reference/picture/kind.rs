@@ -19,7 +19,7 @@ use crate::reference::picture::model_picture::of_model;
 use crate::reference::picture::pixels::Pixels;
 use crate::reference::picture::stages::FrameReference;
 use crate::reference::picture::whole::{self, Drawing, Listener, Work};
-use crate::reference::sprites::{self, OpaquePixel, Factor, Layers, Raster, View};
+use crate::reference::sprites::{self, Factor, Layers, OpaquePixel, Raster, View};
 use crate::reference::volume::{Pixel, Volume};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

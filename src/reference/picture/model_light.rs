@@ -12,7 +12,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::adaptive::Accuracy;
 use crate::reference::area::paths::PathSampling;
-use crate::reference::area::{DiscFacet, Receiver, AreaScene};
+use crate::reference::area::{AreaScene, DiscFacet, Receiver};
 use crate::reference::facets::{self, Facet};
 use crate::reference::picture::stages::{FrameReference, ground};
 use crate::reference::place;
@@ -153,8 +153,14 @@ impl<'a> ModelLight<'a> {
         n_reflections: Option<u32>,
     ) -> ModelLight<'a> {
         let forward = scene.lighting.forward;
-        let scenery =
-            AreaScene::new(&met.surfaces, &met.brdfs, &met.lights, &truth.blobs, forward, &met.discs);
+        let scenery = AreaScene::new(
+            &met.surfaces,
+            &met.brdfs,
+            &met.lights,
+            &truth.blobs,
+            forward,
+            &met.discs,
+        );
         ModelLight {
             scenery,
             eye: met.eye,

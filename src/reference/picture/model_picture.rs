@@ -136,7 +136,13 @@ impl Model<'_> {
     }
 
     /// The surface in a pixel and its light; black from behind.
-    fn seen(&self, view: &View, [i, j]: [u32; 2], number: usize, i_sample: u32) -> (OpaquePixel, Lit) {
+    fn seen(
+        &self,
+        view: &View,
+        [i, j]: [u32; 2],
+        number: usize,
+        i_sample: u32,
+    ) -> (OpaquePixel, Lit) {
         const DARK: Lit =
             Lit { radiance: DVec3::ZERO, doubt: Doubt { quadrature: 0.0, chance: 0.0 } };
         let ray = view.ray(i, j);

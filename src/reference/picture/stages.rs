@@ -12,7 +12,7 @@ use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::reference::area::adaptive::Accuracy;
 use crate::reference::area::mean::each;
-use crate::reference::area::{DiscFacet, Receiver, AreaScene};
+use crate::reference::area::{AreaScene, DiscFacet, Receiver};
 use crate::reference::facets::{Facet, FacetSources};
 use crate::reference::generate::Generated;
 use crate::reference::occlude::Rectangle;

@@ -12,7 +12,7 @@ use crate::model::terrain::Terrain;
 use crate::reference::area::mean::each;
 use crate::reference::picture::pixels::{Pixels, Tile};
 use crate::reference::picture::stages::FrameReference;
-use crate::reference::sprites::{OpaquePixel, Factor, Rounding, View};
+use crate::reference::sprites::{Factor, OpaquePixel, Rounding, View};
 use crate::reference::texture::{Pool, SplatTexture, Textured};
 use crate::reference::threshold::{self, Omitted};
 use crate::reference::volume::Volume;

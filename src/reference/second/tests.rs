@@ -10,7 +10,7 @@ use super::*;
 use crate::model::basis::N_NODES;
 use crate::model::pairings::pairings;
 use crate::model::surface::Surface;
-use crate::reference::area::{Accuracy, Receiver, AreaScene};
+use crate::reference::area::{Accuracy, AreaScene, Receiver};
 
 const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };

@@ -3,8 +3,8 @@
 
 use crate::frame::exchange::{gathers_from_tree, is_glossy};
 use crate::model::basis::MAX_BASES;
-use crate::model::film::FilmFormat;
 use crate::model::cutoff::Cutoff;
+use crate::model::film::FilmFormat;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{Chunks, DrawPath, Gather, LightingMode, Scene};
 use crate::model::sort_bits::SortBits;

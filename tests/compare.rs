@@ -9,8 +9,12 @@ use std::path::Path;
 
 use assert_cmd::Command;
 use nimbus::measure::stats::Summary;
-use nimbus::timing::recorded::read_results;
-use nimbus::timing::records::{FRAMES_FILE, FrameRow, RUN_FILE, Run, write_results};
+use nimbus::timing::attachments::Attachments;
+use nimbus::timing::attachments::Attachments;
+use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable};
+use nimbus::timing::records::Run;
+use nimbus::timing::results::read_results;
+use nimbus::timing::results::{RUN_FILE, write_results};
 use serde_json::{Value, json};
 
 const N_FRAMES: u32 = 60;
@@ -47,12 +51,17 @@ fn run() -> Run {
     results::run(["serial", "parallel"].map(|of| results::mode(of, N_FRAMES as usize, 2)).to_vec())
 }
 
+fn write(folder: &Path, run: &Run, rows: Vec<FrameRow>) {
+    let table = FrameTable { pass_names: ["grid", "sort"].map(str::to_owned).to_vec(), rows };
+    write_results(folder, run, &table, &Attachments::default()).expect("results");
+}
+
 /// A results folder in `dir` whose serial frames take `ms`, and parallel ones 0.9 of it.
 fn written(dir: &tempfile::TempDir, name: &str, ms: f64, run: &Run) -> String {
     let folder = dir.path().join(name);
     fs::create_dir(&folder).expect("a folder");
     let rows = [rows("serial", ms), rows("parallel", 0.9 * ms)].concat();
-    write_results(&folder, run, &["grid".to_owned(), "sort".to_owned()], &rows).expect("results");
+    write(&folder, run, rows);
     folder.to_str().expect("a UTF-8 path").to_owned()
 }
 
@@ -102,8 +111,7 @@ fn a_machine_that_was_not_steady_is_remarked_on() {
         row.block = 3;
         row.frame_ms *= 1.1;
     }
-    write_results(&drifting, &run(), &["grid".to_owned(), "sort".to_owned()], &all)
-        .expect("results");
+    write(&drifting, &run(), all);
     let (code, table, _) = compare(&[&a, drifting.to_str().expect("UTF-8")]);
     assert!(code == 0 && table.matches("note: ").count() == 1, "{table}");
     assert!(table.contains("note: serial: B's own blocks lie a factor of 1.1"), "{table}");
@@ -221,7 +229,7 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
     let (code, table, _) = compare(&[&a, &b]);
     assert_eq!((code, table.matches("note: ").count()), (0, 3), "{table}");
     for word in [
-        "-dirty: that does not say",
+        "-dirty: their sources may differ",
         "B was interrupted",
         "A \"bench a.toml\", B \"bench a.toml --no-skip\"",
     ] {
@@ -232,8 +240,7 @@ fn runs_that_may_be_compared_but_are_not_quite_alike_are_remarked_on() {
     serial.cases[0].modes[0].threading = "elsewhere".to_owned();
     let none = dir.path().join("none");
     fs::create_dir(&none).expect("a folder");
-    write_results(&none, &serial, &["grid".to_owned(), "sort".to_owned()], &rows("elsewhere", 1.0))
-        .expect("results");
+    write(&none, &serial, rows("elsewhere", 1.0));
     let a = written(&dir, "c", 10.0, &run());
     let (code, _, stderr) = compare(&[&a, none.to_str().expect("UTF-8")]);
     assert!(code == 2 && stderr.contains("A has serial, parallel, B has elsewhere"), "{stderr}");

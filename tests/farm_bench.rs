@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames};
 use nimbus::timing::parts::base_spread;
-use nimbus::timing::recorded::read_results;
-use nimbus::timing::records::{FRAMES_FILE, FrameRow, Run};
-use nimbus::timing::rows::read_rows;
+use nimbus::timing::records::Run;
+use nimbus::timing::results::read_results;
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -51,9 +51,9 @@ fn planned(dir: &TempDir, each: &str) -> PathBuf {
     folder
 }
 
-fn rows(folder: &Path) -> (Vec<String>, Vec<FrameRow>) {
+fn rows(folder: &Path) -> FrameTable {
     let path = folder.join(FRAMES_FILE);
-    read_rows(&fs::read_to_string(&path).expect("rows"), &path).expect("rows")
+    parse_frames(&fs::read_to_string(&path).expect("rows"), &path).expect("rows")
 }
 
 fn names(folder: &Path) -> BTreeSet<String> {
@@ -113,7 +113,7 @@ fn parts_together_are_the_bench_of_one_process() {
     // Readers check that rows and records fit.
     let [ours, theirs] = [&merged, &alone].map(|folder| read_results(folder).expect("results"));
     assert_eq!(exact(&ours.run), exact(&theirs.run));
-    let modes = |of: &nimbus::timing::recorded::Recorded| -> Vec<_> {
+    let modes = |of: &nimbus::timing::results::BenchResults| -> Vec<_> {
         of.modes.iter().map(|m| (m.name.clone(), m.frames.clone(), m.blocks.len())).collect()
     };
     assert_eq!((modes(&ours), ours.modes.len()), (modes(&theirs), 18));
@@ -128,7 +128,8 @@ fn parts_together_are_the_bench_of_one_process() {
     );
     assert!(!ours.interrupted && theirs.parts.is_empty());
     // The same rows in the same columns; in each block as many as it had.
-    let ((columns, of_ours), (their_columns, of_theirs)) = (rows(&merged), rows(&alone));
+    let FrameTable { pass_names: columns, rows: of_ours } = rows(&merged);
+    let FrameTable { pass_names: their_columns, rows: of_theirs } = rows(&alone);
     assert_eq!(columns, their_columns);
     let sorted = |rows: &[FrameRow]| {
         let mut all: Vec<String> = rows.iter().map(place).collect();
@@ -138,7 +139,7 @@ fn parts_together_are_the_bench_of_one_process() {
     assert_eq!(sorted(&of_ours), sorted(&of_theirs));
     assert_eq!(of_ours.len(), 6 * 3 * 2 * 4);
     assert_eq!((ours.block_order.len(), theirs.block_order.len()), (36, 36));
-    for (block, about) in ours.block_order.iter().enumerate() {
+    for (block, about) in (0u32..).zip(&ours.block_order) {
         let of_block: Vec<&FrameRow> = of_ours.iter().filter(|row| row.block == block).collect();
         assert_eq!(of_block.len(), 4);
         let name = ours.cases[about.case].name();

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use nimbus::timing::recorded::{Recorded, read_results};
+use nimbus::timing::results::{BenchResults, read_results};
 use serde_json::Value;
 
 /// Frames of a block. On two cores of a software device they take a second or more.
@@ -117,7 +117,7 @@ fn check(threading: &str) {
 
 /// Marked, valid, counted right, and read by `compare`.
 fn check_results(threading: &str, out: &str, whole: &str) {
-    let Recorded { run, modes } = read_results(Path::new(out)).expect("results");
+    let BenchResults { run, modes } = read_results(Path::new(out)).expect("results");
     assert!(run.interrupted);
     let text = fs::read_to_string(Path::new(out).join("run.json")).expect("run.json");
     let schema: Value =

@@ -10,10 +10,11 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use nimbus::measure::stats::Summary;
-use nimbus::timing::recorded::read_results;
-use nimbus::timing::records::{
-    FRAMES_FILE, FrameRow, Measured, Mode, RUN_FILE, Run, write_frames, write_results, write_run,
-};
+use nimbus::timing::attachments::Attachments;
+use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, write_frames};
+use nimbus::timing::json;
+use nimbus::timing::records::{Measured, Mode, Run};
+use nimbus::timing::results::{RUN_FILE, read_results, write_results};
 use serde_json::json;
 
 /// Names the folder in which this program is to replace results without end.
@@ -24,9 +25,9 @@ const N_KILLS: u32 = 100;
 
 /// Rows of generation `k`: their number differs from one generation to the next, and every one
 /// carries k.
-fn rows(k: u32) -> Vec<FrameRow> {
+fn table(k: u32) -> FrameTable {
     let row = |i: u32| FrameRow { frame_ms: f64::from(k), ..results::row("serial", i) };
-    (0..n_rows(k)).map(row).collect()
+    FrameTable { pass_names: Vec::new(), rows: (0..n_rows(k)).map(row).collect() }
 }
 
 fn n_rows(k: u32) -> u32 {
@@ -49,11 +50,11 @@ fn writer() {
         std::env::var(PAUSE_US).ok().map(|us| Duration::from_micros(us.parse().expect("a number")));
     for k in generation(folder).expect("results to begin with") + 1.. {
         let written = match pause {
-            None => write_results(folder, &run(k), &[], &rows(k)),
+            None => write_results(folder, &run(k), &table(k), &Attachments::default()),
             // Each file is whole at every moment, and the two are not replaced together.
-            Some(pause) => write_frames(&folder.join(FRAMES_FILE), &[], &rows(k)).and_then(|()| {
+            Some(pause) => write_frames(&folder.join(FRAMES_FILE), &table(k)).and_then(|()| {
                 std::thread::sleep(pause);
-                write_run(&folder.join(RUN_FILE), &run(k))
+                json::write(&folder.join(RUN_FILE), &run(k))
             }),
         };
         written.expect("written");
@@ -78,7 +79,7 @@ fn generation(folder: &Path) -> Result<u32, String> {
 fn prepared() -> (tempfile::TempDir, std::path::PathBuf) {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("run");
-    write_results(&folder, &run(1), &[], &rows(1)).expect("results");
+    write_results(&folder, &run(1), &table(1), &Attachments::default()).expect("results");
     fs::write(folder.join("notes.txt"), "mine").expect("a file");
     fs::write(folder.join("a.png"), "picture").expect("a file");
     (dir, folder)
@@ -150,8 +151,8 @@ fn a_mixture_is_noticed() {
     let (_dir, folder) = prepared();
     assert_eq!(generation(&folder), Ok(1));
     // As many rows: only the times tell.
-    write_frames(&folder.join(FRAMES_FILE), &[], &rows(8)).expect("frames");
+    write_frames(&folder.join(FRAMES_FILE), &table(8)).expect("frames");
     assert!(generation(&folder).expect_err("a mixture").contains("beside frames of 8"));
-    write_frames(&folder.join(FRAMES_FILE), &[], &rows(2)).expect("frames");
+    write_frames(&folder.join(FRAMES_FILE), &table(2)).expect("frames");
     assert!(generation(&folder).expect_err("a mixture").contains("cut off, or another run's"));
 }

@@ -7,8 +7,9 @@ use std::path::Path;
 use assert_cmd::Command;
 use nimbus::io::scene_file::{LoadedScene, load};
 use nimbus::model::scene::{LightingMode, Threading};
-use nimbus::timing::recorded::read_results;
-use nimbus::timing::records::read_run;
+use nimbus::timing::json;
+use nimbus::timing::records::Run;
+use nimbus::timing::results::read_results;
 use serde_json::{Value, json};
 
 const SCENE: &str = r#"
@@ -192,7 +193,7 @@ fn every_phase_and_point_of_a_sweep_is_a_case_of_the_results() {
         table.lines().filter(|l| l.contains(" serial  ") && !l.contains("no-skip")).collect();
     assert_eq!(cases.len(), 6, "{table}");
     assert!(table.contains("6 of 6 cases gave the same last frame"), "{table}");
-    let run = read_run(Path::new(&out)).expect("the run");
+    let run: Run = json::read(Path::new(&out)).expect("the run");
     let names: Vec<String> = run.cases.iter().map(|c| c.name()).collect();
     let phases = ["lit", "unlit and small", "alone"];
     let all = ["2", "3"].map(|v| phases.map(|p| format!("{p}, draw.cutoff={v}"))).concat();

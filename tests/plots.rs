@@ -10,7 +10,8 @@ use nimbus::report::charts::{Plot, frames, ledger, passes, tradeoff};
 use nimbus::studies::error::records::{Front, Study};
 use nimbus::studies::ledger::records::Ledger;
 use nimbus::studies::provenance::Figure;
-use nimbus::timing::records::{FrameRow, Pass, Run};
+use nimbus::timing::frame_rows::FrameRow;
+use nimbus::timing::records::{Pass, Run};
 use roxmltree::{Document, Node};
 use studies::{configuration, row, study, usual_ledger, usual_study};
 

@@ -9,13 +9,16 @@ use std::path::Path;
 use nimbus::frame::counts::Counts;
 use nimbus::measure::lows::Lows;
 use nimbus::measure::stats::Summary;
+use nimbus::timing::attachments::Attachments;
+use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable};
+use nimbus::timing::json::{read, write};
 use nimbus::timing::machine::{Cpu, cpu, environment, revision, utc_now};
+use nimbus::timing::names::Setting;
 use nimbus::timing::overlap::{Overlap, SerialFrame};
-use nimbus::timing::parts::{BaseTime, PartRecord};
 use nimbus::timing::records::{
-    Case, FRAMES_FILE, FrameRow, Measured, Mode, Pass, RUN_FILE, Ratio, Reason, Run, Setting,
-    Skipping, prepare_out_dir, read_run, write_results, write_run,
+    BaseTime, Case, Measured, Mode, PartRecord, Pass, Ratio, Reason, Run, Skipping,
 };
+use nimbus::timing::results::{RUN_FILE, prepare_out_dir, write_results};
 use serde_json::{Value, json};
 
 fn schema() -> Value {
@@ -240,11 +243,12 @@ fn a_run_comes_back_as_it_was_written() {
     let folder = tempfile::tempdir().unwrap();
     let out_dir = folder.path().join("a/b");
     prepare_out_dir(&out_dir, false).unwrap();
-    let passes = ["sort".to_owned(), "first".to_owned()];
-    write_results(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &passes, &[row(0), row(3)])
+    let pass_names = ["sort".to_owned(), "first".to_owned()].to_vec();
+    let table = FrameTable { pass_names, rows: vec![row(0), row(3)] };
+    write_results(&out_dir, &sample_at("2024-02-29T12:34:56Z"), &table, &Attachments::default())
         .unwrap();
-    assert_eq!(read_run(&out_dir).unwrap(), sample_at("2024-02-29T12:34:56Z"));
-    assert_eq!(read_run(&out_dir.join(RUN_FILE)).unwrap(), sample_at("2024-02-29T12:34:56Z"));
+    assert_eq!(read::<Run>(&out_dir).unwrap(), sample_at("2024-02-29T12:34:56Z"));
+    assert_eq!(read::<Run>(&out_dir.join(RUN_FILE)).unwrap(), sample_at("2024-02-29T12:34:56Z"));
     let names: Vec<_> =
         fs::read_dir(&out_dir).unwrap().map(|entry| entry.unwrap().file_name()).collect();
     assert_eq!(names.len(), 2, "nothing temporary is left: {names:?}");
@@ -281,20 +285,20 @@ fn what_exists_is_refused_unless_forced() {
 fn another_schema_and_another_file_are_named_as_such() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(RUN_FILE);
-    write_run(&path, &Run { schema: 7, ..sample() }).unwrap();
-    assert!(read_run(&path).unwrap_err().to_string().contains("schema 7"));
+    write(&path, &Run { schema: 7, ..sample() }).unwrap();
+    assert!(read::<Run>(&path).unwrap_err().to_string().contains("schema 7"));
     fs::write(&path, "{}").unwrap();
-    assert!(read_run(&path).unwrap_err().to_string().contains("not a run.json"));
+    assert!(read::<Run>(&path).unwrap_err().to_string().contains("not a run.json"));
     fs::write(&path, "{").unwrap();
-    assert!(read_run(&path).is_err());
-    assert!(read_run(&folder.path().join("absent.json")).is_err());
+    assert!(read::<Run>(&path).is_err());
+    assert!(read::<Run>(&folder.path().join("absent.json")).is_err());
 }
 
 #[test]
 fn a_row_with_too_few_pass_times_is_no_row() {
     let folder = tempfile::tempdir().unwrap();
-    let passes = ["sort".to_owned()];
-    assert!(write_results(folder.path(), &sample(), &passes, &[row(0)]).is_err());
+    let table = FrameTable { pass_names: vec!["sort".to_owned()], rows: vec![row(0)] };
+    assert!(write_results(folder.path(), &sample(), &table, &Attachments::default()).is_err());
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 

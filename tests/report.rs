@@ -17,7 +17,9 @@ use base64::Engine;
 use browser::Browser;
 use nimbus::io::image::png_bytes;
 use nimbus::studies::error::records::{Front, Study};
-use nimbus::timing::records::{FrameRow, write_results};
+use nimbus::timing::attachments::Attachments;
+use nimbus::timing::frame_rows::{FrameRow, FrameTable};
+use nimbus::timing::results::write_results;
 use program::{nimbus, path, run};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -427,8 +429,9 @@ fn a_run_without_anything_to_draw_has_a_page() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("bare");
     fs::create_dir(&folder).expect("a folder");
-    let rows = [FrameRow { warm_up: false, ..results::row("serial", 0) }];
-    write_results(&folder, &results::run(vec![results::mode("serial", 1, 0)]), &[], &rows)
+    let rows = vec![FrameRow { warm_up: false, ..results::row("serial", 0) }];
+    let run = results::run(vec![results::mode("serial", 1, 0)]);
+    write_results(&folder, &run, &FrameTable { pass_names: vec![], rows }, &Attachments::default())
         .expect("results");
     let bare = folder.to_str().expect("UTF-8").to_owned();
     let empty = dir.path().join("empty");

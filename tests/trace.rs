@@ -11,9 +11,9 @@ use nimbus::gpu::{ClockFit, ClockPair};
 use nimbus::io::scene_file;
 use nimbus::measure::zones::{Collected, Zones};
 use nimbus::model::scene::Threading;
-use nimbus::timing::bench::{self, BenchPlan, Sample};
-use nimbus::timing::cases::cases;
-use nimbus::timing::trace::{self, Beside};
+use nimbus::timing::blocks::{self, BenchPlan, Sample};
+use nimbus::timing::cases::{LoopChoice, cases};
+use nimbus::timing::trace;
 use serde_json::Value;
 use tracing_subscriber::layer::SubscriberExt;
 
@@ -29,27 +29,23 @@ fn benched(zones: &Zones) -> (Vec<Sample>, Stage, Collected) {
         .map(str::to_owned);
     let loaded =
         scene_file::load(Path::new("tests/data/modes.toml"), &overrides, None).expect("a scene");
-    let cases = cases(
-        loaded,
-        &[],
-        &[Threading::Serial, Threading::Parallel],
-        Some(N_FRAMES),
-        [false, false],
-    );
+    let loops =
+        LoopChoice { modes: &[Threading::Serial, Threading::Parallel], skip: false, saved: false };
+    let cases = cases(loaded, &[], Some(N_FRAMES), loops);
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let stage = Stage::new(cases[0].scene.clone(), &choice, false).expect("a stage");
     zones.take();
     let plan = BenchPlan { n_warm_up: 0, n_rounds: 1, hash_frames: false, pictures: false };
-    let ran = bench::run(stage, &cases, &plan, &AtomicBool::new(false), &mut || {});
+    let ran = blocks::run(stage, &cases, &plan, &AtomicBool::new(false), &mut || {});
     assert_eq!(ran.failure, None);
     let (stage, outcome) = (ran.stage.expect("a stage"), ran.outcome);
     (outcome.samples, stage, zones.take())
 }
 
-fn written(samples: &[Sample], beside: &Beside<'_>) -> Value {
+fn written(samples: &[Sample], zones: Option<&Collected>, clock: Option<ClockFit>) -> Value {
     let dir = tempfile::tempdir().expect("a folder");
     let path = dir.path().join("trace.json");
-    trace::write(&path, samples, beside).expect("written");
+    trace::write(&path, samples, zones, clock).expect("written");
     serde_json::from_slice(&std::fs::read(path).expect("the file")).expect("JSON")
 }
 
@@ -136,7 +132,7 @@ fn zones_nest_and_passes_lie_in_their_frames() {
     tracing::subscriber::set_global_default(tracing_subscriber::registry().with(zones.clone()))
         .expect("the first");
     let (samples, stage, collected) = benched(&zones);
-    let trace = written(&samples, &Beside { zones: Some(&collected), clock: None });
+    let trace = written(&samples, Some(&collected), None);
     assert_eq!(trace["otherData"]["gpu_clock"], "laid on the host's clock by the ends of frames");
     assert_eq!(trace["otherData"]["zones_dropped"], 0);
     let tracks = tracks(&trace);
@@ -203,7 +199,7 @@ fn a_calibrated_clock_lays_the_passes_where_they_were() {
         .collect();
     let clock = ClockFit::of(&pairs).expect("frames");
     for clock in [Some(clock), real].into_iter().flatten() {
-        let trace = written(&samples, &Beside { zones: None, clock: Some(clock) });
+        let trace = written(&samples, None, Some(clock));
         let about = &trace["otherData"];
         assert_eq!(about["gpu_clock"], "calibrated with the host's clock");
         assert_eq!(about["gpu_clock_deviation_us"], 1e-3 * clock.deviation_ns);

@@ -20,8 +20,8 @@ use nimbus::studies::error::front::{Metric, best_within_error, best_within_ms};
 use nimbus::studies::error::records::{Configuration, Front};
 use nimbus::studies::error::run::{Event, Found, Loaded, Setup, StudyPlan, Subject};
 use nimbus::studies::error::turns::{Time, Turn};
-use nimbus::timing::cases::Axis;
-use nimbus::timing::records::Setting;
+use nimbus::timing::names::Setting;
+use nimbus::timing::sweep::Axis;
 
 /// A subject of quality q: q ms a frame, and a picture that is off by 0.2/q² everywhere but for a
 /// pattern of its own; with `waste` it takes half as long again for nothing. All on a machine that

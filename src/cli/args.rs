@@ -19,7 +19,7 @@ pub use farm::{
     CalibrateArgs, EmitArgs, EngineArg, FarmArgs, FarmCommand, FormatArg, GcArgs, JobArgs,
     LocalArgs, MergeArgs, PlanArgs, RunArgs, Span, StatusArgs, SubmitArg, SubmitArgs,
 };
-pub use results::{CompareArgs, ReportArgs, SamenessArg};
+pub use results::{CompareArgs, ReportArgs};
 pub use stress::StressArgs;
 pub use study::{ErrorArgs, LedgerArgs, MetricArg, TimeArg};
 #[cfg(feature = "window")]

@@ -18,13 +18,17 @@ use crate::gpu::ClockFit;
 use crate::io::atomic;
 use crate::measure::zones::Zones;
 use crate::model::scene::Threading;
-use crate::timing::bench::{self, BenchPlan, Outcome, Ran};
-use crate::timing::cases::{Axis, Case, Loop, SIZE_KEY, cases, overrides, points, sweep_text};
-use crate::timing::companions::Beside;
+use crate::timing::attachments::Attachments;
+use crate::timing::blocks::{self, BenchPlan, Finished, Outcome};
+use crate::timing::cases::{Case, Loop, LoopChoice, cases};
+use crate::timing::frame_rows::{FrameRow, FrameTable};
+use crate::timing::json::ResultFile;
 use crate::timing::machine;
-use crate::timing::outcome::pass_names;
+use crate::timing::names::sweep_text;
 use crate::timing::parts::numbers;
-use crate::timing::records::{self, FrameRow, Run};
+use crate::timing::records::Run;
+use crate::timing::results::{prepare_out_dir, write_results};
+use crate::timing::sweep::{Axis, SIZE_KEY, overrides, points};
 use crate::timing::trace;
 
 /// Of the device's clock beside the host's, before the frames and after them.
@@ -116,11 +120,11 @@ fn prepare(args: &BenchArgs, path: &Path, options: &super::SceneArgs) -> Result<
         ThreadingArg::Both => &[Threading::Serial, Threading::Parallel],
     };
     let axes = axes(args)?;
-    let flags = [!options.no_skip, !args.no_saved];
+    let loops = LoopChoice { modes, skip: !options.no_skip, saved: !args.no_saved };
     let loaded = load(path, options)?;
     let (scene_hash, resolved) = (loaded.hash.clone(), loaded.resolved.clone());
     if axes.is_empty() {
-        let cases = of_part(args, cases(loaded, &[], modes, args.frames, flags))?;
+        let cases = of_part(args, cases(loaded, &[], args.frames, loops))?;
         return Ok(Prepared { cases, scene_hash, resolved });
     }
     let (mut all, mut said) = (Vec::new(), BTreeSet::from_iter(warnings_of(&loaded)));
@@ -137,7 +141,7 @@ fn prepare(args: &BenchArgs, path: &Path, options: &super::SceneArgs) -> Result<
                 eprintln!("warning: {}: {warning}", sweep_text(&point));
             }
         }
-        all.extend(cases(at, &point, modes, args.frames, flags));
+        all.extend(cases(at, &point, args.frames, loops));
     }
     Ok(Prepared { cases: of_part(args, all)?, scene_hash, resolved })
 }
@@ -182,13 +186,10 @@ pub(super) fn case_names(args: &BenchArgs) -> Result<(Vec<String>, Amounts)> {
 
 /// The sweep's keys, each once.
 fn axes(args: &BenchArgs) -> Result<Vec<Axis>> {
-    let axes = args.sweep.iter().map(|text| Axis::parse(text)).collect::<Result<Vec<Axis>>>()?;
+    let axes = Axis::parse_all("--sweep", &args.sweep)?;
     let refuse = |key: &str, what: &str| Err(Error::usage(format!("--sweep {key}: {what}")));
-    for (i, axis) in axes.iter().enumerate() {
+    for axis in &axes {
         let has = |key: &str| axes.iter().any(|a| a.key == key);
-        if axes[..i].iter().any(|before| before.key == axis.key) {
-            return refuse(&axis.key, "the key twice; name all its values in one");
-        }
         if axis.key == SIZE_KEY && (has("film.width") || has("film.height")) {
             return refuse(
                 SIZE_KEY,
@@ -269,15 +270,15 @@ fn bench_one(
     let mut readings = stage.device.read_clocks(N_CLOCK_READINGS)?;
     if let Some(dir) = out {
         // What stood here was refused or forced above.
-        records::prepare_out_dir(dir, true)?;
+        prepare_out_dir(dir, true)?;
     }
     let bar = output::progress(
-        bench::n_frames_total(&cases, &plan),
+        blocks::n_frames_total(&cases, &plan),
         &path.display().to_string(),
         args.options.quiet,
     );
-    let Ran { stage, outcome, failure } =
-        bench::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
+    let Finished { stage, outcome, failure } =
+        blocks::run(stage, &cases, &plan, stop, &mut || bar.inc(1));
     bar.finish_and_clear();
     if let (Some(failure), true) = (&failure, outcome.samples.is_empty()) {
         // A folder that holds nothing would only be in the way of the next run.
@@ -285,7 +286,7 @@ fn bench_one(
         return Err(failure.clone());
     }
     let run = Run {
-        schema: records::SCHEMA_VERSION,
+        schema: Run::SCHEMA,
         nimbus: env!("CARGO_PKG_VERSION").into(),
         revision: machine::revision().into(),
         date,
@@ -302,25 +303,23 @@ fn bench_one(
         parts: Vec::new(),
         interrupted: outcome.interrupted || failure.is_some(),
     };
-    let rows = if out.is_some() || args.plot { outcome.rows(&cases) } else { vec![] };
+    let table =
+        if out.is_some() || args.plot { outcome.table(&cases) } else { FrameTable::default() };
     if let Some(dir) = out {
-        let charts = if args.plot { bench_plot::files(&run, &rows)? } else { vec![] };
-        let beside = Beside { pictures: outcome.pictures.clone(), charts, ..Beside::default() };
-        records::write_results_with(dir, &run, &pass_names(), &rows, &beside)?;
+        let charts = if args.plot { bench_plot::files(&run, &table.rows)? } else { vec![] };
+        let beside =
+            Attachments { pictures: outcome.pictures.clone(), charts, ..Attachments::default() };
+        write_results(dir, &run, &table, &beside)?;
     }
     if !args.json {
-        print((args, color), path, (&run, &rows), (&cases, &outcome))?;
+        print((args, color), path, (&run, &table.rows), (&cases, &outcome))?;
     }
     if let Some(file) = &args.trace {
         if let Some(stage) = &stage {
             readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
         }
         let zones = zones.map(Zones::take);
-        trace::write(
-            file,
-            &outcome.samples,
-            &trace::Beside { zones: zones.as_ref(), clock: ClockFit::of(&readings) },
-        )?;
+        trace::write(file, &outcome.samples, zones.as_ref(), ClockFit::of(&readings))?;
     }
     if !args.options.quiet {
         outcome.chosen.iter().for_each(|chosen| eprintln!("note: {chosen}"));

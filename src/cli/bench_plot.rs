@@ -5,8 +5,9 @@ use clap::ColorChoice;
 use super::output;
 use crate::error::Result;
 use crate::report::charts::{Plot, frames, passes};
-use crate::timing::companions::{PASSES_CHART, frames_chart};
-use crate::timing::records::{FrameRow, Run};
+use crate::timing::attachments::{PASSES_CHART, frames_chart};
+use crate::timing::frame_rows::FrameRow;
+use crate::timing::records::Run;
 
 /// For the terminal: frame times of every point of a sweep, and what the device's time goes to.
 pub fn text(run: &Run, rows: &[FrameRow], color: ColorChoice) -> Result<String> {

@@ -4,16 +4,14 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::args::{CompareArgs, SamenessArg};
+use super::args::CompareArgs;
 use super::{compare_pictures, output};
 use crate::error::{Error, Result};
 use crate::measure::bootstrap::Bootstrap;
-use crate::timing::compare::{
-    Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks,
-};
-use crate::timing::difference::{Difference, Sameness, differences, remarks};
-use crate::timing::recorded::{Recorded, read_results};
+use crate::timing::compare::{Comparison, HEADLINE, MeasureComparison, ModeComparison};
+use crate::timing::difference::{Condition, Difference};
 use crate::timing::records::Run;
+use crate::timing::results::{BenchResults, read_results};
 
 /// What `--json` prints. A change of meaning, or of a key, raises `schema`.
 #[derive(Debug, Serialize)]
@@ -26,7 +24,7 @@ struct Report {
     n_resamples: usize,
     /// The measure that decides; the others are not corrected for many comparisons.
     headline: &'static str,
-    modes: Vec<ComparedMode>,
+    modes: Vec<ModeComparison>,
     remarks: Vec<String>,
 }
 
@@ -61,17 +59,27 @@ pub fn run(args: &CompareArgs) -> Result<()> {
         return compare_pictures::run(args);
     }
     let (a, b) = (read_results(&args.a)?, read_results(&args.b)?);
-    let found = differences(&a.run, &b.run);
-    let is_allowed = |d: &Difference| args.allow.iter().any(|allowed| sameness(*allowed) == d.kind);
+    let found = Comparison::new(&a, &b);
+    let is_allowed = |d: &Difference| args.allow.contains(&d.kind);
     let (allowed, refused): (Vec<Difference>, Vec<Difference>) =
-        found.into_iter().partition(is_allowed);
+        found.differences.into_iter().partition(is_allowed);
     if !refused.is_empty() {
         return Err(Error::usage(refusal(args, &refused)));
     }
-    let report = report(args, &a, &b, allowed);
+    let report = Report {
+        schema: REPORT_SCHEMA,
+        a: Side::of(&args.a, &a.run),
+        b: Side::of(&args.b, &b.run),
+        allowed,
+        n_resamples: Bootstrap::default().n_resamples,
+        headline: HEADLINE,
+        modes: found.modes,
+        remarks: found.remarks,
+    };
     if report.modes.is_empty() {
-        let ran =
-            |of: &Recorded| of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ");
+        let ran = |of: &BenchResults| {
+            of.modes.iter().map(|m| m.name.clone()).collect::<Vec<_>>().join(", ")
+        };
         let [of_a, of_b] =
             [&a, &b].map(ran).map(|names| if names.is_empty() { "none".into() } else { names });
         return Err(Error::usage(format!(
@@ -81,21 +89,12 @@ pub fn run(args: &CompareArgs) -> Result<()> {
     if args.json { output::object(&report) } else { output::text(&text(&report)) }
 }
 
-fn sameness(arg: SamenessArg) -> Sameness {
-    match arg {
-        SamenessArg::Device => Sameness::Device,
-        SamenessArg::Build => Sameness::Build,
-        SamenessArg::Scene => Sameness::Scene,
-    }
-}
-
 /// What differs, and the flag that lets it.
 fn refusal(args: &CompareArgs, refused: &[Difference]) -> String {
-    let mut kinds: Vec<&str> = args.allow.iter().map(|a| sameness(*a).name()).collect();
-    kinds.extend(refused.iter().map(|d| d.kind.name()));
-    // Every name once, in the order device, build, scene.
-    let all = [Sameness::Device, Sameness::Build, Sameness::Scene].map(Sameness::name);
-    let flag = all.into_iter().filter(|name| kinds.contains(name)).collect::<Vec<_>>().join(",");
+    let is_named =
+        |kind: &Condition| args.allow.contains(kind) || refused.iter().any(|d| d.kind == *kind);
+    let flag = Condition::ALL.into_iter().filter(is_named).map(Condition::name);
+    let flag = flag.collect::<Vec<_>>().join(",");
     let mut what = format!(
         "{} and {} did not measure the same; --allow {flag} compares them all the same",
         args.a.display(),
@@ -109,23 +108,6 @@ fn refusal(args: &CompareArgs, refused: &[Difference]) -> String {
 
 fn line(d: &Difference) -> String {
     format!("{}, {}: A {}, B {}", d.kind.name(), d.what, d.a, d.b)
-}
-
-fn report(args: &CompareArgs, a: &Recorded, b: &Recorded, allowed: Vec<Difference>) -> Report {
-    let mut said = remarks(&a.run, &b.run);
-    said.extend(frame_remarks(&a.modes, &b.modes));
-    let modes = compare_modes(&a.modes, &b.modes);
-    said.extend(steadiness_remarks(&a.modes, &b.modes, &modes));
-    Report {
-        schema: REPORT_SCHEMA,
-        a: Side::of(&args.a, &a.run),
-        b: Side::of(&args.b, &b.run),
-        allowed,
-        n_resamples: Bootstrap::default().n_resamples,
-        headline: HEADLINE,
-        modes,
-        remarks: said,
-    }
 }
 
 /// The human table.
@@ -153,7 +135,7 @@ fn text(report: &Report) -> String {
     out + &foot(report)
 }
 
-fn rows(mode: &ComparedMode) -> Vec<Vec<String>> {
+fn rows(mode: &ModeComparison) -> Vec<Vec<String>> {
     let header = ["A p50", "B p50", "B / A", "95 % low", "high", "n A", "n B", "B is"];
     let mut rows = vec![
         std::iter::once(format!("{}, ms", mode.name)).chain(header.map(str::to_owned)).collect(),
@@ -175,7 +157,7 @@ fn rows(mode: &ComparedMode) -> Vec<Vec<String>> {
     rows
 }
 
-fn sentence(m: &Compared) -> String {
+fn sentence(m: &MeasureComparison) -> String {
     let verdict = m.verdict.text();
     match m.b_by_a {
         Some(r) => {

@@ -10,8 +10,9 @@ use super::bench;
 use super::farm_cut::Amounts;
 use crate::error::{Error, Result};
 use crate::farm::plan::Work;
+use crate::timing::json;
 use crate::timing::parts::base_spread;
-use crate::timing::records::read_run;
+use crate::timing::records::Run;
 
 /// The cases that `nimbus bench` would time, told the same; `set` is the plan's.
 pub(super) fn work(args: &PlanArgs, set: &[String]) -> Result<(Work, Amounts)> {
@@ -58,7 +59,7 @@ fn parsed(args: &PlanArgs, more: &[String]) -> Result<BenchArgs> {
 
 /// By how much the nodes differ in the first case, of a merged bench; a line.
 pub(super) fn spread(merged: &Path) -> Result<String> {
-    let parts = read_run(merged)?.parts;
+    let parts = json::read::<Run>(merged)?.parts;
     let nodes: BTreeSet<&str> = parts.iter().map(|part| part.node.as_str()).collect();
     let spread = base_spread(&parts);
     if spread.is_empty() {

@@ -1,7 +1,5 @@
 //! `nimbus ledger SCENE`.
 
-use std::io::Write;
-use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
@@ -11,18 +9,19 @@ use super::{device_choice, load, output};
 use crate::error::{Error, Result};
 use crate::frame::limits;
 use crate::frame::stage::Bed;
-use crate::io::atomic::{check_place, write_atomic};
+use crate::io::atomic::check_place;
 use crate::reference::picture::kind::ReferenceKind;
 use crate::reference::picture::model_light::reflections_of;
 use crate::reference::picture::pixels::Pixels;
 use crate::reference::picture::whole::Work;
 use crate::report::charts;
 use crate::studies::error::players::Frames;
-use crate::studies::ledger::records::{LEDGER_FILE, Ledger, Row, SCHEMA_VERSION};
+use crate::studies::ledger::records::{LEDGER_FILE, Ledger, Row};
 use crate::studies::ledger::run::Setup;
 use crate::studies::provenance::{Figure, Provenance};
+use crate::timing::json::{self, ResultFile};
 use crate::timing::machine;
-use crate::timing::records::prepare_out_dir;
+use crate::timing::results::prepare_out_dir;
 
 /// `graceful`: set, as rows that are finished are kept on Ctrl-C.
 pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Result<()> {
@@ -58,7 +57,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     limits::check(&scene, bed.device.limits())?;
     let clocks =
         machine::clocks_record(bed.device.info(), &mut bed.player(scene.clone(), true)?.renderer)?;
-    let made = Provenance::now(SCHEMA_VERSION, &args.scene, &loaded, bed.device.info(), clocks);
+    let made = Provenance::now(Ledger::SCHEMA, &args.scene, &loaded, bed.device.info(), clocks);
     if let Some(out) = &args.out {
         prepare_out_dir(out, true)?;
         check_place(&out.join(LEDGER_FILE))?;
@@ -66,7 +65,7 @@ pub fn run(args: &LedgerArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
     graceful.store(true, Ordering::Relaxed);
     let ledger = measure(args, &bed, &scene, time_s, made, stop)?;
     if let Some(out) = &args.out {
-        write(&out.join(LEDGER_FILE), &ledger)?;
+        json::write(&out.join(LEDGER_FILE), &ledger)?;
         output::write_chart(&out.join("ledger.svg"), &charts::ledger::chart(&ledger))?;
     }
     if args.json {
@@ -105,12 +104,6 @@ fn measure(
     let n_rounds = args.rounds as usize;
     Setup { bed, scene, frames, n_rounds, pixels: &pixels, n_reflections: args.reflections, stop }
         .run(made, &on_part)
-}
-
-fn write(path: &Path, ledger: &Ledger) -> Result<()> {
-    let mut text = serde_json::to_string_pretty(ledger).map_err(|cause| Error::io(path, cause))?;
-    text.push('\n');
-    write_atomic(path, |file| file.write_all(text.as_bytes()))
 }
 
 /// What is printed for people.

@@ -28,14 +28,16 @@ use crate::studies::error::files;
 use crate::studies::error::front::{Metric, best_within_error, best_within_ms};
 use crate::studies::error::knobs::default_axes;
 use crate::studies::error::players::{Frames, Players, frames_of_turns};
-use crate::studies::error::records::{Configuration, SCHEMA_VERSION, Study};
+use crate::studies::error::records::{Configuration, Study};
 use crate::studies::error::run::{Event, Found, Loaded, Setup, StudyPlan};
 use crate::studies::error::turns::{BETWEEN, Time};
 use crate::studies::provenance::{Provenance, ReferenceRecord};
 use crate::studies::reference_cache::{self, Kept};
-use crate::timing::cases::{Axis, SIZE_KEY, overrides};
+use crate::timing::json::ResultFile;
 use crate::timing::machine;
-use crate::timing::records::{Setting, prepare_out_dir};
+use crate::timing::names::Setting;
+use crate::timing::results::prepare_out_dir;
+use crate::timing::sweep::{Axis, SIZE_KEY, overrides};
 
 /// `graceful`: set once there is something to keep on Ctrl-C.
 pub fn run(
@@ -69,7 +71,7 @@ pub fn run(
     let design = if args.grid { Design::Grid } else { Design::Alone };
     let part = args.part.map(|part| part.first as usize..part.end as usize);
     let plan = StudyPlan { axes, design, metric, time, n_rounds: args.rounds as usize, part };
-    let made = Provenance::now(SCHEMA_VERSION, &args.scene, &base, bed.device.info(), clocks);
+    let made = Provenance::now(Study::SCHEMA, &args.scene, &base, bed.device.info(), clocks);
     let reference = ReferenceRecord::of(&kept, args.against, &pixels, args.frame, time_s);
     let mut study = begun(args, made, reference, &plan);
     let mut found = earlier(args, &study)?;
@@ -209,13 +211,9 @@ fn axes(args: &ErrorArgs, scene: &Scene) -> Result<Vec<Axis>> {
     if args.knob.is_empty() {
         return Ok(default_axes(scene));
     }
-    let parse = |text: &String| Axis::parse_as("--knob", text);
-    let axes = args.knob.iter().map(parse).collect::<Result<Vec<Axis>>>()?;
-    for (i, Axis { key, .. }) in axes.iter().enumerate() {
+    let axes = Axis::parse_all("--knob", &args.knob)?;
+    for Axis { key, .. } in &axes {
         let refuse = |what: &str| Err(Error::usage(format!("--knob {key}: {what}")));
-        if axes[..i].iter().any(|before| before.key == *key) {
-            return refuse("the key twice; name all its values in one");
-        }
         if key == SIZE_KEY {
             return refuse(ONE_SIZE);
         }

@@ -9,10 +9,13 @@ use super::plan::{Plan, Shard};
 use super::store::{Manifest, Workplace};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
-use crate::timing::companions::{Beside, picture_file};
+use crate::timing::attachments::{Attachments, picture_file};
+use crate::timing::frame_rows::FRAMES_FILE;
+use crate::timing::json;
 use crate::timing::machine::Device;
 use crate::timing::parts::{Part, differences, join, numbers};
-use crate::timing::records::{self, FRAMES_FILE, RUN_FILE, prepare_out_dir, write_results_with};
+use crate::timing::records::{Case, Run};
+use crate::timing::results::{RUN_FILE, prepare_out_dir, write_results};
 
 /// Files that the part of `shard` has.
 pub fn files(shard: &Shard) -> Vec<String> {
@@ -35,7 +38,7 @@ pub fn measure(
 ) -> Result<Device> {
     let part = workplace.folder("part");
     child::run("bench", (plan, shard, arguments), choice, &part, stop)?;
-    let run = records::read_run(&part)?;
+    let run: Run = json::read(&part)?;
     workplace.take(&part)?;
     Ok(run.device)
 }
@@ -56,7 +59,7 @@ pub fn merge(
     let all: Vec<Part> = parts.iter().zip(&plan.shards).map(read).collect::<Result<_>>()?;
     child::check_comparable(differences(&all), parts)?;
     let Some(joined) = join(&all) else { return Err(Error::usage("a plan without shards")) };
-    let found: Vec<String> = joined.run.cases.iter().map(records::Case::name).collect();
+    let found: Vec<String> = joined.run.cases.iter().map(Case::name).collect();
     if found != names {
         let what = format!(
             "the parts' cases ({}) are not the plan's ({})",
@@ -70,7 +73,7 @@ pub fn merge(
         .pictures
         .iter()
         .map(|moved| (moved.to.clone(), parts[moved.i_part].0.join(&moved.from)));
-    let beside = Beside { copies: copies.collect(), ..Beside::default() };
-    write_results_with(out, &joined.run, &joined.pass_names, &joined.rows, &beside)?;
+    let beside = Attachments { copies: copies.collect(), ..Attachments::default() };
+    write_results(out, &joined.run, &joined.table, &beside)?;
     Ok(joined.run.cases.len())
 }

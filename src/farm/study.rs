@@ -15,9 +15,10 @@ use crate::io::atomic::write_atomic;
 use crate::report::charts::{self, Plot};
 use crate::studies::error::files::{self, CONFIGURATIONS_FILE};
 use crate::studies::error::parts::{Part, differences, join};
-use crate::studies::error::records::{STUDY_FILE, TIMES_FILE};
+use crate::studies::error::records::{STUDY_FILE, Study, TIMES_FILE};
+use crate::timing::json;
 use crate::timing::machine::Device;
-use crate::timing::records::prepare_out_dir;
+use crate::timing::results::prepare_out_dir;
 
 /// Files that every part has; pictures come on top.
 pub const FILES: [&str; 3] = [CONFIGURATIONS_FILE, STUDY_FILE, TIMES_FILE];
@@ -31,7 +32,7 @@ pub fn measure(
 ) -> Result<Device> {
     let part = workplace.folder("part");
     child::run("error", (plan, shard, arguments), choice, &part, stop)?;
-    let study = files::read_study(&part)?;
+    let study: Study = json::read(&part)?;
     workplace.take(&part)?;
     Ok(study.made.device)
 }

@@ -1,45 +1,49 @@
-//! Is B faster than A? Decided measure by measure from the times of single frames, by the ratio of
-//! the medians and its 95 % bootstrap interval: "faster" or "slower" where the interval leaves out
-//! 1, else "no difference found", which is not "equal". Only `frame` is the headline; of twenty
-//! other measures of two equal runs one will seem to differ.
+//! Decides whether B is faster than A, measure by measure, from the times of single frames.
 //!
-//! The interval knows the noise within each run, frame to frame. What differs from one start of a
-//! program to the next (where memory lies, who else is on the machine) is in neither run, and so in
-//! no interval. The blocks of one run show some of it: where they lie as far apart as A and B, a
-//! remark says so.
+//! The verdict depends on the ratio of the medians and its 95 % bootstrap interval: "faster" or
+//! "slower" if the interval excludes 1, else "no difference found", which does not mean "equal".
+//! Only `frame` is the headline; of twenty other measures of two equal runs one will seem to
+//! differ.
+//!
+//! The interval covers the noise within each run, from frame to frame. It does not cover what
+//! changes from one start of the program to the next, such as memory layout or other processes. The
+//! blocks of one run show some of that: if they differ as much as A and B do, a remark says so.
 
 use std::collections::BTreeSet;
 
 use serde::Serialize;
 
+use super::difference::{Difference, differences, remarks};
+use super::intervals::{N_FRAMES_NEEDED, ratio_interval, spread_of_blocks};
+use super::results::{BenchResults, TimedMode};
 use crate::measure::bootstrap::Bootstrap;
 use crate::measure::stats::median;
-use crate::timing::recorded::{Measure, TimedMode};
 
 /// The measure that decides.
 pub const HEADLINE: &str = "frame";
-/// Fewer frames on a side have no verdict: fewer than five blocks of neighbours tell little of
-/// their own spread. From here on the interval held the truth of equal runs with ρ = 0.3 from frame
-/// to frame in 96 % of 4000 trials (`Bootstrap::of_neighbours` has the figures).
-pub const N_FRAMES_NEEDED: usize = 30;
 
+/// The answer for one measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// B takes less time than A.
     Faster,
+    /// B takes more time than A.
     Slower,
-    /// The interval holds 1.
+    /// The interval contains 1.
     NoDifferenceFound,
-    /// Fewer than [`N_FRAMES_NEEDED`] in A or B.
+    /// A or B has fewer than [`N_FRAMES_NEEDED`] frames.
     TooFewFrames,
+    /// A has no such time.
     NotMeasuredInA,
+    /// B has no such time.
     NotMeasuredInB,
-    /// A's median is 0 or may be: nothing can be divided by it.
+    /// A's median is 0, or is 0 in a resample, so that the ratio is not defined.
     NoRatio,
 }
 
 impl Verdict {
+    /// Returns the verdict in words, which complete "B is …".
     pub fn text(self) -> &'static str {
         match self {
             Verdict::Faster => "faster",
@@ -53,50 +57,80 @@ impl Verdict {
     }
 }
 
-/// median(B) / median(A) and the ends of its 95 % interval.
+/// median(B) / median(A) and its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct BByA {
+pub struct MedianRatio {
+    /// The ratio.
     pub estimate: f64,
+    /// Lower end of the interval.
     pub low: f64,
+    /// Upper end of the interval.
     pub high: f64,
 }
 
-/// One measure of one mode.
+/// One measure of one loop, in A and B.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Compared {
+pub struct MeasureComparison {
+    /// Name of the measure.
     pub measure: String,
+    /// Times in A.
     pub n_a: usize,
+    /// Times in B.
     pub n_b: usize,
-    /// Medians, ms.
+    /// Median of A in ms.
     pub a_ms: Option<f64>,
+    /// Median of B in ms.
     pub b_ms: Option<f64>,
-    pub b_by_a: Option<BByA>,
-    /// Neighbouring frames that were resampled together.
+    /// Ratio of the medians.
+    pub b_by_a: Option<MedianRatio>,
+    /// Neighbouring frames that a resample draws together.
     pub block_len: usize,
+    /// The answer.
     pub verdict: Verdict,
 }
 
-/// One mode that both ran.
+/// One loop of one case that both A and B ran.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ComparedMode {
-    /// Phase, sweep and loop, in words.
+pub struct ModeComparison {
+    /// Phase, sweep and loop in words.
     pub name: String,
-    /// `frame` first; passes that ran in neither are left out.
-    pub measures: Vec<Compared>,
+    /// `frame` first; without the passes that ran in neither.
+    pub measures: Vec<MeasureComparison>,
 }
 
-impl ComparedMode {
-    pub fn headline(&self) -> Option<&Compared> {
+impl ModeComparison {
+    /// Returns the measure that decides.
+    pub fn headline(&self) -> Option<&MeasureComparison> {
         self.measures.iter().find(|m| m.measure == HEADLINE)
     }
 }
 
-/// The times of one measure, ms, each in the order they were taken: ⌈√n⌉ neighbours are resampled
-/// together, n the lesser number of frames.
-pub fn compare(measure: &str, a: &[f64], b: &[f64]) -> Compared {
+/// Two results of a bench, compared.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Comparison {
+    /// The conditions that differ.
+    pub differences: Vec<Difference>,
+    /// Every loop that both ran.
+    pub modes: Vec<ModeComparison>,
+    /// What a reader should know about the runs and their frames.
+    pub remarks: Vec<String>,
+}
+
+impl Comparison {
+    /// Compares two results.
+    pub fn new(a: &BenchResults, b: &BenchResults) -> Comparison {
+        let modes = compare_modes(&a.modes, &b.modes);
+        let mut remarks = remarks(&a.run, &b.run);
+        remarks.extend(frame_remarks(&a.modes, &b.modes));
+        remarks.extend(steadiness_remarks(&a.modes, &b.modes, &modes));
+        Comparison { differences: differences(&a.run, &b.run), modes, remarks }
+    }
+}
+
+/// Compares the times of one measure, in ms and in the order in which they were taken.
+fn compare(measure: &str, a: &[f64], b: &[f64]) -> MeasureComparison {
     let n_least = a.len().min(b.len());
-    let bootstrap = Bootstrap::of_neighbours(n_least);
-    let interval = if n_least < N_FRAMES_NEEDED { None } else { bootstrap.ratio_of_medians(b, a) };
+    let interval = ratio_interval(b, a);
     let verdict = match interval {
         _ if a.is_empty() => Verdict::NotMeasuredInA,
         _ if b.is_empty() => Verdict::NotMeasuredInB,
@@ -106,59 +140,56 @@ pub fn compare(measure: &str, a: &[f64], b: &[f64]) -> Compared {
         Some(ratio) if ratio.low > 1.0 => Verdict::Slower,
         Some(_) => Verdict::NoDifferenceFound,
     };
-    Compared {
+    MeasureComparison {
         measure: measure.to_owned(),
         n_a: a.len(),
         n_b: b.len(),
         a_ms: median(a),
         b_ms: median(b),
-        b_by_a: interval.map(|i| BByA { estimate: i.estimate, low: i.low, high: i.high }),
-        block_len: bootstrap.block_len,
+        b_by_a: interval.map(|i| MedianRatio { estimate: i.estimate, low: i.low, high: i.high }),
+        block_len: Bootstrap::of_neighbours(n_least).block_len,
         verdict,
     }
 }
 
-/// Every mode that both ran, and every measure of it that either took, in A's order and then B's.
-pub fn compare_modes(a: &[TimedMode], b: &[TimedMode]) -> Vec<ComparedMode> {
-    let both =
-        a.iter().filter_map(|of_a| Some((of_a, b.iter().find(|of_b| of_b.name == of_a.name)?)));
-    both.map(|(a, b)| ComparedMode { name: a.name.clone(), measures: compare_measures(a, b) })
+/// Compares every loop that both ran, and every measure that either has, in A's order and then B's.
+fn compare_modes(a: &[TimedMode], b: &[TimedMode]) -> Vec<ModeComparison> {
+    pairs(a, b)
+        .map(|(a, b)| ModeComparison { name: a.name.clone(), measures: compare_measures(a, b) })
         .collect()
 }
 
-fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<Compared> {
-    let only_b = b.measures.iter().filter(|of_b| times(&a.measures, &of_b.name).is_none());
-    let names = a.measures.iter().chain(only_b).map(|measure| measure.name.as_str());
-    let taken = names.map(|name| (name, times(&a.measures, name), times(&b.measures, name)));
-    let taken = taken.map(|(name, a, b)| (name, a.unwrap_or_default(), b.unwrap_or_default()));
-    taken
-        .filter(|(_, a, b)| !a.is_empty() || !b.is_empty())
-        .map(|(name, a, b)| compare(name, a, b))
-        .collect()
+/// Returns the loops that both have.
+fn pairs<'a>(
+    a: &'a [TimedMode],
+    b: &'a [TimedMode],
+) -> impl Iterator<Item = (&'a TimedMode, &'a TimedMode)> {
+    a.iter().filter_map(|of_a| Some((of_a, b.iter().find(|of_b| of_b.name == of_a.name)?)))
 }
 
-fn times<'a>(measures: &'a [Measure], name: &str) -> Option<&'a [f64]> {
-    measures.iter().find(|measure| measure.name == name).map(|measure| &measure.ms[..])
+fn compare_measures(a: &TimedMode, b: &TimedMode) -> Vec<MeasureComparison> {
+    let mut names: Vec<&str> = a.measures.iter().map(|m| m.name.as_str()).collect();
+    let only_b = b.measures.iter().map(|m| m.name.as_str()).filter(|name| !names.contains(name));
+    names.extend(only_b.collect::<Vec<_>>());
+    let of = |name: &str| [a, b].map(|mode| mode.times(name));
+    let measured = names.into_iter().map(|name| (name, of(name)));
+    let measured = measured.filter(|(_, [a, b])| !a.is_empty() || !b.is_empty());
+    measured.map(|(name, [a, b])| compare(name, a, b)).collect()
 }
 
-/// Where a difference was found in the headline that is no greater than that between blocks of A,
-/// or of B, which ran the same frames: the machine was not steady, and may have made it.
-pub fn steadiness_remarks(
+/// Remarks on loops whose headline differs by no more than the blocks of A or B, which ran the same
+/// frames: an unsteady machine may have caused the difference.
+fn steadiness_remarks(
     a: &[TimedMode],
     b: &[TimedMode],
-    compared: &[ComparedMode],
+    compared: &[ModeComparison],
 ) -> Vec<String> {
     let mut remarks = Vec::new();
-    for mode in compared {
-        let Some(headline) = mode.headline() else { continue };
-        let Some(ratio) =
-            headline.b_by_a.filter(|_| headline.verdict != Verdict::NoDifferenceFound)
-        else {
-            continue;
-        };
+    for (mode, (a, b)) in compared.iter().zip(pairs(a, b)) {
+        let found = mode.headline().filter(|h| h.verdict != Verdict::NoDifferenceFound);
+        let Some(ratio) = found.and_then(|h| h.b_by_a) else { continue };
         for (name, of) in [("A", a), ("B", b)] {
-            let found = of.iter().find(|m| m.name == mode.name);
-            let spread = found.and_then(|m| spread_of_blocks(m.blocks.iter().map(Vec::as_slice)));
+            let spread = spread_of_blocks(of.blocks.iter().map(Vec::as_slice));
             if let Some(spread) = spread.filter(|spread| spread.ln() >= ratio.estimate.ln().abs()) {
                 let what = "as far as A and B, or further: the machine was not steady";
                 remarks.push(format!(
@@ -171,16 +202,8 @@ pub fn steadiness_remarks(
     remarks
 }
 
-/// Greatest median of a block by the least; None of fewer than two blocks, or where the least is 0.
-pub fn spread_of_blocks<'a>(blocks: impl Iterator<Item = &'a [f64]>) -> Option<f64> {
-    let medians: Vec<f64> = blocks.filter_map(median).collect();
-    let (least, greatest) =
-        medians.iter().fold((f64::INFINITY, 0.0_f64), |(l, g), m| (l.min(*m), g.max(*m)));
-    (medians.len() > 1 && least > 0.0).then(|| greatest / least)
-}
-
-/// What a reader should know of the two lists of frames.
-pub fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
+/// Remarks on loops that only A or B has, and on loops that timed different frames.
+fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
     let mut remarks = Vec::new();
     for (name, of, other_name, other) in [("A", a, "B", b), ("B", b, "A", a)] {
         for mode in of.iter().filter(|mode| other.iter().all(|o| o.name != mode.name)) {
@@ -191,9 +214,8 @@ pub fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
         }
     }
     let numbers = |mode: &TimedMode| mode.frames.iter().copied().collect::<BTreeSet<u32>>();
-    let differs = |a: &TimedMode| b.iter().any(|b| b.name == a.name && numbers(a) != numbers(b));
-    for mode in a.iter().filter(|mode| differs(mode)) {
-        let what = "timed different frames of the scene: where it changes, so may the median";
+    for (mode, _) in pairs(a, b).filter(|(a, b)| numbers(a) != numbers(b)) {
+        let what = "timed different frames of the scene: if the scene changes, so may the median";
         remarks.push(format!("{}: A and B {what}", mode.name));
     }
     remarks
@@ -203,17 +225,18 @@ pub fn frame_remarks(a: &[TimedMode], b: &[TimedMode]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::measure::random::{SplitMix64, frame_times};
+    use crate::timing::results::Measure;
 
     const N_TRIALS: usize = 100;
     const SEED: u64 = 1;
-    /// What a scene of 120 frames gives in the two blocks that are the default.
+    /// Frames of a scene of 120 frames in two blocks, the default.
     const N_FRAMES: usize = 240;
-    /// A quiet machine's noise, of the median: least and greatest.
+    /// Least and greatest noise of a quiet machine, relative to the median.
     const NOISE: [f64; 2] = [0.015, 0.03];
-    /// From frame to frame.
+    /// Correlation from frame to frame.
     const RHO: f64 = 0.3;
 
-    /// How often B at `slowdown` times A was called faster, no different, and slower.
+    /// Returns how often B at `slowdown` times A was called faster, no different, and slower.
     fn verdicts(slowdown: f64, noise: f64, n_trials: usize, seed: u64) -> (usize, usize, usize) {
         let mut random = SplitMix64(seed);
         let mut count = (0, 0, 0);
@@ -231,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_hundred_pairs_of_equal_runs_few_seem_to_differ() {
+    fn few_pairs_of_equal_runs_seem_to_differ() {
         // 95.4 % of 4000 trials at either noise (below): 2.3 % seemed faster, 2.2 % slower. Of 400
         // that is 382 with a standard deviation of 4.2: 371 is two and a half below.
         for noise in NOISE {
@@ -242,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn three_percent_are_found_in_either_direction() {
+    fn a_difference_of_three_percent_is_found_in_either_direction() {
         // The standard error of the ratio is at most 1.25 · 3 % · 1.36 /√240 · √2 = 0.47 %: 3 % is
         // more than six of them.
         for noise in NOISE {
@@ -286,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_judged_says_why() {
+    fn a_missing_verdict_says_why() {
         let thirty = [2.0; N_FRAMES_NEEDED];
         assert_eq!(compare("x", &thirty, &[3.0; N_FRAMES_NEEDED]).verdict, Verdict::Slower);
         for (a, b, verdict) in [
@@ -299,7 +322,7 @@ mod tests {
             let compared = compare("x", a, b);
             assert_eq!((compared.verdict, compared.b_by_a), (verdict, None));
         }
-        // The medians are there all the same.
+        // The medians are reported all the same.
         assert_eq!(compare("x", &[1.0], &[4.0]).b_ms, Some(4.0));
     }
 
@@ -316,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn measures_meet_by_name_whatever_their_order() {
+    fn measures_are_matched_by_name_in_any_order() {
         let a = [
             mode("serial", 0..40, &[("frame", 10.0), ("sort", 1.0), ("grid", 2.0)]),
             mode("parallel", 0..40, &[]),
@@ -329,10 +352,10 @@ mod tests {
         b[0].measures[3].ms.clear();
         let modes = compare_modes(&a, &b);
         assert_eq!(modes.len(), 1);
-        let said: Vec<_> =
+        let verdicts: Vec<_> =
             modes[0].measures.iter().map(|m| (m.measure.as_str(), m.verdict)).collect();
         assert_eq!(
-            said,
+            verdicts,
             [
                 ("frame", Verdict::Slower),
                 ("sort", Verdict::NotMeasuredInB),
@@ -351,7 +374,7 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_like_that_between_blocks_is_remarked_on() {
+    fn a_difference_no_greater_than_between_blocks_is_remarked_on() {
         let with_blocks = |ms: f64, blocks: &[f64]| {
             let mut mode = mode("serial", 0..40, &[("frame", ms)]);
             mode.blocks = blocks.iter().map(|ms| vec![*ms; 20]).collect();
@@ -362,13 +385,13 @@ mod tests {
         // 10 against 11 ms; blocks of A from 9.5 to 10.5 are 1.105 apart, of B from 10.9 to 11.1
         // are 1.018.
         let (a, b) = (with_blocks(10.0, &[9.5, 10.5]), with_blocks(11.0, &[11.1, 10.9]));
-        let said = remarks(&a, &b);
+        let found = remarks(&a, &b);
         assert!(
-            said.len() == 1 && said[0].contains("A's own blocks lie a factor of 1.105 apart"),
-            "{said:?}"
+            found.len() == 1 && found[0].contains("A's own blocks lie a factor of 1.105 apart"),
+            "{found:?}"
         );
-        let said = remarks(&b, &a);
-        assert!(said.len() == 1 && said[0].contains("B's own blocks"), "{said:?}");
+        let found = remarks(&b, &a);
+        assert!(found.len() == 1 && found[0].contains("B's own blocks"), "{found:?}");
         // Steady enough; no difference to doubt; a single block.
         assert_eq!(remarks(&with_blocks(10.0, &[9.9, 10.1]), &b), [""; 0]);
         assert_eq!(remarks(&a, &a), [""; 0]);

@@ -1,181 +1,179 @@
-//! Whether two runs measured the same thing: the same scene on the same device with the same build.
+//! Lists what differs between the conditions of runs: their device, build and scene.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
+use clap::ValueEnum;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::timing::records::Run;
+use super::records::Run;
 
-/// What has to be the same, as `--allow` names it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+/// A condition that two runs must share to be comparable, as `--allow` names it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
-pub enum Sameness {
-    /// The machine: device, driver, processor, and the variables that change what drivers do.
+pub enum Condition {
+    /// Device, driver, processor, and variables that change what drivers do
     Device,
-    /// Version and revision of nimbus.
+    /// Version and revision of nimbus
     Build,
-    /// Every setting of the scene, and its files.
+    /// The scene's settings and files
     Scene,
 }
 
-impl Sameness {
+impl Condition {
+    /// All conditions, in the order in which differences are listed.
+    pub const ALL: [Condition; 3] = [Condition::Device, Condition::Build, Condition::Scene];
+
+    /// Returns the name that `--allow` takes.
     pub fn name(self) -> &'static str {
         match self {
-            Sameness::Device => "device",
-            Sameness::Build => "build",
-            Sameness::Scene => "scene",
+            Condition::Device => "device",
+            Condition::Build => "build",
+            Condition::Scene => "scene",
         }
     }
 }
 
-/// One thing that differs.
+/// One fact that differs between A and B.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Difference {
-    pub kind: Sameness,
-    /// "driver", "scene_hash", "lighting.grid".
+    /// The condition that the fact belongs to.
+    pub kind: Condition,
+    /// Name of the fact: "driver", "scene_hash", "lighting.grid".
     pub what: String,
+    /// Value in A.
     pub a: String,
+    /// Value in B.
     pub b: String,
 }
 
-/// All that must be the same and is not: device, build, scene, in this order.
+impl Difference {
+    fn new(kind: Condition, what: &str, [a, b]: [String; 2]) -> Difference {
+        Difference { kind, what: what.to_owned(), a, b }
+    }
+}
+
+const UNSET: &str = "not set";
+/// Keys of the scene that are listed. The first ones show what was changed; two scenes that share
+/// nothing would fill a page.
+const N_KEYS_SHOWN: usize = 5;
+
+/// Lists all conditions that differ between two runs, in the order of [`Condition::ALL`].
 pub fn differences(a: &Run, b: &Run) -> Vec<Difference> {
     let mut found = Vec::new();
-    let mut compare = |kind, what: &str, a: String, b: String| {
-        if a != b {
-            found.push(Difference { kind, what: what.to_owned(), a, b });
-        }
-    };
-    for (what, of) in [
-        ("name", (|r| r.device.name.clone()) as fn(&Run) -> String),
-        ("driver", |r| r.device.driver.clone()),
-        ("Vulkan", |r| r.device.api.clone()),
-        ("uuid", |r| r.device.uuid.clone()),
-        ("processor", |r| r.cpu.model.clone()),
-        ("cores", |r| r.cpu.logical_cores.to_string()),
+    for (kind, what, of) in [
+        (Condition::Device, "name", (|r| r.device.name.clone()) as fn(&Run) -> String),
+        (Condition::Device, "driver", |r| r.device.driver.clone()),
+        (Condition::Device, "Vulkan", |r| r.device.api.clone()),
+        (Condition::Device, "uuid", |r| r.device.uuid.clone()),
+        (Condition::Device, "processor", |r| r.cpu.model.clone()),
+        (Condition::Device, "cores", |r| r.cpu.logical_cores.to_string()),
+        (Condition::Build, "version", |r| r.nimbus.clone()),
+        (Condition::Build, "revision", |r| r.revision.clone()),
     ] {
-        compare(Sameness::Device, what, of(a), of(b));
+        let values = [of(a), of(b)];
+        if kind == Condition::Build && what == "version" {
+            found.extend(map_differences(Condition::Device, [&a.environment, &b.environment]));
+        }
+        if values[0] != values[1] {
+            found.push(Difference::new(kind, what, values));
+        }
     }
-    let mut variables: Vec<&String> = a.environment.keys().chain(b.environment.keys()).collect();
-    variables.sort();
-    variables.dedup();
-    for variable in variables {
-        let of = |run: &Run| run.environment.get(variable).map_or(UNSET.to_owned(), Clone::clone);
-        compare(Sameness::Device, variable, of(a), of(b));
-    }
-    compare(Sameness::Build, "version", a.nimbus.clone(), b.nimbus.clone());
-    compare(Sameness::Build, "revision", a.revision.clone(), b.revision.clone());
     if a.scene_hash != b.scene_hash {
         found.extend(scene_differences(a, b));
         return found;
     }
-    // Points of a sweep may name files of their own.
+    // The points of a sweep can name different files.
     for of_a in &a.cases {
         let of_b = b.cases.iter().find(|of_b| of_b.name() == of_a.name());
         if let Some(of_b) = of_b.filter(|of_b| of_b.scene_hash != of_a.scene_hash) {
-            let (a, b) = (short(&of_a.scene_hash).to_owned(), short(&of_b.scene_hash).to_owned());
-            found.push(Difference {
-                kind: Sameness::Scene,
-                what: format!("{}, hash", of_a.name()),
-                a,
-                b,
-            });
+            let hashes = [of_a, of_b].map(|case| short(&case.scene_hash));
+            let what = format!("{}, hash", of_a.name());
+            found.push(Difference::new(Condition::Scene, &what, hashes));
         }
     }
     found
 }
 
-const UNSET: &str = "not set";
-/// Of a long list the first say what happened; two scenes that share nothing would fill a page.
-const N_KEYS_SHOWN: usize = 5;
-
-/// The hashes, and the first keys that differ; none do where only a file that the scene names was
-/// changed.
+/// Lists the scene hashes and the first keys that differ; no key differs if only a file that the
+/// scene names was changed.
 fn scene_differences(a: &Run, b: &Run) -> Vec<Difference> {
-    let new = |what: &str, a: &str, b: &str| Difference {
-        kind: Sameness::Scene,
-        what: what.to_owned(),
-        a: a.to_owned(),
-        b: b.to_owned(),
-    };
-    let mut found = vec![new("scene_hash", short(&a.scene_hash), short(&b.scene_hash))];
-    let (mut of_a, mut of_b) = (BTreeMap::new(), BTreeMap::new());
-    leaves(&a.scene, "", &mut of_a);
-    leaves(&b.scene, "", &mut of_b);
-    let mut keys: Vec<&String> = of_a.keys().chain(of_b.keys()).collect();
-    keys.sort();
-    keys.dedup();
-    keys.retain(|key| of_a.get(*key) != of_b.get(*key));
-    for key in keys.iter().take(N_KEYS_SHOWN) {
-        let of = |leaves: &BTreeMap<String, String>| {
-            leaves.get(*key).map_or(UNSET.to_owned(), Clone::clone)
-        };
-        found.push(new(key, &of(&of_a), &of(&of_b)));
-    }
-    if keys.len() > N_KEYS_SHOWN {
-        let more = format!("{} more keys", keys.len() - N_KEYS_SHOWN);
-        found.push(new(&more, "…", "…"));
+    let hashes = [a, b].map(|run| short(&run.scene_hash));
+    let mut found = vec![Difference::new(Condition::Scene, "scene_hash", hashes)];
+    let leaves = [a, b].map(|run| {
+        let mut leaves = BTreeMap::new();
+        add_leaves(&run.scene, "", &mut leaves);
+        leaves
+    });
+    let mut keys = map_differences(Condition::Scene, [&leaves[0], &leaves[1]]);
+    let n_more = keys.len().saturating_sub(N_KEYS_SHOWN);
+    keys.truncate(N_KEYS_SHOWN);
+    found.extend(keys);
+    if n_more > 0 {
+        let more = format!("{n_more} more keys");
+        found.push(Difference::new(Condition::Scene, &more, ["…", "…"].map(str::to_owned)));
     }
     found
 }
 
-/// Enough of a hash to tell two apart by eye.
-fn short(hash: &str) -> &str {
-    hash.get(..12).unwrap_or(hash)
+/// Lists the keys whose values differ, or that only one map has.
+fn map_differences(kind: Condition, maps: [&BTreeMap<String, String>; 2]) -> Vec<Difference> {
+    let keys: BTreeSet<&String> = maps.iter().flat_map(|map| map.keys()).collect();
+    let values = |key: &String| maps.map(|map| map.get(key).map_or(UNSET.to_owned(), Clone::clone));
+    let differ = keys.into_iter().filter(|key| maps[0].get(*key) != maps[1].get(*key));
+    differ.map(|key| Difference::new(kind, key, values(key))).collect()
 }
 
-/// "lighting.grid" → "64" for every value that holds no other; a list of numbers is one value, as
-/// `--set` takes it.
-fn leaves(value: &Value, at: &str, found: &mut BTreeMap<String, String>) {
+/// Returns the beginning of a hash, enough to tell two apart by eye.
+fn short(hash: &str) -> String {
+    hash.chars().take(12).collect()
+}
+
+/// Adds "lighting.grid" → "64" for every value that contains no other. A list of numbers is one
+/// value, as `--set` takes it.
+fn add_leaves(value: &Value, at: &str, leaves: &mut BTreeMap<String, String>) {
     let below = |key: &str| if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") };
     match value {
         Value::Object(object) => {
-            object.iter().for_each(|(key, value)| leaves(value, &below(key), found))
+            object.iter().for_each(|(key, value)| add_leaves(value, &below(key), leaves));
         }
         Value::Array(items) if items.iter().any(|item| item.is_object() || item.is_array()) => {
-            items
-                .iter()
-                .enumerate()
-                .for_each(|(i, item)| leaves(item, &below(&i.to_string()), found));
+            for (i, item) in items.iter().enumerate() {
+                add_leaves(item, &below(&i.to_string()), leaves);
+            }
         }
         _ => {
-            found.insert(at.to_owned(), value.to_string());
+            leaves.insert(at.to_owned(), value.to_string());
         }
     }
 }
 
-/// What a reader should know of runs that may be compared.
-pub fn remarks(a: &Run, b: &Run) -> Vec<String> {
+/// Lists what a reader should know about two runs that may be compared.
+pub(super) fn remarks(a: &Run, b: &Run) -> Vec<String> {
     let mut remarks = Vec::new();
     if a.revision == b.revision && (a.revision == "unknown" || a.revision.ends_with("-dirty")) {
         let revision = &a.revision;
         remarks.push(format!(
-            "both builds call themselves {revision}: that does not say that they are the same"
+            "both builds have the revision {revision}: their sources may differ all the same"
         ));
     }
     for (name, run) in [("A", a), ("B", b)] {
         if run.interrupted {
             remarks.push(format!(
-                "{name} was interrupted: its last block is not whole, and its blocks \
-                    may not balance"
+                "{name} was interrupted: its last block is incomplete, and a drift may not cancel"
             ));
         }
     }
-    let (of_a, of_b) = (wishes(&a.command), wishes(&b.command));
+    let [of_a, of_b] = [a, b].map(|run| relevant_words(&run.command).join(" "));
     if of_a != of_b {
-        remarks.push(format!(
-            "A and B were asked for differently: A \"{}\", B \"{}\"",
-            of_a.join(" "),
-            of_b.join(" ")
-        ));
+        remarks.push(format!("the commands of A and B differ: A \"{of_a}\", B \"{of_b}\""));
     }
     remarks
 }
 
-/// The command without the program and without what changes no time: where results go and how much
-/// is said.
-fn wishes(command: &[String]) -> Vec<&str> {
+/// Returns the command without the program and the arguments that change no time: where results go
+/// and how much is printed.
+fn relevant_words(command: &[String]) -> Vec<&str> {
     let mut words = command.iter().skip(1).map(String::as_str);
     let mut kept = Vec::new();
     while let Some(word) = words.next() {
@@ -187,4 +185,22 @@ fn wishes(command: &[String]) -> Vec<&str> {
         }
     }
     kept
+}
+
+/// The facts of one part of a bench or study, by name, in a fixed order.
+pub type Facts = Vec<(&'static str, String)>;
+
+/// Lists the facts in which parts differ from the first one, as "scene: A of shard 0, B of shard
+/// 4". Each part is given by its name and facts.
+pub fn fact_differences(parts: &[(&str, Facts)]) -> BTreeSet<String> {
+    let Some(((first, facts), others)) = parts.split_first() else {
+        return BTreeSet::from(["there is no part".to_owned()]);
+    };
+    let of_part = |(name, theirs): &(&str, Facts)| {
+        let differ = facts.iter().zip(theirs).filter(|(a, b)| a != b);
+        let text =
+            differ.map(|((what, a), (_, b))| format!("{what}: {a} of {first}, {b} of {name}"));
+        text.collect::<Vec<String>>()
+    };
+    others.iter().flat_map(of_part).collect()
 }

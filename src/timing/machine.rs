@@ -1,4 +1,4 @@
-//! Where and with what a run was made: device, processor, environment, clocks, build.
+//! The conditions of a run: device, processor, environment, clocks, build.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,50 +11,61 @@ use crate::frame::render::Renderer;
 use crate::gpu::DeviceInfo;
 use crate::measure::clock::ClockQuality;
 
+/// A Vulkan device, as results name it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Device {
+    /// Name that the driver reports.
     pub name: String,
+    /// Name and version of the driver.
     pub driver: String,
     /// Vulkan version, "1.3.230".
     pub api: String,
     /// "discrete", "integrated", "virtual", "cpu" or "other".
     #[serde(rename = "type")]
     pub kind: String,
-    /// 32 hex digits.
+    /// UUID of the device, 32 hex digits.
     pub uuid: String,
 }
 
+/// The processor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Cpu {
+    /// Name of the model.
     pub model: String,
     /// Logical cores that this process may use.
     pub logical_cores: usize,
 }
 
 impl Device {
-    /// Its kind: two cards of one kind, whose UUIDs differ, draw the same and take the same time.
+    /// Returns name, driver and Vulkan version. Two cards of one class differ in their UUIDs only;
+    /// they draw the same pictures in the same time.
     pub fn class(&self) -> String {
         format!("{} ({}, Vulkan {})", self.name, self.driver, self.api)
     }
 }
 
 impl Cpu {
+    /// Returns model and number of cores.
     pub fn class(&self) -> String {
         format!("{}, {} cores", self.model, self.logical_cores)
     }
 }
 
+/// The precision of the clocks, in ns.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Clocks {
+    /// Smallest step of the host's clock.
     pub resolution_ns: f64,
+    /// Time that one reading of the host's clock takes.
     pub overhead_ns: f64,
-    /// Of the device; null where it has no timestamps.
+    /// Tick of the device's timestamps; null if it has none.
     pub timestamp_period_ns: Option<f64>,
-    /// What a pass that does nothing measures; a pass near it says nothing.
+    /// Measured time of a pass that does nothing. The time of a real pass means little if it is
+    /// about as short.
     pub timestamp_overhead_ns: Option<f64>,
 }
 
-/// The device as results name it.
+/// Returns the device as results name it.
 pub fn device_record(info: &DeviceInfo) -> Device {
     let (major, minor, patch) = info.api_version;
     Device {
@@ -66,7 +77,10 @@ pub fn device_record(info: &DeviceInfo) -> Device {
     }
 }
 
-/// The host's clock and the device's, measured.
+/// Measures the clocks of host and device.
+///
+/// # Errors
+/// Fails if a Vulkan call fails.
 pub fn clocks_record(info: &DeviceInfo, renderer: &mut Renderer) -> Result<Clocks> {
     let host = ClockQuality::measure();
     let limits = &info.limits;
@@ -77,11 +91,12 @@ pub fn clocks_record(info: &DeviceInfo, renderer: &mut Renderer) -> Result<Clock
     Ok(Clocks { resolution_ns, overhead_ns, timestamp_period_ns, timestamp_overhead_ns })
 }
 
-/// The revision that was built (see build.rs).
+/// Returns the Git revision that was built (see build.rs).
 pub fn revision() -> &'static str {
     env!("NIMBUS_GIT_REVISION")
 }
 
+/// Returns the processor of this machine.
 pub fn cpu() -> Cpu {
     let text = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text
@@ -93,7 +108,7 @@ pub fn cpu() -> Cpu {
     }
 }
 
-/// Of the process: Mesa, its software rasteriser, and the Vulkan loader.
+/// Returns the environment variables that Mesa, its software rasteriser and the Vulkan loader read.
 pub fn environment() -> BTreeMap<String, String> {
     relevant(
         std::env::vars_os()
@@ -106,14 +121,15 @@ fn relevant(variables: impl Iterator<Item = (String, String)>) -> BTreeMap<Strin
     variables.filter(|(key, _)| PREFIXES.iter().any(|prefix| key.starts_with(prefix))).collect()
 }
 
-/// Now, as "2024-02-29T12:34:56Z". A clock before 1970 gives 1970.
+/// Returns the present time as "2024-02-29T12:34:56Z"; 1970 if the clock is set before it.
 pub fn utc_now() -> String {
     iso_8601_utc(SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs()))
 }
 
-/// Seconds since 1970-01-01T00:00:00Z, without leap seconds. The date is Howard Hinnant's
-/// `civil_from_days`: years begin in March, so that the leap day is a year's last, and repeat every
-/// 400 years of 146 097 days.
+/// Formats seconds since 1970-01-01T00:00:00Z, without leap seconds.
+///
+/// The date is Howard Hinnant's `civil_from_days`: years begin in March, so that the leap day is a
+/// year's last, and repeat every 400 years of 146 097 days.
 pub fn iso_8601_utc(unix_s: u64) -> String {
     let (days, second) = (unix_s / 86_400, unix_s % 86_400);
     // Days from 0000-03-01 to 1970-01-01.
@@ -136,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn known_dates() {
+    fn dates_are_those_of_the_date_command() {
         // From `date -u -d @N`.
         for (unix_s, text) in [
             (0, "1970-01-01T00:00:00Z"),
@@ -150,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn only_variables_that_matter_are_kept() {
+    fn only_variables_of_drivers_are_kept() {
         let given =
             ["LP_NUM_THREADS", "HOME", "VK_DRIVER_FILES", "MESA_VK_DEVICE_SELECT", "SECRET_VK_KEY"];
         let kept = relevant(given.iter().map(|key| ((*key).to_owned(), "1".to_owned())));

@@ -1,16 +1,30 @@
-//! Times scenes: cases and the blocks of frames that they are run in, the machine that they run on,
-//! the records of what came out, and the comparison of two runs.
+//! Times scenes and compares the results.
+//!
+//! A bench times [`cases`] (a scene in one phase, at one point of a [`sweep`]), each in several
+//! loops (serial or parallel, with or without skipping), in interleaved [`blocks`] of frames. Its
+//! samples become the [`records`] of `run.json` ([`outcome`], [`overlap`]) and the rows of
+//! `frames.csv` ([`frame_rows`]), which [`results`] writes and reads with the files beside them
+//! ([`attachments`]). [`compare`] decides which of two results is faster; [`difference`] lists what
+//! else differs between them. [`parts`] joins a bench that several nodes timed. [`trace`] writes
+//! the frames as a time line. [`machine`], [`names`] and [`json`] serve all of them, and the
+//! studies too.
 
-pub mod bench;
+pub mod attachments;
+pub mod blocks;
 pub mod cases;
-pub mod companions;
 pub mod compare;
 pub mod difference;
+pub mod frame_rows;
+mod intervals;
+pub mod json;
 pub mod machine;
+pub mod names;
 pub mod outcome;
 pub mod overlap;
 pub mod parts;
-pub mod recorded;
 pub mod records;
-pub mod rows;
+pub mod results;
+pub mod sweep;
 pub mod trace;
+
+pub use intervals::N_FRAMES_NEEDED;

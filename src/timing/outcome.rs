@@ -1,40 +1,41 @@
-//! What a bench's frames say: the records of a run, from its samples.
+//! Summarizes the samples of a bench as the records of its cases and the rows of its frames.
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::blocks::{BenchPlan, Outcome, Sample};
+use super::cases::{Case, Loop};
+use super::frame_rows::{FrameRow, FrameTable};
+use super::intervals::{median_interval, ratio_interval, spread_of_blocks};
+use super::names::sweep_text;
+use super::overlap::{Overlap, SerialFrame};
+use super::records::{self, Measured, Mode, Pass as PassRecord, Ratio, Reason, Skipping};
 use crate::frame::FrameTimes;
 use crate::frame::plan::{Pass, Reason as PlanReason};
-use crate::measure::bootstrap::Bootstrap;
 use crate::measure::lows::Lows;
 use crate::measure::stats::{Summary, mean, median};
 use crate::model::scene::{Impostors, Simulate, Threading};
-use crate::timing::bench::{BenchPlan, Outcome, Sample};
-use crate::timing::cases::{Case, Loop, sweep_text};
-use crate::timing::compare::{N_FRAMES_NEEDED, spread_of_blocks};
-use crate::timing::overlap::{Overlap, SerialFrame};
-use crate::timing::records::{
-    self, FrameRow, Measured, Mode, Pass as PassRecord, Ratio, Reason, Skipping,
-};
 
-impl FrameTimes {
-    /// Sum of the passes; 0 where none had to run, `None` without timestamps.
-    pub fn gpu_ms(&self) -> Option<f64> {
-        let timed = !self.passes.is_empty() || !Pass::ALL.into_iter().any(|p| self.plan.runs(p));
-        // A sum of nothing is -0.
-        timed.then(|| self.passes.iter().map(|p| p.ms()).sum::<f64>() + 0.0)
-    }
-
-    fn pass_ms(&self, name: &str) -> Option<f64> {
-        self.passes.iter().find(|p| p.name == name).map(|p| p.ms())
-    }
+/// Returns the device time of all passes in ms; 0 if none had to run, None without timestamps.
+fn gpu_ms(times: &FrameTimes) -> Option<f64> {
+    let is_timed = !times.passes.is_empty() || !Pass::ALL.into_iter().any(|p| times.plan.runs(p));
+    // The sum of nothing is -0.
+    is_timed.then(|| times.passes.iter().map(|p| p.ms()).sum::<f64>() + 0.0)
 }
 
-/// Timed frames of one case in one loop.
-struct Timed<'a>(Vec<&'a FrameTimes>);
+fn pass_ms(times: &FrameTimes, pass: Pass) -> Option<f64> {
+    times.passes.iter().find(|p| p.name == pass.name()).map(|p| p.ms())
+}
+
+/// The timed frames of one case in one loop.
+struct Timed<'a>(Vec<&'a Sample>);
 
 impl Timed<'_> {
+    fn frames(&self) -> impl Iterator<Item = &FrameTimes> {
+        self.0.iter().map(|s| &s.times)
+    }
+
     fn column(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Vec<f64> {
-        self.0.iter().filter_map(|t| of(t)).collect()
+        self.frames().filter_map(of).collect()
     }
 
     fn frame_ms(&self) -> Vec<f64> {
@@ -43,35 +44,44 @@ impl Timed<'_> {
 
     fn measured(&self, of: impl Fn(&FrameTimes) -> Option<f64>) -> Option<Measured> {
         let values = self.column(of);
-        let bootstrap = Bootstrap::of_neighbours(values.len());
-        let interval =
-            if values.len() < N_FRAMES_NEEDED { None } else { bootstrap.median(&values) };
-        // The widened interval may reach below what a time can be.
-        let (p50_low, p50_high) = interval.map(|i| (i.low.max(0.0), i.high)).unzip();
+        // The widened interval can reach below 0, which no time does.
+        let (p50_low, p50_high) =
+            median_interval(&values).map(|i| (i.low.max(0.0), i.high)).unzip();
         Summary::of(&values).map(|of| Measured { of, p50_low, p50_high })
+    }
+
+    /// Returns the greatest median frame time of a block by the least.
+    fn block_spread(&self) -> Option<f64> {
+        let blocks: Vec<Vec<f64>> = self
+            .0
+            .chunk_by(|a, b| a.i_block == b.i_block)
+            .map(|block| block.iter().map(|s| s.times.frame_ms).collect())
+            .collect();
+        spread_of_blocks(blocks.iter().map(Vec::as_slice))
     }
 }
 
 impl Outcome {
-    fn timed(&self, i_case: usize, of: Loop) -> Timed<'_> {
-        let is_one = |s: &&Sample| s.i_case == i_case && s.of == of && !s.warm_up;
-        Timed(self.samples.iter().filter(is_one).map(|s| &s.times).collect())
+    fn of_loop(&self, i_case: usize, of: Loop) -> impl Iterator<Item = &Sample> {
+        self.samples.iter().filter(move |s| s.i_case == i_case && s.of == of)
     }
 
-    /// The records of every case, in order.
+    fn timed(&self, i_case: usize, of: Loop) -> Timed<'_> {
+        Timed(self.of_loop(i_case, of).filter(|s| !s.warm_up).collect())
+    }
+
+    /// Returns the records of all cases, in order.
     pub fn cases(&self, cases: &[Case], plan: &BenchPlan) -> Vec<records::Case> {
         cases.iter().enumerate().map(|(i, case)| self.case(i, case, plan)).collect()
     }
 
     fn case(&self, i: usize, case: &Case, plan: &BenchPlan) -> records::Case {
-        // With --no-skip no loop skips; else the one that does not is there to measure skipping by.
+        // With --no-skip no loop skips; else a loop that does not measures what skipping saves.
         let skip = case.loops.iter().any(|of| of.skip);
-        let find =
-            |threading| case.loops.iter().copied().find(|of| *of == Loop { threading, skip });
-        let (serial, parallel) = (find(Threading::Serial), find(Threading::Parallel));
-        let pair = serial.zip(parallel);
+        let timed = |of: Loop| case.loops.contains(&of).then(|| self.timed(i, of));
+        let serial = timed(Loop { threading: Threading::Serial, skip });
+        let parallel = timed(Loop { threading: Threading::Parallel, skip });
         let unskipped = case.loops.iter().copied().find(|of| skip && !of.skip);
-        let modes = case.loops.iter().map(|of| self.mode(i, case, *of, unskipped, plan)).collect();
         records::Case {
             phase: case.phase.clone(),
             sweep: case.sweep.clone(),
@@ -79,76 +89,48 @@ impl Outcome {
             particles: case.scene.n_particles(),
             width: case.scene.film.width,
             height: case.scene.film.height,
-            modes,
-            ratio: pair.and_then(|(serial, parallel)| self.ratio(i, serial, parallel)),
-            overlap: serial.and_then(|serial| self.overlap(i, serial, pair.map(|p| p.1))),
+            modes: case.loops.iter().map(|of| self.mode(i, case, *of, unskipped, plan)).collect(),
+            ratio: serial.as_ref().zip(parallel.as_ref()).and_then(|(s, p)| ratio(s, p)),
+            overlap: serial.as_ref().and_then(|serial| overlap(serial, parallel.as_ref())),
             counts: self.counts.get(&i).copied(),
-            skipping: unskipped.and_then(|unskipped| {
-                self.skipping(i, case, [Loop { skip: true, ..unskipped }, unskipped])
-            }),
+            skipping: unskipped.and_then(|unskipped| self.skipping(i, case, unskipped)),
         }
     }
 
-    /// Ratio of the median frame times with its bootstrap 95 % interval. Neighbouring frames are
-    /// alike, so whole runs of frames are drawn, not single ones: √n frames each.
-    fn ratio(&self, i: usize, serial: Loop, parallel: Loop) -> Option<Ratio> {
-        let (serial, parallel) =
-            (self.timed(i, serial).frame_ms(), self.timed(i, parallel).frame_ms());
-        let n = serial.len().min(parallel.len());
-        let bootstrap = Bootstrap::of_neighbours(n);
-        let interval =
-            if n < N_FRAMES_NEEDED { None } else { bootstrap.ratio_of_medians(&parallel, &serial) };
-        let (low, high) = interval.map(|i| (i.low, i.high)).unzip();
-        let parallel_by_serial = median(&parallel)? / median(&serial).filter(|ms| *ms > 0.0)?;
-        Some(Ratio { parallel_by_serial, low, high })
-    }
-
-    /// What overlap could gain, and how much of it the parallel loop gained.
-    fn overlap(&self, i: usize, serial: Loop, parallel: Option<Loop>) -> Option<Overlap> {
-        let row = |t: &&FrameTimes| SerialFrame {
-            frame_ms: t.frame_ms,
-            game_ms: t.game_ms,
-            render_ms: t.render_ms(),
-        };
-        let serial: Vec<SerialFrame> = self.timed(i, serial).0.iter().map(row).collect();
-        Overlap::of(&serial, &parallel.map_or(vec![], |of| self.timed(i, of).frame_ms()))
-    }
-
-    fn skipping(&self, i: usize, case: &Case, [skipped, unskipped]: [Loop; 2]) -> Option<Skipping> {
-        let [gpu, all] = [skipped, unskipped].map(|of| self.timed(i, of).column(|t| t.gpu_ms()));
+    fn skipping(&self, i: usize, case: &Case, unskipped: Loop) -> Option<Skipping> {
+        let loops = [Loop { skip: true, ..unskipped }, unskipped];
+        let [gpu, all] = loops.map(|of| self.timed(i, of).column(gpu_ms));
         if gpu.is_empty() || all.is_empty() {
             return None;
         }
-        // Without skipping no impostor is used.
-        let exact = case.scene.draw.impostors == Impostors::Off;
-        let hashes = [skipped, unskipped].map(|of| self.image_hash(i, of).filter(|_| exact));
+        let hashes = loops.map(|of| self.image_hash(i, of).filter(|_| !has_impostors(case)));
         let same_bytes = if let [Some(a), Some(b)] = hashes { Some(a == b) } else { None };
         Some(Skipping { gpu_ms: mean(&gpu), gpu_no_skip_ms: mean(&all), same_bytes })
     }
 
-    /// Of the last frame of one case in one loop, where one was reached.
+    /// Returns the hash of the last frame of one case in one loop, if it was reached.
     fn image_hash(&self, i_case: usize, of: Loop) -> Option<&str> {
         let mut blocks = self.blocks.iter().filter(|b| b.i_case == i_case && b.of == of);
         blocks.find_map(|b| b.image_hash.as_deref())
     }
 
-    /// Whether the last frames of all blocks of a case are the same, to the byte; none of fewer
-    /// than two. With impostors of those that skip: without skipping there are none.
+    /// Returns whether the last frames of all blocks of a case have the same bytes; None for fewer
+    /// than two. If the scene has impostors, only the loops that skip are compared.
     pub fn is_same_picture(&self, i_case: usize, case: &Case) -> Option<bool> {
-        let exact = case.scene.draw.impostors == Impostors::Off;
-        let blocks = self.blocks.iter().filter(|b| b.i_case == i_case && (exact || b.of.skip));
+        let is_exact = !has_impostors(case);
+        let blocks = self.blocks.iter().filter(|b| b.i_case == i_case && (is_exact || b.of.skip));
         let hashes: Vec<&str> = blocks.filter_map(|b| b.image_hash.as_deref()).collect();
         (hashes.len() > 1).then(|| hashes.windows(2).all(|w| w[0] == w[1]))
     }
 
-    /// Every block that was begun, in order.
+    /// Returns the records of all blocks, in the order in which they ran.
     pub fn block_order(&self) -> Vec<records::Block> {
-        let of = |b: &crate::timing::bench::Block| records::Block {
+        let record = |b: &super::blocks::Block| records::Block {
             case: b.i_case,
             threading: b.of.threading.name().to_owned(),
             skip: b.of.skip,
         };
-        self.blocks.iter().map(of).collect()
+        self.blocks.iter().map(record).collect()
     }
 
     fn mode(
@@ -160,19 +142,15 @@ impl Outcome {
         plan: &BenchPlan,
     ) -> Mode {
         let timed = self.timed(i, of);
-        let blocks: BTreeSet<u32> = self
-            .samples
-            .iter()
-            .filter(|s| s.i_case == i && s.of == of)
-            .map(|s| s.i_block)
-            .collect();
+        let blocks: BTreeSet<u32> = self.of_loop(i, of).map(|s| s.i_block).collect();
         let depths = timed.column(|t| Some(f64::from(t.queue_depth)));
-        let against = unskipped.filter(|u| *u != of).map(|u| self.timed(i, u));
+        let drawn = Summary::of(&timed.column(|t| Some(f64::from(t.n_shown()))));
+        let unskipped = unskipped.filter(|u| *u != of).map(|u| self.timed(i, u));
+        let is_by_cpu = case.scene.threads.simulate == Simulate::Cpu;
         Mode {
             threading: of.threading.name().into(),
             skip: of.skip,
-            simulate: if case.scene.threads.simulate == Simulate::Cpu { "cpu" } else { "gpu" }
-                .into(),
+            simulate: if is_by_cpu { "cpu" } else { "gpu" }.into(),
             frames: timed.0.len(),
             warm_up: plan.n_warm_up as usize,
             blocks: blocks.len(),
@@ -183,36 +161,25 @@ impl Outcome {
             submit_ms: timed.measured(|t| Some(t.submit_ms)),
             wait_ms: timed.measured(|t| Some(t.wait_ms)),
             render_ms: timed.measured(|t| Some(t.render_ms())),
-            gpu_ms: timed.measured(FrameTimes::gpu_ms),
+            gpu_ms: timed.measured(gpu_ms),
             latency_ms: timed.measured(|t| Some(t.latency_ms)),
             queue_depth: (!depths.is_empty()).then(|| mean(&depths)),
-            drawn: Summary::of(&timed.column(|t| Some(f64::from(t.n_shown()))))
-                .map(|s| [s.min, s.mean, s.max]),
-            impostors_reused: timed.0.iter().filter(|t| is_reused(t)).count(),
-            passes: pass_records(&timed, against.as_ref()),
+            drawn: drawn.map(|s| [s.min, s.mean, s.max]),
+            impostors_reused: timed.frames().filter(|t| is_impostor_reused(t)).count(),
+            passes: Pass::ALL.map(|p| pass_record(p, &timed, unskipped.as_ref())).to_vec(),
             image_hash: self.image_hash(i, of).map(str::to_owned),
-            block_spread: self.block_spread(i, of),
+            block_spread: timed.block_spread(),
         }
     }
 
-    /// Greatest median frame time of a block by the least.
-    fn block_spread(&self, i: usize, of: Loop) -> Option<f64> {
-        let mut blocks: BTreeMap<u32, Vec<f64>> = BTreeMap::new();
-        for s in self.samples.iter().filter(|s| s.i_case == i && s.of == of && !s.warm_up) {
-            blocks.entry(s.i_block).or_default().push(s.times.frame_ms);
-        }
-        spread_of_blocks(blocks.values().map(Vec::as_slice))
-    }
-
-    /// The rows of frames.csv, passes in the order of [`pass_names`].
-    pub fn rows(&self, cases: &[Case]) -> Vec<FrameRow> {
-        let names = pass_names();
+    /// Returns the rows of `frames.csv`.
+    pub fn table(&self, cases: &[Case]) -> FrameTable {
         let row = |s: &Sample| FrameRow {
             phase: cases[s.i_case].phase.clone().unwrap_or_default(),
             sweep: sweep_text(&cases[s.i_case].sweep),
             threading: s.of.threading.name().into(),
             skip: s.of.skip,
-            block: s.i_block as usize,
+            block: s.i_block,
             frame: s.times.i_frame,
             time_s: s.times.time_s,
             warm_up: s.warm_up,
@@ -221,34 +188,54 @@ impl Outcome {
             record_ms: s.times.record_ms,
             submit_ms: s.times.submit_ms,
             wait_ms: s.times.wait_ms,
-            gpu_ms: s.times.gpu_ms(),
+            gpu_ms: gpu_ms(&s.times),
             latency_ms: s.times.latency_ms,
-            queue_depth: s.times.queue_depth as usize,
+            queue_depth: s.times.queue_depth,
             n_drawn: s.times.n_shown(),
             ran: ran(&s.times),
-            pass_ms: names.iter().map(|n| s.times.pass_ms(n)).collect(),
+            pass_ms: Pass::ALL.map(|pass| pass_ms(&s.times, pass)).to_vec(),
             image_hash: s.image_hash.clone(),
         };
-        self.samples.iter().map(row).collect()
+        let pass_names = Pass::ALL.map(|pass| pass.name().to_owned()).to_vec();
+        FrameTable { pass_names, rows: self.samples.iter().map(row).collect() }
     }
 }
 
-/// Whether what is far was shown from a picture that an earlier frame made.
-fn is_reused(times: &FrameTimes) -> bool {
+/// Returns whether the pictures of a case depend on skipping: without it no impostor is used.
+fn has_impostors(case: &Case) -> bool {
+    case.scene.draw.impostors != Impostors::Off
+}
+
+/// Returns the ratio of the median frame times with its 95 % bootstrap interval.
+fn ratio(serial: &Timed<'_>, parallel: &Timed<'_>) -> Option<Ratio> {
+    let [serial, parallel] = [serial, parallel].map(Timed::frame_ms);
+    let (low, high) = ratio_interval(&parallel, &serial).map(|i| (i.low, i.high)).unzip();
+    let parallel_by_serial = median(&parallel)? / median(&serial).filter(|ms| *ms > 0.0)?;
+    Some(Ratio { parallel_by_serial, low, high })
+}
+
+fn overlap(serial: &Timed<'_>, parallel: Option<&Timed<'_>>) -> Option<Overlap> {
+    let frame = |t: &FrameTimes| SerialFrame {
+        frame_ms: t.frame_ms,
+        game_ms: t.game_ms,
+        render_ms: t.render_ms(),
+    };
+    let serial: Vec<SerialFrame> = serial.frames().map(frame).collect();
+    Overlap::of(&serial, &parallel.map_or(vec![], Timed::frame_ms))
+}
+
+/// Returns whether distant particles were shown from the impostors of an earlier frame.
+fn is_impostor_reused(times: &FrameTimes) -> bool {
     matches!(times.plan.decision(Pass::Impostors).reason, PlanReason::Reused { .. })
 }
 
-/// "sort+sprites".
+/// Returns the passes that ran, as "sort+sprites".
 fn ran(times: &FrameTimes) -> String {
-    Pass::ALL
-        .into_iter()
-        .filter(|p| times.plan.runs(*p))
-        .map(Pass::name)
-        .collect::<Vec<_>>()
-        .join("+")
+    let passes = Pass::ALL.into_iter().filter(|p| times.plan.runs(*p));
+    passes.map(Pass::name).collect::<Vec<_>>().join("+")
 }
 
-/// Each once, the most frequent first.
+/// Returns each reason once, the most frequent first.
 fn reasons(all: impl Iterator<Item = String>) -> Vec<Reason> {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for reason in all {
@@ -260,31 +247,23 @@ fn reasons(all: impl Iterator<Item = String>) -> Vec<Reason> {
     reasons
 }
 
-/// Timer scopes of a frame.
-pub fn pass_names() -> Vec<String> {
-    Pass::ALL.iter().map(|p| p.name().to_owned()).collect()
-}
-
-/// `against`: frames of the same case that skip nothing.
-fn pass_records(timed: &Timed<'_>, against: Option<&Timed<'_>>) -> Vec<PassRecord> {
-    let total: f64 = timed.column(FrameTimes::gpu_ms).iter().sum();
+/// Returns the record of a pass; `unskipped` are the frames of the loop that skips nothing.
+fn pass_record(pass: Pass, timed: &Timed<'_>, unskipped: Option<&Timed<'_>>) -> PassRecord {
+    let total: f64 = timed.column(gpu_ms).iter().sum();
     let n = timed.0.len();
-    let record = |pass: Pass| {
-        let ms = timed.column(|t| t.pass_ms(pass.name()));
-        let skipped: Vec<&&FrameTimes> = timed.0.iter().filter(|t| !t.plan.runs(pass)).collect();
-        let whole = against.and_then(|a| median(&a.column(|t| t.pass_ms(pass.name()))));
-        PassRecord {
-            name: pass.name().to_owned(),
-            p50_ms: median(&ms),
-            share: (total > 0.0).then(|| ms.iter().sum::<f64>() / total),
-            n_run: n - skipped.len(),
-            n_skipped: skipped.len(),
-            reason: skipped.last().map(|t| t.plan.decision(pass).reason.to_string()),
-            reasons: reasons(skipped.iter().map(|t| t.plan.decision(pass).reason.to_string())),
-            saved_ms: whole
-                .filter(|_| !skipped.is_empty())
-                .map(|ms| ms * (skipped.len() as f64 / n as f64)),
-        }
-    };
-    Pass::ALL.into_iter().map(record).collect()
+    let column = |of: &Timed<'_>| of.column(|t| pass_ms(t, pass));
+    let ms = column(timed);
+    let reason = |t: &FrameTimes| t.plan.decision(pass).reason.to_string();
+    let skipped: Vec<&FrameTimes> = timed.frames().filter(|t| !t.plan.runs(pass)).collect();
+    let whole_ms = unskipped.and_then(|of| median(&column(of))).filter(|_| !skipped.is_empty());
+    PassRecord {
+        name: pass.name().to_owned(),
+        p50_ms: median(&ms),
+        share: (total > 0.0).then(|| ms.iter().sum::<f64>() / total),
+        n_run: n - skipped.len(),
+        n_skipped: skipped.len(),
+        reason: skipped.last().map(|t| reason(t)),
+        reasons: reasons(skipped.iter().map(|t| reason(t))),
+        saved_ms: whole_ms.map(|ms| ms * (skipped.len() as f64 / n as f64)),
+    }
 }

@@ -1,60 +1,68 @@
-//! What running the game step beside the render step could gain, and how much of it was gained.
+//! The gain of running the game step beside the render step: the possible and the reached one.
 //!
-//! The serial loop takes T_serial ≈ T_game + T_render a frame. Side by side a frame takes no less
-//! than the slower of the two, max(T_game, T_render), with both as long as they take alone; but
-//! recording is a part of the render step that the parallel loop lays beside the device's, so that
-//! it may come below that. T_serial less that is the possible gain; T_serial − T_parallel is what
-//! was gained. (Steps that slow one another down by sharing cores, caches or memory gain less; that
-//! is what the share is there to show.) All T are medians.
+//! The serial loop takes T_serial ≈ T_game + T_render a frame. In parallel a frame takes at least
+//! max(T_game, T_render), if each step takes as long as alone. The possible gain is T_serial less
+//! this maximum; the reached gain is T_serial − T_parallel. The reached share falls below 1 if the
+//! steps slow each other down by sharing cores, caches or memory. It can exceed 1, because the
+//! parallel loop also overlaps recording, a part of the render step, with the device's work. All T
+//! are medians.
 
 use serde::{Deserialize, Serialize};
 
 use crate::measure::bootstrap::{Bootstrap, median_of_rows};
 use crate::measure::stats::median;
 
-/// Of the serial frame. What is spent between the steps, some microseconds, is no gain to speak of.
+/// Least possible gain whose share is reported, relative to the serial frame. The microseconds
+/// between the steps are far less.
 const LEAST_GAIN: f64 = 0.05;
-/// To hand a packet to another thread and wake it takes about as long.
+/// The same in ms: handing a packet to another thread and waking it takes about as long.
 const LEAST_GAIN_MS: f64 = 0.05;
 
-/// Medians in ms.
+/// Medians of both loops, in ms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Overlap {
+    /// Frame time of the serial loop.
     pub serial_ms: f64,
-    /// None where the parallel loop did not run.
+    /// Frame time of the parallel loop; None if it did not run.
     pub parallel_ms: Option<f64>,
-    /// Of the serial loop, where neither step disturbs the other.
+    /// Game step of the serial loop, where it shares nothing with the render step.
     pub game_ms: f64,
+    /// Render step of the serial loop.
     pub render_ms: f64,
-    /// max(game, render): what overlapping these two alone can come to.
+    /// max(game, render), the frame time of a perfect overlap.
     pub bound_ms: f64,
-    /// None where the parallel loop did not run, or the possible gain is less than 0.05 ms, a
-    /// twentieth of the serial frame, or not certainly above 0: a share of next to nothing says
-    /// nothing.
+    /// The share of the possible gain that was reached. None if the parallel loop did not run, or
+    /// the possible gain is below 0.05 ms, below a twentieth of the serial frame, or not certainly
+    /// above 0.
     pub reached: Option<Reached>,
 }
 
-/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)): 1 is perfect overlap of the two,
-/// above it recording was hidden too, 0 no gain, below 0 a loss.
+/// (T_serial − T_parallel)/(T_serial − max(T_game, T_render)). 1 is a perfect overlap, 0 no gain,
+/// below 0 a loss; above 1 recording was overlapped too.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Reached {
+    /// The share.
     pub share: f64,
-    /// 95 % bootstrap interval.
+    /// Lower end of its 95 % bootstrap interval.
     pub low: f64,
+    /// Upper end of the interval.
     pub high: f64,
 }
 
-/// One timed frame of the serial loop, ms.
+/// One timed frame of the serial loop, in ms.
 #[derive(Debug, Clone, Copy)]
 pub struct SerialFrame {
+    /// The whole frame.
     pub frame_ms: f64,
+    /// Game step.
     pub game_ms: f64,
+    /// Render step.
     pub render_ms: f64,
 }
 
 impl Overlap {
-    /// Frames in the order they ran; those with a time that is not finite are left out. None
-    /// without a serial frame.
+    /// Computes both gains from frames in the order in which they ran. Frames with a time that is
+    /// not finite are left out; None without a serial frame.
     pub fn of(serial: &[SerialFrame], parallel_ms: &[f64]) -> Option<Overlap> {
         let is_whole =
             |f: &&SerialFrame| [f.frame_ms, f.game_ms, f.render_ms].iter().all(|ms| ms.is_finite());
@@ -66,8 +74,8 @@ impl Overlap {
         let (game_ms, render_ms, serial_ms) = (median(&game)?, median(&render)?, median(&frame)?);
         let is_worth_it =
             serial_ms - game_ms.max(render_ms) >= LEAST_GAIN_MS.max(LEAST_GAIN * serial_ms);
-        // A serial frame is drawn with its game and render step: what slows all three together
-        // cancels.
+        // A resample draws a serial frame together with its game and render step, so that noise
+        // common to the three cancels.
         let bootstrap = Bootstrap::of_neighbours(serial.len().min(parallel.len()));
         let reached =
             bootstrap.interval([serial.len(), parallel.len()], |[rows, parallel_rows]| {
@@ -102,9 +110,8 @@ mod tests {
     }
 
     #[test]
-    fn worked_by_hand() {
-        // 4 + 10 = 14 ms, at best 10: 4 to gain. 11 ms gains 3 of them, 10 all, 16 loses 2; the
-        // other way round too.
+    fn shares_are_those_worked_by_hand() {
+        // 4 + 10 = 14 ms, at best 10: 4 ms to gain. 11 ms gains 3 of them, 10 ms all, 16 ms loses 2.
         for (parallel_ms, share) in [(11.0, 0.75), (10.0, 1.0), (14.0, 0.0), (16.0, -0.5)] {
             for (game, render) in [(4.0, 10.0), (10.0, 4.0)] {
                 let overlap = Overlap::of(&serial(5, game, render), &[parallel_ms; 7]).unwrap();
@@ -118,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_possible_gain_there_is_no_share_of_it() {
+    fn without_a_possible_gain_there_is_no_share() {
         let overlap = Overlap::of(&serial(5, 0.0, 10.0), &[9.0; 5]).unwrap();
         assert_eq!((overlap.bound_ms, overlap.reached), (10.0, None));
         let alone = Overlap::of(&serial(5, 1.0, 10.0), &[]).unwrap();
@@ -128,8 +135,8 @@ mod tests {
         assert_eq!(Overlap::of(&[nan], &[1.0]), None);
     }
 
-    /// Of `n_trials` intervals how many hold the truth. Render 10 ± 0.5 ms, game 4 ± 0.1 ms;
-    /// parallel 12 ± 0.5 ms: half of the 4 ms to gain.
+    /// Returns how many of `n_trials` intervals hold the truth. Render 10 ± 0.5 ms, game 4 ± 0.1
+    /// ms; parallel 12 ± 0.5 ms: half of the 4 ms to gain.
     fn n_held(n_trials: usize, n: usize, rho: f64) -> usize {
         let mut random = SplitMix64(19);
         let mut values = || {

@@ -14,11 +14,13 @@ use nimbus::io::weather::{netcdf, wrf};
 use nimbus::io::{box_file, particle_file};
 use nimbus::model::weather::particles::Layout;
 use nimbus::report::pages::page;
-use nimbus::report::pages::source::{Found, Source, parse_ledger};
-use nimbus::studies::error::files::{parse_found, parse_study};
-use nimbus::timing::compare::compare_modes;
-use nimbus::timing::recorded;
-use nimbus::timing::records::parse_run;
+use nimbus::report::pages::source::{Found, Source};
+use nimbus::studies::error::files::parse_found;
+use nimbus::studies::error::records::Study;
+use nimbus::studies::ledger::records::Ledger;
+use nimbus::timing::compare::Comparison;
+use nimbus::timing::json;
+use nimbus::timing::results::parse_results;
 use serde_json::Value;
 
 /// A folder that does not exist: what is read here names files, and none may be found.
@@ -119,20 +121,20 @@ pub fn particle_list(bytes: &[u8]) -> std::result::Result<(), String> {
 /// made a page of, beside itself.
 pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
     let Some(parts) = parts(bytes) else { return Err("no text".to_owned()) };
-    let (json, table) = (parts[0], parts.get(1).copied().unwrap_or_default());
+    let (text, table) = (parts[0], parts.get(1).copied().unwrap_or_default());
     let path = |name: &str| Path::new(NOWHERE).join(name);
     // Of every kind, of which a text can be one at most.
     let mut errors = Vec::new();
     let mut refuse = |e: Error| errors.push(clean(&e, &[]));
     let mut found = Vec::new();
-    match parse_run(json, &path("run.json")) {
-        Ok(run) => match recorded::join(run, table, &path("frames.csv")) {
+    match json::parse(text, &path("run.json")) {
+        Ok(run) => match parse_results(run, table, &path("frames.csv")) {
             Ok(recorded) => found.push(Found::Bench(Box::new(recorded))),
             Err(e) => refuse(e),
         },
         Err(e) => refuse(e),
     }
-    match parse_study(json, &path("study.json")) {
+    match json::parse::<Study>(text, &path("study.json")) {
         // A study alone is one that is not gone on with.
         Ok(study) => match parse_found(study.clone(), table, &path("times.csv")) {
             Err(e) if !table.is_empty() => refuse(e),
@@ -140,7 +142,7 @@ pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
         },
         Err(e) => refuse(e),
     }
-    match parse_ledger(json, &path("ledger.json")) {
+    match json::parse::<Ledger>(text, &path("ledger.json")) {
         Ok(ledger) => found.push(Found::Ledger(Box::new(ledger))),
         Err(e) => refuse(e),
     }
@@ -174,7 +176,7 @@ pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
 /// A page of a result and, once more, of itself; two benches are compared as `nimbus compare` does.
 fn show(found: Found) -> std::result::Result<(), String> {
     if let Found::Bench(recorded) = &found {
-        drop(compare_modes(&recorded.modes, &recorded.modes));
+        drop(Comparison::new(recorded, recorded));
     }
     let source = |name: &str| Source {
         name: name.to_owned(),

@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use nimbus::timing::frame_rows::FrameRow;
+use nimbus::timing::json::ResultFile;
 use nimbus::timing::machine::{Clocks, Cpu, Device};
-use nimbus::timing::records::{Block, Case, FrameRow, Mode, Run, SCHEMA_VERSION};
+use nimbus::timing::records::{Block, Case, Mode, Run};
 use serde_json::json;
 
 /// A loop of `frames` timed frames, of which nothing is said.
@@ -37,7 +39,7 @@ pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {
 pub fn run(modes: Vec<Mode>) -> Run {
     let block = |m: &Mode| Block { case: 0, threading: m.threading.clone(), skip: m.skip };
     Run {
-        schema: SCHEMA_VERSION,
+        schema: Run::SCHEMA,
         nimbus: "0.1.0".to_owned(),
         revision: "0123456789ab".to_owned(),
         date: "2024-02-29T12:34:56Z".to_owned(),

@@ -4,18 +4,17 @@
 
 use std::collections::BTreeMap;
 
-use nimbus::studies::error::records::{
-    Best, Configuration, Front, PictureError, SCHEMA_VERSION, Study,
-};
+use nimbus::studies::error::records::{Best, Configuration, Front, PictureError, Study};
 use nimbus::studies::ledger::records::{Ledger, Row};
 use nimbus::studies::provenance::{Figure, Provenance, ReferenceRecord};
+use nimbus::timing::json::ResultFile;
 use nimbus::timing::machine::{Clocks, Cpu, Device};
-use nimbus::timing::records::Setting;
+use nimbus::timing::names::Setting;
 use serde_json::json;
 
 pub fn provenance() -> Provenance {
     Provenance {
-        schema: SCHEMA_VERSION,
+        schema: Study::SCHEMA,
         nimbus: "0.1.0".to_owned(),
         revision: "0123456789ab".to_owned(),
         code: "0123456789abcdef".to_owned(),

@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use clap::{Args as ClapArgs, ValueEnum};
+use clap::Args as ClapArgs;
 
 use super::{parse_limit, parse_positive};
+use crate::timing::difference::Condition;
 
 #[derive(Debug, ClapArgs)]
 #[command(after_help = "Two settings of a scene:\n  \
@@ -32,7 +33,7 @@ pub struct CompareArgs {
         value_name = "WHAT,…",
         help_heading = "Results"
     )]
-    pub allow: Vec<SamenessArg>,
+    pub allow: Vec<Condition>,
     /// Write every pixel's FLIP error as a picture, dark for none
     #[arg(short, long, value_name = "FILE.png", help_heading = "Pictures")]
     pub output: Option<PathBuf>,
@@ -52,16 +53,6 @@ pub struct CompareArgs {
     /// JSON in place of the table
     #[arg(long)]
     pub json: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SamenessArg {
-    /// Device, driver, processor, and variables that change what drivers do
-    Device,
-    /// Version and revision of nimbus
-    Build,
-    /// The scene's settings and files
-    Scene,
 }
 
 #[derive(Debug, ClapArgs)]

@@ -10,9 +10,9 @@ use super::number::number;
 use super::plane::{Behind, Plane};
 use super::{Key, Mark, Place, Plot};
 use crate::measure::stats::percentile;
-use crate::timing::cases::sweep_text;
-use crate::timing::recorded::Recorded;
-use crate::timing::records::FrameRow;
+use crate::timing::frame_rows::FrameRow;
+use crate::timing::names::sweep_text;
+use crate::timing::results::BenchResults;
 
 /// Where single frames take more than so many times the 99th percentile, they do not flatten all
 /// others: the axis ends below, and a note counts them.
@@ -61,7 +61,7 @@ pub fn charts_of_rows(rows: &[FrameRow]) -> Vec<FrameChart> {
 }
 
 /// The charts of results that were read back.
-pub fn charts_of(recorded: &Recorded) -> Vec<FrameChart> {
+pub fn charts_of(recorded: &BenchResults) -> Vec<FrameChart> {
     let mut charts = Vec::new();
     // Loops without a timed frame are not in `recorded.modes`.
     let timed = recorded

@@ -11,10 +11,10 @@ use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
 use crate::report::charts::number::{number, with_interval};
 use crate::report::charts::{frames, passes};
-use crate::timing::companions::picture_file;
-use crate::timing::parts::PartRecord;
-use crate::timing::recorded::Recorded;
+use crate::timing::attachments::picture_file;
+use crate::timing::records::PartRecord;
 use crate::timing::records::{Case, Mode, Pass, Run};
+use crate::timing::results::BenchResults;
 
 /// What a case's last frame is called.
 pub fn case_name(run: &Run, i: usize) -> String {
@@ -26,7 +26,7 @@ fn named(case: &Case) -> String {
     if name.is_empty() { "the scene".to_owned() } else { name }
 }
 
-pub fn section(recorded: &Recorded, folder: &Path) -> Result<Markup> {
+pub fn section(recorded: &BenchResults, folder: &Path) -> Result<Markup> {
     let run = &recorded.run;
     let mut charts = Vec::new();
     for frames in frames::charts_of(recorded) {

@@ -3,15 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-
 use crate::error::{Error, Result};
-use crate::io::text_file::{RECORD_LIMIT, read_result};
-use crate::studies::error::files::read_study;
-use crate::studies::error::records::{STUDY_FILE, Study};
-use crate::studies::ledger::records::{LEDGER_FILE, Ledger, SCHEMA_VERSION};
-use crate::timing::recorded::{Recorded, read_results};
-use crate::timing::records::RUN_FILE;
+use crate::studies::error::records::Study;
+use crate::studies::ledger::records::Ledger;
+use crate::timing::json::{self, ResultFile};
+use crate::timing::results::RUN_FILE;
+use crate::timing::results::{BenchResults, read_results};
 
 /// One result.
 #[derive(Debug, Clone)]
@@ -25,12 +22,12 @@ pub struct Source {
 
 #[derive(Debug, Clone)]
 pub enum Found {
-    Bench(Box<Recorded>),
+    Bench(Box<BenchResults>),
     Study(Box<Study>),
     Ledger(Box<Ledger>),
 }
 
-const FILES: [&str; 3] = [RUN_FILE, STUDY_FILE, LEDGER_FILE];
+const FILES: [&str; 3] = [RUN_FILE, Study::FILE, Ledger::FILE];
 
 /// The results in a folder, or one of its files by name.
 pub fn read(path: &Path) -> Result<Vec<Source>> {
@@ -62,31 +59,10 @@ fn source(folder: &Path, file: &str, name: String) -> Result<Source> {
     let path = folder.join(file);
     let found = match file {
         RUN_FILE => Found::Bench(Box::new(read_results(folder)?)),
-        STUDY_FILE => Found::Study(Box::new(read_study(folder)?)),
-        _ => Found::Ledger(Box::new(parse_ledger(&read_result(&path, RECORD_LIMIT)?, &path)?)),
+        Study::FILE => Found::Study(Box::new(json::read(folder)?)),
+        _ => Found::Ledger(Box::new(json::read(&path)?)),
     };
     Ok(Source { name, folder: folder.to_owned(), found })
-}
-
-/// A `ledger.json` from its text; `path` is for messages.
-pub fn parse_ledger(text: &str, path: &Path) -> Result<Ledger> {
-    let broken = |cause| Error::io(path, format!("not JSON, or not all of it: {cause}"));
-    let value: Value = serde_json::from_str(text).map_err(broken)?;
-    // The version is looked at first: of another version any other complaint would mislead.
-    match value.get("schema").and_then(Value::as_u64) {
-        Some(version) if version == u64::from(SCHEMA_VERSION) => {}
-        Some(version) => {
-            return Err(Error::io(
-                path,
-                format!("a ledger of schema {version}; this nimbus reads {SCHEMA_VERSION}"),
-            ));
-        }
-        None => {
-            return Err(Error::io(path, "not a ledger.json of nimbus: it names no schema version"));
-        }
-    }
-    serde_json::from_value(value)
-        .map_err(|cause| Error::io(path, format!("not a ledger.json of nimbus: {cause}")))
 }
 
 /// Later benches and studies, each beside the first of its kind.

@@ -11,12 +11,10 @@ use super::table::{Cell, count, ms, table, text, value};
 use super::tradeoff;
 use crate::error::Result;
 use crate::report::charts::number::with_interval;
-use crate::timing::companions::picture_file;
-use crate::timing::compare::{
-    Compared, ComparedMode, HEADLINE, compare_modes, frame_remarks, steadiness_remarks,
-};
-use crate::timing::difference::{Difference, differences, remarks};
-use crate::timing::recorded::Recorded;
+use crate::timing::attachments::picture_file;
+use crate::timing::compare::{Comparison, HEADLINE, MeasureComparison, ModeComparison};
+use crate::timing::difference::Difference;
+use crate::timing::results::BenchResults;
 
 pub fn section(a: &Source, b: &Source) -> Result<Markup> {
     let inner = match (&a.found, &b.found) {
@@ -32,14 +30,11 @@ pub fn section(a: &Source, b: &Source) -> Result<Markup> {
     })
 }
 
-fn benches(a: &Recorded, b: &Recorded, folders: [&Path; 2]) -> Result<Markup> {
-    let modes = compare_modes(&a.modes, &b.modes);
-    let mut said = remarks(&a.run, &b.run);
-    said.extend(frame_remarks(&a.modes, &b.modes));
-    said.extend(steadiness_remarks(&a.modes, &b.modes, &modes));
+fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Markup> {
+    let Comparison { differences, modes, remarks } = Comparison::new(a, b);
     Ok(html! {
-        (differing(&differences(&a.run, &b.run)))
-        @if !said.is_empty() { ul class="remarks" { @for remark in &said { li { (remark) } } } }
+        (differing(&differences))
+        @if !remarks.is_empty() { ul class="remarks" { @for remark in &remarks { li { (remark) } } } }
         @if modes.is_empty() { p { "A and B have no timed loop in common." } }
         @for mode in &modes { (headline(mode)) }
         @if !modes.is_empty() {
@@ -61,7 +56,7 @@ fn differing(found: &[Difference]) -> Markup {
     }
 }
 
-fn headline(mode: &ComparedMode) -> Markup {
+fn headline(mode: &ModeComparison) -> Markup {
     let Some(of) = mode.headline() else { return html! {} };
     html! {
         p {
@@ -73,8 +68,8 @@ fn headline(mode: &ComparedMode) -> Markup {
     }
 }
 
-fn ratios(modes: &[ComparedMode]) -> Markup {
-    let row = |mode: &ComparedMode, m: &Compared| -> Vec<Cell> {
+fn ratios(modes: &[ModeComparison]) -> Markup {
+    let row = |mode: &ModeComparison, m: &MeasureComparison| -> Vec<Cell> {
         vec![
             text(&m.measure),
             text(&mode.name),
@@ -106,7 +101,11 @@ fn ratios(modes: &[ComparedMode]) -> Markup {
 }
 
 /// Of cases of one name, whatever their places.
-fn pictures_of(a: &Recorded, b: &Recorded, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
+fn pictures_of(
+    a: &BenchResults,
+    b: &BenchResults,
+    [folder_a, folder_b]: [&Path; 2],
+) -> Result<Markup> {
     let mut shown = Vec::new();
     for (i, of_a) in a.run.cases.iter().enumerate() {
         let Some(j) = b.run.cases.iter().position(|of_b| of_b.name() == of_a.name()) else {

@@ -3,8 +3,9 @@
 
 use super::front::Metric;
 use super::records::Configuration;
-use crate::timing::cases::{Axis, points, sweep_text};
-use crate::timing::records::Setting;
+use crate::timing::names::Setting;
+use crate::timing::names::sweep_text;
+use crate::timing::sweep::{Axis, points};
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Design {
@@ -121,7 +122,7 @@ mod tests {
 
     #[test]
     fn alone_or_all_combinations() {
-        let axes = ["a=1,2", "b=3,4,5"].map(|text| Axis::parse(text).unwrap());
+        let axes = ["a=1,2", "b=3,4,5"].map(|text| Axis::parse("--knob", text).unwrap());
         let alone: Vec<String> =
             settings(&axes, Design::Alone).iter().map(|s| name_of(s)).collect();
         assert_eq!(alone, ["a=1", "a=2", "b=3", "b=4", "b=5"]);

@@ -8,14 +8,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::records::{Configuration, Front, SCHEMA_VERSION, STUDY_FILE, Study, TIMES_FILE};
+use super::records::{Configuration, Front, STUDY_FILE, Study, TIMES_FILE};
 use super::run::Found;
 use super::turns::Turn;
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
 use crate::io::folder::replace_files;
-use crate::io::text_file::{RECORD_LIMIT, TABLE_LIMIT, read_result};
+use crate::io::text_file::{TABLE_LIMIT, read_result};
 use crate::studies::provenance::Figure;
+use crate::timing::json;
 
 pub const CONFIGURATIONS_FILE: &str = "configurations.csv";
 
@@ -35,11 +36,7 @@ pub fn write(folder: &Path, study: &Study, found: &Found) -> Result<()> {
     replace_files(folder, &[TIMES_FILE, CONFIGURATIONS_FILE, STUDY_FILE], |folder| {
         write_times(&folder.join(TIMES_FILE), study, &found.turns)?;
         write_csv(&folder.join(CONFIGURATIONS_FILE), study.configurations.iter().map(csv_row))?;
-        let path = folder.join(STUDY_FILE);
-        let mut text =
-            serde_json::to_string_pretty(study).map_err(|cause| Error::io(&path, cause))?;
-        text.push('\n');
-        write_atomic(&path, |file| file.write_all(text.as_bytes()))
+        json::write(&folder.join(STUDY_FILE), study)
     })
 }
 
@@ -157,35 +154,9 @@ fn check_row(row: &TimeRow) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// Reads `study.json` in `folder`.
-pub fn read_study(folder: &Path) -> Result<Study> {
-    let path = if folder.is_dir() { folder.join(STUDY_FILE) } else { folder.to_owned() };
-    parse_study(&read_result(&path, RECORD_LIMIT)?, &path)
-}
-
-/// A `study.json` from its text; `path` is for messages.
-pub fn parse_study(text: &str, path: &Path) -> Result<Study> {
-    let value: serde_json::Value = serde_json::from_str(text)
-        .map_err(|cause| Error::io(path, format!("not JSON, or not all of it: {cause}")))?;
-    match value.get("schema").and_then(serde_json::Value::as_u64) {
-        Some(version) if version == u64::from(SCHEMA_VERSION) => {}
-        Some(version) => {
-            return Err(Error::io(
-                path,
-                format!("a study of schema {version}; this nimbus reads {SCHEMA_VERSION}"),
-            ));
-        }
-        None => {
-            return Err(Error::io(path, "not a study.json of nimbus: it names no schema version"));
-        }
-    }
-    serde_json::from_value(value)
-        .map_err(|cause| Error::io(path, format!("not a study.json of nimbus: {cause}")))
-}
-
 /// What an earlier run in `folder` found, to be gone on with.
 pub fn read_found(folder: &Path) -> Result<(Study, Found)> {
-    let study = read_study(folder)?;
+    let study = json::read(folder)?;
     let path = folder.join(TIMES_FILE);
     parse_found(study, &read_result(&path, TABLE_LIMIT)?, &path)
 }

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::model::scene::{LightingMode, Scene};
-use crate::timing::cases::Axis;
+use crate::timing::sweep::Axis;
 
 /// A key of scenes, and values worth comparing.
 struct Knob {

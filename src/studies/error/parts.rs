@@ -7,7 +7,7 @@ use super::front::Metric;
 use super::records::{Configuration, Study};
 use super::run::Found;
 use super::turns::{Time, Turn};
-use crate::timing::parts::Moved;
+use crate::timing::attachments::PictureCopy;
 
 /// A part as it was read, and what it is called where it differs from the others.
 #[derive(Debug, Clone)]
@@ -56,7 +56,7 @@ pub fn differences(parts: &[Part]) -> Vec<String> {
 /// All of them as one study, whose configurations are in the parts' order, and what its pictures
 /// are called. `parts` do not differ, and there is one. Turns stay in the rounds of their parts,
 /// each beside those of the scene as it stands that it was taken with.
-pub fn join(parts: &[Part]) -> Option<(Study, Found, Vec<Moved>)> {
+pub fn join(parts: &[Part]) -> Option<(Study, Found, Vec<PictureCopy>)> {
     let first = parts.first()?;
     let (mut configurations, mut turns): (Vec<Configuration>, Vec<Turn>) = (Vec::new(), Vec::new());
     let mut moved = Vec::new();
@@ -81,7 +81,7 @@ pub fn join(parts: &[Part]) -> Option<(Study, Found, Vec<Moved>)> {
                 (&mut c.error_map, format!("error-{k}.png")),
             ] {
                 if let Some(from) = name.replace(to.clone()) {
-                    moved.push(Moved { i_part, from, to });
+                    moved.push(PictureCopy { i_part, from, to });
                 } else {
                     *name = None;
                 }

@@ -4,10 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 use crate::studies::provenance::{Figure, Provenance, ReferenceRecord};
-use crate::timing::records::Setting;
+use crate::timing::json::ResultFile;
+use crate::timing::names::Setting;
 
-pub const SCHEMA_VERSION: u32 = 1;
-pub const STUDY_FILE: &str = "study.json";
+pub const STUDY_FILE: &str = Study::FILE;
 /// Every time that was taken, raw.
 pub const TIMES_FILE: &str = "times.csv";
 
@@ -32,6 +32,11 @@ pub struct Study {
     pub configurations: Vec<Configuration>,
     pub best: Vec<Best>,
     pub interrupted: bool,
+}
+
+impl ResultFile for Study {
+    const FILE: &'static str = "study.json";
+    const SCHEMA: u32 = 1;
 }
 
 /// One setting of the knobs.

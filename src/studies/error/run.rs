@@ -14,8 +14,8 @@ use crate::error::{Error, Result};
 use crate::model::scene::Scene;
 use crate::reference::picture::kind::Reference;
 use crate::reference::picture::pixels::Pixels;
-use crate::timing::cases::Axis;
-use crate::timing::records::Setting;
+use crate::timing::names::Setting;
+use crate::timing::sweep::Axis;
 
 /// What draws and times configurations, which are numbered in the order they are added.
 pub trait Subject {

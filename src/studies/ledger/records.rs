@@ -4,9 +4,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::studies::provenance::{Figure, Provenance};
+use crate::timing::json::ResultFile;
 
-pub const SCHEMA_VERSION: u32 = 1;
-pub const LEDGER_FILE: &str = "ledger.json";
+pub const LEDGER_FILE: &str = Ledger::FILE;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Ledger {
@@ -31,6 +31,11 @@ pub struct Ledger {
     /// total ≤ sum, but for rounding: anything else is a fault of nimbus.
     pub holds: bool,
     pub interrupted: bool,
+}
+
+impl ResultFile for Ledger {
+    const FILE: &'static str = "ledger.json";
+    const SCHEMA: u32 = 1;
 }
 
 /// One approximation: two pictures that differ in nothing else.

@@ -4,8 +4,11 @@ use serde_json::json;
 
 use super::*;
 use crate::measure::stats::Summary;
+use crate::timing::json::ResultFile;
 use crate::timing::machine::{Cpu, Device};
-use crate::timing::records::{Measured, SCHEMA_VERSION, Setting, write_results_with};
+use crate::timing::names::Setting;
+use crate::timing::records::Measured;
+use crate::timing::results::write_results;
 
 const LOOPS: [&str; 2] = ["serial", "parallel"];
 const N_WARM_UP: usize = 1;
@@ -26,7 +29,7 @@ fn sweep(k: usize) -> Vec<Setting> {
     vec![Setting { key: "draw.cutoff".to_owned(), value: k.to_string() }]
 }
 
-/// Case `k` where it takes `ms`.
+/// Case `k` with frame time `ms`.
 fn case(k: usize, ms: f64) -> Case {
     Case {
         phase: None,
@@ -43,16 +46,15 @@ fn case(k: usize, ms: f64) -> Case {
     }
 }
 
-/// The time of case `k` as the part from `first` on has it: that of the first case tells who timed
-/// it.
+/// The time of case `k` in the part from `first` on. That of the first case identifies the part.
 fn ms(k: usize, first: usize) -> f64 {
     10.0 + k as f64 + if k == 0 { first as f64 / 10.0 } else { 0.0 }
 }
 
-fn row(k: usize, threading: &str, block: usize, frame: usize, ms: f64) -> FrameRow {
+fn row(k: usize, threading: &str, block: u32, frame: usize, ms: f64) -> FrameRow {
     FrameRow {
         phase: String::new(),
-        sweep: crate::timing::cases::sweep_text(&sweep(k)),
+        sweep: sweep_text(&sweep(k)),
         threading: threading.to_owned(),
         skip: true,
         block,
@@ -74,7 +76,7 @@ fn row(k: usize, threading: &str, block: usize, frame: usize, ms: f64) -> FrameR
     }
 }
 
-/// As `nimbus bench --part` would have it, of a sweep of draw.cutoff=0,1,2,….
+/// The part that `nimbus bench --part` writes for a sweep of draw.cutoff=0,1,2,….
 fn part(range: Range<usize>) -> Part {
     let (numbers, first) = (numbers(&range), range.start);
     let mut block_order = Vec::new();
@@ -90,11 +92,12 @@ fn part(range: Range<usize>) -> Part {
     }
     let rows = block_order.iter().enumerate().flat_map(|(block, of)| {
         let (k, threading) = (numbers[of.case], of.threading.clone());
-        (0..N_WARM_UP + N_FRAMES).map(move |frame| row(k, &threading, block, frame, ms(k, first)))
+        (0..N_WARM_UP + N_FRAMES)
+            .map(move |frame| row(k, &threading, block as u32, frame, ms(k, first)))
     });
     let rows = rows.collect();
     let run = json!({
-        "schema": SCHEMA_VERSION, "nimbus": "0.1.0", "revision": "0123456789ab", "date": "2024-02-29T12:34:56Z",
+        "schema": Run::SCHEMA, "nimbus": "0.1.0", "revision": "0123456789ab", "date": "2024-02-29T12:34:56Z",
         "command": ["nimbus", "bench", "a.toml"], "scene_hash": "ab".repeat(32), "scene": {},
         "device": { "name": "llvmpipe", "driver": "Mesa", "api": "1.3.230", "type": "cpu", "uuid": "00".repeat(16) },
         "cpu": { "model": "a processor", "logical_cores": 2 }, "environment": { "LP_NUM_THREADS": "1" },
@@ -116,8 +119,7 @@ fn part(range: Range<usize>) -> Part {
         node: format!("node-{first}"),
         range,
         run: Run { block_order, cases, chosen, ..run },
-        pass_names: vec!["sort".to_owned()],
-        rows,
+        table: FrameTable { pass_names: vec!["sort".to_owned()], rows },
         pictures,
     }
 }
@@ -137,10 +139,10 @@ fn a_part_has_the_first_case_once() {
 #[test]
 fn parts_together_are_the_whole() {
     let whole = part(0..6);
-    let Joined { run, pass_names, rows, pictures } = join(&three()).unwrap();
+    let Joined { run, table: FrameTable { pass_names, rows }, pictures } = join(&three()).unwrap();
     assert_eq!(run.cases, whole.run.cases);
-    assert_eq!((pass_names, &run.chosen), (whole.pass_names, &whole.run.chosen));
-    // The same blocks and rows, in another order; every row is of the block that its number says.
+    assert_eq!((pass_names, &run.chosen), (whole.table.pass_names, &whole.run.chosen));
+    // The same blocks and rows, in another order; every row belongs to the block that it names.
     let blocks = |run: &Run| {
         let mut all: Vec<_> =
             run.block_order.iter().map(|b| (b.case, b.threading.clone(), b.skip)).collect();
@@ -149,23 +151,24 @@ fn parts_together_are_the_whole() {
     };
     assert_eq!(blocks(&run), blocks(&whole.run));
     assert!(rows.iter().all(|row| is_of_its_block(row, &run)));
-    let told = |rows: &[FrameRow]| {
+    let sorted = |rows: &[FrameRow]| {
         let mut all: Vec<String> =
             rows.iter().map(|row| format!("{:?}", FrameRow { block: 0, ..row.clone() })).collect();
         all.sort();
         all
     };
-    assert_eq!(told(&rows), told(&whole.rows));
-    let numbers: Vec<usize> = rows.iter().map(|row| row.block).collect();
+    assert_eq!(sorted(&rows), sorted(&whole.table.rows));
+    let numbers: Vec<usize> = rows.iter().map(|row| row.block as usize).collect();
     assert!(
         numbers.is_sorted() && numbers.last() == Some(&(run.block_order.len() - 1)),
         "{numbers:?}"
     );
-    // Of each block as many as it had.
+    // Each block keeps its number of rows.
     for block in 0..run.block_order.len() {
         assert_eq!(numbers.iter().filter(|n| **n == block).count(), N_WARM_UP + N_FRAMES);
     }
-    let of = |i_part, from, to| Moved { i_part, from: picture_file(from), to: picture_file(to) };
+    let of =
+        |i_part, from, to| PictureCopy { i_part, from: picture_file(from), to: picture_file(to) };
     assert_eq!(
         pictures,
         [of(0, 0, 0), of(1, 1, 1), of(1, 2, 2), of(1, 3, 3), of(2, 1, 4), of(2, 2, 5)]
@@ -174,7 +177,7 @@ fn parts_together_are_the_whole() {
 }
 
 #[test]
-fn a_reader_sees_who_timed_what() {
+fn the_joined_run_names_the_node_of_each_part() {
     let mut parts = three();
     parts[1].run.date = "2024-03-01T00:00:00Z".to_owned();
     let run = join(&parts).unwrap().run;
@@ -189,7 +192,7 @@ fn a_reader_sees_who_timed_what() {
     assert_eq!(base, [("serial", Some(10.4)), ("parallel", Some(10.4))]);
     let spread = base_spread(&run.parts);
     assert_eq!(spread, [("serial".to_owned(), 1.04), ("parallel".to_owned(), 1.04)]);
-    // Of one part nothing can be told, and of what was not measured.
+    // One part has no spread, nor does a loop that was not measured.
     assert!(base_spread(&run.parts[..1]).is_empty() && base_spread(&[]).is_empty());
     parts[0].run.cases[0].modes[0].frame_ms = None;
     parts[1].run.cases[0].modes[0].frame_ms = None;
@@ -197,7 +200,7 @@ fn a_reader_sees_who_timed_what() {
 }
 
 #[test]
-fn what_was_interrupted_and_has_no_picture_stays_so() {
+fn a_joined_run_is_interrupted_if_a_part_was_and_lacks_the_pictures_that_parts_lack() {
     let mut parts = three();
     parts[1].run.interrupted = true;
     parts[1].pictures.remove(1);
@@ -211,18 +214,18 @@ fn what_was_interrupted_and_has_no_picture_stays_so() {
 }
 
 #[test]
-fn an_auto_is_of_the_case_that_is_named() {
+fn a_choice_belongs_to_the_case_that_its_text_names() {
     let mut run = part(0..3).run;
     run.cases[1].phase = Some("a".to_owned());
     run.cases[2].phase = Some("a: b".to_owned());
     run.cases.iter_mut().for_each(|case| case.sweep.clear());
     run.cases[0].phase = Some("b".to_owned());
     run.chosen = ["a: path", "a: b: path", "b: a: path"].map(str::to_owned).to_vec();
-    let of: Vec<usize> = chosen(&run, 3).iter().map(|(i, _)| *i).collect();
+    let of: Vec<usize> = chosen_by_case(&run, 3).iter().map(|(i, _)| *i).collect();
     assert_eq!(of, [1, 2, 0]);
 }
 
-/// What is changed, and what is said of it.
+/// The difference that is reported, and the change that causes it.
 type Change = (&'static str, fn(&mut Part));
 
 const CHANGES: [Change; 21] = [
@@ -243,7 +246,7 @@ const CHANGES: [Change; 21] = [
     ("environment: ", |p| p.run.environment = BTreeMap::new()),
     ("validation: false of shard 0, true", |p| p.run.command.push("--validation".to_owned())),
     ("poison: ", |p| p.run.command.push("--poison".to_owned())),
-    ("passes: sort of shard 0, cull", |p| p.pass_names = vec!["cull".to_owned()]),
+    ("passes: sort of shard 0, cull", |p| p.table.pass_names = vec!["cull".to_owned()]),
     ("first case: draw.cutoff=0 of shard 0, draw.cutoff=9", |p| p.run.cases[0].sweep = sweep(9)),
     ("scene of the first case: ", |p| p.run.cases[0].scene_hash = "cd".repeat(32)),
     ("particles of the first case: 554 of shard 0, 555", |p| p.run.cases[0].particles += 1),
@@ -258,7 +261,7 @@ const CHANGES: [Change; 21] = [
 ];
 
 #[test]
-fn whatever_differs_is_noticed() {
+fn every_difference_between_parts_is_listed() {
     assert_eq!(differences(&three()), [""; 0]);
     for (expected, change) in CHANGES {
         let mut parts = three();
@@ -279,7 +282,7 @@ fn whatever_differs_is_noticed() {
             differences(&parts).iter().any(|what| what.starts_with("loops of the first case: "))
         );
     }
-    // What nodes may differ in.
+    // Facts in which nodes may differ.
     let mut parts = three();
     parts[1].run.date = "2024-03-01T00:00:00Z".to_owned();
     parts[1].run.clocks.overhead_ns = 30.0;
@@ -287,7 +290,7 @@ fn whatever_differs_is_noticed() {
 }
 
 #[test]
-fn a_part_that_is_missing_or_twice_there_is_noticed() {
+fn a_missing_or_repeated_part_is_listed() {
     assert_eq!(differences(&[]), ["there is no part"]);
     assert_eq!(
         differences(&[part(0..2), part(4..6)]),
@@ -301,29 +304,27 @@ fn a_part_that_is_missing_or_twice_there_is_noticed() {
 }
 
 #[test]
-fn what_is_read_is_what_was_written_and_of_its_range() {
+fn a_part_is_read_as_it_was_written_and_checked_against_its_range() {
     let dir = tempfile::tempdir().unwrap();
-    let Part { run, pass_names, rows, name, node, range, .. } = part(2..4);
-    let write = |rows: &[FrameRow]| {
-        write_results_with(dir.path(), &run, &pass_names, rows, &Default::default())
-    };
+    let Part { run, table, name, node, range, .. } = part(2..4);
+    let write = |table: &FrameTable| write_results(dir.path(), &run, table, &Default::default());
     let read = |range: Range<usize>| Part::read(dir.path(), name.clone(), node.clone(), range);
-    write(&rows).unwrap();
+    write(&table).unwrap();
     std::fs::write(dir.path().join("case-1.png"), "a picture").unwrap();
     let found = read(range.clone()).unwrap();
-    assert_eq!((&found.run, &found.rows, &found.pass_names), (&run, &rows, &pass_names));
+    assert_eq!((&found.run, &found.table), (&run, &table));
     assert_eq!((found.pictures, found.range), (vec!["case-1.png".to_owned()], range.clone()));
     for other in [0..2, 2..5] {
-        let said = read(other).unwrap_err().to_string();
-        assert!(said.contains("3 cases; cases "), "{said}");
+        let message = read(other).unwrap_err().to_string();
+        assert!(message.contains("3 cases; cases "), "{message}");
     }
-    // Its cases are three in either case: the names tell.
+    // Both ranges have three cases with the first; the caller compares their names.
     assert!(read(0..3).is_ok());
     for block in [1, 99] {
-        let mut rows = rows.clone();
-        rows[0].block = block;
-        write(&rows).unwrap();
-        let said = read(range.clone()).unwrap_err().to_string();
-        assert!(said.contains(&format!("a row is not of block {block}")), "{said}");
+        let mut table = table.clone();
+        table.rows[0].block = block;
+        write(&table).unwrap();
+        let message = read(range.clone()).unwrap_err().to_string();
+        assert!(message.contains(&format!("a row is not of block {block}")), "{message}");
     }
 }

@@ -1,0 +1,123 @@
+//! Files beside `run.json`: a picture of every case, and charts.
+
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::io::atomic::write_atomic;
+use crate::io::image::write_bytes;
+
+/// File name of the chart of the passes' times.
+pub const PASSES_CHART: &str = "passes.svg";
+const FRAMES_CHART: &str = "frames.svg";
+
+/// The last frame of a case as it is displayed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CasePicture {
+    /// Number of the case.
+    pub i_case: usize,
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// 8-bit sRGB, three bytes a pixel, rows from the top.
+    pub rgb: Vec<u8>,
+}
+
+/// A picture of a part, and its file name in the joined results.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PictureCopy {
+    /// Number of the part.
+    pub i_part: usize,
+    /// File name in the part's folder.
+    pub from: String,
+    /// File name in the folder of the joined results.
+    pub to: String,
+}
+
+/// Files that are written into a results folder together with `run.json`.
+#[derive(Debug, Clone, Default)]
+pub struct Attachments {
+    /// Pictures of cases.
+    pub pictures: Vec<CasePicture>,
+    /// File names and SVG documents.
+    pub charts: Vec<(String, String)>,
+    /// File names, and the finished pictures that are copied to them.
+    pub copies: Vec<(String, PathBuf)>,
+}
+
+/// Returns the file name of the picture of a case.
+pub fn picture_file(i_case: usize) -> String {
+    format!("case-{i_case}.png")
+}
+
+/// Returns the file name of the chart of frame times at point `i` of the `n` points of a sweep.
+pub fn frames_chart(i: usize, n: usize) -> String {
+    if n == 1 { FRAMES_CHART.to_owned() } else { format!("frames-{i}.svg") }
+}
+
+impl Attachments {
+    /// Returns the names of all files.
+    pub(super) fn names(&self) -> Vec<String> {
+        let pictures = self.pictures.iter().map(|p| picture_file(p.i_case));
+        let charts = self.charts.iter().map(|(name, _)| name.clone());
+        pictures.chain(charts).chain(self.copies.iter().map(|(name, _)| name.clone())).collect()
+    }
+
+    /// Writes all files into `folder`.
+    pub(super) fn write(&self, folder: &Path) -> Result<()> {
+        for CasePicture { i_case, width, height, rgb } in &self.pictures {
+            write_bytes(&folder.join(picture_file(*i_case)), *width, *height, rgb)?;
+        }
+        for (name, from) in &self.copies {
+            let bytes = fs::read(from).map_err(|cause| Error::io(from, cause))?;
+            write_atomic(&folder.join(name), |file| file.write_all(&bytes))?;
+        }
+        for (name, text) in &self.charts {
+            write_atomic(&folder.join(name), |file| file.write_all(text.as_bytes()))?;
+        }
+        Ok(())
+    }
+}
+
+/// Returns the names of the files in `folder` that are named as attachments.
+pub(super) fn names_in(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+    names.filter(|name| is_attachment(name)).collect()
+}
+
+fn is_attachment(name: &str) -> bool {
+    let is_numbered = |before: &str, after: &str| {
+        let number = name.strip_prefix(before).and_then(|rest| rest.strip_suffix(after));
+        number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+    };
+    [PASSES_CHART, FRAMES_CHART].contains(&name)
+        || is_numbered("frames-", ".svg")
+        || is_numbered("case-", ".png")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_other_names_are_no_attachments() {
+        let ours = [frames_chart(0, 1), frames_chart(12, 20), picture_file(0), picture_file(137)];
+        for name in ours.iter().map(String::as_str).chain([PASSES_CHART]) {
+            assert!(is_attachment(name), "{name}");
+        }
+        for name in [
+            "case-.png",
+            "case-a.png",
+            "case-1.png.bak",
+            "picture-1.png",
+            "my-frames.svg",
+            "frames-1x.svg",
+            "a.png",
+        ] {
+            assert!(!is_attachment(name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,203 @@
+//! Results folders: `run.json` and `frames.csv`, with the pictures and charts beside them.
+//!
+//! All files appear whole and together, or not at all ([`crate::io::folder`]).
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::attachments::{self, Attachments};
+use super::frame_rows::{FRAMES_FILE, FrameRow, FrameTable, parse_frames, write_frames};
+use super::json::{self, ResultFile};
+use super::names::{case_name, loop_name};
+use super::records::Run;
+use crate::error::{Error, Result};
+use crate::io::folder::{check_writable, replace_files};
+use crate::io::text_file::{TABLE_LIMIT, read_result};
+
+/// File name of the record of a run.
+pub const RUN_FILE: &str = Run::FILE;
+
+/// The results of a bench.
+#[derive(Debug, Clone)]
+pub struct BenchResults {
+    /// The record of the run.
+    pub run: Run,
+    /// The times of every loop of every case, in the order of `run.cases` and their modes; a loop
+    /// without timed frames is missing.
+    pub modes: Vec<TimedMode>,
+}
+
+/// The timed frames of one loop of one case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimedMode {
+    /// Case and loop, as "dense, size=800x600: serial"; the loop alone if there is one case.
+    pub name: String,
+    /// Frames of the scene, in the order in which they ran.
+    pub frames: Vec<u32>,
+    /// Frame times in ms, block by block.
+    pub blocks: Vec<Vec<f64>>,
+    /// `frame`, `game`, `render`, `gpu`, then the passes in the order of the table.
+    pub measures: Vec<Measure>,
+}
+
+impl TimedMode {
+    /// Returns the times of a measure in ms; empty if there is no such measure.
+    pub(super) fn times(&self, name: &str) -> &[f64] {
+        self.measures.iter().find(|m| m.name == name).map_or(&[], |m| &m.ms)
+    }
+}
+
+/// One kind of time of the frames of a loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measure {
+    /// Name of the measure.
+    pub name: String,
+    /// Times in ms, in the order in which they were taken, without the frames that have none.
+    pub ms: Vec<f64>,
+}
+
+/// Creates the folder of results before anything is measured.
+///
+/// An existing folder is accepted only with `force`; its results are replaced once the new ones are
+/// complete, and its other files stay.
+///
+/// # Errors
+/// Fails if the path exists and `force` is not set, or it cannot be a folder to write in.
+pub fn prepare_out_dir(path: &Path, force: bool) -> Result<()> {
+    match fs::symlink_metadata(path) {
+        Ok(_) if !force => {
+            let expected = "name another folder, or add --force to overwrite it";
+            Err(Error::usage(format!("{}: exists already; {expected}", path.display())))
+        }
+        Ok(_) if !path.is_dir() => Err(Error::io(path, "is not a folder; results need one")),
+        Ok(_) => check_writable(path),
+        Err(_) => fs::create_dir_all(path).map_err(|cause| Error::io(path, cause)),
+    }
+}
+
+/// Writes all files of a result at once, and removes the pictures and charts of an earlier one.
+///
+/// # Errors
+/// Fails if a file cannot be written; an earlier result then stays.
+pub fn write_results(
+    out_dir: &Path,
+    run: &Run,
+    table: &FrameTable,
+    attachments: &Attachments,
+) -> Result<()> {
+    let mut names = attachments.names();
+    for name in attachments::names_in(out_dir) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    // The record is last: a folder that has it has everything.
+    names.extend([FRAMES_FILE, RUN_FILE].map(str::to_owned));
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    replace_files(out_dir, &names, |folder| {
+        attachments.write(folder)?;
+        write_frames(&folder.join(FRAMES_FILE), table)?;
+        json::write(&folder.join(RUN_FILE), run)
+    })
+}
+
+/// Reads a folder that `nimbus bench --out` wrote.
+///
+/// # Errors
+/// Fails if a file is missing, damaged or from another run. The error names the file, and the line
+/// if there is one.
+pub fn read_results(folder: &Path) -> Result<BenchResults> {
+    if !folder.is_dir() {
+        let what = "no such folder; expected one that nimbus bench --out wrote";
+        return Err(Error::io(folder, what));
+    }
+    if !folder.join(RUN_FILE).exists() {
+        return Err(Error::io(folder, format!("holds no {RUN_FILE}; {}", expected_in(folder))));
+    }
+    let run = json::read(folder)?;
+    let path = folder.join(FRAMES_FILE);
+    parse_results(run, &read_result(&path, TABLE_LIMIT)?, &path)
+}
+
+/// Joins a run with the text of its `frames.csv`; errors name `path`.
+///
+/// # Errors
+/// Fails if the text is not such a table, or its frames are not those of the run.
+pub fn parse_results(run: Run, text: &str, path: &Path) -> Result<BenchResults> {
+    join(run, &parse_frames(text, path)?, path)
+}
+
+pub(super) fn join(run: Run, table: &FrameTable, path: &Path) -> Result<BenchResults> {
+    let mut by_name = timed_modes(table);
+    let mut modes = Vec::new();
+    for (case, mode) in run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (c, m))) {
+        let name = mode_name(&case.name(), &mode.threading, mode.skip);
+        let timed = by_name.remove(&name);
+        let (n, n_expected) = (timed.as_ref().map_or(0, |m| m.frames.len()), mode.frames);
+        if n != n_expected {
+            let what = format!("holds {n} timed {name} frames and {RUN_FILE} names {n_expected}");
+            return Err(Error::io(path, format!("{what}: cut off, or another run's")));
+        }
+        modes.extend(timed);
+    }
+    match by_name.keys().next() {
+        Some(other) => {
+            Err(Error::io(path, format!("holds {other} frames, which {RUN_FILE} does not name")))
+        }
+        None => Ok(BenchResults { run, modes }),
+    }
+}
+
+/// Returns a hint for a folder without results: those of several scenes lie one folder deeper.
+fn expected_in(folder: &Path) -> String {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let deeper: Option<PathBuf> =
+        entries.map(|e| e.path()).filter(|p| p.join(RUN_FILE).exists()).min();
+    deeper.map_or("expected a folder that nimbus bench --out wrote".to_owned(), |first| {
+        let first = first.display();
+        format!("it has folders of results in it: name one of those, such as {first}")
+    })
+}
+
+fn mode_name(case: &str, threading: &str, skip: bool) -> String {
+    let of = loop_name(threading, skip);
+    if case.is_empty() { of } else { format!("{case}: {of}") }
+}
+
+/// Groups the timed frames by case and loop.
+fn timed_modes(table: &FrameTable) -> BTreeMap<String, TimedMode> {
+    let mut modes: BTreeMap<String, TimedMode> = BTreeMap::new();
+    let mut last_blocks: BTreeMap<String, u32> = BTreeMap::new();
+    for row in table.rows.iter().filter(|row| !row.warm_up) {
+        let case = case_name(&row.phase, &row.sweep);
+        let name = mode_name(&case, &row.threading, row.skip);
+        let mode = modes.entry(name.clone()).or_insert_with(|| {
+            let names = ["frame", "game", "render", "gpu"].into_iter();
+            let names = names.chain(table.pass_names.iter().map(String::as_str));
+            let measure = |name: &str| Measure { name: name.to_owned(), ms: Vec::new() };
+            let measures = names.map(measure).collect();
+            TimedMode { name: name.clone(), frames: Vec::new(), blocks: Vec::new(), measures }
+        });
+        if last_blocks.insert(name, row.block) != Some(row.block) {
+            mode.blocks.push(Vec::new());
+        }
+        mode.frames.push(row.frame);
+        let times = times(row);
+        if let (Some(block), Some(ms)) = (mode.blocks.last_mut(), times[0]) {
+            block.push(ms);
+        }
+        for (measure, ms) in mode.measures.iter_mut().zip(times) {
+            measure.ms.extend(ms);
+        }
+    }
+    modes
+}
+
+/// Returns the times of a frame in the order of [`TimedMode::measures`].
+fn times(row: &FrameRow) -> Vec<Option<f64>> {
+    let render_ms = row.record_ms + row.submit_ms + row.wait_ms;
+    let of_frame = [row.frame_ms, row.game_ms, render_ms].map(Some).into_iter();
+    let times = of_frame.chain([row.gpu_ms]).chain(row.pass_ms.iter().copied());
+    times.map(|ms| ms.filter(|ms| ms.is_finite())).collect()
+}

@@ -321,7 +321,7 @@ fn what_files_say_is_text() {
 
 fn frame_rows(n: u32) -> Vec<FrameRow> {
     let ms = |i: u32| if i == n / 2 { 50.0 } else { 10.0 + f64::from(i % 5) };
-    let of = |threading: &'static str, block: usize, by: f64| {
+    let of = |threading: &'static str, block: u32, by: f64| {
         move |i: u32| FrameRow {
             frame_ms: by * ms(i),
             block,

@@ -90,7 +90,7 @@ fn loaded(settings: &[Setting]) -> Result<Loaded> {
 }
 
 fn plan(knobs: &[&str], design: Design, n_rounds: usize) -> StudyPlan {
-    let axes = knobs.iter().map(|text| Axis::parse(text).unwrap()).collect();
+    let axes = knobs.iter().map(|text| Axis::parse("--knob", text).unwrap()).collect();
     StudyPlan { axes, design, metric: Metric::Rmse, time: Time::Gpu, n_rounds, part: None }
 }
 

@@ -10,7 +10,6 @@ use std::path::Path;
 use assert_cmd::Command;
 use nimbus::measure::stats::Summary;
 use nimbus::timing::attachments::Attachments;
-use nimbus::timing::attachments::Attachments;
 use nimbus::timing::frame_rows::{FRAMES_FILE, FrameRow, FrameTable};
 use nimbus::timing::records::Run;
 use nimbus::timing::results::read_results;

@@ -8,7 +8,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 use divan::Bencher;
-use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, Place};
+use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage};
 use nimbus::io::box_file;
 use nimbus::layout::particle::{BoxLaw, BoxRecord, ParticleRecord};
 use nimbus::measure::stats::Summary;
@@ -56,10 +56,11 @@ impl OnGpu {
         }
         let mut upload = |words: &[u32]| {
             let n_words = words.len() as u64;
-            let mut staging = Buffer::new::<u32>(&device, "bench.staging", n_words, Place::Upload)
-                .expect("staging");
-            let buffer =
-                Buffer::new::<u32>(&device, "bench.input", n_words, Place::Device).expect("input");
+            let mut staging =
+                Buffer::new::<u32>(&device, "bench.staging", n_words, MemoryUsage::Upload)
+                    .expect("staging");
+            let buffer = Buffer::new::<u32>(&device, "bench.input", n_words, MemoryUsage::Device)
+                .expect("input");
             staging.write(words).expect("write");
             commands
                 .run(|rec| {
@@ -72,9 +73,15 @@ impl OnGpu {
         let buffers = [
             upload(bytemuck::cast_slice(&records)),
             upload(&i_group),
-            Buffer::new::<ParticleRecord>(&device, "bench.particles", n.into(), Place::Device)
-                .expect("particles"),
-            Buffer::new::<u32>(&device, "bench.status", n.into(), Place::Device).expect("status"),
+            Buffer::new::<ParticleRecord>(
+                &device,
+                "bench.particles",
+                n.into(),
+                MemoryUsage::Device,
+            )
+            .expect("particles"),
+            Buffer::new::<u32>(&device, "bench.status", n.into(), MemoryUsage::Device)
+                .expect("status"),
         ];
         let pass = Generate::new(&device, &compiler).expect("generate");
         OnGpu { pass, buffers, n, commands, device }

@@ -6,7 +6,7 @@ mod cpu;
 use std::hint::black_box;
 
 use divan::Bencher;
-use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, Place};
+use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage};
 use nimbus::measure::stats::Summary;
 use nimbus::model::philox::philox4x32_10;
 use nimbus::passes::{self, sort::Sort};
@@ -39,8 +39,10 @@ impl OnGpu {
         let commands = Commands::new(&device, "bench").expect("commands");
         let place =
             |name, place| Buffer::new::<[u32; 2]>(&device, name, n.into(), place).expect("buffer");
-        let (mut input, to) =
-            (place("bench.input", Place::Upload), place("bench.entries", Place::Device));
+        let (mut input, to) = (
+            place("bench.input", MemoryUsage::Upload),
+            place("bench.entries", MemoryUsage::Device),
+        );
         input.write(&entries(n, n_bits)).expect("write");
         let sort = Sort::new(&device, &compiler, n).expect("sort");
         OnGpu { sort, input, entries: to, n, n_bits, commands, device }

@@ -21,7 +21,7 @@ use harness::{Gpu, assert_within};
 use mixed::{cases, front};
 use nimbus::frame::tiling::saturated;
 use nimbus::gpu::Compiler;
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use picture::{FORMATS, Picture, Tiled, Way};

@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use half::f16;
 use harness::Gpu;
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
 use picture::{FORMATS, Picture};
 

@@ -8,9 +8,11 @@ use std::path::Path;
 use glam::{DVec3, UVec3};
 use harness::Gpu;
 use nimbus::error::Error;
-use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::shader::Optimize;
-use nimbus::gpu::{Barriers, Buffer, Compiler, Device, Image, Instance, Kernel, Place, Sources};
+use nimbus::gpu::Optimize;
+use nimbus::gpu::TargetFormat;
+use nimbus::gpu::{
+    Barriers, Buffer, Compiler, Device, DeviceInfo, Image, Instance, Kernel, MemoryUsage, Sources,
+};
 use nimbus::layout::frame::GridRecord;
 use nimbus::layout::particle::{GroupRecord, ModeRecord, ParticleRecord, PlacedRecord};
 use nimbus::model::grid::GridSpec;
@@ -79,8 +81,8 @@ fn a_missing_barrier_between_copies_is_reported() {
 fn a_leaked_buffer_is_reported_by_name_and_size() {
     let instance = Instance::new(true).unwrap();
     let device = Device::open(&instance, None).unwrap();
-    let kept = Buffer::new::<u32>(&device, "test.freed", 10, Place::Device).unwrap();
-    let leaked = Buffer::new::<u32>(&device, "test.leaked", 1000, Place::Device).unwrap();
+    let kept = Buffer::new::<u32>(&device, "test.freed", 10, MemoryUsage::Device).unwrap();
+    let leaked = Buffer::new::<u32>(&device, "test.leaked", 1000, MemoryUsage::Device).unwrap();
     drop(kept);
     std::mem::forget(leaked);
     drop(device);
@@ -112,8 +114,9 @@ fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
     let gpu = Gpu::new();
     let before = gpu.device.allocated_bytes();
     for n in [1_000_000_000, u64::MAX / 2] {
-        let refused =
-            Buffer::new::<[u32; 8]>(&gpu.device, "test.huge", n, Place::Device).err().unwrap();
+        let refused = Buffer::new::<[u32; 8]>(&gpu.device, "test.huge", n, MemoryUsage::Device)
+            .err()
+            .unwrap();
         let Error::Limit { what } = &refused else { panic!("{refused:?}") };
         let limit = gpu.device.limits().max_storage_buffer_bytes;
         assert!(what.contains(&format!("test.huge: {n} records of 32 bytes")), "{what}");
@@ -133,15 +136,16 @@ fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
     // none.
     let limits = gpu.device.limits();
     let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes) / 32;
-    assert_eq!(nimbus::gpu::memory::storage_bytes(limits, "test", most, 32), Ok(32 * most));
-    assert!(nimbus::gpu::memory::storage_bytes(limits, "test", most + 1, 32).is_err());
-    assert_eq!(nimbus::gpu::memory::storage_bytes(limits, "test", 0, 32), Ok(32));
+    assert_eq!(nimbus::gpu::storage_bytes(limits, "test", most, 32), Ok(32 * most));
+    assert!(nimbus::gpu::storage_bytes(limits, "test", most + 1, 32).is_err());
+    assert_eq!(nimbus::gpu::storage_bytes(limits, "test", 0, 32), Ok(32));
 }
 
 #[test]
 fn a_device_that_is_not_there_lists_those_that_are() {
     let instance = Instance::new(true).unwrap();
-    let names: Vec<String> = Device::list(&instance).unwrap().into_iter().map(|d| d.name).collect();
+    let names: Vec<String> =
+        DeviceInfo::list(&instance).unwrap().into_iter().map(|d| d.name).collect();
     assert!(!names.is_empty());
     for choice in ["no such device", "4096"] {
         let refused = Device::open(&instance, Some(choice)).err().unwrap();
@@ -245,15 +249,17 @@ fn records_beyond_one_row_of_workgroups_are_all_done() {
 #[test]
 fn host_memory_is_checked_against_its_size() {
     let gpu = Gpu::new();
-    let mut upload = Buffer::new::<u32>(&gpu.device, "test.upload", 4, Place::Upload).unwrap();
+    let mut upload =
+        Buffer::new::<u32>(&gpu.device, "test.upload", 4, MemoryUsage::Upload).unwrap();
     assert!(upload.write(&[1u32; 4]).is_ok());
     // The allocation behind it may be larger; the buffer is not.
     assert!(matches!(upload.write(&[1u8; 17]), Err(Error::Limit { .. })));
-    let readback = Buffer::new::<u32>(&gpu.device, "test.readback", 4, Place::Readback).unwrap();
+    let readback =
+        Buffer::new::<u32>(&gpu.device, "test.readback", 4, MemoryUsage::Readback).unwrap();
     assert!(readback.read::<u32>(4).is_ok());
     assert!(matches!(readback.read::<u32>(5), Err(Error::Limit { .. })));
     assert!(matches!(readback.read::<u32>(usize::MAX / 2), Err(Error::Limit { .. })));
-    let device = Buffer::new::<u32>(&gpu.device, "test.device", 4, Place::Device).unwrap();
+    let device = Buffer::new::<u32>(&gpu.device, "test.device", 4, MemoryUsage::Device).unwrap();
     assert!(device.bytes() == 16 && device.name() == "test.device");
 }
 

@@ -7,10 +7,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use harness::Gpu;
-use nimbus::gpu::kernel::Field;
-use nimbus::gpu::reflect::{BindingKind, Member, Reflection, Struct, reflect};
-use nimbus::gpu::shader::Optimize;
-use nimbus::gpu::{Buffer, Compiler, Place};
+use nimbus::gpu::Field;
+use nimbus::gpu::Optimize;
+use nimbus::gpu::{BindingKind, Member, Reflection, Struct, reflect};
+use nimbus::gpu::{Buffer, Compiler, MemoryUsage};
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::disc::DiscRecord;
 use nimbus::layout::facet::{
@@ -25,7 +25,7 @@ use nimbus::layout::particle::{
 };
 use nimbus::layout::particle::{DrawnRecord, ModeRecord, PlacedRecord, TexturedRecord};
 use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
-use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
+use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
 use nimbus::passes::{
     self, SHADERS, chunks, contract, cull, facets, first, generate, grid, impostors, live, morton,
@@ -58,7 +58,7 @@ const RECORDS: [Record; 25] = [
     ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
     ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
     ("Kept", KeptRecord::FIELDS, size_of::<KeptRecord>()),
-    ("SplatSheet", SplatSheetRecord::FIELDS, size_of::<SplatSheetRecord>()),
+    ("SplatSheet", SplatTextureRecord::FIELDS, size_of::<SplatTextureRecord>()),
     ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
     ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
@@ -386,10 +386,11 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
     // Small normal floats, so that whatever is taken for a float keeps its bits.
     let words: Vec<u32> = (0..3 * N_WORDS as u32).map(|i| (1.0 + i as f32).to_bits()).collect();
     let mut from =
-        Buffer::new::<u32>(&gpu.device, "test.from", words.len() as u64, Place::Upload).unwrap();
+        Buffer::new::<u32>(&gpu.device, "test.from", words.len() as u64, MemoryUsage::Upload)
+            .unwrap();
     from.write(&words).unwrap();
-    let to =
-        Buffer::new::<u32>(&gpu.device, "test.to", words.len() as u64, Place::Readback).unwrap();
+    let to = Buffer::new::<u32>(&gpu.device, "test.to", words.len() as u64, MemoryUsage::Readback)
+        .unwrap();
     gpu.run(|rec| rec.dispatch_groups(&kernel, &[&from, &to], &(), 3));
     assert_eq!(to.read::<u32>(words.len()).unwrap(), words);
     // tiles_splat.comp takes the second of a Particle's three texels and the last half of a Lit,

@@ -53,9 +53,9 @@ fn doubles_are_refused_where_the_device_has_none() {
     let mut limits = *Gpu::new().device.limits();
     let mut scene = scene(500, 64, "first");
     scene.lighting.sums.precision = Precision::F64;
-    limits.floats_64 = true;
+    limits.has_float64 = true;
     assert!(check(&scene, &limits).is_ok());
-    limits.floats_64 = false;
+    limits.has_float64 = false;
     let refused = check(&scene, &limits).unwrap_err();
     assert_eq!(refused.exit_code(), 2);
     let said = refused.to_string();

@@ -28,7 +28,7 @@ use nimbus::frame::game::Game;
 use nimbus::frame::plan::Pass;
 use nimbus::frame::render::Renderer;
 use nimbus::frame::tiling::saturated;
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
 use picture::{FORMATS, Picture, Way};

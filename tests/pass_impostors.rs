@@ -5,8 +5,8 @@ mod harness;
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use harness::{Gpu, assert_within_and_say, check_within};
-use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Buffer, Compiler, Image, Place, Target};
+use nimbus::gpu::TargetFormat;
+use nimbus::gpu::{Buffer, Compiler, Image, MemoryUsage, Target};
 use nimbus::layout::facet::{LitRecord, RegionRecord};
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::impostor::{FarField, Shell, View};
@@ -147,8 +147,8 @@ fn draw(
 fn read(gpu: &mut Gpu, target: &mut Image, format: TargetFormat) -> Vec<f64> {
     let n = (SIZE[0] * SIZE[1]) as usize;
     let bytes = n as u64 * format.bytes_per_pixel();
-    let readback =
-        Buffer::new::<u8>(&gpu.device, "test.readback", bytes, Place::Readback).expect("readback");
+    let readback = Buffer::new::<u8>(&gpu.device, "test.readback", bytes, MemoryUsage::Readback)
+        .expect("readback");
     gpu.run(|rec| {
         rec.copy_image(target, &readback);
         Ok(())

@@ -9,8 +9,8 @@ use bounded::Random;
 use glam::{DVec3, DVec4};
 use half::f16;
 use harness::Gpu;
-use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Buffer, Compiler, Image, Place};
+use nimbus::gpu::TargetFormat;
+use nimbus::gpu::{Buffer, Compiler, Image, MemoryUsage};
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::passes::present::{Compare, Present, Shown};
 use nimbus::reference::present::{Compared, compared_values};
@@ -129,7 +129,8 @@ fn show(
     let mut window = Image::color_target(&gpu.device, "test.window", WINDOW[0], WINDOW[1], into)
         .expect("a window");
     let n = 4 * window.n_pixels();
-    let read = Buffer::new::<u8>(&gpu.device, "test.codes", n, Place::Readback).expect("room");
+    let read =
+        Buffer::new::<u8>(&gpu.device, "test.codes", n, MemoryUsage::Readback).expect("room");
     let shown = Shown {
         background: film.background.as_vec3().to_array(),
         exposure: film.exposure as f32,

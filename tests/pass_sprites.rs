@@ -22,7 +22,7 @@ use glam::DVec3;
 use harness::{Gpu, assert_within};
 use mixed::{EYE, assert_small, cases, front};
 use nimbus::gpu::Compiler;
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::io::scene_file;
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, TexturedRecord};

@@ -16,8 +16,8 @@ use bounded::greatest_ratio;
 use glam::DVec3;
 use harness::{Gpu, assert_within};
 use nimbus::error::Error;
-use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Amount, Barriers, Image, Target};
+use nimbus::gpu::TargetFormat;
+use nimbus::gpu::{Barriers, Image, RecordCount, Target};
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::FilmFormat;
@@ -429,9 +429,14 @@ fn a_target_that_does_not_fit_is_refused() {
     let mut record = |pass: Option<&Sprites>, depth: Option<&mut Image>| {
         let target = Target { color: &mut color, depth };
         gpu.commands.record(Barriers::Placed, |rec| match pass {
-            Some(pass) => {
-                pass.record(rec, [&buffer; 9], target, &camera, [3.0, 0.0], (Amount::Known(0), 0))
-            }
+            Some(pass) => pass.record(
+                rec,
+                [&buffer; 9],
+                target,
+                &camera,
+                [3.0, 0.0],
+                (RecordCount::Known(0), 0),
+            ),
             None => surfaces.record(rec, [&buffer; 2], target, &camera, 0),
         })
     };

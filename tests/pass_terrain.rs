@@ -17,8 +17,8 @@ mod sheets;
 use bounded::greatest_ratio;
 use glam::DVec3;
 use harness::Gpu;
-use nimbus::gpu::memory::{TargetFormat, has_depth24};
-use nimbus::gpu::{Buffer, Compiler, Image, Place, Start, Target};
+use nimbus::gpu::{Buffer, Compiler, Image, LoadOp, MemoryUsage, Target};
+use nimbus::gpu::{TargetFormat, has_depth24};
 use nimbus::layout::facet::{FacetRecord, RegionRecord};
 use nimbus::passes::facets::Facets;
 use nimbus::passes::terrain::{Piece, Terrain};
@@ -44,21 +44,22 @@ fn draw(
         Image::color_target(&gpu.device, "test.target", width, height, format).expect("a target");
     let mut depth = Image::depth(&gpu.device, "test.depth", width, height).expect("depth");
     let n = (width * height) as usize;
-    let buffer =
-        |name, bytes: usize| Buffer::new::<u8>(&gpu.device, name, bytes as u64, Place::Readback);
+    let buffer = |name, bytes: usize| {
+        Buffer::new::<u8>(&gpu.device, name, bytes as u64, MemoryUsage::Readback)
+    };
     let (colors, depths) =
         (buffer("test.colors", 16 * n).expect("room"), buffer("test.depths", 4 * n).expect("room"));
     let [regions, points, lit] =
         [gpu.upload(&relief.regions), gpu.upload(&relief.points), gpu.upload(&relief.lit)];
     let camera = picture.camera_record();
     gpu.run(|rec| {
-        let mut start = Start::Clear;
+        let mut start = LoadOp::Clear;
         for (region, i_region) in relief.regions.iter().zip(0u32..) {
             let target = Target { color: &mut color, depth: Some(&mut depth) };
             let n_cells = (region.n_u - 1) * (region.n_v - 1);
             let piece = Piece { i_region, i_first_ground: relief.n_before, n_cells };
             pass.record(rec, [&regions, &points, &lit], (target, start), &camera, piece)?;
-            start = Start::Load;
+            start = LoadOp::Load;
         }
         rec.copy_image(&mut color, &colors);
         rec.copy_image(&mut depth, &depths);

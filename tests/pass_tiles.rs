@@ -23,7 +23,7 @@ use harness::{Gpu, assert_within};
 use mixed::{assert_small, cases, front, mixed};
 use nimbus::frame::tiling::saturated;
 use nimbus::gpu::Compiler;
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::texture::Pool;

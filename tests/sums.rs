@@ -10,7 +10,7 @@ mod sums;
 
 use bounded::Random;
 use harness::{Gpu, assert_within_and_say, check_within};
-use nimbus::gpu::shader::Optimize;
+use nimbus::gpu::Optimize;
 use nimbus::gpu::{Compiler, Kernel, Sources};
 use nimbus::layout::sums::SumMacros;
 use nimbus::model::sums::{Precision, Summation, Sums};

@@ -19,7 +19,7 @@ use bounded::{Random, greatest_ratio};
 use glam::{DVec2, DVec3};
 use harness::{Gpu, assert_within};
 use nimbus::frame::tiling::saturated;
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::layout::particle::{DrawnRecord, TexturedRecord};
 use nimbus::model::film::FilmFormat;
 use nimbus::passes;

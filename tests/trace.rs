@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, PoisonError};
 
 use nimbus::frame::stage::{DeviceChoice, Stage};
-use nimbus::gpu::{ClockFit, ClockPair};
+use nimbus::gpu::{ClockFit, ClockSample};
 use nimbus::io::scene_file;
 use nimbus::measure::zones::{Collected, Zones};
 use nimbus::model::scene::Threading;
@@ -183,21 +183,21 @@ fn zones_nest_and_passes_lie_in_their_frames() {
 #[test]
 fn a_calibrated_clock_lays_the_passes_where_they_were() {
     let (samples, stage, _) = benched(&Zones::default());
-    let real = ClockFit::of(&stage.device.read_clocks(4).expect("readings"));
+    let real = ClockFit::from_samples(&stage.device.read_clocks(4).expect("readings"));
     assert_eq!(real.is_some(), stage.info().calibrated_timestamps.is_some());
     println!("{:?}: {real:?}", stage.info().calibrated_timestamps);
     // A device whose own clock is unknown: the last pass of a frame ends when the frame does, so
     // read there.
-    let pairs: Vec<ClockPair> = samples
+    let pairs: Vec<ClockSample> = samples
         .iter()
         .filter_map(|s| Some((s, s.times.passes.last()?.end_ns)))
-        .map(|(s, device_ns)| ClockPair {
+        .map(|(s, device_ns)| ClockSample {
             device_ns,
             host: s.times.marks.end,
             deviation_ns: 1000.0,
         })
         .collect();
-    let clock = ClockFit::of(&pairs).expect("frames");
+    let clock = ClockFit::from_samples(&pairs).expect("frames");
     for clock in [Some(clock), real].into_iter().flatten() {
         let trace = written(&samples, None, Some(clock));
         let about = &trace["otherData"];

@@ -319,7 +319,7 @@ fn bench_one(
             readings.extend(stage.device.read_clocks(N_CLOCK_READINGS)?);
         }
         let zones = zones.map(Zones::take);
-        trace::write(file, &outcome.samples, zones.as_ref(), ClockFit::of(&readings))?;
+        trace::write(file, &outcome.samples, zones.as_ref(), ClockFit::from_samples(&readings))?;
     }
     if !args.options.quiet {
         outcome.chosen.iter().for_each(|chosen| eprintln!("note: {chosen}"));

@@ -5,12 +5,12 @@ use serde_json::json;
 use super::args::DevicesArgs;
 use super::output;
 use crate::error::{Error, Result};
-use crate::gpu::{Device, DeviceInfo, Instance};
+use crate::gpu::{DeviceInfo, Instance};
 
 pub fn run(args: &DevicesArgs) -> Result<()> {
     let instance = Instance::new(args.validation)?;
-    let devices = Device::list(&instance)?;
-    let used = Device::choose(devices.clone(), args.device.as_deref());
+    let devices = DeviceInfo::list(&instance)?;
+    let used = DeviceInfo::choose(devices.clone(), args.device.as_deref());
     let i_used = used.as_ref().ok().map(|d| d.index);
     if args.json {
         let list: Vec<_> = devices.iter().map(|d| to_json(d, i_used)).collect();

@@ -1,7 +1,7 @@
 //! The buffers that the passes hand to each other, and what they are filled with once.
 
 use crate::error::Result;
-use crate::gpu::{Amount, Buffer, Commands, Device, Place, Recorder};
+use crate::gpu::{Buffer, Commands, Device, MemoryUsage, RecordCount, Recorder};
 use crate::layout::cull::KeptRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
@@ -111,8 +111,8 @@ impl Buffers {
     }
 
     /// How many entries are drawn, of `n_drawn` at most.
-    pub fn amount(&self, n_drawn: u32) -> Amount<'_> {
-        self.kept.as_ref().map_or(Amount::Known(n_drawn), Amount::Counted)
+    pub fn amount(&self, n_drawn: u32) -> RecordCount<'_> {
+        self.kept.as_ref().map_or(RecordCount::Known(n_drawn), RecordCount::Indirect)
     }
 
     pub fn new(
@@ -139,57 +139,82 @@ impl Buffers {
                 device,
                 "place.placed",
                 n,
-                Place::Device,
+                MemoryUsage::Device,
             )?),
         };
         Ok(Buffers {
-            boxes: Buffer::new::<BoxRecord>(device, "generate.boxes", n_groups, Place::Device)?,
-            i_group: Buffer::new::<u32>(device, "generate.i_group", n, Place::Device)?,
+            boxes: Buffer::new::<BoxRecord>(
+                device,
+                "generate.boxes",
+                n_groups,
+                MemoryUsage::Device,
+            )?,
+            i_group: Buffer::new::<u32>(device, "generate.i_group", n, MemoryUsage::Device)?,
             particles: Buffer::new::<ParticleRecord>(
                 device,
                 "generate.particles",
                 n,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
-            status: Buffer::new::<u32>(device, "generate.status", n, Place::Device)?,
+            status: Buffer::new::<u32>(device, "generate.status", n, MemoryUsage::Device)?,
             groups: Feed::new::<GroupRecord>(device, "place.groups", n_groups)?,
             drawn: Feed::new::<DrawnRecord>(device, "sort.drawn", n_groups)?,
             modes: Feed::new::<ModeRecord>(device, "place.modes", n_modes)?,
             placed,
-            density: Buffer::new::<f32>(device, "grid.density", n_cells_max(scene), Place::Device)?,
-            facets: Buffer::new::<FacetRecord>(device, "facets.facets", n_facets, Place::Device)?,
+            density: Buffer::new::<f32>(
+                device,
+                "grid.density",
+                n_cells_max(scene),
+                MemoryUsage::Device,
+            )?,
+            facets: Buffer::new::<FacetRecord>(
+                device,
+                "facets.facets",
+                n_facets,
+                MemoryUsage::Device,
+            )?,
             regions: Feed::new::<RegionRecord>(device, "first.regions", scene.n_regions() as u64)?,
             lights: Feed::new::<LightRecord>(device, "transmit.lights", n_lights)?,
             transmittance: Buffer::new::<f32>(
                 device,
                 "transmit.transmittance",
                 n_facets * n_lights,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             i_region: Buffer::new::<u32>(
                 device,
                 "facets.i_region",
                 scene.n_surface_facets(),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
-            ground: Buffer::new::<FacetRecord>(device, "terrain.ground", n_ground, Place::Device)?,
+            ground: Buffer::new::<FacetRecord>(
+                device,
+                "terrain.ground",
+                n_ground,
+                MemoryUsage::Device,
+            )?,
             table: Feed::new::<f32>(device, "first.table", n_table_rows * N_NODES as u64)?,
-            through: Buffer::new::<f32>(device, "transmit.through", n_through, Place::Device)?,
-            lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, Place::Device)?,
+            through: Buffer::new::<f32>(
+                device,
+                "transmit.through",
+                n_through,
+                MemoryUsage::Device,
+            )?,
+            lit: Buffer::new::<LitRecord>(device, "first.lit", n_facets, MemoryUsage::Device)?,
             kept: kept(device, scene)?,
-            i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, Place::Device)?,
-            entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, Place::Device)?,
+            i_facet: Buffer::new::<u32>(device, "facets.i_facet", n_named, MemoryUsage::Device)?,
+            entries: Buffer::new::<[u32; 2]>(device, "sort.entries", n, MemoryUsage::Device)?,
             textured: Buffer::new::<TexturedRecord>(
                 device,
                 "texture.groups",
                 n_textured,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             pool: Buffer::new::<[u32; 4]>(
                 device,
                 "texture.pool",
                 u64::from(n_texels),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
         })
     }
@@ -234,7 +259,7 @@ impl Buffers {
 /// Where the number of kept particles is; none where all are drawn.
 pub(super) fn kept(device: &Device, scene: &Scene) -> Result<Option<Buffer>> {
     culls(scene)
-        .then(|| Buffer::new::<KeptRecord>(device, "cull.kept", 1, Place::Device))
+        .then(|| Buffer::new::<KeptRecord>(device, "cull.kept", 1, MemoryUsage::Device))
         .transpose()
 }
 
@@ -320,7 +345,8 @@ pub fn upload<T: bytemuck::Pod>(
     if data.is_empty() {
         return Ok(());
     }
-    let mut staging = Buffer::new::<T>(device, "frame.staging", data.len() as u64, Place::Upload)?;
+    let mut staging =
+        Buffer::new::<T>(device, "frame.staging", data.len() as u64, MemoryUsage::Upload)?;
     staging.write(data)?;
     commands.run(|rec| {
         rec.copy(&staging, to);
@@ -336,7 +362,7 @@ pub fn download<T: bytemuck::Pod>(
     from: &Buffer,
     n: u32,
 ) -> Result<Vec<T>> {
-    let readback = Buffer::new::<T>(device, "frame.readback", u64::from(n), Place::Readback)?;
+    let readback = Buffer::new::<T>(device, "frame.readback", u64::from(n), MemoryUsage::Readback)?;
     commands.run(|rec| {
         rec.copy(from, &readback);
         Ok(())

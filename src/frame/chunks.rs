@@ -2,9 +2,10 @@
 //! "chunks").
 
 use crate::error::{Error, Result};
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Amount, Buffer, Compiler, Device, Image, Instances, Place, Recorder, Start, Target,
+    Buffer, Compiler, Device, Image, InstanceCount, LoadOp, MemoryUsage, RecordCount, Recorder,
+    Target,
 };
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
@@ -70,12 +71,22 @@ impl Chunks {
             stride,
             composed,
             depth: Image::depth(device, "chunks.depth", width, height).map_err(named)?,
-            texels: Buffer::new::<[f32; 4]>(device, "chunks.texels", n_texels, Place::Device)
+            texels: Buffer::new::<[f32; 4]>(device, "chunks.texels", n_texels, MemoryUsage::Device)
                 .map_err(named)?,
-            nearest: Buffer::new::<[u32; 2]>(device, "chunks.nearest", n_places, Place::Device)
-                .map_err(named)?,
-            draws: Buffer::new::<[u32; 4]>(device, "chunks.draws", n_chunks.into(), Place::Device)?,
-            known: Buffer::new::<KeptRecord>(device, "chunks.known", 1, Place::Device)?,
+            nearest: Buffer::new::<[u32; 2]>(
+                device,
+                "chunks.nearest",
+                n_places,
+                MemoryUsage::Device,
+            )
+            .map_err(named)?,
+            draws: Buffer::new::<[u32; 4]>(
+                device,
+                "chunks.draws",
+                n_chunks.into(),
+                MemoryUsage::Device,
+            )?,
+            known: Buffer::new::<KeptRecord>(device, "chunks.known", 1, MemoryUsage::Device)?,
         })
     }
 
@@ -85,29 +96,29 @@ impl Chunks {
         &mut self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 9],
-        (target, start): (Target<'_>, Start),
+        (target, start): (Target<'_>, LoadOp),
         view: &View<'_>,
-        (n, i_first_facet): (Amount<'_>, u32),
+        (n, i_first_facet): (RecordCount<'_>, u32),
     ) -> Result<()> {
         let Chunks { pass, sprites, composed, texels, nearest, draws, known, .. } = self;
         let (n_chunks, stride) = (self.n_chunks, self.stride);
         let kept = match n {
-            Amount::Known(n) => {
+            RecordCount::Known(n) => {
                 rec.update(known, &KeptRecord::of(n, 1));
                 &*known
             }
-            Amount::Counted(kept) => kept,
+            RecordCount::Indirect(kept) => kept,
         };
         let [entries, of_particles @ ..] = buffers;
         pass.record_order(rec, [entries, kept, nearest, draws], [n_chunks, stride])?;
         let (depth, first) = match target.depth {
-            Some(depth) => (depth, Start::ClearColor),
-            None => (&mut self.depth, Start::Clear),
+            Some(depth) => (depth, LoadOp::ClearColor),
+            None => (&mut self.depth, LoadOp::Clear),
         };
         for i in 0..n_chunks {
             let into = Target { color: &mut *composed, depth: Some(&mut *depth) };
-            let start = if i == 0 { first } else { Start::Load };
-            let instances = Instances::Counted(draws, 4 * i);
+            let start = if i == 0 { first } else { LoadOp::Load };
+            let instances = InstanceCount::Indirect(draws, 4 * i);
             let chunk = Chunk { instances, i_first: i * stride, i_first_facet };
             let [placed, particles, lit, i_facet, i_group, drawn, textured, pool] = of_particles;
             let from = [&*nearest, placed, particles, lit, i_facet, i_group, drawn, textured, pool];

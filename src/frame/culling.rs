@@ -6,7 +6,7 @@ use super::feed::IN_FLIGHT;
 use super::packet::Packet;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Place, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, MemoryUsage, Recorder};
 use crate::layout::cull::KeptRecord;
 use crate::model::scene::{Cull as CullMode, Impostors, Scene};
 use crate::passes::cull::{Cull, Order, View};
@@ -41,7 +41,7 @@ impl Culling {
             scene.n_particles() as u32,
             [scene.draw.count.is_some(), scene.draw.threshold.is_active(), scene.has_ellipsoids()],
         );
-        let count = |name| Buffer::new::<KeptRecord>(device, name, 1, Place::Readback);
+        let count = |name| Buffer::new::<KeptRecord>(device, name, 1, MemoryUsage::Readback);
         let counts = [count("cull.count.even")?, count("cull.count.odd")?];
         Ok(Some(Culling { cull: Cull::new(device, compiler, n, variant)?, counts }))
     }

@@ -12,8 +12,8 @@ use super::settings::Settings;
 use super::shrunk::Shrunk;
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, Image, Recorder, Start, Target};
+use crate::gpu::TargetFormat;
+use crate::gpu::{Buffer, Compiler, Device, Image, LoadOp, Recorder, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::resolution::Resolution;
 use crate::model::scene::{
@@ -290,7 +290,7 @@ impl Drawing {
             _ => {
                 let Some(target) = target else { return Err(no_sprites()) };
                 let is_under = target.depth.is_some() || near.is_some();
-                let start = if is_under { Start::Load } else { Start::Clear };
+                let start = if is_under { LoadOp::Load } else { LoadOp::Clear };
                 let cuts = [s.cutoff, s.threshold];
                 match (&self.sprites, &mut self.chunks) {
                     (Some(sprites), _) => {

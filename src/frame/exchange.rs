@@ -2,7 +2,7 @@
 //! scene.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Device, Place, Recorder};
+use crate::gpu::{Buffer, Commands, Device, MemoryUsage, Recorder};
 use crate::layout::facet::lobe_width;
 use crate::layout::second::{BlockRecord, PackedRecord, PairingRecord, SourceRecord};
 use crate::model::pairings::{Pairing, pairings};
@@ -72,7 +72,7 @@ impl Exchange {
         let at_rest = [0, 1, 1].repeat(n_rounds as usize + 1);
         let mut made = |name: &str, data: &[u32], words: usize| -> Result<Buffer> {
             let n = (data.len() as u64).max(words as u64);
-            let buffer = Buffer::new::<u32>(device, name, n, Place::Device)?;
+            let buffer = Buffer::new::<u32>(device, name, n, MemoryUsage::Device)?;
             upload(device, commands, data, &buffer)?;
             Ok(buffer)
         };
@@ -89,16 +89,26 @@ impl Exchange {
                 device,
                 "second.sources",
                 n_sources,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
-            fluxes: Buffer::new::<[f32; 4]>(device, "second.fluxes", n_fluxes, Place::Device)?,
+            fluxes: Buffer::new::<[f32; 4]>(
+                device,
+                "second.fluxes",
+                n_fluxes,
+                MemoryUsage::Device,
+            )?,
             stencils: Buffer::new::<PackedRecord>(
                 device,
                 "second.stencils",
                 n_fluxes,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
-            reached: Buffer::new::<u32>(device, "second.reached", scene.n_facets(), Place::Device)?,
+            reached: Buffer::new::<u32>(
+                device,
+                "second.reached",
+                scene.n_facets(),
+                MemoryUsage::Device,
+            )?,
             rounds: made("second.rounds", &at_rest, 3)?,
             rounds_at_rest: made("second.rounds_at_rest", &at_rest, 3)?,
             n_rounds,

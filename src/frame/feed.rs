@@ -4,7 +4,7 @@
 use bytemuck::Pod;
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Device, Place, Recorder};
+use crate::gpu::{Buffer, Device, MemoryUsage, Recorder};
 
 /// Frames that may be on the device at once: one being drawn, one recorded and ready.
 pub const IN_FLIGHT: usize = 2;
@@ -21,10 +21,11 @@ pub struct Feed {
 impl Feed {
     /// Room for `n` records of type `T`.
     pub fn new<T: Pod>(device: &Device, name: &str, n: u64) -> Result<Feed> {
-        let staging =
-            |k: usize| Buffer::new::<T>(device, &format!("{name}.upload{k}"), n, Place::Upload);
+        let staging = |k: usize| {
+            Buffer::new::<T>(device, &format!("{name}.upload{k}"), n, MemoryUsage::Upload)
+        };
         Ok(Feed {
-            buffer: Buffer::new::<T>(device, name, n, Place::Device)?,
+            buffer: Buffer::new::<T>(device, name, n, MemoryUsage::Device)?,
             staging: [staging(0)?, staging(1)?],
             last: vec![],
             is_new: false,

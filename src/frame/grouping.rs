@@ -4,7 +4,7 @@ use super::buffers::{Buffers, upload};
 use super::feed::Feed;
 use super::packet::Packet;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
+use crate::gpu::{Buffer, Commands, Compiler, Device, MemoryUsage, Recorder};
 use crate::layout::facet::{RegionBoundsRecord, RunRecord};
 use crate::model::scene::{LightingMode, Scene};
 use crate::passes::facets::Facets;
@@ -51,13 +51,13 @@ impl Grouping {
         let grouping = Grouping {
             morton: Morton::new(device, compiler)?,
             sort: Sort::new(device, compiler, n as u32)?,
-            entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, Place::Device)?,
-            order: Buffer::new::<u32>(device, "morton.order", n, Place::Device)?,
+            entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, MemoryUsage::Device)?,
+            order: Buffer::new::<u32>(device, "morton.order", n, MemoryUsage::Device)?,
             runs: Buffer::new::<RunRecord>(
                 device,
                 "facets.runs",
                 runs.len() as u64,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             bounds: Feed::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64)?,
             n_particles: n as u32,

@@ -8,8 +8,8 @@ use super::settings::Settings;
 use super::shells::{Keeper, Kept, Rules, Step, view_of};
 use super::tiling::Tiling;
 use crate::error::{Error, Result};
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Amount, Buffer, Compiler, Device, Image, Place, Recorder, Target};
+use crate::gpu::TargetFormat;
+use crate::gpu::{Buffer, Compiler, Device, Image, MemoryUsage, RecordCount, Recorder, Target};
 use crate::model::film::FilmFormat;
 use crate::model::scene::{DrawPath, Scene};
 use crate::passes;
@@ -76,7 +76,7 @@ impl Impostors {
                     device,
                     "impostors.texels",
                     n_texels,
-                    Place::Device,
+                    MemoryUsage::Device,
                 )?,
             })
         };
@@ -87,14 +87,14 @@ impl Impostors {
             }
             _ => None,
         };
-        let entries = |name| Buffer::new::<[u32; 2]>(device, name, n, Place::Device);
+        let entries = |name| Buffer::new::<[u32; 2]>(device, name, n, MemoryUsage::Device);
         Ok(Impostors {
             pass: passes::impostors::Impostors::new(device, compiler, format, scene.has_solids())?,
             keeper: Keeper::new(rules),
             now: Step::Nothing("there is no frame before"),
             sprites: (path != DrawPath::Tiles).then(of_sprites).transpose()?,
             tiling,
-            members: Buffer::new::<u32>(device, "impostors.members", n, Place::Device)?,
+            members: Buffer::new::<u32>(device, "impostors.members", n, MemoryUsage::Device)?,
             far: entries("impostors.far")?,
             near: entries("impostors.near")?,
         })
@@ -153,7 +153,7 @@ impl Impostors {
                 path,
                 b,
                 &kept,
-                (Amount::Known(packet.n_drawn), s.n_solid_facets),
+                (RecordCount::Known(packet.n_drawn), s.n_solid_facets),
                 s,
             )?;
         }
@@ -180,7 +180,7 @@ impl Impostors {
         path: DrawPath,
         b: &Buffers,
         kept: &Kept,
-        counts: (Amount<'_>, u32),
+        counts: (RecordCount<'_>, u32),
         s: &Settings,
     ) -> Result<()> {
         let buffers = b.of_sprites_from(&self.far);

@@ -4,9 +4,9 @@
 use glam::DVec3;
 
 use crate::error::{Error, Result};
-use crate::gpu::device::Limits;
-use crate::gpu::memory::{DEPTH_BYTES_PER_PIXEL, TargetFormat, storage_bytes};
-use crate::gpu::reflect::BindingKind;
+use crate::gpu::BindingKind;
+use crate::gpu::Limits;
+use crate::gpu::{DEPTH_BYTES_PER_PIXEL, TargetFormat, storage_bytes};
 use crate::layout::disc::DiscRecord;
 use crate::layout::facet::{FacetRecord, LitRecord, RegionRecord};
 use crate::layout::frame::LightRecord;
@@ -67,7 +67,7 @@ pub fn check(scene: &Scene, limits: &Limits) -> Result<u64> {
             "the scene's {n} particles; nimbus numbers them with 32 bits"
         )));
     }
-    if scene.lighting.sums.precision == Precision::F64 && !limits.floats_64 {
+    if scene.lighting.sums.precision == Precision::F64 && !limits.has_float64 {
         return Err(Error::limit(
             "lighting.precision = \"f64\": this device's shaders have no doubles (shaderFloat64); \
              expected \"f32\"",

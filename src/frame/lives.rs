@@ -4,7 +4,7 @@
 use super::feed::{Feed, IN_FLIGHT};
 use super::packet::Packet;
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Place, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, MemoryUsage, Recorder};
 use crate::layout::disc::DiscRecord;
 use crate::layout::particle::ParticleRecord;
 use crate::model::cloud::{Cloud, CloudSource, Group};
@@ -91,7 +91,8 @@ impl Lives {
         }
         if lives_on_host(scene) {
             let n = scene.n_particles();
-            let staging = |name| Buffer::new::<ParticleRecord>(device, name, n, Place::Upload);
+            let staging =
+                |name| Buffer::new::<ParticleRecord>(device, name, n, MemoryUsage::Upload);
             return Ok(Some(Lives::ByHost([staging("live.upload0")?, staging("live.upload1")?])));
         }
         let discs = Box::new(Feed::new::<DiscRecord>(device, "live.discs", counts.len() as u64)?);

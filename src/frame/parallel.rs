@@ -18,7 +18,7 @@ use super::packet::Packet;
 use super::render::Renderer;
 use super::{OnFrame, Started};
 use crate::error::{Error, Result};
-use crate::gpu::Pending;
+use crate::gpu::Submission;
 
 /// What the drawing thread is told.
 enum Event {
@@ -45,7 +45,7 @@ pub fn run(
     let drawn = std::thread::scope(|scope| {
         let (tell, events) = sync_channel::<Event>(EVENTS);
         let (grant, granted) = sync_channel::<()>(IN_FLIGHT);
-        let (submit, submitted) = sync_channel::<Pending>(IN_FLIGHT);
+        let (submit, submitted) = sync_channel::<Submission>(IN_FLIGHT);
         let teller = tell.clone();
         start(scope, "game", tell.clone(), move || play(game, frames, &granted, &teller))?;
         let teller = tell.clone();
@@ -115,7 +115,7 @@ fn play(
 }
 
 /// The waiting thread: tells when each submission was finished.
-fn wait(submitted: &Receiver<Pending>, tell: &SyncSender<Event>) {
+fn wait(submitted: &Receiver<Submission>, tell: &SyncSender<Event>) {
     while let Ok(pending) = submitted.recv() {
         let event = pending.wait().map_or_else(Event::Failed, |()| Event::Ended(Instant::now()));
         if tell.send(event).is_err() {
@@ -128,10 +128,10 @@ fn wait(submitted: &Receiver<Pending>, tell: &SyncSender<Event>) {
 struct Drawing<'a> {
     renderer: &'a mut Renderer,
     grant: SyncSender<()>,
-    submit: SyncSender<Pending>,
+    submit: SyncSender<Submission>,
     started: VecDeque<Started>,
     /// Of the same frames.
-    under_way: VecDeque<Pending>,
+    under_way: VecDeque<Submission>,
 }
 
 impl Drawing<'_> {

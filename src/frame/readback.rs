@@ -5,7 +5,7 @@ use tracing::info_span;
 use super::buffers::download;
 use super::render::Renderer;
 use crate::error::{Error, Result};
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{Buffer, Device, Recorder};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};

@@ -7,7 +7,7 @@ use super::packet::Packet;
 use super::plan::{Pass, Plan};
 use super::tensor::TensorStage;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
+use crate::gpu::{Buffer, Commands, Compiler, Device, MemoryUsage, Recorder};
 use crate::layout::facet::RegionBoundsRecord;
 use crate::model::scene::{Pairs, Scene};
 use crate::passes::morton::Morton;
@@ -177,7 +177,7 @@ impl Order {
         Ok(Order {
             morton: Morton::new(device, compiler)?,
             sort: Sort::new(device, compiler, n as u32)?,
-            entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, Place::Device)?,
+            entries: Buffer::new::<[u32; 2]>(device, "morton.entries", n, MemoryUsage::Device)?,
             bounds: Feed::new::<RegionBoundsRecord>(device, "morton.bounds", n_regions as u64)?,
             n_regions: n_regions as u32,
         })

@@ -19,7 +19,9 @@ use super::settings::Settings;
 use super::tensor::{TensorStage, tensor_stage};
 use super::{limits, ms};
 use crate::error::{Error, Result};
-use crate::gpu::{Barriers, Buffer, Commands, Compiler, Device, Pending, Place, ScopeTime};
+use crate::gpu::{
+    Barriers, Buffer, Commands, Compiler, Device, MemoryUsage, ScopeTime, Submission,
+};
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::scene::{LightingMode, Scene, Simulate};
 use crate::passes::facets::Facets;
@@ -153,7 +155,7 @@ impl Renderer {
                 device,
                 "film.readback",
                 settings.n_bytes(),
-                Place::Readback,
+                MemoryUsage::Readback,
             )?,
             settings,
             traits: Traits::of(scene, tensors, skip),
@@ -174,7 +176,7 @@ impl Renderer {
 
     /// Uploads, records and submits a frame, and gives what can be waited for. At most
     /// [`IN_FLIGHT`] frames may have begun and not ended.
-    pub fn begin(&mut self, packet: Packet) -> Result<Pending> {
+    pub fn begin(&mut self, packet: Packet) -> Result<Submission> {
         if self.failed {
             return Err(Error::usage(
                 "a frame has failed: what the device holds is not known any more",
@@ -192,7 +194,7 @@ impl Renderer {
         Ok(pending)
     }
 
-    fn submit(&mut self, packet: Packet) -> Result<Pending> {
+    fn submit(&mut self, packet: Packet) -> Result<Submission> {
         let begin = Instant::now();
         let _zone = info_span!("render step").entered();
         let plan = info_span!("plan").in_scope(|| {

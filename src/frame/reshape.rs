@@ -9,7 +9,7 @@ use super::render::Renderer;
 use super::stage::{Bed, Player};
 use super::tiling::is_thin;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Device, Place};
+use crate::gpu::{Buffer, Device, MemoryUsage};
 use crate::layout::particle::ParticleRecord;
 use crate::model::boxes::MAX_ATTEMPTS;
 use crate::model::cloud::{Cloud, CloudSource, Group};
@@ -120,7 +120,7 @@ impl Renderer {
         // room for any.
         let side = u64::from(scene.lighting.grid);
         let n = (2 * n).min(side * side * side).max(n);
-        let density = Buffer::new::<f32>(device, "grid.density", n, Place::Device)?;
+        let density = Buffer::new::<f32>(device, "grid.density", n, MemoryUsage::Device)?;
         self.grid.make_room(device, n)?;
         self.buffers.density = density;
         Ok(())

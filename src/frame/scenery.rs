@@ -4,8 +4,8 @@ use super::buffers::Buffers;
 use super::plan::Pass;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Compiler, Device, Image, Recorder, Start, Target};
+use crate::gpu::TargetFormat;
+use crate::gpu::{Compiler, Device, Image, LoadOp, Recorder, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::scene::Scene;
 use crate::model::terrain::Terrain as Ground;
@@ -55,14 +55,14 @@ impl Scenery {
                 Ok(true)
             }
             (Pass::Terrain, before, Some((terrain, pieces))) => {
-                let mut start = if before.is_some() { Start::Load } else { Start::Clear };
+                let mut start = if before.is_some() { LoadOp::Load } else { LoadOp::Clear };
                 for piece in pieces {
                     let target = Target { color: &mut *color, depth: Some(&mut *depth) };
                     let buffers = [&b.regions.buffer, &b.ground, &b.lit];
                     terrain.record(
                         rec,
                         buffers,
-                        (target, std::mem::replace(&mut start, Start::Load)),
+                        (target, std::mem::replace(&mut start, LoadOp::Load)),
                         camera,
                         *piece,
                     )?;

@@ -2,7 +2,7 @@
 
 use super::limits;
 use super::tiling::saturated;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::model::scene::Scene;
 
 pub(super) struct Settings {

@@ -8,8 +8,8 @@ use super::packet::Packet;
 use super::plan::Pass;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Buffer, Compiler, Device, Place, Recorder, Target};
+use crate::gpu::TargetFormat;
+use crate::gpu::{Buffer, Compiler, Device, MemoryUsage, Recorder, Target};
 use crate::layout::frame::CameraRecord;
 use crate::model::film::Film;
 use crate::model::resolution::{LowResLayout, Resolution};
@@ -47,7 +47,7 @@ impl Shrunk {
         let n_full = u64::from(full[0]) * u64::from(full[1]);
         // Whole texels.
         let texels = |name, n: u64, bytes: u64| {
-            Buffer::new::<[u32; 4]>(device, name, (n * bytes).div_ceil(16), Place::Device)
+            Buffer::new::<[u32; 4]>(device, name, (n * bytes).div_ceil(16), MemoryUsage::Device)
         };
         let pixel = format.bytes_per_pixel();
         let surfaces = || -> Result<[Buffer; 3]> {

@@ -9,7 +9,7 @@ use super::packet::Packet;
 use super::plan::Tensors;
 use super::settings::Settings;
 use crate::error::Result;
-use crate::gpu::{Buffer, Commands, Compiler, Device, Place, Recorder};
+use crate::gpu::{Buffer, Commands, Compiler, Device, MemoryUsage, Recorder};
 use crate::layout::facet::{REGION_CLOUD, REGION_COLORED, REGION_SURFACE, REGION_TERRAIN};
 use crate::model::basis::Basis;
 use crate::model::cloud::CloudSource;
@@ -215,7 +215,7 @@ impl TensorStage {
             device,
             "contract.spans",
             from_whom.len() as u64,
-            Place::Device,
+            MemoryUsage::Device,
         )?;
         upload(device, commands, &from_whom, &spans)?;
         Ok(TensorStage {
@@ -223,8 +223,8 @@ impl TensorStage {
             first: FirstTensor::new(device, compiler)?,
             second,
             contract: Contract::new(device, compiler, shape.n_bases, &scene.lighting.sums.into())?,
-            t1: Buffer::new::<f32>(device, "first.t1", shape.n_first(), Place::Device)?,
-            t2: Buffer::new::<f32>(device, "second.t2", n_second, Place::Device)?,
+            t1: Buffer::new::<f32>(device, "first.t1", shape.n_first(), MemoryUsage::Device)?,
+            t2: Buffer::new::<f32>(device, "second.t2", n_second, MemoryUsage::Device)?,
             coefficients: Feed::new::<[f32; 4]>(
                 device,
                 "contract.coefficients",

@@ -3,8 +3,8 @@
 use super::feed::IN_FLIGHT;
 use super::grouping::is_grouped;
 use crate::error::{Error, Result};
-use crate::gpu::memory::TargetFormat;
-use crate::gpu::{Amount, Buffer, Compiler, Device, Place, Recorder, Target};
+use crate::gpu::TargetFormat;
+use crate::gpu::{Buffer, Compiler, Device, MemoryUsage, RecordCount, Recorder, Target};
 use crate::model::cloud::{Group, SQRT_TAU};
 use crate::model::film::FilmFormat;
 use crate::model::scene::{Impostors, LightingMode, Scene};
@@ -31,7 +31,7 @@ impl Tiling {
         let bytes = u64::from(division.width)
             * u64::from(division.height)
             * variant.format.bytes_per_pixel();
-        let picture = |name| Buffer::new::<u8>(device, name, bytes, Place::Device);
+        let picture = |name| Buffer::new::<u8>(device, name, bytes, MemoryUsage::Device);
         let sort = Sort::for_bits(device, compiler, tiles.capacity(), division.n_bits())?;
         Ok(Tiling { sort, tiles, pictures: [picture("tiles.even")?, picture("tiles.odd")?] })
     }
@@ -85,14 +85,14 @@ impl Tiling {
         under: Option<Target<'_>>,
         buffers: [&Buffer; 9],
         view: &View<'_>,
-        (n, i_first_facet): (Amount<'_>, u32),
+        (n, i_first_facet): (RecordCount<'_>, u32),
     ) -> Result<()> {
         let (tiles, picture) = (&self.tiles, &self.pictures[i]);
         match under {
             Some(under) => tiles.record_under(rec, under, picture),
             None => tiles.record_nothing(rec, picture),
         }
-        if matches!(n, Amount::Known(0)) {
+        if matches!(n, RecordCount::Known(0)) {
             return Ok(());
         }
         tiles.record_splats(rec, buffers, view, n, [i_first_facet, TILE])?;

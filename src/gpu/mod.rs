@@ -1,43 +1,59 @@
-//! Vulkan, and nothing of nimbus: instance, device, memory, shaders, kernels, command recording,
-//! timers.
+//! Vulkan for the passes: instance, device, memory, shaders, pipelines, command recording, timers,
+//! windows. This room knows no cloud.
 //!
-//! Vulkan 1.3 core (synchronization2, dynamic rendering, timeline semaphores). What a shader reads
-//! and writes is reflected from its SPIR-V, and the recorder derives the barriers from that.
+//! It uses Vulkan 1.3 core (synchronization2, dynamic rendering, timeline semaphores). Each
+//! pipeline's reads and writes are reflected from its SPIR-V, and the recorder derives the barriers
+//! from them.
 
-pub mod calibration;
-pub mod device;
-pub mod draw;
-pub mod instance;
-pub mod kernel;
-pub mod memory;
+mod barriers;
+mod buffer;
+mod call;
+mod clocks;
+mod commands;
+mod descriptors;
+mod device;
+mod device_info;
+mod draw_pipeline;
+mod draws;
+mod image;
+mod instance;
+mod interface;
+mod kernel;
+mod memory;
 #[cfg(feature = "window")]
-pub mod overlay;
+mod overlay;
 #[cfg(feature = "window")]
 mod presenter;
-mod probe;
-pub mod recorder;
-pub mod recorder_draw;
-pub mod reflect;
-pub mod shader;
+mod recorder;
+mod reflect;
+mod shader;
 #[cfg(feature = "window")]
-pub mod surface;
+mod surface;
 #[cfg(feature = "window")]
-pub mod swapchain;
-pub mod timer;
+mod swapchain;
+mod timer;
+mod validation;
 
-pub use calibration::{ClockFit, ClockPair};
-pub use device::{Device, DeviceInfo};
-pub use draw::{DrawPipeline, Meet};
+pub use barriers::Barriers;
+pub use buffer::{Buffer, MemoryUsage, storage_bytes};
+pub use clocks::{ClockFit, ClockSample};
+pub use commands::{Commands, Submission};
+pub use device::Device;
+pub use device_info::{DeviceInfo, Limits};
+pub use draw_pipeline::{BlendMode, DrawPipeline};
+pub use draws::{InstanceCount, LoadOp, Target};
+pub use image::{DEPTH_BYTES_PER_PIXEL, Image, TargetFormat, has_depth24};
 pub use instance::Instance;
-pub use kernel::{Field, Kernel};
-pub use memory::{Buffer, Image, Place};
+pub use interface::Field;
+pub use kernel::Kernel;
 #[cfg(feature = "window")]
 pub use overlay::{Backdrop, Overlay, Widgets};
-pub use recorder::{Amount, Barriers, Commands, Pending, Recorder};
-pub use recorder_draw::{Instances, Start, Target};
-pub use shader::{Compiler, Sources};
+pub use recorder::{RecordCount, Recorder};
+pub use reflect::{Binding, BindingKind, Member, Reflection, Struct, reflect};
+pub use shader::{Compiler, Optimize, Sources, cache_folder, hex};
 #[cfg(feature = "window")]
 pub use surface::{PresentMode, Surface};
 #[cfg(feature = "window")]
-pub use swapchain::{Shown, Swapchain};
+pub use swapchain::{PresentOutcome, Swapchain};
 pub use timer::ScopeTime;
+pub use validation::Messages;

@@ -1,5 +1,4 @@
-//! Widgets over a window's picture: egui's triangles, drawn by its renderer for ash into the
-//! window's image.
+//! Widgets over a window's picture: egui's triangles, drawn by its renderer for ash.
 
 use std::sync::Arc;
 
@@ -9,26 +8,30 @@ use egui::{ClippedPrimitive, TextureId};
 use egui_ash_renderer::allocator::GpuAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
 
-use super::device::{Device, Shared};
-use super::memory::{Image, TargetFormat};
-use super::presenter::ON_THEIR_WAY;
+use super::call::Call;
+use super::device::{Device, Owned, SharedDevice};
+use super::draws::{LoadOp, Target};
+use super::image::{Image, TargetFormat};
+use super::presenter::FRAMES_IN_FLIGHT;
 use super::recorder::Recorder;
 use super::swapchain::Swapchain;
 use crate::error::{Error, Result};
 
-/// What is drawn: egui's, tessellated.
+/// Widgets to draw, tessellated by egui.
 #[derive(Debug, Clone)]
 pub struct Widgets {
-    /// What lies within the backdrop: drawn once, and copied to every picture then.
+    /// Widgets inside the backdrop: drawn once, then copied to every picture.
     pub within: Vec<ClippedPrimitive>,
-    /// What is drawn over all.
+    /// Widgets drawn over the rest.
     pub above: Vec<ClippedPrimitive>,
+    /// Pixels per point.
     pub pixels_per_point: f32,
-    /// Below it nothing of the picture is seen.
+    /// A rectangle that hides the picture.
     pub backdrop: Option<Backdrop>,
 }
 
 impl Widgets {
+    /// Sorts `primitives` into those inside the backdrop and the others.
     pub fn new(
         primitives: Vec<ClippedPrimitive>,
         pixels_per_point: f32,
@@ -44,16 +47,16 @@ impl Widgets {
 /// A rectangle of one colour.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Backdrop {
-    /// Points from the window's upper left corner.
+    /// The rectangle, in points from the window's upper left corner.
     pub room: egui::Rect,
-    /// Code values.
+    /// Its colour, in code values.
     pub color: egui::Color32,
 }
 
 impl Backdrop {
-    /// In pixels, as far as it lies in the image; none where nothing of it does.
+    /// Returns the part inside the image in pixels; none where that is empty.
     fn area(&self, pixels_per_point: f32, extent: vk::Extent2D) -> Option<vk::Rect2D> {
-        // Beyond the picture's pixels casts stop at their ends.
+        // Casts saturate where the rectangle reaches beyond the pixels.
         let px = |points: f32, most: u32| ((points * pixels_per_point).round() as u32).min(most);
         let (left, right) = (px(self.room.min.x, extent.width), px(self.room.max.x, extent.width));
         let (top, bottom) =
@@ -69,34 +72,37 @@ impl Backdrop {
     }
 }
 
-/// Draws widgets. Pictures that show them must be done before it goes.
+/// Draws widgets. Submissions that show them must have finished before it is dropped.
+// Fields drop in order: the renderer before the pool.
 pub struct Overlay {
-    /// None only while it is dropped: it goes before the pool.
-    renderer: Option<Renderer<GpuAllocator>>,
-    /// For textures on their way.
-    pool: vk::CommandPool,
-    /// What the picture after the next change does not show any more.
+    renderer: Renderer<GpuAllocator>,
+    /// For the uploads of textures.
+    pool: Owned<vk::CommandPool>,
+    /// Textures that the next change frees: the last picture may still show them.
     to_free: Vec<TextureId>,
     /// None where the window's images cannot be copied to.
-    kept: Option<Kept>,
-    shared: Arc<Shared>,
+    cached: Option<CachedWidgets>,
+    shared: Arc<SharedDevice>,
 }
 
-/// A picture of what lies within a backdrop: a copy costs a tenth of drawing it anew.
-struct Kept {
+/// A picture of the widgets inside a backdrop: copying it takes a tenth of the time of drawing it.
+struct CachedWidgets {
     image: Image,
     of: Option<Arc<Widgets>>,
 }
 
-/// Each picture draws twice at most, and as many may be on their way.
-const DRAWS: usize = 2 * ON_THEIR_WAY;
+/// Each picture draws widgets twice at most.
+const MAX_DRAWS: usize = 2 * FRAMES_IN_FLIGHT;
 
 fn failed(what: &'static str) -> impl Fn(egui_ash_renderer::RendererError) -> Error {
     move |e| Error::vulkan(format!("window.widgets: {what}"), e)
 }
 
 impl Overlay {
-    /// Over images of `format`.
+    /// Makes an overlay for images of `format`.
+    ///
+    /// # Errors
+    /// The renderer or a driver's object cannot be made.
     pub fn new(device: &Device, format: TargetFormat) -> Result<Overlay> {
         let shared = device.shared().clone();
         let mode = RenderMode::DynamicRendering(DynamicRendering {
@@ -106,87 +112,86 @@ impl Overlay {
         });
         // The image holds code values, and so do blended widgets.
         let options =
-            Options { in_flight_frames: DRAWS, srgb_framebuffer: false, ..Options::default() };
+            Options { in_flight_frames: MAX_DRAWS, srgb_framebuffer: false, ..Options::default() };
         let allocator = Arc::clone(&shared.allocator);
-        let renderer = Renderer::with_gpu_allocator(allocator, shared.raw.clone(), mode, options);
-        let renderer = Some(renderer.map_err(failed("making its renderer"))?);
-        let mut overlay = Overlay {
-            renderer,
-            pool: vk::CommandPool::null(),
-            to_free: vec![],
-            kept: None,
-            shared,
-        };
-        let info =
-            vk::CommandPoolCreateInfo::default().queue_family_index(overlay.shared.queue_family);
-        overlay.pool = unsafe { overlay.shared.raw.create_command_pool(&info, None) }
-            .map_err(|e| Error::vulkan("vkCreateCommandPool window.widgets", e))?;
-        Ok(overlay)
+        let renderer = Renderer::with_gpu_allocator(allocator, shared.raw.clone(), mode, options)
+            .map_err(failed("making its renderer"))?;
+        let pool = shared.command_pool("window.widgets")?;
+        Ok(Overlay { renderer, pool, to_free: vec![], cached: None, shared })
     }
 
-    /// Takes over what of its textures has changed. Waits for the device where anything has: hardly
-    /// ever.
+    /// Uploads changed textures. Waits for the device where any has changed, which is rare.
+    ///
+    /// # Errors
+    /// An upload fails, or the device is lost.
     pub fn set_textures(&mut self, mut changes: TexturesDelta) -> Result<()> {
-        let Some(renderer) = &mut self.renderer else { return Ok(()) };
         if changes.is_empty() && self.to_free.is_empty() {
             return Ok(());
         }
         let queue = self.shared.lock_queue();
-        // Pictures on their way may show what is replaced.
-        unsafe { self.shared.raw.queue_wait_idle(*queue) }
-            .map_err(|e| Error::vulkan("vkQueueWaitIdle", e))?;
+        // Pictures in flight may show the old textures.
+        unsafe { self.shared.raw.queue_wait_idle(*queue) }.of_call("vkQueueWaitIdle", "")?;
         for id in self.to_free.drain(..) {
-            renderer.free_texture(id).map_err(failed("freeing a texture"))?;
+            self.renderer.free_texture(id).map_err(failed("freeing a texture"))?;
         }
         for (id, deltas) in std::mem::take(&mut changes.set) {
             for delta in &deltas {
-                renderer.set_texture(*queue, self.pool, id, delta).map_err(failed("a texture"))?;
+                self.renderer
+                    .set_texture(*queue, self.pool.raw, id, delta)
+                    .map_err(failed("a texture"))?;
             }
         }
         self.to_free.extend(std::mem::take(&mut changes.free));
         Ok(())
     }
 
-    /// For images of another size from now on. None that it has drawn into may be on its way.
+    /// Prepares for the images of another swapchain. No submission that drew widgets may be in
+    /// flight.
+    ///
+    /// # Errors
+    /// The device has too little memory.
     pub fn fit(&mut self, device: &Device, chain: &Swapchain) -> Result<()> {
-        self.kept = None;
+        self.cached = None;
         if chain.takes_copies() {
             let [width, height] = chain.size();
             let image =
                 Image::color_target(device, "window.widgets", width, height, chain.format())?;
-            self.kept = Some(Kept { image, of: None });
+            self.cached = Some(CachedWidgets { image, of: None });
         }
         Ok(())
     }
 
-    /// Draws over what is in `image`.
+    /// Draws widgets over the content of `image`.
+    ///
+    /// # Errors
+    /// The renderer fails.
     pub fn record(
         &mut self,
         rec: &mut Recorder<'_>,
         image: &mut Image,
         widgets: &Arc<Widgets>,
     ) -> Result<()> {
-        let Overlay { renderer: Some(renderer), kept, shared, .. } = self else { return Ok(()) };
+        let Overlay { renderer, cached, .. } = self;
         let scale = widgets.pixels_per_point;
         let area = widgets.backdrop.and_then(|b| Some((b.area(scale, image.extent)?, b.color)));
-        let mut draw = |rec: &mut Recorder<'_>,
-                        image: &mut Image,
-                        clear,
-                        primitives: &[ClippedPrimitive]| {
-            rec.draw_over(image, |commands, extent| {
-                if let Some((area, color)) = clear {
-                    fill(shared, commands, area, color);
+        let mut draw =
+            |rec: &mut Recorder<'_>, image: &mut Image, clear, primitives: &[ClippedPrimitive]| {
+                rec.render(Target::color(image), LoadOp::Load, |device, commands, all| {
+                    if let Some((area, color)) = clear {
+                        fill(device, commands, area, color);
+                    }
+                    renderer
+                        .cmd_draw(commands, all.extent, scale, primitives)
+                        .map_err(failed("drawing"))
+                })
+            };
+        match (cached, area) {
+            (Some(cached), Some((place, _))) => {
+                if !cached.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, widgets)) {
+                    draw(rec, &mut cached.image, area, &widgets.within)?;
+                    cached.of = Some(widgets.clone());
                 }
-                renderer.cmd_draw(commands, extent, scale, primitives).map_err(failed("drawing"))
-            })
-        };
-        match (kept, area) {
-            (Some(kept), Some((place, _))) => {
-                if !kept.of.as_ref().is_some_and(|of| Arc::ptr_eq(of, widgets)) {
-                    draw(rec, &mut kept.image, area, &widgets.within)?;
-                    kept.of = Some(widgets.clone());
-                }
-                rec.copy_part(&mut kept.image, image, place);
+                rec.copy_area(&mut cached.image, image, place);
             }
             _ if area.is_some() || !widgets.within.is_empty() => {
                 draw(rec, image, area, &widgets.within)?
@@ -197,8 +202,8 @@ impl Overlay {
     }
 }
 
-/// Makes `area` of what is drawn into one colour.
-fn fill(shared: &Shared, commands: vk::CommandBuffer, area: vk::Rect2D, color: egui::Color32) {
+/// Fills `area` of the target with one colour.
+fn fill(device: &ash::Device, commands: vk::CommandBuffer, area: vk::Rect2D, color: egui::Color32) {
     let float32 = color.to_array().map(|v| f32::from(v) / 255.0);
     let clear = vk::ClearAttachment {
         aspect_mask: vk::ImageAspectFlags::COLOR,
@@ -206,17 +211,13 @@ fn fill(shared: &Shared, commands: vk::CommandBuffer, area: vk::Rect2D, color: e
         clear_value: vk::ClearValue { color: vk::ClearColorValue { float32 } },
     };
     let rect = vk::ClearRect { rect: area, base_array_layer: 0, layer_count: 1 };
-    unsafe { shared.raw.cmd_clear_attachments(commands, &[clear], &[rect]) };
+    unsafe { device.cmd_clear_attachments(commands, &[clear], &[rect]) };
 }
 
 impl Drop for Overlay {
     fn drop(&mut self) {
-        // SAFETY: pictures are done; uploads were waited for.
-        unsafe {
-            let _ = self.shared.raw.queue_wait_idle(*self.shared.lock_queue());
-            drop(self.renderer.take());
-            self.shared.raw.destroy_command_pool(self.pool, None);
-        }
+        // The renderer's buffers may be in use; a lost device has ended that.
+        let _ = unsafe { self.shared.raw.queue_wait_idle(*self.shared.lock_queue()) };
     }
 }
 
@@ -226,7 +227,7 @@ mod tests {
     use egui::{Color32, Rect, pos2};
 
     #[test]
-    fn a_backdrop_ends_where_the_image_does() {
+    fn a_backdrop_is_cut_at_the_images_edges() {
         let of = |min, max, scale| {
             let backdrop = Backdrop { room: Rect::from_min_max(min, max), color: Color32::BLACK };
             let area = backdrop.area(scale, vk::Extent2D { width: 100, height: 80 })?;

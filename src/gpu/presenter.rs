@@ -1,7 +1,8 @@
-//! The thread that shows. It asks the window system for images and gives them back to be seen. A
-//! driver may keep whoever shows a picture until the device is done with all that it was handed,
-//! also with what came after the picture: software ones do. Then the next submission waits for the
-//! queue, but neither the game step nor recording does.
+//! The thread that acquires a window's images and presents them.
+//!
+//! A driver may block a present until the device has finished all that was submitted, also what
+//! came after the image: software drivers do. The next submission then waits for the queue, but
+//! neither the game step nor recording does.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,75 +12,80 @@ use std::time::Duration;
 
 use ash::{khr, vk};
 
-use super::device::Shared;
-use super::recorder::Pending;
+use super::commands::Submission;
+use super::device::SharedDevice;
 use crate::error::{Error, Result};
 
-/// So many pictures may be on their way to the window: slots, each with a semaphore and commands of
-/// its own.
-pub(super) const ON_THEIR_WAY: usize = 2;
+/// Images that may be on their way to the window: slots, each with a semaphore and commands of its
+/// own.
+pub(super) const FRAMES_IN_FLIGHT: usize = 2;
 
-/// What the thread tells.
-pub(super) enum Told {
-    /// May be drawn into once the slot's semaphore is signalled. Commands of the slot have been
-    /// done.
-    Image {
+/// What the thread reports.
+pub(super) enum Event {
+    /// The image may be drawn into once the slot's semaphore is signalled. The slot's commands have
+    /// finished.
+    Acquired {
+        /// The image's place in the swapchain.
         i_image: usize,
+        /// The slot that acquired it.
         i_slot: usize,
     },
-    /// The window is of another size by now, or gone: nothing more is told.
+    /// The window has another size by now, or is gone. The thread has ended.
     Outdated,
+    /// A call failed. The thread has ended.
     Failed(Error),
 }
 
-/// A picture whose commands are with the device.
+/// An image whose commands were submitted.
 pub(super) struct Drawn {
     pub i_image: usize,
     pub i_slot: usize,
-    pub done: Pending,
-    /// Dropped when the window system has it.
+    pub submission: Submission,
+    /// Dropped when the window system has the image.
     pub handed_over: SyncSender<()>,
 }
 
-/// What the thread works with. Whoever owns the swapchain and the semaphores ends it before them.
-pub(super) struct Chain {
+/// The handles that the thread uses. The owner of the swapchain and the semaphores ends the thread
+/// before it destroys them.
+pub(super) struct PresentQueue {
     pub raw: vk::SwapchainKHR,
     pub loader: khr::swapchain::Device,
     /// By slot: the image may be drawn into.
-    pub ready: [vk::Semaphore; ON_THEIR_WAY],
-    /// By image: it may be shown.
+    pub ready: [vk::Semaphore; FRAMES_IN_FLIGHT],
+    /// By image: it may be presented.
     pub drawn: Vec<vk::Semaphore>,
-    pub shared: Arc<Shared>,
+    pub shared: Arc<SharedDevice>,
 }
 
+/// A running thread.
 pub(super) struct Presenter {
-    /// None once it is to end.
+    /// None once the thread is to end.
     drawn: Option<SyncSender<Drawn>>,
-    pub told: Receiver<Told>,
+    pub events: Receiver<Event>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Presenter {
-    pub fn start(chain: Chain) -> Result<Presenter> {
-        let (drawn, from_drawing) = sync_channel(ON_THEIR_WAY);
-        // Every slot's image, and how it ended.
-        let (tell, told) = sync_channel(ON_THEIR_WAY + 1);
+    pub fn start(queue: PresentQueue) -> Result<Presenter> {
+        let (drawn, from_drawing) = sync_channel(FRAMES_IN_FLIGHT);
+        // Room for every slot's image and for the last event.
+        let (report, events) = sync_channel(FRAMES_IN_FLIGHT + 1);
         let work = move || {
-            let ended = match chain.run(&from_drawing, &tell) {
-                Ok(End::Outdated) => Told::Outdated,
-                Ok(End::NotWanted) => return,
-                Err(error) => Told::Failed(error),
+            let last = match queue.run(&from_drawing, &report) {
+                Ok(Exit::Outdated) => Event::Outdated,
+                Ok(Exit::Disconnected) => return,
+                Err(error) => Event::Failed(error),
             };
-            // Nobody listens where nothing is wanted any more.
-            let _ = tell.send(ended);
+            // Sending fails only after the swapchain is dropped, and then nobody needs the event.
+            let _ = report.send(last);
         };
         let thread = std::thread::Builder::new().name("show".into()).spawn(work);
         let thread = thread.map_err(|e| Error::vulkan("starting the show thread", e))?;
-        Ok(Presenter { drawn: Some(drawn), told, thread: Some(thread) })
+        Ok(Presenter { drawn: Some(drawn), events, thread: Some(thread) })
     }
 
-    /// Has it shown. A thread that has ended has told why.
-    pub fn show(&self, drawn: Drawn) {
+    /// Has an image presented. A thread that has ended has reported why.
+    pub fn present(&self, drawn: Drawn) {
         if let Some(send) = &self.drawn {
             let _ = send.send(drawn);
         }
@@ -88,73 +94,73 @@ impl Presenter {
     /// Returns when the thread has ended.
     pub fn end(&mut self) {
         self.drawn = None;
-        // One that panicked has ended as well.
+        // A thread that panicked has ended as well.
         let _ = self.thread.take().map(JoinHandle::join);
     }
 }
 
 /// Why the thread ends.
-enum End {
-    NotWanted,
+enum Exit {
+    Disconnected,
     Outdated,
 }
 
-/// The window system is asked for so long at once, so that what is drawn meanwhile does not wait
-/// longer.
-const PATIENCE: Duration = Duration::from_millis(1);
+/// Longest wait for an image in one call, so that a drawn image does not wait longer to be
+/// presented.
+const ACQUIRE_TIMEOUT: Duration = Duration::from_millis(1);
 
-impl Chain {
-    fn run(&self, drawn: &Receiver<Drawn>, tell: &SyncSender<Told>) -> Result<End> {
-        // Slots without an image, and their last commands.
-        let mut idle: VecDeque<(usize, Option<Pending>)> =
-            (0..ON_THEIR_WAY).map(|i| (i, None)).collect();
+impl PresentQueue {
+    fn run(&self, drawn: &Receiver<Drawn>, report: &SyncSender<Event>) -> Result<Exit> {
+        // Slots without an image, and their last submissions.
+        let mut idle: VecDeque<(usize, Option<Submission>)> =
+            (0..FRAMES_IN_FLIGHT).map(|i| (i, None)).collect();
         let mut wait = Duration::ZERO;
         loop {
-            // What is drawn is shown before more is asked for.
+            // Drawn images are presented before another one is acquired.
             let next = match idle.is_empty() {
                 true => drawn.recv().map_err(|_| RecvTimeoutError::Disconnected),
                 false => drawn.recv_timeout(std::mem::take(&mut wait)),
             };
             match next {
-                Ok(Drawn { i_image, i_slot, done, handed_over }) => {
-                    let is_shown = self.present(i_image);
+                Ok(Drawn { i_image, i_slot, submission, handed_over }) => {
+                    let is_current = self.present(i_image);
                     drop(handed_over);
-                    if !is_shown? {
-                        return Ok(End::Outdated);
+                    if !is_current? {
+                        return Ok(Exit::Outdated);
                     }
-                    idle.push_back((i_slot, Some(done)));
+                    idle.push_back((i_slot, Some(submission)));
                     continue;
                 }
-                Err(RecvTimeoutError::Disconnected) => return Ok(End::NotWanted),
+                Err(RecvTimeoutError::Disconnected) => return Ok(Exit::Disconnected),
                 Err(RecvTimeoutError::Timeout) => {}
             }
             let Some((i_slot, last)) = idle.front() else { continue };
-            // Its semaphore is free once what waited for it is done.
+            // The slot's semaphore is free once the submission that waited for it has finished.
             if let Some(last) = last
                 && !last.is_done()?
             {
-                wait = PATIENCE;
+                wait = ACQUIRE_TIMEOUT;
                 continue;
             }
             let i_slot = *i_slot;
             match self.acquire(i_slot)? {
                 Acquired::Image(i_image) => {
                     idle.pop_front();
-                    if tell.send(Told::Image { i_image, i_slot }).is_err() {
-                        return Ok(End::NotWanted);
+                    if report.send(Event::Acquired { i_image, i_slot }).is_err() {
+                        return Ok(Exit::Disconnected);
                     }
                 }
                 Acquired::Late => {}
-                Acquired::Outdated => return Ok(End::Outdated),
+                Acquired::Outdated => return Ok(Exit::Outdated),
             }
         }
     }
 
     fn acquire(&self, i_slot: usize) -> Result<Acquired> {
-        let (timeout, ready) = (PATIENCE.as_nanos() as u64, self.ready[i_slot]);
+        let (timeout, ready) = (ACQUIRE_TIMEOUT.as_nanos() as u64, self.ready[i_slot]);
         match unsafe { self.loader.acquire_next_image(self.raw, timeout, ready, vk::Fence::null()) }
         {
-            // A picture that does not quite fit is shown all the same: its semaphore is signalled.
+            // A suboptimal image is presented all the same: its semaphore is signalled.
             Ok((i_image, _)) => Ok(Acquired::Image(i_image as usize)),
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(Acquired::Late),
             Err(e) if is_outdated(e) => Ok(Acquired::Outdated),
@@ -162,7 +168,7 @@ impl Chain {
         }
     }
 
-    /// False where the window is another by now.
+    /// Presents an image; false where the window has another size by now.
     fn present(&self, i_image: usize) -> Result<bool> {
         let (drawn, chains, images) = ([self.drawn[i_image]], [self.raw], [i_image as u32]);
         let info = vk::PresentInfoKHR::default()

@@ -1,33 +1,37 @@
-//! The surface that a window system gives: what of a window Vulkan knows, and what it takes.
+//! The Vulkan surface of a window, and its present modes and formats.
 
+use std::ffi::CStr;
 use std::sync::Arc;
 
 use ash::{khr, vk};
 use raw_window_handle::{RawDisplayHandle, RawWindowHandle};
 
+use super::call::Call;
 use super::device::Device;
+use super::image::TargetFormat;
 use super::instance::Instance;
-use super::memory::TargetFormat;
 use crate::error::{Error, Result};
 
-/// When a picture that is ready is shown.
+/// When a presented image becomes visible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PresentMode {
-    /// At the next refresh, one after the other: every device has it.
+    /// At the next refresh, one image after the other: every device has it.
     Fifo,
-    /// At the next refresh, the newest.
+    /// At the next refresh, the newest image.
     Mailbox,
     /// At once.
     Immediate,
 }
 
 impl PresentMode {
+    /// All modes with their names on the command line.
     pub const NAMES: [(&'static str, PresentMode); 3] = [
         ("fifo", PresentMode::Fifo),
         ("mailbox", PresentMode::Mailbox),
         ("immediate", PresentMode::Immediate),
     ];
 
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize].0
     }
@@ -41,16 +45,20 @@ impl PresentMode {
     }
 }
 
-/// A window, as Vulkan knows it. The window must outlive it.
+/// The surface of a window, which must outlive it.
 pub struct Surface {
     pub(super) raw: vk::SurfaceKHR,
     loader: khr::surface::Instance,
-    /// Outlives it.
-    _instance: Arc<Instance>,
 }
 
+/// Values are shown as the image holds them.
+pub(super) const COLOR_SPACE: vk::ColorSpaceKHR = vk::ColorSpaceKHR::SRGB_NONLINEAR;
+
 impl Surface {
-    /// An instance that can show pictures on `display`, and the surface of a window there.
+    /// Opens an instance that can present to `display`, and the surface of a window there.
+    ///
+    /// # Errors
+    /// Vulkan has no extension for the window system, or the driver refuses the window.
     pub fn open(
         validation: bool,
         display: RawDisplayHandle,
@@ -60,62 +68,58 @@ impl Surface {
             Error::vulkan("window extensions", format!("no Vulkan for this window system: {e}"))
         })?;
         // SAFETY: the list is of static C strings.
-        let names: Vec<_> =
-            wanted.iter().map(|name| unsafe { std::ffi::CStr::from_ptr(*name) }).collect();
+        let names: Vec<_> = wanted.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect();
         let instance = Instance::with_extensions(validation, &names)?;
-        // SAFETY: both handles are those of a living window; whoever holds the surface keeps it.
-        let raw = unsafe {
-            ash_window::create_surface(&instance.entry, &instance.raw, display, window, None)
-        }
-        .map_err(|e| Error::vulkan("creating the window's surface", e))?;
-        let loader = khr::surface::Instance::new(&instance.entry, &instance.raw);
-        Ok((instance.clone(), Surface { raw, loader, _instance: instance }))
+        let (entry, raw) = (&instance.vulkan.entry, &instance.vulkan.raw);
+        let loader = khr::surface::Instance::new(entry, raw);
+        // SAFETY: both handles are those of a living window, which the caller keeps.
+        let raw = unsafe { ash_window::create_surface(entry, raw, display, window, None) }
+            .of_call("creating the window's surface", "")?;
+        Ok((instance, Surface { raw, loader }))
     }
 
-    /// Whether `device` can show pictures here; an error that says so where it cannot.
+    /// Checks that `device` can present here.
+    ///
+    /// # Errors
+    /// It cannot.
     pub fn check(&self, device: &Device) -> Result<()> {
-        let family = device.shared().queue_family;
-        let can = unsafe {
-            self.loader.get_physical_device_surface_support(device.physical(), family, self.raw)
-        };
-        match can {
-            Ok(true) if device.info().has_swapchain => Ok(()),
-            Ok(_) => Err(Error::vulkan(
-                "window",
-                format!("{} cannot show pictures in it", device.info().name),
-            )),
-            Err(e) => Err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR", e)),
+        let (physical, family) = (device.physical(), device.shared().queue_family);
+        let can =
+            unsafe { self.loader.get_physical_device_surface_support(physical, family, self.raw) };
+        match can.of_call("vkGetPhysicalDeviceSurfaceSupportKHR", "")? {
+            true if device.info().has_swapchain => Ok(()),
+            _ => {
+                let what = format!("{} cannot present to it", device.info().name);
+                Err(Error::vulkan("window", what))
+            }
         }
     }
 
-    /// The modes that `device` has here, of those that nimbus knows.
+    /// Returns the modes that `device` has here, of those that nimbus knows.
+    ///
+    /// # Errors
+    /// The device or the surface is lost.
     pub fn modes(&self, device: &Device) -> Result<Vec<PresentMode>> {
         let found = unsafe {
             self.loader.get_physical_device_surface_present_modes(device.physical(), self.raw)
-        };
-        let found =
-            found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfacePresentModesKHR", e))?;
-        Ok(PresentMode::NAMES
-            .map(|(_, mode)| mode)
-            .into_iter()
-            .filter(|m| found.contains(&m.raw()))
-            .collect())
+        }
+        .of_call("vkGetPhysicalDeviceSurfacePresentModesKHR", "")?;
+        let modes = PresentMode::NAMES.map(|(_, mode)| mode).into_iter();
+        Ok(modes.filter(|mode| found.contains(&mode.raw())).collect())
     }
 
     pub(super) fn capabilities(&self, device: &Device) -> Result<vk::SurfaceCapabilitiesKHR> {
         unsafe { self.loader.get_physical_device_surface_capabilities(device.physical(), self.raw) }
-            .map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", e))
+            .of_call("vkGetPhysicalDeviceSurfaceCapabilitiesKHR", "")
     }
 
-    /// What of its formats holds bytes as they are shown.
+    /// Returns a format of the surface whose bytes are shown as they are.
     pub(super) fn format(&self, device: &Device) -> Result<TargetFormat> {
         let found =
-            unsafe { self.loader.get_physical_device_surface_formats(device.physical(), self.raw) };
-        let found = found.map_err(|e| Error::vulkan("vkGetPhysicalDeviceSurfaceFormatsKHR", e))?;
+            unsafe { self.loader.get_physical_device_surface_formats(device.physical(), self.raw) }
+                .of_call("vkGetPhysicalDeviceSurfaceFormatsKHR", "")?;
         let has = |format: &TargetFormat| {
-            let of =
-                |f: &vk::SurfaceFormatKHR| f.format == format.raw() && f.color_space == COLOR_SPACE;
-            found.iter().any(of)
+            found.iter().any(|f| f.format == format.raw() && f.color_space == COLOR_SPACE)
         };
         [TargetFormat::Rgba8, TargetFormat::Bgra8].into_iter().find(has).ok_or_else(|| {
             Error::vulkan("window", "it takes neither R8G8B8A8_UNORM nor B8G8R8A8_UNORM in sRGB")
@@ -125,20 +129,17 @@ impl Surface {
 
 impl Drop for Surface {
     fn drop(&mut self) {
-        // SAFETY: its swapchains are gone: who has both drops them first. The instance is alive.
+        // SAFETY: the owner of both drops the swapchain first; the instance is never destroyed.
         unsafe { self.loader.destroy_surface(self.raw, None) };
     }
 }
-
-/// Bytes are shown as they are.
-pub(super) const COLOR_SPACE: vk::ColorSpaceKHR = vk::ColorSpaceKHR::SRGB_NONLINEAR;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn modes_have_their_names() {
+    fn present_modes_have_their_own_names() {
         for (name, mode) in PresentMode::NAMES {
             assert_eq!(mode.name(), name);
         }

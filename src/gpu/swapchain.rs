@@ -1,4 +1,4 @@
-//! Pictures in a window: the images that go to and fro between it and nimbus.
+//! The images of a window: acquired, drawn into and presented.
 
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
@@ -6,54 +6,63 @@ use std::time::Duration;
 
 use ash::{khr, vk};
 
-use super::device::{Device, Shared};
-use super::memory::{Image, TargetFormat};
-use super::presenter::{Chain, Drawn, ON_THEIR_WAY, Presenter, Told};
-use super::recorder::{Barriers, Commands, Pending, Recorder};
+use super::barriers::Barriers;
+use super::call::Call;
+use super::commands::{Commands, Submission};
+use super::device::{Device, Owned, SharedDevice};
+use super::image::{Image, TargetFormat};
+use super::presenter::{Drawn, Event, FRAMES_IN_FLIGHT, PresentQueue, Presenter};
+use super::recorder::Recorder;
 use super::surface::{COLOR_SPACE, PresentMode, Surface};
 use crate::error::{Error, Result};
 
-/// What became of a picture.
+/// The outcome of showing a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Shown {
-    Yes,
-    /// The window system had no image to draw into for [`PATIENCE`]: nothing of the window is seen.
+pub enum PresentOutcome {
+    /// The picture is on its way to the window.
+    Presented,
+    /// The window system had no image to draw into within a quarter of a second: the window is
+    /// hidden.
     Late,
-    /// The window is of another size by now, or nothing of it is seen: the swapchain is to be made
-    /// anew.
+    /// The window has another size by now, or is hidden: make a new swapchain.
     Outdated,
 }
 
-/// A window behind others may get no images at all; who waits for one could not be told to stop.
+/// A window behind others may get no images at all; a thread that waited longer for one could not
+/// be stopped.
 const PATIENCE: Duration = Duration::from_millis(250);
 
 /// The images of a window.
 pub struct Swapchain {
-    /// One for each picture on its way.
+    /// By slot: one for each frame in flight.
     commands: Vec<Commands>,
     images: Vec<Image>,
-    /// By commands: the image may be drawn into.
-    ready: Vec<vk::Semaphore>,
-    /// By image: it may be shown.
-    drawn: Vec<vk::Semaphore>,
-    /// Asks for images and shows them; none until all of the above is there.
+    /// By slot: the image may be drawn into.
+    ready: Vec<Owned<vk::Semaphore>>,
+    /// By image: it may be presented.
+    drawn: Vec<Owned<vk::Semaphore>>,
+    /// The thread that acquires and presents; none until all of the above is there.
     presenter: Option<Presenter>,
     raw: vk::SwapchainKHR,
     loader: khr::swapchain::Device,
     format: TargetFormat,
     takes_copies: bool,
-    /// The picture that was shown last: when it is drawn, and when the window system has it.
-    last: Option<(Pending, Receiver<()>)>,
-    /// An image that nothing was drawn into after all: its slot.
-    stray: Option<usize>,
-    /// The presenter has told how it ended.
+    /// The last picture's submission; its channel closes when the window system has the image.
+    last: Option<(Submission, Receiver<()>)>,
+    /// The slot of an acquired image that was not drawn into, because recording failed.
+    i_unused_slot: Option<usize>,
+    /// Whether the presenter has reported its end.
     is_over: bool,
-    shared: Arc<Shared>,
+    shared: Arc<SharedDevice>,
 }
 
 impl Swapchain {
-    /// For `surface` as large as it is; `size` where the window system leaves that to us. None
-    /// where nothing of the window is seen: it is minimised. The one before must be gone.
+    /// Makes the images of `surface`, as large as the window; `size` counts where the window
+    /// system leaves it open. None where the window is minimised. An earlier swapchain of the
+    /// surface must be gone.
+    ///
+    /// # Errors
+    /// The device or the surface is lost, or the window takes none of our formats.
     pub fn new(
         device: &Device,
         surface: &Surface,
@@ -72,10 +81,9 @@ impl Swapchain {
             .into_iter()
             .find(|a| capabilities.supported_composite_alpha.contains(*a))
             .unwrap_or(vk::CompositeAlphaFlagsKHR::PRE_MULTIPLIED);
-        // All windows are drawn into, nearly all are copied to as well.
+        // Every window can be drawn into, nearly every one can be copied to.
         let usage = vk::ImageUsageFlags::COLOR_ATTACHMENT
             | (vk::ImageUsageFlags::TRANSFER_DST & capabilities.supported_usage_flags);
-        let takes_copies = usage.contains(vk::ImageUsageFlags::TRANSFER_DST);
         let info = vk::SwapchainCreateInfoKHR::default()
             .surface(surface.raw)
             .min_image_count((capabilities.min_image_count + 1).min(most))
@@ -89,22 +97,21 @@ impl Swapchain {
             .present_mode(mode.raw())
             .clipped(true);
         let shared = device.shared().clone();
-        let loader = khr::swapchain::Device::new(&shared.instance.raw, &shared.raw);
-        let raw = unsafe { loader.create_swapchain(&info, None) }
-            .map_err(|e| Error::vulkan("vkCreateSwapchainKHR", e))?;
-        let (commands, images, ready, drawn) = (vec![], vec![], vec![], vec![]);
+        let loader = khr::swapchain::Device::new(&shared.instance.vulkan.raw, &shared.raw);
+        let raw =
+            unsafe { loader.create_swapchain(&info, None) }.of_call("vkCreateSwapchainKHR", "")?;
         let mut chain = Swapchain {
-            commands,
-            images,
-            ready,
-            drawn,
+            commands: vec![],
+            images: vec![],
+            ready: vec![],
+            drawn: vec![],
             presenter: None,
             raw,
             loader,
             format,
-            takes_copies,
+            takes_copies: usage.contains(vk::ImageUsageFlags::TRANSFER_DST),
             last: None,
-            stray: None,
+            i_unused_slot: None,
             is_over: false,
             shared,
         };
@@ -114,112 +121,105 @@ impl Swapchain {
 
     fn fill(&mut self, device: &Device, extent: vk::Extent2D) -> Result<()> {
         let images = unsafe { self.loader.get_swapchain_images(self.raw) }
-            .map_err(|e| Error::vulkan("vkGetSwapchainImagesKHR", e))?;
+            .of_call("vkGetSwapchainImagesKHR", "")?;
+        let (shared, kind) = (&self.shared, vk::SemaphoreType::BINARY);
         for raw in images {
-            self.images.push(Image::of_swapchain(
-                &self.shared,
-                "window.image",
-                raw,
-                extent,
-                self.format,
-            )?);
-            self.drawn.push(self.semaphore("window.drawn")?);
+            let image = Image::of_swapchain(shared, "window.image", raw, extent, self.format)?;
+            self.images.push(image);
+            self.drawn.push(shared.semaphore("window.drawn", kind)?);
         }
-        for _ in 0..ON_THEIR_WAY {
+        for _ in 0..FRAMES_IN_FLIGHT {
             self.commands.push(Commands::new(device, "window.show")?);
-            self.ready.push(self.semaphore("window.ready")?);
+            self.ready.push(shared.semaphore("window.ready", kind)?);
         }
-        self.presenter = Some(Presenter::start(Chain {
+        self.presenter = Some(Presenter::start(PresentQueue {
             raw: self.raw,
             loader: self.loader.clone(),
-            ready: std::array::from_fn(|i| self.ready[i]),
-            drawn: self.drawn.clone(),
+            ready: std::array::from_fn(|i| self.ready[i].raw),
+            drawn: self.drawn.iter().map(|semaphore| semaphore.raw).collect(),
             shared: self.shared.clone(),
         })?);
         Ok(())
     }
 
-    fn semaphore(&self, name: &str) -> Result<vk::Semaphore> {
-        let made =
-            unsafe { self.shared.raw.create_semaphore(&vk::SemaphoreCreateInfo::default(), None) };
-        let semaphore = made.map_err(|e| Error::vulkan("vkCreateSemaphore", e))?;
-        self.shared.name(semaphore, name);
-        Ok(semaphore)
-    }
-
+    /// Returns the format of the images.
     pub fn format(&self) -> TargetFormat {
         self.format
     }
 
-    /// Whether images may be copied to its own.
+    /// Whether the images can be copied to.
     pub fn takes_copies(&self) -> bool {
         self.takes_copies
     }
 
-    /// Width and height in pixels.
+    /// Returns width and height in pixels.
     pub fn size(&self) -> [u32; 2] {
         self.images.first().map_or([0, 0], |image| image.size().into())
     }
 
-    /// Has `draw` fill all of an image, and has it shown. What `draw` records is with the device
-    /// when this returns, ahead of whatever is submitted next.
+    /// Has `draw` fill an image, and has it presented. When this returns, `draw`'s commands are
+    /// submitted, ahead of the next submission.
+    ///
+    /// # Errors
+    /// `draw` fails, or the device is lost.
     pub fn show(
         &mut self,
         draw: impl FnOnce(&mut Recorder<'_>, &mut Image) -> Result<()>,
-    ) -> Result<Shown> {
-        let Some(presenter) = &self.presenter else { return Ok(Shown::Outdated) };
-        let (i_image, i_slot) = match presenter.told.recv_timeout(PATIENCE) {
-            Ok(Told::Image { i_image, i_slot }) => (i_image, i_slot),
-            Ok(Told::Failed(error)) => {
-                self.is_over = true;
-                return Err(error);
-            }
-            Ok(Told::Outdated) => {
-                self.is_over = true;
-                return Ok(Shown::Outdated);
-            }
-            Err(RecvTimeoutError::Timeout) => return Ok(Shown::Late),
-            // It has told that before, unless it panicked.
-            Err(RecvTimeoutError::Disconnected) if self.is_over => return Ok(Shown::Outdated),
+    ) -> Result<PresentOutcome> {
+        let Some(presenter) = &self.presenter else { return Ok(PresentOutcome::Outdated) };
+        let event = presenter.events.recv_timeout(PATIENCE);
+        let was_over = self.is_over;
+        self.is_over |= matches!(event, Ok(Event::Failed(_) | Event::Outdated));
+        let (i_image, i_slot) = match event {
+            Ok(Event::Acquired { i_image, i_slot }) => (i_image, i_slot),
+            Ok(Event::Failed(error)) => return Err(error),
+            Ok(Event::Outdated) => return Ok(PresentOutcome::Outdated),
+            Err(RecvTimeoutError::Timeout) => return Ok(PresentOutcome::Late),
+            // A thread that ended has reported why, unless it panicked.
+            Err(RecvTimeoutError::Disconnected) if was_over => return Ok(PresentOutcome::Outdated),
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(Error::Fault { what: "the show thread panicked".to_owned() });
             }
         };
-        self.stray = Some(i_slot);
+        self.i_unused_slot = Some(i_slot);
         let (commands, image) = (&mut self.commands[i_slot], &mut self.images[i_image]);
         commands.record(Barriers::Placed, |rec| {
             draw(rec, image)?;
-            rec.show(image);
+            rec.present(image);
             Ok(())
         })?;
-        let done = commands.submit_between(Some(self.ready[i_slot]), Some(self.drawn[i_image]))?;
-        self.stray = None;
+        let (ready, drawn) = (self.ready[i_slot].raw, self.drawn[i_image].raw);
+        let submission = commands.submit_between(Some(ready), Some(drawn))?;
+        self.i_unused_slot = None;
         let (handed_over, is_handed_over) = sync_channel(0);
-        self.last = Some((done.clone(), is_handed_over));
-        presenter.show(Drawn { i_image, i_slot, done, handed_over });
-        Ok(Shown::Yes)
+        self.last = Some((submission.clone(), is_handed_over));
+        presenter.present(Drawn { i_image, i_slot, submission, handed_over });
+        Ok(PresentOutcome::Presented)
     }
 
-    /// Returns when the last picture has been drawn and handed over to the window system.
+    /// Returns when the last picture has been drawn and handed to the window system.
+    ///
+    /// # Errors
+    /// The device is lost.
     pub fn wait(&self) -> Result<()> {
-        let Some((done, is_handed_over)) = &self.last else { return Ok(()) };
-        done.wait()?;
-        // Nothing is ever sent: the other end goes when it is, or with the thread that did not come
-        // to it. A window system that keeps the thread is not waited for longer than for an image.
+        let Some((submission, is_handed_over)) = &self.last else { return Ok(()) };
+        submission.wait()?;
+        // Nothing is ever sent: the channel closes when the image is handed over, or with the
+        // thread. A window system that blocks the thread is waited for as long as for an image.
         let _ = is_handed_over.recv_timeout(PATIENCE);
         Ok(())
     }
 
-    /// Waits on the device for images that nobody drew into: a semaphore that is still to be
-    /// signalled may not go.
+    /// Waits on the device for acquired images that were not drawn into: a semaphore that is yet
+    /// to be signalled must not be destroyed.
     fn take_back(&self, presenter: &Presenter) {
-        let told = presenter.told.try_iter().filter_map(|told| match told {
-            Told::Image { i_slot, .. } => Some(i_slot),
-            Told::Outdated | Told::Failed(_) => None,
+        let acquired = presenter.events.try_iter().filter_map(|event| match event {
+            Event::Acquired { i_slot, .. } => Some(i_slot),
+            Event::Outdated | Event::Failed(_) => None,
         });
-        for i_slot in told.chain(self.stray) {
+        for i_slot in acquired.chain(self.i_unused_slot) {
             let wait = [vk::SemaphoreSubmitInfo::default()
-                .semaphore(self.ready[i_slot])
+                .semaphore(self.ready[i_slot].raw)
                 .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
             let info = [vk::SubmitInfo2::default().wait_semaphore_infos(&wait)];
             // A lost device signals nothing any more.
@@ -236,21 +236,18 @@ impl Drop for Swapchain {
             presenter.end();
             self.take_back(&presenter);
         }
-        // SAFETY: all that was submitted or shown ends before what it uses; a lost device has ended
-        // it.
+        // SAFETY: all submissions and presents end before the objects that they use; a lost device
+        // has ended them.
         unsafe {
             let _ = self.shared.raw.queue_wait_idle(*self.shared.lock_queue());
             self.commands.clear();
             self.images.clear();
-            for semaphore in self.ready.drain(..).chain(self.drawn.drain(..)) {
-                self.shared.raw.destroy_semaphore(semaphore, None);
-            }
             self.loader.destroy_swapchain(self.raw, None);
         }
     }
 }
 
-/// What the window system says; where it leaves the size open, `size` within its limits.
+/// Returns the window system's extent; where that is open, `size` within the limits.
 fn extent_of(capabilities: &vk::SurfaceCapabilitiesKHR, size: [u32; 2]) -> vk::Extent2D {
     let current = capabilities.current_extent;
     if current.width != u32::MAX {
@@ -268,7 +265,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_window_system_has_the_first_word_on_the_size() {
+    fn the_window_systems_size_comes_before_ours() {
         let of = |width, height| vk::Extent2D { width, height };
         let mut capabilities = vk::SurfaceCapabilitiesKHR {
             current_extent: of(640, 480),

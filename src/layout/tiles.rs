@@ -20,7 +20,7 @@ record! {
 
 record! {
     /// What of a splat is textured (docs/model.md §11 "texture"); the shaders' Sheet.
-    pub struct SplatSheetRecord {
+    pub struct SplatTextureRecord {
         turn: [f32; 4],
         gain: [f32; 3],
         /// Its level's first texel in the pool, and log2 of the level's side.

@@ -8,9 +8,10 @@
 //! at each layer, of the film's format once, and what is left out behind a full pixel.
 
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target,
+    BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, Kernel, LoadOp, Recorder,
+    Target,
 };
 use crate::layout::record;
 
@@ -43,7 +44,7 @@ impl Chunks {
                 "chunks",
                 Push::FIELDS,
                 &[(0, 1)],
-                (FORMAT, Meet::Hide),
+                (FORMAT, BlendMode::DepthOnly),
             )?,
             show: DrawPipeline::new(
                 device,
@@ -51,7 +52,7 @@ impl Chunks {
                 "chunks",
                 Push::FIELDS,
                 &[(0, 0)],
-                (format, Meet::Over),
+                (format, BlendMode::Over),
             )?,
         })
     }
@@ -83,7 +84,7 @@ impl Chunks {
         saturated: f64,
     ) -> Result<()> {
         let push = Push { width: target.color.size().0, saturated: saturated as f32 };
-        rec.draw(&self.pick, target, Start::Load, &[composed], &push, Instances::Known(1))
+        rec.draw(&self.pick, target, LoadOp::Load, &[composed], &push, InstanceCount::Known(1))
     }
 
     /// Draws `composed` over `target`, or alone where `start` clears it.
@@ -91,10 +92,10 @@ impl Chunks {
         &self,
         rec: &mut Recorder<'_>,
         composed: &Buffer,
-        (target, start): (Target<'_>, Start),
+        (target, start): (Target<'_>, LoadOp),
     ) -> Result<()> {
         let target = Target::color(target.color);
         let push = Push { width: target.color.size().0, saturated: 0.0 };
-        rec.draw(&self.show, target, start, &[composed], &push, Instances::Known(1))
+        rec.draw(&self.show, target, start, &[composed], &push, InstanceCount::Known(1))
     }
 }

@@ -6,7 +6,7 @@
 //! none that a pixel shows; with a smallest size, what is left out for it is bounded there.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, MemoryUsage, Recorder};
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
 
@@ -107,9 +107,9 @@ impl Cull {
                 device,
                 "cull.masks",
                 n_tiles * u64::from(WORDS),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
-            totals: Buffer::new::<u32>(device, "cull.totals", n_tiles, Place::Device)?,
+            totals: Buffer::new::<u32>(device, "cull.totals", n_tiles, MemoryUsage::Device)?,
             max_groups: device.limits().max_workgroups_x,
         })
     }

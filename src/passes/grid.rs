@@ -6,7 +6,7 @@
 //! half a quantum of the fixed-point sum a deposit.
 
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, MemoryUsage, Recorder};
 use crate::layout::frame::GridRecord;
 use crate::layout::record;
 
@@ -46,7 +46,7 @@ impl Grid {
                 &[("WORKGROUP", width)],
             )?,
             resolve: Kernel::new(device, compiler, "grid.resolve", ResolvePush::FIELDS, &[])?,
-            sums: Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, Place::Device)?,
+            sums: Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, MemoryUsage::Device)?,
             room: n_cells,
         })
     }
@@ -58,7 +58,7 @@ impl Grid {
 
     /// Room for `n_cells` cells.
     pub fn make_room(&mut self, device: &Device, n_cells: u64) -> Result<()> {
-        self.sums = Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, Place::Device)?;
+        self.sums = Buffer::new::<[u32; 2]>(device, "grid.sums", n_cells, MemoryUsage::Device)?;
         self.room = n_cells;
         Ok(())
     }

@@ -10,9 +10,10 @@
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Buffer, Compiler, Device, DrawPipeline, Instances, Kernel, Meet, Recorder, Start, Target,
+    BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, Kernel, LoadOp, Recorder,
+    Target,
 };
 use crate::layout::record;
 
@@ -63,7 +64,7 @@ impl Impostors {
         format: TargetFormat,
         behind: bool,
     ) -> Result<Impostors> {
-        let meet = if behind { Meet::OverNearer } else { Meet::Over };
+        let meet = if behind { BlendMode::OverTested } else { BlendMode::Over };
         Ok(Impostors {
             part: Kernel::new(device, compiler, "impostors.part", PartPush::FIELDS, &[])?,
             show: DrawPipeline::new(
@@ -111,8 +112,8 @@ impl Impostors {
     ) -> Result<()> {
         let (width, height) = target.color.size();
         let push = push(shown, [width, height]);
-        let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
-        rec.draw(&self.show, target, start, &[shell], &push, Instances::Known(1))
+        let start = if target.depth.is_some() { LoadOp::Load } else { LoadOp::Clear };
+        rec.draw(&self.show, target, start, &[shell], &push, InstanceCount::Known(1))
     }
 }
 

@@ -8,9 +8,10 @@
 //! of a difference besides 11 roundings of what it is of.
 
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Buffer, Compiler, Device, DrawPipeline, Image, Instances, Meet, Recorder, Start, Target,
+    BlendMode, Buffer, Compiler, Device, DrawPipeline, Image, InstanceCount, LoadOp, Recorder,
+    Target,
 };
 use crate::layout::record;
 
@@ -79,7 +80,7 @@ impl Present {
             "present",
             Push::FIELDS,
             &[(0, kind)],
-            (to, Meet::Over),
+            (to, BlendMode::Over),
         )?;
         Ok(Present { pipeline })
     }
@@ -105,10 +106,10 @@ impl Present {
         rec.draw(
             &self.pipeline,
             Target::color(into),
-            Start::Overwrite,
+            LoadOp::DontCare,
             &pictures,
             &push,
-            Instances::Known(1),
+            InstanceCount::Known(1),
         )
     }
 }

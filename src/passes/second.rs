@@ -67,7 +67,7 @@ impl Turns {
             ("BATCH_TURNS", self.batch),
             ("MAX_ASIDE", self.aside),
             ("N_KEPT", self.kept),
-            ("TOGETHER", u32::from(device.limits().subgroup_arithmetic)),
+            ("TOGETHER", u32::from(device.limits().has_subgroup_arithmetic)),
         ]
     }
 }
@@ -237,6 +237,6 @@ fn of_round<P: Pod>(
 ) -> Result<()> {
     match i_round {
         0 => rec.dispatch_groups(kernel, buffers, push, n_blocks),
-        _ => rec.dispatch_counted(kernel, buffers, push, (buffers[15], 3 * i_round)),
+        _ => rec.dispatch_indirect(kernel, buffers, push, (buffers[15], 3 * i_round)),
     }
 }

@@ -7,7 +7,7 @@
 //! bits).
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, MemoryUsage, Recorder};
 use crate::layout::record;
 
 record! {
@@ -92,13 +92,13 @@ impl Sort {
                 device,
                 "sort.table",
                 u64::from(n_max.div_ceil(TILE)) << digit_bits,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             swapped: Buffer::new::<[u32; 2]>(
                 device,
                 "sort.swapped",
                 u64::from(n_max),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             digit_bits,
         })
@@ -173,14 +173,14 @@ impl Sort {
                 Entries::Counted(c) => {
                     let push = DigitPush { n_entries: 0, i_count: c.i_count, shift };
                     let tiles = (c.buffer, c.i_groups);
-                    rec.dispatch_counted(
+                    rec.dispatch_indirect(
                         &self.count,
                         &[c.buffer, from, &self.table],
                         &push,
                         tiles,
                     )?;
                     rec.dispatch_groups(&self.scan, &[c.buffer, &self.table], &push, 1)?;
-                    rec.dispatch_counted(
+                    rec.dispatch_indirect(
                         &self.scatter,
                         &[c.buffer, from, &self.table, to],
                         &push,

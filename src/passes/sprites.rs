@@ -8,9 +8,10 @@
 //! rounding at each layer.
 
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Amount, Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target,
+    BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, RecordCount,
+    Recorder, Target,
 };
 use crate::layout::cull::KeptRecord;
 use crate::layout::frame::CameraRecord;
@@ -27,7 +28,7 @@ pub struct Sprites {
 /// A part of the entries: so many, from the first one on; and the particles' first facet.
 #[derive(Clone, Copy)]
 pub struct Chunk<'a> {
-    pub instances: Instances<'a>,
+    pub instances: InstanceCount<'a>,
     pub i_first: u32,
     pub i_first_facet: u32,
 }
@@ -46,7 +47,7 @@ impl Sprites {
     ) -> Result<Sprites> {
         let constants =
             constants([lit, behind, grouped, weighted, textured, threshold, ellipsoids]);
-        let meet = if behind { Meet::OverNearer } else { Meet::Over };
+        let meet = if behind { BlendMode::OverTested } else { BlendMode::Over };
         let pipeline = DrawPipeline::new(
             device,
             compiler,
@@ -72,7 +73,7 @@ impl Sprites {
             "sprites",
             Push::FIELDS,
             &constants,
-            (format, Meet::UnderNearer),
+            (format, BlendMode::UnderTested),
         )?;
         Ok(Sprites { pipeline })
     }
@@ -91,9 +92,9 @@ impl Sprites {
         target: Target<'_>,
         camera: &CameraRecord,
         [cutoff, threshold]: [f64; 2],
-        counts: (Amount<'_>, u32),
+        counts: (RecordCount<'_>, u32),
     ) -> Result<()> {
-        let start = if target.depth.is_some() { Start::Load } else { Start::Clear };
+        let start = if target.depth.is_some() { LoadOp::Load } else { LoadOp::Clear };
         self.record_from(rec, buffers, (target, start), camera, [cutoff, threshold], counts)
     }
 
@@ -102,14 +103,14 @@ impl Sprites {
         &self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 9],
-        (target, start): (Target<'_>, Start),
+        (target, start): (Target<'_>, LoadOp),
         camera: &CameraRecord,
         [cutoff, threshold]: [f64; 2],
-        (n_drawn, i_first_facet): (Amount<'_>, u32),
+        (n_drawn, i_first_facet): (RecordCount<'_>, u32),
     ) -> Result<()> {
         let instances = match n_drawn {
-            Amount::Known(n) => Instances::Known(n),
-            Amount::Counted(kept) => Instances::Counted(kept, KeptRecord::I_DRAW),
+            RecordCount::Known(n) => InstanceCount::Known(n),
+            RecordCount::Indirect(kept) => InstanceCount::Indirect(kept, KeptRecord::I_DRAW),
         };
         let all = Chunk { instances, i_first: 0, i_first_facet };
         self.record_chunk(rec, buffers, (target, start), camera, [cutoff, threshold], all)
@@ -120,7 +121,7 @@ impl Sprites {
         &self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 9],
-        (target, start): (Target<'_>, Start),
+        (target, start): (Target<'_>, LoadOp),
         camera: &CameraRecord,
         [cutoff, threshold]: [f64; 2],
         Chunk { instances, i_first, i_first_facet }: Chunk<'_>,

@@ -6,9 +6,9 @@
 //! the cosine, depth likewise, and the target's rounding.
 
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target,
+    BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, Recorder, Target,
 };
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
@@ -36,7 +36,7 @@ impl Surfaces {
             "surfaces",
             Push::FIELDS,
             &constants,
-            (format, Meet::Replace),
+            (format, BlendMode::Opaque),
         )?;
         Ok(Surfaces { pipeline })
     }
@@ -57,10 +57,10 @@ impl Surfaces {
         rec.draw(
             &self.pipeline,
             target,
-            Start::Clear,
+            LoadOp::Clear,
             &buffers,
             &push,
-            Instances::Known(n_surfaces),
+            InstanceCount::Known(n_surfaces),
         )
     }
 }

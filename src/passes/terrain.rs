@@ -7,9 +7,9 @@
 //! a pixel, as exactly as Vulkan promises vertices to be placed; and the target's rounding.
 
 use crate::error::Result;
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Buffer, Compiler, Device, DrawPipeline, Instances, Meet, Recorder, Start, Target,
+    BlendMode, Buffer, Compiler, Device, DrawPipeline, InstanceCount, LoadOp, Recorder, Target,
 };
 use crate::layout::frame::CameraRecord;
 use crate::layout::record;
@@ -46,7 +46,7 @@ impl Terrain {
             "terrain",
             Push::FIELDS,
             &constants,
-            (format, Meet::Replace),
+            (format, BlendMode::Opaque),
         )?;
         Ok(Terrain { pipeline })
     }
@@ -57,7 +57,7 @@ impl Terrain {
         &self,
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 3],
-        (target, start): (Target<'_>, Start),
+        (target, start): (Target<'_>, LoadOp),
         camera: &CameraRecord,
         piece: Piece,
     ) -> Result<()> {
@@ -65,6 +65,6 @@ impl Terrain {
         let pixel = [2.0 * camera.tan_x / width as f32, 2.0 * camera.tan_y / height as f32];
         let Piece { i_region, i_first_ground, n_cells } = piece;
         let push = Push { camera: *camera, pixel, i_region, i_first_ground };
-        rec.draw(&self.pipeline, target, start, &buffers, &push, Instances::Known(n_cells))
+        rec.draw(&self.pipeline, target, start, &buffers, &push, InstanceCount::Known(n_cells))
     }
 }

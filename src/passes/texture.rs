@@ -7,7 +7,7 @@
 //! 2⁻¹².
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Compiler, Device, Kernel, Place, Recorder};
+use crate::gpu::{Buffer, Compiler, Device, Kernel, MemoryUsage, Recorder};
 use crate::layout::record;
 
 record! {
@@ -52,7 +52,7 @@ impl Texture {
                 device,
                 "texture.work",
                 u64::from(POOL_TEXELS / 2),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
         })
     }

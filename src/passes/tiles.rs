@@ -8,10 +8,10 @@
 mod division;
 
 use crate::error::{Error, Result};
-use crate::gpu::device::Limits;
-use crate::gpu::memory::{TargetFormat, has_depth24};
-use crate::gpu::{Amount, Buffer, Compiler, Device, Kernel, Place, Recorder, Target};
-use crate::layout::tiles::{RoundRecord, SplatRecord, SplatSheetRecord};
+use crate::gpu::Limits;
+use crate::gpu::{Buffer, Compiler, Device, Kernel, MemoryUsage, RecordCount, Recorder, Target};
+use crate::gpu::{TargetFormat, has_depth24};
+use crate::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
 use crate::layout::{cull::KeptRecord, frame::CameraRecord, record};
 
 pub use division::{Division, RUN, TILES_ACROSS, invocations};
@@ -250,15 +250,16 @@ impl Tiles {
             ("THRESHOLD", threshold),
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", together),
-            ("WORDS_64", u32::from(device.limits().words_64)),
+            ("WORDS_64", u32::from(device.limits().has_int64)),
             ("BEHIND", behind),
         ];
         let compose = |rounds: u32| {
             let macros = [&macros[..], &[("ROUNDS", rounds)]].concat();
             Kernel::with_macros(device, compiler, "tiles", Push::FIELDS, &[], &macros)
         };
-        let buffer =
-            |name, n: u64, words: u64| Buffer::new::<u32>(device, name, n * words, Place::Device);
+        let buffer = |name, n: u64, words: u64| {
+            Buffer::new::<u32>(device, name, n * words, MemoryUsage::Device)
+        };
         let n_state = if n_rounds > 1 { division.n_pixels() } else { 1 };
         let [n_sheets, n_conics] = [variant.textured, variant.ellipsoids]
             .map(|are| if are { u64::from(n_max) } else { 1 });
@@ -292,18 +293,18 @@ impl Tiles {
             n_rounds,
             max_groups: device.limits().max_workgroups_x,
             most_tiles: variant.most_tiles.unwrap_or(most_tiles(device)),
-            known: Buffer::new::<KeptRecord>(device, "tiles.known", 1, Place::Device)?,
+            known: Buffer::new::<KeptRecord>(device, "tiles.known", 1, MemoryUsage::Device)?,
             splats: Buffer::new::<SplatRecord>(
                 device,
                 "tiles.splats",
                 u64::from(n_max),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
-            sheets: Buffer::new::<SplatSheetRecord>(
+            sheets: Buffer::new::<SplatTextureRecord>(
                 device,
                 "tiles.sheets",
                 n_sheets,
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             conics: buffer("tiles.conics", n_conics, 4)?,
             reaches: buffer("tiles.reaches", n_max.into(), 2)?,
@@ -313,7 +314,7 @@ impl Tiles {
                 device,
                 "tiles.rounds",
                 n_rounds.into(),
-                Place::Device,
+                MemoryUsage::Device,
             )?,
             entries: buffer("tiles.entries", capacity, 2)?,
             found: buffer("tiles.ranges", division.n_tiles(), 4)?,
@@ -329,10 +330,10 @@ impl Tiles {
     }
 
     /// Where the device has the number of splats.
-    fn kept<'a>(&'a self, n_splats: Amount<'a>) -> &'a Buffer {
+    fn kept<'a>(&'a self, n_splats: RecordCount<'a>) -> &'a Buffer {
         match n_splats {
-            Amount::Known(_) => &self.known,
-            Amount::Counted(kept) => kept,
+            RecordCount::Known(_) => &self.known,
+            RecordCount::Indirect(kept) => kept,
         }
     }
 
@@ -344,7 +345,7 @@ impl Tiles {
         rec: &mut Recorder<'_>,
         buffers: [&Buffer; 9],
         view: &View<'_>,
-        n_splats: Amount<'_>,
+        n_splats: RecordCount<'_>,
         [i_first_facet, sort_tile]: [u32; 2],
     ) -> Result<()> {
         let Division { width, height, tile, .. } = self.division;
@@ -361,7 +362,7 @@ impl Tiles {
             inv_threshold: inverse(view.threshold),
         };
         let [entries, placed, particles, lit, i_facet, i_group, drawn, textured, _] = buffers;
-        if let Amount::Known(n) = n_splats {
+        if let RecordCount::Known(n) = n_splats {
             rec.update(&self.known, &KeptRecord::of(n, BLOCK));
         }
         let kept = self.kept(n_splats);
@@ -369,7 +370,7 @@ impl Tiles {
         let from = [entries, placed, particles, lit, i_facet, i_group, drawn, textured];
         let buffers =
             [&from[..], &[splats, reaches, before, blocks, sheets, kept, conics]].concat();
-        rec.dispatch_counted(&self.splat, &buffers, &push, (kept, KeptRecord::I_SPLAT))?;
+        rec.dispatch_indirect(&self.splat, &buffers, &push, (kept, KeptRecord::I_SPLAT))?;
         let push = RoundsPush {
             n_rounds: self.n_rounds,
             capacity: self.capacity,
@@ -406,7 +407,7 @@ impl Tiles {
         &self,
         rec: &mut Recorder<'_>,
         i_round: u32,
-        n_splats: Amount<'_>,
+        n_splats: RecordCount<'_>,
         view: &View<'_>,
     ) -> Result<()> {
         let Division { n_bins_x, tile, .. } = self.division;
@@ -424,7 +425,12 @@ impl Tiles {
             &self.splats,
             self.kept(n_splats),
         ];
-        rec.dispatch_counted(&self.pairs, &buffers, &push, (&self.round, ROUND_WORDS * i_round + 4))
+        rec.dispatch_indirect(
+            &self.pairs,
+            &buffers,
+            &push,
+            (&self.round, ROUND_WORDS * i_round + 4),
+        )
     }
 
     /// The words of `round` that hold round `i`'s number of pairs, and, three of them, workgroups
@@ -450,7 +456,7 @@ impl Tiles {
             most_tiles: self.most_tiles,
         };
         let bins = (&self.round, ROUND_WORDS * i_round + 8);
-        rec.dispatch_counted(&self.ranges, &[sorted, &self.round, &self.found], &push, bins)?;
+        rec.dispatch_indirect(&self.ranges, &[sorted, &self.round, &self.found], &push, bins)?;
         let push = Push {
             tangents: [view.camera.tan_x, view.camera.tan_y],
             pixel: self.pixel(view.camera),
@@ -480,10 +486,10 @@ impl Tiles {
         ];
         let buffers = &buffers[..self.n_bindings];
         if i_round == 0 {
-            rec.dispatch_counted(&self.alone, buffers, &push, (&self.round, 16))?;
+            rec.dispatch_indirect(&self.alone, buffers, &push, (&self.round, 16))?;
         }
         match &self.compose {
-            Some(compose) => rec.dispatch_counted(
+            Some(compose) => rec.dispatch_indirect(
                 compose,
                 buffers,
                 &push,

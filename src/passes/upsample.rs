@@ -7,8 +7,8 @@
 //! forty roundings of what the weights' magnitudes sum to, and the format's once.
 
 use crate::error::Result;
-use crate::gpu::memory::{TargetFormat, has_depth24};
 use crate::gpu::{Buffer, Compiler, Device, Kernel, Recorder};
+use crate::gpu::{TargetFormat, has_depth24};
 use crate::layout::record;
 
 record! {
@@ -66,7 +66,7 @@ impl Upsample {
             ("PIXEL_WORDS", pixel_words),
             ("TOGETHER", if width.is_multiple_of(together) { together } else { 1 }),
             // Beside edges of depth pixels are stored one by one.
-            ("WORDS_64", u32::from(!behind && device.limits().words_64)),
+            ("WORDS_64", u32::from(!behind && device.limits().has_int64)),
             ("BEHIND", if behind { 1 + u32::from(has_depth24(device)) } else { 0 }),
         ];
         let kernel = Kernel::with_macros(device, compiler, "upsample", Push::FIELDS, &[], &macros)?;

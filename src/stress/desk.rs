@@ -8,7 +8,9 @@ use bytemuck::Pod;
 
 use crate::error::{Error, Result};
 use crate::frame::stage::{Bed, DeviceChoice, Player};
-use crate::gpu::{Buffer, Commands, Compiler, Device, Field, Kernel, Place, Recorder, Sources};
+use crate::gpu::{
+    Buffer, Commands, Compiler, Device, Field, Kernel, MemoryUsage, Recorder, Sources,
+};
 use crate::io::scene_file::parse;
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
@@ -191,8 +193,12 @@ impl Desk {
 
     /// A device buffer that holds `data`.
     pub fn upload<T: Pod>(&mut self, data: &[T]) -> Result<Buffer> {
-        let mut staging =
-            Buffer::new::<T>(&self.bed.device, "stress.staging", data.len() as u64, Place::Upload)?;
+        let mut staging = Buffer::new::<T>(
+            &self.bed.device,
+            "stress.staging",
+            data.len() as u64,
+            MemoryUsage::Upload,
+        )?;
         staging.write(data)?;
         let buffer = self.buffer::<T>(data.len())?;
         self.run(|rec| {
@@ -204,13 +210,13 @@ impl Desk {
 
     /// A device buffer of `n` records of unknown content.
     pub fn buffer<T: Pod>(&self, n: usize) -> Result<Buffer> {
-        Buffer::new::<T>(&self.bed.device, "stress.buffer", n as u64, Place::Device)
+        Buffer::new::<T>(&self.bed.device, "stress.buffer", n as u64, MemoryUsage::Device)
     }
 
     /// The first `n` records of a device buffer.
     pub fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Result<Vec<T>> {
         let readback =
-            Buffer::new::<T>(&self.bed.device, "stress.readback", n as u64, Place::Readback)?;
+            Buffer::new::<T>(&self.bed.device, "stress.readback", n as u64, MemoryUsage::Readback)?;
         self.run(|rec| {
             rec.copy(buffer, &readback);
             Ok(())

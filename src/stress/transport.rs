@@ -370,7 +370,7 @@ fn terms() -> [Vec<f32>; 2] {
 }
 
 fn sums(desk: &mut Desk, summation: Summation, precision: Precision) -> Result<Found> {
-    if precision == Precision::F64 && !desk.device().limits().floats_64 {
+    if precision == Precision::F64 && !desk.device().limits().has_float64 {
         return Ok(Found::NotHere("the device has no f64 in shaders".to_owned()));
     }
     let sums = Sums { summation, precision };

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::error::Result;
-use crate::gpu::shader::cache_folder;
+use crate::gpu::cache_folder;
 use crate::io::atomic::write_atomic;
 use crate::model::basis::Sampling;
 use crate::model::film::{Film, FilmFormat, ToneMap};

@@ -14,7 +14,7 @@ use crate::frame::counts::Counts;
 use crate::frame::light_notes::light_notes;
 use crate::frame::render::Renderer;
 use crate::frame::stage::Stage;
-use crate::gpu::shader::hex;
+use crate::gpu::hex;
 use crate::io::image::display_bytes;
 use crate::model::scene::{Draw, Scene};
 

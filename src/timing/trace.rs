@@ -136,7 +136,7 @@ fn about(zones: Option<&Collected>, clock: Option<ClockFit>) -> Value {
             "gpu_clock": "calibrated with the host's clock",
             "gpu_clock_deviation_us": 1e-3 * clock.deviation_ns,
             "gpu_clock_rate": clock.rate,
-            "gpu_clock_readings": clock.n_pairs,
+            "gpu_clock_readings": clock.n_samples,
         }),
         None => json!({ "gpu_clock": "laid on the host's clock by the ends of frames" }),
     };

@@ -7,9 +7,10 @@ use super::widgets::{SharedFace, take};
 use crate::error::Result;
 use crate::frame::render::Renderer;
 use crate::frame::stage::{Bed, DeviceChoice};
-use crate::gpu::memory::TargetFormat;
+use crate::gpu::TargetFormat;
 use crate::gpu::{
-    Buffer, Commands, Instance, Overlay, Place, PresentMode, Recorder, Shown, Surface, Swapchain,
+    Buffer, Commands, Instance, MemoryUsage, Overlay, PresentMode, PresentOutcome, Recorder,
+    Surface, Swapchain,
 };
 use crate::model::film::{Film, ToneMap};
 use crate::passes::present::{self, Compare, Present};
@@ -77,7 +78,7 @@ impl Pane {
         let (format, n_bytes): (TargetFormat, u64) = renderer.picture_format();
         let Film { width, height, background, exposure, tone_map, .. } = *film;
         let bed = &self.bed;
-        let picture = |name| Buffer::new::<u8>(&bed.device, name, n_bytes, Place::Device);
+        let picture = |name| Buffer::new::<u8>(&bed.device, name, n_bytes, MemoryUsage::Device);
         let pictures = [picture("window.picture")?, picture("window.other")?];
         // What nothing was drawn into is all background.
         Commands::new(&bed.device, "window.blank")?.run(|rec| {
@@ -123,7 +124,7 @@ impl Pane {
             )?;
             widgets.map_or(Ok(()), |widgets| overlay.record(rec, image, &widgets))
         })?;
-        Ok(shown != Shown::Outdated)
+        Ok(shown != PresentOutcome::Outdated)
     }
 
     /// Returns when the last picture has been drawn and handed over to the window system.

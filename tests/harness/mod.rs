@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, Place, Recorder};
+use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage, Recorder};
 use nimbus::passes;
 
 pub struct Gpu {
@@ -30,8 +30,8 @@ impl Gpu {
     /// A device buffer that holds `data`.
     pub fn upload<T: Pod>(&mut self, data: &[T]) -> Buffer {
         let n = data.len() as u64;
-        let mut staging =
-            Buffer::new::<T>(&self.device, "test.staging", n, Place::Upload).expect("staging");
+        let mut staging = Buffer::new::<T>(&self.device, "test.staging", n, MemoryUsage::Upload)
+            .expect("staging");
         staging.write(data).expect("write");
         let buffer = self.buffer::<T>(data.len());
         self.run(|rec| {
@@ -43,13 +43,15 @@ impl Gpu {
 
     /// A device buffer of `n` records of unknown content.
     pub fn buffer<T: Pod>(&self, n: usize) -> Buffer {
-        Buffer::new::<T>(&self.device, "test.buffer", n as u64, Place::Device).expect("buffer")
+        Buffer::new::<T>(&self.device, "test.buffer", n as u64, MemoryUsage::Device)
+            .expect("buffer")
     }
 
     /// The first `n` records of a device buffer.
     pub fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Vec<T> {
-        let readback = Buffer::new::<T>(&self.device, "test.readback", n as u64, Place::Readback)
-            .expect("readback");
+        let readback =
+            Buffer::new::<T>(&self.device, "test.readback", n as u64, MemoryUsage::Readback)
+                .expect("readback");
         self.run(|rec| {
             rec.copy(buffer, &readback);
             Ok(())

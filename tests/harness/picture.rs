@@ -9,7 +9,7 @@ mod drawn;
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use nimbus::gpu::memory::TargetFormat;
+use nimbus::gpu::TargetFormat;
 use nimbus::layout::facet::LitRecord;
 use nimbus::layout::particle::{DrawnRecord, ParticleRecord, PlacedRecord, TexturedRecord};
 use nimbus::model::camera::{Camera, CameraKey};

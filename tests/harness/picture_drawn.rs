@@ -5,8 +5,8 @@ use half::f16;
 use nimbus::error::Result;
 use nimbus::frame::chunks::{self, Chunks};
 use nimbus::frame::tiling::Tiling;
-use nimbus::gpu::memory::TargetFormat;
-use nimbus::gpu::{Amount, Buffer, Compiler, Image, Place, Recorder, Start, Target};
+use nimbus::gpu::TargetFormat;
+use nimbus::gpu::{Buffer, Compiler, Image, LoadOp, MemoryUsage, RecordCount, Recorder, Target};
 use nimbus::layout::frame::CameraRecord;
 use nimbus::model::film::{Film, FilmFormat, ToneMap};
 use nimbus::passes::sprites::Sprites;
@@ -70,7 +70,7 @@ impl Picture {
         let camera = self.camera_record();
         let n_numbers = 4 * target.n_pixels() as usize;
         let bytes = target.n_pixels() * format.bytes_per_pixel();
-        let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, Place::Readback)
+        let readback = Buffer::new::<u8>(&gpu.device, "test.pixels", bytes, MemoryUsage::Readback)
             .expect("readback");
         gpu.run(|rec| {
             if let Some(under) = &under {
@@ -196,7 +196,7 @@ impl Picture {
         camera: &CameraRecord,
     ) -> Result<()> {
         let from = uploaded.of_sprites.each_ref();
-        let n = (Amount::Known(uploaded.n_entries), uploaded.n_surface_facets);
+        let n = (RecordCount::Known(uploaded.n_entries), uploaded.n_surface_facets);
         let (cutoff, threshold) = (self.view.cutoff, self.view.threshold);
         match made {
             Made::Sprites(sprites) => {
@@ -207,7 +207,7 @@ impl Picture {
                 tiling.record(rec, 0, self.scenery.is_some().then_some(target), from, &view, n)
             }
             Made::Chunks(chunks, saturated) => {
-                let start = if self.scenery.is_some() { Start::Load } else { Start::Clear };
+                let start = if self.scenery.is_some() { LoadOp::Load } else { LoadOp::Clear };
                 let view =
                     chunks::View { camera, cuts: [cutoff, threshold], saturated: *saturated };
                 chunks.record(rec, from, (target, start), &view, n)

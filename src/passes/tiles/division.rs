@@ -1,7 +1,7 @@
 //! How a picture is divided into bins of tiles, and tiles into rows of pixels.
 
 use crate::error::{Error, Result};
-use crate::gpu::device::Limits;
+use crate::gpu::Limits;
 
 /// An invocation's pixels; the shader's RUN.
 pub const RUN: u32 = 8;

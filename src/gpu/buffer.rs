@@ -1,0 +1,188 @@
+//! Storage buffers, checked against the device's limits before they are allocated.
+
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+
+use super::call::Call;
+use super::device::{Device, Owned};
+use super::device_info::Limits;
+use super::memory::Memory;
+use super::reflect::BindingKind;
+use crate::error::{Error, Result};
+
+/// The memory a buffer lives in, by who accesses it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MemoryUsage {
+    /// The device alone.
+    Device,
+    /// The host writes, the device reads.
+    Upload,
+    /// The device writes, the host reads.
+    Readback,
+}
+
+/// Texel formats: words of any bits, and floats. Every device reads both.
+const TEXELS: [(BindingKind, vk::Format); 2] = [
+    (BindingKind::Texels, vk::Format::R32G32B32A32_UINT),
+    (BindingKind::Floats, vk::Format::R32_SFLOAT),
+];
+
+/// Bytes of the larger of the two texels.
+const MAX_TEXEL_BYTES: u64 = 16;
+
+/// A buffer that shaders read and write as records or read as texels, and that can be copied and
+/// dispatched from.
+// Fields drop in order: views before their buffer, the buffer before its memory.
+pub struct Buffer {
+    /// A view of the whole buffer for each kind of texel; none where it has more texels than the
+    /// device reads.
+    views: [Option<Owned<vk::BufferView>>; 2],
+    handle: Owned<vk::Buffer>,
+    memory: Memory,
+    bytes: u64,
+    max_texels: u64,
+    name: String,
+}
+
+impl Buffer {
+    /// Allocates a buffer of `n` records of type `T`; at least one record, since Vulkan has no
+    /// empty buffers. On a device that poisons, the buffer is full of NaN.
+    ///
+    /// # Errors
+    /// The size breaks a limit of the device, or its memory is used up.
+    pub fn new<T: Pod>(device: &Device, name: &str, n: u64, usage: MemoryUsage) -> Result<Buffer> {
+        let bytes = storage_bytes(device.limits(), name, n, size_of::<T>() as u64)?;
+        let shared = device.shared();
+        let info = vk::BufferCreateInfo::default()
+            // Whole texels, so that texel reads reach the last words too.
+            .size(bytes.next_multiple_of(MAX_TEXEL_BYTES))
+            .usage(
+                vk::BufferUsageFlags::STORAGE_BUFFER
+                    | vk::BufferUsageFlags::UNIFORM_TEXEL_BUFFER
+                    | vk::BufferUsageFlags::TRANSFER_SRC
+                    | vk::BufferUsageFlags::TRANSFER_DST
+                    | vk::BufferUsageFlags::INDIRECT_BUFFER,
+            );
+        let raw =
+            unsafe { shared.raw.create_buffer(&info, None) }.of_call("vkCreateBuffer", name)?;
+        let handle = shared.own(raw, name, ash::Device::destroy_buffer);
+        let requirements = unsafe { shared.raw.get_buffer_memory_requirements(raw) };
+        let location = match usage {
+            // The host fills poisoned buffers, so it must see them all.
+            MemoryUsage::Device if !shared.is_poisoning() => MemoryLocation::GpuOnly,
+            MemoryUsage::Device | MemoryUsage::Upload => MemoryLocation::CpuToGpu,
+            MemoryUsage::Readback => MemoryLocation::GpuToCpu,
+        };
+        let mut memory = Memory::new(shared, name, requirements, location, true)?;
+        let (block, offset) = memory.place();
+        unsafe { shared.raw.bind_buffer_memory(raw, block, offset) }
+            .of_call("vkBindBufferMemory", name)?;
+        if shared.is_poisoning()
+            && let Some(bytes) = memory.mapped_mut()
+        {
+            // NaN as floats, and too great as numbers.
+            bytes.fill(u8::MAX);
+        }
+        let max_texels = device.limits().max_texels;
+        let mut views = [None, None];
+        for (view, (kind, format)) in views.iter_mut().zip(TEXELS) {
+            let n = bytes.div_ceil(u64::from(kind.texel_bytes()));
+            if n <= max_texels {
+                let range = n * u64::from(kind.texel_bytes());
+                let info = vk::BufferViewCreateInfo::default().buffer(raw).format(format);
+                let raw = unsafe { shared.raw.create_buffer_view(&info.range(range), None) }
+                    .of_call("vkCreateBufferView", name)?;
+                *view = Some(shared.own(raw, name, ash::Device::destroy_buffer_view));
+            }
+        }
+        Ok(Buffer { views, handle, memory, bytes, max_texels, name: name.to_owned() })
+    }
+
+    pub(super) fn raw(&self) -> vk::Buffer {
+        self.handle.raw
+    }
+
+    /// Returns the view by which shaders read the buffer as texels; null for records.
+    pub(super) fn texels(&self, kind: BindingKind) -> Result<vk::BufferView> {
+        let Some(i) = TEXELS.iter().position(|(k, _)| *k == kind) else {
+            return Ok(vk::BufferView::null());
+        };
+        self.views[i].as_ref().map(|view| view.raw).ok_or_else(|| {
+            Error::limit(format!(
+                "{}: {} bytes are to be read by {}, this device takes {} such texels at most \
+                 (maxTexelBufferElements)",
+                self.name,
+                self.bytes,
+                kind.texel_bytes(),
+                self.max_texels
+            ))
+        })
+    }
+
+    /// Returns the size in bytes, as it was asked for.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Returns the name, `room.thing`.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Copies `data` to the start of an upload buffer. The GPU must not be reading it.
+    ///
+    /// # Errors
+    /// The data does not fit, or the host cannot see the buffer.
+    pub fn write<T: Pod>(&mut self, data: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        // The allocation may be larger than the buffer.
+        let size = self.bytes as usize;
+        let target =
+            self.memory.mapped_mut().and_then(|m| m.get_mut(..size)?.get_mut(..bytes.len()));
+        let Some(target) = target else {
+            return Err(Error::limit(format!(
+                "{}: {} bytes do not fit a host-visible buffer of {size}",
+                self.name,
+                bytes.len(),
+            )));
+        };
+        target.copy_from_slice(bytes);
+        Ok(())
+    }
+
+    /// Returns the first `n` records of a readback buffer. The GPU must have finished writing it.
+    ///
+    /// # Errors
+    /// The buffer holds fewer records, or the host cannot see it.
+    pub fn read<T: Pod>(&self, n: usize) -> Result<Vec<T>> {
+        let size = self.bytes as usize;
+        let bytes =
+            self.memory.mapped().and_then(|m| m.get(..size)?.get(..n.checked_mul(size_of::<T>())?));
+        // Collected, since the mapping has the allocator's alignment and not that of T.
+        bytes.map(bytemuck::pod_collect_to_vec).ok_or_else(|| {
+            Error::limit(format!(
+                "{}: {n} records do not lie in a host-visible buffer of {size} bytes",
+                self.name
+            ))
+        })
+    }
+}
+
+/// Returns the bytes of a storage buffer of `n` records.
+///
+/// # Errors
+/// The device takes fewer; the message names the limit.
+pub fn storage_bytes(limits: &Limits, name: &str, n: u64, record_bytes: u64) -> Result<u64> {
+    let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes);
+    match n.max(1).checked_mul(record_bytes) {
+        Some(bytes) if bytes <= most => Ok(bytes.next_multiple_of(4)),
+        _ => Err(Error::limit(format!(
+            "{name}: {n} records of {record_bytes} bytes are wanted, this device takes {} at most \
+             (maxStorageBufferRange {}, memory {} bytes)",
+            most / record_bytes,
+            limits.max_storage_buffer_bytes,
+            limits.device_memory_bytes
+        ))),
+    }
+}

@@ -1,0 +1,339 @@
+//! Properties and limits of a Vulkan device before it is opened, and the choice among devices.
+
+use std::ffi::CStr;
+
+use ash::{ext, khr, vk};
+
+use super::call::Call;
+use super::instance::Instance;
+use crate::error::{Error, Result};
+
+/// Properties of a device that need no opening.
+#[derive(Debug, Clone)]
+pub struct DeviceInfo {
+    /// Its place in the loader's order.
+    pub index: usize,
+    /// The driver's name of it.
+    pub name: String,
+    /// The driver's name and version.
+    pub driver: String,
+    /// Major, minor and patch version of Vulkan.
+    pub api_version: (u32, u32, u32),
+    /// "discrete", "integrated", "virtual", "cpu" or "other".
+    pub kind: &'static str,
+    /// VkPhysicalDeviceIDProperties::deviceUUID in hexadecimal.
+    pub uuid: String,
+    /// The reason why nimbus cannot use it, where there is one.
+    pub unusable: Option<String>,
+    /// Its limits.
+    pub limits: Limits,
+    /// Whether it can present to windows.
+    pub has_swapchain: bool,
+    /// The extension that reads the device's clock and the host's at one moment, where the device
+    /// has one.
+    pub calibrated_timestamps: Option<&'static CStr>,
+    pub(super) physical: vk::PhysicalDevice,
+    pub(super) queue_family: u32,
+}
+
+/// Limits and optional features of a device.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Limits {
+    /// Bytes of one storage buffer that a shader can address.
+    pub max_storage_buffer_bytes: u64,
+    /// Texels of one texel buffer.
+    pub max_texels: u64,
+    /// Workgroups along x of one dispatch.
+    pub max_workgroups_x: u32,
+    /// Invocations of one workgroup.
+    pub max_workgroup_invocations: u32,
+    /// Bytes of memory that a workgroup shares.
+    pub max_shared_memory_bytes: u32,
+    /// Bytes of push constants.
+    pub max_push_constant_bytes: u32,
+    /// Pixels along a side of an image that is drawn into.
+    pub max_image_extent: u32,
+    /// Bytes of the largest device-local heap.
+    pub device_memory_bytes: u64,
+    /// Invocations of a subgroup, unless a kernel asks for another size.
+    pub subgroup_size: u32,
+    /// Whether compute shaders can sum and compare over a subgroup.
+    pub has_subgroup_arithmetic: bool,
+    /// Whether compute shaders can vote, ballot and shuffle over a subgroup.
+    pub has_subgroup_shuffle: bool,
+    /// Whether all subgroups have the same size.
+    pub is_subgroup_size_fixed: bool,
+    /// Whether a compute kernel can ask for a subgroup size.
+    pub can_choose_subgroup_size: bool,
+    /// Whether shaders can use 64-bit integers.
+    pub has_int64: bool,
+    /// Whether shaders can use 64-bit floats.
+    pub has_float64: bool,
+    /// Bits of a timestamp that count; 0 where the queue has no timestamps.
+    pub timestamp_valid_bits: u32,
+    /// Nanoseconds per timestamp tick.
+    pub timestamp_period_ns: f64,
+}
+
+impl Limits {
+    /// Whether a workgroup of `n_invocations` is certainly one subgroup that can vote and shuffle.
+    pub fn is_one_subgroup(&self, n_invocations: u32) -> bool {
+        self.has_subgroup_shuffle
+            && self.subgroup_size == n_invocations
+            && (self.is_subgroup_size_fixed || self.can_choose_subgroup_size)
+    }
+
+    /// Returns the nanoseconds from the device's own zero to a timestamp of its queue.
+    pub(super) fn ticks_ns(&self, ticks: u64) -> f64 {
+        (ticks & self.tick_mask()) as f64 * self.timestamp_period_ns
+    }
+
+    /// Returns a mask of the timestamp bits that count.
+    pub(super) fn tick_mask(&self) -> u64 {
+        u64::MAX.checked_shr(64 - self.timestamp_valid_bits).unwrap_or(0)
+    }
+}
+
+impl DeviceInfo {
+    /// Lists every Vulkan device, usable or not, in the loader's order.
+    ///
+    /// # Errors
+    /// The driver fails to enumerate its devices.
+    pub fn list(instance: &Instance) -> Result<Vec<DeviceInfo>> {
+        let physical = unsafe { instance.vulkan.raw.enumerate_physical_devices() }
+            .of_call("vkEnumeratePhysicalDevices", "")?;
+        let describe = |(index, physical)| DeviceInfo::describe(instance, index, physical);
+        Ok(physical.into_iter().enumerate().map(describe).collect())
+    }
+
+    /// Chooses the device named by `choice` (an index, or part of a name), else the best one:
+    /// discrete, then integrated, virtual, CPU.
+    ///
+    /// # Errors
+    /// No device matches, or the named one is unusable. The message lists the devices.
+    pub fn choose(devices: Vec<DeviceInfo>, choice: Option<&str>) -> Result<DeviceInfo> {
+        let names: Vec<String> =
+            devices.iter().map(|d| format!("{}: {}", d.index, d.name)).collect();
+        let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let Some(text) = choice.map(str::trim) else {
+            const KINDS: [&str; 4] = ["discrete", "integrated", "virtual", "cpu"];
+            let rank = |d: &DeviceInfo| KINDS.iter().position(|kind| *kind == d.kind).unwrap_or(9);
+            let usable = devices.into_iter().filter(|d| d.unusable.is_none());
+            return usable.min_by_key(rank).ok_or_else(|| {
+                let what = format!(
+                    "no usable Vulkan 1.3 device (found: {names}); tools/bootstrap installs a \
+                     software one"
+                );
+                Error::vulkan("device choice", what)
+            });
+        };
+        // An empty text is part of every name, and hardly meant: a script's unset variable.
+        let is_named = |d: &&DeviceInfo| {
+            !text.is_empty() && d.name.to_lowercase().contains(&text.to_lowercase())
+        };
+        // Names hold numbers too ("4090"), so that a number need not be an index.
+        let has_index = |d: &&DeviceInfo| text.parse() == Ok(d.index);
+        let found = devices.iter().find(has_index).or_else(|| devices.iter().find(is_named));
+        match found {
+            Some(DeviceInfo { name, unusable: Some(why), .. }) => {
+                Err(Error::vulkan("device choice", format!("{name}: {why}")))
+            }
+            Some(device) => Ok(device.clone()),
+            None => Err(Error::usage(format!(
+                "--device \"{text}\": expected an index or a part of a name; found: {names}"
+            ))),
+        }
+    }
+
+    fn describe(instance: &Instance, index: usize, physical: vk::PhysicalDevice) -> DeviceInfo {
+        let vulkan = &instance.vulkan.raw;
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut id = vk::PhysicalDeviceIDProperties::default();
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut sizes = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut driver)
+            .push_next(&mut id)
+            .push_next(&mut subgroup)
+            .push_next(&mut sizes);
+        unsafe { vulkan.get_physical_device_properties2(physical, &mut all) };
+        let properties = all.properties;
+        let families = unsafe { vulkan.get_physical_device_queue_family_properties(physical) };
+        let wanted = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+        let family = families.iter().position(|f| f.queue_flags.contains(wanted));
+        let heaps = unsafe { vulkan.get_physical_device_memory_properties(physical) };
+        let local = |heap: &&vk::MemoryHeap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+        let memory_bytes = heaps.memory_heaps_as_slice().iter().filter(local).map(|h| h.size).max();
+        let version = properties.api_version;
+        let limits = properties.limits;
+        let features = unsafe { vulkan.get_physical_device_features(physical) };
+        let in_compute =
+            |stages: vk::ShaderStageFlags| stages.contains(vk::ShaderStageFlags::COMPUTE);
+        let has_subgroup = |operations| {
+            in_compute(subgroup.supported_stages)
+                && subgroup.supported_operations.contains(operations)
+        };
+        use vk::SubgroupFeatureFlags as Subgroup;
+        DeviceInfo {
+            index,
+            name: text(properties.device_name_as_c_str()),
+            driver: [driver.driver_name_as_c_str(), driver.driver_info_as_c_str()]
+                .map(text)
+                .join(" ")
+                .trim()
+                .to_owned(),
+            api_version: (
+                vk::api_version_major(version),
+                vk::api_version_minor(version),
+                vk::api_version_patch(version),
+            ),
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+                vk::PhysicalDeviceType::CPU => "cpu",
+                _ => "other",
+            },
+            uuid: id.device_uuid.iter().map(|b| format!("{b:02x}")).collect(),
+            unusable: unusable(vulkan, physical, version, family),
+            limits: Limits {
+                max_storage_buffer_bytes: u64::from(limits.max_storage_buffer_range),
+                max_texels: u64::from(limits.max_texel_buffer_elements),
+                max_workgroups_x: limits.max_compute_work_group_count[0],
+                max_workgroup_invocations: limits.max_compute_work_group_invocations,
+                max_shared_memory_bytes: limits.max_compute_shared_memory_size,
+                max_push_constant_bytes: limits.max_push_constants_size,
+                max_image_extent: limits
+                    .max_image_dimension2_d
+                    .min(limits.max_framebuffer_width)
+                    .min(limits.max_framebuffer_height),
+                device_memory_bytes: memory_bytes.unwrap_or(0),
+                subgroup_size: subgroup.subgroup_size,
+                has_subgroup_arithmetic: has_subgroup(Subgroup::ARITHMETIC),
+                has_subgroup_shuffle: has_subgroup(
+                    Subgroup::BALLOT | Subgroup::VOTE | Subgroup::SHUFFLE,
+                ),
+                is_subgroup_size_fixed: sizes.min_subgroup_size == sizes.max_subgroup_size,
+                can_choose_subgroup_size: in_compute(sizes.required_subgroup_size_stages),
+                has_int64: features.shader_int64 == vk::TRUE,
+                has_float64: features.shader_float64 == vk::TRUE,
+                timestamp_valid_bits: family.map_or(0, |i| families[i].timestamp_valid_bits),
+                timestamp_period_ns: f64::from(limits.timestamp_period),
+            },
+            has_swapchain: has_extension(vulkan, physical, khr::swapchain::NAME),
+            calibrated_timestamps: calibrated_timestamps(instance, physical),
+            physical,
+            queue_family: family.unwrap_or(0) as u32,
+        }
+    }
+}
+
+/// Returns the reason why nimbus cannot use a device, where there is one.
+fn unusable(
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+    version: u32,
+    family: Option<usize>,
+) -> Option<String> {
+    if version < vk::API_VERSION_1_3 {
+        return Some("Vulkan 1.3 is needed".into());
+    }
+    if family.is_none() {
+        return Some("no queue for both graphics and compute".into());
+    }
+    let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+    unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    let needs = [
+        (v12.timeline_semaphore, "timelineSemaphore"),
+        (v13.synchronization2, "synchronization2"),
+        (v13.dynamic_rendering, "dynamicRendering"),
+        (v13.shader_demote_to_helper_invocation, "shaderDemoteToHelperInvocation"),
+        (v13.subgroup_size_control, "subgroupSizeControl"),
+        (v13.compute_full_subgroups, "computeFullSubgroups"),
+    ];
+    let missing = needs.iter().find(|(has, _)| *has == vk::FALSE);
+    missing.map(|(_, name)| format!("feature {name} is missing"))
+}
+
+/// Returns the extension by which a device reads its clock and CLOCK_MONOTONIC at one moment,
+/// the newer one first.
+fn calibrated_timestamps(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+) -> Option<&'static CStr> {
+    if !cfg!(target_os = "linux") {
+        return None;
+    }
+    let (entry, raw) = (&instance.vulkan.entry, &instance.vulkan.raw);
+    let name = [khr::calibrated_timestamps::NAME, ext::calibrated_timestamps::NAME]
+        .into_iter()
+        .find(|name| has_extension(raw, physical, name))?;
+    let domains = unsafe {
+        if name == khr::calibrated_timestamps::NAME {
+            khr::calibrated_timestamps::Instance::new(entry, raw)
+                .get_physical_device_calibrateable_time_domains(physical)
+        } else {
+            ext::calibrated_timestamps::Instance::new(entry, raw)
+                .get_physical_device_calibrateable_time_domains(physical)
+        }
+    };
+    let domains = domains.ok()?;
+    let needs = [vk::TimeDomainKHR::DEVICE, vk::TimeDomainKHR::CLOCK_MONOTONIC];
+    needs.iter().all(|d| domains.contains(d)).then_some(name)
+}
+
+/// Whether a device lists an extension; false where the list cannot be read.
+fn has_extension(instance: &ash::Instance, physical: vk::PhysicalDevice, name: &CStr) -> bool {
+    let extensions = unsafe { instance.enumerate_device_extension_properties(physical) };
+    extensions.is_ok_and(|all| all.iter().any(|e| e.extension_name_as_c_str() == Ok(name)))
+}
+
+/// Returns a fixed-size C string of Vulkan as text; empty where it does not end.
+fn text<E>(chars: std::result::Result<&CStr, E>) -> String {
+    chars.map_or_else(|_| String::new(), |s| s.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(index: usize, name: &str, kind: &'static str) -> DeviceInfo {
+        DeviceInfo {
+            index,
+            name: name.to_owned(),
+            driver: String::new(),
+            api_version: (1, 3, 0),
+            kind,
+            uuid: String::new(),
+            unusable: None,
+            limits: Limits::default(),
+            has_swapchain: false,
+            calibrated_timestamps: None,
+            physical: vk::PhysicalDevice::null(),
+            queue_family: 0,
+        }
+    }
+
+    #[test]
+    fn a_device_is_chosen_by_index_name_or_kind() {
+        let devices = || {
+            vec![device(0, "llvmpipe (LLVM 15)", "cpu"), device(1, "GeForce RTX 4090", "discrete")]
+        };
+        let chosen = |choice| DeviceInfo::choose(devices(), choice).map(|d| d.index);
+        assert_eq!(chosen(None), Ok(1));
+        assert_eq!(chosen(Some("0")), Ok(0));
+        assert_eq!(chosen(Some("4090")), Ok(1));
+        assert_eq!(chosen(Some("GEFORCE")), Ok(1));
+        // 1 is an index although it stands in both names.
+        assert_eq!(chosen(Some("1")), Ok(1));
+        assert_eq!(chosen(Some("15")), Ok(0));
+        for wrong in ["", "  ", "7", "Radeon"] {
+            let error = chosen(Some(wrong)).expect_err(wrong);
+            assert_eq!(error.exit_code(), 2);
+            let message = error.to_string();
+            assert!(message.contains("0: llvmpipe (LLVM 15), 1: GeForce RTX 4090"), "{message}");
+        }
+    }
+}

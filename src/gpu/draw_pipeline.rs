@@ -1,0 +1,144 @@
+//! Graphics pipelines without vertex buffers: the vertex shader pulls from storage buffers.
+
+use ash::vk;
+
+use super::call::Call;
+use super::device::Device;
+use super::image::{TargetFormat, depth_format};
+use super::interface::{Constants, Field, Interface, Pipeline, Stage};
+use super::shader::Compiler;
+use crate::error::Result;
+
+/// A graphics pipeline that draws triangle strips of four vertices.
+pub struct DrawPipeline {
+    pub(super) pipeline: Pipeline,
+    /// Whether it draws into a target with depth.
+    pub(super) has_depth: bool,
+}
+
+/// How a fragment combines with what the target holds.
+///
+/// Colours are premultiplied. Depth is reversed: the greater one is nearer. Depth tests pass a
+/// fragment that is at least as near as the target's depth.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BlendMode {
+    /// Blended over the target, which has no depth.
+    Over,
+    /// Depth-tested and blended over the target; writes no depth.
+    OverTested,
+    /// Depth-tested and blended under the target; writes no depth.
+    UnderTested,
+    /// Depth-tested, replaces colour and depth; of equal depths the last stays.
+    Opaque,
+    /// Depth-tested, writes depth alone.
+    DepthOnly,
+}
+
+impl BlendMode {
+    fn has_depth(self) -> bool {
+        self != BlendMode::Over
+    }
+
+    fn writes_depth(self) -> bool {
+        matches!(self, BlendMode::Opaque | BlendMode::DepthOnly)
+    }
+
+    fn attachment(self) -> vk::PipelineColorBlendAttachmentState {
+        let (src, dst) = match self {
+            BlendMode::UnderTested => (vk::BlendFactor::ONE_MINUS_DST_ALPHA, vk::BlendFactor::ONE),
+            _ => (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA),
+        };
+        vk::PipelineColorBlendAttachmentState::default()
+            .blend_enable(!self.writes_depth())
+            .src_color_blend_factor(src)
+            .dst_color_blend_factor(dst)
+            .src_alpha_blend_factor(src)
+            .dst_alpha_blend_factor(dst)
+            .color_write_mask(match self {
+                BlendMode::DepthOnly => vk::ColorComponentFlags::empty(),
+                _ => vk::ColorComponentFlags::RGBA,
+            })
+    }
+}
+
+impl DrawPipeline {
+    /// Makes a pipeline from `name.vert` and `name.frag` for targets of `format`.
+    ///
+    /// `push` are the host's push constants in order; `constants` the specialization constants by
+    /// id.
+    ///
+    /// # Errors
+    /// A shader does not compile, or its interface differs from the host's.
+    pub fn new(
+        device: &Device,
+        compiler: &Compiler,
+        name: &str,
+        push: &[Field],
+        constants: &[(u32, u32)],
+        (format, mode): (TargetFormat, BlendMode),
+    ) -> Result<DrawPipeline> {
+        let stage = |extension, flags| {
+            Stage::new(device, compiler, format!("{name}.{extension}"), flags, &[])
+        };
+        let stages = [
+            stage("vert", vk::ShaderStageFlags::VERTEX)?,
+            stage("frag", vk::ShaderStageFlags::FRAGMENT)?,
+        ];
+        let interface = Interface::new(device, name, &stages, push)?;
+        let constants = Constants::new(constants);
+        let specialization = constants.info();
+        let infos = stages.each_ref().map(|stage| stage.info(&specialization));
+        let raw = create(device, &interface, name, &infos, format, mode)?;
+        let handle = device.shared().own(raw, name, ash::Device::destroy_pipeline);
+        let point = vk::PipelineBindPoint::GRAPHICS;
+        let pipeline = Pipeline { handle, point, interface, name: name.to_owned() };
+        Ok(DrawPipeline { pipeline, has_depth: mode.has_depth() })
+    }
+}
+
+fn create(
+    device: &Device,
+    interface: &Interface,
+    name: &str,
+    stages: &[vk::PipelineShaderStageCreateInfo<'_>],
+    format: TargetFormat,
+    mode: BlendMode,
+) -> Result<vk::Pipeline> {
+    let vertex_input = vk::PipelineVertexInputStateCreateInfo::default();
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+        .topology(vk::PrimitiveTopology::TRIANGLE_STRIP);
+    let viewport =
+        vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
+    let raster = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+    let samples = vk::PipelineMultisampleStateCreateInfo::default()
+        .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+    let attachments = [mode.attachment()];
+    let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+    let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+        .depth_test_enable(mode.has_depth())
+        .depth_write_enable(mode.writes_depth())
+        .depth_compare_op(vk::CompareOp::GREATER_OR_EQUAL);
+    let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+    let formats = [format.raw()];
+    let mut rendering =
+        vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&formats);
+    if mode.has_depth() {
+        rendering = rendering.depth_attachment_format(depth_format(device));
+    }
+    let info = vk::GraphicsPipelineCreateInfo::default()
+        .stages(stages)
+        .vertex_input_state(&vertex_input)
+        .input_assembly_state(&assembly)
+        .viewport_state(&viewport)
+        .rasterization_state(&raster)
+        .multisample_state(&samples)
+        .depth_stencil_state(&depth)
+        .color_blend_state(&blend)
+        .dynamic_state(&dynamic)
+        .layout(interface.layout.raw)
+        .push_next(&mut rendering);
+    let (shared, cache) = (device.shared(), vk::PipelineCache::null());
+    let made = unsafe { shared.raw.create_graphics_pipelines(cache, &[info], None) };
+    Ok(made.map_err(|(_, e)| e).of_call("vkCreateGraphicsPipelines", name)?[0])
+}

@@ -1,12 +1,17 @@
 #version 460
 
-// What has been composed near to far: shown; or the pixels that let no more through than may be
-// left out, and those alone (docs/model.md §11 "chunks").
+// Shows a picture that was composed near to far, or marks the pixels that are saturated, so that
+// later chunks skip them (docs/model.md §11 "chunks").
+// In: the composed picture, RGBA floats, rows from the top. Out: the pixel's colour; saturated
+// pixels alone where PICKS is 1.
 
-// 0: shows; 1: picks.
+// 0: shows all pixels; 1: keeps only those that let less light through than push.saturated.
 layout(constant_id = 0) const uint PICKS = 0;
 
-layout(push_constant) uniform Push { uint width; float saturated; } push;
+layout(push_constant) uniform Push {
+    uint width;
+    float saturated;
+} push;
 // Four floats a pixel, rows from the top.
 layout(binding = 0) uniform usamplerBuffer composed;
 

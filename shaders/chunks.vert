@@ -1,8 +1,7 @@
 #version 460
+#extension GL_GOOGLE_include_directive : require
+#include "strip.glsl"
 
-// All of the picture, nearer than anything (docs/model.md §11 "chunks").
+// Covers the whole picture at the nearest depth (docs/model.md §11 "chunks").
 
-void main() {
-    bvec2 end = bvec2((gl_VertexIndex & 1) != 0, (gl_VertexIndex & 2) != 0);
-    gl_Position = vec4(mix(vec2(-1.0), vec2(1.0), end), 1.0, 1.0);
-}
+void main() { gl_Position = vec4(corner_of_strip(vec2(-1.0), vec2(1.0)), 1.0, 1.0); }

@@ -1,20 +1,23 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "tensor.glsl"
 #include "sum.glsl"
 
-// Radiance and irradiance of every facet from the tensors T1 and T2, the lights' energies and the
-// materials' coefficients, C (13)-(16) (docs/model.md §7, §11 "contract").
+// Contracts the tensors T1 and T2 with the lights' energies and the materials' coefficients
+// (docs/model.md §7, §11 "contract").
+// In: facets, lights, regions, coefficients by column, T1 [light][row], T2 (tensor.glsl). Out:
+// irradiance I_d, I_i and radiance L1, L2 of every facet, linear RGB.
+// Law: I = pi sum E T, L = sum E c_b' C T over lights, bases and columns. Source: C (13)-(16).
+// Error bound: that of the sums, of magnitude sum |c_b| max|v_b| (§11 "sums").
 
-// N_b.
+// N_b: the number of basis functions.
 #ifndef N_BASES
 #define N_BASES 8
 #endif
-
-layout(local_size_x = 64) in;
 
 #if DOUBLE
 const REAL PI = 3.14159265358979LF;
@@ -22,32 +25,45 @@ const REAL PI = 3.14159265358979LF;
 const REAL PI = 3.14159265358979;
 #endif
 
-layout(push_constant) uniform Push { uint n_facets; uint n_lights; uint n_rows; uint n_columns; } push;
-layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
-layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
+layout(push_constant) uniform Push {
+    uint n_facets;
+    uint n_lights;
+    uint n_rows;
+    uint n_columns;
+} push;
+READS(0, Facet, facets)
+READS(1, Light, lights)
 layout(binding = 2) uniform usamplerBuffer regions;
 #include "regions.glsl"
-// By column.
+// RGB coefficients by column.
 layout(binding = 3) uniform usamplerBuffer coefficients;
 // [light][row]
 layout(binding = 4) uniform samplerBuffer t1;
-// As tensor.glsl has it.
+// Indexed by second_at() of tensor.glsl.
 layout(binding = 5) uniform samplerBuffer t2;
-// By region (first, number) of its spans; then the spans, (first, number) of columns that it can
-// receive light from.
-layout(std430, binding = 6) readonly buffer Spans { uvec2 spans[]; };
-layout(std430, binding = 7) writeonly buffer LitFacets { Lit lit[]; };
+// By region the first span and the number of its spans. Behind them the spans: the first column and
+// the number of columns that the region can receive light from.
+READS(6, uvec2, spans)
+WRITES(7, Lit, lit)
 
-vec3 coefficient_of(uint column) { return uintBitsToFloat(texelFetch(coefficients, int(column)).rgb); }
+vec3 coefficient_of(uint column) {
+    return uintBitsToFloat(texelFetch(coefficients, int(column)).rgb);
+}
 
-// A facet as a receiver: c_b of its bases, and the row of each.
+// The facet as a receiver: coefficient and row of each of its bases.
 REAL3 own[N_BASES];
 uint rows[N_BASES];
 
 #if SUMMATION == PLAIN && !DOUBLE
-struct Sum { vec3 direct; vec3 indirect; vec3 first; vec3 second; };
+struct Sum {
+    vec3 direct;
+    vec3 indirect;
+    vec3 first;
+    vec3 second;
+};
 
-// What one light of energy 1 brings. A column's coefficient is loaded once for all bases.
+// Returns what one light of energy 1 brings. Each column's coefficient is loaded once for all
+// bases.
 Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
     uint at[N_BASES];
     float direct = texelFetch(t1, int(l * push.n_rows + rows[0])).x;
@@ -79,8 +95,13 @@ Sum of_light(uint l, uvec2 own_spans, uint n_shiny) {
 }
 
 #else
-// What all lights bring, each a single sum over lights, bases and columns.
-struct Sum { SUM3 direct; SUM3 indirect; SUM3 first; SUM3 second; };
+// The sums over all lights: each is a single sum over lights, bases and columns.
+struct Sum {
+    SUM3 direct;
+    SUM3 indirect;
+    SUM3 first;
+    SUM3 second;
+};
 
 void add_light(inout Sum sum, REAL3 energy, uint l, uvec2 own_spans, uint n_shiny) {
     uint at[N_BASES];
@@ -128,7 +149,9 @@ void main() {
         Sum sum = Sum(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
         for (uint l = 0u; l < push.n_lights; ++l) {
             vec3 energy = lights[l].energy;
-            Sum light = of_light(l, energy == vec3(0.0) ? uvec2(0u) : spans[facet.i_region], glossy ? 1u : 0u);
+            Sum light = of_light(
+                l, energy == vec3(0.0) ? uvec2(0u) : spans[facet.i_region], glossy ? 1u : 0u
+            );
             sum.direct += energy * light.direct;
             sum.indirect += energy * light.indirect;
             sum.first += energy * light.first;
@@ -138,10 +161,13 @@ void main() {
         Sum sum = Sum(EMPTY3, EMPTY3, EMPTY3, EMPTY3);
         for (uint l = 0u; l < push.n_lights; ++l) {
             vec3 energy = lights[l].energy;
-            add_light(sum, energy, l, energy == vec3(0.0) ? uvec2(0u) : spans[facet.i_region], glossy ? 1u : 0u);
+            add_light(
+                sum, energy, l, energy == vec3(0.0) ? uvec2(0u) : spans[facet.i_region],
+                glossy ? 1u : 0u
+            );
         }
 #endif
-        // n_unresolved stays as second counted it.
+        // n_unresolved keeps the value that `second` counted.
         lit[j].direct = vec3(PI * TOTAL(sum.direct));
         lit[j].indirect = vec3(PI * TOTAL(sum.indirect));
         lit[j].first = vec3(TOTAL(sum.first));

@@ -1,17 +1,25 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "cull.glsl"
 
-// Where each tile's kept particles begin, and what those that come after need of their number. One
-// workgroup: an invocation a run of tiles.
+// Scans the tiles' counts of kept particles (docs/model.md §11 "cull"). One workgroup; each
+// invocation owns a run of tiles.
+// In: kept particles of each tile. Out: kept particles before each tile, and the Kept record with
+// the dispatch and draw sizes of the passes to come. Exact: integers.
 
 layout(local_size_x = 256) in;
 
-layout(push_constant) uniform Push { uint n_tiles; uint sort_tile; uint splat_block; uint max_groups; } push;
-// In: kept ones of each tile. Out: of the tiles before it.
-layout(std430, binding = 0) buffer Totals { uint n_kept[]; };
-layout(std430, binding = 1) writeonly buffer KeptOnes { Kept kept[]; };
+layout(push_constant) uniform Push {
+    uint n_tiles;
+    uint sort_tile;
+    uint splat_block;
+    uint max_groups;
+} push;
+// In: kept particles of each tile. Out: kept particles of the tiles before it.
+UPDATES(0, uint, n_kept)
+WRITES(1, Kept, kept)
 
 shared uint sums[256];
 
@@ -27,7 +35,7 @@ void main() {
     }
     sums[t] = total;
     barrier();
-    // Hillis-Steele over the 256 runs.
+    // Hillis-Steele prefix sum over the 256 runs.
     for (uint apart = 1; apart < 256; apart *= 2) {
         uint left = t >= apart ? sums[t - apart] : 0u;
         barrier();

@@ -1,11 +1,19 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
+#include "variants.glsl"
 #include "blob.glsl"
 #include "cull.glsl"
 #include "one_subgroup.glsl"
 
-// Which of the drawn particles can show in a pixel, a bit each (docs/model.md §11 "cull").
+// Tests which drawn particles can show in any pixel (docs/model.md §11 "cull").
+// In: placed particles, their groups, the camera. Out: one bit a particle, and the number of kept
+// particles of each tile of 256.
+// Law: depth >= near, tau > 0, sigma >= the smallest size, and the silhouette's rectangle holds a
+// pixel's centre.
+// Bound: conservative; the silhouette is widened by more than its rounding, so a particle that
+// draws is never dropped.
 
 #ifndef TILE_INVOCATIONS
 #define TILE_INVOCATIONS 32
@@ -13,21 +21,25 @@
 
 layout(local_size_x = TILE_INVOCATIONS) in;
 
-// As in sprites.vert.
-layout(constant_id = 3) const uint WEIGHTED = 0;
-layout(constant_id = 5) const uint THRESHOLD = 0;
-layout(constant_id = 6) const uint ELLIPSOIDS = 0;
-
-// `smallest`: slopes that sigma must span from the eye.
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; float inv_threshold; float smallest; uint n_particles; uint width; uint height; } push;
-layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
-layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
-layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
-layout(std430, binding = 3) readonly buffer DrawnGroups { Drawn drawn[]; };
-// Bits of 32 particles, and how many of the tile are kept before them.
-layout(std430, binding = 4) writeonly buffer Masks { uvec2 masks[]; };
-// Kept ones of each tile.
-layout(std430, binding = 5) writeonly buffer Totals { uint n_kept[]; };
+// smallest: the least sigma over view depth, in slopes.
+layout(push_constant) uniform Push {
+    Camera camera;
+    vec2 pixel;
+    float cutoff;
+    float inv_threshold;
+    float smallest;
+    uint n_particles;
+    uint width;
+    uint height;
+} push;
+READS(0, Placed, placed)
+READS(1, Particle, particles)
+READS(2, uint, i_group)
+READS(3, Drawn, drawn)
+// Bits of 32 particles, and the number of kept particles before them in their tile.
+WRITES(4, uvec2, masks)
+// Kept particles of each tile.
+WRITES(5, uint, n_kept)
 
 shared uint bits[WORDS];
 
@@ -60,7 +72,8 @@ bool is_kept(uint i) {
         pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach * sigma, size);
     }
     bool is_in = pixels.x < pixels.y && pixels.z < pixels.w;
-    return i < group.end && v.z >= push.camera.near && is_dense && widest >= push.smallest * v.z && is_in;
+    return i < group.end && v.z >= push.camera.near && is_dense && widest >= push.smallest * v.z
+           && is_in;
 }
 
 void main() {
@@ -74,7 +87,7 @@ void main() {
         for (uint k = t; k < TILE; k += TILE_INVOCATIONS) {
             uint i = tile * TILE + k;
             if (i < push.n_particles && is_kept(i)) {
-                // Whatever the order, the bits are the same.
+                // The bits do not depend on the order of the atomics.
                 atomicOr(bits[k / 32], 1u << (k % 32));
             }
         }

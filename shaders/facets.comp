@@ -1,21 +1,27 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "functions.glsl"
 
-// One facet a particle (docs/model.md §5, §11): normal from the gradient of the smoothed density
-// where that is well conditioned, else away from the cloud's centre.
+// Makes one lighting facet for each particle (docs/model.md §5, §11 "facets").
+// In: placed particles, groups, the density grid (1/length). Out: facets with position, unit
+// normal, area and colour.
+// Law: the normal opposes the gradient of the smoothed density where that is well conditioned, else
+// it points away from the cloud's centre. Source: C §2.4.
 
-layout(local_size_x = 64) in;
-
-layout(push_constant) uniform Push { Grid grid; uint n_particles; uint i_first_facet; } push;
-layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
-layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
-layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
-layout(std430, binding = 3) readonly buffer Groups { Group groups[]; };
+layout(push_constant) uniform Push {
+    Grid grid;
+    uint n_particles;
+    uint i_first_facet;
+} push;
+READS(0, Placed, placed)
+READS(1, Particle, particles)
+READS(2, uint, i_group)
+READS(3, Group, groups)
 layout(binding = 4) uniform samplerBuffer density;
-layout(std430, binding = 5) writeonly buffer Facets { Facet facets[]; };
+WRITES(5, Facet, facets)
 
 #include "shell.glsl"
 
@@ -24,8 +30,8 @@ void main() {
         vec3 p = placed[i].position;
         float sigma = placed[i].sigma;
         Group group = groups[i_group[i]];
-        // The light on a small blob is that of the blobs it lies among: on its own scale it would
-        // be a speck.
+        // Small blobs take the group's scale: on their own scale the normal is that of their
+        // neighbours' noise, and they would show as specks.
         float scale = max(sigma, group.sigma_mean);
         float aspect = particles[i].aspect;
         vec3 n = normal_at(p, scale, aspect, group.cloud_center);

@@ -1,31 +1,47 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "functions.glsl"
 
-// One facet a run of particles in Morton order (docs/model.md §5, §11). Means are taken about the
-// first particle of the run, so that a run of one is that particle, to the bit.
+// Makes one lighting facet for each run of particles in Morton order (docs/model.md §5, §11
+// "facets").
+// In: placed particles, their Morton order, the runs. Out: facets, and the facet of every particle.
+// Law: the run counts as one blob of the members' mean position, spread and colour. Means are taken
+// about the first member, so that a run of one particle gives that particle's facet to the bit.
 
-layout(local_size_x = 64) in;
-
-layout(push_constant) uniform Push { Grid grid; uint n_facets; uint i_first_facet; } push;
-layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
-layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
-layout(std430, binding = 2) readonly buffer GroupOf { uint i_group[]; };
-layout(std430, binding = 3) readonly buffer Groups { Group groups[]; };
+layout(push_constant) uniform Push {
+    Grid grid;
+    uint n_facets;
+    uint i_first_facet;
+} push;
+READS(0, Placed, placed)
+READS(1, Particle, particles)
+READS(2, uint, i_group)
+READS(3, Group, groups)
 layout(binding = 4) uniform samplerBuffer density;
-// Particle of each place.
-layout(std430, binding = 5) readonly buffer Order { uint order[]; };
-layout(std430, binding = 6) readonly buffer Runs { Run runs[]; };
-layout(std430, binding = 7) writeonly buffer Facets { Facet facets[]; };
+// Particle at each place of the order.
+READS(5, uint, order)
+READS(6, Run, runs)
+WRITES(7, Facet, facets)
 // By particle.
-layout(std430, binding = 8) writeonly buffer FacetOf { uint i_facet[]; };
+WRITES(8, uint, i_facet)
 
 #include "shell.glsl"
 
-// What a run adds up to: by mass the position, sigma bar and count; by area the colour.
-struct Sums { float mass; vec3 position; float sigma_mean; float area; vec3 color; vec3 plain_color; vec3 plain_position; float plain_sigma; };
+// Sums over a run: position and sigma by mass, colour by area, and the plain sums that replace them
+// where mass or area vanish.
+struct Sums {
+    float mass;
+    vec3 position;
+    float sigma_mean;
+    float area;
+    vec3 color;
+    vec3 plain_color;
+    vec3 plain_position;
+    float plain_sigma;
+};
 
 float mass_of(uint i) {
     float sigma = placed[i].sigma;
@@ -52,7 +68,8 @@ Sums sums_of(Run run, uint first, float sigma_first) {
     return s;
 }
 
-// sigma_g^2 about the mean position: x, or of ellipsoids along x and z, and along y.
+// Returns the run's variance about its mean position: in x, or for ellipsoids along x and z, and
+// along y.
 vec2 spread_of(Run run, vec3 p, bool by_mass) {
     vec2 sum = vec2(0.0);
     float weight = 0.0;
@@ -79,15 +96,22 @@ void main() {
         Group group = groups[i_group[first]];
         Sums s = sums_of(run, first, group.sigma_mean);
         float n_inverse = 1.0 / float(run.n_particles);
-        // Without mass, or area, all count alike.
+        // Members without mass, or without area, all count alike.
         bool by_mass = s.mass > 0.0, by_area = s.area > 0.0;
-        vec3 p = placed[first].position + (by_mass ? s.position / s.mass : s.plain_position * n_inverse);
-        float sigma_mean = group.sigma_mean + (by_mass ? s.sigma_mean / s.mass : s.plain_sigma * n_inverse);
-        vec3 color = particles[first].color + (by_area ? s.color / s.area : s.plain_color * n_inverse);
-        vec2 spread = run.n_particles > 1u ? sqrt(spread_of(run, p, by_mass)) : vec2(placed[first].sigma, 0.0);
+        vec3 p =
+            placed[first].position + (by_mass ? s.position / s.mass : s.plain_position * n_inverse);
+        float sigma_mean =
+            group.sigma_mean + (by_mass ? s.sigma_mean / s.mass : s.plain_sigma * n_inverse);
+        vec3 color =
+            particles[first].color + (by_area ? s.color / s.area : s.plain_color * n_inverse);
+        vec2 spread = run.n_particles > 1u ? sqrt(spread_of(run, p, by_mass))
+                                           : vec2(placed[first].sigma, 0.0);
         float sigma = spread.x;
 #if ELLIPSOIDS
-        float aspect = run.n_particles > 1u ? (sigma > 0.0 ? clamp(spread.y / sigma, LEAST_ASPECT, 1.0 / LEAST_ASPECT) : 1.0) : particles[first].aspect;
+        float aspect =
+            run.n_particles > 1u
+                ? (sigma > 0.0 ? clamp(spread.y / sigma, LEAST_ASPECT, 1.0 / LEAST_ASPECT) : 1.0)
+                : particles[first].aspect;
 #else
         float aspect = 1.0;
 #endif

@@ -1,27 +1,31 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 
-// Facets of the surfaces: each rectangle's grid, along u first, row by row along v (docs/model.md
-// §5, §11).
-
-layout(local_size_x = 64) in;
+// Makes the facets of the surfaces: each rectangle's grid, along u first, row by row along v
+// (docs/model.md §5, §11 "facets").
+// In: regions, the region of each facet. Out: facets with position, normal and area. Error: a few
+// roundings of f32.
 
 layout(push_constant) uniform Push { uint n_facets; } push;
 layout(binding = 0) uniform usamplerBuffer regions;
 #include "regions.glsl"
 // Region of each facet.
-layout(std430, binding = 1) readonly buffer RegionOf { uint i_region[]; };
-layout(std430, binding = 2) writeonly buffer Facets { Facet facets[]; };
+READS(1, uint, i_region)
+WRITES(2, Facet, facets)
 
 void main() {
     FOR_EACH(j, push.n_facets) {
         Region region = region_at(i_region[j]);
         uint i = j - region.i_first_facet;
-        vec2 at = vec2(2u * uvec2(i % region.n_u, i / region.n_u) + 1u) / vec2(region.n_u, region.n_v) - 1.0;
+        vec2 at =
+            vec2(2u * uvec2(i % region.n_u, i / region.n_u) + 1u) / vec2(region.n_u, region.n_v)
+            - 1.0;
         vec3 u = region.u / float(region.n_u), v = region.v / float(region.n_v);
         vec3 position = region.center + at.x * region.u + at.y * region.v;
-        facets[j] = Facet(position, 4.0 * length(u) * length(v), region.normal, i_region[j], vec3(1.0), 0u);
+        facets[j] =
+            Facet(position, 4.0 * length(u) * length(v), region.normal, i_region[j], vec3(1.0), 0u);
     }
 }

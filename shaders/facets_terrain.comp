@@ -1,18 +1,22 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 
-// Facets of the ground, put where its origin is (docs/model.md §16).
+// Moves the ground's facets to the place of the ground's origin (docs/model.md §16).
+// In: facets relative to the origin. Out: facets relative to the lighting origin. Error: one
+// rounding.
 
-layout(local_size_x = 64) in;
-
-layout(push_constant) uniform Push { uint n_facets; uint i_first_facet; } push;
+layout(push_constant) uniform Push {
+    uint n_facets;
+    uint i_first_facet;
+} push;
 layout(binding = 0) uniform usamplerBuffer regions;
 #include "regions.glsl"
-// Relative to their ground's origin.
-layout(std430, binding = 1) readonly buffer Ground { Facet ground[]; };
-layout(std430, binding = 2) writeonly buffer Facets { Facet facets[]; };
+// Facets relative to their ground's origin.
+READS(1, Facet, ground)
+WRITES(2, Facet, facets)
 
 void main() {
     FOR_EACH(i, push.n_facets) {

@@ -1,23 +1,29 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
 
-// The first reflection, C (15), toward the eye (docs/model.md §7, §11).
-
-layout(local_size_x = 64) in;
+// Computes the first reflection toward the eye (docs/model.md §7, §11 "first").
+// In: facets, lights, transmittance [facet][light], regions, the lobe table. Out: irradiance I_d
+// and radiance L1 of every facet, linear RGB.
+// Law: L1 = K_d c I_d/pi + K_s sum E f S(w). Source: C (15).
 
 const float INV_PI = 0.318309886183791;
 
-layout(push_constant) uniform Push { vec3 eye; uint n_facets; uint n_lights; } push;
-layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
-layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
+layout(push_constant) uniform Push {
+    vec3 eye;
+    uint n_facets;
+    uint n_lights;
+} push;
+READS(0, Facet, facets)
+READS(1, Light, lights)
+READS(2, float, transmittance)
 layout(binding = 3) uniform usamplerBuffer regions;
 #include "regions.glsl"
 layout(binding = 4) uniform samplerBuffer table;
-layout(std430, binding = 5) buffer LitFacets { Lit lit[]; };
+UPDATES(5, Lit, lit)
 
 #include "lobe.glsl"
 
@@ -26,7 +32,7 @@ void main() {
         Facet facet = facets[j];
         Region region = region_at(facet.i_region);
         vec3 outgoing = normalize(push.eye - facet.position);
-        // The lobe is the front side's, and none costs no lookup.
+        // Only the front side has a lobe; a region without one needs no lookup.
         bool shines = region.i_lobe != NO_LOBE && dot(outgoing, facet.normal) > 0.0;
         uint n_shiny = shines ? 1u : 0u;
         vec3 irradiance = vec3(0.0);
@@ -34,7 +40,8 @@ void main() {
         for (uint l = 0; l < push.n_lights; ++l) {
             Light light = lights[l];
             Arrival a = arrival_at(light, facet.position);
-            vec3 e = light.energy * share_of(light, a, facet.normal, transmittance[j * push.n_lights + l]);
+            vec3 e = light.energy
+                     * share_of(light, a, facet.normal, transmittance[j * push.n_lights + l]);
             irradiance += e;
             uint n_lobes = light.kind == LIGHT_SKY ? 0u : n_shiny;
             for (uint s = 0; s < n_lobes; ++s) {

@@ -1,26 +1,34 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
 
-// T1: the first reflection by light and basis, without energies and materials (docs/model.md §7,
-// §11 "contract").
-
-layout(local_size_x = 64) in;
+// Computes T1, the first reflection by light and basis, without energies and materials
+// (docs/model.md §7, §11 "contract").
+// In: facets, lights, transmittance [facet][light], the table of basis functions. Out: T1
+// [light][row], row = basis and facet; cleared Lit records. Source: C (13)-(16).
 
 const float INV_PI = 0.318309886183791;
 
-layout(push_constant) uniform Push { vec3 eye; uint n_facets; uint n_lights; uint n_bases; uint n_rows; uint i_vectors; } push;
-layout(std430, binding = 0) readonly buffer Facets { Facet facets[]; };
-layout(std430, binding = 1) readonly buffer Lights { Light lights[]; };
-layout(std430, binding = 2) readonly buffer Transmittance { float transmittance[]; };
+layout(push_constant) uniform Push {
+    vec3 eye;
+    uint n_facets;
+    uint n_lights;
+    uint n_bases;
+    uint n_rows;
+    uint i_vectors;
+} push;
+READS(0, Facet, facets)
+READS(1, Light, lights)
+READS(2, float, transmittance)
 layout(binding = 3) uniform usamplerBuffer regions;
 #include "regions.glsl"
 layout(binding = 4) uniform samplerBuffer table;
 // [light][row]
-layout(std430, binding = 5) writeonly buffer First { float t1[]; };
-layout(std430, binding = 6) writeonly buffer LitFacets { Lit lit[]; };
+WRITES(5, float, t1)
+WRITES(6, Lit, lit)
 
 #include "lobe.glsl"
 
@@ -44,7 +52,7 @@ void main() {
                 t1[row] = glossy * value_at(push.i_vectors + b, knot);
             }
         }
-        // What second counts and contract sums.
+        // `second` counts into these records and `contract` fills them.
         lit[j] = Lit(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
     }
 }

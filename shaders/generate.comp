@@ -1,24 +1,34 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 
-// P (1)-(11), Fig. 1 (docs/model.md §1): particles of boxes by bounded rejection.
+// Generates the particles of boxes by bounded rejection (docs/model.md §1, §11 "generate").
+// In: boxes, the group of each particle. Out: particles relative to their box's centre, and the
+// attempts that each took.
+// Law and source: P (1)-(11), Fig. 1. Philox4x32-10 gives each attempt's numbers from (seed, box,
+// particle, attempt).
+// Bound: positions lie in the box; after max_attempts the last offset is folded into it.
 
 layout(local_size_x = 64) in;
 
-// Particles an invocation makes; src/passes/generate.rs says why that many.
+// Particles an invocation makes; src/passes/generate.rs derives the number.
 const uint PER_INVOCATION = 16;
 
-layout(push_constant) uniform Push { uint i_first; uint n_particles; uint max_attempts; } push;
-layout(std430, binding = 0) readonly buffer Boxes { Box boxes[]; };
-layout(std430, binding = 1) readonly buffer GroupOf { uint i_group[]; };
-layout(std430, binding = 2) writeonly buffer Particles { Particle particles[]; };
-// Attempts made; bit 31 set where the particle was folded back.
-layout(std430, binding = 3) writeonly buffer Status { uint status[]; };
+layout(push_constant) uniform Push {
+    uint i_first;
+    uint n_particles;
+    uint max_attempts;
+} push;
+READS(0, Box, boxes)
+READS(1, uint, i_group)
+WRITES(2, Particle, particles)
+// Attempts made; bit 31 is set where the particle was folded.
+WRITES(3, uint, status)
 
-// P (1)-(7): offset from the box's centre.
+// Returns the offset from the box's centre, P (1)-(7).
 vec3 offset_of(vec3 u, Box b) {
     vec3 x = (b.form == FORM_PRINTED ? u : 2.0 * u - 1.0) * b.extent;
     float px = 0.5 * PI * sine(0.5 * x.y);
@@ -40,18 +50,18 @@ vec3 fold(vec3 v, vec3 h) {
     return clamp(folded, -h, h);
 }
 
-// u1 to u4 of one attempt of particle i.
+// Returns u1 to u4 of one attempt of particle i.
 vec4 draw(Box b, uint i, uint attempt) {
     return uniforms(philox4x32_10(uvec2(b.seed, b.i_box), uvec4(i - b.i_first, attempt, 0, 0)));
 }
 
-// Attempts of the particles found so far, a byte each with the last one lowest: 16 fit.
+// Attempts of the particles found so far, one byte each with the last one lowest: 16 fit.
 const uint BYTE_OUTSIDE = 0x80u;
 
-// The particles begin, begin + hop, ... below end, all of box b. First the search, one attempt a
-// turn of whichever particle this invocation is at: a lucky one goes on to its next particle
-// instead of waiting for its neighbours. Then the particles, from the attempts that were kept:
-// computed twice, but stored without neighbours waiting.
+// Makes the particles begin, begin + hop, ... below end, all of box b.
+// The first loop searches: each iteration makes one attempt for the invocation's current particle,
+// so that an invocation goes on to its next particle without waiting for its neighbours. The second
+// loop computes the particles of the kept attempts again and stores them.
 void make(Box b, uint begin, uint end, uint hop) {
     vec3 h = 0.5 * b.extent;
     uvec4 found = uvec4(0);
@@ -76,7 +86,10 @@ void make(Box b, uint begin, uint end, uint hop) {
         vec3 v = offset_of(u.xyz, b);
         float r = u.w * b.radius_max;
         float radius = r + 0.5 * PI * sine(r);
-        particles[i] = Particle(inside ? v : fold(v, h), b.sigma_factor * radius, vec3(1.0), b.kappa, 1.0, 0.0, vec2(0.0));
+        particles[i] = Particle(
+            inside ? v : fold(v, h), b.sigma_factor * radius, vec3(1.0), b.kappa, 1.0, 0.0,
+            vec2(0.0)
+        );
         status[i] = n_attempts | (inside ? 0u : 0x80000000u);
     }
 }
@@ -87,8 +100,7 @@ void main() {
     uint first = push.i_first + gl_WorkGroupID.x * n_chunk;
     for (uint chunk = first; chunk < run_end; chunk += gl_NumWorkGroups.x * n_chunk) {
         uint chunk_end = min(chunk + n_chunk, run_end);
-        // Groups are runs of consecutive particles, so that a workgroup reads a box once and not
-        // for each of them.
+        // Groups are runs of consecutive particles, so a workgroup reads each box once.
         uint last = i_group[chunk_end - 1];
         for (uint g = i_group[chunk]; g <= last; ++g) {
             Box b = boxes[g];

@@ -1,12 +1,17 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "functions.glsl"
 
-// Deposits each blob's mass into the cells it meets (docs/model.md §8, "grid"): a workgroup a blob.
-// Sums are 64-bit fixed point, so that they do not depend on the order of the atomics.
+// Deposits each blob's mass into the grid's cells, a workgroup a blob (docs/model.md §8, §11
+// "grid").
+// In: placed particles (lengths), kappa (1/length). Out: fixed-point sums of mass by cell, 64 bits.
+// Law: the Gaussian, cut at 3 sigma and normalised, integrated over each cell. The fixed-point sums
+// do not depend on the order of the atomics.
+// Bound: half a quantum a deposit, and erf_approx's error in the weights.
 
-// One subgroup wide where the host says how wide that is: barriers are then cheap.
+// The host asks for one subgroup, where barriers are cheap.
 #ifndef WORKGROUP
 #define WORKGROUP 32
 #endif
@@ -14,32 +19,40 @@ layout(local_size_x = WORKGROUP) in;
 
 const uint MAX_CELLS = 512;
 const float CUT_SIGMA = 3.0;
-// erf(3/sqrt 2): the share of a Gaussian within the cut, to which the weights sum before they are
+// erf(3/sqrt 2): the share of a Gaussian within the cut, the weights' sum before they are
 // normalised.
 const float WITHIN_CUT = 0.9973002039367398;
 // (2 pi)^(3/2)
 const float MASS_FACTOR = 15.7496099457224;
 
-layout(push_constant) uniform Push { Grid grid; uint n_particles; float quanta_per_mass; } push;
-layout(std430, binding = 0) readonly buffer PlacedParticles { Placed placed[]; };
-layout(std430, binding = 1) readonly buffer Particles { Particle particles[]; };
+layout(push_constant) uniform Push {
+    Grid grid;
+    uint n_particles;
+    float quanta_per_mass;
+} push;
+READS(0, Placed, placed)
+READS(1, Particle, particles)
 // Cell c: low word at 2c, high word at 2c + 1.
-layout(std430, binding = 2) buffer Sums { uint sums[]; };
+UPDATES(2, uint, sums)
 
 shared float weights[3][MAX_CELLS];
 
-// Share of a unit Gaussian at 0 between cell faces a and b (in sigma), cut at +-CUT_SIGMA.
+// Returns the share of a unit Gaussian at 0 between cell faces a and b, in sigma, cut at
+// +-CUT_SIGMA.
 float weight(float a, float b) {
     float low = clamp(a, -CUT_SIGMA, CUT_SIGMA), high = clamp(b, -CUT_SIGMA, CUT_SIGMA);
-    // Not negative even where rounding makes it so: a negative float has no defined uint.
-    return max(0.5 / WITHIN_CUT * (erf_approx(high * 0.70710678118) - erf_approx(low * 0.70710678118)), 0.0);
+    // Rounding must not make it negative: a negative float has no defined uint.
+    return max(
+        0.5 / WITHIN_CUT * (erf_approx(high * 0.70710678118) - erf_approx(low * 0.70710678118)), 0.0
+    );
 }
 
 void main() {
     for (uint p = gl_WorkGroupID.x; p < push.n_particles; p += gl_NumWorkGroups.x) {
         Placed blob = placed[p];
         float aspect = particles[p].aspect;
-        float mass = particles[p].kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma * aspect;
+        float mass =
+            particles[p].kappa * MASS_FACTOR * blob.sigma * blob.sigma * blob.sigma * aspect;
         vec3 sigma = blob.sigma * vec3(1.0, aspect, 1.0);
         vec3 edges = push.grid.cell * vec3(1.0, push.grid.aspect, 1.0);
         vec3 inv_edges = push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0);
@@ -49,7 +62,8 @@ void main() {
         ivec3 end = clamp(ivec3(floor((x + CUT_SIGMA * sigma) * inv_edges)), begin, last);
         if (mass > 0.0) {
             for (int axis = 0; axis < 3; ++axis) {
-                for (int i = begin[axis] + int(gl_LocalInvocationID.x); i <= end[axis]; i += int(gl_WorkGroupSize.x)) {
+                for (int i = begin[axis] + int(gl_LocalInvocationID.x); i <= end[axis];
+                     i += int(gl_WorkGroupSize.x)) {
                     float a = (float(i) * edges[axis] - x[axis]) / sigma[axis];
                     float b = (float(i + 1) * edges[axis] - x[axis]) / sigma[axis];
                     weights[axis][i - begin[axis]] = weight(a, b);
@@ -63,8 +77,8 @@ void main() {
         for (int z = 0; z < n.z; ++z) {
             int first = begin.x + row * begin.y + layer * (begin.z + z);
             float layer_quanta = total_quanta * weights[2][z];
-            // k / n.x by a float quotient: exact, as k < MAX_CELLS^2 = 2^18 leaves the half a
-            // margin of many ulp. Integer division is slow on most devices.
+            // k / n.x by a float quotient is exact: k < MAX_CELLS^2 = 2^18 leaves the half a margin
+            // of many ulp. Integer division is slow on most devices.
             for (int k = int(gl_LocalInvocationID.x); k < n.x * n.y; k += int(gl_WorkGroupSize.x)) {
                 int y = int((float(k) + 0.5) / float(n.x));
                 int x = k - y * n.x;

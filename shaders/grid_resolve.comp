@@ -1,17 +1,21 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "each.glsl"
 
-// Fixed-point sums to density: extinction per unit length.
+// Converts the grid's fixed-point sums to density (docs/model.md §11 "grid").
+// In: 64-bit sums by cell. Out: density, extinction per unit length. Error: three roundings.
 
-layout(local_size_x = 64) in;
-
-layout(push_constant) uniform Push { uint n_cells; float density_per_quantum; } push;
-layout(std430, binding = 0) readonly buffer Sums { uvec2 sums[]; };
-layout(std430, binding = 1) writeonly buffer Density { float density[]; };
+layout(push_constant) uniform Push {
+    uint n_cells;
+    float density_per_quantum;
+} push;
+READS(0, uvec2, sums)
+WRITES(1, float, density)
 
 void main() {
     FOR_EACH(c, push.n_cells) {
-        density[c] = (float(sums[c].y) * 4294967296.0 + float(sums[c].x)) * push.density_per_quantum;
+        density[c] =
+            (float(sums[c].y) * 4294967296.0 + float(sums[c].x)) * push.density_per_quantum;
     }
 }

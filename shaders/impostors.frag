@@ -1,14 +1,13 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "records.glsl"
 
-// A shell's picture seen from elsewhere: the pixel's place in it by a homography, Catmull and Rom's
-// cubic between its texels (docs/model.md §11 "impostors").
+// Draws a shell's picture as seen from elsewhere (docs/model.md §11 "impostors").
+// In: the shell's picture, RGBA floats. Out: the pixel's colour.
+// Law: a homography gives the pixel's place in the shell's picture; Catmull-Rom cubics interpolate
+// between its texels.
 
-// From pixels off the middle of the picture to texels off the middle of the shell's: (column, row)
-// over under.
-layout(push_constant) uniform Push { vec3 column; float depth; vec3 row; uint width; vec3 under; uint height; vec2 middle; vec2 low; vec2 high; } push;
+#include "impostors.glsl"
 // Four floats a texel, rows from the top.
 layout(binding = 0) uniform usamplerBuffer shell;
 
@@ -16,27 +15,28 @@ layout(location = 0) out vec4 out_color;
 
 vec4 weights(float t) {
     float t2 = t * t, t3 = t2 * t;
-    return 0.5 * vec4(2.0 * t2 - t - t3, 2.0 - 5.0 * t2 + 3.0 * t3, t + 4.0 * t2 - 3.0 * t3, t3 - t2);
+    return 0.5
+           * vec4(2.0 * t2 - t - t3, 2.0 - 5.0 * t2 + 3.0 * t3, t + 4.0 * t2 - 3.0 * t3, t3 - t2);
 }
 
-vec4 texel(int i, int j) {
-    return uintBitsToFloat(texelFetch(shell, j * int(push.width) + i));
-}
+vec4 texel(int i, int j) { return uintBitsToFloat(texelFetch(shell, j * int(push.width) + i)); }
 
 void main() {
     vec3 pixel = vec3(gl_FragCoord.xy - push.middle, 1.0);
     vec2 extent = vec2(push.width, push.height);
-    // In texels from the first one's centre; no farther off than its footprint has texels to show.
-    vec2 at = vec2(dot(push.column, pixel), dot(push.row, pixel)) / dot(push.under, pixel) + 0.5 * extent - 0.5;
+    // In texels from the first one's centre, clamped to the texels there are.
+    vec2 at = vec2(dot(push.column, pixel), dot(push.row, pixel)) / dot(push.under, pixel)
+              + 0.5 * extent - 0.5;
     at = clamp(at, vec2(0.0), extent - 1.0);
     vec2 low = floor(at);
     vec4 across = weights(at.x - low.x), down = weights(at.y - low.y);
     ivec2 first = ivec2(low) - 1, last = ivec2(extent) - 1;
-    ivec4 i = clamp(first.x + ivec4(0, 1, 2, 3), 0, last.x), j = clamp(first.y + ivec4(0, 1, 2, 3), 0, last.y);
+    ivec4 i = clamp(first.x + ivec4(0, 1, 2, 3), 0, last.x),
+          j = clamp(first.y + ivec4(0, 1, 2, 3), 0, last.y);
     vec4 sum = vec4(0.0);
     [[unroll]] for (int k = 0; k < 4; ++k) {
-        vec4 line = across.x * texel(i.x, j[k]) + across.y * texel(i.y, j[k]) + across.z * texel(i.z, j[k])
-                  + across.w * texel(i.w, j[k]);
+        vec4 line = across.x * texel(i.x, j[k]) + across.y * texel(i.y, j[k])
+                    + across.z * texel(i.z, j[k]) + across.w * texel(i.w, j[k]);
         sum += down[k] * line;
     }
     out_color = vec4(max(sum.xyz, 0.0), clamp(sum.w, 0.0, 1.0));

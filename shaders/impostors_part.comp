@@ -1,21 +1,27 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 
-// The sorted entries once with what is far alone, once with what is near (docs/model.md §11
-// "impostors").
+// Splits the sorted entries into far ones and near ones (docs/model.md §11 "impostors").
+// In: entries (key, particle). Out: the entries twice, with NO_PARTICLE in place of the near ones
+// and of the far ones. Exact: it only copies.
 
-layout(local_size_x = 64) in;
-
-// last_key: of what is far; is_new: who is far is said anew by the keys, else it is what it was.
-layout(push_constant) uniform Push { uint n_entries; uint last_key; uint is_new; uint unused; } push;
+// last_key: greatest key of a far entry. is_new: 1 decides anew by the keys who is far, 0 keeps the
+// last decision.
+layout(push_constant) uniform Push {
+    uint n_entries;
+    uint last_key;
+    uint is_new;
+    uint unused;
+} push;
 // (key, particle)
-layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
-// By particle whether it is in the shell.
-layout(std430, binding = 1) buffer Members { uint members[]; };
-layout(std430, binding = 2) writeonly buffer Far { uvec2 far[]; };
-layout(std430, binding = 3) writeonly buffer Near { uvec2 near[]; };
+READS(0, uvec2, entries)
+// By particle, whether it is in the shell.
+UPDATES(1, uint, members)
+WRITES(2, uvec2, far)
+WRITES(3, uvec2, near)
 
 void main() {
     FOR_EACH(k, push.n_entries) {

@@ -1,20 +1,21 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "functions.glsl"
 
-// Positions relative to the lighting origin: position, as it has grown, + its group's offset + the
-// gusts' displacement (docs/model.md §11 to §13).
-
-layout(local_size_x = 64) in;
+// Places particles for this frame: position, as it has grown, + its group's offset + the gusts'
+// displacement (docs/model.md §11 to §13).
+// In: particles, groups, gust modes. Out: positions relative to the lighting origin, and sigma.
+// Error: a few roundings, and sine()'s.
 
 layout(push_constant) uniform Push { uint n_particles; } push;
-layout(std430, binding = 0) readonly buffer Particles { Particle particles[]; };
-layout(std430, binding = 1) readonly buffer GroupOf { uint i_group[]; };
-layout(std430, binding = 2) readonly buffer Groups { Group groups[]; };
-layout(std430, binding = 3) readonly buffer Modes { Mode modes[]; };
-layout(std430, binding = 4) writeonly buffer PlacedParticles { Placed placed[]; };
+READS(0, Particle, particles)
+READS(1, uint, i_group)
+READS(2, Group, groups)
+READS(3, Mode, modes)
+WRITES(4, Placed, placed)
 
 void main() {
     FOR_EACH(i, push.n_particles) {

@@ -1,7 +1,9 @@
 #version 460
 
-// A picture as a display shows it: over the background, tone-mapped, in sRGB, dithered; or two,
-// compared (docs/model.md §11 "present").
+// Shows a picture on a display: over the background, tone-mapped, in sRGB, dithered; or two
+// pictures compared (docs/model.md §11 "present").
+// In: one or two pictures, premultiplied linear RGBA. Out: code values of 8 bits. Error: half a
+// code value, by dithering.
 
 // 0: bytes, 1: half floats, 2: floats.
 layout(constant_id = 0) const uint FORMAT = 1;
@@ -16,7 +18,7 @@ layout(push_constant) uniform Push {
     int split;
     float gain;
 } push;
-// Four words at a time, as devices read them best.
+// Four words a texel, which devices read best.
 layout(binding = 0) uniform usamplerBuffer picture_a;
 layout(binding = 1) uniform usamplerBuffer picture_b;
 
@@ -24,16 +26,16 @@ layout(location = 0) out vec4 out_color;
 
 const uint NEUTRAL = 0;
 
-// What is compared, and how.
+// Ways of comparing.
 const uint SPLIT = 1;
 const uint DIFFERENCE = 2;
 const uint SECOND = 3;
-// Rows of a dash of the line between, so that it shows on white and on black.
+// Rows of a dash of the dividing line, so that the line shows on white and on black.
 const uint DASH = 4;
 const float START_COMPRESSION = 0.8;
 const float DESATURATION = 0.15;
 
-// Premultiplied linear RGBA.
+// Returns a premultiplied linear RGBA pixel.
 vec4 pixel_at(bool is_b, uvec2 p) {
     uint i = p.y * push.size.x + p.x;
     int at = int(FORMAT == 0 ? i >> 2 : FORMAT == 1 ? i >> 1 : i);
@@ -57,12 +59,13 @@ vec3 neutral(vec3 color) {
     const float d = 1.0 - START_COMPRESSION;
     float new_peak = 1.0 - d * d / (peak + d - START_COMPRESSION);
     float gray = 1.0 - 1.0 / (DESATURATION * (peak - new_peak) + 1.0);
-    // What is beyond f32's numbers is white.
+    // Beyond f32's range the colour is white.
     return peak > 3e38 ? vec3(1.0) : mix(color * (new_peak / peak), vec3(new_peak), gray);
 }
 
-// How far two pixels over the background are apart, times the gain; from differences, so that small
-// ones keep their digits. What is no number is 1: nobody is to take it for none.
+// Returns how far two pixels over the background are apart, times the gain. Differences are formed
+// first, so that small ones keep their digits. NaN gives 1, so that it is not taken for no
+// difference.
 vec3 apart(vec4 a, vec4 b) {
     vec4 d = a - b;
     vec3 far = push.gain * (push.exposure * abs(d.rgb - d.a * push.background));
@@ -75,7 +78,7 @@ float encoded(float linear) {
     return v <= 0.0031308 ? 12.92 * v : 1.055 * exp2(log2(v) / 2.4) - 0.055;
 }
 
-// (B + 1/2)/64 of Bayer's 8 by 8 matrix B.
+// Returns (B + 1/2)/64 of Bayer's 8 by 8 matrix B.
 float dither(uvec2 p) {
     uint a = (p.x ^ p.y) & 7u, b = p.y & 7u, bayer = 0u;
     for (uint i = 0u; i < 3u; ++i) {
@@ -103,6 +106,8 @@ void main() {
         vec3 linear = push.exposure * (pixel.rgb + (1.0 - pixel.a) * push.background);
         shown = push.tone_map == NEUTRAL ? neutral(linear) : linear;
     }
-    vec3 code = floor(255.0 * vec3(encoded(shown.r), encoded(shown.g), encoded(shown.b)) + dither(uvec2(at)));
+    vec3 code = floor(
+        255.0 * vec3(encoded(shown.r), encoded(shown.g), encoded(shown.b)) + dither(uvec2(at))
+    );
     out_color = vec4(min(code, 255.0) / 255.0, 1.0);
 }

@@ -1,14 +1,16 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "sort.glsl"
 #include "one_subgroup.glsl"
 
-// Digits of each tile: table[digit][tile].
+// Counts the digits of each tile's keys (docs/model.md §11 "sort"). In: entries (key, value). Out:
+// table[digit][tile]. Exact: integers.
 
 layout(local_size_x = TILE_INVOCATIONS) in;
 
-layout(std430, binding = 1) readonly buffer Entries { uvec2 entries[]; };
-layout(std430, binding = 2) writeonly buffer Table { uint table[]; };
+READS(1, uvec2, entries)
+WRITES(2, uint, table)
 
 shared uint counts[N_DIGITS];
 

@@ -1,12 +1,14 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "sort.glsl"
 
-// Exclusive prefix sum of table[digit][tile] in one workgroup: an invocation a digit.
+// Scans table[digit][tile] to an exclusive prefix sum in one workgroup, an invocation a digit
+// (docs/model.md §11 "sort"). Exact: integers.
 
 layout(local_size_x = 1 << DIGIT_BITS) in;
 
-layout(std430, binding = 1) buffer Table { uint table[]; };
+UPDATES(1, uint, table)
 
 shared uint sums[N_DIGITS];
 
@@ -20,7 +22,7 @@ void main() {
     }
     sums[d] = total;
     barrier();
-    // Hillis-Steele over the digits.
+    // Hillis-Steele prefix sum over the digits.
     for (uint reach = 1; reach < N_DIGITS; reach *= 2) {
         uint left = d >= reach ? sums[d - reach] : 0u;
         barrier();

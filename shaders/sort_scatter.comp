@@ -1,19 +1,21 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "sort.glsl"
 #include "one_subgroup.glsl"
 
 // Moves every entry to its place: the table's base for (digit, tile) plus its rank among its digit
-// inside the tile.
+// inside the tile (docs/model.md §11 "sort").
+// In: entries and the scanned table. Out: entries sorted by one digit; stable.
 
 layout(local_size_x = TILE_INVOCATIONS) in;
 
-layout(std430, binding = 1) readonly buffer Entries { uvec2 entries[]; };
-layout(std430, binding = 2) readonly buffer Table { uint table[]; };
-layout(std430, binding = 3) writeonly buffer Sorted { uvec2 entries_sorted[]; };
+READS(1, uvec2, entries)
+READS(2, uint, table)
+WRITES(3, uvec2, entries_sorted)
 
-// Counters of two digits a word: word w of invocation t at [w * TILE_INVOCATIONS + t]. 16 KiB for
-// 32 invocations, which every Vulkan device has; a tile's 1024 entries fit 16 bits.
+// Counters of two digits a word: word w of invocation t at [w * TILE_INVOCATIONS + t]. They take 16
+// KiB for 32 invocations, which every Vulkan device has; a tile's 1024 entries fit 16 bits.
 shared uint ranks[N_DIGITS / 2 * TILE_INVOCATIONS];
 
 void main() {

@@ -1,21 +1,20 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "camera.glsl"
+#include "variants.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 
-layout(constant_id = 4) const uint TEXTURED = 0;
-layout(constant_id = 5) const uint THRESHOLD = 0;
-layout(constant_id = 6) const uint ELLIPSOIDS = 0;
-
 layout(binding = 8) uniform usamplerBuffer pool;
-#define SHEET_PIXELS
+#define SAMPLES_TEXTURE
 #include "texture.glsl"
 
-// Optical depth along the pixel's ray through a thin Gaussian blob, premultiplied (docs/model.md
-// §9).
+// Computes a thin Gaussian blob's opacity along the pixel's ray (docs/model.md §9, §11 "sprites").
+// In: the blob from sprites.vert. Out: premultiplied colour and opacity, 1 - e^-tau.
+// Law: tau = sqrt(2 pi) kappa sigma e^(-b^2/2 sigma^2), b the ray's distance from the centre.
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; float inv_threshold; uint i_first; } push;
+#include "sprites.glsl"
 
 layout(location = 0) flat in vec4 in_blob;
 layout(location = 1) flat in vec3 in_radiance;
@@ -27,10 +26,9 @@ layout(location = 6) flat in vec4 in_conic;
 layout(location = 0) out vec4 out_color;
 
 void main() {
-    // The ray (x, y, 1) through the pixel's centre; pixel = (2 tan_x/W, 2 tan_y/H).
-    vec2 ray = vec2(gl_FragCoord.x * push.pixel.x - push.camera.tan_x, push.camera.tan_y - gl_FragCoord.y * push.pixel.y);
-    // b^2 = |c x d|^2/|d|^2 with c = z (s, 1) and d = (s + delta, 1): one subtraction that can
-    // cancel, the delta.
+    vec2 ray = ray_through(push.camera, gl_FragCoord.xy, push.pixel).xy;
+    // b^2 = |c x d|^2/|d|^2 with c = z (s, 1) and d = (s + delta, 1). Only the subtraction for
+    // delta can cancel.
     vec2 s = in_blob.xy;
     vec2 delta = ray - s;
     float twist = s.x * delta.y - s.y * delta.x;
@@ -39,12 +37,16 @@ void main() {
     float cut = THRESHOLD != 0 ? in_cut : 0.5 * push.cutoff * push.cutoff;
     float tau = in_blob.w;
     if (ELLIPSOIDS != 0) {
-        // |M d|^2, and |d|/|M d|: a ray is as long within the ball as it is made to be.
-        vec3 d = vec3(ray, 1.0), y = vec3(push.camera.right.y, push.camera.up.y, push.camera.forward.y);
+        // |M d|^2, and |d|/|M d|: the ray's length in the scene over that in the ball's
+        // coordinates.
+        vec3 d = vec3(ray, 1.0),
+             y = vec3(push.camera.right.y, push.camera.up.y, push.camera.forward.y);
         float up = dot(y, d);
         vec3 across = d - up * y;
         float rest = dot(across, across), white = rest + in_conic.w * up * up;
-        e = (in_conic.x * delta.x * delta.x + in_conic.y * delta.x * delta.y + in_conic.z * delta.y * delta.y) / white;
+        e = (in_conic.x * delta.x * delta.x + in_conic.y * delta.x * delta.y
+             + in_conic.z * delta.y * delta.y)
+            / white;
         tau *= sqrt((rest + up * up) / white);
         cut = 0.5 * push.cutoff * push.cutoff;
         if (THRESHOLD != 0) {
@@ -55,7 +57,7 @@ void main() {
     if (e <= cut) {
         float exponent = -e;
         if (TEXTURED != 0) {
-            exponent += sheet_exponent(delta, in_turn, in_place, in_gain);
+            exponent += texture_exponent(delta, in_turn, in_place, in_gain);
         }
         alpha = one_minus_exp(tau * exp(exponent));
     }

@@ -1,16 +1,23 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
+#include "camera.glsl"
 
-// Surfaces that hide and are not seen.
+// 1: surfaces hide blobs and are not seen.
 layout(constant_id = 0) const uint DEPTH_ONLY = 0;
 
-// Where the pixel's ray meets a rectangle: its depth, and the radiance there (docs/model.md §11
-// "surfaces").
+// Intersects the pixel's ray with a rectangle (docs/model.md §11 "surfaces").
+// In: the rectangle from surfaces.vert, radiance of facets. Out: depth near/z, and the radiance
+// there, interpolated between facets.
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; vec2 unused; } push;
-layout(std430, binding = 0) readonly buffer Regions { Region regions[]; };
-layout(std430, binding = 1) readonly buffer LitFacets { Lit lit[]; };
+layout(push_constant) uniform Push {
+    Camera camera;
+    vec2 pixel;
+    vec2 unused;
+} push;
+READS(0, Region, regions)
+READS(1, Lit, lit)
 
 layout(location = 0) flat in uint in_i;
 layout(location = 1) flat in vec4 in_plane;
@@ -18,11 +25,9 @@ layout(location = 2) flat in vec4 in_s;
 layout(location = 3) flat in vec4 in_t;
 layout(location = 0) out vec4 out_color;
 
-vec3 radiance_of(uint i) {
-    return lit[i].first + lit[i].second;
-}
+vec3 radiance_of(uint i) { return lit[i].first + lit[i].second; }
 
-// Between the centres of the facets around (s, t), both in [-1, 1].
+// Returns the radiance between the centres of the facets around (s, t), both in [-1, 1].
 vec3 interpolated(Region region, vec2 st) {
     uvec2 n = uvec2(region.n_u, region.n_v);
     vec2 at = clamp((0.5 * st + 0.5) * vec2(n) - 0.5, vec2(0.0), vec2(n - 1));
@@ -36,16 +41,15 @@ vec3 interpolated(Region region, vec2 st) {
 }
 
 void main() {
-    // Through the pixel's centre; pixel = (2 tan_x/W, 2 tan_y/H).
-    vec2 at = gl_FragCoord.xy * push.pixel;
-    vec3 ray = vec3(at.x - push.camera.tan_x, push.camera.tan_y - at.y, 1.0);
+    vec3 ray = ray_through(push.camera, gl_FragCoord.xy, push.pixel);
     // z ray = C + s u + t v by Cramer's rule: z = q/d, s = (ray.(V x C))/(|u| d), t = (ray.(C x
     // U))/(|v| d).
     float d = dot(ray, in_plane.xyz), size = abs(d);
     float q = d < 0.0 ? -in_plane.w : in_plane.w;
     float s = dot(ray, in_s.xyz), t = dot(ray, in_t.xyz);
-    // Without division, so that a ray along the plane is no special case.
-    bool is_hit = q > 0.0 && q >= push.camera.near * size && abs(s) <= in_s.w * size && abs(t) <= in_t.w * size;
+    // Without division a ray along the plane is no special case.
+    bool is_hit = q > 0.0 && q >= push.camera.near * size && abs(s) <= in_s.w * size
+                  && abs(t) <= in_t.w * size;
     if (!is_hit) {
         discard;
     }

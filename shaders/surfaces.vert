@@ -1,39 +1,33 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
+#include "camera.glsl"
+#include "plane.glsl"
 
-// A screen-aligned quad around what is seen of each rectangle (docs/model.md §11 "surfaces"). The
-// fragment shader's own test decides which pixels it covers, so that neither clipping nor snapping
-// of corners far off the screen does.
+// Draws a screen-aligned quad around the visible part of each rectangle (docs/model.md §11
+// "surfaces"). The fragment shader's own test decides which pixels the rectangle covers, so that
+// clipping and snapping of far corners do not.
+// In: regions, the camera. Out: the quad, and the rectangle's plane for surfaces.frag.
+// Bound: the quad is widened by ROUNDING and SNAP, more than its corners can err.
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; vec2 unused; } push;
-layout(std430, binding = 0) readonly buffer Regions { Region regions[]; };
+layout(push_constant) uniform Push {
+    Camera camera;
+    vec2 pixel;
+    vec2 unused;
+} push;
+READS(0, Region, regions)
 
 layout(location = 0) flat out uint out_i;
-// U x V, C.(U x V); V x C, |u|; C x U, |v|: centre C from the eye, directions U = u/|u|, V = v/|v|,
-// all along (right, up, forward), where |.| is the greatest component: f32 holds no product of two
-// lengths of 1e-15 with a third.
 layout(location = 1) flat out vec4 out_plane;
 layout(location = 2) flat out vec4 out_s;
 layout(location = 3) flat out vec4 out_t;
 
-// Vulkan promises vertices 4 bits below the pixel: a corner may move by this many pixels when it is
-// snapped.
-const float SNAP = 1.0 / 16.0;
 // A corner's coordinate errs by less than this share of |C|_1 + |u|_1 + |v|_1. In units of 2^-24 of
 // numbers that are at most that sum: 1 for C's subtraction, 6 for dividing u and v by their lengths
 // and multiplying again, 3 for the dot product, 2 for the sums; and 13 for a crossing of the near
 // plane (two differences, a quotient of 5, product, sum, and those of both ends): 25, 1.5e-6.
 const float ROUNDING = 2e-6;
-
-vec3 along_view(vec3 v) {
-    return vec3(dot(push.camera.right, v), dot(push.camera.up, v), dot(push.camera.forward, v));
-}
-
-float greatest(vec3 v) {
-    v = abs(v);
-    return max(max(v.x, v.y), v.z);
-}
 
 // Widens low and high to the slopes of p, which errs by at most e < z/2 along each axis.
 void widen(inout vec2 low, inout vec2 high, vec3 p, float e) {
@@ -47,33 +41,35 @@ void main() {
     Region region = regions[gl_InstanceIndex];
     vec3 from_eye = region.center - push.camera.eye;
     float length_u = greatest(region.u), length_v = greatest(region.v);
-    vec3 c = along_view(from_eye), u = along_view(region.u / length_u), v = along_view(region.v / length_v);
-    vec3 n = cross(u, v);
+    vec3 c = along_camera(push.camera, from_eye),
+         u = along_camera(push.camera, region.u / length_u),
+         v = along_camera(push.camera, region.v / length_v);
     out_i = gl_InstanceIndex;
-    out_plane = vec4(n, dot(c, n));
-    out_s = vec4(cross(v, c), length_u);
-    out_t = vec4(cross(c, u), length_v);
+    RayPlane plane = ray_plane(c, u, v, length_u, length_v);
+    out_plane = plane.normal;
+    out_s = plane.s;
+    out_t = plane.t;
 
     vec2 tangents = vec2(push.camera.tan_x, push.camera.tan_y);
     vec2 low = tangents, high = -tangents;
     float e = ROUNDING * dot(abs(from_eye) + abs(region.u) + abs(region.v), vec3(1.0));
-    float plane = push.camera.near - e;
+    float near = push.camera.near - e;
     if (e < 0.25 * push.camera.near) {
-        // The corners before the plane, and where the sides cross it.
+        // The corners before the plane, and the points where the sides cross it.
         u *= length_u;
         v *= length_v;
         for (int k = 0; k < 4; ++k) {
             vec3 a = c + (k == 0 || k == 3 ? -u : u) + (k < 2 ? -v : v);
             vec3 b = c + (k >= 2 ? -u : u) + (k == 0 || k == 3 ? -v : v);
-            if (a.z >= plane) {
+            if (a.z >= near) {
                 widen(low, high, a, e);
             }
-            if ((a.z >= plane) != (b.z >= plane)) {
-                widen(low, high, vec3(mix(a.xy, b.xy, (plane - a.z) / (b.z - a.z)), plane), e);
+            if ((a.z >= near) != (b.z >= near)) {
+                widen(low, high, vec3(mix(a.xy, b.xy, (near - a.z) / (b.z - a.z)), near), e);
             }
         }
     } else {
-        // No telling what lies before the near plane: the whole screen.
+        // The near plane lies within the error: the whole screen.
         low = -tangents;
         high = tangents;
     }
@@ -82,7 +78,7 @@ void main() {
     bool right = (gl_VertexIndex & 1) != 0, top = (gl_VertexIndex & 2) != 0;
     gl_Position = vec4(right ? high.x : low.x, -(top ? high.y : low.y), 0.0, 1.0);
     if (!all(lessThan(low, high))) {
-        // Nothing to draw: a quad without area.
+        // Draws nothing: a quad without area.
         gl_Position = vec4(2.0, 2.0, 0.0, 1.0);
     }
 }

@@ -1,14 +1,22 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
+#include "camera.glsl"
 
-// Ground that hides and is not seen.
+// 1: ground hides blobs and is not seen.
 layout(constant_id = 0) const uint DEPTH_ONLY = 0;
 
-// Where the pixel's ray meets a triangle's plane, no farther out than the triangle reaches: its
-// depth, and the radiance there (docs/model.md §16).
+// Intersects the pixel's ray with a triangle's plane, no farther out than the triangle reaches
+// (docs/model.md §16).
+// In: the triangle from terrain.vert. Out: depth near/z, and the radiance there, interpolated
+// between the corners.
 
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; uint i_region; uint i_first_ground; } push;
+layout(push_constant) uniform Push {
+    Camera camera;
+    vec2 pixel;
+    uint i_region;
+    uint i_first_ground;
+} push;
 
 layout(location = 0) flat in vec4 in_plane;
 layout(location = 1) flat in vec4 in_s;
@@ -23,12 +31,13 @@ layout(location = 0) out vec4 out_color;
 const float LEAST = 1e-30;
 
 void main() {
-    vec2 at = gl_FragCoord.xy * push.pixel;
-    vec3 ray = vec3(at.x - push.camera.tan_x, push.camera.tan_y - at.y, 1.0);
+    vec3 ray = ray_through(push.camera, gl_FragCoord.xy, push.pixel);
     // z ray = C + s u + t v by Cramer's rule.
     float d = dot(ray, in_plane.xyz);
     float inverse = 1.0 / (abs(d) > LEAST ? d : LEAST);
-    float z = clamp(in_plane.w * inverse, max(in_depths.x, push.camera.near), max(in_depths.y, push.camera.near));
+    float z = clamp(
+        in_plane.w * inverse, max(in_depths.x, push.camera.near), max(in_depths.y, push.camera.near)
+    );
     gl_FragDepth = min(push.camera.near / z, 1.0);
     if (DEPTH_ONLY != 0) {
         out_color = vec4(0.0);

@@ -1,27 +1,32 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
 #include "texture.glsl"
 
-// The pool's fields from their waves (docs/model.md §11 "texture"): an inverse DFT, along rows,
-// then along columns. Fields 2t and 2t + 1 are real and imaginary part of one. A workgroup has one
-// row or column of one level.
+// Transforms waves to the pool's fields: an inverse DFT along rows, then along columns
+// (docs/model.md §11 "texture").
+// In: Philox numbers by wave. Out: fields, of which 2t and 2t + 1 are the real and the imaginary
+// part of one transform. A workgroup transforms one row or column of one level.
 
-// One subgroup wide where the host says how wide that is: barriers are then cheap.
+// The host asks for one subgroup, where barriers are cheap.
 #ifndef WORKGROUP
 #define WORKGROUP 32
 #endif
 layout(local_size_x = WORKGROUP) in;
 
-layout(push_constant) uniform Push { uint seed; uint along_columns; } push;
-layout(std430, binding = 0) buffer Work { vec2 work[]; };
+layout(push_constant) uniform Push {
+    uint seed;
+    uint along_columns;
+} push;
+UPDATES(0, vec2, work)
 
 const uint N_PAIRS = 4;
 // Rows of all levels.
 const uint N_ROWS = 504;
-// |F| = AMPLITUDE |k|^-1.7: of all waves from |k| = 2 to 64 the squares' sum is 1.
+// |F| = AMPLITUDE |k|^-1.7: over all waves from |k| = 2 to 64 the sum of squares is 1.
 const float AMPLITUDE = 0.6982250102949674;
 const float HALF_SLOPE = 0.85;
 
@@ -31,7 +36,7 @@ shared vec2 roots[TEXTURE_SIDE / 2];
 
 vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
 
-// F of field 2t at k, and i times that of field 2t + 1.
+// Returns F of field 2t at k, plus i times that of field 2t + 1.
 vec2 wave(ivec2 k, uint pair, int most) {
     int square = k.x * k.x + k.y * k.y;
     if (square < 4 || square > most * most) {
@@ -50,7 +55,7 @@ vec2 wave(ivec2 k, uint pair, int most) {
 void main() {
     for (uint group = gl_WorkGroupID.x; group < N_PAIRS * N_ROWS; group += gl_NumWorkGroups.x) {
         uint pair = group / N_ROWS, i = group % N_ROWS;
-        // Rows 512 - 2^(9 - l) and on are level l's.
+        // Rows 512 - 2^(9 - l) and on belong to level l.
         uint level = 8u - uint(findMSB(511u - i));
         uint row = i - (512u - (512u >> level)), n = TEXTURE_SIDE >> level, half_n = n / 2u;
         uint first = pair * FIELD_TEXELS + level_offset(level);
@@ -58,17 +63,18 @@ void main() {
         uint stride = push.along_columns != 0u ? n : 1u;
         barrier();
         for (uint x = gl_LocalInvocationID.x; x < n; x += gl_WorkGroupSize.x) {
-            // Waves above n/2 are the negative ones.
+            // Waves from n/2 on are the negative ones.
             ivec2 k = ivec2(x, row);
             k -= ivec2(greaterThanEqual(k, ivec2(half_n))) * int(n);
-            values[0][x] = push.along_columns != 0u ? work[start + x * stride] : wave(k, pair, int(n / 4u));
+            values[0][x] =
+                push.along_columns != 0u ? work[start + x * stride] : wave(k, pair, int(n / 4u));
         }
         for (uint j = gl_LocalInvocationID.x; j < half_n; j += gl_WorkGroupSize.x) {
             roots[j] = unit_at(float(j << level) * (1.0 / float(TEXTURE_SIDE)));
         }
         barrier();
-        // Stockham's form: after a stage with m the transforms of length 2m lie m apart, in order
-        // at the end.
+        // Stockham's form: after the stage with m the transforms of length 2m lie m apart; at the
+        // end they are in order.
         uint from = 0u;
         // Half of the rows have no wave: zeros stay zeros.
         bool empty = push.along_columns == 0u && min(row, n - row) > n / 4u;

@@ -1,22 +1,23 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "tiles.glsl"
 #include "each.glsl"
 
-// Nothing drawn yet, in every pixel; where one round is not enough.
+// Clears the state of every pixel where one round is not enough (docs/model.md §11 "tiles"). Out:
+// RGBA floats, all 0.
 
-layout(local_size_x = 64) in;
-
-layout(push_constant) uniform Push { uint n_pixels; uint unused; } push;
-layout(std430, binding = 0) readonly buffer Rounds { Round rounds[]; };
-layout(std430, binding = 1) writeonly buffer State { vec4 state[]; };
+layout(push_constant) uniform Push {
+    uint n_pixels;
+    uint unused;
+} push;
+READS(0, Round, rounds)
+WRITES(1, vec4, state)
 
 void main() {
     if (rounds[0].bins.w == 0) {
         return;
     }
-    FOR_EACH(i, push.n_pixels) {
-        state[i] = vec4(0.0);
-    }
+    FOR_EACH(i, push.n_pixels) { state[i] = vec4(0.0); }
 }

@@ -1,25 +1,33 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Where each bin's pairs lie among the sorted ones, and the tiles of it that any of them reaches,
-// dealt to workgroups. Their order decides nothing: no two share a pixel.
+// Finds each bin's range of sorted pairs and deals its tiles to workgroups (docs/model.md §11
+// "tiles"). The order of the ranges does not matter: no two share a pixel.
+// In: sorted pairs. Out: ranges (first pair, end, bin, tile bits), and the dispatch sizes of
+// tiles.comp. Exact: integers.
 
 layout(local_size_x = 64) in;
 
-layout(push_constant) uniform Push { uint n_bins; uint i_round; uint max_groups; uint most_tiles; } push;
-// Pairs that a workgroup goes through: once for each of its tiles, 0.8 turns of its loops a pair,
-// and llvmpipe ends loops after 65 535.
+layout(push_constant) uniform Push {
+    uint n_bins;
+    uint i_round;
+    uint max_groups;
+    uint most_tiles;
+} push;
+// Pairs that a workgroup goes through, once for each of its tiles, 0.8 iterations of its loops a
+// pair: llvmpipe ends loops after 65 535 iterations.
 const uint MOST_PAIRS = 16384;
 
-layout(std430, binding = 0) readonly buffer Pairs { uvec2 pairs[]; };
-layout(std430, binding = 1) buffer Rounds { Round rounds[]; };
+READS(0, uvec2, pairs)
+UPDATES(1, Round, rounds)
 // (first pair, end, bin, a bit for each tile of it)
-layout(std430, binding = 2) writeonly buffer Ranges { uvec4 ranges[]; };
+WRITES(2, uvec4, ranges)
 
-// The first of n pairs whose bin is not below `bin`.
+// Returns the first of n pairs whose bin is not below `bin`.
 uint lower_bound(uint n, uint bin) {
     uint low = 0, high = n;
     while (low < high) {
@@ -42,8 +50,8 @@ void main() {
     uint n = rounds[push.i_round].extent.w;
     uint first = lower_bound(n, bin), end = lower_bound(n, bin + 1u);
     uint reached = 0;
-    // By eights: llvmpipe ends all loops of an invocation after 65 535 turns, and a bin may have as
-    // many pairs.
+    // By eights: llvmpipe ends all loops of an invocation after 65 535 iterations, and a bin may
+    // have as many pairs.
     for (uint i = first; i < end; i += 8) {
         [[unroll]] for (uint k = 0; k < 8; ++k) {
             reached |= pairs[min(i + k, end - 1u)].x >> BIN_BITS;
@@ -52,7 +60,7 @@ void main() {
     if (reached == 0) {
         return;
     }
-    // As many tiles a workgroup as it has turns for.
+    // As many tiles a workgroup as it has iterations for.
     uint most = clamp(MOST_PAIRS / (end - first), 1u, push.most_tiles);
     uint n_ranges = (bitCount(reached) + most - 1u) / most;
     uint before = atomicAdd(rounds[push.i_round].tiles.w, n_ranges);
@@ -65,7 +73,8 @@ void main() {
             tiles = 0;
         }
     }
-    uvec2 groups = uvec2(min(n_before, push.max_groups), (n_before + push.max_groups - 1u) / push.max_groups);
+    uvec2 groups =
+        uvec2(min(n_before, push.max_groups), (n_before + push.max_groups - 1u) / push.max_groups);
     if (push.i_round == 0 && rounds[0].bins.w == 0) {
         atomicAdd(rounds[0].alone.w, n_ranges);
         atomicMax(rounds[0].alone.x, groups.x);

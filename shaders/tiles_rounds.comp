@@ -1,18 +1,26 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#include "buffers.glsl"
 #include "records.glsl"
 #include "tiles.glsl"
 
-// Deals the blocks of splats, near to far, to rounds, each as many as the pairs' buffer has room
-// for. One invocation: there are a few hundred blocks.
+// Deals the blocks of splats, near to far, to rounds of as many blocks as the pairs' buffer has
+// room for (docs/model.md §11 "tiles"). One invocation: there are a few hundred blocks.
+// In: pairs of each block. Out: the rounds with their dispatch sizes. Exact: integers.
 
 layout(local_size_x = 1) in;
 
-layout(push_constant) uniform Push { uint n_rounds; uint capacity; uint most_blocks; uint sort_tile; uint bin_groups; } push;
+layout(push_constant) uniform Push {
+    uint n_rounds;
+    uint capacity;
+    uint most_blocks;
+    uint sort_tile;
+    uint bin_groups;
+} push;
 // In: pairs of each block. Out: pairs of the blocks before it in its round.
-layout(std430, binding = 0) buffer Blocks { uint n_pairs[]; };
-layout(std430, binding = 1) writeonly buffer Rounds { Round rounds[]; };
-layout(std430, binding = 2) readonly buffer KeptOnes { Kept kept[]; };
+UPDATES(0, uint, n_pairs)
+WRITES(1, Round, rounds)
+READS(2, Kept, kept)
 
 void close(uint k, uint first, uint end, uint n, bool is_last) {
     rounds[k].extent = uvec4((n + push.sort_tile - 1u) / push.sort_tile, 1, 1, n);

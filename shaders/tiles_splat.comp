@@ -1,7 +1,9 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "buffers.glsl"
 #include "records.glsl"
+#include "variants.glsl"
 #include "blob.glsl"
 #include "philox.glsl"
 #include "functions.glsl"
@@ -12,8 +14,10 @@
 #extension GL_KHR_shader_subgroup_shuffle : require
 #endif
 
-// Each blob as a splat, near to far: the conic of its optical depth on the screen, and the bins
-// that it can reach (docs/model.md §11 "tiles"). A workgroup goes through a block.
+// Projects each blob to a splat, near to far, a block a workgroup (docs/model.md §11 "tiles").
+// In: sorted entries, placed particles, radiance. Out: splats (the conic of the optical depth on
+// the screen), and the bins that each can reach.
+// Bound: rectangles are widened as in blob.glsl.
 
 #ifndef INVOCATIONS
 #define INVOCATIONS 8
@@ -21,37 +25,39 @@
 
 layout(local_size_x = INVOCATIONS) in;
 
-// As in sprites.vert.
-layout(constant_id = 0) const uint LIT = 1;
-layout(constant_id = 2) const uint GROUPED = 0;
-layout(constant_id = 3) const uint WEIGHTED = 0;
-layout(constant_id = 4) const uint TEXTURED = 0;
-layout(constant_id = 5) const uint THRESHOLD = 0;
-layout(constant_id = 6) const uint ELLIPSOIDS = 0;
-
-layout(push_constant) uniform Push { Camera camera; vec2 pixel; float cutoff; uint i_first_facet; uint width; uint height; uint tile_width; uint tile_height; float inv_threshold; } push;
-layout(std430, binding = 0) readonly buffer Entries { uvec2 entries[]; };
-// By texels, which llvmpipe fetches for all invocations at once: a Placed is one, a Particle three,
-// a Lit four.
+layout(push_constant) uniform Push {
+    Camera camera;
+    vec2 pixel;
+    float cutoff;
+    uint i_first_facet;
+    uint width;
+    uint height;
+    uint tile_width;
+    uint tile_height;
+    float inv_threshold;
+} push;
+READS(0, uvec2, entries)
+// Texels, which llvmpipe fetches for all invocations at once: a Placed is one texel, a Particle
+// three, a Lit four.
 layout(binding = 1) uniform usamplerBuffer placed;
 layout(binding = 2) uniform usamplerBuffer particles;
 layout(binding = 3) uniform usamplerBuffer lit;
-layout(std430, binding = 4) readonly buffer FacetOf { uint i_facet[]; };
-layout(std430, binding = 5) readonly buffer GroupOf { uint i_group[]; };
-layout(std430, binding = 6) readonly buffer DrawnGroups { Drawn drawn[]; };
-layout(std430, binding = 7) readonly buffer TexturedGroups { Textured textured[]; };
-layout(std430, binding = 8) writeonly buffer Splats { uvec4 splats[]; };
-// Tiles it can reach: (first, end) of columns and of rows, 16 bits each; 0 for none.
-layout(std430, binding = 9) writeonly buffer Reaches { uvec2 reach[]; };
+READS(4, uint, i_facet)
+READS(5, uint, i_group)
+READS(6, Drawn, drawn)
+READS(7, Textured, textured)
+WRITES(8, uvec4, splats)
+// Tiles that the splat can reach: (first, end) of columns and of rows, 16 bits each; 0 for none.
+WRITES(9, uvec2, reach)
 // Pairs of the splats before it in its block, and of each block.
-layout(std430, binding = 10) writeonly buffer Before { uint n_before[]; };
-layout(std430, binding = 11) writeonly buffer Blocks { uint n_pairs[]; };
-// What of it is textured; only where something is.
-layout(std430, binding = 12) writeonly buffer Sheets { SplatSheet sheets[]; };
+WRITES(10, uint, n_before)
+WRITES(11, uint, n_pairs)
+// The texture of each splat; only with textures.
+WRITES(12, SplatTexture, splat_textures)
 
-layout(std430, binding = 13) readonly buffer KeptOnes { Kept kept[]; };
-// Of ellipsoids: the conic, in powers of two, and 1/a^2.
-layout(std430, binding = 14) writeonly buffer Conics { vec4 conics[]; };
+READS(13, Kept, kept)
+// Ellipsoids' conics, in powers of two, and 1/a^2.
+WRITES(14, vec4, conics)
 
 #if !ONE_SUBGROUP
 shared uint sums[INVOCATIONS];
@@ -59,14 +65,15 @@ shared uint sums[INVOCATIONS];
 
 const float LOG2_E = 1.44269504089;
 
-// Splat r of particle i, and how many bins it can reach; where there are none only its rectangle is
-// set.
+// Projects particle i to splat r and returns the number of bins that it can reach; where that is 0
+// only its rectangle is set.
 uint project(uint i, uint r) {
     reach[r] = uvec2(0);
     if (i == NO_PARTICLE) {
         return 0u;
     }
-    vec4 place = uintBitsToFloat(texelFetch(placed, int(i))), shade = uintBitsToFloat(texelFetch(particles, int(3 * i + 1)));
+    vec4 place = uintBitsToFloat(texelFetch(placed, int(i))),
+         shade = uintBitsToFloat(texelFetch(particles, int(3 * i + 1)));
     vec3 v = along_camera(push.camera, place.xyz - push.camera.eye);
     float sigma = place.w;
     float tau = SQRT_TAU * shade.w * sigma;
@@ -95,7 +102,8 @@ uint project(uint i, uint r) {
     uvec2 size = uvec2(push.width, push.height);
     uvec4 pixels;
     if (ELLIPSOIDS != 0) {
-        pixels = silhouette_of(shape, push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
+        pixels =
+            silhouette_of(shape, push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
     } else {
         pixels = silhouette(push.camera, push.pixel, v, GROWTH * reach_in_sigma * sigma, size);
     }
@@ -109,7 +117,8 @@ uint project(uint i, uint r) {
     vec3 radiance = shade.xyz;
     if (LIT != 0) {
         int facet = int(GROUPED != 0 ? i_facet[i] : push.i_first_facet + i);
-        radiance = uintBitsToFloat(texelFetch(lit, 4 * facet + 2).xyz) + uintBitsToFloat(texelFetch(lit, 4 * facet + 3).xyz);
+        radiance = uintBitsToFloat(texelFetch(lit, 4 * facet + 2).xyz)
+                   + uintBitsToFloat(texelFetch(lit, 4 * facet + 3).xyz);
     }
     // A Splat, by fours.
     splats[2 * r] = floatBitsToUint(vec4(s, scale, tau));
@@ -119,8 +128,12 @@ uint project(uint i, uint r) {
     }
     uvec2 tile = uvec2(push.tile_width, push.tile_height);
     if (TEXTURED != 0) {
-        Sheet sheet = sheet_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
-        sheets[r] = SplatSheet(sheet.turn, sheet.gain, sheet.place.x, sheet.place.y, 0u, uvec2(0));
+        TextureSample texture_sample =
+            texture_sample_of(textured[i_group[i]], i, v.z / sigma, push.pixel.y);
+        splat_textures[r] = SplatTexture(
+            texture_sample.turn, texture_sample.gain, texture_sample.place.x,
+            texture_sample.place.y, 0u, uvec2(0)
+        );
     }
     // In tiles: a rectangle of them, ends included.
     uvec2 first = uvec2(columns.x, rows.x) / tile, last = (uvec2(columns.y, rows.y) - 1u) / tile;
@@ -131,7 +144,7 @@ uint project(uint i, uint r) {
     return n.x * n.y;
 }
 
-// (sum of n over the invocations up to this one, over all)
+// Returns (sum of n over the invocations up to this one, sum over all).
 uvec2 sums_of(uint n) {
     uint t = gl_LocalInvocationID.x;
 #if ONE_SUBGROUP
@@ -161,7 +174,7 @@ void main() {
         uint r = gl_WorkGroupID.x * BLOCK + k + t;
         uint n = 0;
         if (r < n_splats) {
-            // Far to near is how they are sorted.
+            // Entries are sorted far to near.
             n = project(entries[n_splats - 1u - r].y, r);
         }
         uvec2 here = sums_of(n);

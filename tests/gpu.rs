@@ -1,5 +1,5 @@
-//! gpu/ itself: what it refuses, what it reports, and that the reports would come: missing
-//! barriers, leaks, limits, shaders that do not compile or do not fit, the SPIR-V cache.
+//! Tests of gpu/: validation messages of missing barriers, leak reports, refusals of sizes and
+//! shaders beyond the device, and the SPIR-V cache.
 
 mod harness;
 
@@ -20,8 +20,8 @@ use nimbus::passes;
 use nimbus::passes::{grid, place};
 use sha2::{Digest, Sha256};
 
-/// What validation says of place followed by the grid's deposit, which reads what place wrote;
-/// recorded and never submitted.
+/// Returns the validation messages of `place` and then the grid's deposit, which reads the placed
+/// particles. The commands are recorded and never submitted.
 fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
     let spec = GridSpec { aspect: 1.0, n_cells: UVec3::splat(8), cell: 1.0, low: DVec3::ZERO };
     let place = place::Place::new(&gpu.device, &gpu.compiler).unwrap();
@@ -35,7 +35,7 @@ fn hazards_of_two_dispatches(gpu: &mut Gpu, barriers: Barriers) -> Vec<String> {
         grid.record(rec, [&placed, &particles, &density], &record, 64, 1.0)
     });
     recorded.unwrap();
-    // Without their buffers the commands are void; what comes next is recorded anew.
+    // The commands are void once their buffers are gone, so others are recorded in their place.
     gpu.commands.record(Barriers::Placed, |_| Ok(())).unwrap();
     gpu.instance.messages().take()
 }
@@ -66,12 +66,12 @@ fn a_missing_barrier_between_copies_is_reported() {
                 Ok(())
             });
             recorded.unwrap();
-            let said = gpu.instance.messages().take();
+            let messages = gpu.instance.messages().take();
             match barriers {
                 Barriers::Omitted => {
-                    assert!(said.iter().any(|m| m.contains(hazard)), "{hazard}: {said:?}")
+                    assert!(messages.iter().any(|m| m.contains(hazard)), "{hazard}: {messages:?}")
                 }
-                Barriers::Placed => assert!(said.is_empty(), "{said:?}"),
+                Barriers::Placed => assert!(messages.is_empty(), "{messages:?}"),
             }
         }
     }
@@ -86,9 +86,9 @@ fn a_leaked_buffer_is_reported_by_name_and_size() {
     drop(kept);
     std::mem::forget(leaked);
     drop(device);
-    let said = instance.messages().take();
-    assert_eq!(said.len(), 1, "{said:?}");
-    let bytes: u64 = said[0]
+    let messages = instance.messages().take();
+    assert_eq!(messages.len(), 1, "{messages:?}");
+    let bytes: u64 = messages[0]
         .strip_prefix("leak: test.leaked (")
         .unwrap()
         .strip_suffix(" bytes)")
@@ -100,7 +100,7 @@ fn a_leaked_buffer_is_reported_by_name_and_size() {
 }
 
 #[test]
-fn without_a_leak_nothing_is_said() {
+fn a_freed_buffer_is_not_reported() {
     let gpu = Gpu::new();
     let instance = gpu.instance.clone();
     let buffer = gpu.buffer::<u32>(10);
@@ -110,7 +110,7 @@ fn without_a_leak_nothing_is_said() {
 }
 
 #[test]
-fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
+fn sizes_beyond_the_device_are_refused_before_anything_is_allocated() {
     let gpu = Gpu::new();
     let before = gpu.device.allocated_bytes();
     for n in [1_000_000_000, u64::MAX / 2] {
@@ -132,8 +132,7 @@ fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
         "{refused}"
     );
     assert_eq!(gpu.device.allocated_bytes(), before);
-    // What just fits by the count is counted right: one record more than the limit, and one that is
-    // none.
+    // The greatest number of records fits, one more does not, and an empty buffer has one record.
     let limits = gpu.device.limits();
     let most = limits.max_storage_buffer_bytes.min(limits.device_memory_bytes) / 32;
     assert_eq!(nimbus::gpu::storage_bytes(limits, "test", most, 32), Ok(32 * most));
@@ -142,7 +141,7 @@ fn wishes_beyond_the_device_are_refused_before_anything_is_allocated() {
 }
 
 #[test]
-fn a_device_that_is_not_there_lists_those_that_are() {
+fn an_unknown_device_is_refused_with_a_list_of_all() {
     let instance = Instance::new(true).unwrap();
     let names: Vec<String> =
         DeviceInfo::list(&instance).unwrap().into_iter().map(|d| d.name).collect();
@@ -153,14 +152,14 @@ fn a_device_that_is_not_there_lists_those_that_are() {
         let text = refused.to_string();
         assert!(text.contains(choice) && names.iter().all(|n| text.contains(n.as_str())), "{text}");
     }
-    // A part of a name in any case, and an index.
+    // A name matches in any case, and so does an index.
     assert_eq!(Device::open(&instance, Some(&names[0].to_uppercase())).unwrap().info().index, 0);
     assert_eq!(Device::open(&instance, Some("0")).unwrap().info().name, names[0]);
     assert_eq!(instance.messages().take(), [""; 0]);
 }
 
 #[test]
-fn errors_of_shaders_carry_file_and_line() {
+fn shader_errors_carry_file_and_line() {
     let line_of = |file: &str, text: &str| {
         let source = passes::SHADERS.iter().find(|(n, _)| *n == file).unwrap().1;
         1 + source.lines().position(|l| l.contains(text)).unwrap()
@@ -182,7 +181,7 @@ fn errors_of_shaders_carry_file_and_line() {
 }
 
 #[test]
-fn what_does_not_fit_the_shader_is_refused() {
+fn a_host_interface_that_differs_from_the_shaders_is_refused() {
     let mut gpu = Gpu::new();
     let new = |push: &[nimbus::gpu::Field]| {
         Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", push, &[]).err()
@@ -201,7 +200,7 @@ fn what_does_not_fit_the_shader_is_refused() {
             "{refused:?}"
         );
     }
-    // While recording: a buffer too few, push constants of another size.
+    // Recording refuses a missing buffer, and push constants of another size.
     let kernel =
         Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[])
             .unwrap();
@@ -214,7 +213,7 @@ fn what_does_not_fit_the_shader_is_refused() {
     let too_small =
         gpu.commands.record(Barriers::Placed, |rec| rec.dispatch(&kernel, &buffers, &8u32, 8));
     assert!(matches!(too_small, Err(Error::Shader { .. })));
-    // And all is well afterwards.
+    // The recorder still works afterwards.
     gpu.run(|rec| {
         rec.fill(&sums, 1);
         rec.dispatch(&kernel, &buffers, &push, 8)
@@ -223,16 +222,16 @@ fn what_does_not_fit_the_shader_is_refused() {
 }
 
 #[test]
-fn records_beyond_one_row_of_workgroups_are_all_done() {
+fn a_dispatch_of_several_rows_of_workgroups_processes_every_record() {
     let mut gpu = Gpu::new();
     let kernel =
         Kernel::new(&gpu.device, &gpu.compiler, "grid.resolve", grid::ResolvePush::FIELDS, &[])
             .unwrap();
-    // Two rows and a bit, and no whole number of workgroups.
+    // Two rows and a part of a workgroup.
     let in_a_row =
         u64::from(gpu.device.limits().max_workgroups_x) * u64::from(kernel.local_size_x());
     if in_a_row > 1 << 23 {
-        println!("a row of this device's holds {in_a_row} records: not tested");
+        println!("skipped: a row of this device holds {in_a_row} records");
         return;
     }
     let n = 2 * in_a_row as u32 + 77;
@@ -247,12 +246,12 @@ fn records_beyond_one_row_of_workgroups_are_all_done() {
 }
 
 #[test]
-fn host_memory_is_checked_against_its_size() {
+fn host_access_is_checked_against_the_buffers_size() {
     let gpu = Gpu::new();
     let mut upload =
         Buffer::new::<u32>(&gpu.device, "test.upload", 4, MemoryUsage::Upload).unwrap();
     assert!(upload.write(&[1u32; 4]).is_ok());
-    // The allocation behind it may be larger; the buffer is not.
+    // The allocation may be larger than the buffer.
     assert!(matches!(upload.write(&[1u8; 17]), Err(Error::Limit { .. })));
     let readback =
         Buffer::new::<u32>(&gpu.device, "test.readback", 4, MemoryUsage::Readback).unwrap();
@@ -270,7 +269,7 @@ fn cached_files(folder: &Path) -> Vec<std::path::PathBuf> {
 }
 
 #[test]
-fn the_cache_is_read_checked_and_mended() {
+fn the_spirv_cache_is_read_checked_and_repaired() {
     let folder = tempfile::tempdir().unwrap();
     let cache = folder.path().join("below/spirv");
     let compiler = |sources: Sources| Compiler::new(sources, Some(cache.clone())).unwrap();
@@ -279,12 +278,12 @@ fn the_cache_is_read_checked_and_mended() {
     let files = cached_files(&cache);
     assert_eq!(files.len(), 1);
     let good = std::fs::read(&files[0]).unwrap();
-    // What lies there is what comes back: here the words with one added, under a right sum.
+    // A cached file with a right checksum is used: here the words with one added.
     let other: Vec<u32> = [&words[..], &[7]].concat();
     let bytes: &[u8] = bytemuck::cast_slice(&other);
     std::fs::write(&files[0], [Sha256::digest(bytes).as_slice(), bytes].concat()).unwrap();
     assert_eq!(compile(&compiler(passes::sources())), other);
-    // A wrong bit, a cut, nothing at all: compiled anew, and the file is whole again.
+    // Damaged files (a flipped bit, cuts, nothing at all) are compiled anew and written again.
     let mut flipped = good.clone();
     flipped[100] ^= 4;
     for bad in [flipped, good[..good.len() - 4].to_vec(), good[..20].to_vec(), vec![]] {
@@ -292,22 +291,22 @@ fn the_cache_is_read_checked_and_mended() {
         assert_eq!(compile(&compiler(passes::sources())), words);
         assert_eq!(std::fs::read(&files[0]).unwrap(), good);
     }
-    // Another include, other options: other files. No temporary file is left.
+    // Another include or other options give other files. No temporary file is left.
     let mut sources = passes::sources();
-    assert!(sources.replace("include/each.glsl", "// One", "// Two"));
+    assert!(sources.replace("include/each.glsl", "Runs its body", "Runs this body"));
     compile(&compiler(sources));
     compiler(passes::sources()).compile("place.comp", Optimize::No).unwrap();
     let files = cached_files(&cache);
     assert_eq!(files.len(), 3);
     assert!(files.iter().all(|f| f.extension().is_some_and(|e| e == "spv")), "{files:?}");
-    // A cache that cannot be written costs time only: its folder is a file.
+    // A cache that cannot be written (its folder is a file) costs time only.
     let file = folder.path().join("file");
     std::fs::write(&file, "").unwrap();
     assert_eq!(compile(&Compiler::new(passes::sources(), Some(file)).unwrap()), words);
 }
 
 #[test]
-fn a_folder_of_shaders_takes_the_place_of_the_embedded_ones() {
+fn a_folder_of_shaders_replaces_the_embedded_ones() {
     let folder = tempfile::tempdir().unwrap();
     let compile =
         |s: Sources| Compiler::new(s, None).unwrap().compile("place.comp", Optimize::Yes).unwrap();
@@ -327,7 +326,7 @@ fn a_folder_of_shaders_takes_the_place_of_the_embedded_ones() {
     assert_ne!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
     std::fs::write(folder.path().join("place.comp"), text).unwrap();
     assert_eq!(compile(passes::sources().with_dir(folder.path()).unwrap()), embedded);
-    // Includes too.
+    // Includes are replaced, too.
     std::fs::create_dir(folder.path().join("include")).unwrap();
     std::fs::write(folder.path().join("include/records.glsl"), "nonsense").unwrap();
     let sources = passes::sources().with_dir(folder.path()).unwrap();

@@ -138,7 +138,7 @@ fn wrong_trees_are_noticed() {
         (0, merge, "flux += child.sent.xyz", "flux += 0.999 * child.sent.xyz"),
         (0, merge, "sum += fluxes[", "sum += 0.99 * fluxes["),
         (0, "second_sources.comp", "(u * u + v * v) / 3.0", "(u * u + v * v) / 2.0"),
-        (0, "include/veil.glsl", "beyond == 4.0 ? 2u", "beyond == 4.0 ? 1u"),
+        (0, "include/occluders.glsl", "beyond == 4.0 ? 2u", "beyond == 4.0 ? 1u"),
     ] {
         if !wrong(&Gpu::wrong_compiler(file, from, to), scene) {
             missed.push(format!("{scene} {file}: {from} as {to}"));

@@ -172,9 +172,9 @@ fn wrong_pictures_are_noticed() {
     values[i] -= 2.0 * bounds[i];
     assert!(greatest_ratio(&values, &truths, &bounds) > 1.0, "one corrupted number");
     for (file, from, to) in [
-        ("tiles.comp", "least = -push.cut", "least = -0.9 * push.cut"),
+        ("tiles.comp", "min_exponent = -push.cut", "min_exponent = -0.9 * push.cut"),
         ("tiles.comp", "* inv_norm[j]", ""),
-        ("tiles.comp", "opaque[j] += here;", "opaque[j] += 0.999 * here;"),
+        ("tiles.comp", "alpha[j] += here;", "alpha[j] += 0.999 * here;"),
         ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),
         (
             "tiles.comp",

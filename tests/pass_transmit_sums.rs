@@ -91,7 +91,7 @@ fn wrong_doubles_and_floats_in_their_place_are_noticed() {
     assert!(ratio(None, doubles) <= 1.0 && ratio(None, KAHAN) > 1.0);
     for (file, from, to) in [
         ("transmit.comp", "#define DEEP DOUBLE", "#define DEEP 0"),
-        ("transmit.comp", "Way(d > 0.0 ? offset / d", "Way(d > 0.0 ? offset"),
+        ("transmit.comp", "LightPath(d > 0.0 ? offset / d", "LightPath(d > 0.0 ? offset"),
         ("transmit.comp", "PLACE(light.position) - PLACE(p)", "PLACE(p) - PLACE(light.position)"),
         (
             "include/density.glsl",

@@ -1,8 +1,8 @@
-// What of a light's energy arrives at each point of a cell (docs/model.md §11 "second"). Needs
-// stencil.glsl, reach.glsl, turns.glsl.
+// The light that arrives at each point of a cell (docs/model.md §11 "second"). Needs
+// cell_samples.glsl, reach.glsl, iterations.glsl.
 
-// A lamp's falloff and cosine over one row; `o` from the row's middle to the lamp, its height over
-// the cell's plane.
+// Returns a lamp's falloff times cosine over one row of points. o: from the row's middle to the
+// lamp; height: of the lamp over the cell's plane.
 vec4 row_of_falloffs(Light light, vec3 o, vec3 u, float height) {
     vec4 d2 = max(dot(o, o) - ALONG * (2.0 * dot(o, u)) + ALONG * ALONG * dot(u, u), 1e-30);
     vec4 inverse = inversesqrt(d2);
@@ -11,34 +11,45 @@ vec4 row_of_falloffs(Light light, vec3 o, vec3 u, float height) {
     return height * inverse * cone * cone / max(d2, light.radius * light.radius);
 }
 
-// A directional light's or the sky's share, v of it being in the clear.
+// Returns the share of a directional light's or the sky's energy; v is the share that is not in
+// shadow.
 vec4 share_by(Light light, vec3 normal, vec4 v) {
     float cosine = dot(normal, light.toward);
-    return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant : v * max(cosine, 0.0);
+    return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant
+                                   : v * max(cosine, 0.0);
 }
 
-// What of a light's energy arrives at each point of a facet, past the surfaces of the mask
-// (shadows_on). `through`: what the clouds let through.
-Stencil arriving(Light light, Cell cell, vec3 normal, float through, uint shadows, uint i_own, uint n_surfaces) {
-    Stencil s = Stencil(vec4(through), vec4(through), vec4(through), vec4(through));
+// Returns the share of a light's energy that arrives at each point of a facet, past the surfaces of
+// the mask that shadows_on() found. through: transmittance of the clouds.
+CellSamples arriving(
+    Light light, Cell cell, vec3 normal, float through, uint shadows, uint i_own, uint n_surfaces
+) {
+    CellSamples s = CellSamples(vec4(through), vec4(through), vec4(through), vec4(through));
     bool lamp = light.kind == LIGHT_POINT;
     uint i = shadows != 0u ? uint(findLSB(shadows)) : n_surfaces;
     while (i < n_surfaces) {
         if (i != i_own) {
-            shade(s, region_at(i), lamp ? light.position : light.toward, lamp ? 1.0 : 0.0, cell);
+            subtract_shadow(
+                s, region_at(i), lamp ? light.position : light.toward, lamp ? 1.0 : 0.0, cell
+            );
         }
-        n_turns += 1u;
+        n_iterations += 1u;
         i += N_MASK;
         bool done = i >= n_surfaces;
         shadows &= done ? shadows - 1u : shadows;
         i = done ? (shadows != 0u ? uint(findLSB(shadows)) : n_surfaces) : i;
     }
-    // The cell is flat: the lamp's height over it is the same everywhere.
+    // The cell is flat, so the lamp's height over it is the same everywhere.
     vec3 o = light.position - cell.middle;
     float height = max(dot(normal, o), 0.0);
-    return Stencil(
-        lamp ? s.a * row_of_falloffs(light, o - ALONG.x * cell.v, cell.u, height) : share_by(light, normal, s.a),
-        lamp ? s.b * row_of_falloffs(light, o - ALONG.y * cell.v, cell.u, height) : share_by(light, normal, s.b),
-        lamp ? s.c * row_of_falloffs(light, o - ALONG.z * cell.v, cell.u, height) : share_by(light, normal, s.c),
-        lamp ? s.d * row_of_falloffs(light, o - ALONG.w * cell.v, cell.u, height) : share_by(light, normal, s.d));
+    return CellSamples(
+        lamp ? s.a * row_of_falloffs(light, o - ALONG.x * cell.v, cell.u, height)
+             : share_by(light, normal, s.a),
+        lamp ? s.b * row_of_falloffs(light, o - ALONG.y * cell.v, cell.u, height)
+             : share_by(light, normal, s.b),
+        lamp ? s.c * row_of_falloffs(light, o - ALONG.z * cell.v, cell.u, height)
+             : share_by(light, normal, s.c),
+        lamp ? s.d * row_of_falloffs(light, o - ALONG.w * cell.v, cell.u, height)
+             : share_by(light, normal, s.d)
+    );
 }

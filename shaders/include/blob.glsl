@@ -1,21 +1,15 @@
-// A blob as the camera sees it (docs/model.md §11 "sprites"): what both draw paths start from.
+// A blob as the camera sees it; both draw paths start from it (docs/model.md §11 "sprites").
+
+#include "camera.glsl"
 
 const float SQRT_TAU = 2.50662827463;
-// What is drawn of a blob is taken to be this much larger than its silhouette, so that rounding
-// never cuts a pixel that the pixel's own test would keep; that test decides.
+// Silhouettes are drawn this much larger, so that rounding never cuts a pixel that the pixel's own
+// test would keep.
 const float GROWTH = 1.0 + 1e-4;
 
-// Pixels that rounding may move an edge by. Vulkan promises vertices 4 bits below the pixel: a
-// corner may move by as much when it is snapped.
-const float SNAP = 1.0 / 16.0;
-
-// Along the camera's right, up and forward.
-vec3 along_camera(Camera camera, vec3 from_eye) {
-    return vec3(dot(camera.right, from_eye), dot(camera.up, from_eye), dot(camera.forward, from_eye));
-}
-
-// Slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the circle
-// reaches beside the eye, lines of either sign meet it, before the eye or behind: no bounds.
+// Returns the slopes of the two tangents from the eye to a circle of radius r at (a, z). Where the
+// circle reaches beside the eye, lines in front of it and behind it meet the circle, and there are
+// no bounds.
 vec2 tangents(float a, float z, float r) {
     float t2 = a * a + z * z - r * r;
     if (t2 > 0.0) {
@@ -28,81 +22,93 @@ vec2 tangents(float a, float z, float r) {
     return vec2(-1e9, 1e9);
 }
 
-// An ellipsoid with an axis along y (docs/model.md §14): what its aspect a and the camera make of
-// it.
+// An ellipsoid with an axis along y: values that follow from its aspect a and the camera
+// (docs/model.md §14).
 struct Shape {
     // The scene's y along the camera's right, up and forward.
     vec3 y;
-    // a^2, and 1/a^2.
+    // a^2 and 1/a^2.
     float square, inverse;
-    // Greatest depth of a line through its centre over that of one across, and the widest sigma
-    // over that.
+    // Greatest depth of a line through the centre over the depth across y. Also the widest sigma
+    // over that across y.
     float wider;
 };
 
 Shape shape_of(Camera camera, float aspect) {
-    return Shape(vec3(camera.right.y, camera.up.y, camera.forward.y), aspect * aspect, 1.0 / (aspect * aspect), max(aspect, 1.0));
+    return Shape(
+        vec3(camera.right.y, camera.up.y, camera.forward.y), aspect * aspect,
+        1.0 / (aspect * aspect), max(aspect, 1.0)
+    );
 }
 
-// |M v|^2, M = diag(1, 1/a, 1) along the scene's axes, of v along the camera's: what stands across y by itself, as the two may differ by
-// orders of magnitude.
+// Returns |M v|^2 of v along the camera's axes, M = diag(1, 1/a, 1) along the scene's. The parts
+// along y and across y are kept apart, as they may differ by orders of magnitude.
 float white_square(Shape shape, vec3 v) {
     float up = dot(shape.y, v);
     vec3 across = v - up * shape.y;
     return dot(across, across) + shape.inverse * up * up;
 }
 
-// Slopes of the two tangents as `tangents` gives them, along right (k = 0) or up (1): planes
-// through the eye touch where (n.c)^2 = r^2 n.S n, S the ellipsoid's matrix and n = (1, -slope).
+// Returns the slopes of the two tangents, as tangents() does, along right (k = 0) or up (k = 1). A
+// plane through the eye touches where (n.c)^2 = r^2 n.S n, S the ellipsoid's matrix and n = (1,
+// -slope).
 vec2 tangents_of(Shape shape, vec3 v, int k, float r) {
     float more = shape.square - 1.0;
     float s_xx = 1.0 + more * shape.y[k] * shape.y[k], s_zz = 1.0 + more * shape.y.z * shape.y.z;
     float s_xz = more * shape.y[k] * shape.y.z;
-    // As they are at depth 1: no square of a length leaves what f32 holds.
+    // Scaled to depth 1, so that squares of lengths stay within f32's range.
     float s = v[k] / v.z, q = r / v.z, q2 = q * q;
     float a = 1.0 - q2 * s_zz;
     if (v.z > 0.0 && a > 0.0) {
         float b = s - q2 * s_xz;
-        // b^2 - a c over q^2: what cancels is left out.
-        float root = q * sqrt(max(s_xx + s_zz * s * s - 2.0 * s_xz * s - q2 * (s_xx * s_zz - s_xz * s_xz), 0.0));
+        // b^2 - a c over q^2, without the terms that cancel.
+        float root =
+            q
+            * sqrt(
+                max(s_xx + s_zz * s * s - 2.0 * s_xz * s - q2 * (s_xx * s_zz - s_xz * s_xz), 0.0)
+            );
         return vec2((b - root) / a, (b + root) / a);
     }
     return vec2(-1e9, 1e9);
 }
 
-// The first pixel and the one after the last whose centres lie within [low, high], in pixels from
-// the first one's edge.
+// Returns the first pixel and the one after the last whose centres lie within [low, high], in
+// pixels from the first one's edge.
 uvec2 pixels_within(float low, float high, uint n) {
     vec2 at = vec2(ceil(low - 0.5 - SNAP), floor(high + 0.5 + SNAP));
     uvec2 range = uvec2(clamp(at, vec2(0.0), vec2(float(n))));
     return uvec2(min(range.x, range.y), range.y);
 }
 
-// (first, end) of columns and of rows whose centres lie in the rectangle around a circle of radius
-// r about v (along_camera); none in either where the rectangle holds no centre.
+// Returns (first, end) of the columns and of the rows whose centres lie in the rectangle around a
+// circle of radius r about v (along_camera). Both are empty where the rectangle holds no centre.
 uvec4 silhouette(Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
     vec2 x = (tangents(v.x, v.z, r) + camera.tan_x) / pixel.x;
     vec2 y = (camera.tan_y - tangents(v.y, v.z, r).yx) / pixel.y;
     return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
 }
 
-// The same of an ellipsoid out to r, its sigma along x and z times whatever reach.
+// Returns the same for an ellipsoid; r is its reach across y.
 uvec4 silhouette_of(Shape shape, Camera camera, vec2 pixel, vec3 v, float r, uvec2 size) {
     vec2 x = (tangents_of(shape, v, 0, r) + camera.tan_x) / pixel.x;
     vec2 y = (camera.tan_y - tangents_of(shape, v, 1, r).yx) / pixel.y;
     return uvec4(pixels_within(x.x, x.y, size.x), pixels_within(y.x, y.y, size.y));
 }
 
-// z^2/(2 sigma^2) |M' (delta.y, -delta.x, s.x delta.y - s.y delta.x)|^2, M' = M's cofactors, is
-// b^2/(2 sigma^2) |M ray|^2 of a ray delta from the centre's slopes s, b where the ellipsoid is
-// made a ball of sigma: as (xx, 2 xy, yy) of delta, times `scale` in place of z^2/(2 sigma^2).
+// Returns the quadratic form of a ray's offset delta from the centre's slopes s, as the
+// coefficients of (x^2, x y, y^2).
+// The form is scale |M' (delta.y, -delta.x, s.x delta.y - s.y delta.x)|^2, M' the cofactors of M.
+// With scale = z^2/(2 sigma^2) it is b^2/(2 sigma^2) |M ray|^2, b the distance where the ellipsoid
+// is made a ball of sigma.
 vec3 conic_of(Shape shape, vec2 s, float scale) {
-    // What a unit of delta along each axis makes of the cross product of centre and ray.
+    // The cross product of centre and ray for a unit of delta along each axis.
     vec3 x = vec3(0.0, 1.0, -s.y), y = vec3(-1.0, 0.0, s.x);
     float up_x = dot(shape.y, x), up_y = dot(shape.y, y);
     vec3 across_x = x - up_x * shape.y, across_y = y - up_y * shape.y;
-    return scale * vec3(
-        shape.inverse * dot(across_x, across_x) + up_x * up_x,
-        2.0 * (shape.inverse * dot(across_x, across_y) + up_x * up_y),
-        shape.inverse * dot(across_y, across_y) + up_y * up_y);
+    return scale
+           * vec3(
+               shape.inverse * dot(across_x, across_x) + up_x * up_x,
+               2.0 * (shape.inverse * dot(across_x, across_y) + up_x * up_y),
+               shape.inverse * dot(across_y, across_y) + up_y * up_y
+           );
 }

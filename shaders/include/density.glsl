@@ -1,4 +1,4 @@
-// Trilinear density between cell centres, 0 outside their hull (docs/model.md, "sample"). Needs
+// Trilinear density between cell centres, 0 outside their hull (docs/model.md §11 "sample"). Needs
 // `Grid grid` in the push constants and `samplerBuffer density`.
 
 // 1: places and weights are doubles.
@@ -19,10 +19,10 @@
 #define IN_CELLS(x) ((x) * push.grid.inv_cell * vec3(1.0, push.grid.inv_aspect, 1.0))
 #endif
 
-// Edges of a cell.
+// Returns the edges of a cell.
 PLACE cell_edges() { return push.grid.cell * PLACE(1.0, push.grid.aspect, 1.0); }
 
-// Lengths along d as cells are wide: of a unit vector 1 where cells are cubes.
+// Returns the length of d in widths of cells: 1 for a unit vector where cells are cubes.
 WEIGHT in_widths(PLACE d) { return length(PLACE(d.x, d.y * push.grid.inv_aspect, d.z)); }
 
 float cell_at(int c) { return texelFetch(density, c).x; }
@@ -38,8 +38,11 @@ WEIGHT density_at(PLACE p) {
     PLACE f = g - base;
     int row = n.x, layer = n.x * n.y;
     int c = i.x + row * i.y + layer * i.z;
-    WEIGHTS4 low = WEIGHTS4(cell_at(c), cell_at(c + row), cell_at(c + layer), cell_at(c + layer + row));
-    WEIGHTS4 high = WEIGHTS4(cell_at(c + 1), cell_at(c + row + 1), cell_at(c + layer + 1), cell_at(c + layer + row + 1));
+    WEIGHTS4 low =
+        WEIGHTS4(cell_at(c), cell_at(c + row), cell_at(c + layer), cell_at(c + layer + row));
+    WEIGHTS4 high = WEIGHTS4(
+        cell_at(c + 1), cell_at(c + row + 1), cell_at(c + layer + 1), cell_at(c + layer + row + 1)
+    );
     WEIGHTS4 x = mix(low, high, f.x);
     WEIGHTS2 y = mix(x.xz, x.yw, f.y);
     return mix(y.x, y.y, f.z);

@@ -1,6 +1,9 @@
-// One invocation a record; the host deals them to rows of workgroups where a device has no room for
-// one row. A test and no loop: where invocations run together a loop is gone through once more than
-// its turns, with nothing to do (llvmpipe).
+layout(local_size_x = 64) in;
+
+// Runs its body in one invocation a record; the host deals invocations to rows of workgroups where
+// one row is too short. It is a condition and not a loop: where invocations run in step (llvmpipe),
+// a loop costs one more empty iteration.
 #define FOR_EACH(i, n) \
-    uint i = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x + gl_LocalInvocationID.x; \
+    uint i = (gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x) * gl_WorkGroupSize.x \
+             + gl_LocalInvocationID.x; \
     if (i < (n))

@@ -1,20 +1,19 @@
-// Functions whose accuracy Vulkan does not promise, or not where nimbus needs them.
+// Functions whose accuracy Vulkan does not promise where nimbus needs it.
 
 const float PI = 3.14159265358979;
 
-// sin x to 3.5 ulp after the reduction x - k pi with pi in four parts of few bits (Cody-Waite), so
-// that k times each part is exact for |k| < 2^14; beyond, the argument's own rounding error
-// outgrows the reduction's. Built-in sin promises 2^-11 absolute inside [-pi, pi] only.
-// Coefficients: minimax on [-pi/2, pi/2] (as published in SLEEF).
+// Returns sin x to 3.5 ulp after the reduction x - k pi. Pi is in four parts of few bits
+// (Cody-Waite), so that k times each part is exact for |k| < 2^14; beyond, the argument's own
+// rounding error outgrows the reduction's. The built-in sin promises 2^-11 absolute inside [-pi,
+// pi] only. Coefficients: minimax on [-pi/2, pi/2] (as published in SLEEF).
 float sine(float x) {
     float k = round(x * 0.318309886183790672);
     float r = x - k * 3.140625;
     r -= k * 0.0009670257568359375;
     r -= k * 6.2771141529083251953e-07;
     r -= k * 1.2154201256553420e-10;
-    // k is off by one where x is nearer to a half than its rounding, and r then beyond pi/2 by up
-    // to 2 u |x| = 0.0062; a huge argument reduces to anything: what is further out is cut so that
-    // the result stays a sine.
+    // k is off by one where x is nearer to a half than its rounding, and r is then beyond pi/2 by
+    // up to 2 u |x| = 0.0062. A huge argument reduces to anything; the cut keeps the result a sine.
     r = clamp(r, -1.58, 1.58);
     float s = r * r;
     float u = 2.6083159809786593541503e-06;
@@ -22,24 +21,32 @@ float sine(float x) {
     u = u * s + 0.00833307858556509017944336;
     u = u * s - 0.166666597127914428710938;
     float value = s * (u * r) + r;
-    // Parity in floats: exact for every k, while int(k) is undefined where k has no int.
+    // Parity in floats is exact for every k; int(k) is undefined where k has no int.
     return k - 2.0 * floor(k * 0.5) == 0.0 ? value : -value;
 }
 
-// (cos, sin) of 2 pi x for |x| <= 1/2, x a multiple of 2^-24, so that the differences are exact and
-// no argument is above pi/2: each within 10 u, u = 2^-24.
+// Returns (cos, sin) of 2 pi x for |x| <= 1/2, x a multiple of 2^-24, so that the differences are
+// exact and no argument is above pi/2. Each is within 10 u, u = 2^-24.
 vec2 unit_at(float turns) {
     float a = abs(turns);
     float s = sine(2.0 * PI * min(a, 0.5 - a));
     return vec2(sine(2.0 * PI * (0.25 - a)), turns < 0.0 ? -s : s);
 }
 
-// erf x: Abramowitz and Stegun 7.1.28, whose own error is at most 3e-7; exact sign symmetry. In f32
-// the 16th power multiplies d's rounding: |error| <= 2.5e-6 near 0, falling to 4e-7 where the
-// result is near 1.
+// Returns erf x by Abramowitz and Stegun 7.1.28, whose own error is at most 3e-7, with exact sign
+// symmetry. In f32 the 16th power multiplies d's rounding: |error| <= 2.5e-6 near 0, falling to
+// 4e-7 where the result is near 1.
 float erf_approx(float x) {
     float a = abs(x);
-    float d = 1.0 + a * (0.0705230784 + a * (0.0422820123 + a * (0.0092705272 + a * (0.0001520143 + a * (0.0002765672 + a * 0.0000430638)))));
+    float d =
+        1.0
+        + a
+              * (0.0705230784
+                 + a
+                       * (0.0422820123
+                          + a
+                                * (0.0092705272
+                                   + a * (0.0001520143 + a * (0.0002765672 + a * 0.0000430638)))));
     d *= d;
     d *= d;
     d *= d;
@@ -47,9 +54,9 @@ float erf_approx(float x) {
     return sign(x) * (1.0 - 1.0 / d);
 }
 
-// 2^x for |x| <= 125, relative error below 3e-7; exp2 promises 3 + 2|x| ulp, and is some 10
-// operations more where it cares for all x. The degree-5 polynomial errs by 7.5e-8 of 2^f on [-1/2,
-// 1/2] (minimax).
+// Returns 2^x for |x| <= 125 with a relative error below 3e-7. The built-in exp2 promises 3 + 2|x|
+// ulp and takes some 10 operations more for all x. The polynomial of degree 5 errs by 7.5e-8 of 2^f
+// on [-1/2, 1/2] (minimax).
 float power_of_two(float x) {
     float n = roundEven(x);
     float f = x - n;
@@ -59,14 +66,28 @@ float power_of_two(float x) {
     return intBitsToFloat(floatBitsToInt(p) + (int(n) << 23));
 }
 
-// 1 - e^-t for t >= 0, relative error below 1e-6 everywhere: the series where the difference would
-// cancel. Eight terms at t = 1/2 leave t^8/9! = 1e-8.
+// Returns 1 - e^-t for t >= 0 with a relative error below 1e-6 everywhere, by a series where the
+// difference would cancel. Eight terms at t = 1/2 leave t^8/9! = 1e-8.
 float one_minus_exp(float t) {
     if (t < 0.5) {
-        return t * (1.0 - t * (1.0 / 2.0) * (1.0 - t * (1.0 / 3.0) * (1.0 - t * (1.0 / 4.0) * (1.0 - t * (1.0 / 5.0) * (1.0 - t * (1.0 / 6.0) * (1.0 - t * (1.0 / 7.0) * (1.0 - t * (1.0 / 8.0))))))));
+        return t
+               * (1.0
+                  - t * (1.0 / 2.0)
+                        * (1.0
+                           - t * (1.0 / 3.0)
+                                 * (1.0
+                                    - t * (1.0 / 4.0)
+                                          * (1.0
+                                             - t * (1.0 / 5.0)
+                                                   * (1.0
+                                                      - t * (1.0 / 6.0)
+                                                            * (1.0
+                                                               - t * (1.0 / 7.0)
+                                                                     * (1.0
+                                                                        - t * (1.0 / 8.0))))))));
     }
     return 1.0 - exp(-t);
 }
 
-// A direction, and 0 where there is none.
+// Returns the unit vector along o, and 0 where o is 0.
 vec3 unit(vec3 o) { return o * inversesqrt(max(dot(o, o), 1e-30)); }

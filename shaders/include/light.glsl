@@ -1,6 +1,10 @@
-// How a light reaches a point where nothing is in its way (src/model/light.rs).
+// How a light reaches a point with nothing in between (src/model/light.rs).
 
-struct Arrival { vec3 toward; float distance; float falloff; };
+struct Arrival {
+    vec3 toward;
+    float distance;
+    float falloff;
+};
 
 Arrival arrival_at(Light light, vec3 p) {
     if (light.kind != LIGHT_POINT) {
@@ -8,16 +12,17 @@ Arrival arrival_at(Light light, vec3 p) {
     }
     vec3 offset = light.position - p;
     float d = length(offset);
-    // At the light itself every direction is as good as another.
+    // At the light itself any direction will do.
     vec3 toward = d > 0.0 ? offset / d : vec3(0.0, 1.0, 0.0);
     float reach = max(d, light.radius);
     float cone = clamp(light.cone_scale * dot(toward, light.toward) + light.cone_offset, 0.0, 1.0);
     return Arrival(toward, d, cone * cone / (reach * reach));
 }
 
-// Irradiance on a facet of normal n as a share of the light's energy, v being the transmittance
-// toward it.
+// Returns the irradiance on a facet of normal n as a share of the light's energy; v is the
+// transmittance toward the light.
 float share_of(Light light, Arrival a, vec3 n, float v) {
     float cosine = dot(n, a.toward);
-    return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant : v * a.falloff * max(cosine, 0.0);
+    return light.kind == LIGHT_SKY ? v * (0.5 + 0.5 * cosine) + light.constant
+                                   : v * a.falloff * max(cosine, 0.0);
 }

@@ -1,10 +1,13 @@
 // Tabulated lobes over t = (1 - cos gamma)^(1/4), gamma between the normal and the half vector
-// (docs/model.md §6). Needs `samplerBuffer table`, a lobe a row.
+// (docs/model.md §6). Needs `samplerBuffer table`, one lobe a row.
 
 const uint N_NODES = 1025;
 
-// Between which nodes w lies: the same in every row.
-struct Knot { uint i; float part; };
+// The interval of table nodes that w lies in: the same for every row.
+struct Knot {
+    uint i;
+    float part;
+};
 
 Knot knot_at(float w) {
     float t = sqrt(sqrt(clamp(w, 0.0, 1.0))) * float(N_NODES - 1u);
@@ -17,12 +20,10 @@ float value_at(uint i_row, Knot knot) {
     return mix(texelFetch(table, k).x, texelFetch(table, k + 1).x, knot.part);
 }
 
-float lobe_at(uint i_row, float w) {
-    return value_at(i_row, knot_at(w));
-}
+float lobe_at(uint i_row, float w) { return value_at(i_row, knot_at(w)); }
 
-// 1 - cos gamma of the half vector of unit a and b, without the cancellation: half the square of
-// the chord from n to it.
+// Returns 1 - cos gamma for the half vector of unit a and b without cancellation: half the square
+// of the chord from n to it.
 float half_vector_gap(vec3 n, vec3 a, vec3 b) {
     vec3 h = a + b;
     vec3 chord = n - h * inversesqrt(max(dot(h, h), 1e-30));

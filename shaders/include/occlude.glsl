@@ -1,14 +1,15 @@
 // Whether a surface's rectangle lies between two points, or before a light (docs/model.md §7). Both
-// sides occlude.
+// of its sides occlude.
 
-// A point nearer to a rectangle's plane than this share of its distance from the centre lies in it,
-// but for the rounding of its coordinates (a few 2^-24), and what lies in it is not hidden by it.
+// A point nearer to a rectangle's plane than this share of its distance from the centre lies in the
+// plane, but for the rounding of its coordinates (a few 2^-24); the rectangle does not hide such a
+// point.
 const float IN_PLANE = 9.5367431640625e-7;
 
 // A ball stands for a square: half its side over its diagonal, halved.
 const float SOFT = 0.70710678;
 
-// Signed distance from the rectangle's plane; 0 within it.
+// Returns the signed distance from the rectangle's plane; 0 within the plane.
 float side_of(Region r, vec3 p) {
     vec3 o = p - r.center;
     float e = dot(r.normal, o);
@@ -20,16 +21,16 @@ bool holds(Region r, vec3 x) {
     return abs(dot(o, r.u)) <= dot(r.u, r.u) && abs(dot(o, r.v)) <= dot(r.v, r.v);
 }
 
-// Between p and q.
+// Whether the rectangle hides p and q from each other.
 bool hides(Region r, vec3 p, vec3 q) {
     float a = side_of(r, p), b = side_of(r, q);
     bool apart = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
     return apart && holds(r, p + (q - p) * (a / (a - b)));
 }
 
-// How much of the ball about q is hidden from p: x, the share of it, as if the shadow's rim were
-// straight; y, whether it runs through the ball. The ball's size where the way crosses the plane is
-// its own, shortened by the crossing's share of the way and lengthened by the way's slant.
+// Returns x: the share of the ball about q that is hidden from p, as if the shadow's edge were
+// straight; y: whether the edge crosses the ball. The ball's size in the rectangle's plane is its
+// own, shortened by the crossing's share of the distance and lengthened by the direction's slant.
 vec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
     float a = side_of(r, p), b = side_of(r, q);
     vec3 d = q - p;
@@ -42,19 +43,20 @@ vec2 hides_ball(Region r, vec3 p, vec3 q, float radius) {
     vec2 outside = (beside - vec2(uu, vv)) * inversesqrt(vec2(uu, vv));
     float most = max(outside.x, outside.y);
     float reach = radius * abs(part) * max(length(d) * across, 1.0);
-    bool torn = abs(b) < radius ? most < reach : apart && abs(most) < reach;
+    bool edge_facets = abs(b) < radius ? most < reach : apart && abs(most) < reach;
     float soft = clamp(0.5 - SOFT * most / max(reach, 1e-30), 0.0, 1.0);
-    return vec2(apart ? soft : 0.0, a != 0.0 && torn ? 1.0 : 0.0);
+    return vec2(apart ? soft : 0.0, a != 0.0 && edge_facets ? 1.0 : 0.0);
 }
 
-// From p along d without end.
+// Whether the rectangle meets the ray from p along d.
 bool shades(Region r, vec3 p, vec3 d) {
     float a = side_of(r, p), b = dot(r.normal, d);
     bool toward = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
     return toward && holds(r, p - d * (a / b));
 }
 
-// How much of the ball about p its shadow along -d without end covers, as hides_ball has it.
+// Returns x: whether the shadow along -d covers the middle of the ball about p; y: whether its edge
+// crosses the ball, as in hides_ball().
 bvec2 shades_ball(Region r, vec3 p, vec3 d, float radius) {
     float a = side_of(r, p), b = dot(r.normal, d);
     vec3 o = p - d * (a / b) - r.center;
@@ -63,5 +65,7 @@ bvec2 shades_ball(Region r, vec3 p, vec3 d, float radius) {
     float most = max(outside.x, outside.y);
     float reach = radius / max(abs(b), 1e-30);
     bool toward = (a > 0.0 && b < 0.0) || (a < 0.0 && b > 0.0);
-    return bvec2(toward && most <= 0.0, abs(a) < radius ? most < reach : toward && abs(most) < reach);
+    return bvec2(
+        toward && most <= 0.0, abs(a) < radius ? most < reach : toward && abs(most) < reach
+    );
 }

@@ -1,5 +1,5 @@
-// Waiting within a workgroup that is one subgroup (ONE_SUBGROUP) or not. A workgroup's barrier
-// costs llvmpipe all that it holds in registers, and the sums it would rather do again than keep.
+// Barriers within a workgroup, cheap where it is one subgroup (ONE_SUBGROUP). A full barrier makes
+// llvmpipe store all registers, among them sums that it would rather compute again.
 
 #ifndef ONE_SUBGROUP
 #define ONE_SUBGROUP 0

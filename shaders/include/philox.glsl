@@ -11,5 +11,5 @@ uvec4 philox4x32_10(uvec2 key, uvec4 counter) {
     return counter;
 }
 
-// The upper 24 bits as numbers in [0, 1), exact in a float.
+// Returns the upper 24 bits as numbers in [0, 1), exact in a float.
 vec4 uniforms(uvec4 words) { return vec4(words >> 8) * (1.0 / 16777216.0); }

@@ -1,15 +1,15 @@
-// A picture's pixels as they lie in buffers, in rows, and how they are stored. Who includes it says
-// PICTURE, the binding that they go to.
+// A picture's pixels in buffers, row by row, and how they are stored. The includer defines PICTURE,
+// the binding they are written to.
 
 // Words of a pixel: 1 rgba8, 2 rgba16f, 4 rgba32f.
 #ifndef PIXEL_WORDS
 #define PIXEL_WORDS 2
 #endif
-// Pixels that are stored together, as four words: where rows have a whole number of them.
+// Pixels that are stored together as four words, where rows have a whole number of them.
 #ifndef TOGETHER
 #define TOGETHER 1
 #endif
-// 1: the device has words of 64 bits.
+// 1: the device has 64-bit words.
 #ifndef WORDS_64
 #define WORDS_64 0
 #endif
@@ -17,7 +17,7 @@
 #define TEXEL_PIXELS (4 / PIXEL_WORDS)
 #define FOURS (TOGETHER * PIXEL_WORDS == 4)
 
-// A device without vector stores takes one for every element: as few as may be.
+// A device without vector stores makes one store an element: as few elements as possible.
 #if FOURS && WORDS_64
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 layout(std430, binding = PICTURE) writeonly buffer Picture { u64vec2 picture[]; };
@@ -29,7 +29,7 @@ void store_words(uint i, uvec4 words) { picture[i] = words; }
 layout(std430, binding = PICTURE) writeonly buffer Picture { uint picture[]; };
 #endif
 
-// Pixel m of a texel's.
+// Returns pixel m of a texel.
 vec4 pixel_of(uvec4 words, uint m) {
 #if PIXEL_WORDS == 1
     return unpackUnorm4x8(words[m]);
@@ -50,18 +50,19 @@ uvec4 packed(vec4 value) {
 #endif
 }
 
-// Pixels p and on, TOGETHER of them.
+// Stores pixels p and on, TOGETHER of them.
 void store_together(uint p, vec4 values[TOGETHER]) {
 #if TOGETHER == 4
-    store_words(p / 4, uvec4(packed(values[0]).x, packed(values[1]).x, packed(values[2]).x, packed(values[3]).x));
+    store_words(
+        p / 4,
+        uvec4(packed(values[0]).x, packed(values[1]).x, packed(values[2]).x, packed(values[3]).x)
+    );
 #elif TOGETHER == 2
     store_words(p / 2, uvec4(packed(values[0]).xy, packed(values[1]).xy));
 #elif FOURS
     store_words(p, packed(values[0]));
 #else
     uvec4 words = packed(values[0]);
-    [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) {
-        picture[PIXEL_WORDS * p + k] = words[k];
-    }
+    [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) { picture[PIXEL_WORDS * p + k] = words[k]; }
 #endif
 }

@@ -1,30 +1,216 @@
 // The records of src/layout/, in std430. tests/layout.rs compares names, offsets and sizes.
 
-struct Particle { vec3 position; float sigma; vec3 color; float kappa; float aspect; float unused; vec2 unused_too; };
-struct Box { vec3 extent; float radius_max; float sigma_factor; float kappa; uint seed; uint i_box; uint i_first; uint n_particles; uint form; uint unused; };
-struct Disc { vec3 center; float radius; vec3 drift; float outflow; float sigma; float sigma_spread; float rise; float warmth_spread; float core; float life_spread; float cooling; float growth; float kappa; float inv_fade_in; float inv_fade_out; float base; float inv_over; float lift; uint dilution; uint seed; uint i_first; uint n_particles; uint generation; uint phase; };
-struct Placed { vec3 position; float sigma; };
-struct Group { vec3 offset; uint i_region; vec3 cloud_center; float sigma_mean; vec3 center; uint i_mode; uint n_modes; float scale; uvec2 unused; };
-struct Drawn { uint shift; uint end; float kappa_scale; float last_weight; };
-struct Kept { uvec4 sort; uvec4 draw; uvec4 splat; };
-struct SplatSheet { vec4 turn; vec3 gain; uint i_texel; uint log2_side; uint unused; uvec2 unused_too; };
-struct Round { uvec4 extent; uvec4 blocks; uvec4 bins; uvec4 tiles; uvec4 alone; };
-struct Splat { vec2 center; float scale; float tau; vec3 radiance; float depth; };
-struct Textured { uint seed; uint i_box; uint i_first; uint i_field; float strength; };
-struct Mode { vec3 k; float phase; vec3 a; uint unused; };
-struct Facet { vec3 position; float area; vec3 normal; uint i_region; vec3 color; uint unused; };
-struct Run { uint i_first; uint n_particles; };
-struct Lit { vec3 direct; float n_unresolved; vec3 indirect; float unresolved; vec3 first; float n_lost; vec3 second; float unused; };
-struct Region { vec3 kd; uint kind; vec3 ks; uint i_lobe; vec3 center; uint i_first_facet; vec3 u; uint n_facets; vec3 v; uint n_u; vec3 normal; uint n_v; float lobe_width; float lobe_width_most; uint i_column; uint i_row; };
-struct RegionBounds { vec3 low; uint unused; vec3 scale; uint unused_too; };
-struct Source { vec4 place; vec4 sent; vec4 face; vec4 extent; vec4 leaning; };
-struct Packed { uvec4 ab; uvec4 cd; };
-struct Block { uint i_first; uint n_facets; uint i_pairing; uint n_pairings; };
-struct Pairing { uint i_region; uint i_occluder; uint n_occluders; uint i_source; uint n_sources; };
-struct Node { uint n_nodes; };
-struct Light { vec3 toward; uint kind; vec3 energy; float constant; vec3 position; float radius; float cone_scale; float cone_offset; vec2 unused; };
-struct Grid { vec3 low; float cell; uvec3 n_cells; float inv_cell; float aspect; float inv_aspect; vec2 unused; };
-struct Camera { vec3 eye; float tan_x; vec3 right; float tan_y; vec3 up; float near; vec3 forward; float unused; };
+struct Particle {
+    vec3 position;
+    float sigma;
+    vec3 color;
+    float kappa;
+    float aspect;
+    float unused;
+    vec2 unused_too;
+};
+struct Box {
+    vec3 extent;
+    float radius_max;
+    float sigma_factor;
+    float kappa;
+    uint seed;
+    uint i_box;
+    uint i_first;
+    uint n_particles;
+    uint form;
+    uint unused;
+};
+struct Disc {
+    vec3 center;
+    float radius;
+    vec3 drift;
+    float outflow;
+    float sigma;
+    float sigma_spread;
+    float rise;
+    float warmth_spread;
+    float core;
+    float life_spread;
+    float cooling;
+    float growth;
+    float kappa;
+    float inv_fade_in;
+    float inv_fade_out;
+    float base;
+    float inv_over;
+    float lift;
+    uint dilution;
+    uint seed;
+    uint i_first;
+    uint n_particles;
+    uint generation;
+    uint phase;
+};
+struct Placed {
+    vec3 position;
+    float sigma;
+};
+struct Group {
+    vec3 offset;
+    uint i_region;
+    vec3 cloud_center;
+    float sigma_mean;
+    vec3 center;
+    uint i_mode;
+    uint n_modes;
+    float scale;
+    uvec2 unused;
+};
+struct Drawn {
+    uint shift;
+    uint end;
+    float kappa_scale;
+    float last_weight;
+};
+struct Kept {
+    uvec4 sort;
+    uvec4 draw;
+    uvec4 splat;
+};
+struct SplatTexture {
+    vec4 turn;
+    vec3 gain;
+    uint i_texel;
+    uint log2_side;
+    uint unused;
+    uvec2 unused_too;
+};
+struct Round {
+    uvec4 extent;
+    uvec4 blocks;
+    uvec4 bins;
+    uvec4 tiles;
+    uvec4 alone;
+};
+struct Splat {
+    vec2 center;
+    float scale;
+    float tau;
+    vec3 radiance;
+    float depth;
+};
+struct Textured {
+    uint seed;
+    uint i_box;
+    uint i_first;
+    uint i_field;
+    float strength;
+};
+struct Mode {
+    vec3 k;
+    float phase;
+    vec3 a;
+    uint unused;
+};
+struct Facet {
+    vec3 position;
+    float area;
+    vec3 normal;
+    uint i_region;
+    vec3 color;
+    uint unused;
+};
+struct Run {
+    uint i_first;
+    uint n_particles;
+};
+struct Lit {
+    vec3 direct;
+    float n_unresolved;
+    vec3 indirect;
+    float unresolved;
+    vec3 first;
+    float n_lost;
+    vec3 second;
+    float unused;
+};
+struct Region {
+    vec3 kd;
+    uint kind;
+    vec3 ks;
+    uint i_lobe;
+    vec3 center;
+    uint i_first_facet;
+    vec3 u;
+    uint n_facets;
+    vec3 v;
+    uint n_u;
+    vec3 normal;
+    uint n_v;
+    float lobe_width;
+    float lobe_width_most;
+    uint i_column;
+    uint i_row;
+};
+struct RegionBounds {
+    vec3 low;
+    uint unused;
+    vec3 scale;
+    uint unused_too;
+};
+struct Source {
+    vec4 place;
+    vec4 sent;
+    vec4 face;
+    vec4 extent;
+    vec4 leaning;
+};
+struct Packed {
+    uvec4 ab;
+    uvec4 cd;
+};
+struct Block {
+    uint i_first;
+    uint n_facets;
+    uint i_pairing;
+    uint n_pairings;
+};
+struct Pairing {
+    uint i_region;
+    uint i_occluder;
+    uint n_occluders;
+    uint i_source;
+    uint n_sources;
+};
+struct Node {
+    uint n_nodes;
+};
+struct Light {
+    vec3 toward;
+    uint kind;
+    vec3 energy;
+    float constant;
+    vec3 position;
+    float radius;
+    float cone_scale;
+    float cone_offset;
+    vec2 unused;
+};
+struct Grid {
+    vec3 low;
+    float cell;
+    uvec3 n_cells;
+    float inv_cell;
+    float aspect;
+    float inv_aspect;
+    vec2 unused;
+};
+struct Camera {
+    vec3 eye;
+    float tan_x;
+    vec3 right;
+    float tan_y;
+    vec3 up;
+    float near;
+    vec3 forward;
+    float unused;
+};
 
 // In place of a particle's number: an entry that draws nothing.
 const uint NO_PARTICLE = 0xFFFFFFFFu;

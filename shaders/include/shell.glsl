@@ -1,5 +1,5 @@
-// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, the push
-// constants' grid and `density`.
+// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, `density` and the
+// push constants' grid.
 
 #include "density.glsl"
 
@@ -15,7 +15,7 @@ const float SMOOTH_SIGMA = 4.47213595499958;
 const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;
-// No blob is flatter, nor its inverse higher.
+// Least aspect of a blob, and least inverse of one.
 const float LEAST_ASPECT = 1e-3;
 
 vec3 unit_or(vec3 v, vec3 otherwise) {
@@ -23,8 +23,8 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
     return l > 1e-30 ? v / l : otherwise;
 }
 
-// Against the gradient of the density smoothed to 2 scale where that is well conditioned, else away
-// from the centre.
+// Returns the unit normal against the gradient of the density smoothed to 2 scale where that is
+// well conditioned, else away from the cloud's centre.
 vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
 #if ELLIPSOIDS
     vec3 axes = vec3(1.0, aspect, 1.0);
@@ -40,7 +40,8 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
             d[k >> 1] = (k & 1) == 0 ? 1.0 : -1.0;
             w = 1.0 / 15.0;
         } else {
-            d = vec3((k & 1) == 0 ? 1.0 : -1.0, (k & 2) == 0 ? 1.0 : -1.0, k < 10 ? 1.0 : -1.0) * 0.57735026919;
+            d = vec3((k & 1) == 0 ? 1.0 : -1.0, (k & 2) == 0 ? 1.0 : -1.0, k < 10 ? 1.0 : -1.0)
+                * 0.57735026919;
             w = 3.0 / 40.0;
         }
 #if ELLIPSOIDS
@@ -54,7 +55,7 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
     float slope = length(gradient);
     float condition = sum > 0.0 ? slope / sum : 0.0;
 #if ELLIPSOIDS
-    // The gradient is of what is stretched to a ball.
+    // The gradient was taken in coordinates that make the ellipsoid a ball.
     gradient /= axes;
     slope = length(gradient);
 #endif
@@ -63,7 +64,7 @@ vec3 normal_at(vec3 p, float scale, float aspect, vec3 cloud_center) {
     return t > 0.0 ? unit_or(t * (-gradient / slope) + (1.0 - t) * outward, outward) : outward;
 }
 
-// Where the shell of a blob about p has the normal n.
+// Returns the place where the shell of a blob about p has the normal n.
 vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
 #if ELLIPSOIDS
     vec3 to = vec3(n.x, aspect * aspect * n.y, n.z);
@@ -73,8 +74,8 @@ vec3 shell_at(vec3 p, float scale, float aspect, vec3 n) {
 #endif
 }
 
-// pi R^2 (1 - e^-tau) of a blob, R = 3 sigma; of an ellipsoid the mean over all directions it is
-// seen from.
+// Returns pi R^2 (1 - e^-tau) of a blob, R = 3 sigma; of an ellipsoid the mean over all directions
+// it is seen from.
 float area_of(float sigma, float aspect, float kappa) {
     float radius = 3.0 * sigma;
     float area = PI * radius * radius, tau = SQRT_TAU * kappa * sigma;

@@ -1,7 +1,9 @@
-// Stable radix sort, DIGIT_BITS bits a pass. A workgroup owns a tile of 1024 entries, each
-// invocation a run of consecutive ones, so that order inside a tile is the order of (invocation,
-// turn). The fewer invocations, the fewer counters to clear and sum: the host asks for one
-// subgroup, 32 at most.
+// Stable radix sort, DIGIT_BITS bits a pass (docs/model.md §11 "sort"). A workgroup owns a tile of
+// 1024 entries, each invocation a run of consecutive ones, so that order inside a tile is the order
+// of (invocation, iteration). Fewer invocations have fewer counters to clear and sum: the host asks
+// for one subgroup, 32 at most.
+
+#include "buffers.glsl"
 
 #ifndef TILE_INVOCATIONS
 #define TILE_INVOCATIONS 32
@@ -15,10 +17,14 @@ const uint TILE = 1024;
 const uint RUN = TILE / TILE_INVOCATIONS;
 const uint N_DIGITS = 1 << DIGIT_BITS;
 
-// `i_count`: the word of `n_counted` that holds the number of entries; NO_COUNT where the host
-// knows it.
-layout(push_constant) uniform Push { uint n_entries; uint i_count; uint shift; } push;
-layout(std430, binding = 0) readonly buffer Counts { uint n_counted[]; };
+// i_count: the word of n_counted that holds the number of entries; NO_COUNT where the host knows
+// the number.
+layout(push_constant) uniform Push {
+    uint n_entries;
+    uint i_count;
+    uint shift;
+} push;
+READS(0, uint, n_counted)
 
 const uint NO_COUNT = 0xFFFFFFFFu;
 

@@ -1,6 +1,6 @@
 // How the long sums of light are formed (docs/model.md §11 "sums"). SUM1 and SUM3 hold a sum, ADD
-// adds to it and TOTAL says what it has come to; as plain sums of floats they are the numbers
-// themselves. Needs GL_EXT_control_flow_attributes.
+// adds to it and TOTAL returns it; plain sums of floats are the numbers themselves. Needs
+// GL_EXT_control_flow_attributes.
 
 #define PLAIN 0
 #define KAHAN 1
@@ -21,8 +21,8 @@
 #define REAL3 vec3
 #endif
 
-// A loop that adds to sums. Not unrolled where they are compensated: spirv-opt's copies of an
-// unrolled body lose `precise`, and with it drivers take what is lost for 0.
+// Marks a loop that adds to sums. Compensated sums are not unrolled: spirv-opt's copies of an
+// unrolled body lose `precise`, and then drivers take the compensation for 0.
 #if SUMMATION == KAHAN
 #define UNROLL [[dont_unroll]]
 #else
@@ -40,11 +40,17 @@
 
 #elif SUMMATION == KAHAN
 
-// The sum, and what its roundings have lost: a term is added together with that, and Knuth's
-// two-sum, which is exact whichever of the two is the greater, says what is lost now. `precise`,
-// since to a compiler that may transform sums all that is lost is 0.
-struct SUM1 { REAL value; REAL lost; };
-struct SUM3 { REAL3 value; REAL3 lost; };
+// A sum, and what its roundings have lost. A term is added together with the loss, and Knuth's
+// two-sum, exact whichever operand is greater, gives the new loss. It is `precise`, since a
+// compiler that may transform sums takes every loss for 0.
+struct SUM1 {
+    REAL value;
+    REAL lost;
+};
+struct SUM3 {
+    REAL3 value;
+    REAL3 lost;
+};
 #define EMPTY1 SUM1(REAL(0.0), REAL(0.0))
 #define EMPTY3 SUM3(REAL3(0.0), REAL3(0.0))
 #define ADD(sum, x) add_to(sum, x)
@@ -63,12 +69,20 @@ ADDING(SUM3, REAL3)
 #elif SUMMATION == PAIRWISE
 
 // Terms are added up by blocks of BLOCK, and blocks as a binary counter counts: part k is the sum
-// of 2^k blocks, and is there where bit k of the number of blocks is set; the last part takes all
-// that there is beyond. No loop and no index, so that parts can lie in registers.
+// of 2^k blocks and holds a value where bit k of the number of blocks is set; the last part takes
+// the rest. There is no loop and no index, so that parts can lie in registers.
 const uint BLOCK = 8u;
 const uint N_PARTS = 12u;
-struct SUM1 { REAL block; uint n; REAL parts[N_PARTS]; };
-struct SUM3 { REAL3 block; uint n; REAL3 parts[N_PARTS]; };
+struct SUM1 {
+    REAL block;
+    uint n;
+    REAL parts[N_PARTS];
+};
+struct SUM3 {
+    REAL3 block;
+    uint n;
+    REAL3 parts[N_PARTS];
+};
 #define TWELVE(x) x, x, x, x, x, x, x, x, x, x, x, x
 #define EMPTY1 SUM1(REAL(0.0), 0u, REAL[N_PARTS](TWELVE(REAL(0.0))))
 #define EMPTY3 SUM3(REAL3(0.0), 0u, REAL3[N_PARTS](TWELVE(REAL3(0.0))))

@@ -1,15 +1,15 @@
-// The law of textured splats (docs/model.md §9, §11 "texture"), for every path that draws them:
-// `sheet_of` makes what a splat needs, once; `sheet_exponent` gives ln of the factor on tau in a
-// pixel. Needs records, functions and philox; where pixels are drawn, SHEET_PIXELS and
+// Textured splats, for every path that draws them (docs/model.md §9, §11 "texture").
+// texture_sample_of() computes what a splat needs, once; texture_exponent() returns ln of the
+// factor on tau in a pixel. Needs records, functions and philox; pixels need SAMPLES_TEXTURE and
 // `usamplerBuffer pool`.
 
-// "text": particles are drawn from other counters.
+// "text": the stream's counters differ from those of particles.
 const uint TEXTURE_STREAM = 0x74657874u;
 
 // Side of level 0 in texels; level l has 2^-l of it.
 const uint TEXTURE_SIDE = 256;
 const int LAST_LEVEL = 5;
-// Of the levels before l of one field, 4^8 + ... : (4^9 - 4^(9 - l))/3; of all levels.
+// Texels of all levels of one field. Levels before l have 4^8 + ... = (4^9 - 4^(9 - l))/3 texels.
 const uint FIELD_TEXELS = 87360;
 uint level_offset(uint level) { return (262144u - (262144u >> (2u * level))) / 3u; }
 
@@ -26,23 +26,27 @@ const vec3 MEAN_SQUARES[6] = vec3[](
     vec3(0.9311588081134532, 0.8447946249367331, 0.8223410488849066),
     vec3(0.8223410488849066, 0.6166847013743091, 0.579927630240152),
     vec3(0.579927630240152, 0.14228647888238133, 0.12315655986123047),
-    vec3(0.12315655986123047, 0.0, 0.0));
+    vec3(0.12315655986123047, 0.0, 0.0)
+);
 
-struct Sheet {
+struct TextureSample {
     // From a difference of slopes d to texels (a d.x - b d.y + c, b d.x + a d.y + d): a, b, c, d.
     vec4 turn;
-    // Its level's first texel in the pool; log2 of the level's side.
+    // The level's first texel in the pool; log2 of the level's side.
     uvec2 place;
-    // Factors on n_l and n_l+1 in quanta; what is subtracted so that the factor has mean one.
+    // Factors on n_l and n_l+1 in quanta; the subtrahend that gives the factor mean one.
     vec3 gain;
 };
 
-// Of particle i_particle, whose view depth is z_in_sigma sigma, where slopes change by pixel from a
-// pixel to the next.
-Sheet sheet_of(Textured textured, uint i_particle, float z_in_sigma, float pixel) {
-    uvec4 words = philox4x32_10(uvec2(textured.seed, textured.i_box), uvec4(i_particle - textured.i_first, 0u, 0u, TEXTURE_STREAM));
+// Returns the texture's place and level for particle i_particle at a view depth of z_in_sigma
+// sigma. pixel: change of slopes from a pixel to the next.
+TextureSample texture_sample_of(Textured textured, uint i_particle, float z_in_sigma, float pixel) {
+    uvec4 words = philox4x32_10(
+        uvec2(textured.seed, textured.i_box),
+        uvec4(i_particle - textured.i_first, 0u, 0u, TEXTURE_STREAM)
+    );
     vec3 u = uniforms(words).xyz;
-    // Texels of level 0 in a pixel; from 2^6 on there is no wave left that a pixel could show.
+    // Texels of level 0 in a pixel; from 2^6 on no wave is left that a pixel could show.
     float dense = clamp(float(TEXTURE_SIDE) / PERIOD_SIGMA * (z_in_sigma * pixel), 1.0, 64.0);
     int level = min(int(floatBitsToUint(dense) >> 23) - 127, LAST_LEVEL);
     // 2^-level.
@@ -54,23 +58,26 @@ Sheet sheet_of(Textured textured, uint i_particle, float z_in_sigma, float pixel
     vec3 squares = MEAN_SQUARES[level];
     float s = textured.strength, own = 1.0 - fade;
     float square = own * own * squares.x + 2.0 * own * fade * squares.y + fade * fade * squares.z;
-    return Sheet(
+    return TextureSample(
         vec4(turn, side * u.yz),
         uvec2(textured.i_field * FIELD_TEXELS + level_offset(uint(level)), 8u - uint(level)),
-        vec3(s * own * (1.0 / QUANTA), s * fade * (1.0 / QUANTA), 0.5 * s * s * square));
+        vec3(s * own * (1.0 / QUANTA), s * fade * (1.0 / QUANTA), 0.5 * s * s * square)
+    );
 }
 
-#ifdef SHEET_PIXELS
-// n_l and n_l+1, weighted, at the corners of a word: its lower and its upper half.
+#ifdef SAMPLES_TEXTURE
+// Returns n_l and n_l+1, weighted, at the two corners of a word: its lower and its upper half.
 vec2 weighted(uint own, uint above, vec3 gain) {
-    ivec2 a = ivec2(int(own << 16) >> 16, int(own) >> 16), b = ivec2(int(above << 16) >> 16, int(above) >> 16);
+    ivec2 a = ivec2(int(own << 16) >> 16, int(own) >> 16),
+          b = ivec2(int(above << 16) >> 16, int(above) >> 16);
     return gain.x * vec2(a) + gain.y * vec2(b);
 }
 
-// s n - s^2 <n^2>/2 where the ray's slopes are delta from the centre's. One texel holds all four
-// corners of both levels.
-float sheet_exponent(vec2 delta, vec4 turn, uvec2 place, vec3 gain) {
-    vec2 at = vec2(turn.x * delta.x - turn.y * delta.y, turn.y * delta.x + turn.x * delta.y) + turn.zw;
+// Returns s n - s^2 <n^2>/2 where the ray's slopes are delta from the centre's. One texel holds all
+// four corners of both levels.
+float texture_exponent(vec2 delta, vec4 turn, uvec2 place, vec3 gain) {
+    vec2 at =
+        vec2(turn.x * delta.x - turn.y * delta.y, turn.y * delta.x + turn.x * delta.y) + turn.zw;
     vec2 low = floor(at), share = at - low;
     // Two's complement: the lowest bits are the remainder, of negative numbers too.
     uvec2 corner = uvec2(ivec2(low)) & ((1u << place.y) - 1u);

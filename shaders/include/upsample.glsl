@@ -1,4 +1,4 @@
-// What a full pixel has of the blobs' smaller picture (docs/model.md §11 "upsample").
+// A full pixel's value from the blobs' smaller picture (docs/model.md §11 "upsample").
 
 // Full pixels along a side of a small one.
 #ifndef N
@@ -12,7 +12,7 @@
 #ifndef SHIFT
 #define SHIFT 0
 #endif
-// There are surfaces; 2: their depth has 24 bits.
+// 1: there are surfaces; 2: and their depth has 24 bits.
 #ifndef BEHIND
 #define BEHIND 0
 #endif
@@ -20,13 +20,23 @@
 #define PICTURE 1
 #include "pixels.glsl"
 
-layout(push_constant) uniform Push { uint width; uint height; uint small_width; uint small_height; uint offset_x; uint offset_y; uint n_runs; uint n_pairs; uint last_texel; } push;
+layout(push_constant) uniform Push {
+    uint width;
+    uint height;
+    uint small_width;
+    uint small_height;
+    uint offset_x;
+    uint offset_y;
+    uint n_runs;
+    uint n_pairs;
+    uint last_texel;
+} push;
 layout(binding = 0) uniform usamplerBuffer small;
 
-// Depths that differ by no more than this share of the nearer one are those of one surface.
+// Depths that differ by no more than this share of the nearer one belong to one surface.
 const float ALIKE = 0.0625;
 
-// Lagrange's polynomial of degree five of tap k, at 2 + t of the taps 0 ... 5.
+// Returns Lagrange's polynomial of degree five of tap k, at 2 + t of the taps 0 ... 5.
 float weight(uint k, float t) {
     float w = 1.0;
     [[unroll]] for (int m = 0; m < 6; ++m) {
@@ -36,7 +46,7 @@ float weight(uint k, float t) {
 }
 
 #if BEHIND
-// The surfaces; near/z of what the small pixels and the full ones see.
+// The surfaces' picture; near/z of the small pixels and of the full ones.
 layout(binding = 2) uniform usamplerBuffer under;
 layout(binding = 3) uniform usamplerBuffer small_depths;
 layout(binding = 4) uniform usamplerBuffer depths;
@@ -50,10 +60,12 @@ vec4 depths_of(uvec4 words) {
 }
 
 vec4 small_depths_at(uint texel) {
-    return depths_of(texelFetch(small_depths, int(min(texel, push.small_width * push.small_height / 4 - 1u))));
+    return depths_of(
+        texelFetch(small_depths, int(min(texel, push.small_width * push.small_height / 4 - 1u)))
+    );
 }
 
-// Pixel p alone.
+// Stores pixel p alone.
 void store(uint p, vec4 value) {
     uvec4 words = packed(value);
     [[unroll]] for (uint k = 0; k < PIXEL_WORDS; ++k) {
@@ -69,13 +81,13 @@ void store(uint p, vec4 value) {
 float depth_at(uint p) { return depths_of(texelFetch(depths, int(p / 4)))[p % 4]; }
 #endif
 
-// What is seen where the blobs' picture has `sum` before `behind`.
+// Composes the blobs' value `sum` over `behind`.
 vec4 over_this(vec4 sum, vec4 behind) {
     vec4 blobs = vec4(max(sum.xyz, 0.0), clamp(sum.w, 0.0, 1.0));
     return blobs + (1.0 - blobs.w) * behind;
 }
 
-// The same in pixel p.
+// The same for pixel p.
 vec4 over(vec4 sum, uint p) {
 #if BEHIND
     return over_this(sum, pixel_of(texelFetch(under, int(p / TEXEL_PIXELS)), p % TEXEL_PIXELS));
@@ -84,7 +96,7 @@ vec4 over(vec4 sum, uint p) {
 #endif
 }
 
-// Pixels p and on of the blobs' picture, TOGETHER of them.
+// Composes and stores pixels p and on, TOGETHER of them.
 void store_all(uint p, vec4 sums[TOGETHER]) {
 #if BEHIND && FOURS
     uvec4 behind = texelFetch(under, int(p / TEXEL_PIXELS));
@@ -92,25 +104,21 @@ void store_all(uint p, vec4 sums[TOGETHER]) {
         sums[m] = over_this(sums[m], pixel_of(behind, m));
     }
 #else
-    [[unroll]] for (uint m = 0; m < TOGETHER; ++m) {
-        sums[m] = over(sums[m], p + m);
-    }
+    [[unroll]] for (uint m = 0; m < TOGETHER; ++m) { sums[m] = over(sums[m], p + m); }
 #endif
     store_together(p, sums);
 }
 
 #if BEHIND
-// The share by which two depths differ; of one surface's, 0.
+// Returns the share by which two depths differ; 0 for depths of one surface.
 float apart(float a, float b) {
     float nearer = max(a, b), by = abs(a - b);
     return by <= ALIKE * nearer ? 0.0 : by / nearer;
 }
 
-// The taps' weights along an axis: of six, of the inner four, or of the inner two.
+// Returns the taps' weights along an axis: of six, of the inner four, or of the inner two.
 void weights(out float w[6], uint order, float t) {
-    [[unroll]] for (uint k = 0; k < 6; ++k) {
-        w[k] = weight(k, t);
-    }
+    [[unroll]] for (uint k = 0; k < 6; ++k) { w[k] = weight(k, t); }
     if (order < 6) {
         w[0] = 0.0;
         w[5] = 0.0;
@@ -122,7 +130,7 @@ void weights(out float w[6], uint order, float t) {
     }
 }
 
-// The blobs' picture at a pixel some of whose taps may be of other surfaces than it is.
+// Returns the blobs' value at a pixel some of whose taps may belong to other surfaces.
 vec4 beside_edges(uvec2 pixel, uint p) {
     uvec2 q = uvec2(push.offset_x, push.offset_y) + 2u * pixel;
     uvec2 first = q / (2u * N) - 2u, rest = q % (2u * N);
@@ -138,8 +146,8 @@ vec4 beside_edges(uvec2 pixel, uint p) {
         bool inner = all(greaterThanEqual(tap, uvec2(1))) && all(lessThanEqual(tap, uvec2(4)));
         six = six && by == 0.0;
         four = four && (by == 0.0 || !inner);
-        ivec2 way = int(2u * N) * (ivec2(tap) - 2) - ivec2(rest);
-        int far = way.x * way.x + way.y * way.y;
+        ivec2 direction = int(2u * N) * (ivec2(tap) - 2) - ivec2(rest);
+        int far = direction.x * direction.x + direction.y * direction.y;
         bool better = by < least || (by == least && far < closest);
         least = better ? by : least;
         closest = better ? far : closest;

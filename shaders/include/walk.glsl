@@ -1,115 +1,202 @@
-// How a receiver goes through the sources of a pairing (docs/model.md §11 "second"): wholes one by
-// one, and those set aside
-// cell by cell. Who includes it says what is taken, and from where (`own`: the cell's light is its
-// own, not its facet's):
-//   void take_whole(uint i, Sender source, View view, Region emitter, Taker taker, float share);
-//   void take_cell(uint i, Sender source, View view, Region emitter, Taker taker, Stencil seen,
-//   Walk walk, Cell cell, float part,
-//       uint i_own, const bool own);
-//   void take_doubt(uint i, Sender source, View view, Region emitter, Taker taker, float area): a
-//   cell that stayed too wide.
+// How a receiver walks the sources of a pairing: wholes one by one, deferred ones cell by cell
+// (docs/model.md §11 "second"). The includer defines what is added:
+//   void add_whole(uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver,
+//   float share);
+//   void add_cell(uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver,
+//   CellSamples seen, Walk walk, Cell cell, float part, uint i_own, const bool own);
+//   void add_unresolved(uint i, LoadedSource source, SourceView view, Region emitter, Receiver
+//   receiver, float area);
+// own: the cell's light is found at its own points, not taken from its facet's. add_unresolved: for
+// a cell that stayed too wide.
 
 // Facets whose cells a driver cut short all the same.
 float n_cut = 0.0;
 
-// Facets that a shadow of a light tears and that are to be quartered: their cells' own light is
-// found when all else is done, so that no other cell has to wait for it. Source and pairing.
-uvec2 torn[MAX_TORN];
-uint n_torn = 0u;
+// Facets that a light's shadow edge crosses and that must be split, as (source, pairing). Their
+// cells' own light is found after all else, so that no other cell waits for it.
+uvec2 edge_facets[MAX_EDGE_FACETS];
+uint n_edge_facets = 0u;
 
-// One cell of a facet; whether it is quartered.
-bool take_or_quarter(uint i, Walk walk, Pairing pairing, Region emitter, Taker taker, Veil veil, Pane pane, const bool own) {
-    Sender source = sender_at(i, emitter, pane);
-    View view = look(source, i, walk, BROAD, pane, emitter, taker);
-    bool quartered = view.wide && walk.level < push.pair_levels && n_turns < QUARTER_TURNS;
+// Adds one cell of a facet, or returns true where the cell must be split.
+bool add_or_split(
+    uint i, Walk walk, Pairing pairing, Region emitter, Receiver receiver,
+    OccluderList occluder_list, FacetShape facet_shape, const bool own
+) {
+    LoadedSource source = load_source(i, emitter, facet_shape);
+    SourceView view = view_of(source, i, walk, CELL_WIDTH, facet_shape, emitter, receiver);
+    bool is_split =
+        view.is_too_wide && walk.level < push.pair_levels && n_iterations < SPLIT_ITERATIONS;
     float scale = cell_scale(walk.level);
-    Cell cell = Cell(view.position, scale * pane.half_u, scale * pane.half_v);
-    // Of the facet, and a sixteenth to each point.
-    float part = quartered ? 0.0 : 0.0625 * scale * scale;
-    Stencil seen = forms(cell, source.normal, taker.normal, taker.position, scale * scale * source.area);
-    shade_all(seen, pairing, veil, taker.position, cell, quartered ? 0u : veil.n);
+    Cell cell = Cell(view.position, scale * facet_shape.half_u, scale * facet_shape.half_v);
+    // Share of the facet, and a sixteenth of it for each point.
+    float part = is_split ? 0.0 : 0.0625 * scale * scale;
+    CellSamples seen =
+        forms(cell, source.normal, receiver.normal, receiver.position, scale * scale * source.area);
+    subtract_shadows(
+        seen, pairing, occluder_list, receiver.position, cell, is_split ? 0u : occluder_list.n
+    );
 #if MARCH
-    part *= attenuation(taker.position, view.position, part > 0.0);
+    part *= attenuation(receiver.position, view.position, part > 0.0);
 #endif
-    take_cell(i, source, view, emitter, taker, seen, walk, cell, part, pairing.i_region, own);
-    for (uint k = 0u; k < (view.wide && !quartered ? 1u : 0u); ++k) {
-        take_doubt(i, source, view, emitter, taker, scale * scale * source.area);
-        n_turns += 1u;
+    add_cell(i, source, view, emitter, receiver, seen, walk, cell, part, pairing.i_region, own);
+    for (uint k = 0u; k < (view.is_too_wide && !is_split ? 1u : 0u); ++k) {
+        add_unresolved(i, source, view, emitter, receiver, scale * scale * source.area);
+        n_iterations += 1u;
     }
-    n_turns += CELL_TURNS;
-    return quartered;
+    n_iterations += CELL_ITERATIONS;
+    return is_split;
 }
 
-// One step is one cell, so that neighbouring invocations need not wait for each other's facets.
-void gather_cells(Pairing pairing, Region emitter, Taker taker, Veil veil, Pane pane, uint aside[MAX_ASIDE], uint n_aside) {
+// Walks the cells of the deferred facets. One iteration is one cell, so that neighbouring
+// invocations need not wait for each other's facets.
+void gather_cells(
+    Pairing pairing, Region emitter, Receiver receiver, OccluderList occluder_list,
+    FacetShape facet_shape, uint deferred[MAX_DEFERRED], uint n_deferred
+) {
     Walk walk = start_walk(0u);
-    while (walk.s < n_aside) {
-        walk = advance(walk, take_or_quarter(aside[walk.s], walk, pairing, emitter, taker, veil, pane, false));
+    while (walk.s < n_deferred) {
+        walk = advance(
+            walk, add_or_split(
+                      deferred[walk.s], walk, pairing, emitter, receiver, occluder_list,
+                      facet_shape, false
+                  )
+        );
     }
-    n_cut += float(n_aside - walk.s);
+    n_cut += float(n_deferred - walk.s);
 }
 
-// The torn facets of all pairings.
-void gather_torn(Taker taker) {
+// Walks the cells of the facets with shadow edges, of all pairings.
+void gather_edge_facets(Receiver receiver) {
     Walk walk = start_walk(0u);
-    while (walk.s < n_torn) {
-        uvec2 facet = torn[walk.s];
+    while (walk.s < n_edge_facets) {
+        uvec2 facet = edge_facets[walk.s];
         Pairing pairing = pairings[facet.y];
         Region emitter = region_at(pairing.i_region);
-        // All that may stand between the surfaces: a veil of its own would be looked at for one
-        // facet.
-        Veil veil = whole_veil(pairing);
-        walk = advance(walk, take_or_quarter(facet.x, walk, pairing, emitter, taker, veil, pane_of(emitter), true));
+        // All surfaces in between: finding a list would not pay for one facet.
+        OccluderList occluder_list = all_occluders(pairing);
+        walk = advance(
+            walk, add_or_split(
+                      facet.x, walk, pairing, emitter, receiver, occluder_list,
+                      facet_shape_of(emitter), true
+                  )
+        );
     }
-    n_cut += float(n_torn - walk.s);
-    n_torn = 0u;
-    count_together();
+    n_cut += float(n_edge_facets - walk.s);
+    n_edge_facets = 0u;
+    share_iteration_count();
 }
 
 // Adds what the sources of a pairing from `s` on send to the receiver, and moves `s`.
-void gather(uint i_pairing, Pairing pairing, Region emitter, Taker taker, Veil veil, inout uint s, uint end) {
-    Pane pane = pane_of(emitter);
-    uint aside[MAX_ASIDE];
-    // What is set aside is finished: it needs room.
-    while (s < end && n_turns < BATCH_TURNS && n_torn < MAX_TORN) {
-        uint n_aside = 0u;
-        while (s < end && n_turns < BATCH_TURNS && n_aside < MAX_ASIDE && n_torn < MAX_TORN) {
+void gather(
+    uint i_pairing, Pairing pairing, Region emitter, Receiver receiver, OccluderList occluder_list,
+    inout uint s, uint end
+) {
+    FacetShape facet_shape = facet_shape_of(emitter);
+    uint deferred[MAX_DEFERRED];
+    // Deferred facets are finished in the same dispatch, which needs room for them.
+    while (s < end && n_iterations < BATCH_ITERATIONS && n_edge_facets < MAX_EDGE_FACETS) {
+        uint n_deferred = 0u;
+        while (s < end && n_iterations < BATCH_ITERATIONS && n_deferred < MAX_DEFERRED
+               && n_edge_facets < MAX_EDGE_FACETS) {
             uint i = pairing.i_source + s;
-            Sender source = sender_at(i, emitter, pane);
-            View view = look(source, i, start_walk(s), 1.0, pane, emitter, taker);
+            LoadedSource source = load_source(i, emitter, facet_shape);
+            SourceView view =
+                view_of(source, i, start_walk(s), 1.0, facet_shape, emitter, receiver);
             bool cluster = is_cluster(source);
             // A cloud's facet has no width and so no cells.
-            bool closer = view.wide;
-            float share = closer ? 0.0 : form_of(source, view, pane, emitter, taker);
-            bool rims = share > 0.0 && may_be_torn(source, view);
-            vec2 veiling = veils_ball(pairing, veil, taker.position, view.position, source.radius, share > 0.0);
-            share *= veiling.x;
-            bool coarse = view.width > push.pair_size * SINGLE;
-            bool is_torn = rims && veiling.y > 0.0 && (cluster || coarse || source.in_part);
-            closer = closer || is_torn || (coarse && source.in_part && share > 0.0);
+            bool closer = view.is_too_wide;
+            float share = closer ? 0.0 : form_of(source, view, facet_shape, emitter, receiver);
+            bool may_split = share > 0.0 && may_have_edge(source, view);
+            vec2 visibility = visible_part(
+                pairing, occluder_list, receiver.position, view.position, source.radius, share > 0.0
+            );
+            share *= visibility.x;
+            bool coarse = view.width > push.pair_size * SINGLE_EDGE_WIDTH;
+            bool has_edge =
+                may_split && visibility.y > 0.0 && (cluster || coarse || source.is_partly_shadowed);
+            closer = closer || has_edge || (coarse && source.is_partly_shadowed && share > 0.0);
             share = closer ? 0.0 : share;
 #if MARCH
-            share *= attenuation(taker.position, view.position, share > 0.0);
+            share *= attenuation(receiver.position, view.position, share > 0.0);
 #endif
-            take_whole(i, source, view, emitter, taker, share);
+            add_whole(i, source, view, emitter, receiver, share);
             bool by_cells = closer && !cluster;
-            bool quartered = by_cells && source.in_part && view.quartered;
-            torn[n_torn] = uvec2(i, i_pairing);
-            n_torn += quartered ? 1u : 0u;
-            aside[n_aside] = i;
-            n_aside += by_cells && !quartered ? 1u : 0u;
+            bool is_split = by_cells && source.is_partly_shadowed && view.is_split;
+            edge_facets[n_edge_facets] = uvec2(i, i_pairing);
+            n_edge_facets += is_split ? 1u : 0u;
+            deferred[n_deferred] = i;
+            n_deferred += by_cells && !is_split ? 1u : 0u;
             s += closer && cluster ? 1u : source.n_nodes;
-            n_turns += STEP_TURNS;
+            n_iterations += STEP_ITERATIONS;
         }
-        gather_cells(pairing, emitter, taker, veil, pane, aside, n_aside);
-        n_turns += 1u;
-        count_together();
+        gather_cells(pairing, emitter, receiver, occluder_list, facet_shape, deferred, n_deferred);
+        n_iterations += 1u;
+        share_iteration_count();
     }
-    count_together();
+    share_iteration_count();
 }
 
-// Where the walk through a pairing's sources begins, `reached` being the first source that is still
-// to be looked at.
+// Returns where the walk through a pairing's sources begins; `reached` is the first source not
+// looked at yet.
 uint begin_of(Pairing pairing, uint reached) {
-    return clamp(reached, pairing.i_source, pairing.i_source + pairing.n_sources) - pairing.i_source;
+    return clamp(reached, pairing.i_source, pairing.i_source + pairing.n_sources)
+           - pairing.i_source;
+}
+
+void main() {
+    Block block = blocks[push.i_first_block + gl_WorkGroupID.x];
+    bool is_receiver = gl_LocalInvocationID.x < block.n_facets;
+    uint j = order[block.i_first + min(gl_LocalInvocationID.x, block.n_facets - 1u)];
+    uint next = push.i_round == 0u ? 0u : reached[j];
+    if (next == DONE) {
+        return;
+    }
+    KEEP_LIGHTS
+    Facet facet = facets[j];
+    Region own = region_at(facet.i_region);
+    vec3 to_eye = push.eye - facet.position;
+    vec3 albedo = own.kd * facet.color * PI_INVERSE;
+    Receiver receiver = Receiver(facet.position, facet.normal, normalize(to_eye), albedo, own);
+    front = dot(to_eye, facet.normal) > 0.0 ? 1.0 : 0.0;
+    uint last = 0u;
+    for (uint k = 0u; k < block.n_pairings; ++k) {
+        Pairing pairing = pairings[block.i_pairing + k];
+        last = pairing.i_source + pairing.n_sources;
+        bool open =
+            n_iterations < BATCH_ITERATIONS && n_edge_facets < MAX_EDGE_FACETS && next < last;
+        Region emitter = region_at(pairing.i_region);
+        uint s = begin_of(pairing, next);
+        uint n = open ? pairing.n_sources : 0u;
+        OccluderList occluder_list = find_occluders(pairing, emitter, facet.position, open);
+#if STORES_PAIRINGS
+        clear();
+#endif
+        gather(
+            block.i_pairing + k, pairing, emitter, receiver, occluder_list, s,
+            occluder_list.closed ? 0u : n
+        );
+#if STORES_PAIRINGS
+        gather_edge_facets(receiver);
+#endif
+        s = occluder_list.closed && open ? pairing.n_sources : s;
+        next = open ? pairing.i_source + s : next;
+        n_iterations += 4u;
+#if STORES_PAIRINGS
+        if (is_receiver) {
+            store_pairing(j, own, emitter);
+        }
+#endif
+    }
+#if !STORES_PAIRINGS
+    gather_edge_facets(receiver);
+#endif
+    if (is_receiver) {
+        // Sources that no dispatch has reached are counted, and then there is no bound.
+        bool is_last = push.i_round + 1u == push.n_rounds;
+        store_receiver(j, receiver, n_cut + (is_last ? float(last - min(next, last)) : 0.0));
+        reached[j] = next >= last ? DONE : next;
+        if (next < last) {
+            atomicMax(rounds[3u * (push.i_round + 1u)], gl_NumWorkGroups.x);
+        }
+    }
 }

@@ -186,7 +186,7 @@ pub fn turns(scene: &Scene) -> Turns {
     let n_occluders = from.iter().flatten().map(|p| p.occluders.len()).max().unwrap_or(0);
     let n_lights = scene.lights.len();
     let march = if scene.n_particles() > 0 { scene.lighting.pairs.steps } else { 0 };
-    // A cell at its longest: turns.glsl's count of its loops, all occluders, and before every light
+    // A cell at its longest: iterations.glsl's count of its loops, all occluders, and before every light
     // all surfaces.
     let of_cell =
         16 + 5 * n_lights + n_occluders + n_lights * scene.surfaces.len() + march as usize;

@@ -79,7 +79,7 @@ pub(super) enum Lives {
         counts: Vec<u32>,
     },
     /// Staging buffers of all particles.
-    ByHost([Buffer; IN_FLIGHT]),
+    ByHost(Box<[Buffer; IN_FLIGHT]>),
 }
 
 impl Lives {
@@ -93,7 +93,10 @@ impl Lives {
             let n = scene.n_particles();
             let staging =
                 |name| Buffer::new::<ParticleRecord>(device, name, n, MemoryUsage::Upload);
-            return Ok(Some(Lives::ByHost([staging("live.upload0")?, staging("live.upload1")?])));
+            return Ok(Some(Lives::ByHost(Box::new([
+                staging("live.upload0")?,
+                staging("live.upload1")?,
+            ]))));
         }
         let discs = Box::new(Feed::new::<DiscRecord>(device, "live.discs", counts.len() as u64)?);
         Ok(Some(Lives::ByDevice { live: Live::new(device, compiler)?, discs, counts }))

@@ -35,72 +35,56 @@ impl Scope {
     pub const TRANSFER_READ: Scope = Scope::new(Stages::ALL_TRANSFER, Accesses::TRANSFER_READ);
     pub const TRANSFER_WRITE: Scope = Scope::new(Stages::ALL_TRANSFER, Accesses::TRANSFER_WRITE);
     pub const HOST_READ: Scope = Scope::new(Stages::HOST, Accesses::HOST_READ);
-    const COLOR: Scope = Scope::new(
-        Stages::COLOR_ATTACHMENT_OUTPUT,
-        Accesses::from_raw(
-            Accesses::COLOR_ATTACHMENT_READ.as_raw() | Accesses::COLOR_ATTACHMENT_WRITE.as_raw(),
-        ),
-    );
-    /// Fragment tests, which read and write depth.
-    const DEPTH: Scope = Scope::new(
-        Stages::from_raw(
-            Stages::EARLY_FRAGMENT_TESTS.as_raw() | Stages::LATE_FRAGMENT_TESTS.as_raw(),
-        ),
-        Accesses::from_raw(
-            Accesses::DEPTH_STENCIL_ATTACHMENT_READ.as_raw()
-                | Accesses::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw(),
-        ),
-    );
-    /// All stages and accesses by which nimbus uses buffers.
-    pub const ANY: Scope = Scope::new(
-        Stages::from_raw(
-            Stages::COMPUTE_SHADER.as_raw()
-                | Stages::VERTEX_SHADER.as_raw()
-                | Stages::FRAGMENT_SHADER.as_raw()
-                | Stages::DRAW_INDIRECT.as_raw()
-                | Stages::ALL_TRANSFER.as_raw(),
-        ),
-        Accesses::from_raw(
-            Accesses::SHADER_STORAGE_READ.as_raw()
-                | Accesses::SHADER_STORAGE_WRITE.as_raw()
-                | Accesses::SHADER_SAMPLED_READ.as_raw()
-                | Accesses::INDIRECT_COMMAND_READ.as_raw()
-                | Accesses::TRANSFER_READ.as_raw()
-                | Accesses::TRANSFER_WRITE.as_raw(),
-        ),
-    );
-
     const fn new(stages: Stages, accesses: Accesses) -> Scope {
         Scope { stages, accesses }
     }
 
+    /// Returns all stages and accesses by which nimbus uses buffers.
+    pub fn any() -> Scope {
+        Scope::new(
+            Stages::COMPUTE_SHADER
+                | Stages::VERTEX_SHADER
+                | Stages::FRAGMENT_SHADER
+                | Stages::DRAW_INDIRECT
+                | Stages::ALL_TRANSFER,
+            Accesses::SHADER_STORAGE_READ
+                | Accesses::SHADER_STORAGE_WRITE
+                | Accesses::SHADER_SAMPLED_READ
+                | Accesses::INDIRECT_COMMAND_READ
+                | Accesses::TRANSFER_READ
+                | Accesses::TRANSFER_WRITE,
+        )
+    }
+
     /// Returns the scope in which the shaders of a pipeline access one of its bindings.
     pub fn of_binding(interface: &Interface, access: &Access) -> Scope {
-        let stages = [
-            (vk::ShaderStageFlags::COMPUTE, Stages::COMPUTE_SHADER),
-            (vk::ShaderStageFlags::VERTEX, Stages::VERTEX_SHADER),
-            (vk::ShaderStageFlags::FRAGMENT, Stages::FRAGMENT_SHADER),
-        ];
-        let used = stages.iter().filter(|(shader, _)| interface.stages.contains(*shader));
+        let when = |is_used, stage| if is_used { stage } else { Stages::NONE };
+        let runs = |shader| interface.stages.contains(shader);
         let read = match access.kind {
             BindingKind::Storage => Accesses::SHADER_STORAGE_READ,
             BindingKind::Texels | BindingKind::Floats => Accesses::SHADER_SAMPLED_READ,
         };
-        let accesses = [(access.reads, read), (access.writes, Accesses::SHADER_STORAGE_WRITE)];
-        Scope {
-            stages: used.fold(Stages::NONE, |all, (_, stage)| all | *stage),
-            accesses: accesses
-                .iter()
-                .filter(|(is_made, _)| *is_made)
-                .fold(Accesses::NONE, |all, (_, access)| all | *access),
-        }
+        let made = |is_made, access| if is_made { access } else { Accesses::NONE };
+        Scope::new(
+            when(runs(vk::ShaderStageFlags::COMPUTE), Stages::COMPUTE_SHADER)
+                | when(runs(vk::ShaderStageFlags::VERTEX), Stages::VERTEX_SHADER)
+                | when(runs(vk::ShaderStageFlags::FRAGMENT), Stages::FRAGMENT_SHADER),
+            made(access.reads, read) | made(access.writes, Accesses::SHADER_STORAGE_WRITE),
+        )
     }
 
     /// Returns the scope in which an image is used in a layout.
     fn of_layout(layout: vk::ImageLayout) -> Scope {
         match layout {
-            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => Scope::COLOR,
-            vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL => Scope::DEPTH,
+            vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL => Scope::new(
+                Stages::COLOR_ATTACHMENT_OUTPUT,
+                Accesses::COLOR_ATTACHMENT_READ | Accesses::COLOR_ATTACHMENT_WRITE,
+            ),
+            // Fragment tests read and write depth.
+            vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL => Scope::new(
+                Stages::EARLY_FRAGMENT_TESTS | Stages::LATE_FRAGMENT_TESTS,
+                Accesses::DEPTH_STENCIL_ATTACHMENT_READ | Accesses::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            ),
             vk::ImageLayout::TRANSFER_SRC_OPTIMAL => Scope::TRANSFER_READ,
             vk::ImageLayout::TRANSFER_DST_OPTIMAL => Scope::TRANSFER_WRITE,
             _ => Scope::NONE,

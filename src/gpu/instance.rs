@@ -58,7 +58,8 @@ impl Instance {
         let vulkan = match made.iter().find(is_wanted) {
             Some(vulkan) => *vulkan,
             None => {
-                let vulkan = Box::leak(Box::new(VulkanInstance::new(has_validation, surface)?));
+                let vulkan: &'static VulkanInstance =
+                    Box::leak(Box::new(VulkanInstance::new(has_validation, surface)?));
                 made.push(vulkan);
                 vulkan
             }

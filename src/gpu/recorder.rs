@@ -57,10 +57,10 @@ impl Commands {
         // Orders this submission after the earlier ones, which may still be under way.
         // Synchronization validation of 1.3.239 does not look across submissions, so no test would
         // notice if this line were missing.
-        stage_barrier(&raw, buffer, Scope::ANY, Scope::ANY);
+        stage_barrier(&raw, buffer, Scope::any(), Scope::any());
         f(&mut Recorder { commands: self, uses: Uses::default(), barriers })?;
         self.timer.copy(buffer);
-        stage_barrier(&raw, buffer, Scope::ANY, Scope::HOST_READ);
+        stage_barrier(&raw, buffer, Scope::any(), Scope::HOST_READ);
         unsafe { raw.end_command_buffer(buffer) }.of_call("vkEndCommandBuffer", "")
     }
 
@@ -265,7 +265,7 @@ impl Recorder<'_> {
         let before = self.uses.add(coming);
         if let Some(before) = before.filter(|_| self.barriers == Barriers::Placed) {
             let (device, commands) = self.raw();
-            stage_barrier(device, commands, before, Scope::ANY);
+            stage_barrier(device, commands, before, Scope::any());
         }
     }
 

@@ -1,49 +1,59 @@
-//! What a SPIR-V module says of itself: workgroup size, push constants, storage buffers and how it
-//! touches them.
+//! Reflection of a SPIR-V module: workgroup size, push constants, and its buffers with their
+//! accesses.
 
 use rspirv::dr::{Instruction, Module, Operand};
 use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, Op, StorageClass};
 
 use crate::error::{Error, Result};
 
+/// The interface of a shader.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Reflection {
+    /// Invocations of a workgroup along x, y, z; 0 in a graphics shader.
     pub local_size: [u32; 3],
+    /// The push constants, where there are any.
     pub push: Option<Struct>,
-    /// By binding number; set 0 only, which is all that nimbus uses.
+    /// The bindings of set 0, the only one that nimbus uses, in ascending order.
     pub bindings: Vec<Binding>,
-    /// Bytes of workgroup-shared memory.
+    /// Bytes of memory that a workgroup shares.
     pub shared_bytes: u32,
 }
 
-/// Members with their byte offset and size; names are empty where the compiler stripped them.
+/// A struct; names are empty where the compiler stripped them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Struct {
+    /// Its name.
     pub name: String,
+    /// Its size in bytes, without padding at the end.
     pub bytes: u32,
+    /// Its members in order.
     pub members: Vec<Member>,
 }
 
+/// A member of a struct.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Member {
+    /// Its name.
     pub name: String,
+    /// Bytes from the struct's beginning.
     pub offset: u32,
+    /// Its size in bytes.
     pub bytes: u32,
 }
 
-/// How a shader asks for a buffer.
+/// How a shader declares a buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BindingKind {
-    /// `buffer`: read and written as records.
+    /// `buffer`: reads and writes records.
     Storage,
-    /// `usamplerBuffer`: read only, four words at a time.
+    /// `usamplerBuffer`: reads four words at a time.
     Texels,
-    /// `samplerBuffer`: read only, float by float.
+    /// `samplerBuffer`: reads single floats.
     Floats,
 }
 
 impl BindingKind {
-    /// Of one texel; 0 for records, whose block tells.
+    /// Returns the bytes of a texel; 0 for records, whose block declares them.
     pub fn texel_bytes(self) -> u32 {
         match self {
             BindingKind::Storage => 0,
@@ -53,12 +63,18 @@ impl BindingKind {
     }
 }
 
+/// A buffer of a shader.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Binding {
+    /// Its binding number.
     pub binding: u32,
+    /// Its declaration.
     pub kind: BindingKind,
+    /// Its name.
     pub name: String,
+    /// Whether the shader may read it.
     pub reads: bool,
+    /// Whether the shader may write it.
     pub writes: bool,
     /// Bytes from one element of the block's runtime array to the next.
     pub stride: u32,
@@ -67,10 +83,13 @@ pub struct Binding {
 }
 
 /// Reflects a module of one entry point.
+///
+/// # Errors
+/// `words` are no SPIR-V.
 pub fn reflect(name: &str, words: &[u32]) -> Result<Reflection> {
     let module = rspirv::dr::load_words(words)
         .map_err(|e| Error::Shader { name: name.to_owned(), what: format!("SPIR-V: {e}") })?;
-    let m = Reader { module: &module };
+    let m = Reader(&module);
     let mut found = Reflection { local_size: m.local_size(), ..Reflection::default() };
     for variable in module.types_global_values.iter().filter(|i| i.class.opcode == Op::Variable) {
         let (Some(id), Some(Operand::StorageClass(class))) =
@@ -78,11 +97,11 @@ pub fn reflect(name: &str, words: &[u32]) -> Result<Reflection> {
         else {
             continue;
         };
-        let pointee = variable.result_type.and_then(|t| m.pointee(t));
-        let Some(pointee) = pointee else { continue };
+        let pointer = variable.result_type.and_then(|t| m.definition(t));
+        let Some(pointee) = pointer.and_then(|pointer| id_of(pointer, 1)) else { continue };
         match class {
             StorageClass::PushConstant => found.push = Some(m.structure(pointee)),
-            StorageClass::StorageBuffer => found.bindings.push(m.binding(id, pointee)),
+            StorageClass::StorageBuffer => found.bindings.push(m.buffer(id, pointee)),
             StorageClass::UniformConstant => found.bindings.push(m.texels(id, pointee)),
             StorageClass::Workgroup => found.shared_bytes += m.size(pointee, None),
             _ => {}
@@ -92,101 +111,99 @@ pub fn reflect(name: &str, words: &[u32]) -> Result<Reflection> {
     Ok(found)
 }
 
-struct Reader<'a> {
-    module: &'a Module,
+fn id_of(i: &Instruction, operand: usize) -> Option<u32> {
+    i.operands.get(operand)?.id_ref_any()
 }
+
+fn literal(operand: Option<&Operand>) -> u32 {
+    match operand {
+        Some(Operand::LiteralBit32(value)) => *value,
+        _ => 0,
+    }
+}
+
+/// Returns what instructions say of `id`, or of a member of it: their operands after that.
+fn payloads(
+    instructions: &[Instruction],
+    [plain, of_member]: [Op; 2],
+    id: u32,
+    member: Option<u32>,
+) -> impl Iterator<Item = &[Operand]> {
+    instructions.iter().filter_map(move |i| {
+        let of_id = id_of(i, 0) == Some(id);
+        match member {
+            None if of_id && i.class.opcode == plain => i.operands.get(1..),
+            Some(m) if of_id && i.class.opcode == of_member => {
+                (literal(i.operands.get(1)) == m).then(|| i.operands.get(2..))?
+            }
+            _ => None,
+        }
+    })
+}
+
+struct Reader<'a>(&'a Module);
 
 impl Reader<'_> {
     fn definition(&self, id: u32) -> Option<&Instruction> {
-        self.module.types_global_values.iter().find(|i| i.result_id == Some(id))
+        self.0.types_global_values.iter().find(|i| i.result_id == Some(id))
     }
 
-    fn id(&self, i: &Instruction, operand: usize) -> Option<u32> {
-        match i.operands.get(operand) {
-            Some(Operand::IdRef(id)) => Some(*id),
-            _ => None,
-        }
+    /// Returns the definition of the type that operand `operand` of `id`'s definition names.
+    fn operand_of(&self, id: u32, operand: usize) -> Option<&Instruction> {
+        self.definition(id_of(self.definition(id)?, operand)?)
     }
 
-    fn literal(&self, i: &Instruction, operand: usize) -> u32 {
-        match i.operands.get(operand) {
-            Some(Operand::LiteralBit32(v)) => *v,
-            _ => 0,
-        }
-    }
-
-    fn pointee(&self, pointer: u32) -> Option<u32> {
-        let i = self.definition(pointer)?;
-        if i.class.opcode == Op::TypePointer { self.id(i, 1) } else { None }
-    }
-
-    /// Value of an OpConstant or of a specialization constant's default.
+    /// Returns the value of a constant, or the default of a specialization constant.
     fn constant(&self, id: u32) -> u32 {
-        self.definition(id).map_or(0, |i| self.literal(i, 0))
+        self.definition(id).map_or(0, |i| literal(i.operands.first()))
     }
 
-    /// From LocalSize, or from the WorkgroupSize constant that overrides it.
+    /// Returns the size from the WorkgroupSize constant, or else from LocalSize.
     fn local_size(&self) -> [u32; 3] {
-        let builtin = self.module.annotations.iter().find(|a| {
-            matches!(a.operands.get(1), Some(Operand::Decoration(Decoration::BuiltIn)))
-                && matches!(a.operands.get(2), Some(Operand::BuiltIn(BuiltIn::WorkgroupSize)))
-        });
-        if let Some(composite) =
-            builtin.and_then(|a| self.id(a, 0)).and_then(|id| self.definition(id))
-        {
-            return [0, 1, 2].map(|k| self.id(composite, k).map_or(0, |id| self.constant(id)));
+        let is_size = |a: &&Instruction| {
+            a.operands.get(1..3)
+                == Some(&[
+                    Operand::Decoration(Decoration::BuiltIn),
+                    Operand::BuiltIn(BuiltIn::WorkgroupSize),
+                ])
+        };
+        let builtin = self.0.annotations.iter().find(is_size);
+        if let Some(size) = builtin.and_then(|a| self.definition(id_of(a, 0)?)) {
+            return [0, 1, 2].map(|k| id_of(size, k).map_or(0, |id| self.constant(id)));
         }
-        let modes = self.module.execution_modes.iter();
-        let sizes = modes.filter(|m| {
-            matches!(m.operands.get(1), Some(Operand::ExecutionMode(ExecutionMode::LocalSize)))
-        });
-        sizes.map(|m| [2, 3, 4].map(|k| self.literal(m, k))).next().unwrap_or([0; 3])
+        let is_local = Some(&Operand::ExecutionMode(ExecutionMode::LocalSize));
+        let mode = self.0.execution_modes.iter().find(|mode| mode.operands.get(1) == is_local);
+        [2, 3, 4].map(|k| literal(mode.and_then(|mode| mode.operands.get(k))))
     }
 
-    /// The literal of `decoration` on `id`, or on member `member` of it.
-    fn decoration(&self, id: u32, member: Option<u32>, decoration: Decoration) -> Option<u32> {
-        let wanted = Operand::Decoration(decoration);
-        self.module.annotations.iter().find_map(|a| {
-            let at = match (a.class.opcode, member) {
-                (Op::Decorate, None) => 1,
-                (Op::MemberDecorate, Some(m)) if self.literal(a, 1) == m => 2,
-                _ => return None,
-            };
-            (self.id(a, 0) == Some(id) && a.operands.get(at) == Some(&wanted))
-                .then(|| self.literal(a, at + 1))
-        })
+    /// Returns the literal of a decoration of `id`, or of a member of it.
+    fn decoration(&self, id: u32, member: Option<u32>, wanted: Decoration) -> Option<u32> {
+        payloads(&self.0.annotations, [Op::Decorate, Op::MemberDecorate], id, member)
+            .find(|payload| payload.first() == Some(&Operand::Decoration(wanted)))
+            .map(|payload| literal(payload.get(1)))
     }
 
     fn name(&self, id: u32, member: Option<u32>) -> String {
-        let named = self.module.debug_names.iter().find_map(|n| {
-            let text = match (n.class.opcode, member) {
-                (Op::Name, None) => n.operands.get(1),
-                (Op::MemberName, Some(m)) if self.literal(n, 1) == m => n.operands.get(2),
-                _ => None,
-            };
-            match text {
-                Some(Operand::LiteralString(s)) if self.id(n, 0) == Some(id) => Some(s.clone()),
-                _ => None,
-            }
-        });
-        named.unwrap_or_default()
+        let mut names = payloads(&self.0.debug_names, [Op::Name, Op::MemberName], id, member);
+        match names.next().and_then(<[_]>::first) {
+            Some(Operand::LiteralString(name)) => name.clone(),
+            _ => String::new(),
+        }
     }
 
-    /// Size of a type in bytes; `matrix_stride` and array strides come from decorations.
+    /// Returns the size of a type in bytes; `matrix_stride` comes from the member's decoration.
     fn size(&self, id: u32, matrix_stride: Option<u32>) -> u32 {
         let Some(i) = self.definition(id) else { return 0 };
+        let element = || id_of(i, 0).map_or(0, |t| self.size(t, None));
+        let count = || literal(i.operands.get(1));
         match i.class.opcode {
-            Op::TypeInt | Op::TypeFloat => self.literal(i, 0) / 8,
+            Op::TypeInt | Op::TypeFloat => literal(i.operands.first()) / 8,
             Op::TypeBool => 4,
-            Op::TypeVector => self.id(i, 0).map_or(0, |t| self.size(t, None)) * self.literal(i, 1),
-            Op::TypeMatrix => {
-                let column = self.id(i, 0).map_or(0, |t| self.size(t, None));
-                matrix_stride.unwrap_or(column) * self.literal(i, 1)
-            }
+            Op::TypeVector => element() * count(),
+            Op::TypeMatrix => matrix_stride.unwrap_or_else(element) * count(),
             Op::TypeArray => {
-                let element = self.id(i, 0).map_or(0, |t| self.size(t, None));
-                let stride = self.decoration(id, None, Decoration::ArrayStride).unwrap_or(element);
-                stride * self.id(i, 1).map_or(0, |n| self.constant(n))
+                let stride = self.decoration(id, None, Decoration::ArrayStride);
+                stride.unwrap_or_else(element) * id_of(i, 1).map_or(0, |n| self.constant(n))
             }
             Op::TypeStruct => self.structure(id).bytes,
             _ => 0,
@@ -195,50 +212,51 @@ impl Reader<'_> {
 
     fn structure(&self, id: u32) -> Struct {
         let Some(i) = self.definition(id) else { return Struct::default() };
-        let mut unplaced = 0;
-        let members: Vec<Member> = (0..i.operands.len() as u32)
-            .map(|k| {
-                let stride = self.decoration(id, Some(k), Decoration::MatrixStride);
-                let bytes = self.id(i, k as usize).map_or(0, |t| self.size(t, stride));
-                let offset = self.decoration(id, Some(k), Decoration::Offset).unwrap_or(unplaced);
-                unplaced = offset + bytes;
-                Member { name: self.name(id, Some(k)), offset, bytes }
-            })
-            .collect();
+        let mut end = 0;
+        let member = |k: u32| {
+            let stride = self.decoration(id, Some(k), Decoration::MatrixStride);
+            let bytes = id_of(i, k as usize).map_or(0, |t| self.size(t, stride));
+            // Members of shared memory have no offsets.
+            let offset = self.decoration(id, Some(k), Decoration::Offset).unwrap_or(end);
+            end = offset + bytes;
+            Member { name: self.name(id, Some(k)), offset, bytes }
+        };
+        let members: Vec<Member> = (0..i.operands.len() as u32).map(member).collect();
         let bytes = members.iter().map(|m| m.offset + m.bytes).max().unwrap_or(0);
         Struct { name: self.name(id, None), bytes, members }
     }
 
-    fn binding(&self, id: u32, block: u32) -> Binding {
-        let binding = self.decoration(id, None, Decoration::Binding).unwrap_or(0);
+    fn binding(&self, id: u32) -> u32 {
+        self.decoration(id, None, Decoration::Binding).unwrap_or(0)
+    }
+
+    /// Reflects a storage buffer, whose block ends in a runtime array.
+    fn buffer(&self, id: u32, block: u32) -> Binding {
         let has = |d| {
-            self.decoration(id, None, d).is_some() || self.decoration(block, Some(0), d).is_some()
+            self.decoration(id, None, d).or_else(|| self.decoration(block, Some(0), d)).is_some()
         };
-        let array = self.definition(block).and_then(|b| self.id(b, 0));
-        let element = array.and_then(|a| self.definition(a)).and_then(|a| self.id(a, 0));
-        let is_struct =
-            |id: &u32| self.definition(*id).is_some_and(|i| i.class.opcode == Op::TypeStruct);
+        let array = self.operand_of(block, 0).and_then(|array| array.result_id);
+        let stride = array.and_then(|a| self.decoration(a, None, Decoration::ArrayStride));
+        let element = array.and_then(|a| self.operand_of(a, 0));
+        let element = element.filter(|e| e.class.opcode == Op::TypeStruct);
         Binding {
-            binding,
+            binding: self.binding(id),
             kind: BindingKind::Storage,
             name: self.name(block, Some(0)),
             reads: !has(Decoration::NonReadable),
             writes: !has(Decoration::NonWritable),
-            stride: array
-                .and_then(|a| self.decoration(a, None, Decoration::ArrayStride))
-                .unwrap_or(0),
-            element: element.filter(is_struct).map(|e| self.structure(e)),
+            stride: stride.unwrap_or(0),
+            element: element.and_then(|e| e.result_id).map(|e| self.structure(e)),
         }
     }
 
-    /// An image of dimension "buffer"; what it samples as tells its texels.
+    /// Reflects a texel buffer: an image of dimension "buffer". The sampled type tells its texels.
     fn texels(&self, id: u32, image: u32) -> Binding {
-        let sampled =
-            self.definition(image).and_then(|i| self.id(i, 0)).and_then(|t| self.definition(t));
-        let of_floats = sampled.is_some_and(|t| t.class.opcode == Op::TypeFloat);
-        let kind = if of_floats { BindingKind::Floats } else { BindingKind::Texels };
+        let sampled = self.operand_of(image, 0);
+        let is_float = sampled.is_some_and(|t| t.class.opcode == Op::TypeFloat);
+        let kind = if is_float { BindingKind::Floats } else { BindingKind::Texels };
         Binding {
-            binding: self.decoration(id, None, Decoration::Binding).unwrap_or(0),
+            binding: self.binding(id),
             kind,
             name: self.name(id, None),
             reads: true,

@@ -1,4 +1,4 @@
-//! GLSL to SPIR-V at run time by shaderc, cached on disk by content.
+//! GLSL sources, and their compilation to SPIR-V at run time by shaderc, cached on disk by content.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,12 +12,15 @@ use crate::error::{Error, Result};
 pub struct Sources(BTreeMap<String, String>);
 
 impl Sources {
-    /// The texts built into the binary.
+    /// Returns the texts built into the binary.
     pub fn embedded(texts: &[(&str, &str)]) -> Sources {
         Sources(texts.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect())
     }
 
-    /// The embedded texts, with those that `dir` holds in their place: `--shaders DIR`.
+    /// Replaces texts by those that `dir` holds, for `--shaders DIR`.
+    ///
+    /// # Errors
+    /// `dir` is no folder, holds none of the shaders, or cannot be read.
     pub fn with_dir(mut self, dir: &Path) -> Result<Sources> {
         if !dir.is_dir() {
             return Err(Error::io(dir, "expected a folder of shaders"));
@@ -31,59 +34,79 @@ impl Sources {
             }
         }
         if n_found == 0 {
-            let names: Vec<&str> = self.0.keys().map(String::as_str).collect();
-            return Err(Error::io(
-                dir,
-                format!("holds none of nimbus's shaders ({})", names.join(", ")),
-            ));
+            let names: Vec<&str> = self.names().collect();
+            let what = format!("holds none of nimbus's shaders ({})", names.join(", "));
+            return Err(Error::io(dir, what));
         }
         Ok(self)
     }
 
-    /// One text more, or in place of another of that name.
+    /// Adds a text, or replaces the one of that name.
     pub fn with_text(mut self, name: &str, text: &str) -> Sources {
         self.0.insert(name.to_owned(), text.to_owned());
         self
     }
 
-    /// SHA-256 (hex) over all names and texts.
+    /// Returns the SHA-256 over all names and texts, in hexadecimal.
     pub fn hash(&self) -> String {
         let mut hasher = Sha256::new();
         for (name, text) in &self.0 {
-            // Lengths tell where one ends.
+            // Lengths mark where a text ends.
             hasher.update(format!("{name} {}\n{text}", text.len()));
         }
         format!("{:x}", hasher.finalize())
     }
 
+    /// Returns the file names.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }
 
-    /// Replaces one text; for tests that prove that a wrong shader is noticed.
+    /// Replaces each `from` in a text by `to`, for tests that prove that a wrong shader is noticed.
+    /// White space does not count. Returns whether anything was replaced.
     pub fn replace(&mut self, name: &str, from: &str, to: &str) -> bool {
         let Some(text) = self.0.get_mut(name) else { return false };
-        let changed = text.replace(from, to);
-        std::mem::replace(text, changed.clone()) != changed
+        let solid = |text: &str| -> Vec<(usize, char)> {
+            text.char_indices().filter(|(_, c)| !c.is_whitespace()).collect()
+        };
+        let (within, wanted) = (solid(text), solid(from));
+        let (mut replaced, mut end, mut i) = (String::new(), 0, 0);
+        while let Some(found) = within.get(i..i + wanted.len()) {
+            let is_match = found.iter().zip(&wanted).all(|((_, a), (_, b))| a == b);
+            if let (true, Some((first, _)), Some((last, c))) =
+                (is_match, found.first(), found.last())
+            {
+                replaced += &text[end..*first];
+                replaced += to;
+                end = last + c.len_utf8();
+            }
+            i += if is_match { wanted.len().max(1) } else { 1 };
+        }
+        replaced += &text[end..];
+        let is_changed = replaced != *text;
+        *text = replaced;
+        is_changed
     }
 }
 
+/// How SPIR-V is optimised.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Optimize {
-    /// What runs.
+    /// Fully, for running.
     Yes,
-    /// The twin with all its names, for reflection tests.
+    /// Not at all, with all names, for reflection tests.
     No,
 }
 
+/// Compiles shaders, and caches their SPIR-V.
 pub struct Compiler {
     raw: shaderc::Compiler,
     sources: Sources,
     cache: Option<PathBuf>,
 }
 
-/// Where what can be made again is kept: `$NIMBUS_CACHE_DIR`, else `$XDG_CACHE_HOME/nimbus`, else
-/// `~/.cache/nimbus`, each with `name` below it.
+/// Returns the folder `name` for files that can be made again: in `$NIMBUS_CACHE_DIR`, else
+/// `$XDG_CACHE_HOME/nimbus`, else `~/.cache/nimbus`.
 pub fn cache_folder(name: &str) -> Option<PathBuf> {
     let var = |name| std::env::var_os(name).filter(|v| !v.is_empty()).map(PathBuf::from);
     let base = var("NIMBUS_CACHE_DIR")
@@ -93,29 +116,39 @@ pub fn cache_folder(name: &str) -> Option<PathBuf> {
 }
 
 impl Compiler {
-    /// `cache` is a folder for SPIR-V, made when first needed; without one every shader is compiled
-    /// anew.
+    /// Makes a compiler of `sources`. `cache` is a folder for SPIR-V, made when first needed;
+    /// without one every shader is compiled anew.
+    ///
+    /// # Errors
+    /// shaderc does not start.
     pub fn new(sources: Sources, cache: Option<PathBuf>) -> Result<Compiler> {
         let raw = shaderc::Compiler::new()
             .map_err(|e| Error::Shader { name: "compiler".into(), what: e.to_string() })?;
         Ok(Compiler { raw, sources, cache })
     }
 
-    /// `spirv` in the [`cache_folder`].
+    /// Returns the folder `spirv` of the [`cache_folder`].
     pub fn default_cache() -> Option<PathBuf> {
         cache_folder("spirv")
     }
 
+    /// Returns the shader texts.
     pub fn sources(&self) -> &Sources {
         &self.sources
     }
 
-    /// SPIR-V of `file` (its extension gives the stage). Errors carry the compiler's file:line.
+    /// Returns the SPIR-V of `file`, whose extension names the stage.
+    ///
+    /// # Errors
+    /// The text does not compile; the error carries the compiler's file:line.
     pub fn compile(&self, file: &str, optimize: Optimize) -> Result<Vec<u32>> {
         self.compile_with(file, optimize, &[])
     }
 
-    /// The same with `macros` defined.
+    /// Returns the SPIR-V of `file` with `macros` defined.
+    ///
+    /// # Errors
+    /// The text does not compile; the error carries the compiler's file:line.
     pub fn compile_with(
         &self,
         file: &str,
@@ -132,10 +165,8 @@ impl Compiler {
             Some("frag") => shaderc::ShaderKind::Fragment,
             _ => return Err(fail("expected a file ending in .comp, .vert or .frag".into())),
         };
-        let cached = self
-            .cache
-            .as_ref()
-            .map(|dir| dir.join(format!("{}.spv", self.key(file, text, optimize, macros))));
+        let key = || self.key(file, text, optimize, macros);
+        let cached = self.cache.as_ref().map(|dir| dir.join(format!("{}.spv", key())));
         if let Some(words) = cached.as_deref().and_then(read_cached) {
             return Ok(words);
         }
@@ -154,18 +185,16 @@ impl Compiler {
             let content = self.sources.0.get(&full).cloned().ok_or(format!("no include {full}"))?;
             Ok(shaderc::ResolvedInclude { resolved_name: full, content })
         });
-        let compiled = self
-            .raw
-            .compile_into_spirv(text, kind, file, "main", Some(&options))
-            .map_err(|e| fail(e.to_string()))?;
-        let words = compiled.as_binary().to_vec();
+        let compiled = self.raw.compile_into_spirv(text, kind, file, "main", Some(&options));
+        let words = compiled.map_err(|e| fail(e.to_string()))?.as_binary().to_vec();
         if let Some(path) = cached {
-            write_cached(&path, &words);
+            // A cache that cannot be written costs time and nothing else.
+            let _ = write_cached(&path, &words);
         }
         Ok(words)
     }
 
-    /// Hash of all that the SPIR-V depends on: the text, every include, the options, the compiler.
+    /// Hashes all that the SPIR-V depends on: the text, every include, the options, the compiler.
     fn key(&self, file: &str, text: &str, optimize: Optimize, macros: &[(&str, u32)]) -> String {
         let mut hash = Sha256::new();
         let (version, revision) = shaderc::get_spirv_version();
@@ -181,12 +210,12 @@ impl Compiler {
     }
 }
 
-/// Lower-case hexadecimal.
+/// Returns bytes in lower-case hexadecimal.
 pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
-/// A cached file is its words after their SHA-256; anything else is not there.
+/// Reads a cached file: words after their SHA-256. Any other content counts as missing.
 fn read_cached(path: &Path) -> Option<Vec<u32>> {
     let bytes = std::fs::read(path).ok()?;
     let (sum, words) = bytes.split_at_checked(32)?;
@@ -196,20 +225,30 @@ fn read_cached(path: &Path) -> Option<Vec<u32>> {
     Some(bytemuck::pod_collect_to_vec(words))
 }
 
-/// A cache that cannot be written costs time and nothing else, so failure is silent.
-fn write_cached(path: &Path, words: &[u32]) {
+/// Writes a cached file under another name and renames it, so that none is seen half written.
+fn write_cached(path: &Path, words: &[u32]) -> std::io::Result<()> {
     let bytes: &[u8] = bytemuck::cast_slice(words);
-    let temporary = path.with_extension(format!(
-        "{}-{:?}.tmp",
-        std::process::id(),
-        std::thread::current().id()
-    ));
-    let write = || -> std::io::Result<()> {
-        std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
-        std::fs::write(&temporary, [Sha256::digest(bytes).as_slice(), bytes].concat())?;
-        std::fs::rename(&temporary, path)
-    };
-    if write().is_err() {
+    let owner = format!("{}-{:?}.tmp", std::process::id(), std::thread::current().id());
+    let temporary = path.with_extension(owner);
+    std::fs::create_dir_all(path.parent().unwrap_or(Path::new(".")))?;
+    let written = std::fs::write(&temporary, [Sha256::digest(bytes).as_slice(), bytes].concat())
+        .and_then(|()| std::fs::rename(&temporary, path));
+    if written.is_err() {
         let _ = std::fs::remove_file(&temporary);
+    }
+    written
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replace_ignores_white_space() {
+        let mut sources = Sources::embedded(&[("a.comp", "f(a,\n    b); f(a, b); g")]);
+        assert!(sources.replace("a.comp", "f(a, b)", "h"));
+        assert_eq!(sources.0["a.comp"], "h; h; g");
+        assert!(!sources.replace("a.comp", "f(a, b)", "h"));
+        assert!(!sources.replace("b.comp", "g", "h"));
     }
 }

@@ -1,4 +1,4 @@
-//! The discs that particles come from, at a frame's time (docs/model.md §2).
+//! The record of a disc of particles at a frame's time (docs/model.md §2).
 
 use glam::DVec3;
 
@@ -7,50 +7,62 @@ use crate::model::cloud::Group;
 use crate::model::disc::{Cycle, Disc};
 
 record! {
-    /// The law of a disc's particles, in lengths that a whole period makes of speeds, and the time.
+    /// The law of a disc's particles, and the time. Speeds are lengths per period L of the disc.
     pub struct DiscRecord {
-        /// The group's centre relative to the disc's.
+        /// The group's centre relative to the disc's, scene units.
         center: [f32; 3],
+        /// Radius of the disc.
         radius: f32,
-        /// Wind · L.
+        /// Displacement by the wind in a period: wind · L.
         drift: [f32; 3],
-        /// Greatest v T: what outflow covers in the end.
+        /// Greatest displacement by the outflow, v T.
         outflow: f32,
+        /// Mean σ at birth.
         sigma: f32,
+        /// Greatest relative deviation of σ at birth.
         sigma_spread: f32,
-        /// b θ̄ T: what a particle of mean warmth rises in the end.
+        /// Rise of a particle of mean warmth in the end, b θ̄ T.
         rise: f32,
+        /// Greatest relative deviation of the warmth.
         warmth_spread: f32,
+        /// Share of the warmth that particles at the rim lack.
         core: f32,
+        /// Greatest share of the period by which a life is shorter.
         life_spread: f32,
-        /// L/T.
+        /// Period over cooling time, L/T.
         cooling: f32,
-        /// Growth of σ by rise.
+        /// Growth of σ per length of rise.
         growth: f32,
+        /// κ at birth.
         kappa: f32,
-        /// One over the shares of a life.
+        /// One over the share of a life in which a particle fades in.
         inv_fade_in: f32,
+        /// One over the share of a life in which a particle fades out.
         inv_fade_out: f32,
+        /// Height of the condensation level over the disc.
         base: f32,
-        /// One over the height in which particles condense; 0: they always have.
+        /// One over the height range of condensation; 0: all particles are condensed.
         inv_over: f32,
-        /// How much higher a particle of mean warmth condenses at birth.
+        /// Additional height at which a particle of mean warmth condenses at birth.
         lift: f32,
-        /// k of κ ∝ σ^−k: 0, 1 or 3.
+        /// Exponent k of κ ∝ σ^−k: 0, 1 or 3.
         dilution: u32,
         /// Philox key.
         seed: u32,
         /// The disc's first particle in the buffer.
         i_first: u32,
+        /// Number of particles.
         n_particles: u32,
-        /// Time: (generation + phase/2³²) L.
+        /// Whole periods of the time, (generation + phase/2³²) L.
         generation: u32,
+        /// Fraction of a period in 2⁻³².
         phase: u32,
     }
 }
 
 impl DiscRecord {
-    /// `group`: the disc's, of a cloud of `seed` in `wind`.
+    /// Returns the record of `disc`, whose particles are `group`, in a cloud of `seed` and `wind`
+    /// (scene units per second), at `turn`.
     pub fn new(disc: &Disc, group: &Group, seed: u32, wind: DVec3, turn: Cycle) -> Self {
         let condensation = disc.condensation;
         let of =

@@ -1,4 +1,4 @@
-//! What a frame says to many passes: lights, camera, grid.
+//! Records that many passes of a frame read: lights, camera, grid.
 
 use glam::DVec3;
 
@@ -8,35 +8,40 @@ use crate::model::film::Film;
 use crate::model::grid::GridSpec;
 use crate::model::light::{Light, MIN_PENUMBRA, UP};
 
-/// Kinds of [`LightRecord`]; the shaders' `LIGHT_*`.
+/// The kind of a directional [`LightRecord`]. The shaders' `LIGHT_*` have the same values.
 pub const LIGHT_DIRECTIONAL: u32 = 0;
+/// The kind of the sky.
 pub const LIGHT_SKY: u32 = 1;
+/// The kind of a point or spot light.
 pub const LIGHT_POINT: u32 = 2;
 
 record! {
     /// A light. A spot is a point light with a cone.
     pub struct LightRecord {
-        /// Unit vector toward a directional light, for the sky up, for a spot against its axis.
+        /// Unit vector toward a directional light; up for the sky; against a spot's axis.
         toward: [f32; 3],
+        /// `LIGHT_DIRECTIONAL`, `LIGHT_SKY` or `LIGHT_POINT`.
         kind: u32,
-        /// Irradiance; of point lights intensity.
+        /// Irradiance, or intensity of a point light, linear RGB.
         energy: [f32; 3],
-        /// The sky's share from everywhere.
+        /// Share of the sky's energy that arrives from everywhere.
         constant: f32,
-        /// Relative to the lighting origin.
+        /// Place of a point light relative to the lighting origin.
         position: [f32; 3],
-        /// Nearer than this a point light does not grow brighter.
+        /// Distance below which a point light does not grow brighter.
         radius: f32,
-        /// A spot's share is (cone_scale · cos + cone_offset) cut to [0, 1], squared; of other
-        /// lights 1.
+        /// Scale of a spot's share, (cone_scale · cos + cone_offset) cut to [0, 1] and squared; the
+        /// share of other lights is 1.
         cone_scale: f32,
+        /// Offset of a spot's share.
         cone_offset: f32,
+        /// Padding.
         unused: [f32; 2],
     }
 }
 
 impl LightRecord {
-    /// `origin`: the lighting origin.
+    /// Returns the record of `light`; `origin` is the lighting origin.
     pub fn new(light: &Light, origin: DVec3) -> Self {
         let f32s = |v: DVec3| v.as_vec3().to_array();
         let record = LightRecord {
@@ -78,15 +83,21 @@ impl LightRecord {
 }
 
 record! {
-    /// The density grid (model.md §8), corner relative to the lighting origin.
+    /// The density grid (docs/model.md §8).
     pub struct GridRecord {
+        /// Low corner relative to the lighting origin.
         low: [f32; 3],
+        /// Edge of a cell along x and z.
         cell: f32,
+        /// Cells along each axis.
         n_cells: [u32; 3],
+        /// 1/`cell`.
         inv_cell: f32,
-        /// Of the cells: their edge along y over those along x and z, and its inverse.
+        /// Edge of a cell along y over that along x and z.
         aspect: f32,
+        /// 1/`aspect`.
         inv_aspect: f32,
+        /// Padding.
         unused: [f32; 2],
     }
 }
@@ -106,23 +117,30 @@ impl From<&GridSpec> for GridRecord {
 }
 
 record! {
-    /// The camera as the sprites need it. The pixel (i, j)'s ray is x right + y up + forward with
-    /// x = (2(i + ½)/W − 1) tan_x, y = (1 − 2(j + ½)/H) tan_y.
+    /// The camera. The ray of pixel (i, j) is x right + y up + forward, with
+    /// x = (2(i + ½)/W − 1) tan_x and y = (1 − 2(j + ½)/H) tan_y.
     pub struct CameraRecord {
         /// Eye minus lighting origin.
         eye: [f32; 3],
+        /// Tangent of half the horizontal field of view.
         tan_x: f32,
+        /// Unit vector to the right.
         right: [f32; 3],
+        /// Tangent of half the vertical field of view.
         tan_y: f32,
+        /// Unit vector upward in the picture.
         up: [f32; 3],
+        /// View depth of the near plane.
         near: f32,
+        /// Unit vector of view.
         forward: [f32; 3],
+        /// Padding.
         unused: f32,
     }
 }
 
 impl CameraRecord {
-    /// `light_origin` is subtracted from the eye in f64.
+    /// Returns the record of a camera at `pose`. `light_origin` is subtracted from the eye in f64.
     pub fn new(camera: &Camera, pose: &Pose, film: &Film, light_origin: DVec3) -> Self {
         let tan_y = (0.5 * camera.fov_y_rad).tan();
         CameraRecord {

@@ -1,5 +1,5 @@
-//! The f32 records that shaders read, from the f64 model. Declared once, here; a test reflects
-//! every shader and compares names, offsets and sizes.
+//! The f32 records that shaders read, made from the f64 model. A test reflects every shader and
+//! compares names, offsets and sizes with the declarations here.
 
 pub mod cull;
 pub mod disc;

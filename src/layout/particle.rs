@@ -1,4 +1,4 @@
-//! Particles as the GPU holds them, and the boxes they are generated from.
+//! Records of particles, of their groups, and of the boxes they are generated from.
 
 use glam::DVec3;
 
@@ -10,51 +10,63 @@ use crate::model::gust::Mode;
 use crate::model::texture::Texture;
 
 record! {
-    /// A Gaussian blob; position relative to its group's origin. Scene units, κ per unit.
+    /// A Gaussian blob; lengths in scene units.
     pub struct ParticleRecord {
+        /// Centre relative to its group's origin.
         position: [f32; 3],
+        /// σ along x and z.
         sigma: f32,
+        /// Factor on K_d, linear RGB.
         color: [f32; 3],
+        /// Extinction at the centre, per scene unit.
         kappa: f32,
         /// σ along y over that along x and z.
         aspect: f32,
+        /// Padding.
         unused: f32,
+        /// Padding.
         unused_too: [f32; 2],
     }
 }
 
 record! {
-    /// One box to generate from: P Table 1 with the constants of its laws.
+    /// A box to generate particles in: P Table 1, with the constants of its laws.
     pub struct BoxRecord {
-        /// X_L, Y_L, Z_L.
+        /// Edges X_L, Y_L, Z_L.
         extent: [f32; 3],
-        /// R_max.
+        /// Greatest radius R_max.
         radius_max: f32,
-        /// σ of a particle over P (11)'s radius: the form's factor, `radius_scale` and 1/3.
+        /// σ of a particle over its radius of P (11): the form's factor, `radius_scale` and 1/3.
         sigma_factor: f32,
+        /// κ of its particles.
         kappa: f32,
-        /// Philox key.
+        /// Philox key: the cloud's seed.
         seed: u32,
+        /// Philox key: the number of the box in its cloud.
         i_box: u32,
         /// Number of the box's first particle in the buffer.
         i_first: u32,
+        /// Number of particles.
         n_particles: u32,
         /// `FORM_CENTRED`, `FORM_PRINTED`, or `FORM_GIVEN` for a group that is no box.
         form: u32,
+        /// Padding.
         unused: u32,
     }
 }
 
-/// In place of a particle's number: an entry that draws nothing; the shaders' NO_PARTICLE.
+/// In place of a particle's number: an entry that draws nothing.
 pub const NO_PARTICLE: u32 = u32::MAX;
 
-/// Values of [`BoxRecord::form`]; the shaders' `FORM_*`.
+/// [`BoxRecord::form`] of offsets about the centre. The shaders' `FORM_*` have the same values.
 pub const FORM_CENTRED: u32 = 0;
+/// [`BoxRecord::form`] of P's formulas as printed.
 pub const FORM_PRINTED: u32 = 1;
+/// [`BoxRecord::form`] of a group whose particles are uploaded.
 pub const FORM_GIVEN: u32 = 2;
 
 impl ParticleRecord {
-    /// `particle` relative to `group`.
+    /// Returns `particle` relative to `group`.
     pub fn new(particle: &Particle, group: &Group) -> Self {
         ParticleRecord {
             position: (particle.position - group.center).as_vec3().to_array(),
@@ -68,17 +80,21 @@ impl ParticleRecord {
     }
 }
 
-/// What a cloud says of all its boxes.
+/// The law by which a cloud generates the particles of all its boxes.
 #[derive(Debug, Clone, Copy)]
 pub struct BoxLaw {
+    /// The form of P (1)–(7).
     pub form: Form,
+    /// Mean optical depth through a particle's centre.
     pub optical_depth: f64,
+    /// Factor on all radii.
     pub radius_scale: f64,
+    /// Philox key.
     pub seed: u32,
 }
 
 impl BoxRecord {
-    /// Box `i_box` of its cloud, whose particles start at `i_first`.
+    /// Returns the record of box `i_box` of its cloud, whose particles start at `i_first`.
     pub fn new(b: &CloudBox, law: &BoxLaw, i_box: u32, i_first: u32) -> Self {
         BoxRecord {
             extent: b.extent.as_vec3().to_array(),
@@ -99,28 +115,31 @@ impl BoxRecord {
         }
     }
 
-    /// Stands for a group whose particles are uploaded, not generated.
+    /// Returns the record of a group whose particles are uploaded, not generated.
     pub fn given() -> Self {
         BoxRecord { form: FORM_GIVEN, ..BoxRecord::default() }
     }
 }
 
 record! {
-    /// A particle where the frame has it: position relative to the lighting origin, and its σ.
+    /// A particle's place in this frame.
     pub struct PlacedRecord {
+        /// Centre relative to the lighting origin.
         position: [f32; 3],
+        /// σ along x and z, as the particle has grown.
         sigma: f32,
     }
 }
 
 record! {
-    /// What moves a group this frame.
+    /// A group's place and motion in this frame.
     pub struct GroupRecord {
         /// Cloud origin(t) + group centre, as it has grown, − lighting origin.
         offset: [f32; 3],
+        /// The cloud's region.
         i_region: u32,
-        /// What its facets look away from relative to the lighting origin: the cloud's centre, or
-        /// far below that.
+        /// The point that its facets face away from, relative to the lighting origin: the cloud's
+        /// centre, or a point far below it.
         cloud_center: [f32; 3],
         /// Mean σ of the group's particles, as they have grown.
         sigma_mean: f32,
@@ -128,17 +147,19 @@ record! {
         center: [f32; 3],
         /// Its cloud's first gust mode.
         i_mode: u32,
+        /// Number of gust modes.
         n_modes: u32,
-        /// s: lengths over those at time 0.
+        /// Growth s: lengths over those at time 0.
         scale: f32,
+        /// Padding.
         unused: [u32; 2],
     }
 }
 
 impl GroupRecord {
-    /// `group`: as it has grown; `origin_from_light`: the cloud's origin at the frame's time minus
-    /// the lighting origin, in f64. `i_region`: the cloud's; `modes`: first gust mode of the cloud,
-    /// and how many it has.
+    /// Returns the record of `group`, as it has grown. `origin_from_light` is the cloud's origin at
+    /// the frame's time minus the lighting origin. The last argument is the cloud's first gust mode
+    /// and their number.
     pub fn new(
         group: &Group,
         i_region: u32,
@@ -160,20 +181,21 @@ impl GroupRecord {
 }
 
 record! {
-    /// What is drawn of a group this frame.
+    /// The particles of a group that are drawn in this frame.
     pub struct DrawnRecord {
-        /// From the number of a drawn particle to that of its entry, modulo 2³².
+        /// Number of a drawn particle's entry minus the particle's number, modulo 2³².
         shift: u32,
-        /// The group's first particle that is not drawn.
+        /// End of the drawn particles: the first one that is not drawn.
         end: u32,
-        /// Factor on κ, and on the last drawn particle's beside it.
+        /// Factor on κ.
         kappa_scale: f32,
+        /// Further factor on the last drawn particle's κ.
         last_weight: f32,
     }
 }
 
 impl DrawnRecord {
-    /// `i_entry`: of the group's first drawn particle.
+    /// Returns the record of `group`; `i_entry` is the entry of its first drawn particle.
     pub fn new(group: &Group, drawn: &DrawnCount, i_entry: u32) -> Self {
         DrawnRecord {
             shift: i_entry.wrapping_sub(group.i_first),
@@ -185,21 +207,24 @@ impl DrawnRecord {
 }
 
 record! {
-    /// What a group's particles are drawn with (docs/model.md §11 "texture").
+    /// The texture of a group's particles (docs/model.md §11 "texture").
     pub struct TexturedRecord {
-        /// Philox key of each particle's turn.
+        /// Philox key of each particle's rotation and shift: the cloud's seed.
         seed: u32,
+        /// Philox key: the number of the box in its cloud.
         i_box: u32,
         /// The group's first particle.
         i_first: u32,
+        /// Field of the pool.
         i_field: u32,
-        /// s; 0: plain.
+        /// Strength s; 0 without a texture.
         strength: f32,
     }
 }
 
 impl TexturedRecord {
-    /// Box `i_box` of a cloud of `seed` and `texture`, whose particles start at `i_first`.
+    /// Returns the record of box `i_box` of a cloud of `seed` and `texture`, whose particles start
+    /// at `i_first`.
     pub fn new(texture: &Texture, seed: u32, i_box: u32, i_first: u32) -> Self {
         let (i_field, strength) = texture.of_box(i_box);
         TexturedRecord { seed, i_box, i_first, i_field, strength: strength as f32 }
@@ -209,14 +234,19 @@ impl TexturedRecord {
 record! {
     /// One wave of a cloud's gusts at the frame's time: a sin(k·x + phase).
     pub struct ModeRecord {
+        /// Wave vector k.
         k: [f32; 3],
+        /// Phase in radians.
         phase: f32,
+        /// Amplitude a.
         a: [f32; 3],
+        /// Padding.
         unused: u32,
     }
 }
 
 impl ModeRecord {
+    /// Returns the record of `mode` at `time_s`.
     pub fn new(mode: &Mode, time_s: f64) -> Self {
         ModeRecord {
             k: mode.k.as_vec3().to_array(),

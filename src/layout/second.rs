@@ -1,63 +1,71 @@
-//! What the second reflection is gathered from (docs/model.md §7).
+//! Records that the second reflection is gathered from (docs/model.md §7).
 
 use crate::layout::record;
 
 record! {
-    /// Light on its way from a facet, or from a cluster of facets of one region. By fours, since a
-    /// device that loads for each invocation by itself pays by the load.
+    /// A source of light: a facet, or a cluster of facets of one region. Fields have four words,
+    /// since a device that loads for each invocation by itself pays by the load.
     pub struct SourceRecord {
-        /// Position, a cluster's the mean of its facets' by their flux; and the radius from it that
-        /// no point is beyond.
+        /// Position (a cluster's mean by flux), and the radius that holds all its points.
         place: [f32; 4],
-        /// Σ A_i L1_i of the diffuse basis, linear RGB; and the nodes of its subtree, itself
-        /// included: 1 for a facet, -1 for one that the rim of a light's shadow runs through.
+        /// Diffuse flux Σ A_i L1_i, linear RGB; and the nodes of its subtree, itself included: 1 for
+        /// a facet, −1 for one that the edge of a light's shadow crosses.
         sent: [f32; 4],
         /// Mean normal by flux, shorter than 1 where a cluster's normals differ; and the mean area
-        /// of its facets, by area: what bounds the form factor as the distance goes to 0.
+        /// of its facets by area, which bounds the form factor as the distance goes to 0.
         face: [f32; 4],
-        /// Σ A_i; and second moments M about the position, by flux: xx, yy, zz.
+        /// Area Σ A_i; and second moments M about the position by flux: xx, yy, zz.
         extent: [f32; 4],
-        /// xy, xz, yz; 0.
+        /// Second moments xy, xz, yz; 0.
         leaning: [f32; 4],
     }
 }
 
 record! {
-    /// Of one light at the 4 × 4 points of a surface's facet: shares of the greatest, 16 bits each,
-    /// rows along v.
+    /// Light at the 4 × 4 points of a surface's facet: shares of the greatest, 16 bits each, rows
+    /// along v.
     pub struct PackedRecord {
+        /// The first two rows.
         ab: [u32; 4],
+        /// The last two rows.
         cd: [u32; 4],
     }
 }
 
 record! {
-    /// Receivers that are gathered for together: consecutive places in the order of facets, all of
-    /// one region.
+    /// Receivers of one workgroup: consecutive places in the order of facets, all of one region.
     pub struct BlockRecord {
+        /// First place.
         i_first: u32,
+        /// Number of places.
         n_facets: u32,
+        /// First pairing of the region.
         i_pairing: u32,
+        /// Number of pairings.
         n_pairings: u32,
     }
 }
 
 record! {
-    /// One region as seen from another.
+    /// One region as another one sees it.
     pub struct PairingRecord {
+        /// The emitting region.
         i_region: u32,
-        /// Surfaces that may stand between the two.
+        /// First of the surfaces that may stand between the two.
         i_occluder: u32,
+        /// Number of these surfaces.
         n_occluders: u32,
-        /// Its first source, and how many there are: its facets, or the nodes of its tree.
+        /// The region's first source.
         i_source: u32,
+        /// Number of its sources: its facets, or the nodes of its tree.
         n_sources: u32,
     }
 }
 
 record! {
-    /// What the walk needs of a source: the nodes of its subtree, itself included; 1 for a facet.
+    /// A node of a tree of sources.
     pub struct NodeRecord {
+        /// Nodes of its subtree, itself included; 1 for a facet.
         n_nodes: u32,
     }
 }

@@ -1,17 +1,20 @@
-//! How sums are formed, as shaders are told: macros of `include/sum.glsl`.
+//! The macros of `include/sum.glsl`, which choose how shaders form sums.
 
 use crate::model::sums::{Precision, Summation, Sums};
 
-/// PLAIN, KAHAN and PAIRWISE of `include/sum.glsl`.
+/// `SUMMATION` of plain sums.
 pub const PLAIN: u32 = 0;
+/// `SUMMATION` of compensated sums.
 pub const KAHAN: u32 = 1;
+/// `SUMMATION` of pairwise sums.
 pub const PAIRWISE: u32 = 2;
 
-/// Of a kernel whose sums can be formed otherwise; plain sums of floats by default.
+/// The macros of a kernel with long sums; plain sums of floats by default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SumMacros([(&'static str, u32); 2]);
 
 impl SumMacros {
+    /// Returns names and values.
     pub fn list(&self) -> &[(&'static str, u32)] {
         &self.0
     }

@@ -1,48 +1,54 @@
-//! What the kernels of `tiles` hand on (docs/model.md §11 "tiles").
+//! Records that the kernels of `tiles` pass on (docs/model.md §11 "tiles").
 
 use crate::layout::record;
 
 record! {
-    /// A blob on the screen: its optical depth at the ray (x, y, 1) is tau 2^-e, e = scale (δx² +
-    /// δy² + (cx δy − cy δx)²)/ (1 + x² + y²), δ = (x, y) − (cx, cy) (docs/model.md §11 "tiles").
+    /// A blob on the screen. Its optical depth along the ray (x, y, 1) is tau 2^−e, with
+    /// e = scale (δx² + δy² + (cx δy − cy δx)²)/(1 + x² + y²) and δ = (x, y) − (cx, cy).
     pub struct SplatRecord {
-        /// Slopes.
+        /// Slopes (cx, cy) of the centre.
         center: [f32; 2],
-        /// z²/(2 σ² ln 2).
+        /// Scale z²/(2 σ² ln 2).
         scale: f32,
-        /// Through the centre.
+        /// Optical depth through the centre.
         tau: f32,
+        /// Linear RGB.
         radiance: [f32; 3],
-        /// near/z.
+        /// Depth near/z.
         depth: f32,
     }
 }
 
 record! {
-    /// What of a splat is textured (docs/model.md §11 "texture"); the shaders' Sheet.
+    /// The texture of a splat (docs/model.md §11 "texture").
     pub struct SplatTextureRecord {
+        /// Rotation and shift from slopes to texels.
         turn: [f32; 4],
+        /// Factors on the noise of two levels, and the subtrahend for mean one.
         gain: [f32; 3],
-        /// Its level's first texel in the pool, and log2 of the level's side.
+        /// First texel of its level in the pool.
         i_texel: u32,
+        /// Log2 of the level's side.
         log2_side: u32,
+        /// Padding.
         unused: u32,
+        /// Padding.
         unused_too: [u32; 2],
     }
 }
 
 record! {
-    /// As many blocks of splats, near to far, as there is room for the pairs of at once.
+    /// A round: blocks of splats, near to far, whose pairs fit the buffer together.
     pub struct RoundRecord {
-        /// Workgroups that sort: [n, 1, 1]; pairs.
+        /// Workgroups that sort: [n, 1, 1]; number of pairs.
         extent: [u32; 4],
-        /// How many blocks: [n, 1, 1]; the first.
+        /// Blocks: [n, 1, 1]; the first block.
         blocks: [u32; 4],
-        /// Workgroups that look for the bins' pairs: [n, 1, 1]; 1 where a later round has splats.
+        /// Workgroups that find the bins' ranges: [n, 1, 1]; 1 where a later round has splats.
         bins: [u32; 4],
-        /// Workgroups that compose where there are several rounds: [x, y, 1]; how many have tiles.
+        /// Workgroups that compose one of several rounds: [x, y, 1]; number of ranges.
         tiles: [u32; 4],
-        /// The same where this is the only round.
+        /// The same for an only round.
         alone: [u32; 4],
     }
 }

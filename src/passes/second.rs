@@ -63,9 +63,9 @@ pub struct Turns {
 impl Turns {
     fn macros(&self, device: &Device) -> [(&'static str, u32); 5] {
         [
-            ("QUARTER_TURNS", self.quarter),
-            ("BATCH_TURNS", self.batch),
-            ("MAX_ASIDE", self.aside),
+            ("SPLIT_ITERATIONS", self.quarter),
+            ("BATCH_ITERATIONS", self.batch),
+            ("MAX_DEFERRED", self.aside),
             ("N_KEPT", self.kept),
             ("TOGETHER", u32::from(device.limits().has_subgroup_arithmetic)),
         ]

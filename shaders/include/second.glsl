@@ -1,0 +1,31 @@
+// The buffers and functions that second_gather.comp and second_tensor.comp share (docs/model.md §7,
+// §11 "second"). The includer declares the push constants first.
+
+READS(0, Block, blocks)
+READS(1, Pairing, pairings)
+READS(2, uint, occluders)
+READS(3, uint, order)
+READS(4, Facet, facets)
+layout(binding = 5) uniform usamplerBuffer regions;
+READS(6, Light, lights)
+layout(binding = 7) uniform usamplerBuffer sources;
+layout(binding = 8) uniform usamplerBuffer fluxes;
+layout(binding = 9) uniform samplerBuffer table;
+layout(binding = 10) uniform samplerBuffer density;
+// By facet: the first source that was not looked at yet, or DONE.
+UPDATES(13, uint, reached)
+// As second_sources.comp writes them.
+layout(binding = 14) uniform usamplerBuffer cell_samples;
+// Workgroups of each round, three numbers a round: a receiver that is not done counts for the next.
+UPDATES(15, uint, rounds)
+
+#include "regions.glsl"
+#include "lobe.glsl"
+#if MARCH
+#include "density.glsl"
+#endif
+#include "occluders.glsl"
+#include "reach.glsl"
+#include "arriving.glsl"
+#include "gather.glsl"
+#include "cells.glsl"

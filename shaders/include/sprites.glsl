@@ -1,0 +1,9 @@
+// The push constants of the sprites' two shaders. Needs records.glsl.
+layout(push_constant) uniform Push {
+    Camera camera;
+    vec2 pixel;
+    float cutoff;
+    uint i_first_facet;
+    float inv_threshold;
+    uint i_first;
+} push;

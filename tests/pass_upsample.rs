@@ -8,8 +8,8 @@ mod harness;
 use bounded::{Random, U, greatest_ratio};
 use harness::{Gpu, assert_within_and_say};
 use nimbus::gpu::{Buffer, Compiler};
-use nimbus::model::resolution::{ALIKE, LowResLayout};
 use nimbus::gpu::{TargetFormat, has_depth24};
+use nimbus::model::resolution::{ALIKE, LowResLayout};
 use nimbus::passes::upsample::{Extents, Upsample};
 use nimbus::reference::upsample::{OpaqueLayer, Summed, render_alike};
 

@@ -1,4 +1,4 @@
-//! Shader and host agree by machine: every shader compiled unoptimised, reflected, and compared
+//! Tests that shaders and host agree: every shader is compiled unoptimised, reflected, and compared
 //! with the host's records, push constants and shared constants.
 
 mod harness;
@@ -7,10 +7,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use harness::Gpu;
-use nimbus::gpu::Field;
-use nimbus::gpu::Optimize;
-use nimbus::gpu::{BindingKind, Member, Reflection, Struct, reflect};
-use nimbus::gpu::{Buffer, Compiler, MemoryUsage};
+use nimbus::gpu::{BindingKind, Field, Member, Reflection, Struct, reflect};
+use nimbus::gpu::{Buffer, Compiler, MemoryUsage, Optimize, Sources};
 use nimbus::layout::cull::KeptRecord;
 use nimbus::layout::disc::DiscRecord;
 use nimbus::layout::facet::{
@@ -65,171 +63,72 @@ const RECORDS: [Record; 25] = [
 ];
 
 /// Every shader, the push constants that its pass writes, and the element of each of its buffers: a
-/// record's name, or the bytes of a plain element.
-const INTERFACES: [(&str, &[Field], &[Element]); 49] = [
-    (
-        "contract.comp",
-        contract::Push::FIELDS,
-        &[R("Facet"), R("Light"), T, T, F, F, B(8), R("Lit")],
-    ),
-    (
-        "cull_test.comp",
-        cull::TestPush::FIELDS,
-        &[R("Placed"), R("Particle"), B(4), R("Drawn"), B(8), B(4)],
-    ),
-    ("cull_scan.comp", cull::ScanPush::FIELDS, &[B(4), R("Kept")]),
-    ("cull_write.comp", cull::WritePush::FIELDS, &[R("Placed"), B(8), B(4), B(8)]),
-    (
-        "facets.comp",
-        facets::Push::FIELDS,
-        &[R("Placed"), R("Particle"), B(4), R("Group"), F, R("Facet")],
-    ),
-    ("first.comp", first::Push::FIELDS, &[R("Facet"), R("Light"), B(4), T, F, R("Lit")]),
-    (
-        "first_tensor.comp",
-        first::TensorPush::FIELDS,
-        &[R("Facet"), R("Light"), B(4), T, F, B(4), R("Lit")],
-    ),
-    (
-        "facets_groups.comp",
-        facets::GroupsPush::FIELDS,
-        &[R("Placed"), R("Particle"), B(4), R("Group"), F, B(4), R("Run"), R("Facet"), B(4)],
-    ),
-    ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, &[T, B(4), R("Facet")]),
-    ("facets_terrain.comp", facets::TerrainPush::FIELDS, &[T, R("Facet"), R("Facet")]),
-    (
-        "second_sources.comp",
-        second::SourcesPush::FIELDS,
-        &[R("Facet"), R("Light"), B(4), B(4), T, B(4), B(4), R("Source"), B(16), R("Packed")],
-    ),
-    ("second_merge.comp", second::MergePush::FIELDS, &[B(4), R("Node"), R("Source"), B(16)]),
+/// record's name, the bytes of a plain element, `T` for texels of four words, `F` for texels of one
+/// float, `-` for a buffer that only the pipeline's other shader reads.
+#[rustfmt::skip]
+const INTERFACES: [(&str, &[Field], &str); 49] = [
+    ("chunks.frag", chunks::Push::FIELDS, "T"),
+    ("chunks.vert", &[], ""),
+    ("chunks_order.comp", chunks::OrderPush::FIELDS, "8 Kept 8 16"),
+    ("contract.comp", contract::Push::FIELDS, "Facet Light T T F F 8 Lit"),
+    ("cull_scan.comp", cull::ScanPush::FIELDS, "4 Kept"),
+    ("cull_test.comp", cull::TestPush::FIELDS, "Placed Particle 4 Drawn 8 4"),
+    ("cull_write.comp", cull::WritePush::FIELDS, "Placed 8 4 8"),
+    ("facets.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet"),
+    ("facets_groups.comp", facets::GroupsPush::FIELDS, "Placed Particle 4 Group F 4 Run Facet 4"),
+    ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, "T 4 Facet"),
+    ("facets_terrain.comp", facets::TerrainPush::FIELDS, "T Facet Facet"),
+    ("first.comp", first::Push::FIELDS, "Facet Light 4 T F Lit"),
+    ("first_tensor.comp", first::TensorPush::FIELDS, "Facet Light 4 T F 4 Lit"),
+    ("generate.comp", generate::Push::FIELDS, "Box 4 Particle 4"),
+    ("grid_deposit.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
+    ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
+    ("impostors.frag", impostors::Push::FIELDS, "T"),
+    ("impostors.vert", impostors::Push::FIELDS, ""),
+    ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8"),
+    ("live.comp", live::Push::FIELDS, "Disc Particle"),
+    ("morton_key.comp", morton::KeyPush::FIELDS, "Facet RegionBounds 8"),
+    ("morton_order.comp", morton::OrderPush::FIELDS, "8 4"),
+    ("place.comp", place::Push::FIELDS, "Particle 4 Group Mode Placed"),
+    ("present.frag", present::Push::FIELDS, "T T"),
+    ("present.vert", &[], ""),
     (
         "second_gather.comp",
         second::GatherPush::FIELDS,
-        &[
-            R("Block"),
-            R("Pairing"),
-            B(4),
-            B(4),
-            R("Facet"),
-            T,
-            R("Light"),
-            T,
-            T,
-            F,
-            F,
-            R("Node"),
-            R("Lit"),
-            B(4),
-            T,
-            B(4),
-        ],
+        "Block Pairing 4 4 Facet T Light T T F F Node Lit 4 T 4",
     ),
-    ("generate.comp", generate::Push::FIELDS, &[R("Box"), B(4), R("Particle"), B(4)]),
-    ("grid_deposit.comp", grid::DepositPush::FIELDS, &[R("Placed"), R("Particle"), B(4)]),
-    ("grid_resolve.comp", grid::ResolvePush::FIELDS, &[B(8), B(4)]),
-    ("chunks.frag", chunks::Push::FIELDS, &[T]),
-    ("chunks.vert", &[], &[]),
-    ("chunks_order.comp", chunks::OrderPush::FIELDS, &[B(8), R("Kept"), B(8), B(16)]),
-    ("impostors.frag", impostors::Push::FIELDS, &[T]),
-    ("impostors.vert", impostors::Push::FIELDS, &[]),
-    ("impostors_part.comp", impostors::PartPush::FIELDS, &[B(8), B(4), B(8), B(8)]),
-    ("live.comp", live::Push::FIELDS, &[R("Disc"), R("Particle")]),
-    ("morton_key.comp", morton::KeyPush::FIELDS, &[R("Facet"), R("RegionBounds"), B(8)]),
-    ("morton_order.comp", morton::OrderPush::FIELDS, &[B(8), B(4)]),
-    ("place.comp", place::Push::FIELDS, &[R("Particle"), B(4), R("Group"), R("Mode"), R("Placed")]),
+    ("second_merge.comp", second::MergePush::FIELDS, "4 Node Source 16"),
+    ("second_sources.comp", second::SourcesPush::FIELDS, "Facet Light 4 4 T 4 4 Source 16 Packed"),
     (
         "second_tensor.comp",
         second::TensorPush::FIELDS,
-        &[
-            R("Block"),
-            R("Pairing"),
-            B(4),
-            B(4),
-            R("Facet"),
-            T,
-            R("Light"),
-            T,
-            T,
-            F,
-            F,
-            R("Lit"),
-            B(4),
-            B(4),
-            T,
-            B(4),
-        ],
+        "Block Pairing 4 4 Facet T Light T T F F Lit 4 4 T 4",
     ),
-    ("sort_count.comp", sort::DigitPush::FIELDS, &[B(4), B(8), B(4)]),
-    ("sort_key.comp", sort::KeyPush::FIELDS, &[R("Placed"), B(4), R("Drawn"), B(8)]),
-    ("sort_scan.comp", sort::DigitPush::FIELDS, &[B(4), B(4)]),
-    ("sort_scatter.comp", sort::DigitPush::FIELDS, &[B(4), B(8), B(4), B(8)]),
-    (
-        "sprites.frag",
-        sprites::Push::FIELDS,
-        &[
-            Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere, Elsewhere,
-            T,
-        ],
-    ),
-    (
-        "sprites.vert",
-        sprites::Push::FIELDS,
-        &[B(8), R("Placed"), R("Particle"), R("Lit"), B(4), B(4), R("Drawn"), R("Textured")],
-    ),
-    ("present.frag", present::Push::FIELDS, &[T, T]),
-    ("present.vert", &[], &[]),
-    ("surfaces.frag", surfaces::Push::FIELDS, &[R("Region"), R("Lit")]),
-    ("surfaces.vert", surfaces::Push::FIELDS, &[R("Region")]),
-    ("terrain.frag", terrain::Push::FIELDS, &[]),
-    ("terrain.vert", terrain::Push::FIELDS, &[R("Region"), R("Facet"), R("Lit")]),
-    ("texture_pack.comp", texture::PackPush::FIELDS, &[F, B(16)]),
-    ("texture_transform.comp", texture::TransformPush::FIELDS, &[B(8)]),
-    ("tiles.comp", tiles::Push::FIELDS, &[T, B(8), R("Round"), B(16), B(16), B(4)]),
-    ("tiles_clear.comp", tiles::ClearPush::FIELDS, &[R("Round"), B(16)]),
-    (
-        "tiles_pairs.comp",
-        tiles::PairsPush::FIELDS,
-        &[B(8), B(4), B(4), R("Round"), B(8), R("Splat"), R("Kept")],
-    ),
-    ("tiles_ranges.comp", tiles::RangesPush::FIELDS, &[B(8), R("Round"), B(16)]),
-    ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, &[B(4), R("Round"), R("Kept")]),
+    ("sort_count.comp", sort::DigitPush::FIELDS, "4 8 4"),
+    ("sort_key.comp", sort::KeyPush::FIELDS, "Placed 4 Drawn 8"),
+    ("sort_scan.comp", sort::DigitPush::FIELDS, "4 4"),
+    ("sort_scatter.comp", sort::DigitPush::FIELDS, "4 8 4 8"),
+    ("sprites.frag", sprites::Push::FIELDS, "- - - - - - - - T"),
+    ("sprites.vert", sprites::Push::FIELDS, "8 Placed Particle Lit 4 4 Drawn Textured"),
+    ("surfaces.frag", surfaces::Push::FIELDS, "Region Lit"),
+    ("surfaces.vert", surfaces::Push::FIELDS, "Region"),
+    ("terrain.frag", terrain::Push::FIELDS, ""),
+    ("terrain.vert", terrain::Push::FIELDS, "Region Facet Lit"),
+    ("texture_pack.comp", texture::PackPush::FIELDS, "F 16"),
+    ("texture_transform.comp", texture::TransformPush::FIELDS, "8"),
+    ("tiles.comp", tiles::Push::FIELDS, "T 8 Round 16 16 4"),
+    ("tiles_clear.comp", tiles::ClearPush::FIELDS, "Round 16"),
+    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, "8 4 4 Round 8 Splat Kept"),
+    ("tiles_ranges.comp", tiles::RangesPush::FIELDS, "8 Round 16"),
+    ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, "4 Round Kept"),
     (
         "tiles_splat.comp",
         tiles::SplatPush::FIELDS,
-        &[
-            B(8),
-            T,
-            T,
-            T,
-            B(4),
-            B(4),
-            R("Drawn"),
-            R("Textured"),
-            B(16),
-            B(8),
-            B(4),
-            B(4),
-            R("SplatTexture"),
-            R("Kept"),
-            B(16),
-        ],
+        "8 T T T 4 4 Drawn Textured 16 8 4 4 SplatTexture Kept 16",
     ),
-    ("transmit.comp", transmit::Push::FIELDS, &[R("Facet"), R("Light"), T, F, B(4), B(4)]),
-    ("upsample.comp", upsample::Push::FIELDS, &[T, B(4)]),
+    ("transmit.comp", transmit::Push::FIELDS, "Facet Light T F 4 4"),
+    ("upsample.comp", upsample::Push::FIELDS, "T 4"),
 ];
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Element {
-    Record(&'static str),
-    Bytes(u32),
-    /// Read by four words, whatever it holds.
-    Texels,
-    Floats,
-    /// Read by the pipeline's other shader alone.
-    Elsewhere,
-}
-use Element::{Bytes as B, Elsewhere, Floats as F, Record as R, Texels as T};
 
 fn compare_fields(what: &str, members: &[Member], fields: &[Field], complaints: &mut Vec<String>) {
     let declared = members.iter().map(|m| (m.name.as_str(), m.offset as usize, m.bytes as usize));
@@ -266,34 +165,27 @@ fn compare_record(
     compare_fields(&format!("{file}: {name}"), &found.members, fields, complaints);
 }
 
-fn compare(file: &str, found: &Reflection, push: &[Field], elements: &[Element]) -> Vec<String> {
+fn compare(file: &str, found: &Reflection, push: &[Field], elements: &str) -> Vec<String> {
     let mut complaints = vec![];
     let members = found.push.as_ref().map_or(&[][..], |p| &p.members);
     compare_fields(&format!("{file}: push constants"), members, push, &mut complaints);
     let bindings: Vec<u32> = found.bindings.iter().map(|b| b.binding).collect();
-    let here = (0u32..).zip(elements).filter(|(_, e)| **e != Elsewhere);
+    let here = (0u32..).zip(elements.split_whitespace()).filter(|(_, e)| *e != "-");
     if bindings != here.clone().map(|(i, _)| i).collect::<Vec<_>>() {
-        complaints
-            .push(format!("{file}: bindings {bindings:?}, the host gives {}", elements.len()));
+        complaints.push(format!("{file}: bindings {bindings:?}, the host gives {elements}"));
         return complaints;
     }
     for (binding, (_, element)) in found.bindings.iter().zip(here) {
-        match (&binding.element, element) {
-            (Some(s), R(expected)) => {
-                compare_record(file, s, binding.stride, expected, &mut complaints)
-            }
-            (None, B(bytes))
-                if binding.stride == *bytes && binding.kind == BindingKind::Storage => {}
-            (None, T) if binding.kind == BindingKind::Texels => {}
-            (None, F) if binding.kind == BindingKind::Floats => {}
-            (found, _) => {
-                let found =
-                    found.as_ref().map_or(format!("{} bytes", binding.stride), |s| s.name.clone());
-                complaints.push(format!(
-                    "{file}: {} holds {found}, the host gives {element:?}",
-                    binding.name
-                ));
-            }
+        let plain = match binding.kind {
+            BindingKind::Storage => binding.stride.to_string(),
+            BindingKind::Texels => "T".to_owned(),
+            BindingKind::Floats => "F".to_owned(),
+        };
+        match &binding.element {
+            Some(s) => compare_record(file, s, binding.stride, element, &mut complaints),
+            None if plain == element => {}
+            None => complaints
+                .push(format!("{file}: {} holds {plain}, the host gives {element}", binding.name)),
         }
     }
     complaints
@@ -312,7 +204,7 @@ fn shaders_folder() -> PathBuf {
 }
 
 #[test]
-fn every_shader_declares_what_the_host_writes() {
+fn every_shader_declares_the_hosts_records() {
     let compiler = embedded();
     let complaints: Vec<String> = INTERFACES
         .iter()
@@ -321,8 +213,8 @@ fn every_shader_declares_what_the_host_writes() {
         })
         .collect();
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
-    // The grid and the camera lie in push constants; their inner layout is read from the text's own
-    // struct by use in a buffer, since reflection gives a nested member's size only.
+    // The grid and the camera lie in push constants, and reflection gives only the size of a nested
+    // member. A buffer of each shows the layout of its members.
     let text = r#"#version 460
 #extension GL_GOOGLE_include_directive : require
 #include "records.glsl"
@@ -332,18 +224,14 @@ layout(std430, binding = 1) buffer Cameras { Camera cameras[]; };
 void main() { grids[0].cell = cameras[0].near; }
 "#;
     let texts = [&[("nested.comp", text)], SHADERS].concat();
-    let compiler = Compiler::new(nimbus::gpu::Sources::embedded(&texts), None).unwrap();
-    let complaints = compare(
-        "nested.comp",
-        &unoptimised(&compiler, "nested.comp"),
-        &[],
-        &[R("Grid"), R("Camera")],
-    );
+    let compiler = Compiler::new(Sources::embedded(&texts), None).unwrap();
+    let complaints =
+        compare("nested.comp", &unoptimised(&compiler, "nested.comp"), &[], "Grid Camera");
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
 #[test]
-fn every_shader_and_every_record_is_covered() {
+fn every_shader_and_record_is_compared() {
     let listed: BTreeSet<&str> = SHADERS.iter().map(|(name, _)| *name).collect();
     let compared: BTreeSet<&str> = INTERFACES.iter().map(|(file, _, _)| *file).collect();
     let compiled: BTreeSet<&str> =
@@ -366,11 +254,10 @@ fn every_shader_and_every_record_is_covered() {
     assert_eq!(known, structs);
 }
 
-/// Records that shaders read by texels have no layout to reflect: read by the shaders' own function
-/// and written as records, every word is where it was. A source and a packed stencil are four-word
-/// fields in the host's order.
+/// A region that shaders read by texels has no layout to reflect. The test reads regions by the
+/// shaders' own function, writes them as records, and compares every word.
 #[test]
-fn a_region_read_by_texels_is_the_record() {
+fn a_region_read_by_texels_equals_its_record() {
     let mut gpu = Gpu::new();
     let text = r#"#version 460
 #extension GL_GOOGLE_include_directive : require
@@ -383,7 +270,7 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
 "#;
     let kernel = gpu.test_kernel("texels", text, &[]);
     const N_WORDS: usize = size_of::<RegionRecord>() / 4;
-    // Small normal floats, so that whatever is taken for a float keeps its bits.
+    // Normal floats keep their bits where the shader takes them for floats.
     let words: Vec<u32> = (0..3 * N_WORDS as u32).map(|i| (1.0 + i as f32).to_bits()).collect();
     let mut from =
         Buffer::new::<u32>(&gpu.device, "test.from", words.len() as u64, MemoryUsage::Upload)
@@ -393,7 +280,7 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
         .unwrap();
     gpu.run(|rec| rec.dispatch_groups(&kernel, &[&from, &to], &(), 3));
     assert_eq!(to.read::<u32>(words.len()).unwrap(), words);
-    // tiles_splat.comp takes the second of a Particle's three texels and the last half of a Lit,
+    // tiles_splat.comp reads the second of a Particle's three texels and the last half of a Lit,
     // and writes a Splat by fours.
     let texels = [
         size_of::<PlacedRecord>(),
@@ -423,7 +310,7 @@ fn records_glsl() -> &'static str {
     text_of("include/records.glsl")
 }
 
-/// The number of `const uint NAME = …;` (decimal, or 0x…u) or `const float NAME = …;`.
+/// Returns the number of `const uint NAME = …;` (decimal, or 0x…u) or `const float NAME = …;`.
 fn constant(text: &str, name: &str) -> Option<f64> {
     let line = text.lines().find_map(|l| {
         let rest = l.trim().strip_prefix("const ")?;
@@ -484,9 +371,9 @@ fn shared_constants_have_one_value() {
     assert_eq!(transmit::MAX_STEPS, nimbus::reference::transmit::MAX_STEPS);
     assert_eq!(transmit::MAX_STEPS, nimbus::model::grid::MAX_MARCH_STEPS);
     assert!(text_of("include/sort.glsl").contains("#define DIGIT_BITS 8\n"));
-    // FOLDED is a number in an expression.
+    // FOLDED is a number in an expression of the shader.
     assert!(text_of("generate.comp").contains(&format!("{:#x}u", generate::FOLDED)));
-    // The checker sees what is not there, and what differs.
+    // The parser tells names apart, and reads decimal and hexadecimal numbers.
     assert_eq!(constant("const uint TILE = 7;", "TIL"), None);
     assert_eq!(constant("const uint TILE = 7;", "TILE"), Some(7.0));
     assert_eq!(constant("const uint MANY = 0xFFu;", "MANY"), Some(255.0));

@@ -1,6 +1,7 @@
-//! The shaders' own functions against f64: Philox's words bit for bit, sine, erf and 1 − e^−t
-//! within what Vulkan's precision rules allow (+, −, × correctly rounded or contracted, division
-//! 2.5 ulp, exp 3 + 2|x| ulp).
+//! Tests of the shaders' own functions: Philox's words bit for bit, the others against f64.
+//!
+//! The bounds follow from Vulkan's precision rules: +, −, × correctly rounded or contracted,
+//! division 2.5 ulp, exp 3 + 2|x| ulp.
 
 mod harness;
 
@@ -24,7 +25,13 @@ layout(std430, binding = 0) readonly buffer X { float x[]; };
 layout(std430, binding = 1) writeonly buffer Y { float y[]; };
 void main() {
     FOR_EACH(i, push.n) {
-        y[i] = push.which == 0 ? sine(x[i]) : push.which == 1 ? erf_approx(x[i]) : push.which == 2 ? one_minus_exp(x[i]) : push.which == 5 ? power_of_two(x[i]) : unit_at(x[i])[push.which - 3];
+        switch (push.which) {
+        case 0: y[i] = sine(x[i]); break;
+        case 1: y[i] = erf_approx(x[i]); break;
+        case 2: y[i] = one_minus_exp(x[i]); break;
+        case 5: y[i] = power_of_two(x[i]); break;
+        default: y[i] = unit_at(x[i])[push.which - 3];
+        }
     }
 }
 "#;
@@ -71,7 +78,7 @@ fn evaluate(gpu: &mut Gpu, kernel: &Kernel, which: u32, x: &[f32]) -> Vec<f64> {
     gpu.download::<f32>(&output, x.len()).into_iter().map(f64::from).collect()
 }
 
-/// The kernel with a text of functions.glsl replaced.
+/// Returns the kernel with a text of functions.glsl replaced.
 fn wrong_functions(gpu: &Gpu, from: &str, to: &str) -> Kernel {
     let mut sources = Sources::embedded(&[&[("functions.comp", FUNCTIONS)], SHADERS].concat());
     assert!(sources.replace("include/functions.glsl", from, to));
@@ -79,7 +86,7 @@ fn wrong_functions(gpu: &Gpu, from: &str, to: &str) -> Kernel {
     Kernel::new(&gpu.device, &compiler, "functions", Push::FIELDS, &[]).unwrap()
 }
 
-/// `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to
+/// Returns `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to
 /// `high`, then as many spread evenly over ±`high`.
 fn sweep(low: f64, high: f64, n: usize) -> Vec<f32> {
     let share = |i: usize| (i as f64 + 0.5) / n as f64;
@@ -106,7 +113,7 @@ fn philox_gives_the_published_words() {
         KNOWN.map(|(_, _, words)| words.map(|w| nimbus::model::philox::uniform(w) as f32));
     assert_eq!(u, expected);
 
-    // One digit of a multiplier, one round too few: both must show.
+    // A wrong digit of a multiplier and a missing round must both show.
     for (from, to) in [("0xCD9E8D57u", "0xCD9E8D55u"), ("i < 10", "i < 9")] {
         let mut sources = Sources::embedded(&[&[("kat.comp", KAT)], SHADERS].concat());
         assert!(sources.replace("include/philox.glsl", from, to));
@@ -116,7 +123,7 @@ fn philox_gives_the_published_words() {
     }
 }
 
-/// What reduction and polynomial may err at `x`: the argument moved by e, and SINE_ERROR.
+/// Returns the bound on sine's error at `x`: the argument moved by e, and SINE_ERROR.
 fn sine_bound(x: f64) -> f64 {
     let e = REDUCTION_ERROR * U_F32 * x.abs();
     SINE_ERROR + x.cos().abs() * e + 0.5 * e * e
@@ -129,8 +136,7 @@ fn sine_is_within_its_documented_error() {
     // The reduction holds for |k| < 2^14.
     let mut x = sweep(1e-20, 16_383.0 * std::f64::consts::PI, 400_000);
     x.extend(sweep(1e-3, 12.0, 400_000));
-    // Zeros, extremes, and the arguments at which the reduction changes from one multiple of π to
-    // the next.
+    // Zeros, extremes, and arguments at which the reduction changes to the next multiple of π.
     for k in -20_000..20_000 {
         let at = (f64::from(k) * 0.5 * std::f64::consts::PI) as f32;
         x.extend([at.next_down(), at, at.next_up()]);
@@ -143,7 +149,7 @@ fn sine_is_within_its_documented_error() {
     let worst = small.iter().map(|i| (values[*i] - truths[*i]).abs()).fold(0.0, f64::max);
     println!("sine: greatest error without reduction {worst:e}, allowed {SINE_ERROR:e}");
 
-    // Beyond the reduction's range it is still a sine: at most 1, with the polynomial's rounding.
+    // Beyond the reduction's range the result is at most 1, with the polynomial's rounding.
     let huge = evaluate(&mut gpu, &kernel, SINE, &[1e6, -3e8, 6.75e9, -6.8e9, 1e20, -1e37, 3.4e38]);
     assert!(huge.iter().all(|v| v.abs() <= 1.0 + SINE_ERROR), "{huge:?}");
 
@@ -208,15 +214,15 @@ fn powers_of_two_are_within_their_documented_error() {
     let mut gpu = Gpu::new();
     let kernel = gpu.test_kernel("functions", FUNCTIONS, Push::FIELDS);
     let mut x = sweep(1e-20, 125.0, 400_000);
-    // Integers, and where the reduction goes from one to the next.
+    // Integers, and arguments at which the reduction changes to the next one.
     x.extend((-249..250).flat_map(|k| {
         let at = 0.5 * k as f32;
         [at.next_down(), at, at.next_up()]
     }));
     let values = evaluate(&mut gpu, &kernel, POWER_OF_TWO, &x);
     let truths: Vec<f64> = x.iter().map(|x| f64::from(*x).exp2()).collect();
-    // The polynomial's 7.5e-8; and rounding, e_k <= u |p_k| + u |c_k| + |f| (u |p_k+1| + e_k+1)
-    // down to k = 0 at |f| = 1/2, where it is the greatest: 3.7 u.
+    // The polynomial errs by 7.5e-8. Rounding adds e_k <= u |p_k| + u |c_k| + |f| (u |p_k+1| +
+    // e_k+1) down to k = 0. It is greatest at |f| = 1/2: 3.7 u.
     let bounds: Vec<f64> = truths.iter().map(|t| (7.5e-8 + 3.7 * U_F32) * t).collect();
     assert_within_and_say("a power of two", &values, &truths, &bounds);
     let wrong = wrong_functions(&gpu, "0.0555071327386", "0.0555171327386");
@@ -225,16 +231,16 @@ fn powers_of_two_are_within_their_documented_error() {
 }
 
 /// The relative error that functions.glsl promises. From t = 1/2 on exp's 3 + 2t ulp (2 u each, of
-/// e^−t) are at most 4.9 u of the 0.39 that is left, 12.4 u relative, and the subtraction adds one;
-/// below, the series' outer two rounding steps dominate, some 4 u, and its end leaves 1e-8. 13.4 u
-/// = 8.0e-7.
+/// e^−t) are at most 4.9 u of the 0.39 that is left, 12.4 u relative. The subtraction adds one:
+/// 13.4 u = 8.0e-7. Below, the series' outer two rounding steps dominate, some 4 u, and its end
+/// leaves 1e-8.
 const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
 
 #[test]
 fn one_minus_exp_keeps_its_relative_accuracy() {
     let mut gpu = Gpu::new();
     let kernel = gpu.test_kernel("functions", FUNCTIONS, Push::FIELDS);
-    // From the least normal number on; beyond 80 e^−t is below 2^−115 and the result is 1.
+    // Normal numbers up to 80; beyond, e^−t is below 2^−115 and the result is 1.
     let mut x: Vec<f32> = sweep(1.2e-38, 80.0, 500_000).into_iter().map(f32::abs).collect();
     x.extend([0.0, 0.5f32.next_down(), 0.5, 0.5f32.next_up(), 80.0]);
     let values = evaluate(&mut gpu, &kernel, ONE_MINUS_EXP, &x);
@@ -243,7 +249,7 @@ fn one_minus_exp_keeps_its_relative_accuracy() {
     assert_within_and_say("1 - e^-t", &values, &truths, &bounds);
     assert_eq!(values[x.len() - 5], 0.0);
 
-    // Without the series: what cancels near 0 must show.
+    // Without the series the cancellation near 0 must show.
     let wrong = wrong_functions(&gpu, "if (t < 0.5)", "if (t < 0.0)");
     let values = evaluate(&mut gpu, &wrong, ONE_MINUS_EXP, &x);
     assert!(check_within("a wrong 1 - e^-t", &values, &truths, &bounds).is_err());

@@ -283,7 +283,7 @@ fn the_spirv_cache_is_read_checked_and_repaired() {
     let bytes: &[u8] = bytemuck::cast_slice(&other);
     std::fs::write(&files[0], [Sha256::digest(bytes).as_slice(), bytes].concat()).unwrap();
     assert_eq!(compile(&compiler(passes::sources())), other);
-    // Damaged files (a flipped bit, cuts, nothing at all) are compiled anew and written again.
+    // Damaged files (a flipped bit, cuts, nothing at all) are compiled and written again.
     let mut flipped = good.clone();
     flipped[100] ^= 4;
     for bad in [flipped, good[..good.len() - 4].to_vec(), good[..20].to_vec(), vec![]] {

@@ -62,9 +62,9 @@ const RECORDS: [Record; 25] = [
     ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
 ];
 
-/// Every shader, the push constants that its pass writes, and the element of each of its buffers: a
-/// record's name, the bytes of a plain element, `T` for texels of four words, `F` for texels of one
-/// float, `-` for a buffer that only the pipeline's other shader reads.
+/// Every shader, the push constants that its pass writes, and the element of each of its buffers.
+/// An element is a record's name or the bytes of a plain element. `T` stands for texels of four
+/// words, `F` for texels of one float, `-` for a buffer that only the other shader reads.
 #[rustfmt::skip]
 const INTERFACES: [(&str, &[Field], &str); 49] = [
     ("chunks.frag", chunks::Push::FIELDS, "T"),
@@ -310,7 +310,7 @@ fn records_glsl() -> &'static str {
     text_of("include/records.glsl")
 }
 
-/// Returns the number of `const uint NAME = …;` (decimal, or 0x…u) or `const float NAME = …;`.
+/// Returns the number of `const uint NAME = …;` (decimal or 0x…u) or `const float NAME = …;`.
 fn constant(text: &str, name: &str) -> Option<f64> {
     let line = text.lines().find_map(|l| {
         let rest = l.trim().strip_prefix("const ")?;

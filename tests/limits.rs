@@ -1,4 +1,4 @@
-//! What a scene may ask for, and what it is told before it costs dearly.
+//! Tests of the limits that a scene is checked against, and of the advice on costly settings.
 
 mod harness;
 
@@ -21,16 +21,16 @@ fn scene(n_particles: u32, grid: u32, mode: &str) -> Scene {
 }
 
 #[test]
-fn blobs_much_larger_than_cells_are_told_of() {
+fn blobs_much_larger_than_cells_give_advice() {
     assert!(advice(&scene(500, 64, "first")).is_empty());
     assert!(advice(&scene(300_000, 64, "first"))[0].contains("lighting.grid = 64"));
     assert!(advice(&scene(300_000, 64, "none")).is_empty());
-    // The inner cells halve: 60 to 30 a side.
+    // The inner cells are half as many a side: 60 and 30.
     assert!(n_deposits(&scene(1000, 64, "first")) > 6.0 * n_deposits(&scene(1000, 34, "first")));
 }
 
 #[test]
-fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
+fn a_buffer_of_more_texels_than_the_device_reads_is_refused() {
     let mut limits = *Gpu::new().device.limits();
     let scene = scene(500, 64, "first");
     assert!(check(&scene, &limits).is_ok());
@@ -40,7 +40,7 @@ fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
         refused.contains("the density grid") && refused.contains("takes 1000 at most"),
         "{refused}"
     );
-    // Without light nothing is read by texels but the pool of textures, where there is one.
+    // Without light only a pool of textures is read by texels.
     let mut unlit = self::scene(500, 64, "none");
     assert!(check(&unlit, &limits).is_ok());
     unlit.clouds[0].texture.choice = Choice::ByBox;
@@ -49,7 +49,7 @@ fn what_is_read_by_texels_is_refused_where_the_device_reads_fewer() {
 }
 
 #[test]
-fn doubles_are_refused_where_the_device_has_none() {
+fn f64_sums_are_refused_on_a_device_without_doubles() {
     let mut limits = *Gpu::new().device.limits();
     let mut scene = scene(500, 64, "first");
     scene.lighting.sums.precision = Precision::F64;
@@ -58,17 +58,17 @@ fn doubles_are_refused_where_the_device_has_none() {
     limits.has_float64 = false;
     let refused = check(&scene, &limits).unwrap_err();
     assert_eq!(refused.exit_code(), 2);
-    let said = refused.to_string();
+    let message = refused.to_string();
     assert!(
-        said.contains("lighting.precision = \"f64\"") && said.contains("shaderFloat64"),
-        "{said}"
+        message.contains("lighting.precision = \"f64\"") && message.contains("shaderFloat64"),
+        "{message}"
     );
     scene.lighting.sums.precision = Precision::F32;
     assert!(check(&scene, &limits).is_ok());
 }
 
 #[test]
-fn a_step_that_would_cut_a_march_short_is_refused_by_name() {
+fn a_step_too_short_for_the_march_is_refused_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s.toml");
     std::fs::write(&path, "[lighting]\ngrid = 512\nstep = 0.2\n").unwrap();

@@ -19,7 +19,7 @@ Light kept[N_KEPT];
 #define KEEP_LIGHTS
 #endif
 
-// What the facets of a region have in common. A cloud's facets have no axes and are one cell.
+// Shape of the facets of a region. A cloud's facets have no axes and are one cell.
 struct FacetShape {
     vec3 half_u;
     vec3 half_v;

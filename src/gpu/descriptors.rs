@@ -1,4 +1,4 @@
-//! Descriptor sets, from pools that a command buffer resets when it is recorded anew.
+//! Descriptor sets, from pools that are reset at each recording of their command buffer.
 
 use std::sync::Arc;
 

@@ -20,7 +20,7 @@ use crate::error::{Error, Result};
 /// own.
 pub(super) const FRAMES_IN_FLIGHT: usize = 2;
 
-/// What the thread reports.
+/// An event that the thread reports.
 pub(super) enum Event {
     /// The image may be drawn into once the slot's semaphore is signalled. The slot's commands have
     /// finished.

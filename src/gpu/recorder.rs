@@ -35,7 +35,8 @@ pub struct Recorder<'a> {
 }
 
 impl Commands {
-    /// Records anew what `f` asks for. The previous submission must have been waited for.
+    /// Records the commands of `f` in place of the last ones. The last submission must have been
+    /// waited for.
     ///
     /// # Errors
     /// `f` fails, or the driver is out of memory.

@@ -117,7 +117,7 @@ pub fn cache_folder(name: &str) -> Option<PathBuf> {
 
 impl Compiler {
     /// Makes a compiler of `sources`. `cache` is a folder for SPIR-V, made when first needed;
-    /// without one every shader is compiled anew.
+    /// without a cache every call compiles.
     ///
     /// # Errors
     /// shaderc does not start.

@@ -117,7 +117,7 @@ impl From<&GridSpec> for GridRecord {
 }
 
 record! {
-    /// The camera. The ray of pixel (i, j) is x right + y up + forward, with
+    /// The camera. The ray of pixel (i, j) is x right + y up + forward. There
     /// x = (2(i + ½)/W − 1) tan_x and y = (1 − 2(j + ½)/H) tan_y.
     pub struct CameraRecord {
         /// Eye minus lighting origin.

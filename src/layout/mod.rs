@@ -15,7 +15,10 @@ pub mod tiles;
 #[macro_export]
 #[doc(hidden)]
 macro_rules! __record {
-    ($(#[$about:meta])* $vis:vis struct $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty),* $(,)? }) => {
+    (
+        $(#[$about:meta])*
+        $vis:vis struct $name:ident { $($(#[$doc:meta])* $field:ident: $type:ty),* $(,)? }
+    ) => {
         $(#[$about])*
         #[repr(C)]
         #[derive(Debug, Clone, Copy, PartialEq, Default, bytemuck::Pod, bytemuck::Zeroable)]

@@ -8,11 +8,11 @@ record! {
     pub struct SourceRecord {
         /// Position (a cluster's mean by flux), and the radius that holds all its points.
         place: [f32; 4],
-        /// Diffuse flux Σ A_i L1_i, linear RGB; and the nodes of its subtree, itself included: 1 for
-        /// a facet, −1 for one that the edge of a light's shadow crosses.
+        /// Diffuse flux Σ A_i L1_i, linear RGB; and the nodes of its subtree, itself included. That
+        /// is 1 for a facet, −1 for a facet that the edge of a light's shadow crosses.
         sent: [f32; 4],
         /// Mean normal by flux, shorter than 1 where a cluster's normals differ; and the mean area
-        /// of its facets by area, which bounds the form factor as the distance goes to 0.
+        /// of its facets by area. The area bounds the form factor as the distance goes to 0.
         face: [f32; 4],
         /// Area Σ A_i; and second moments M about the position by flux: xx, yy, zz.
         extent: [f32; 4],

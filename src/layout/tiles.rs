@@ -3,8 +3,8 @@
 use crate::layout::record;
 
 record! {
-    /// A blob on the screen. Its optical depth along the ray (x, y, 1) is tau 2^−e, with
-    /// e = scale (δx² + δy² + (cx δy − cy δx)²)/(1 + x² + y²) and δ = (x, y) − (cx, cy).
+    /// A blob on the screen. Its optical depth along the ray (x, y, 1) is tau 2^−e. There
+    /// e = scale (δx² + δy² + (cx δy − cy δx)²)/(1 + x² + y²), and δ = (x, y) − (cx, cy).
     pub struct SplatRecord {
         /// Slopes (cx, cy) of the centre.
         center: [f32; 2],

@@ -84,6 +84,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/sum.glsl",
     "include/tensor.glsl",
     "include/texture.glsl",
+    "include/tile_splats.glsl",
     "include/tiles.glsl",
     "include/upsample.glsl",
     "include/variants.glsl",

@@ -86,8 +86,8 @@ fn wrong_functions(gpu: &Gpu, from: &str, to: &str) -> Kernel {
     Kernel::new(&gpu.device, &compiler, "functions", Push::FIELDS, &[]).unwrap()
 }
 
-/// Returns `n` numbers of either sign whose magnitudes are spread evenly over the exponents from `low` to
-/// `high`, then as many spread evenly over ±`high`.
+/// Returns `n` numbers of either sign whose magnitudes are spread evenly over the exponents from
+/// `low` to `high`, then as many spread evenly over ±`high`.
 fn sweep(low: f64, high: f64, n: usize) -> Vec<f32> {
     let share = |i: usize| (i as f64 + 0.5) / n as f64;
     let sign = |i: usize| if i.is_multiple_of(2) { 1.0 } else { -1.0 };

@@ -1,0 +1,115 @@
+//! The host's records, and the interface that it expects of every shader.
+
+use nimbus::gpu::Field;
+use nimbus::layout::cull::KeptRecord;
+use nimbus::layout::disc::DiscRecord;
+use nimbus::layout::facet::{FacetRecord, LitRecord, RegionBoundsRecord, RegionRecord, RunRecord};
+use nimbus::layout::frame::{CameraRecord, GridRecord, LightRecord};
+use nimbus::layout::particle::{
+    BoxRecord, DrawnRecord, GroupRecord, ModeRecord, ParticleRecord, PlacedRecord, TexturedRecord,
+};
+use nimbus::layout::second::{BlockRecord, NodeRecord, PackedRecord, PairingRecord, SourceRecord};
+use nimbus::layout::tiles::{RoundRecord, SplatRecord, SplatTextureRecord};
+use nimbus::passes::{
+    chunks, contract, cull, facets, first, generate, grid, impostors, live, morton, place, present,
+    second, sort, sprites, surfaces, terrain, texture, tiles, transmit, upsample,
+};
+
+/// A host record: GLSL's name of it, its fields, its size.
+pub type Record = (&'static str, &'static [Field], usize);
+
+pub const RECORDS: [Record; 25] = [
+    ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
+    ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),
+    ("Disc", DiscRecord::FIELDS, size_of::<DiscRecord>()),
+    ("Mode", ModeRecord::FIELDS, size_of::<ModeRecord>()),
+    ("Placed", PlacedRecord::FIELDS, size_of::<PlacedRecord>()),
+    ("Group", GroupRecord::FIELDS, size_of::<GroupRecord>()),
+    ("Textured", TexturedRecord::FIELDS, size_of::<TexturedRecord>()),
+    ("Drawn", DrawnRecord::FIELDS, size_of::<DrawnRecord>()),
+    ("Facet", FacetRecord::FIELDS, size_of::<FacetRecord>()),
+    ("RegionBounds", RegionBoundsRecord::FIELDS, size_of::<RegionBoundsRecord>()),
+    ("Run", RunRecord::FIELDS, size_of::<RunRecord>()),
+    ("Lit", LitRecord::FIELDS, size_of::<LitRecord>()),
+    ("Region", RegionRecord::FIELDS, size_of::<RegionRecord>()),
+    ("Source", SourceRecord::FIELDS, size_of::<SourceRecord>()),
+    ("Packed", PackedRecord::FIELDS, size_of::<PackedRecord>()),
+    ("Node", NodeRecord::FIELDS, size_of::<NodeRecord>()),
+    ("Block", BlockRecord::FIELDS, size_of::<BlockRecord>()),
+    ("Pairing", PairingRecord::FIELDS, size_of::<PairingRecord>()),
+    ("Light", LightRecord::FIELDS, size_of::<LightRecord>()),
+    ("Grid", GridRecord::FIELDS, size_of::<GridRecord>()),
+    ("Kept", KeptRecord::FIELDS, size_of::<KeptRecord>()),
+    ("SplatTexture", SplatTextureRecord::FIELDS, size_of::<SplatTextureRecord>()),
+    ("Splat", SplatRecord::FIELDS, size_of::<SplatRecord>()),
+    ("Round", RoundRecord::FIELDS, size_of::<RoundRecord>()),
+    ("Camera", CameraRecord::FIELDS, size_of::<CameraRecord>()),
+];
+
+/// Every shader, the push constants that its pass writes, and the element of each of its buffers.
+/// An element is a record's name or the bytes of a plain element. `T` stands for texels of four
+/// words, `F` for texels of one float, `-` for a buffer that only the other shader reads.
+#[rustfmt::skip]
+pub const INTERFACES: [(&str, &[Field], &str); 49] = [
+    ("chunks.frag", chunks::Push::FIELDS, "T"),
+    ("chunks.vert", &[], ""),
+    ("chunks_order.comp", chunks::OrderPush::FIELDS, "8 Kept 8 16"),
+    ("contract.comp", contract::Push::FIELDS, "Facet Light T T F F 8 Lit"),
+    ("cull_scan.comp", cull::ScanPush::FIELDS, "4 Kept"),
+    ("cull_test.comp", cull::TestPush::FIELDS, "Placed Particle 4 Drawn 8 4"),
+    ("cull_write.comp", cull::WritePush::FIELDS, "Placed 8 4 8"),
+    ("facets.comp", facets::Push::FIELDS, "Placed Particle 4 Group F Facet"),
+    ("facets_groups.comp", facets::GroupsPush::FIELDS, "Placed Particle 4 Group F 4 Run Facet 4"),
+    ("facets_surfaces.comp", facets::SurfacesPush::FIELDS, "T 4 Facet"),
+    ("facets_terrain.comp", facets::TerrainPush::FIELDS, "T Facet Facet"),
+    ("first.comp", first::Push::FIELDS, "Facet Light 4 T F Lit"),
+    ("first_tensor.comp", first::TensorPush::FIELDS, "Facet Light 4 T F 4 Lit"),
+    ("generate.comp", generate::Push::FIELDS, "Box 4 Particle 4"),
+    ("grid_deposit.comp", grid::DepositPush::FIELDS, "Placed Particle 4"),
+    ("grid_resolve.comp", grid::ResolvePush::FIELDS, "8 4"),
+    ("impostors.frag", impostors::Push::FIELDS, "T"),
+    ("impostors.vert", impostors::Push::FIELDS, ""),
+    ("impostors_part.comp", impostors::PartPush::FIELDS, "8 4 8 8"),
+    ("live.comp", live::Push::FIELDS, "Disc Particle"),
+    ("morton_key.comp", morton::KeyPush::FIELDS, "Facet RegionBounds 8"),
+    ("morton_order.comp", morton::OrderPush::FIELDS, "8 4"),
+    ("place.comp", place::Push::FIELDS, "Particle 4 Group Mode Placed"),
+    ("present.frag", present::Push::FIELDS, "T T"),
+    ("present.vert", &[], ""),
+    (
+        "second_gather.comp",
+        second::GatherPush::FIELDS,
+        "Block Pairing 4 4 Facet T Light T T F F Node Lit 4 T 4",
+    ),
+    ("second_merge.comp", second::MergePush::FIELDS, "4 Node Source 16"),
+    ("second_sources.comp", second::SourcesPush::FIELDS, "Facet Light 4 4 T 4 4 Source 16 Packed"),
+    (
+        "second_tensor.comp",
+        second::TensorPush::FIELDS,
+        "Block Pairing 4 4 Facet T Light T T F F Lit 4 4 T 4",
+    ),
+    ("sort_count.comp", sort::DigitPush::FIELDS, "4 8 4"),
+    ("sort_key.comp", sort::KeyPush::FIELDS, "Placed 4 Drawn 8"),
+    ("sort_scan.comp", sort::DigitPush::FIELDS, "4 4"),
+    ("sort_scatter.comp", sort::DigitPush::FIELDS, "4 8 4 8"),
+    ("sprites.frag", sprites::Push::FIELDS, "- - - - - - - - T"),
+    ("sprites.vert", sprites::Push::FIELDS, "8 Placed Particle Lit 4 4 Drawn Textured"),
+    ("surfaces.frag", surfaces::Push::FIELDS, "Region Lit"),
+    ("surfaces.vert", surfaces::Push::FIELDS, "Region"),
+    ("terrain.frag", terrain::Push::FIELDS, ""),
+    ("terrain.vert", terrain::Push::FIELDS, "Region Facet Lit"),
+    ("texture_pack.comp", texture::PackPush::FIELDS, "F 16"),
+    ("texture_transform.comp", texture::TransformPush::FIELDS, "8"),
+    ("tiles.comp", tiles::Push::FIELDS, "T 8 Round 16 16 4"),
+    ("tiles_clear.comp", tiles::ClearPush::FIELDS, "Round 16"),
+    ("tiles_pairs.comp", tiles::PairsPush::FIELDS, "8 4 4 Round 8 Splat Kept"),
+    ("tiles_ranges.comp", tiles::RangesPush::FIELDS, "8 Round 16"),
+    ("tiles_rounds.comp", tiles::RoundsPush::FIELDS, "4 Round Kept"),
+    (
+        "tiles_splat.comp",
+        tiles::SplatPush::FIELDS,
+        "8 T T T 4 4 Drawn Textured 16 8 4 4 SplatTexture Kept 16",
+    ),
+    ("transmit.comp", transmit::Push::FIELDS, "Facet Light T F 4 4"),
+    ("upsample.comp", upsample::Push::FIELDS, "T 4"),
+];

@@ -21,10 +21,7 @@ use nimbus::layout::particle::{
 use nimbus::layout::second::{PackedRecord, SourceRecord};
 use nimbus::layout::tiles::SplatRecord;
 use nimbus::model::grid::{DEPOSIT_CUT_SIGMA, MAX_CELLS};
-use nimbus::passes::{
-    self, SHADERS, cull, facets, first, generate, grid, place, second, sort, texture, tiles,
-    transmit, upsample,
-};
+use nimbus::passes::{self, SHADERS, cull, generate, sort, texture, tiles, transmit};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

@@ -18,6 +18,7 @@ use nimbus::passes::{
 /// A host record: GLSL's name of it, its fields, its size.
 pub type Record = (&'static str, &'static [Field], usize);
 
+/// All records of the host.
 pub const RECORDS: [Record; 25] = [
     ("Particle", ParticleRecord::FIELDS, size_of::<ParticleRecord>()),
     ("Box", BoxRecord::FIELDS, size_of::<BoxRecord>()),

@@ -419,9 +419,9 @@ fn wrong_shaders_are_noticed() {
         ("include/blob.glsl", "ceil(low - 0.5 - SNAP)", "ceil(low)"),
         ("include/blob.glsl", "min(low, high) > 0.0", "true"),
         (
-            "include/blob.glsl",
-            "vec3(dot(camera.right, from_eye), dot(camera.up",
-            "vec3(dot(camera.up, from_eye), dot(camera.right",
+            "include/camera.glsl",
+            "vec3(dot(camera.right, v), dot(camera.up",
+            "vec3(dot(camera.up, v), dot(camera.right",
         ),
     ] {
         let wrong = Gpu::wrong_compiler(file, from, to);

@@ -114,9 +114,19 @@ fn wrong_gathers_are_noticed() {
     for (scene, file, from, to) in [
         (0, "include/gather.glsl", "2.0 / (3.0 * d2)", "1.0 / (3.0 * d2)"),
         (0, "include/gather.glsl", "6.0 * dot(along, along)", "5.0 * dot(along, along)"),
-        (0, "include/cells.glsl", "const float RIM = 0.125", "const float RIM = 0.25"),
-        (0, "include/cells.glsl", "const float SINGLE = 0.25", "const float SINGLE = 0.5"),
-        (0, "include/cells.glsl", "const float BROAD = 3.0", "const float BROAD = 4.0"),
+        (
+            0,
+            "include/cells.glsl",
+            "const float EDGE_WIDTH = 0.125",
+            "const float EDGE_WIDTH = 0.25",
+        ),
+        (
+            0,
+            "include/cells.glsl",
+            "const float SINGLE_EDGE_WIDTH = 0.25",
+            "const float SINGLE_EDGE_WIDTH = 0.5",
+        ),
+        (0, "include/cells.glsl", "const float CELL_WIDTH = 3.0", "const float CELL_WIDTH = 4.0"),
         (0, "include/cells.glsl", "const float LOBE_STEP = 3.0", "const float LOBE_STEP = 4.0"),
         (0, "include/cells.glsl", "const float LOBE_PARTS = 1.5", "const float LOBE_PARTS = 2.0"),
         (0, "include/cell_samples.glsl", "0.5) * cell.u", "0.45) * cell.u"),
@@ -131,7 +141,7 @@ fn wrong_gathers_are_noticed() {
         ),
         (0, "include/cell_samples.glsl", "(2.0 / 3.0)", "(1.0 / 3.0)"),
         (0, "include/cell_samples.glsl", ">> level, v", ">> 0, v"),
-        (0, "include/walk.glsl", "by_cells && source.in_part && view.quartered", "false"),
+        (0, "include/walk.glsl", "by_cells && source.is_partly_shadowed && view.is_split", "false"),
         (0, "include/arriving.glsl", "height * inverse * cone", "height * cone"),
         (
             0,
@@ -156,8 +166,8 @@ fn a_gather_that_does_not_come_to_its_end_says_so() {
     // Receivers that never begin: all of their sources are told, and none of the light has a bound.
     let idle = Gpu::wrong_compiler(
         "include/walk.glsl",
-        "while (s < end && n_turns < BATCH_TURNS",
-        "while (s < end && n_turns < 1u",
+        "while (s < end && n_iterations < BATCH_ITERATIONS",
+        "while (s < end && n_iterations < 1u",
     );
     let f = frame_by(&gpu, &idle, room(0, ""));
     let lost = f.lit.iter().filter(|l| l.n_lost > 0.0);

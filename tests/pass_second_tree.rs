@@ -93,8 +93,8 @@ fn wrong_trees_are_noticed() {
     let (cells, merge) = ("include/cells.glsl", "second_merge.comp");
     let mut missed = vec![];
     for (scene, file, from, to) in [
-        (0, cells, "12.0 * dot(along, way)", "11.0 * dot(along, way)"),
-        (1, cells, "12.0 * dot(along, way)", "11.0 * dot(along, way)"),
+        (0, cells, "12.0 * dot(along, direction)", "11.0 * dot(along, direction)"),
+        (1, cells, "12.0 * dot(along, direction)", "11.0 * dot(along, direction)"),
         (0, cells, "- 2.0 * extent", "- 1.9 * extent"),
         (0, cells, "- 4.0 * (at_source", "- 3.9 * (at_source"),
         (
@@ -111,14 +111,19 @@ fn wrong_trees_are_noticed() {
         (0, cells, "nearest * nearest * nearest", "nearest * nearest"),
         (2, cells, "tilt / max(1.0 - tilt, 0.01)", "tilt"),
         (0, cells, "wrong / (allowed * allowed)", "wrong / allowed"),
-        (0, cells, "dot(taker.normal, view.way) + tilt", "dot(taker.normal, view.way)"),
-        (0, cells, "min(at_taker, 1.0) * at_source", "min(at_taker, 1.0)"),
+        (
+            0,
+            cells,
+            "dot(receiver.normal, view.direction) + tilt",
+            "dot(receiver.normal, view.direction)",
+        ),
+        (0, cells, "min(at_receiver, 1.0) * at_source", "min(at_receiver, 1.0)"),
         (1, cells, "0.0) + 1.0 - sqrt(even)", "0.0)"),
         (1, cells, "const float MIXED = 0.5", "const float MIXED = 0.55"),
         (1, cells, "const float CLOUD_THETA = 0.4", "const float CLOUD_THETA = 0.41"),
         (1, cells, "const float EVEN = 0.9999", "const float EVEN = 0.5"),
-        (0, cells, "const float TORN = 0.5", "const float TORN = 0.52"),
-        (3, cells, "const float TORN = 0.5", "const float TORN = 0.6"),
+        (0, cells, "const float CLUSTER_EDGE_WIDTH = 0.5", "const float CLUSTER_EDGE_WIDTH = 0.52"),
+        (3, cells, "const float CLUSTER_EDGE_WIDTH = 0.5", "const float CLUSTER_EDGE_WIDTH = 0.6"),
         (0, cells, "cluster ? LOBE_STEP * theta", "cluster ? 1.1 * LOBE_STEP * theta"),
         (1, cells, "const float UNLIT = 1e6", "const float UNLIT = 2.0"),
         (0, cells, "cluster ? 2.0 * source.radius", "cluster ? 1.9 * source.radius"),

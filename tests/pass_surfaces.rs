@@ -385,9 +385,9 @@ fn wrong_pictures_are_noticed() {
         ("surfaces.frag", "regions[in_i]", "regions[in_i / 2]"),
         ("surfaces.vert", "-(top ? high.y : low.y)", "(top ? high.y : low.y)"),
         ("surfaces.vert", "+ SNAP * push.pixel", "- 8.0 * push.pixel"),
-        ("surfaces.vert", "(a.z >= plane) != (b.z >= plane)", "false"),
-        ("surfaces.vert", "if (a.z >= plane) {", "if (false) {"),
-        ("surfaces.vert", "vec4(cross(c, u), length_v)", "vec4(cross(c, u), length_u)"),
+        ("surfaces.vert", "(a.z >= near) != (b.z >= near)", "false"),
+        ("surfaces.vert", "if (a.z >= near) {", "if (false) {"),
+        ("include/plane.glsl", "vec4(cross(c, u), length_v)", "vec4(cross(c, u), length_u)"),
     ] {
         let values = draw_wrong(&mut gpu, &picture, wrong);
         assert!(worst(&values, &candidates) > 1.0, "{} as {}", wrong.1, wrong.2);

@@ -177,7 +177,7 @@ fn wrong_pictures_are_noticed() {
         ("tiles.comp", "alpha[j] += here;", "alpha[j] += 0.999 * here;"),
         ("tiles.comp", "k + t < n ? splat.place.w", "k + t <= n ? splat.place.w"),
         (
-            "tiles.comp",
+            "include/tile_splats.glsl",
             "n + subgroupBallotBitCount(hits)",
             "n + min(subgroupBallotBitCount(hits), 7u)",
         ),

@@ -213,7 +213,7 @@ fn wrong_cuts_are_noticed() {
         (tiled, "tiles_splat.comp", "sqrt(2.0 * cut)", "sqrt(1.5 * cut)"),
         (tiled, "tiles_pairs.comp", "log2(splats[r].tau", "0.7 * log2(splats[r].tau"),
         (tiled, "tiles.comp", "log2(place.w", "0.98 * log2(place.w"),
-        (tiled, "tiles.comp", "max(least, -log2", "min(least, -log2"),
+        (tiled, "tiles.comp", "max(min_exponent, -log2", "min(min_exponent, -log2"),
     ] {
         let (truths, bounds) = truth(&picture, way);
         let values = picture.draw_by(&mut gpu, None, FORMAT.0, way);

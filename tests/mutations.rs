@@ -1,66 +1,65 @@
-//! The stress suite finds faults: each of these shaders is wrong in one place, and a case that is
-//! named fails of it (docs/stability.md, "Faults that are found").
+//! Faults injected into the shaders, each of which must fail a case of the stress suite
+//! (docs/stability.md, "Faults that are found").
 
 use nimbus::frame::stage::DeviceChoice;
 use nimbus::passes;
-use nimbus::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
+use nimbus::stress::{Outcome, StressContext, Verdict, cases};
 
-/// What is wrong, in which file, a text of it and what stands in its place, and the case that
-/// fails.
+/// Description, shader file, original text, faulty text, and the case that must fail.
 type Fault = (&'static str, &'static str, &'static str, &'static str, &'static str);
 
 const FAULTS: &[Fault] = &[
     (
-        "a sine's coefficient in its fourth digit",
+        "wrong fourth digit in a coefficient of the sine",
         "include/functions.glsl",
         "0.00833307858",
         "0.00833007858",
         "functions/sine",
     ),
     (
-        "the sign of every other two half waves",
+        "wrong sign of every other pair of half waves",
         "include/functions.glsl",
         "2.0 * floor(k * 0.5)",
         "4.0 * floor(k * 0.25)",
         "functions/sine",
     ),
     (
-        "no cut of what a huge argument is reduced to",
+        "no clamp of the reduced argument",
         "include/functions.glsl",
         "r = clamp(r, -1.58, 1.58);",
         "",
         "functions/sine-far",
     ),
     (
-        "1 - exp(-t) where that cancels",
+        "1 - exp(-t) evaluated where it cancels",
         "include/functions.glsl",
         "if (t < 0.5) {",
         "if (t < 0.0) {",
         "functions/one-minus-exp",
     ),
     (
-        "erf's third coefficient",
+        "wrong third coefficient of erf",
         "include/functions.glsl",
         "0.0092705272",
         "0.0092805272",
         "functions/erf",
     ),
     (
-        "a coefficient of 2^x",
+        "wrong coefficient of 2^x",
         "include/functions.glsl",
         "0.0555071327386",
         "0.0555171327386",
         "functions/power-of-two",
     ),
     (
-        "1 - cos for half of the chord's square",
+        "1 - cos instead of half the squared chord",
         "include/lobe.glsl",
         "return 0.5 * dot(chord, chord);",
         "return 1.0 - dot(n, n - chord);",
         "functions/half-vector",
     ),
     (
-        "no guard where there is no half vector",
+        "no guard for opposite directions, which have no half vector",
         "include/lobe.glsl",
         "max(dot(h, h), 1e-30)",
         "dot(h, h)",
@@ -74,49 +73,49 @@ const FAULTS: &[Fault] = &[
         "functions/lobe",
     ),
     (
-        "nine rounds of Philox and not ten",
+        "nine rounds of Philox instead of ten",
         "include/philox.glsl",
         "i < 10",
         "i < 9",
         "generation/unit",
     ),
     (
-        "a slot's phase forgotten",
+        "a slot's phase is ignored",
         "live.comp",
         "d.phase + bitfieldReverse(slot)",
         "d.phase",
         "live/late",
     ),
     (
-        "a death that is not faded",
+        "no fade-out at the end of life",
         "live.comp",
         "smooth_rise((1.0 - lived) * d.inv_fade_out)",
         "1.0",
         "live/dead",
     ),
     (
-        "what is outside is left there",
+        "particles outside the box are not folded back",
         "generate.comp",
         "inside ? v : fold(v, h)",
         "v",
         "generation/needle",
     ),
     (
-        "one attempt more than there may be",
+        "one attempt more than allowed",
         "generate.comp",
         "attempt >= push.max_attempts",
         "attempt > push.max_attempts",
         "generation/folded",
     ),
     (
-        "the sort key of negative depths",
+        "wrong sort key of negative depths",
         "include/key.glsl",
         "? ~bits : bits | 0x80000000u",
         "? bits : bits | 0x80000000u",
         "compositing/alternating",
     ),
     (
-        "a prefix sum that begins one digit late",
+        "a prefix sum that starts one digit late",
         "sort_scan.comp",
         "d >= reach ? sums[d - reach] : 0u",
         "d > reach ? sums[d - reach] : 0u",
@@ -130,79 +129,79 @@ const FAULTS: &[Fault] = &[
         "sorting/random",
     ),
     (
-        "colours added up in f16",
+        "colours accumulated in f16",
         "tiles.comp",
         "color[j] += here * light.xyz;",
         "color[j] += here * light.xyz; color[j].xy = unpackHalf2x16(packHalf2x16(color[j].xy));",
         "compositing/paths",
     ),
     (
-        "optical depth for opacity",
+        "optical depth used as opacity",
         "sprites.frag",
         "one_minus_exp(tau * exp(exponent))",
         "tau * exp(exponent)",
         "space/narrow",
     ),
-    ("growth forgotten", "place.comp", "sigma * group.scale", "sigma", "space/late-growth"),
-    ("a wave's phase forgotten", "place.comp", " + modes[m].phase", "", "space/late-gust"),
+    ("growth is ignored", "place.comp", "sigma * group.scale", "sigma", "space/late-growth"),
+    ("a wave's phase is ignored", "place.comp", " + modes[m].phase", "", "space/late-gust"),
     (
-        "1/d for 1/d^2",
+        "falloff 1/d instead of 1/d^2",
         "include/light.glsl",
         "cone * cone / (reach * reach)",
         "cone * cone / reach",
         "brdf/exponent-40",
     ),
     (
-        "the grid's mass by the square of sigma",
+        "the grid's mass uses the square of sigma instead of the cube",
         "grid_deposit.comp",
         "blob.sigma * blob.sigma * blob.sigma",
         "blob.sigma * blob.sigma",
         "transmittance/inside",
     ),
     (
-        "a compensation that is lost",
+        "lost compensation",
         "include/sum.glsl",
         "precise T lost = (sum.value - (value - added)) + (term - added);",
         "precise T lost = T(0.0);",
         "transport/sum-kahan",
     ),
     (
-        "a partial sum left out",
+        "a missing partial sum",
         "include/sum.glsl",
         "total += (n_blocks >> k & 1u) == 1u ? sum.parts[k] : T(0.0);",
         "total += k != 6u && (n_blocks >> k & 1u) == 1u ? sum.parts[k] : T(0.0);",
         "transport/sum-pairwise",
     ),
     (
-        "the last particle's place is not written",
+        "the last particle's position is not written",
         "place.comp",
         "FOR_EACH(i, push.n_particles) {",
         "FOR_EACH(i, push.n_particles - 1u) {",
         "determinism/poison",
     ),
     (
-        "an epsilon added to a depth",
+        "an epsilon added to an optical depth",
         "include/functions.glsl",
         "t * (1.0 - t * (1.0 / 2.0)",
         "(t + 1e-7) * (1.0 - t * (1.0 / 2.0)",
         "functions/one-minus-exp",
     ),
     (
-        "a guard of lengths that are not short",
+        "the guard against short vectors affects longer ones",
         "include/functions.glsl",
         "max(dot(o, o), 1e-30)",
         "max(dot(o, o), 1e-2)",
         "functions/normalize",
     ),
     (
-        "a guard of half vectors that are there",
+        "the guard against missing half vectors affects short ones",
         "include/lobe.glsl",
         "max(dot(h, h), 1e-30)",
         "max(dot(h, h), 1e-4)",
         "functions/half-vector",
     ),
     (
-        "pi forgotten in what a diffuse surface sends",
+        "missing 1/pi in diffuse reflection",
         "first.comp",
         "0.318309886183791",
         "1.0",
@@ -210,41 +209,36 @@ const FAULTS: &[Fault] = &[
     ),
 ];
 
-fn named(name: &str) -> Case {
-    cases().into_iter().find(|c| c.name == name).unwrap_or_else(|| panic!("no case {name}"))
-}
-
-/// What becomes of a case with the fault.
-fn with(fault: &Fault) -> Outcome {
-    let (what, file, from, to, case) = fault;
+/// Runs the fault's case with the faulty shader.
+fn run(fault: &Fault) -> Outcome {
+    let (what, file, from, to, name) = fault;
     let mut sources = passes::sources();
-    assert!(sources.replace(file, from, to), "{what}: {file} does not hold {from}");
+    assert!(sources.replace(file, from, to), "{what}: {file} does not contain {from}");
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
-    let mut desk = Desk::with_sources(&choice, sources).expect("a device");
-    let outcome = run_case(&named(case), &mut desk);
-    // A wrong shader may be told by validation, too; here it is the case that counts.
-    let _ = desk.close();
+    let mut context = StressContext::with_sources(&choice, sources).expect("a device");
+    let case = cases().into_iter().find(|c| c.name == *name);
+    let outcome = case.unwrap_or_else(|| panic!("no case {name}")).run(&mut context);
+    // The validation layer may report the fault as well; only the case counts here.
+    let _ = context.close();
     outcome
 }
 
 #[test]
-fn every_fault_is_found_by_its_case() {
+fn every_fault_fails_its_case() {
     let mut missed = Vec::new();
     for fault in FAULTS {
-        let outcome = with(fault);
-        println!("{}: {:?} ({}; {:?})", fault.0, outcome.verdict, fault.4, outcome.worst);
+        let outcome = run(fault);
+        let found = format!("{}: {} {:?}", fault.0, fault.4, outcome.verdict);
+        println!("{found}; {:?}", outcome.worst);
         if outcome.verdict != Verdict::Failed {
-            missed.push(format!(
-                "{}: {} {:?} {:?}",
-                fault.0, fault.4, outcome.verdict, outcome.remark
-            ));
+            missed.push(format!("{found} {:?}", outcome.remark));
         }
     }
     assert!(missed.is_empty() && FAULTS.len() >= 20, "not found:\n{}", missed.join("\n"));
 }
 
 #[test]
-fn the_page_lists_every_fault() {
+fn docs_list_every_fault() {
     let page = std::fs::read_to_string("docs/stability.md").expect("docs/stability.md");
     for (what, file, _, _, case) in FAULTS {
         let row = format!("| {what} | `{file}` | `{case}` |");

@@ -8,7 +8,7 @@ use super::args::StressArgs;
 use super::output;
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
-use crate::stress::{Case, Desk, Outcome, Verdict, cases, run_case};
+use crate::stress::{Case, Outcome, StressContext, Verdict, cases};
 use crate::timing::machine::{self, Cpu, Device};
 
 /// What `--json` prints; its form is docs/stress.schema.json.
@@ -38,7 +38,7 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         validation: args.validation,
         poison: false,
     };
-    let mut desk = Desk::open(&choice)?;
+    let mut context = StressContext::open(&choice)?;
     graceful.store(true, Ordering::Relaxed);
     let bar = output::progress(chosen.len() as u64, "cases", args.quiet);
     let mut done: Vec<Outcome> = Vec::new();
@@ -47,12 +47,12 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
             break;
         }
         bar.set_message(case.name);
-        done.push(run_case(case, &mut desk));
+        done.push(case.run(&mut context));
         bar.inc(1);
     }
     bar.finish_and_clear();
     let interrupted = done.len() < chosen.len();
-    let info = desk.device().info().clone();
+    let info = context.device().info().clone();
     let report = Report {
         schema: SCHEMA_VERSION,
         nimbus: env!("CARGO_PKG_VERSION"),
@@ -68,7 +68,7 @@ pub fn run(args: &StressArgs, stop: &AtomicBool, graceful: &AtomicBool) -> Resul
         (_, true) => output::rows(&report.cases.iter().map(row).collect::<Vec<_>>(), false)?,
         _ => output::text(&text(&report))?,
     }
-    desk.close()?;
+    context.close()?;
     if interrupted { Err(Error::Interrupted) } else { judged(&report.cases) }
 }
 

@@ -1,321 +1,291 @@
-//! Layers over layers: very many, opaque ones, equal depths, subnormal numbers, either order. A
-//! pixel of one layer shows its opacity as the device has it; laws of many are told by that, so
-//! that only composing is judged.
+//! Compositing of layers: very many, opaque, at equal depths, subnormal, in either order.
+//!
+//! The opacity of a single layer is taken from the device, so that these cases judge compositing
+//! alone.
 
 use glam::DVec3;
 
-use super::case::{Case, Comparison, Found};
-use super::desk::{Desk, Played};
-use super::scenes::{PLAIN, blob, heap, with_particles};
+use super::case::{Case, Comparison};
+use super::context::{DeviceFrame, StressContext};
+use super::scenes::{
+    HEIGHT, MIDDLE, PATHS, SPRITES, TILES, UNLIT, WIDTH, blob, blob_cluster, render_blobs,
+};
 use crate::error::Result;
 use crate::model::cloud::Particle;
-use crate::model::scene::Scene;
 use crate::reference::rounding::U_F32;
 
 pub const CASES: &[Case] = &[
     Case {
         name: "compositing/thin-sprites",
-        what: "100 000 layers of opacity 1e-5 by sprites: 1 - (1 - a)^n",
+        what: "100 000 layers of opacity 1e-5 as sprites: 1 - (1 - a)^n",
         bound: "2^-23 of the value a layer, as it is blended",
-        run: |desk| thin(desk, SPRITES),
+        check: |ctx, c| thin(ctx, c, SPRITES),
     },
     Case {
         name: "compositing/thin-tiles",
-        what: "100 000 layers of opacity 1e-5 by tiles: 1 - (1 - a)^n",
+        what: "100 000 layers of opacity 1e-5 in tiles: 1 - (1 - a)^n",
         bound: "u of the value a layer, and 4 u",
-        run: |desk| thin(desk, TILES),
+        check: |ctx, c| thin(ctx, c, TILES),
     },
     Case {
         name: "compositing/thin-chunks",
-        what: "100 000 layers of opacity 1e-5 by sprites near to far in chunks",
+        what: "100 000 layers of opacity 1e-5 as sprites, near to far in chunks",
         bound: "2^-23 of the value a layer, as it is blended",
-        run: |desk| thin(desk, "path = 'sprites'\nchunks = 4"),
+        check: |ctx, c| thin(ctx, c, "path = 'sprites'\nchunks = 4"),
     },
     Case {
         name: "compositing/opaque-sprites",
-        what: "a layer of opacity 1 exactly: its colour, and nothing of what is behind",
+        what: "a layer of opacity exactly 1, as a sprite: its colour, and nothing behind it",
         bound: "0",
-        run: |desk| opaque(desk, SPRITES),
+        check: |ctx, c| opaque(ctx, c, SPRITES),
     },
     Case {
         name: "compositing/opaque-tiles",
-        what: "the same by tiles",
+        what: "a layer of opacity exactly 1, in tiles: its colour, and nothing behind it",
         bound: "0",
-        run: |desk| opaque(desk, TILES),
+        check: |ctx, c| opaque(ctx, c, TILES),
     },
     Case {
         name: "compositing/alternating",
-        what: "200 layers, opaque and thin by turns: the nearest opaque one and what is before it",
-        bound: "2^-23 a layer that shows",
-        run: alternating,
+        what: "200 layers, opaque and thin in turn: the nearest opaque layer and the layer before \
+            it",
+        bound: "2^-23 a visible layer",
+        check: alternating,
     },
     Case {
         name: "compositing/equal-depths",
-        what: "layers at one depth are drawn in the order of their numbers, the last on top",
+        what: "layers at one depth: drawn in the order of their indices, the last one on top",
         bound: "2^-23 a layer",
-        run: equal_depths,
+        check: equal_depths,
     },
     Case {
         name: "compositing/reversed",
-        what: "a hundred blobs of one colour, listed forwards and backwards: the same picture",
+        what: "100 blobs of one colour, listed forwards and backwards: the same picture",
         bound: "2^-22 a layer",
-        run: reversed,
+        check: reversed,
     },
     Case {
         name: "compositing/subnormal-opacity",
-        what: "a thousand layers whose opacity is subnormal: as good as nothing",
+        what: "1000 layers of subnormal opacity: an almost empty picture",
         bound: "the sum of all opacities and 2^-126 a layer",
-        run: subnormal_opacity,
+        check: subnormal_opacity,
     },
     Case {
         name: "compositing/subnormal-colour",
-        what: "layers whose colour is subnormal: no number is odd, and none is more \
-            than the colour",
+        what: "layers of subnormal colour: finite values, none above the colour",
         bound: "1e-39 and 2^-126 a layer",
-        run: subnormal_colour,
+        check: subnormal_colour,
     },
     Case {
         name: "compositing/bright",
-        what: "radiances of 1e30 in a target of 32 bits: a product and no infinity",
+        what: "radiances of 1e30 in a 32-bit target: the product, not infinity",
         bound: "2^-22 of it",
-        run: bright,
+        check: bright,
     },
     Case {
         name: "compositing/saturated-half",
-        what: "radiances of 1e6 in a target of 16 bits, which holds 65504: infinite or \
-            that, alpha right",
+        what: "radiances of 1e6 in a 16-bit target, whose largest value is 65504: that or \
+            infinity, with the right alpha",
         bound: "0 in alpha; infinity or 65504 in colour",
-        run: saturated_half,
+        check: saturated_half,
     },
     Case {
         name: "compositing/paths",
-        what: "a heap of 800 blobs by sprites and by tiles: the same picture",
+        what: "800 blobs as sprites and in tiles: the same picture",
         bound: "2^-22 a layer, and (2e-6 + 64 u) tau of all",
-        run: paths,
+        check: |ctx, c| {
+            const N: u32 = 800;
+            // At 8 sigma the discontinuity at a sprite's edge vanishes.
+            let [a, b] = PATHS.map(|path| {
+                render_blobs(ctx, UNLIT, &format!("{path}\ncutoff = 8"), blob_cluster(N))
+            });
+            let (a, b) = (a?, b?);
+            for i in 0..WIDTH * HEIGHT {
+                let bound = two_pictures_bound(a.channel(i, 3), N);
+                for k in 0..4 {
+                    let at = format_args!("pixel {i}, channel {k}");
+                    c.add(a.channel(i, k), b.channel(i, k), bound, at);
+                }
+            }
+            Ok(())
+        },
     },
 ];
 
-const WIDTH: usize = 65;
-const MIDDLE: usize = 24 * WIDTH + 32;
-
-const SPRITES: &str = "path = 'sprites'";
-const TILES: &str = "path = 'tiles'";
-
-/// `drawing`: keys of [draw].
-fn draw(desk: &mut Desk, drawing: &str, particles: Vec<Particle>) -> Result<Played> {
-    let scene = with_particles(desk, &format!("{PLAIN}[draw]\n{drawing}\n"), particles)?;
-    desk.play(&scene, 0)
+/// Returns how far two evaluations of one pixel with `n` layers may be apart. The effect of the
+/// opacities' errors is bounded by their total depth, which follows from alpha.
+pub(super) fn two_pictures_bound(alpha: f64, n: u32) -> f64 {
+    let tau = -(1.0 - alpha).max(1e-7).ln();
+    f64::from(n) * 2f64.powi(-22) + (2e-6 + 64.0 * U_F32) * tau
 }
 
-fn channel(played: &Played, i_pixel: usize, k: usize) -> f64 {
-    f64::from(played.rgba[4 * i_pixel + k])
+fn draw(ctx: &mut StressContext, keys: &str, particles: Vec<Particle>) -> Result<DeviceFrame> {
+    render_blobs(ctx, UNLIT, keys, particles)
 }
 
-fn thin(desk: &mut Desk, path: &str) -> Result<Found> {
+fn thin(ctx: &mut StressContext, c: &mut Comparison, path: &str) -> Result<()> {
     const N: u32 = 100_000;
-    let layer = Particle { color: DVec3::new(0.75, 0.5, 0.25), ..blob([0.0; 3], 0.5, 1e-5) };
-    let one = draw(desk, path, vec![layer])?;
-    let all = draw(desk, path, vec![layer; N as usize])?;
-    let is_tiled = path == TILES;
-    let mut c = Comparison::default();
-    for i in 0..WIDTH * 49 {
-        // Alone a layer is its own opacity, to the bit.
-        let a = channel(&one, i, 3);
+    let color = DVec3::new(0.75, 0.5, 0.25);
+    let layer = Particle { color, ..blob([0.0; 3], 0.5, 1e-5) };
+    let one = draw(ctx, path, vec![layer])?;
+    let all = draw(ctx, path, vec![layer; N as usize])?;
+    let n = f64::from(N);
+    for i in 0..WIDTH * HEIGHT {
+        // A single layer shows its opacity exactly.
+        let a = one.channel(i, 3);
         if a == 0.0 {
             continue;
         }
-        let n = f64::from(N);
-        let passed = n * (-a).ln_1p();
-        let truth = -passed.exp_m1();
-        // Blending: of every layer what is written is rounded, by 2 u of it, and (1 - a) of that
-        // goes on: no more than 2 u/a of it, and as much again by second orders. Tiles: A + (1 - A)
-        // a, whose sum is rounded as what it is; 1 - A and the product by 2 u of what is added, all
-        // of them once.
-        let bound = match is_tiled {
-            false => (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth,
-            true => (U_F32 * n + 4.0 * U_F32) * truth,
+        let truth = -(n * (-a).ln_1p()).exp_m1();
+        // Blending rounds every layer by 2 u of what is written, of which (1 - a) remains: at most
+        // 2 u/a of it, and as much again by second orders. Tiles: A + (1 - A) a, whose sum is
+        // rounded by u; 1 - A and the product by 2 u of the summand, in total of A.
+        let bound = if path == TILES {
+            (U_F32 * n + 4.0 * U_F32) * truth
+        } else {
+            (2.0 * U_F32 * n).min(4.0 * U_F32 / a) * truth
         };
-        c.add(channel(&all, i, 3), truth, bound, || format!("alpha, opacity {a:e} each"));
-        for (k, light) in [0.75, 0.5, 0.25].into_iter().enumerate() {
-            c.add(channel(&all, i, k), light * truth, bound, || {
-                format!("channel {k}, opacity {a:e} each")
-            });
+        c.add(all.channel(i, 3), truth, bound, format_args!("alpha, opacity {a:e} each"));
+        for k in 0..3 {
+            let at = format_args!("channel {k}, opacity {a:e} each");
+            c.add(all.channel(i, k), color[k] * truth, bound, at);
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn opaque(desk: &mut Desk, path: &str) -> Result<Found> {
+fn opaque(ctx: &mut StressContext, c: &mut Comparison, path: &str) -> Result<()> {
     let behind = Particle { color: DVec3::new(7.0, 5.0, 3.0), ..blob([0.0, 0.0, -2.0], 0.5, 3.0) };
     let before = Particle { color: DVec3::new(0.3, 0.6, 0.1), ..blob([0.0; 3], 0.5, 1e5) };
-    let played = draw(desk, path, vec![behind, before])?;
-    let mut c = Comparison::default();
-    c.add(channel(&played, MIDDLE, 3), 1.0, 0.0, || "alpha in the middle".to_owned());
+    let frame = draw(ctx, path, vec![behind, before])?;
+    c.exact(frame.channel(MIDDLE, 3), 1.0, "alpha in the middle");
     for k in 0..3 {
-        c.add(channel(&played, MIDDLE, k), f64::from(before.color[k] as f32), 0.0, || {
-            format!("channel {k} in the middle")
-        });
+        let at = format_args!("channel {k} in the middle");
+        c.exact(frame.channel(MIDDLE, k), before.color[k] as f32, at);
     }
-    c.add(played.n_odd() as f64, 0.0, 0.0, || "numbers that are not finite".to_owned());
-    Ok(c.into())
+    c.finite(&frame.rgba, "picture");
+    Ok(())
 }
 
-fn alternating(desk: &mut Desk) -> Result<Found> {
-    // From the farthest to the nearest: opaque, thin, opaque, thin; the nearest is thin.
-    let of = |i: u32| {
-        let z = -4.0 + 0.02 * f64::from(i);
-        let is_thin = i % 2 == 1;
-        let color = if is_thin {
-            DVec3::new(0.0, 1.0, 0.0)
+fn alternating(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    // From the farthest to the nearest layer; the nearest is thin.
+    let layer = |i: u32| {
+        let at = [0.0, 0.0, -4.0 + 0.02 * f64::from(i)];
+        if i % 2 == 1 {
+            Particle { color: DVec3::Y, ..blob(at, 0.5, 0.01) }
         } else {
-            DVec3::new(1.0, 0.0, f64::from(i) / 256.0)
-        };
-        Particle { color, ..blob([0.0, 0.0, z], 0.5, if is_thin { 0.01 } else { 1e4 }) }
+            Particle { color: DVec3::new(1.0, 0.0, f64::from(i) / 256.0), ..blob(at, 0.5, 1e4) }
+        }
     };
-    let all: Vec<Particle> = (0..200).map(of).collect();
-    let mut c = Comparison::default();
-    for path in [SPRITES, TILES] {
-        let thin = channel(&draw(desk, path, vec![all[199]])?, MIDDLE, 3);
-        // Of 32 bits, which have a sign; those of 16 count from the farthest.
-        let played = draw(desk, &format!("{path}\nsort_bits = 32"), all.clone())?;
+    let all: Vec<Particle> = (0..200).map(layer).collect();
+    for path in PATHS {
+        let thin = draw(ctx, path, vec![all[199]])?.channel(MIDDLE, 3);
+        // 32-bit keys have a sign; 16-bit keys count from the farthest particle.
+        let frame = draw(ctx, &format!("{path}\nsort_bits = 32"), all.clone())?;
         let last = all[198].color;
         let truth = [(1.0 - thin) * last.x, thin, (1.0 - thin) * last.z, 1.0];
-        for (k, truth) in truth.into_iter().enumerate() {
-            c.add(channel(&played, MIDDLE, k), truth, 2.0 * 2f64.powi(-23), || {
-                format!("{path}, channel {k}")
-            });
-        }
+        let values = (0..4).map(|k| frame.channel(MIDDLE, k));
+        c.each(values, truth, |_| 2.0 * 2f64.powi(-23), format_args!("{path}, channels"));
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn equal_depths(desk: &mut Desk) -> Result<Found> {
-    let colors = [DVec3::X, DVec3::Y, DVec3::Z];
-    let all: Vec<Particle> =
-        (0..30).map(|i| Particle { color: colors[i % 3], ..blob([0.0; 3], 0.5, 0.4) }).collect();
-    let mut c = Comparison::default();
-    for path in [SPRITES, TILES] {
-        let a = channel(&draw(desk, path, vec![all[0]])?, MIDDLE, 3);
-        let played = draw(desk, path, all.clone())?;
-        let mut truth = DVec3::ZERO;
-        all.iter().for_each(|p| truth = a * p.color + (1.0 - a) * truth);
-        for k in 0..3 {
-            let bound = 30.0 * 2f64.powi(-23) * truth[k].max(a);
-            c.add(channel(&played, MIDDLE, k), truth[k], bound, || format!("{path}, channel {k}"));
-        }
+fn equal_depths(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let all: Vec<Particle> = (0..30)
+        .map(|i| Particle { color: DVec3::AXES[i % 3], ..blob([0.0; 3], 0.5, 0.4) })
+        .collect();
+    for path in PATHS {
+        let a = draw(ctx, path, vec![all[0]])?.channel(MIDDLE, 3);
+        let frame = draw(ctx, path, all.clone())?;
+        let truth = all.iter().fold(DVec3::ZERO, |below, p| a * p.color + (1.0 - a) * below);
+        let values = (0..3).map(|k| frame.channel(MIDDLE, k));
+        let bound = |truth: f64| 30.0 * 2f64.powi(-23) * truth.max(a);
+        c.each(values, truth.to_array(), bound, format_args!("{path}, channels"));
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn one_colour(n: u32) -> Vec<Particle> {
-    heap(n).into_iter().map(|p| Particle { color: DVec3::new(0.8, 0.6, 0.4), ..p }).collect()
-}
-
-fn reversed(desk: &mut Desk) -> Result<Found> {
+fn reversed(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const N: u32 = 100;
-    // All at one depth: the order of the list is that of the layers.
-    let forwards: Vec<Particle> = one_colour(N)
+    // At one depth the order of the list is the order of the layers.
+    let forwards: Vec<Particle> = blob_cluster(N)
         .into_iter()
-        .map(|p| Particle { position: p.position * DVec3::new(1.0, 1.0, 0.0), ..p })
+        .map(|p| Particle {
+            color: DVec3::new(0.8, 0.6, 0.4),
+            position: p.position.with_z(0.0),
+            ..p
+        })
         .collect();
     let backwards: Vec<Particle> = forwards.iter().rev().copied().collect();
-    let mut c = Comparison::default();
-    for path in [SPRITES, TILES] {
-        let (a, b) = (draw(desk, path, forwards.clone())?, draw(desk, path, backwards.clone())?);
-        for (i, (a, b)) in a.rgba.iter().zip(&b.rgba).enumerate() {
-            let bound = f64::from(N) * 2f64.powi(-22) * f64::from(*b);
-            c.add(f64::from(*a), f64::from(*b), bound, || format!("{path}, number {i}"));
-        }
+    for path in PATHS {
+        let a = draw(ctx, path, forwards.clone())?.rgba;
+        let b = draw(ctx, path, backwards.clone())?.rgba;
+        c.each(a, b, |b| f64::from(N) * 2f64.powi(-22) * b, format_args!("{path}, picture"));
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn subnormal_opacity(desk: &mut Desk) -> Result<Found> {
+fn subnormal_opacity(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const TAU: f64 = 1e-41;
-    let mut c = Comparison::default();
-    for path in [SPRITES, TILES] {
-        let played = draw(desk, path, vec![blob([0.0; 3], 0.5, TAU); 1000])?;
-        for (i, v) in played.rgba.iter().enumerate() {
-            let bound = 1000.0 * (TAU + f64::from(f32::MIN_POSITIVE));
-            c.add(f64::from(*v), 0.0, bound, || format!("{path}, number {i}"));
+    let bound = 1000.0 * (TAU + f64::from(f32::MIN_POSITIVE));
+    for path in PATHS {
+        let frame = draw(ctx, path, vec![blob([0.0; 3], 0.5, TAU); 1000])?;
+        for v in frame.rgba {
+            c.add(v, 0.0, bound, format_args!("{path}, value of the picture"));
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn subnormal_colour(desk: &mut Desk) -> Result<Found> {
+fn subnormal_colour(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const LIGHT: f64 = 1e-39;
-    let mut c = Comparison::default();
-    for path in [SPRITES, TILES] {
-        let all: Vec<Particle> =
-            heap(300).into_iter().map(|p| Particle { color: DVec3::splat(LIGHT), ..p }).collect();
-        let played = draw(desk, path, all)?;
-        for i in 0..WIDTH * 49 {
+    let bound = LIGHT + 300.0 * f64::from(f32::MIN_POSITIVE);
+    let all: Vec<Particle> = blob_cluster(300)
+        .into_iter()
+        .map(|p| Particle { color: DVec3::splat(LIGHT), ..p })
+        .collect();
+    for path in PATHS {
+        let frame = draw(ctx, path, all.clone())?;
+        for i in 0..WIDTH * HEIGHT {
             for k in 0..3 {
-                let bound = LIGHT + 300.0 * f64::from(f32::MIN_POSITIVE);
-                c.add(channel(&played, i, k), 0.0, bound, || {
-                    format!("{path}, pixel {i}, channel {k}")
-                });
+                let at = format_args!("{path}, pixel {i}, channel {k}");
+                c.add(frame.channel(i, k), 0.0, bound, at);
             }
-            c.holds((0.0..=1.0).contains(&channel(&played, i, 3)), || {
-                format!("{path}, alpha of pixel {i}")
-            });
+            let is_alpha = (0.0..=1.0).contains(&frame.channel(i, 3));
+            c.holds(is_alpha, format_args!("{path}, alpha of pixel {i} within 0 and 1"));
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn bright(desk: &mut Desk) -> Result<Found> {
-    const LIGHT: f64 = 1e30;
-    let mut c = Comparison::default();
-    for path in [SPRITES, TILES] {
-        let layer = Particle { color: DVec3::splat(LIGHT), ..blob([0.0; 3], 0.5, 0.7) };
-        let played = draw(desk, path, vec![layer])?;
-        for i in 0..WIDTH * 49 {
-            let truth = f64::from(LIGHT as f32) * channel(&played, i, 3);
-            c.add(channel(&played, i, 0), truth, 2f64.powi(-22) * truth, || {
-                format!("{path}, pixel {i}")
-            });
+fn bright(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let light = 1e30f32;
+    let layer = Particle { color: DVec3::splat(1e30), ..blob([0.0; 3], 0.5, 0.7) };
+    for path in PATHS {
+        let frame = draw(ctx, path, vec![layer])?;
+        for i in 0..WIDTH * HEIGHT {
+            let truth = f64::from(light) * frame.channel(i, 3);
+            let at = format_args!("{path}, pixel {i}");
+            c.add(frame.channel(i, 0), truth, 2f64.powi(-22) * truth, at);
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn saturated_half(desk: &mut Desk) -> Result<Found> {
+fn saturated_half(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     let layer = Particle { color: DVec3::splat(1e6), ..blob([0.0; 3], 0.5, 1e5) };
-    let text = PLAIN.replace("rgba32f", "rgba16f");
-    let mut c = Comparison::default();
+    let text = UNLIT.replace("rgba32f", "rgba16f");
     let mut n_infinite = 0;
-    for path in [SPRITES, TILES] {
-        let scene: Scene = with_particles(desk, &format!("{text}[draw]\n{path}\n"), vec![layer])?;
-        let played = desk.play(&scene, 0)?;
-        c.add(channel(&played, MIDDLE, 3), 1.0, 0.0, || format!("{path}, alpha"));
-        let red = channel(&played, MIDDLE, 0);
-        // Vulkan lets a conversion overflow either way.
-        c.holds(red == f64::INFINITY || red == 65504.0, || format!("{path}, red {red}"));
-        c.holds(!played.rgba.iter().any(|v| v.is_nan()), || format!("{path}, that none is NaN"));
-        n_infinite += played.n_odd();
+    for path in PATHS {
+        let frame = render_blobs(ctx, &text, path, vec![layer])?;
+        c.exact(frame.channel(MIDDLE, 3), 1.0, format_args!("{path}, alpha"));
+        let red = frame.channel(MIDDLE, 0);
+        // Vulkan allows a conversion to overflow either way.
+        let is_overflow = red == f64::INFINITY || red == 65504.0;
+        c.holds(is_overflow, format_args!("{path}, red {red} is infinity or 65504"));
+        c.holds(!frame.rgba.iter().any(|v| v.is_nan()), format_args!("{path}, no NaN"));
+        n_infinite += frame.rgba.iter().filter(|v| !v.is_finite()).count();
     }
-    Ok(c.remark(format!("{n_infinite} numbers are infinite")).into())
-}
-
-fn paths(desk: &mut Desk) -> Result<Found> {
-    const N: u32 = 800;
-    // At 8 sigma the step at a sprite's rim is nothing, and it does not matter who has it.
-    let [a, b] = ["path = 'sprites'\ncutoff = 8", "path = 'tiles'\ncutoff = 8"]
-        .map(|drawing| draw(desk, drawing, heap(N)));
-    let (a, b) = (a?, b?);
-    let mut c = Comparison::default();
-    for i in 0..WIDTH * 49 {
-        // What the opacities' errors can do is bounded by the depth of all of them, which alpha
-        // tells where it is not full.
-        let tau = -(1.0 - channel(&a, i, 3)).max(1e-7).ln();
-        let bound = f64::from(N) * 2f64.powi(-22) + (2e-6 + 64.0 * U_F32) * tau;
-        for k in 0..4 {
-            c.add(channel(&a, i, k), channel(&b, i, k), bound, || {
-                format!("pixel {i}, channel {k}")
-            });
-        }
-    }
-    Ok(c.into())
+    c.remark(format!("{n_infinite} values are infinite"));
+    Ok(())
 }

@@ -1,12 +1,15 @@
-//! Count by distance, C (4) to (6), at the edge: no distance and an endless one, no size, as many
-//! as 32 bits hold, one for all.
+//! The number of particles by distance, C (4) to (6): no distance and infinite distance, no size,
+//! the largest counts, a single particle for all.
+
+use std::cmp::Ordering;
 
 use glam::DVec3;
 
-use super::case::{Case, Comparison, Found};
-use super::desk::Desk;
-use super::scenes::{PLAIN, blob, with_particles};
+use super::case::{Case, Comparison};
+use super::context::StressContext;
+use super::scenes::{MIDDLE, PATHS, UNLIT, blob, render_blobs};
 use crate::error::Result;
+use crate::layout::particle::DrawnRecord;
 use crate::model::cloud::Group;
 use crate::model::count::{Count, DrawnCount, MIN_DRAWN};
 use crate::reference::count::weights;
@@ -15,61 +18,66 @@ use crate::reference::rounding::U_F32;
 pub const CASES: &[Case] = &[
     Case {
         name: "count/at-the-eye",
-        what: "a cloud at distance 0, and one behind the eye (a negative distance): all of it",
+        what: "clouds at distance 0 and behind the eye (negative distance): every particle",
         bound: "0",
-        run: at_the_eye,
+        check: at_the_eye,
     },
     Case {
         name: "count/nowhere",
-        what: "distances that are huge, infinite or no numbers: nothing, and no factor that is odd",
+        what: "distances that are huge, infinite or NaN: no particle, finite factors",
         bound: "0",
-        run: nowhere,
+        check: |_, c| {
+            for d in [1e6, 1e30, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
+                nothing(c, 1.0, d);
+            }
+            Ok(())
+        },
     },
     Case {
         name: "count/no-size",
-        what: "clouds whose size falls to 0: nothing, and no factor that is odd",
+        what: "clouds whose size falls to 0: no particle, finite factors",
         bound: "0",
-        run: no_size,
+        check: |_, c| {
+            for scale in [1e-4, 1e-30, 1e-120, 5e-324, 0.0, f64::NAN] {
+                nothing(c, scale, 1.0);
+            }
+            Ok(())
+        },
     },
     Case {
         name: "count/most",
-        what: "2^32 - 1 particles, all of them or nearly: the count stays within 32 bits",
+        what: "2^32 - 1 particles, all or nearly all drawn: the count fits into 32 bits",
         bound: "2^-52 of the count",
-        run: most,
+        check: most,
     },
     Case {
         name: "count/conserved",
-        what: "the sum of all optical depths as the count falls to 1: what it was",
+        what: "the sum of the optical depths is constant as the count falls to 1",
         bound: "3 u of f32's factors",
-        run: conserved,
+        check: conserved,
     },
     Case {
         name: "count/weights",
-        what: "each particle's factor against the reference, from all of them to a \
+        what: "the factor of each particle against the reference, from all particles to a \
             millionth of one",
         bound: "3 u of f32's factors, and 2^-52 of the count",
-        run: each_weight,
+        check: each_weight,
     },
     Case {
         name: "count/drawn",
-        what: "opacity of coincident blobs as the device draws fewer of them: what all \
-            together have",
+        what: "the opacity of coincident blobs is constant as the device draws fewer of them",
         bound: "(1e-6 + 16 u) tau, and 2^-23 a layer",
-        run: drawn,
+        check: drawn,
     },
 ];
 
 const COUNT: Count = Count { a: 280.0, d0: 1.0, normalised: false, conserve: true };
 
-/// What the device is told of a group of `n`: factors on κ, particle by particle that is drawn.
-fn told(n: u32, drawn: &DrawnCount) -> (u32, f64, f64) {
-    let record = crate::layout::particle::DrawnRecord::new(&group(n), drawn, 0);
-    (record.end, f64::from(record.kappa_scale), f64::from(record.last_weight))
-}
-
-fn group(n: u32) -> Group {
-    Group {
-        facing_from: glam::DVec3::ZERO,
+/// Returns the device's record of a group of `n` particles: the number drawn, the factor on κ and
+/// the weight of the last particle.
+fn record(n: u32, drawn: &DrawnCount) -> (u32, f64, f64) {
+    let group = Group {
+        facing_from: DVec3::ZERO,
         aspects: [1.0; 3],
         i_cloud: 0,
         i_first: 0,
@@ -84,135 +92,109 @@ fn group(n: u32) -> Group {
         kappa_max: 1.0,
         mass_max: 1.0,
         gust_reach: 0.0,
-    }
+    };
+    let record = DrawnRecord::new(&group, drawn, 0);
+    (record.end, f64::from(record.kappa_scale), f64::from(record.last_weight))
 }
 
-fn at_the_eye(_: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
+fn at_the_eye(_: &mut StressContext, c: &mut Comparison) -> Result<()> {
     for d in [0.0, -0.0, -1e-300, -3.0, -1e300, f64::NEG_INFINITY] {
         for n in [1, 7, 1_000_000] {
-            let (end, scale, last) = told(n, &COUNT.drawn(n, COUNT.share(1.0, d)));
-            for (value, truth) in [(f64::from(end), f64::from(n)), (scale, 1.0), (last, 1.0)] {
-                c.add(value, truth, 0.0, || format!("{n} particles at {d:e}"));
-            }
+            let (end, scale, last) = record(n, &COUNT.drawn(n, COUNT.share(1.0, d)));
+            c.exact(end, n, format_args!("particles drawn of {n} at {d:e}"));
+            c.exact(scale, 1.0, format_args!("factor of {n} particles at {d:e}"));
+            c.exact(last, 1.0, format_args!("last weight of {n} particles at {d:e}"));
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-/// Adds that nothing is drawn, and that what would be multiplied is finite.
-fn nothing(c: &mut Comparison, drawn: &DrawnCount, what: &str) {
-    let (end, scale, last) = told(1000, drawn);
-    c.add(f64::from(end), 0.0, 0.0, || format!("particles {what}"));
-    c.holds(scale.is_finite() && last.is_finite(), || format!("finite factors {what}"));
+/// Checks that no particle of a cloud is drawn and that its factors are finite.
+fn nothing(c: &mut Comparison, scale: f64, distance: f64) {
+    let (end, factor, last) = record(1000, &COUNT.drawn(1000, COUNT.share(scale, distance)));
+    c.exact(end, 0.0, format_args!("particles drawn at {distance:e}, size {scale:e}"));
+    c.holds(
+        factor.is_finite() && last.is_finite(),
+        format_args!("finite factors at {distance:e}, size {scale:e}"),
+    );
 }
 
-fn nowhere(_: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
-    for d in [1e6, 1e30, 1e300, f64::MAX, f64::INFINITY, f64::NAN] {
-        nothing(&mut c, &COUNT.drawn(1000, COUNT.share(1.0, d)), &format!("at {d:e}"));
-    }
-    Ok(c.into())
-}
-
-fn no_size(_: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
-    for scale in [1e-4, 1e-30, 1e-120, 5e-324, 0.0, f64::NAN] {
-        nothing(&mut c, &COUNT.drawn(1000, COUNT.share(scale, 1.0)), &format!("of size {scale:e}"));
-    }
-    Ok(c.into())
-}
-
-fn most(_: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
+fn most(_: &mut StressContext, c: &mut Comparison) -> Result<()> {
     let n = u32::MAX;
     for share in [1.0, 1.0f64.next_down(), 1.0 - 1e-9, 0.5, 1e-3] {
         let drawn = COUNT.drawn(n, share);
         let x = f64::from(n) * share;
-        c.add(f64::from(drawn.n) - 1.0 + drawn.last_weight, x, 2f64.powi(-52) * x, || {
-            format!("count of share {share}")
-        });
-        c.holds(drawn.last_weight > 0.0 && drawn.last_weight <= 1.0, || {
-            format!("the last one's weight of share {share}")
-        });
+        let count = f64::from(drawn.n) - 1.0 + drawn.last_weight;
+        c.add(count, x, 2f64.powi(-52) * x, format_args!("count of share {share}"));
+        let is_weight = drawn.last_weight > 0.0 && drawn.last_weight <= 1.0;
+        c.holds(is_weight, format_args!("last weight of share {share} within 0 and 1"));
     }
     for d in [0.0, -1e9] {
-        c.add(f64::from(COUNT.drawn(n, COUNT.share(1e9, d)).n), f64::from(n), 0.0, || {
-            format!("all, at {d:e}")
-        });
+        c.exact(COUNT.drawn(n, COUNT.share(1e9, d)).n, n, format_args!("all, at {d:e}"));
     }
-    Ok(c.into())
+    Ok(())
 }
 
-/// Shares from 1 down to where one of `n` is left.
-fn shares(n: u32) -> impl Iterator<Item = f64> {
-    (0..=200).map(move |k| f64::from(n).powf(-f64::from(k) / 200.0))
-}
-
-fn conserved(_: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
+fn conserved(_: &mut StressContext, c: &mut Comparison) -> Result<()> {
     for n in [1, 2, 3, 17, 1000, 1_000_000] {
-        for share in shares(n) {
-            let (end, scale, last) = told(n, &COUNT.drawn(n, share));
+        // From all particles down to a single one.
+        for k in 0..=200 {
+            let share = f64::from(n).powf(-f64::from(k) / 200.0);
+            let (end, scale, last) = record(n, &COUNT.drawn(n, share));
             let sum = scale * (f64::from(end) - 1.0 + last);
-            // The factor and the weight are rounded to f32, and the weight is 1 at most.
-            c.add(sum, f64::from(n), 3.0 * U_F32 * f64::from(n), || {
-                format!("{n} particles, share {share:e}")
-            });
+            // Factor and weight are rounded to f32; the weight is at most 1.
+            let bound = 3.0 * U_F32 * f64::from(n);
+            c.add(sum, n, bound, format_args!("{n} particles, share {share:e}"));
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn each_weight(_: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
+fn each_weight(_: &mut StressContext, c: &mut Comparison) -> Result<()> {
     for conserve in [true, false] {
         let count = Count { conserve, ..COUNT };
         for n in [1u32, 5, 37] {
             for k in 0..600 {
                 let share = 1.0 / f64::from(n) * f64::from(n).powf(1.0 - f64::from(k) / 300.0);
-                let drawn = count.drawn(n, share);
-                let (end, scale, last) = told(n, &drawn);
-                let truth = weights(n, share, conserve);
                 if f64::from(n) * share < MIN_DRAWN {
                     continue;
                 }
-                for (i, truth) in (0..n).zip(truth) {
+                let (end, scale, last) = record(n, &count.drawn(n, share));
+                for (i, truth) in (0..n).zip(weights(n, share, conserve)) {
                     let value = match (i + 1).cmp(&end) {
-                        std::cmp::Ordering::Less => scale,
-                        std::cmp::Ordering::Equal => scale * last,
-                        std::cmp::Ordering::Greater => 0.0,
+                        Ordering::Less => scale,
+                        Ordering::Equal => scale * last,
+                        Ordering::Greater => 0.0,
                     };
-                    // The last one's weight is a difference of the count.
+                    // The last weight is a difference of the count.
                     let bound = 3.0 * U_F32 * truth + 2f64.powi(-52) * f64::from(n) * scale;
-                    c.add(value, truth, bound, || format!("particle {i} of {n}, share {share:e}"));
+                    c.add(
+                        value,
+                        truth,
+                        bound,
+                        format_args!("particle {i} of {n}, share {share:e}"),
+                    );
                 }
             }
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn drawn(desk: &mut Desk) -> Result<Found> {
+fn drawn(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const N: u32 = 64;
-    const TAU: f64 = 0.02;
-    let mut c = Comparison::default();
-    for path in ["sprites", "tiles"] {
-        // Of C's formula with d0 = 1 the eye at 10 sees e^{-10/a}: from all to one.
+    // At least one particle is drawn, which stands for all of them.
+    const TAU: f64 = N as f64 * 0.02;
+    let blobs = vec![blob([0.0; 3], 0.5, 0.02); N as usize];
+    for path in PATHS {
+        // By C's formula the eye at 10 sees a share e^{-10/a}: from all of them to one.
         for a in [1e9, 20.0, 5.0, 3.0, 2.45] {
-            let text = format!(
-                "{PLAIN}[draw]\npath = '{path}'\ncount = 'distance'\ncount_a = \
-                 {a:?}\ncount_d0 = 1.0\n"
-            );
-            let scene = with_particles(desk, &text, vec![blob([0.0; 3], 0.5, TAU); N as usize])?;
-            let played = desk.play(&scene, 0)?;
-            let middle = played.rgba[4 * (24 * 65 + 32) + 3];
-            // No fewer than one of them is there, which stands for all.
-            let tau = f64::from(N) * TAU;
-            let truth = -(-tau).exp_m1();
-            let bound = (1e-6 + 16.0 * U_F32) * tau + f64::from(N) * 2f64.powi(-23);
-            c.add(f64::from(middle), truth, bound, || format!("{path}, a = {a}"));
+            let draw = format!("{path}\ncount = 'distance'\ncount_a = {a:?}\ncount_d0 = 1.0");
+            let frame = render_blobs(ctx, UNLIT, &draw, blobs.clone())?;
+            let bound = (1e-6 + 16.0 * U_F32) * TAU + f64::from(N) * 2f64.powi(-23);
+            let at = format_args!("{path}, a = {a}");
+            c.add(frame.channel(MIDDLE, 3), -(-TAU).exp_m1(), bound, at);
         }
     }
-    Ok(c.into())
+    Ok(())
 }

@@ -1,115 +1,133 @@
-//! The same bytes whatever way a frame is made: again, in workgroups of other sizes, on one thread
-//! or two, with what is left out and without, alone or after others, from memory that holds NaN.
+//! Frames that must have the same bytes however they are computed: repeated, with other workgroup
+//! sizes, on one or two threads, with and without skipping, alone or in sequence, from poisoned
+//! memory.
 
-use super::case::{Case, Comparison, Found};
-use super::desk::Desk;
-use super::scenes::{LIT, heap, one_box, with_boxes};
+use glam::DVec3;
+
+use super::case::{Case, Comparison};
+use super::context::StressContext;
+use super::scenes::{LIT, PATHS, blob_cluster, box_scene, centred_box, cloud_of};
 use crate::error::Result;
+use crate::frame::render::Renderer;
 use crate::frame::{FrameTimes, parallel, serial};
 use crate::model::cloud::CloudSource;
 use crate::model::gust::Gust;
 use crate::model::scene::{Scene, Threading};
-use crate::stress::scenes::cloud_of;
 
 pub const CASES: &[Case] = &[
     Case {
         name: "determinism/runs",
-        what: "a frame of everything, made twice",
+        what: "a frame with every feature, rendered twice",
         bound: "0: the same bytes",
-        run: runs,
+        check: |ctx, c| {
+            for path in PATHS {
+                let scene = full_scene(path)?;
+                let (a, b) = (ctx.render(&scene, 2)?, ctx.render(&scene, 2)?);
+                c.same(&a.bytes, &b.bytes, format_args!("bytes, {path}"));
+                c.same(&a.lit, &b.lit, format_args!("lit facets, {path}"));
+                let is_drawn = a.bytes.iter().any(|b| *b != 0);
+                c.holds(is_drawn, format_args!("the picture is not empty, {path}"));
+            }
+            Ok(())
+        },
     },
     Case {
         name: "determinism/workgroups-32",
-        what: "shaders that work by single records in workgroups of 32 and not 64",
+        what: "shaders that treat single records, in workgroups of 32 instead of 64",
         bound: "0: the same bytes",
-        run: |desk| workgroups(desk, 32),
+        check: |ctx, c| {
+            let other = ctx.with_workgroup_size(32)?;
+            same_on(ctx, c, other)
+        },
     },
     Case {
         name: "determinism/workgroups-128",
-        what: "shaders that work by single records in workgroups of 128",
+        what: "shaders that treat single records, in workgroups of 128 instead of 64",
         bound: "0: the same bytes",
-        run: |desk| workgroups(desk, 128),
+        check: |ctx, c| {
+            let other = ctx.with_workgroup_size(128)?;
+            same_on(ctx, c, other)
+        },
     },
     Case {
         name: "determinism/threads",
-        what: "six frames, game step and render step side by side and one after the other",
+        what: "six frames, with game step and render step in parallel and in sequence",
         bound: "0: the same bytes",
-        run: threads,
+        check: |ctx, c| same_frames(ctx, c, (Threading::Serial, true), (Threading::Parallel, true)),
     },
     Case {
         name: "determinism/skipping",
-        what: "six frames with what they do not need left out, and with everything done",
+        what: "six frames with skipping of unchanged passes and without",
         bound: "0: the same bytes",
-        run: skipping,
+        check: |ctx, c| same_frames(ctx, c, (Threading::Serial, true), (Threading::Serial, false)),
     },
     Case {
         name: "determinism/alone",
-        what: "a frame after five others, and the same one alone",
+        what: "a frame after five others, and the same frame alone",
         bound: "0: the same bytes",
-        run: alone,
+        check: |ctx, c| {
+            for path in PATHS {
+                let scene = full_scene(path)?;
+                let all = frames(ctx, &scene, Threading::Serial, true)?;
+                let alone = ctx.render(&scene, N_FRAMES - 1)?;
+                let last = &all[N_FRAMES as usize - 1];
+                c.same(last, &alone.bytes, format_args!("bytes, {path}"));
+            }
+            Ok(())
+        },
     },
     Case {
         name: "determinism/poison",
-        what: "buffers that hold NaN before anything is written to them, and others",
+        what: "buffers filled with NaN at allocation, and buffers that are not",
         bound: "0: the same bytes",
-        run: poison,
+        check: |ctx, c| {
+            let poisoned = ctx.with_poison()?;
+            same_on(ctx, c, poisoned)
+        },
     },
 ];
 
-/// Boxes beside a list, gusts and wind, two reflections, a floor; drawn by `path`.
-fn everything(desk: &Desk, path: &str) -> Result<Scene> {
+const N_FRAMES: u32 = 6;
+
+/// Returns a scene with boxes, a list of particles, gusts, wind, two reflections and a floor.
+fn full_scene(path: &str) -> Result<Scene> {
     let text = LIT.replace("mode = 'first'", "mode = 'two-reflection'\nfacets_per_cloud = 48");
     let text = format!(
-        "{text}[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 4]\nv = [4, 0, 0]\nsubdivide = [3, \
-         3]\nmaterial = 'cloud'\n\
-         [time]\nstep_s = 0.25\n[draw]\npath = '{path}'\n"
+        "{text}[[surface]]\ncenter = [0, -3, 0]\nu = [0, 0, 4]\nv = [4, 0, 0]\n\
+         subdivide = [3, 3]\nmaterial = 'cloud'\n[time]\nstep_s = 0.25\n[draw]\n{path}\n"
     );
-    let mut scene = with_boxes(
-        desk,
-        &text,
-        vec![one_box(150, [2.0, 1.0, 2.0], 0.8), one_box(80, [1.0, 2.0, 1.0], 0.5)],
-    )?;
+    let boxes = vec![centred_box(150, [2.0, 1.0, 2.0], 0.8), centred_box(80, [1.0, 2.0, 1.0], 0.5)];
+    let mut scene = box_scene(&text, boxes)?;
     scene.clouds[0].gust = Gust { amplitude: 0.2, length: 2.0, period_s: 3.0, n_waves: 8 };
-    let mut list = cloud_of(CloudSource::Particles(heap(60)));
-    list.wind = glam::DVec3::new(0.3, 0.0, -0.1);
+    let mut list = cloud_of(CloudSource::Particles(blob_cluster(60)));
+    list.wind = DVec3::new(0.3, 0.0, -0.1);
     scene.clouds.push(list);
     Ok(scene)
 }
 
-const PATHS: [&str; 2] = ["sprites", "tiles"];
-const N_FRAMES: u32 = 6;
-
-fn runs(desk: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
+/// Compares a frame with that of another context.
+fn same_on(ctx: &mut StressContext, c: &mut Comparison, mut other: StressContext) -> Result<()> {
     for path in PATHS {
-        let scene = everything(desk, path)?;
-        let (a, b) = (desk.play(&scene, 2)?, desk.play(&scene, 2)?);
-        c.same(&a.bytes, &b.bytes, &format!("bytes, {path}"));
-        c.same(&a.lit, &b.lit, &format!("lit facets, {path}"));
-        c.holds(a.bytes.iter().any(|b| *b != 0), || format!("that something is drawn, {path}"));
+        let scene = full_scene(path)?;
+        let (a, b) = (ctx.render(&scene, 2)?, other.render(&scene, 2)?);
+        c.same(&a.bytes, &b.bytes, format_args!("bytes, {path}"));
+        c.same(&a.particles, &b.particles, format_args!("particles, {path}"));
+        c.same(&a.lit, &b.lit, format_args!("lit facets, {path}"));
+        c.finite(&b.rgba, path);
     }
-    Ok(c.into())
+    other.close()
 }
 
-fn workgroups(desk: &mut Desk, n: u32) -> Result<Found> {
-    let mut other = desk.in_workgroups_of(n)?;
-    let mut c = Comparison::default();
-    for path in PATHS {
-        let scene = everything(desk, path)?;
-        let (a, b) = (desk.play(&scene, 2)?, other.play(&scene, 2)?);
-        c.same(&a.bytes, &b.bytes, &format!("bytes, {path}"));
-        c.same(&a.particles, &b.particles, &format!("particles, {path}"));
-        c.same(&a.lit, &b.lit, &format!("lit facets, {path}"));
-    }
-    other.close()?;
-    Ok(c.into())
-}
-
-/// The bytes of every frame of a run.
-fn frames(desk: &Desk, scene: &Scene, threading: Threading, skip: bool) -> Result<Vec<Vec<u8>>> {
-    let mut player = desk.player(scene, skip)?;
+/// Returns the bytes of every frame of a run.
+fn frames(
+    ctx: &StressContext,
+    scene: &Scene,
+    threading: Threading,
+    skip: bool,
+) -> Result<Vec<Vec<u8>>> {
+    let mut player = ctx.player(scene, skip)?;
     let mut all = Vec::new();
-    let on_frame = &mut |_: FrameTimes, renderer: &mut crate::frame::render::Renderer| {
+    let on_frame = &mut |_: FrameTimes, renderer: &mut Renderer| {
         all.push(renderer.image_bytes()?);
         Ok(true)
     };
@@ -121,50 +139,20 @@ fn frames(desk: &Desk, scene: &Scene, threading: Threading, skip: bool) -> Resul
     Ok(all)
 }
 
-fn compare(desk: &Desk, a: (Threading, bool), b: (Threading, bool)) -> Result<Found> {
-    let mut c = Comparison::default();
+/// Compares the frames of two runs, each given by its threading and whether it skips passes.
+fn same_frames(
+    ctx: &StressContext,
+    c: &mut Comparison,
+    a: (Threading, bool),
+    b: (Threading, bool),
+) -> Result<()> {
     for path in PATHS {
-        let scene = everything(desk, path)?;
-        let (a, b) = (frames(desk, &scene, a.0, a.1)?, frames(desk, &scene, b.0, b.1)?);
+        let scene = full_scene(path)?;
+        let (a, b) = (frames(ctx, &scene, a.0, a.1)?, frames(ctx, &scene, b.0, b.1)?);
         for (i, (a, b)) in a.iter().zip(&b).enumerate() {
-            c.same(a, b, &format!("bytes of frame {i}, {path}"));
+            c.same(a, b, format_args!("bytes of frame {i}, {path}"));
         }
-        c.holds(a.len() == N_FRAMES as usize && a[0] != a[1], || {
-            "frames that differ from each other".to_owned()
-        });
+        c.holds(a.len() == N_FRAMES as usize && a[0] != a[1], "the frames of a run differ");
     }
-    Ok(c.into())
-}
-
-fn threads(desk: &mut Desk) -> Result<Found> {
-    compare(desk, (Threading::Serial, true), (Threading::Parallel, true))
-}
-
-fn skipping(desk: &mut Desk) -> Result<Found> {
-    compare(desk, (Threading::Serial, true), (Threading::Serial, false))
-}
-
-fn alone(desk: &mut Desk) -> Result<Found> {
-    let mut c = Comparison::default();
-    for path in PATHS {
-        let scene = everything(desk, path)?;
-        let after = frames(desk, &scene, Threading::Serial, true)?;
-        let alone = desk.play(&scene, N_FRAMES - 1)?;
-        c.same(&after[N_FRAMES as usize - 1], &alone.bytes, &format!("bytes, {path}"));
-    }
-    Ok(c.into())
-}
-
-fn poison(desk: &mut Desk) -> Result<Found> {
-    let mut poisoned = desk.poisoned()?;
-    let mut c = Comparison::default();
-    for path in PATHS {
-        let scene = everything(desk, path)?;
-        let (a, b) = (desk.play(&scene, 2)?, poisoned.play(&scene, 2)?);
-        c.same(&a.bytes, &b.bytes, &format!("bytes, {path}"));
-        c.same(&a.lit, &b.lit, &format!("lit facets, {path}"));
-        c.add(b.n_odd() as f64, 0.0, 0.0, || format!("numbers that are not finite, {path}"));
-    }
-    poisoned.close()?;
-    Ok(c.into())
+    Ok(())
 }

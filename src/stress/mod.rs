@@ -1,31 +1,34 @@
-//! `nimbus stress`: whether a device computes at the edges what nimbus claims, case by case, each
-//! with a bound that is derived (docs/stability.md) from the precision that Vulkan promises.
+//! The numerical stress suite, `nimbus stress`: computations of the device at the limits of the
+//! accepted input, compared with `f64` references.
+//!
+//! Every case has an error bound derived from the precision that Vulkan guarantees; see
+//! docs/stability.md. [`cases`] lists the cases, [`Case::run`] runs one on a [`StressContext`].
 
 mod brdf;
 mod case;
 mod compositing;
+mod context;
 mod count;
-mod desk;
 mod determinism;
 mod functions;
 mod generation;
 mod live;
 mod metamorphic;
 mod moisture;
-mod run;
 mod scenes;
 mod sorting;
 mod space;
+mod sums;
 mod transmittance;
 mod transport;
+mod views;
 
-pub use case::{Case, Comparison, Found, Outcome, Verdict, Worst};
-pub use desk::{Desk, Played};
-pub use run::run_case;
+pub use case::{Case, Comparison, Outcome, Verdict, Worst};
+pub use context::{DeviceFrame, StressContext};
 
-/// Every case, family by family.
+/// Returns every case, family by family.
 pub fn cases() -> Vec<Case> {
-    let families: [&[Case]; 13] = [
+    [
         functions::CASES,
         generation::CASES,
         live::CASES,
@@ -33,12 +36,14 @@ pub fn cases() -> Vec<Case> {
         moisture::CASES,
         brdf::CASES,
         transport::CASES,
+        sums::CASES,
         transmittance::CASES,
         sorting::CASES,
         compositing::CASES,
         space::CASES,
+        views::CASES,
         determinism::CASES,
         metamorphic::CASES,
-    ];
-    families.concat()
+    ]
+    .concat()
 }

@@ -1,39 +1,67 @@
-//! Scenes of the suite: a text without files, and clouds put into it.
+//! Scenes of the stress suite: scene texts without files, and clouds and surfaces added to them.
+
+use std::path::Path;
 
 use glam::DVec3;
 
-use super::desk::Desk;
+use super::context::{DeviceFrame, StressContext};
 use crate::error::Result;
+use crate::io::scene_file::parse;
 use crate::model::boxes::{CloudBox, Form};
-use crate::model::cloud::{Cloud, CloudSource, Particle, SQRT_TAU};
+use crate::model::cloud::{Cloud, CloudSource, Facing, Particle, SQRT_TAU};
 use crate::model::growth::Growth;
 use crate::model::gust::Gust;
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
 use crate::model::texture::Texture;
 
-/// An odd number of pixels, so that there is one in the middle; numbers are kept as they are.
-pub const PLAIN: &str = "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, \
-    0]\n\
+/// Picture width of the suite's scenes, px. Odd, so that one column lies in the middle.
+pub const WIDTH: usize = 65;
+/// Picture height of the suite's scenes, px.
+pub const HEIGHT: usize = 49;
+/// Index of the pixel in the middle of the picture.
+pub const MIDDLE: usize = HEIGHT / 2 * WIDTH + WIDTH / 2;
+
+/// A scene without light or clouds. Its film stores the values without rounding them again.
+pub const UNLIT: &str = "\
+    [film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
     [camera]\nposition = [0, 0, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = 'none'\n";
 
-/// The same lit by a sun and the sky.
-pub const LIT: &str = "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, \
-    0]\n\
+/// The same scene with a sun, a sky and a white cloud material.
+pub const LIT: &str = "\
+    [film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
     [camera]\nposition = [0, 0, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = 'first'\ngrid = 24\n\
     [[light]]\nkind = 'directional'\ndirection = [-0.5, -0.8, -0.3]\nirradiance = [3, 2.9, 2.7]\n\
     [[light]]\nkind = 'sky'\nirradiance = [0.8, 0.87, 1]\nconstant = 0.25\n\
     [[material]]\nname = 'cloud'\nkd = [0.9, 0.9, 0.9]\n";
 
+/// Keys of `[draw]` that select the sprite path.
+pub const SPRITES: &str = "path = 'sprites'";
+/// Keys of `[draw]` that select the tile path.
+pub const TILES: &str = "path = 'tiles'";
+/// Both drawing paths.
+pub const PATHS: [&str; 2] = [SPRITES, TILES];
+
 /// The seed of the suite's clouds.
 pub const SEED: u32 = 9;
-
-/// Of a thickness that shows.
+/// Optical depth of the clouds of boxes.
 pub const OPTICAL_DEPTH: f64 = 1.3;
 
+/// A sun in the zenith.
+pub const SUN_ABOVE: &str =
+    "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
+/// Keys of a diffuse grey material.
+pub const GREY: &str = "kd = [0.5, 0.5, 0.5]\n";
+
+/// Parses the text of a scene that names no files.
+pub fn parse_scene(text: &str) -> Result<Scene> {
+    Ok(parse(text.to_owned(), Path::new("stress.toml"), &[], None)?.scene)
+}
+
+/// Returns a cloud at the origin, at rest.
 pub fn cloud_of(source: CloudSource) -> Cloud {
     Cloud {
-        facing: crate::model::cloud::Facing::Outward,
+        facing: Facing::Outward,
         source,
         position: DVec3::ZERO,
         wind: DVec3::ZERO,
@@ -45,31 +73,41 @@ pub fn cloud_of(source: CloudSource) -> Cloud {
     }
 }
 
-/// `text` with a cloud of boxes.
-pub fn with_boxes(desk: &Desk, text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
-    let source = CloudSource::Boxes {
+/// Parses a scene text and adds a cloud of boxes.
+pub fn box_scene(text: &str, boxes: Vec<CloudBox>) -> Result<Scene> {
+    let mut scene = parse_scene(text)?;
+    scene.clouds.push(cloud_of(CloudSource::Boxes {
         boxes,
         form: Form::Centred,
         optical_depth: OPTICAL_DEPTH,
         radius_scale: 1.0,
-    };
-    let mut scene = desk.scene(text)?;
-    scene.clouds.push(cloud_of(source));
+    }));
     Ok(scene)
 }
 
-/// `text` with a cloud of these particles.
-pub fn with_particles(desk: &Desk, text: &str, particles: Vec<Particle>) -> Result<Scene> {
-    let mut scene = desk.scene(text)?;
+/// Parses a scene text with the keys `draw` of `[draw]` and adds a cloud of particles.
+pub fn blob_scene(text: &str, draw: &str, particles: Vec<Particle>) -> Result<Scene> {
+    let mut scene = parse_scene(&format!("{text}[draw]\n{draw}\n"))?;
     scene.clouds.push(cloud_of(CloudSource::Particles(particles)));
     Ok(scene)
 }
 
-pub fn one_box(n_particles: u32, extent: [f64; 3], radius_max: f64) -> CloudBox {
+/// Renders frame 0 of [`blob_scene`].
+pub fn render_blobs(
+    ctx: &mut StressContext,
+    text: &str,
+    draw: &str,
+    particles: Vec<Particle>,
+) -> Result<DeviceFrame> {
+    ctx.render(&blob_scene(text, draw, particles)?, 0)
+}
+
+/// Returns a box at the origin.
+pub fn centred_box(n_particles: u32, extent: [f64; 3], radius_max: f64) -> CloudBox {
     CloudBox { n_particles, extent: DVec3::from_array(extent), center: DVec3::ZERO, radius_max }
 }
 
-/// A white blob whose optical depth through the centre is `tau`.
+/// Returns a white particle whose optical depth through the centre is `tau`.
 pub fn blob(position: [f64; 3], sigma: f64, tau: f64) -> Particle {
     Particle {
         aspect: 1.0,
@@ -80,50 +118,64 @@ pub fn blob(position: [f64; 3], sigma: f64, tau: f64) -> Particle {
     }
 }
 
-/// Some hundred blobs in a ball of radius 2, of several sizes and colours.
-pub fn heap(n: u32) -> Vec<Particle> {
-    let of = |i: u32| {
+/// Returns `n` particles of several sizes and colours, spread over a ball of radius 2.
+pub fn blob_cluster(n: u32) -> Vec<Particle> {
+    let particle = |i: u32| {
         let t = f64::from(i);
         let share = |k: f64| (k * t).fract();
-        let (z, turn, r) = (
-            2.0 * share(0.618_033_988_7) - 1.0,
-            2.399_963_229_7 * t,
-            2.0 * share(0.754_877_666_2).cbrt(),
-        );
-        let across = (1.0 - z * z).sqrt();
-        let at = [r * across * turn.cos(), r * z, r * across * turn.sin()];
+        let z = 2.0 * share(0.618_033_988_7) - 1.0;
+        let (sin, cos) = (2.399_963_229_7 * t).sin_cos();
+        let r = 2.0 * share(0.754_877_666_2).cbrt();
+        let across = r * (1.0 - z * z).sqrt();
         let color = DVec3::new(0.5 + 0.5 * share(0.3), 0.5 + 0.5 * share(0.7), 1.0);
+        let at = [across * cos, r * z, across * sin];
         Particle { color, ..blob(at, 0.15 + 0.2 * share(0.569_840_290_9), 0.2 + share(0.41)) }
     };
-    (0..n).map(of).collect()
+    (0..n).map(particle).collect()
 }
 
-/// A rectangle of half axes `u` and `v`, whose front is toward u × v, of `n` × `n` facets.
-pub fn plate(center: [f64; 3], u: [f64; 3], v: [f64; 3], n: u32) -> Surface {
+/// Returns a rectangle of half axes `u` and `v` with `n` × `n` facets. Its front faces u × v.
+pub fn rectangle(center: [f64; 3], u: [f64; 3], v: [f64; 3], n: u32) -> Surface {
     let [center, u, v] = [center, u, v].map(DVec3::from_array);
     Surface { center, u, v, i_material: 0, subdivide: [n, n] }
 }
 
-/// A sun from above, straight down.
-pub const NOON: &str =
-    "[[light]]\nkind = 'directional'\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n";
-pub const DULL: &str = "kd = [0.5, 0.5, 0.5]\n";
+/// Returns a horizontal square of side 2 with `n` × `n` facets, facing up.
+pub fn floor(center: [f64; 3], n: u32) -> Surface {
+    rectangle(center, [0.0, 0.0, 1.0], [1.0, 0.0, 0.0], n)
+}
 
-/// Rectangles of one material under `lights`, by two reflections; `lighting`: further keys of it.
-pub fn room(
-    desk: &Desk,
+/// Returns a floor and two walls that meet in a corner, each of side 2 with `n` × `n` facets.
+pub fn corner(n: u32) -> [Surface; 3] {
+    [
+        floor([0.0; 3], n),
+        rectangle([0.0, 1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], n),
+        rectangle([-1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], n),
+    ]
+}
+
+/// Returns a two-reflection scene of rectangles of one material; `lighting` holds more keys of
+/// `[lighting]`.
+pub fn surface_scene(
     lighting: &str,
     lights: &str,
     material: &str,
-    surfaces: Vec<Surface>,
+    surfaces: impl Into<Vec<Surface>>,
 ) -> Result<Scene> {
     let text = format!(
         "[film]\nwidth = 65\nheight = 49\nformat = 'rgba32f'\nbackground = [0, 0, 0]\n\
-         [camera]\nposition = [0.3, 4, 10]\ntarget = [0, 0, 0]\n[lighting]\nmode = \
-         'two-reflection'\n{lighting}\n{lights}\
+         [camera]\nposition = [0.3, 4, 10]\ntarget = [0, 0, 0]\n\
+         [lighting]\nmode = 'two-reflection'\n{lighting}\n{lights}\
          [[material]]\nname = 'm'\n{material}"
     );
-    let mut scene = desk.scene(&text)?;
-    scene.surfaces = surfaces;
+    let mut scene = parse_scene(&text)?;
+    scene.surfaces = surfaces.into();
     Ok(scene)
+}
+
+/// Applies `change` to the position and the target of every camera key.
+pub fn change_camera(scene: &mut Scene, change: impl Fn(DVec3) -> DVec3) {
+    for key in &mut scene.camera.keys {
+        (key.position, key.target) = (change(key.position), change(key.target));
+    }
 }

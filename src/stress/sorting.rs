@@ -1,7 +1,8 @@
-//! Orders: keys of every kind, in numbers that fill tiles and do not, and depths of either sign.
+//! The radix sort and its keys: keys of every kind, numbers of entries around whole tiles, depths
+//! of both signs.
 
-use super::case::{Case, Comparison, Found};
-use super::desk::Desk;
+use super::case::{Case, Comparison};
+use super::context::StressContext;
 use crate::error::Result;
 use crate::model::philox::philox4x32_10;
 use crate::passes::sort::Sort;
@@ -10,96 +11,83 @@ use crate::reference::sort::{key16, key32, order};
 pub const CASES: &[Case] = &[
     Case {
         name: "sorting/random",
-        what: "random keys, 0 to 20 000 of them, about whole tiles and not",
+        what: "0 to 20 000 random keys, in numbers that fill tiles and that do not",
         bound: "0: the stable order",
-        run: |desk| sorted(desk, |i| philox4x32_10([7, 0], [i, 0, 0, 0])[0]),
+        check: |ctx, c| sorted(ctx, c, |i| philox4x32_10([7, 0], [i, 0, 0, 0])[0]),
     },
     Case {
         name: "sorting/equal",
-        what: "equal keys: the order they came in",
+        what: "equal keys: the input order",
         bound: "0: the stable order",
-        run: |desk| sorted(desk, |_| 0x1234_5678),
+        check: |ctx, c| sorted(ctx, c, |_| 0x1234_5678),
     },
     Case {
         name: "sorting/few",
-        what: "keys of two digits, one of them 0 and one the greatest",
+        what: "keys of 0 and of the two largest values",
         bound: "0: the stable order",
-        run: |desk| sorted(desk, |i| if i % 3 == 0 { 0 } else { u32::MAX - (i & 1) }),
+        check: |ctx, c| sorted(ctx, c, |i| if i % 3 == 0 { 0 } else { u32::MAX - (i & 1) }),
     },
     Case {
         name: "sorting/reversed",
-        what: "keys from the greatest down",
+        what: "keys in descending order",
         bound: "0: the stable order",
-        run: |desk| sorted(desk, |i| u32::MAX - i * 7919),
+        check: |ctx, c| sorted(ctx, c, |i| u32::MAX - i * 7919),
     },
     Case {
         name: "sorting/keys",
-        what: "keys of depths: either sign, both zeros, subnormal, infinite",
-        bound: "0: the very keys, and their order the depths'",
-        run: keys,
+        what: "the keys of depths: both signs, both zeros, subnormal, infinite",
+        bound: "0: the reference's keys, in the order of the depths",
+        check: keys,
     },
 ];
 
 type Entry = [u32; 2];
 
-fn sorted(desk: &mut Desk, key: impl Fn(u32) -> u32) -> Result<Found> {
-    let mut c = Comparison::default();
+fn sorted(ctx: &mut StressContext, c: &mut Comparison, key: impl Fn(u32) -> u32) -> Result<()> {
     for n in [0u32, 1, 33, 1023, 1024, 1025, 20_000] {
-        let sort = Sort::new(desk.device(), desk.compiler(), n)?;
-        let keys: Vec<u32> = (0..n).map(&key).collect();
-        for n_bits in [16, 32] {
-            let entries: Vec<Entry> = keys.iter().zip(0..).map(|(key, i)| [*key, i]).collect();
-            let buffer = desk.upload(&entries)?;
-            desk.run(|rec| sort.record(rec, &buffer, n, n_bits))?;
-            let found: Vec<Entry> = desk.download(&buffer, n as usize)?;
-            let low: Vec<u32> =
-                keys.iter().map(|k| if n_bits < 32 { k & 0xffff } else { *k }).collect();
+        let sort = Sort::new(ctx.device(), ctx.compiler(), n)?;
+        let entries: Vec<Entry> = (0..n).map(|i| [key(i), i]).collect();
+        for (n_bits, mask) in [(16, 0xffff), (32, u32::MAX)] {
+            let buffer = ctx.upload(&entries)?;
+            ctx.run(|rec| sort.record(rec, &buffer, n, n_bits))?;
+            let found: Vec<Entry> = ctx.download(&buffer, n as usize)?;
+            let keys: Vec<u32> = entries.iter().map(|[key, _]| key & mask).collect();
             let expected: Vec<Entry> =
-                order(&low).into_iter().map(|i| [keys[i as usize], i]).collect();
-            c.same(&found, &expected, &format!("{n} entries by {n_bits} bits"));
+                order(&keys).into_iter().map(|i| entries[i as usize]).collect();
+            c.same(&found, &expected, format_args!("{n} entries by {n_bits} bits"));
         }
     }
-    Ok(c.into())
+    Ok(())
 }
 
-fn keys(desk: &mut Desk) -> Result<Found> {
+fn keys(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const RADIUS: f64 = 3.0;
-    let mut depths: Vec<f32> = vec![
-        0.0,
-        -0.0,
-        1e-42,
-        -1e-42,
-        f32::MIN_POSITIVE,
-        f32::MAX,
-        f32::MIN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-    ];
-    depths.extend((-300..300).map(|i| i as f32 * 0.01));
+    let special = [0.0, -0.0, 1e-42, -1e-42, f32::MIN_POSITIVE, f32::MAX, f32::MIN];
+    let mut depths: Vec<f32> = special
+        .into_iter()
+        .chain([f32::INFINITY, f32::NEG_INFINITY])
+        .chain((-300..300).map(|i| i as f32 * 0.01))
+        .collect();
     depths.sort_by(|a, b| b.total_cmp(a));
     let inputs: Vec<[f32; 4]> = depths
         .iter()
         .map(|z| [*z, RADIUS as f32, (65536.0 / (2.0 * RADIUS)) as f32, 0.0])
         .collect();
-    let body = "return vec4(uintBitsToFloat(0x3f800000u | key_of(x.x, 32u, x.y, x.z) >> 9), \
-        uintBitsToFloat(0x3f800000u | \
-        key_of(x.x, 32u, x.y, x.z) & 0x1ffu), float(key_of(x.x, 16u, x.y, x.z)), 0.0);";
-    let found = desk.probe(&["key.glsl"], body, &inputs)?;
-    let mut c = Comparison::default();
+    // The upper 23 and the lower 9 bits of the key as mantissas of numbers from 1 to 2: the key's
+    // own bits as a float could be NaN, whose bits may change.
+    let body = "uint key = key_of(x.x, 32u, x.y, x.z); \
+        return vec4(uintBitsToFloat(0x3f800000u | key >> 9), \
+        uintBitsToFloat(0x3f800000u | key & 0x1ffu), float(key_of(x.x, 16u, x.y, x.z)), 0.0);";
     let mut last = 0;
-    for (z, y) in depths.iter().zip(found) {
-        // 23 and 9 bits of the key as floats' last ones: a word that is no number would not come
-        // through.
+    for (z, y) in depths.iter().zip(ctx.probe("key.glsl", &[], body, &inputs)?) {
         let key = y[0].to_bits() << 9 | (y[1].to_bits() & 0x1ff);
-        c.add(f64::from(key), f64::from(key32(*z)), 0.0, || format!("key of depth {z:e}"));
-        c.holds(key >= last, || format!("the order of depth {z:e}"));
+        c.exact(key, key32(*z), format_args!("key of depth {z:e}"));
+        c.holds(key >= last, format_args!("key of depth {z:e} in order"));
         last = key;
-        // Where the step is on the brink rounding decides.
-        let (low, high) =
-            (key16(f64::from(*z) + 1e-6, RADIUS), key16(f64::from(*z) - 1e-6, RADIUS));
-        c.holds((f64::from(low)..=f64::from(high)).contains(&f64::from(y[2])), || {
-            format!("16 bits of depth {z:e}: {}", y[2])
-        });
+        // At the boundary of two 16-bit keys rounding decides.
+        let [low, high] = [1e-6, -1e-6].map(|d| f64::from(key16(f64::from(*z) + d, RADIUS)));
+        let is_key = (low..=high).contains(&f64::from(y[2]));
+        c.holds(is_key, format_args!("16-bit key of depth {z:e}: {}", y[2]));
     }
-    Ok(c.into())
+    Ok(())
 }

@@ -1,296 +1,237 @@
-//! Light between facets: at one place, touching, in one plane, back to back, tiny, huge and far
-//! away; sums of a million terms; a closed box, in which no energy may come to be.
+//! Light between facets: coincident, touching, coplanar, back to back, tiny, huge and distant; a
+//! closed box, which conserves energy.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-use super::case::{Case, Comparison, Found};
-use super::desk::{Desk, Played};
-use super::scenes::{DULL, LIT, NOON, blob, plate, room, with_particles};
+use super::case::{Case, Comparison};
+use super::context::{DeviceFrame, StressContext};
+use super::scenes::{
+    GREY, LIT, SUN_ABOVE, blob, blob_scene, change_camera, corner, floor, rectangle, surface_scene,
+};
 use crate::error::Result;
-use crate::layout::sums::SumMacros;
+use crate::layout::facet::LitRecord;
 use crate::model::scene::Scene;
-use crate::model::sums::{Precision, Summation, Sums};
 use crate::model::surface::Surface;
 use crate::reference::picture::stages::FrameReference;
-use crate::reference::rounding::{U_F32, sum_error};
+use crate::reference::rounding::U_F32;
 
 pub const CASES: &[Case] = &[
     Case {
         name: "transport/coincident",
-        what: "two rectangles at one place, one upon the other: neither lights the other",
+        what: "coincident rectangles with equal normals: neither lights the other",
         bound: "0",
-        run: coincident,
+        check: |ctx, c| {
+            no_second(ctx, c, [floor([0.0; 3], 4), floor([0.0; 3], 4), floor([0.3, 0.0, 0.1], 5)])
+        },
     },
     Case {
         name: "transport/coplanar",
-        what: "rectangles beside each other in one plane: neither lights the other",
+        what: "rectangles side by side in one plane: neither lights the other",
         bound: "0",
-        run: coplanar,
+        check: |ctx, c| {
+            let others = [floor([2.0, 0.0, 0.0], 4), floor([0.0, 0.0, 2.5], 3)];
+            no_second(ctx, c, [floor([0.0; 3], 4), others[0], others[1]])
+        },
     },
     Case {
         name: "transport/back-to-back",
-        what: "rectangles whose fronts look away from each other: neither lights the other",
+        what: "rectangles facing away from each other: neither lights the other",
         bound: "0",
-        run: back_to_back,
+        check: |ctx, c| no_second(ctx, c, [floor([0.0; 3], 4), ceiling([0.0, -0.5, 0.0], 4)]),
     },
     Case {
         name: "transport/touching",
-        what: "a floor and a wall that share an edge, against the integral over their areas",
-        bound: "1 % of the greatest L2 (docs/measured.md), and what is told to be unresolved",
-        run: touching,
+        what: "a floor and a wall with a common edge, against the integral over their areas",
+        bound: "1 % of the greatest L2 (docs/measured.md), and the reported unresolved part",
+        check: touching,
     },
     Case {
         name: "transport/crossing",
-        what: "two rectangles through each other's middle: some light, finite, no more than all \
-            that is sent",
+        what: "two rectangles through each other's middle: some light, finite, no more than the \
+            emitted light",
         bound: "1e-3 of the brightest L1",
-        run: crossing,
+        check: crossing,
     },
     Case {
         name: "transport/tiny",
-        what: "a room of areas of 1e-12: the same light as of the same room 2^20 times as large",
+        what: "a room of areas of 1e-12: the same light as of the room 2^20 times as large",
         bound: "0: powers of two change no digit",
-        run: |desk| scaled(desk, -20),
+        check: |ctx, c| scaled(ctx, c, -20),
     },
     Case {
         name: "transport/huge",
-        what: "a room of areas of 1e12",
+        what: "a room of areas of 1e12: the same light as of the room 2^-20 times as large",
         bound: "0: powers of two change no digit",
-        run: |desk| scaled(desk, 20),
+        check: |ctx, c| scaled(ctx, c, 20),
     },
     Case {
         name: "transport/far",
         what: "a floor and a ceiling 1e9 apart: K_d L1 A/(pi d^2)",
         bound: "64 u, relative",
-        run: far,
+        check: far,
     },
     Case {
         name: "transport/touching-facets",
-        what: "facets of a cloud at two points, to each other at distance 0, over a floor: finite, \
-            lit by it, not negative",
+        what: "facets of a cloud at two points, many at distance 0, over a floor: finite light \
+            from it, not negative",
         bound: "0",
-        run: one_point,
+        check: one_point,
     },
     Case {
         name: "transport/tree-one-point",
-        what: "a tree of facets at two points and a floor, opened to its leaves: as gathered \
-            from every pair",
+        what: "a tree of facets at two points and a floor, opened to its leaves: the same light \
+            as from every pair",
         bound: "2 (n + 32) u of the greatest",
-        run: tree_one_point,
+        check: tree_one_point,
     },
     Case {
         name: "transport/closed-box",
-        what: "six white walls that close a box, a lamp in it: as much arrives as is sent",
+        what: "a closed box of six white walls with a lamp: as much light arrives as is emitted",
         bound: "1 % of pairs (docs/measured.md); of the lamp 64 u of its facets' sum",
-        run: closed_box,
-    },
-    Case {
-        name: "transport/sum-plain",
-        what: "a million terms of both signs and 40 binades, one after the other",
-        bound: "gamma_(n-1) of the sum of magnitudes",
-        run: |desk| sums(desk, Summation::Plain, Precision::F32),
-    },
-    Case {
-        name: "transport/sum-kahan",
-        what: "the same, compensated",
-        bound: "2 u + O(n u^2) of the sum of magnitudes",
-        run: |desk| sums(desk, Summation::Kahan, Precision::F32),
-    },
-    Case {
-        name: "transport/sum-pairwise",
-        what: "the same, pairwise",
-        bound: "gamma of 8 + log2(n/4) + n/2^14 of the sum of magnitudes",
-        run: |desk| sums(desk, Summation::Pairwise, Precision::F32),
-    },
-    Case {
-        name: "transport/sum-double",
-        what: "the same in f64, where the device has it",
-        bound: "u of the sum, and gamma of f64",
-        run: |desk| sums(desk, Summation::Plain, Precision::F64),
+        check: closed_box,
     },
 ];
 
-/// Rectangles in the sun of noon.
-fn noon(desk: &Desk, surfaces: Vec<Surface>) -> Result<Scene> {
-    room(desk, "gather = 'exact'", NOON, DULL, surfaces)
+const EXACT: &str = "gather = 'exact'";
+
+/// Returns a square of side 2 that faces down.
+fn ceiling(center: [f64; 3], n: u32) -> Surface {
+    rectangle(center, [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], n)
 }
 
-/// The greatest channel of L2 and I_i, which must be no less than 0 and finite.
-fn second(c: &mut Comparison, played: &Played) -> Vec<f64> {
-    let of = |(i, lit): (usize, &crate::layout::facet::LitRecord)| {
-        let all = lit.second.iter().chain(&lit.indirect).chain(&lit.first);
-        c.holds(all.clone().all(|v| v.is_finite() && *v >= 0.0), || {
-            format!("light of facet {i}, finite and not negative")
-        });
+/// Returns a sun that shines in `direction`.
+fn sun(direction: &str) -> String {
+    format!("[[light]]\nkind = 'directional'\ndirection = {direction}\nirradiance = [1, 1, 1]\n")
+}
+
+/// Checks that the facets' light is finite and not negative, and returns the greatest channel of
+/// every facet's L2.
+fn second(c: &mut Comparison, frame: &DeviceFrame) -> Vec<f64> {
+    let greatest = |(i, lit): (usize, &LitRecord)| {
+        let mut all = lit.second.iter().chain(&lit.indirect).chain(&lit.first);
+        let is_light = all.all(|v| v.is_finite() && *v >= 0.0);
+        c.holds(is_light, format_args!("finite light of facet {i}, not negative"));
         f64::from(lit.second.iter().copied().fold(0.0, f32::max))
     };
-    played.lit.iter().enumerate().map(of).collect()
+    frame.lit.iter().enumerate().map(greatest).collect()
 }
 
-/// Adds that no facet has any L2.
-fn nothing(desk: &mut Desk, surfaces: Vec<Surface>) -> Result<Found> {
-    let scene = noon(desk, surfaces)?;
-    let played = desk.play(&scene, 0)?;
-    let mut c = Comparison::default();
-    let lit = second(&mut c, &played);
-    lit.iter().enumerate().for_each(|(i, l)| c.add(*l, 0.0, 0.0, || format!("L2 of facet {i}")));
-    Ok(c.into())
+/// Checks that no facet of rectangles under a sun receives light from another.
+fn no_second<const N: usize>(
+    ctx: &mut StressContext,
+    c: &mut Comparison,
+    surfaces: [Surface; N],
+) -> Result<()> {
+    let frame = ctx.render(&surface_scene(EXACT, SUN_ABOVE, GREY, surfaces)?, 0)?;
+    for (i, l) in second(c, &frame).into_iter().enumerate() {
+        c.exact(l, 0.0, format_args!("L2 of facet {i}"));
+    }
+    Ok(())
 }
 
-const FLOOR: ([f64; 3], [f64; 3]) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
-
-fn floor(center: [f64; 3], n: u32) -> Surface {
-    plate(center, FLOOR.0, FLOOR.1, n)
-}
-
-fn coincident(desk: &mut Desk) -> Result<Found> {
-    nothing(desk, vec![floor([0.0; 3], 4), floor([0.0; 3], 4), floor([0.3, 0.0, 0.1], 5)])
-}
-
-fn coplanar(desk: &mut Desk) -> Result<Found> {
-    nothing(desk, vec![floor([0.0; 3], 4), floor([2.0, 0.0, 0.0], 4), floor([0.0, 0.0, 2.5], 3)])
-}
-
-fn back_to_back(desk: &mut Desk) -> Result<Found> {
-    // Fronts up and down.
-    let down = plate([0.0, -0.5, 0.0], FLOOR.1, FLOOR.0, 4);
-    nothing(desk, vec![floor([0.0; 3], 4), down])
-}
-
-fn touching(desk: &mut Desk) -> Result<Found> {
-    let wall = plate([0.0, 1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 7);
-    let lights =
-        "[[light]]\nkind = 'directional'\ndirection = [0.2, -1, -0.7]\nirradiance = [1, 1, 1]\n";
-    let scene = room(desk, "gather = 'exact'", lights, DULL, vec![floor([0.0; 3], 7), wall])?;
-    let played = desk.play(&scene, 0)?;
+fn touching(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let [floor, wall, _] = corner(7);
+    let scene = surface_scene(EXACT, &sun("[0.2, -1, -0.7]"), GREY, [floor, wall])?;
+    let frame = ctx.render(&scene, 0)?;
     let truth = FrameReference::of(&scene, 0.0)?;
-    let mut c = Comparison::default();
-    second(&mut c, &played);
+    second(c, &frame);
     let most = truth.second.iter().map(|l| l.max_element()).fold(0.0, f64::max);
-    for (i, (lit, truth)) in played.lit.iter().zip(&truth.second).enumerate() {
-        c.holds(f64::from(lit.unresolved) < 0.01 * most, || {
-            format!("facet {i}, resolved but for {:e}", lit.unresolved)
-        });
-        let bound = 0.01 * most + f64::from(lit.unresolved);
-        c.add(f64::from(lit.second[0]), truth.x, bound, || format!("L2 of facet {i}"));
+    for (i, (lit, truth)) in frame.lit.iter().zip(&truth.second).enumerate() {
+        let unresolved = f64::from(lit.unresolved);
+        let at = format_args!("facet {i} resolved but for {unresolved:e}");
+        c.holds(unresolved < 0.01 * most, at);
+        let bound = 0.01 * most + unresolved;
+        c.add(lit.second[0], truth.x, bound, format_args!("L2 of facet {i}"));
     }
-    c.holds(most > 0.0, || "that there is some".to_owned());
-    Ok(c.into())
+    c.holds(most > 0.0, "some second reflection");
+    Ok(())
 }
 
-fn crossing(desk: &mut Desk) -> Result<Found> {
-    let tilted = plate([0.0; 3], [0.0, 0.0, 1.0], [0.8, 0.6, 0.0], 6);
-    let scene = noon(desk, vec![floor([0.0; 3], 6), tilted])?;
-    let played = desk.play(&scene, 0)?;
-    let mut c = Comparison::default();
-    // Of a hemisphere of the brightest L1 a facet receives pi of it.
-    let brightest = played.lit.iter().map(|l| f64::from(l.first[0])).fold(0.0, f64::max);
-    let lit = second(&mut c, &played);
-    c.holds(lit.iter().any(|l| *l > 0.01 * brightest), || {
-        "that there is a second reflection".to_owned()
-    });
-    for (i, l) in lit.into_iter().enumerate() {
-        c.add((l - 0.5 * brightest).max(0.0), 0.0, 1e-3 * brightest, || {
-            format!("L2 of facet {i} beyond K_d of the brightest")
-        });
+fn crossing(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let tilted = rectangle([0.0; 3], [0.0, 0.0, 1.0], [0.8, 0.6, 0.0], 6);
+    let scene = surface_scene(EXACT, SUN_ABOVE, GREY, [floor([0.0; 3], 6), tilted])?;
+    let frame = ctx.render(&scene, 0)?;
+    // A hemisphere of the brightest L1 gives an irradiance of pi of it.
+    let brightest = frame.lit.iter().map(|l| f64::from(l.first[0])).fold(0.0, f64::max);
+    let second = second(c, &frame);
+    c.holds(second.iter().any(|l| *l > 0.01 * brightest), "some second reflection");
+    for (i, l) in second.into_iter().enumerate() {
+        let beyond = (l - 0.5 * brightest).max(0.0);
+        let at = format_args!("L2 of facet {i} above K_d of the brightest L1");
+        c.add(beyond, 0.0, 1e-3 * brightest, at);
     }
-    Ok(c.into())
+    Ok(())
 }
 
-/// A corner of three walls, lit askew, as large as 2^k.
-fn corner(desk: &Desk, k: i32) -> Result<Scene> {
+/// Returns a corner of a floor and two walls, scaled by 2^k.
+fn scaled_corner(k: i32) -> Result<Scene> {
     let s = 2f64.powi(k);
-    let surfaces = [
-        plate([0.0; 3], FLOOR.0, FLOOR.1, 5),
-        plate([0.0, 1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], 5),
-        plate([-1.0, 1.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], 5),
-    ];
-    let scaled = surfaces.map(|p| Surface { center: s * p.center, u: s * p.u, v: s * p.v, ..p });
-    let lights =
-        "[[light]]\nkind = 'directional'\ndirection = [-0.5, -1, -0.7]\nirradiance = [1, 1, 1]\n";
-    let mut scene = room(desk, "gather = 'exact'", lights, DULL, scaled.to_vec())?;
-    scene
-        .camera
-        .keys
-        .iter_mut()
-        .for_each(|key| (key.position, key.target) = (s * key.position, s * key.target));
+    let surfaces = corner(5).map(|p| Surface { center: s * p.center, u: s * p.u, v: s * p.v, ..p });
+    let mut scene = surface_scene(EXACT, &sun("[-0.5, -1, -0.7]"), GREY, surfaces)?;
+    change_camera(&mut scene, |p| s * p);
     scene.camera.near *= s;
     Ok(scene)
 }
 
-fn scaled(desk: &mut Desk, k: i32) -> Result<Found> {
-    let (one, other) = (corner(desk, 0)?, corner(desk, k)?);
-    let (one, other) = (desk.play(&one, 0)?, desk.play(&other, 0)?);
-    let mut c = Comparison::default();
-    let light =
-        |p: &Played| p.lit.iter().map(|l| (l.first, l.second, l.indirect)).collect::<Vec<_>>();
+fn scaled(ctx: &mut StressContext, c: &mut Comparison, k: i32) -> Result<()> {
+    let one = ctx.render(&scaled_corner(0)?, 0)?;
+    let other = ctx.render(&scaled_corner(k)?, 0)?;
+    let light = |frame: &DeviceFrame| -> Vec<_> {
+        frame.lit.iter().map(|l| (l.first, l.second, l.indirect)).collect()
+    };
     c.same(&light(&one), &light(&other), "light of facets");
-    let lit = second(&mut c, &one);
-    c.holds(lit.iter().any(|l| *l > 0.0), || "that there is a second reflection".to_owned());
-    Ok(c.into())
+    let is_lit = second(c, &one).into_iter().any(|l| l > 0.0);
+    c.holds(is_lit, "some second reflection");
+    Ok(())
 }
 
-fn far(desk: &mut Desk) -> Result<Found> {
+fn far(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const D: f64 = 1e9;
-    // Fronts toward each other; the sun comes from beside the ceiling and meets the floor alone.
-    let ceiling = plate([0.0, D, 0.0], FLOOR.1, FLOOR.0, 1);
-    let lights =
-        "[[light]]\nkind = 'directional'\ndirection = [0.6, -0.8, 0]\nirradiance = [1, 1, 1]\n";
-    let scene = room(desk, "gather = 'exact'", lights, DULL, vec![floor([0.0; 3], 1), ceiling])?;
-    let played = desk.play(&scene, 0)?;
-    let mut c = Comparison::default();
-    let lit = second(&mut c, &played);
-    // L1 = K_d E cos/pi of the floor, A = 4; L2 = K_d/pi L1 A/d^2.
+    // The sun comes from beside the ceiling and lights the floor alone.
+    let surfaces = [floor([0.0; 3], 1), ceiling([0.0, D, 0.0], 1)];
+    let frame = ctx.render(&surface_scene(EXACT, &sun("[0.6, -0.8, 0]"), GREY, surfaces)?, 0)?;
+    let second = second(c, &frame);
+    // L1 = K_d E cos/pi of the floor, A = 4; L2 = K_d/pi L1 A/d².
     let truth = 0.5 / PI * (0.5 * 0.8 / PI) * 4.0 / (D * D);
-    c.add(lit[1], truth, 64.0 * U_F32 * truth, || "L2 of the ceiling".to_owned());
-    c.add(lit[0], 0.0, 0.0, || "L2 of the floor".to_owned());
-    Ok(c.into())
+    c.add(second[1], truth, 64.0 * U_F32 * truth, "L2 of the ceiling");
+    c.exact(second[0], 0.0, "L2 of the floor");
+    Ok(())
 }
 
-/// Blobs at one point.
-fn heaped(desk: &Desk, gather: &str, n: u32) -> Result<Scene> {
-    let text = LIT.replace(
-        "mode = 'first'",
-        &format!("mode = 'two-reflection'\ngather = '{gather}'\ntheta = 0.0"),
-    );
-    // Two points, so that the cloud's facets look away from each other, over a floor that all of
-    // them see.
+/// Renders `n` blobs at two points over a floor. The facets of either point face away from the
+/// other point, and all face the floor.
+fn two_points(ctx: &mut StressContext, gather: &str, n: u32) -> Result<DeviceFrame> {
+    let mode = format!("mode = 'two-reflection'\ngather = '{gather}'\ntheta = 0.0");
+    let text = LIT.replace("mode = 'first'", &mode);
     let at = |i: u32| [if i.is_multiple_of(2) { 1.0 } else { -1.0 }, 0.0, 0.0];
-    let mut scene = with_particles(desk, &text, (0..n).map(|i| blob(at(i), 0.2, 0.5)).collect())?;
-    scene.surfaces.push(plate([0.0, -2.0, 0.0], [0.0, 0.0, 5.0], [5.0, 0.0, 0.0], 6));
-    Ok(scene)
+    let blobs = (0..n).map(|i| blob(at(i), 0.2, 0.5)).collect();
+    let mut scene = blob_scene(&text, "", blobs)?;
+    scene.surfaces.push(rectangle([0.0, -2.0, 0.0], [0.0, 0.0, 5.0], [5.0, 0.0, 0.0], 6));
+    ctx.render(&scene, 0)
 }
 
-fn one_point(desk: &mut Desk) -> Result<Found> {
-    let scene = heaped(desk, "exact", 100)?;
-    let played = desk.play(&scene, 0)?;
-    let mut c = Comparison::default();
-    let lit = second(&mut c, &played);
-    // Surfaces' facets come first.
-    c.holds(lit[36..].iter().all(|l| *l > 0.0), || "that the floor lights all of them".to_owned());
-    c.add(played.n_odd() as f64, 0.0, 0.0, || {
-        "numbers of the picture that are not finite".to_owned()
-    });
-    Ok(c.into())
+fn one_point(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
+    let frame = two_points(ctx, "exact", 100)?;
+    let second = second(c, &frame);
+    // The first 36 facets are the floor's.
+    c.holds(second[36..].iter().all(|l| *l > 0.0), "the floor lights every facet");
+    c.finite(&frame.rgba, "picture");
+    Ok(())
 }
 
-fn tree_one_point(desk: &mut Desk) -> Result<Found> {
+fn tree_one_point(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     const N: u32 = 150;
-    let (exact, tree) = (heaped(desk, "exact", N)?, heaped(desk, "tree", N)?);
-    let (exact, tree) = (desk.play(&exact, 0)?, desk.play(&tree, 0)?);
-    let mut c = Comparison::default();
-    let (exact, tree) = (second(&mut c, &exact), second(&mut c, &tree));
+    let [exact, tree] = ["exact", "tree"].map(|gather| two_points(ctx, gather, N));
+    let (exact, tree) = (second(c, &exact?), second(c, &tree?));
     let most = exact.iter().copied().fold(0.0, f64::max);
-    c.holds(most > 0.0, || "that there is a second reflection".to_owned());
-    for (i, (a, b)) in exact.iter().zip(&tree).enumerate() {
-        c.add(*b, *a, 2.0 * (f64::from(N) + 32.0) * U_F32 * most, || format!("L2 of facet {i}"));
-    }
-    Ok(c.into())
+    c.holds(most > 0.0, "some second reflection");
+    c.each(tree, exact, |_| 2.0 * (f64::from(N) + 32.0) * U_F32 * most, "L2 of facets");
+    Ok(())
 }
 
-fn closed_box(desk: &mut Desk) -> Result<Found> {
+fn closed_box(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
     let (x, y, z) = ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
     let walls = [
         ([0.0, -1.0, 0.0], z, x),
@@ -300,27 +241,19 @@ fn closed_box(desk: &mut Desk) -> Result<Found> {
         ([0.0, 0.0, -1.0], x, y),
         ([0.0, 0.0, 1.0], y, x),
     ];
-    let lamp = "[[light]]\nkind = 'point'\nposition = [0.1, 0.2, -0.1]\nintensity = [1, 1, \
-        1]\nradius = 0.05\n";
-    let surfaces = walls.map(|(at, u, v)| plate(at, u, v, 6)).to_vec();
-    let scene = room(desk, "gather = 'exact'", lamp, "kd = [1, 1, 1]\n", surfaces)?;
-    let played = desk.play(&scene, 0)?;
-    let mut c = Comparison::default();
-    second(&mut c, &played);
-    let flux = |of: fn(&crate::layout::facet::LitRecord) -> f32| -> f64 {
-        played
-            .facets
-            .iter()
-            .zip(&played.lit)
-            .map(|(f, l)| f64::from(f.area) * f64::from(of(l)))
-            .sum()
+    let lamp = "[[light]]\nkind = 'point'\nposition = [0.1, 0.2, -0.1]\nintensity = [1, 1, 1]\n\
+        radius = 0.05\n";
+    let surfaces = walls.map(|(at, u, v)| rectangle(at, u, v, 6));
+    let scene = surface_scene(EXACT, lamp, "kd = [1, 1, 1]\n", surfaces)?;
+    let frame = ctx.render(&scene, 0)?;
+    second(c, &frame);
+    let flux = |irradiance: fn(&LitRecord) -> f32| -> f64 {
+        let facets = frame.facets.iter().zip(&frame.lit);
+        facets.map(|(f, l)| f64::from(f.area) * f64::from(irradiance(l))).sum()
     };
-    let (sent, received) = (flux(|l| l.direct[0]), flux(|l| l.indirect[0]));
-    c.add(received, sent, 0.01 * sent, || {
-        "all that is received of the second reflection, by what was sent".to_owned()
-    });
-    // Of the lamp what its facets' centres receive, and that is its power but for the midpoint
-    // rule.
+    let (emitted, received) = (flux(|l| l.direct[0]), flux(|l| l.indirect[0]));
+    c.add(received, emitted, 0.01 * emitted, "received of the emitted second reflection");
+    // The irradiance at the facets' centres: the lamp's power but for the midpoint rule.
     let lamp = DVec3::new(0.1, 0.2, -0.1);
     let at = |s: &Surface, i: u32| {
         let way = lamp - s.facet_center(i);
@@ -328,68 +261,7 @@ fn closed_box(desk: &mut Desk) -> Result<Found> {
     };
     let truth: f64 =
         scene.surfaces.iter().flat_map(|s| (0..s.n_facets() as u32).map(move |i| at(s, i))).sum();
-    c.add(sent, truth, 64.0 * U_F32 * truth, || "all that is received of the lamp".to_owned());
-    c.add(sent, 4.0 * PI, 0.02 * 4.0 * PI, || "the lamp's power".to_owned());
-    Ok(c.into())
-}
-
-/// One invocation sums a million terms, sixteen a turn of its loop.
-const SUM: &str = r#"#version 460
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
-layout(local_size_x = 1) in;
-layout(std430, binding = 0) readonly buffer Terms { float terms[]; };
-layout(std430, binding = 1) writeonly buffer Totals { float total; };
-#include "sum.glsl"
-// By hand: what an optimiser unrolls may lose `precise`, and with it the compensation.
-#define FOUR(i) ADD(sum, terms[i]); ADD(sum, terms[i + 1u]); ADD(sum, terms[i + 2u]); ADD(sum, terms[i + 3u])
-void main() {
-    SUM1 sum = EMPTY1;
-    for (uint i = 0u; i < terms.length(); i += 16u) {
-        FOUR(i);
-        FOUR(i + 4u);
-        FOUR(i + 8u);
-        FOUR(i + 12u);
-    }
-    total = float(TOTAL(sum));
-}
-"#;
-
-const N_TERMS: u32 = 1_000_000;
-
-/// Of both signs, over 40 binades; and one beside which each of the others by itself is rounded
-/// away.
-fn terms() -> [Vec<f32>; 2] {
-    let share = |i: u32, k: f64| (f64::from(i) * k).fract();
-    let wide = |i: u32| {
-        let magnitude = (40.0 * share(i, 0.754_877_666_246_693) - 30.0).exp2();
-        ((2.0 * share(i, 0.618_033_988_749_895) - 1.0) * magnitude) as f32
-    };
-    let dust = |i: u32| if i == 0 { 1.0 } else { 0.4 / 16_777_216.0 };
-    [(0..N_TERMS).map(wide).collect(), (0..N_TERMS).map(dust).collect()]
-}
-
-fn sums(desk: &mut Desk, summation: Summation, precision: Precision) -> Result<Found> {
-    if precision == Precision::F64 && !desk.device().limits().has_float64 {
-        return Ok(Found::NotHere("the device has no f64 in shaders".to_owned()));
-    }
-    let sums = Sums { summation, precision };
-    let kernel = desk.kernel("sum", SUM, &[], SumMacros::from(sums).list())?;
-    let mut c = Comparison::default();
-    for (what, terms) in ["wide", "dust"].into_iter().zip(terms()) {
-        let (x, y) = (desk.upload(&terms)?, desk.buffer::<f32>(1)?);
-        desk.run(|rec| rec.dispatch_groups(&kernel, &[&x, &y], &(), 1))?;
-        let found = desk.download::<f32>(&y, 1)?[0];
-        // Exact: f64 beside what its roundings lose.
-        let (mut sum, mut lost, mut magnitude) = (0.0f64, 0.0, 0.0);
-        for x in terms.iter().map(|x| f64::from(*x)) {
-            let next = sum + x;
-            let added = next - sum;
-            lost += (sum - (next - added)) + (x - added);
-            (sum, magnitude) = (next, magnitude + x.abs());
-        }
-        let bound = sum_error(sums, u64::from(N_TERMS)) * magnitude;
-        c.add(f64::from(found), sum + lost, bound, || format!("the sum of {what} terms"));
-    }
-    Ok(c.into())
+    c.add(emitted, truth, 64.0 * U_F32 * truth, "received of the lamp");
+    c.add(emitted, 4.0 * PI, 0.02 * 4.0 * PI, "the lamp's power");
+    Ok(())
 }

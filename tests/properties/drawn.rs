@@ -12,7 +12,7 @@ use nimbus::model::growth::Growth;
 use nimbus::model::gust::Gust;
 use nimbus::model::scene::Scene;
 use nimbus::model::texture::Texture;
-use nimbus::stress::Desk;
+use nimbus::stress::StressContext;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
@@ -74,8 +74,9 @@ fn cloud_of(source: CloudSource, gust: Gust) -> Cloud {
     }
 }
 
-fn with_clouds(desk: &Desk, (text, list, one_box, is_stirred): Made) -> Scene {
-    let mut scene = desk.scene(&text).expect("a scene");
+fn with_clouds((text, list, one_box, is_stirred): Made) -> Scene {
+    let path = Path::new("property.toml");
+    let mut scene = parse(text, path, &[], None).expect("a scene").scene;
     let stirred = Gust { amplitude: 0.2, length: 2.0, period_s: 3.0, n_waves: 4 };
     let gust = if is_stirred { stirred } else { Gust::CALM };
     scene.clouds.push(cloud_of(CloudSource::Particles(list), gust));
@@ -89,11 +90,11 @@ fn with_clouds(desk: &Desk, (text, list, one_box, is_stirred): Made) -> Scene {
 
 /// Colours and bytes of every frame.
 fn frames(
-    desk: &Desk,
+    context: &StressContext,
     scene: &Scene,
     skip: bool,
 ) -> nimbus::error::Result<Vec<(Vec<f32>, Vec<u8>)>> {
-    let mut player = desk.player(scene, skip)?;
+    let mut player = context.player(scene, skip)?;
     let mut all = Vec::new();
     serial::run(&mut player.game, &mut player.renderer, 0..N_FRAMES, &mut |_, renderer| {
         all.push((renderer.image()?, renderer.image_bytes()?));
@@ -105,14 +106,12 @@ fn frames(
 #[test]
 fn pictures_are_numbers_and_the_same_whatever_is_left_out() {
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
-    let desk = RefCell::new(Some(Desk::open(&choice).expect("a Vulkan 1.3 device")));
+    let context = StressContext::open(&choice).expect("a Vulkan 1.3 device");
     let n_seen = std::cell::Cell::new(0);
     check(24, scene(), |made| {
-        let desk = desk.borrow();
-        let desk = desk.as_ref().expect("it is closed at the end");
-        let scene = with_clouds(desk, made);
+        let scene = with_clouds(made);
         let drawn =
-            |skip| frames(desk, &scene, skip).map_err(|e| TestCaseError::fail(e.to_string()));
+            |skip| frames(&context, &scene, skip).map_err(|e| TestCaseError::fail(e.to_string()));
         let (some, all) = (drawn(true)?, drawn(false)?);
         prop_assert_eq!(some.len(), N_FRAMES as usize);
         for (i, ((rgba, bytes), (_, bytes_of_all))) in some.iter().zip(&all).enumerate() {
@@ -130,5 +129,5 @@ fn pictures_are_numbers_and_the_same_whatever_is_left_out() {
     });
     // An empty picture would be the same, too.
     assert!(n_seen.get() > 24, "something is drawn in {} frames", n_seen.get());
-    desk.into_inner().expect("a desk").close().expect("nothing said by validation");
+    context.close().expect("no validation messages");
 }

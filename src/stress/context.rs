@@ -1,0 +1,237 @@
+//! The device that stress cases run on, for single shader functions and for whole scenes.
+
+use std::sync::Arc;
+
+use bytemuck::Pod;
+
+use crate::error::{Error, Result};
+use crate::frame::stage::{Bed, DeviceChoice, Player};
+use crate::gpu::{Buffer, Commands, Compiler, Device, Field, Kernel, MemoryUsage, Recorder, Sources};
+use crate::layout::facet::{FacetRecord, LitRecord};
+use crate::layout::particle::{ParticleRecord, PlacedRecord};
+use crate::layout::record;
+use crate::model::scene::{LightingMode, Scene};
+
+record! {
+    struct ProbePush { n: u32 }
+}
+
+/// A shader that applies `vec4 probe(vec4 x)` to every element of a buffer.
+const PROBE: &str = "#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+ABOVE
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { uint n; } push;
+layout(std430, binding = 0) readonly buffer X { vec4 xs[]; };
+layout(std430, binding = 1) writeonly buffer Y { vec4 ys[]; };
+vec4 probe(vec4 x) { BODY }
+void main() {
+    FOR_EACH(i, push.n) {
+        ys[i] = probe(xs[i]);
+    }
+}
+";
+
+/// Number of shaders at least whose workgroup size is free: those that treat single records.
+const MIN_SHADERS_RESIZED: u32 = 15;
+
+/// A device with a set of shaders.
+pub struct StressContext {
+    // Dropped first, because dropping the commands waits for the work in flight.
+    commands: Commands,
+    sources: Sources,
+    choice: DeviceChoice,
+    gpu: Bed,
+}
+
+/// The device's results for one frame of a scene.
+pub struct DeviceFrame {
+    /// Premultiplied linear RGBA, row by row from the top.
+    pub rgba: Vec<f32>,
+    /// The render target's content.
+    pub bytes: Vec<u8>,
+    /// Particles relative to the scene's origin.
+    pub placed: Vec<PlacedRecord>,
+    /// Particles relative to their groups' origins.
+    pub particles: Vec<ParticleRecord>,
+    /// Attempts of every particle; bit 31 is set if the particle was folded back.
+    pub status: Vec<u32>,
+    /// Facets; empty if the lighting mode is "none".
+    pub facets: Vec<FacetRecord>,
+    /// Light of the facets.
+    pub lit: Vec<LitRecord>,
+}
+
+impl DeviceFrame {
+    /// Returns channel `k` (0 to 3: red, green, blue, alpha) of a pixel.
+    pub fn channel(&self, i_pixel: usize, k: usize) -> f64 {
+        f64::from(self.rgba[4 * i_pixel + k])
+    }
+}
+
+impl StressContext {
+    /// Opens a device with the shaders that `choice` names.
+    ///
+    /// # Errors
+    /// If the device cannot be opened or a shader cannot be read.
+    pub fn open(choice: &DeviceChoice) -> Result<StressContext> {
+        StressContext::with_sources(choice, choice.sources()?)
+    }
+
+    /// Opens a device with the given shaders. Tests pass faulty ones.
+    ///
+    /// # Errors
+    /// If the device cannot be opened.
+    pub fn with_sources(choice: &DeviceChoice, sources: Sources) -> Result<StressContext> {
+        let gpu = Bed::with_sources(choice, sources.clone())?;
+        let commands = Commands::new(&gpu.device, "stress")?;
+        Ok(StressContext { commands, sources, choice: choice.clone(), gpu })
+    }
+
+    /// Opens the device again with workgroups of `n` in every shader whose workgroups have 64
+    /// invocations. Other workgroup sizes follow from subgroups or shared memory.
+    pub(super) fn with_workgroup_size(&self, n: u32) -> Result<StressContext> {
+        let names: Vec<String> = self.sources.names().map(str::to_owned).collect();
+        let mut sources = self.sources.clone();
+        let size = format!("local_size_x = {n}");
+        let is_resized = |name: &&String| {
+            name.ends_with(".comp") && sources.replace(name, "local_size_x = 64", &size)
+        };
+        let n_resized = names.iter().filter(is_resized).count();
+        if n_resized < MIN_SHADERS_RESIZED as usize {
+            return Err(Error::usage(format!(
+                "{n_resized} shaders have workgroups of 64; expected at least \
+                 {MIN_SHADERS_RESIZED}"
+            )));
+        }
+        StressContext::with_sources(&self.choice, sources)
+    }
+
+    /// Opens the device again with buffers that are filled with NaN at allocation.
+    pub(super) fn with_poison(&self) -> Result<StressContext> {
+        let choice = DeviceChoice { poison: true, ..self.choice.clone() };
+        StressContext::with_sources(&choice, self.sources.clone())
+    }
+
+    /// Returns the device.
+    pub fn device(&self) -> &Device {
+        &self.gpu.device
+    }
+
+    /// Returns the compiler of the shaders.
+    pub(super) fn compiler(&self) -> &Compiler {
+        self.gpu.compiler()
+    }
+
+    /// Closes the device.
+    ///
+    /// # Errors
+    /// If the validation layer or the leak report has messages.
+    pub fn close(self) -> Result<()> {
+        let StressContext { commands, gpu, .. } = self;
+        drop(commands);
+        gpu.close()
+    }
+
+    /// Compiles a shader text, which may include nimbus's own files.
+    pub(super) fn kernel(
+        &self,
+        name: &str,
+        text: &str,
+        push: &[Field],
+        macros: &[(&str, u32)],
+    ) -> Result<Kernel> {
+        let sources = self.sources.clone().with_text(&format!("{name}.comp"), text);
+        let compiler = Compiler::new(sources, Compiler::default_cache())?;
+        Kernel::with_macros(self.device(), &compiler, name, push, &[], macros)
+    }
+
+    /// Evaluates `vec4 probe(vec4 x) { body }` for every input. `body` may use the shader file
+    /// `include` and, unless `table` is empty, its elements as `samplerBuffer table`.
+    pub(super) fn probe(
+        &mut self,
+        include: &str,
+        table: &[f32],
+        body: &str,
+        inputs: &[[f32; 4]],
+    ) -> Result<Vec<[f32; 4]>> {
+        let mut above = format!("#include \"each.glsl\"\n#include \"{include}\"\n");
+        if !table.is_empty() {
+            above.insert_str(0, "layout(binding = 2) uniform samplerBuffer table;\n");
+        }
+        let text = PROBE.replace("ABOVE", &above).replace("BODY", body);
+        let kernel = self.kernel("probe", &text, ProbePush::FIELDS, &[])?;
+        let (x, y) = (self.upload(inputs)?, self.buffer::<[f32; 4]>(inputs.len())?);
+        let push = ProbePush { n: inputs.len() as u32 };
+        if table.is_empty() {
+            self.run(|rec| rec.dispatch(&kernel, &[&x, &y], &push, push.n))?;
+        } else {
+            let table = self.upload(table)?;
+            self.run(|rec| rec.dispatch(&kernel, &[&x, &y, &table], &push, push.n))?;
+        }
+        self.download(&y, inputs.len())
+    }
+
+    /// Uploads `data` to a new device buffer.
+    pub(super) fn upload<T: Pod>(&mut self, data: &[T]) -> Result<Buffer> {
+        let n = data.len() as u64;
+        let mut staging = Buffer::new::<T>(self.device(), "stress.staging", n, MemoryUsage::Upload)?;
+        staging.write(data)?;
+        let buffer = self.buffer::<T>(data.len())?;
+        self.copy(&staging, &buffer)?;
+        Ok(buffer)
+    }
+
+    /// Allocates a device buffer of `n` records of undefined content.
+    pub(super) fn buffer<T: Pod>(&self, n: usize) -> Result<Buffer> {
+        Buffer::new::<T>(self.device(), "stress.buffer", n as u64, MemoryUsage::Device)
+    }
+
+    /// Reads the first `n` records of a device buffer.
+    pub(super) fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Result<Vec<T>> {
+        let readback =
+            Buffer::new::<T>(self.device(), "stress.readback", n as u64, MemoryUsage::Readback)?;
+        self.copy(buffer, &readback)?;
+        readback.read(n)
+    }
+
+    fn copy(&mut self, from: &Buffer, to: &Buffer) -> Result<()> {
+        self.run(|rec| {
+            rec.copy(from, to);
+            Ok(())
+        })
+    }
+
+    /// Records commands, submits them and waits until they have run.
+    pub(super) fn run(&mut self, f: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
+        self.commands.run(f).map(|_| ())
+    }
+
+    /// Allocates the buffers and pipelines of a scene. With `skip`, passes whose input has not
+    /// changed since the last frame are left out.
+    ///
+    /// # Errors
+    /// If the scene exceeds a limit of the device, or a Vulkan call fails.
+    pub fn player(&self, scene: &Scene, skip: bool) -> Result<Player> {
+        self.gpu.player(Arc::new(scene.clone()), skip)
+    }
+
+    /// Renders a single frame of a scene with every pass.
+    ///
+    /// # Errors
+    /// If the scene exceeds a limit of the device, or a Vulkan call fails.
+    pub fn render(&mut self, scene: &Scene, i_frame: u32) -> Result<DeviceFrame> {
+        let mut player = self.player(scene, false)?;
+        let (renderer, device) = (&mut player.renderer, &self.gpu.device);
+        renderer.step(player.game.step(i_frame)?)?;
+        let (facets, lit) = match scene.lighting.mode {
+            LightingMode::None => (Vec::new(), Vec::new()),
+            _ => renderer.facets(device)?,
+        };
+        let (rgba, bytes) = (renderer.image()?, renderer.image_bytes()?);
+        let placed = renderer.placed(device)?;
+        let (particles, status) = renderer.generate_now(device)?;
+        Ok(DeviceFrame { rgba, bytes, placed, particles, status, facets, lit })
+    }
+}

@@ -194,7 +194,7 @@ fn readers(dir: &TempDir, merged: &Path, alone: &Path) {
     let (code, _, said) = ran(&["report", text(merged), "-o", text(&page)]);
     assert_eq!(code, Some(0), "{said}");
     let page = fs::read_to_string(page).expect("a page");
-    assert!(page.contains("Who timed what") && page.contains("2..4"));
+    assert!(page.contains("The nodes that timed the cases") && page.contains("2..4"));
     let (code, out, said) = ran(&["compare", text(alone), text(merged)]);
     assert!(code == Some(0) && out.contains("draw.cutoff=4, size=48x36"), "{out}{said}");
     let value: Value =

@@ -1,8 +1,9 @@
-//! `nimbus report` as a user runs it, and its pages as a browser shows them: whole without a
-//! script, quiet, on their own.
+//! `nimbus report`: its messages, and its pages in a browser, with and without scripts.
 
 #[path = "harness/browser.rs"]
 mod browser;
+#[path = "report/checks.rs"]
+mod checks;
 #[path = "harness/program.rs"]
 mod program;
 #[path = "harness/results.rs"]
@@ -13,7 +14,6 @@ mod studies;
 use std::fs;
 use std::path::PathBuf;
 
-use base64::Engine;
 use browser::Browser;
 use nimbus::io::image::png_bytes;
 use nimbus::studies::error::records::{Front, Study};
@@ -24,13 +24,13 @@ use program::{nimbus, path, run};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// A picture of 24 × 16 pixels of one colour.
+/// Returns a picture of 24 × 16 pixels of one colour.
 fn picture(rgb: [u8; 3]) -> Vec<u8> {
     png_bytes(24, 16, &rgb.repeat(24 * 16)).expect("a picture")
 }
 
-/// A study with pictures, and a ledger, in folders of their own.
-fn written(dir: &TempDir) -> [String; 2] {
+/// Writes a study with pictures and a ledger, each in its own folder.
+fn write_results_of_studies(dir: &TempDir) -> [String; 2] {
     let mut study = studies::usual_study();
     for (i, c) in study.configurations.iter_mut().enumerate().take(3) {
         (c.picture, c.error_map) = (Some(format!("p{i}.png")), Some(format!("e{i}.png")));
@@ -55,7 +55,7 @@ fn write_study(folder: &std::path::Path, study: &Study) {
         .expect("a study");
 }
 
-/// Two real benches of a few frames: the second one's picture is another.
+/// Runs two short benches with different pictures.
 fn benches(dir: &TempDir) -> [String; 2] {
     let scene = format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR"));
     let bench = |name: &str, set: &str| {
@@ -85,7 +85,7 @@ fn benches(dir: &TempDir) -> [String; 2] {
                 && shown.contains("frame of the scene"),
             "{shown}"
         );
-        assert!(!shown.contains('\u{1b}'), "no colours where no terminal is");
+        assert!(!shown.contains('\u{1b}'), "colours without a terminal");
         for file in ["run.json", "frames.csv", "frames.svg", "passes.svg", "case-0.png"] {
             assert!(PathBuf::from(&out).join(file).exists(), "{file}");
         }
@@ -110,9 +110,9 @@ fn report(dir: &TempDir, runs: &[&str]) -> PathBuf {
 }
 
 #[test]
-fn a_page_of_everything_is_whole_quiet_and_alone() {
+fn page_of_all_results_is_complete_and_self_contained() {
     let dir = tempfile::tempdir().expect("a folder");
-    let ([study, ledger], [before, after]) = (written(&dir), benches(&dir));
+    let ([study, ledger], [before, after]) = (write_results_of_studies(&dir), benches(&dir));
     let page = report(&dir, &[&before, &after, &study, &ledger]);
     let mut browser = Browser::new();
     browser.size(1200, 900);
@@ -123,7 +123,7 @@ fn a_page_of_everything_is_whole_quiet_and_alone() {
             .as_u64()
             .expect("a number")
     };
-    // Two benches with two charts each, a study, a ledger, and the comparison.
+    // Two benches with two charts each, a study, a ledger, and a comparison.
     assert_eq!((n(&mut browser, "main > section"), n(&mut browser, "figure.chart svg")), (5, 6));
     let titles = browser.eval(
         "[...document.querySelectorAll('figure.chart svg')].map(s => s.getAttribute('aria-label'))",
@@ -137,12 +137,12 @@ fn a_page_of_everything_is_whole_quiet_and_alone() {
             bench[0],
             bench[1],
             "Time against error",
-            "What every approximation is off by"
+            "Error of every approximation"
         ])
     );
     assert_eq!(n(&mut browser, "#run-2 .mark"), 23);
     assert_eq!(n(&mut browser, "#run-2 table:first-of-type tbody tr"), 23 + 3);
-    // Nothing hangs over, no picture is broken, all have texts, no two elements one name.
+    // No overflow; pictures are loaded and have texts; ids are unique.
     assert_eq!(browser.eval("document.documentElement.scrollWidth <= innerWidth"), json!(true));
     let pictures = browser
         .eval("[...document.images].every(i => i.complete && i.naturalWidth > 0 && i.alt !== '')");
@@ -155,12 +155,12 @@ fn a_page_of_everything_is_whole_quiet_and_alone() {
         json!(true)
     );
     assert_eq!(n(&mut browser, "table:not(:has(caption)), th:not([scope])"), 0);
-    pointing(&mut browser);
-    sliding(&mut browser);
-    sorting(&mut browser);
-    appearances(&mut browser);
+    checks::tooltips(&mut browser);
+    checks::sliders(&mut browser);
+    checks::sorting(&mut browser);
+    checks::contrasts(&mut browser);
     assert_eq!(browser.complaints(), [""; 0]);
-    // The check sees what it looks for.
+    // Errors would be reported.
     browser.eval("console.error('seen')");
     browser.eval("fetch('http://127.0.0.1:9/').catch(() => 0)");
     assert!(browser.complaints().len() >= 2, "{:?}", browser.complaints());
@@ -169,164 +169,11 @@ fn a_page_of_everything_is_whole_quiet_and_alone() {
     browser.open(&page);
     let text = browser.call("Runtime.evaluate", json!({ "expression": "1" }));
     assert!(text.is_object());
-    without_scripts(&mut browser);
-}
-
-/// A hint on pointing and on focus, gone after.
-fn pointing(browser: &mut Browser) {
-    let hint = "(() => { const h = document.getElementById('hint'); return h.hidden ? '' : \
-        h.textContent; })()";
-    assert_eq!(browser.eval(hint), json!(""));
-    let at = browser.eval(
-        "(() => { const m = document.querySelector('#run-2 .mark'); m.scrollIntoView({ block: \
-         'center' }); \
-         const b = m.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()",
-    );
-    let at = [0, 1].map(|i| at[i].as_f64().expect("a number"));
-    browser.point_at(at[0], at[1]);
-    let said = browser.eval(hint);
-    let said = said.as_str().expect("text");
-    // The fastest on the front comes first.
-    assert!(
-        said.contains("draw.resolution=0.25, draw.threshold=0.05")
-            && said.contains("GPU time of a frame: 4 (3.8 to 4.2) ms"),
-        "{said}"
-    );
-    assert!(said.contains("RMSE from the reference \"thin\": 0.06 (0.048 to 0.072)"), "{said}");
-    browser.point_at(1.0, 1.0);
-    assert_eq!(browser.eval(hint), json!(""));
-    browser.eval("document.querySelector('#run-2 .mark').focus()");
-    assert!(browser.eval(hint).as_str().is_some_and(|s| s.contains("draw.resolution=0.25")));
-    browser.key("Tab", 9);
-    assert!(
-        browser.eval(hint).as_str().is_some_and(|s| s.contains("draw.resolution=0.5")),
-        "the next on the front"
-    );
-    browser.key("Escape", 27);
-    assert_eq!(browser.eval(hint), json!(""));
-    let inside = "(() => { document.querySelector('#run-2 .mark').focus(); const b = \
-        document.getElementById('hint').getBoundingClientRect(); \
-                  document.activeElement.blur(); return b.left >= 0 && b.right <= innerWidth; })()";
-    assert_eq!(browser.eval(inside), json!(true));
-}
-
-/// One of two benches, three of the study against its reference.
-fn sliding(browser: &mut Browser) {
-    let sliders = "document.querySelectorAll('.slider').length";
-    assert_eq!(browser.eval(sliders), json!(4));
-    let cut = |browser: &mut Browser| {
-        browser.eval(
-            "(() => { const s = document.querySelector('#versus-0 .slider'); return \
-            [s.querySelector('input').value, s.querySelectorAll('img')[1].style.clipPath]; })()",
-        )
-    };
-    assert_eq!(cut(browser), json!(["50", "inset(0px 0px 0px 50%)"]));
-    browser.eval("document.querySelector('#versus-0 .slider input').focus()");
-    browser.key("ArrowRight", 39);
-    assert_eq!(cut(browser), json!(["51", "inset(0px 0px 0px 51%)"]));
-    // The two pictures and where they differ, which they do.
-    let captions = browser.eval(
-        "[...document.querySelectorAll('#versus-0 .pair figcaption')].map(c => c.textContent)",
-    );
-    assert_eq!(captions.as_array().map(Vec::len), Some(3));
-    assert!(
-        captions[2].as_str().is_some_and(|c| c.contains("FLIP") && !c.contains("mean 0;")),
-        "{captions}"
-    );
-}
-
-fn sorting(browser: &mut Browser) {
-    let rmse = "[...document.querySelectorAll('#run-2 table')].find(t => t.rows.length === 24)";
-    let column = |browser: &mut Browser| -> Vec<f64> {
-        let all = browser.eval(&format!(
-            "[...{rmse}.tBodies[0].rows].map(r => Number(r.cells[6].dataset.value))"
-        ));
-        all.as_array().expect("rows").iter().map(|v| v.as_f64().expect("a number")).collect()
-    };
-    let before = column(browser);
-    browser.eval(&format!("{rmse}.tHead.rows[0].cells[6].querySelector('button').click()"));
-    let sorted = column(browser);
-    assert!(sorted.is_sorted() && !before.is_sorted() && sorted.len() == before.len());
-    browser.eval(&format!("{rmse}.tHead.rows[0].cells[6].querySelector('button').click()"));
-    assert!(column(browser).iter().rev().is_sorted());
-}
-
-/// Light and dark, on a screen and on paper: all differ that should, and what is written can be
-/// read.
-fn appearances(browser: &mut Browser) {
-    let mut shown = Vec::new();
-    for (name, scheme, media) in
-        [("light", "light", "screen"), ("dark", "dark", "screen"), ("print", "dark", "print")]
-    {
-        browser.media(scheme, media);
-        let contrasts = browser.eval(CONTRAST);
-        let contrasts = contrasts.as_array().expect("a list");
-        assert!(contrasts.len() > 100, "{} texts", contrasts.len());
-        for of in contrasts {
-            // WCAG 2.1, 1.4.3.
-            assert!(of[0].as_f64().is_some_and(|c| c >= 4.5), "{name}: {of}");
-        }
-        let dark = browser.eval(&format!(
-            "({LUMINANCE})(getComputedStyle(document.documentElement).backgroundColor) < 0.2"
-        ));
-        assert_eq!(dark, json!(name == "dark"), "{name}");
-        let picture = browser.picture();
-        let bytes = base64::engine::general_purpose::STANDARD.decode(&picture).expect("base64");
-        if let Ok(kept) = std::env::var("NIMBUS_TEST_KEEP_PAGE") {
-            fs::write(format!("{kept}.{name}.png"), &bytes).expect("a file");
-        }
-        assert!(!shown.contains(&picture));
-        shown.push(picture);
-    }
-    browser.media("light", "screen");
-}
-
-/// Relative luminance of "rgb(…)" (WCAG 2.1).
-const LUMINANCE: &str = "c => { const v = c.match(/[0-9.]+/g).slice(0, 3).map(x => x / 255).map(x \
-    => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return 0.2126 * v[0] + 0.7152 * \
-    v[1] + 0.0722 * v[2]; }";
-
-/// Contrast of every element that has text of its own against what it stands on.
-const CONTRAST: &str = "(() => { const lum = c => { const v = c.match(/[0-9.]+/g).slice(0, \
-    3).map(x => x / 255).map(x => x <= 0.03928 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4); return \
-    0.2126 * v[0] + 0.7152 * v[1] + 0.0722 * v[2]; };\
-  const behind = e => { for (; e; e = e.parentElement) { const c = \
-  getComputedStyle(e).backgroundColor; if (!c.endsWith(', 0)') && c !== 'transparent') return c; } \
-  return 'rgb(255, 255, 255)'; };\
-  const out = [];\
-  for (const e of document.querySelectorAll('body *')) {\
-    if (!e.checkVisibility() || e.closest('script, style, title')) continue;\
-    const own = [...e.childNodes].filter(n => n.nodeType === 3).map(n => \
-    n.textContent.trim()).join('');\
-    if (own === '') continue;\
-    const style = getComputedStyle(e);\
-    const [a, b] = [lum(e.namespaceURI.endsWith('svg') ? style.fill : style.color), \
-    lum(behind(e))];\
-    out.push([(Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), own.slice(0, 40)]);\
-  } return out; })()";
-
-/// All tables and pictures are there; sliders are not.
-fn without_scripts(browser: &mut Browser) {
-    let document = browser.call("DOM.getDocument", json!({ "depth": 0 }))["root"]["nodeId"].clone();
-    let mut n = |selector: &str| {
-        let found = browser
-            .call("DOM.querySelectorAll", json!({ "nodeId": document, "selector": selector }));
-        found["nodeIds"].as_array().map(Vec::len).expect("a list")
-    };
-    assert_eq!(n(".slider"), 0);
-    assert_eq!(n("thead button"), 0);
-    assert_eq!(n("figure.chart svg"), 6);
-    // Each bench: loops, cases, passes; the study: configurations and budgets; the ledger; what
-    // differs, and the ratios.
-    assert_eq!(n("table"), 2 * 3 + 2 + 1 + 2);
-    assert_eq!(n(".mark title"), n(".mark"));
-    // The benches' last frames; the study's reference, three pictures and three error maps; A, B
-    // and where they differ.
-    assert_eq!(n("img"), 2 + 7 + 3);
+    checks::without_scripts(&mut browser);
 }
 
 #[test]
-fn what_files_say_cannot_act() {
+fn page_escapes_text_of_files() {
     let dir = tempfile::tempdir().expect("a folder");
     let evil = "</script><script>document.title='owned'</script><img src=x \
         onerror=\"document.title='owned'\">\"'&";
@@ -350,7 +197,7 @@ fn what_files_say_cannot_act() {
             .is_some_and(|t| t.matches("onerror=").count() >= 5)
     );
     assert_eq!(browser.complaints(), [""; 0]);
-    // A picture elsewhere is none of the study's.
+    // A picture in another folder is refused.
     study.configurations[0].picture = Some("../../secret.png".to_owned());
     write_study(&folder, &study);
     let output = run(&["report", folder.to_str().expect("UTF-8"), "-o", &path(&dir, "other.html")]);
@@ -359,9 +206,9 @@ fn what_files_say_cannot_act() {
 }
 
 #[test]
-fn bad_input_is_one_message_and_no_page() {
+fn bad_input_gives_one_message_and_no_page() {
     let dir = tempfile::tempdir().expect("a folder");
-    let [study, _] = written(&dir);
+    let [study, _] = write_results_of_studies(&dir);
     let (page, empty) = (path(&dir, "page.html"), path(&dir, "empty"));
     fs::create_dir(&empty).expect("a folder");
     let other = |name: &str, change: fn(&mut Value)| {
@@ -407,7 +254,7 @@ fn bad_input_is_one_message_and_no_page() {
         assert_eq!(output.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&output.stderr).contains(said));
     }
-    // What exists stays, unless forced; a file by its name is as good as its folder.
+    // Existing files stay without --force; a file may be named instead of its folder.
     assert!(run(&["report", &study, "-o", &page]).status.success());
     let first = fs::read(&page).expect("a page");
     let refused = run(&["report", &study, "-o", &page]);
@@ -425,7 +272,7 @@ fn bad_input_is_one_message_and_no_page() {
 }
 
 #[test]
-fn a_run_without_anything_to_draw_has_a_page() {
+fn page_of_a_run_without_data() {
     let dir = tempfile::tempdir().expect("a folder");
     let folder = dir.path().join("bare");
     fs::create_dir(&folder).expect("a folder");
@@ -446,7 +293,7 @@ fn a_run_without_anything_to_draw_has_a_page() {
 }
 
 #[test]
-fn a_bench_keeps_the_last_frame_of_its_cases_and_no_other_run_s() {
+fn bench_replaces_only_its_own_files() {
     let dir = tempfile::tempdir().expect("a folder");
     let (scene, out) =
         (format!("{}/scenes/threads.toml", env!("CARGO_MANIFEST_DIR")), path(&dir, "run"));
@@ -479,7 +326,7 @@ fn a_bench_keeps_the_last_frame_of_its_cases_and_no_other_run_s() {
         "run.json",
     ];
     assert_eq!(swept, all);
-    // The frame itself, as `render` writes it.
+    // The picture equals that of `render`.
     let drawn = path(&dir, "drawn.png");
     for (i, exposure) in ["film.exposure=1", "film.exposure=0.5"].into_iter().enumerate() {
         let more = ["--set", exposure, "--frame", "3", "-o", &drawn, "--force"];

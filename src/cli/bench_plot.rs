@@ -4,7 +4,7 @@ use clap::ColorChoice;
 
 use super::output;
 use crate::error::Result;
-use crate::report::charts::{Plot, frames, passes};
+use crate::report::charts::{Chart, frames, passes};
 use crate::timing::attachments::{PASSES_CHART, frames_chart};
 use crate::timing::frame_rows::FrameRow;
 use crate::timing::records::Run;

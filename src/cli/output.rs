@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::error::{Error, Result};
 use crate::io::atomic::write_atomic;
-use crate::report::charts::Plot;
+use crate::report::charts::Chart;
 
 /// `error: …` on stderr.
 pub fn error(error: &Error, color: ColorChoice) {
@@ -54,7 +54,7 @@ pub fn text(text: &str) -> Result<()> {
 }
 
 /// A chart as an SVG file.
-pub fn write_chart(path: &Path, chart: &impl Plot) -> Result<()> {
+pub fn write_chart(path: &Path, chart: &impl Chart) -> Result<()> {
     let svg = chart.svg(chart.size())?;
     write_atomic(path, |file| file.write_all(svg.as_bytes()))
 }

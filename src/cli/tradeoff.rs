@@ -22,7 +22,7 @@ use crate::model::film::Film;
 use crate::model::scene::Scene;
 use crate::reference::picture::pixels::Pixels;
 use crate::reference::picture::whole::Work;
-use crate::report::charts::{self, Plot};
+use crate::report::charts::{self, Chart};
 use crate::studies::error::design::{Design, name_of, settings};
 use crate::studies::error::files;
 use crate::studies::error::front::{Metric, best_within_error, best_within_ms};
@@ -111,7 +111,7 @@ pub fn run(
     sum_up(args, &mut study, &found, metric, time);
     if let Some(out) = &args.out {
         files::write(out, &study, &found)?;
-        output::write_chart(&out.join("front.svg"), &charts::tradeoff::chart(&study))?;
+        output::write_chart(&out.join("front.svg"), &charts::error::chart(&study))?;
     }
     done?;
     print(args, color, &study)?;
@@ -153,7 +153,7 @@ fn print(args: &ErrorArgs, color: ColorChoice, study: &Study) -> Result<()> {
     if !args.plot {
         return Ok(());
     }
-    let chart = charts::tradeoff::chart(study);
+    let chart = charts::error::chart(study);
     output::text(&format!(
         "\n{}",
         chart.text(output::columns(), chart.rows(), output::colored(color))?

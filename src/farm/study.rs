@@ -12,7 +12,7 @@ use super::store::{Manifest, Workplace};
 use crate::error::{Error, Result};
 use crate::frame::stage::DeviceChoice;
 use crate::io::atomic::write_atomic;
-use crate::report::charts::{self, Plot};
+use crate::report::charts::{self, Chart};
 use crate::studies::error::files::{self, CONFIGURATIONS_FILE};
 use crate::studies::error::parts::{Part, differences, join};
 use crate::studies::error::records::{STUDY_FILE, Study, TIMES_FILE};
@@ -60,7 +60,7 @@ pub fn merge(parts: &[(PathBuf, Manifest)], out: &Path, force: bool) -> Result<u
         fs::copy(&from, &to).map_err(|cause| of_io(&to, &cause))?;
     }
     files::write(out, &study, &found)?;
-    let chart = charts::tradeoff::chart(&study);
+    let chart = charts::error::chart(&study);
     let svg = chart.svg(chart.size())?;
     write_atomic(&out.join("front.svg"), |file| std::io::Write::write_all(file, svg.as_bytes()))?;
     Ok(study.configurations.len())

@@ -1,4 +1,4 @@
-//! Charts and pages, made from the records of results alone.
+//! Charts and pages made from result records alone, without a device.
 
 pub mod charts;
 pub mod pages;

@@ -1,6 +1,7 @@
-//! What is done with an input by the fuzz target of its kind (fuzz/fuzz_targets) and by the
-//! regression tests: it is read, and either gives one clean error or something whole, which is then
-//! written and read again. A fault is a panic.
+//! Checks of parsers, shared by the fuzz targets (fuzz/fuzz_targets) and the regression tests.
+//!
+//! Every check parses an input. The parser returns either one clean error or a complete value,
+//! which is then written and parsed again. A fault is a panic.
 
 #![allow(dead_code, reason = "each program uses its own part")]
 
@@ -14,7 +15,7 @@ use nimbus::io::weather::{netcdf, wrf};
 use nimbus::io::{box_file, particle_file};
 use nimbus::model::weather::particles::Layout;
 use nimbus::report::pages::page;
-use nimbus::report::pages::source::{Found, Source};
+use nimbus::report::pages::source::{Results, Source};
 use nimbus::studies::error::files::parse_found;
 use nimbus::studies::error::records::Study;
 use nimbus::studies::ledger::records::Ledger;
@@ -23,22 +24,23 @@ use nimbus::timing::json;
 use nimbus::timing::results::parse_results;
 use serde_json::Value;
 
-/// A folder that does not exist: what is read here names files, and none may be found.
+/// A folder that does not exist, so that no input reads files of the machine.
 pub const NOWHERE: &str = "/nowhere/of/nimbus";
 
-/// What is longer is read, but not played: frames and pages are made in a moment or not at all.
+/// Largest scene whose frames are computed, in particles, facets and waves. Larger scenes are only
+/// parsed.
 const MAX_PLAYED: u64 = 4096;
 
-/// A message that holds more than this echoes its input.
-const LONGEST_MESSAGE: usize = 4096;
+/// Length limit of a message, bytes. A longer message repeats its input.
+const MAX_MESSAGE: usize = 4096;
 
-/// An input of several files, which zero bytes part.
+/// Splits an input into files, which are separated by zero bytes.
 fn parts(bytes: &[u8]) -> Option<Vec<&str>> {
     bytes.split(|b| *b == 0).map(|part| std::str::from_utf8(part).ok()).collect()
 }
 
-/// A scene; then the box file that it finds under every name, the particle list that it finds under
-/// every name in .csv, and what is given with `--set`, one a part.
+/// Checks the parser of scenes. The parts of the input are the scene, the content of every box
+/// file, the content of every particle list (.csv), and arguments of `--set`.
 pub fn scene_file(bytes: &[u8]) -> std::result::Result<(), String> {
     let Some(parts) = parts(bytes) else { return Err("no text".to_owned()) };
     let part = |i: usize| parts.get(i).copied().unwrap_or_default();
@@ -68,11 +70,11 @@ pub fn scene_file(bytes: &[u8]) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// The first frame and the last, as far as the host has to do with them.
+/// Runs the game step of the first and the last frame.
 fn play(loaded: &LoadedScene) {
     let scene = &loaded.scene;
     let n_waves: u64 = scene.clouds.iter().map(|c| u64::from(c.gust.n_waves)).sum();
-    // The basis of a lobe takes longer than all else together.
+    // Computing the basis of a lobe takes longer than everything else.
     let is_glossy = scene.materials.iter().any(|m| m.is_glossy());
     if is_glossy || scene.n_particles() + scene.n_surface_facets() + n_waves > MAX_PLAYED {
         return;
@@ -89,7 +91,7 @@ fn play(loaded: &LoadedScene) {
     }
 }
 
-/// A box file; what it holds is written and read again.
+/// Checks the parser of box files.
 pub fn boxes(bytes: &[u8]) -> std::result::Result<(), String> {
     let Ok(text) = std::str::from_utf8(bytes) else { return Err("no text".to_owned()) };
     let path = Path::new("b.dat");
@@ -101,13 +103,13 @@ pub fn boxes(bytes: &[u8]) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// A particle list; every particle has a line of its own.
+/// Checks the parser of particle lists: every particle has its own line.
 pub fn particle_list(bytes: &[u8]) -> std::result::Result<(), String> {
     let Ok(text) = std::str::from_utf8(bytes) else { return Err("no text".to_owned()) };
     let (particles, lines) = particle_file::parse_with_lines(text, Path::new("p.csv"))
         .map_err(|e| clean(&e, &[text]))?;
     assert_eq!(particles.len(), lines.len());
-    // CSV takes a carriage return alone for a row's end; no editor counts a line there.
+    // CSV ends a row at a single carriage return, where no line ends.
     let is_after = |w: &[usize]| if text.contains('\r') { w[0] <= w[1] } else { w[0] < w[1] };
     assert!(lines.windows(2).all(is_after), "lines in order: {lines:?}");
     assert!(
@@ -117,33 +119,32 @@ pub fn particle_list(bytes: &[u8]) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// A JSON file of results and, after a zero byte, the table that belongs to it. What is whole is
-/// made a page of, beside itself.
+/// Checks the parsers of results: a JSON file and, after a zero byte, its table. Complete results
+/// become a page that compares them with themselves.
 pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
     let Some(parts) = parts(bytes) else { return Err("no text".to_owned()) };
     let (text, table) = (parts[0], parts.get(1).copied().unwrap_or_default());
     let path = |name: &str| Path::new(NOWHERE).join(name);
-    // Of every kind, of which a text can be one at most.
     let mut errors = Vec::new();
     let mut refuse = |e: Error| errors.push(clean(&e, &[]));
     let mut found = Vec::new();
     match json::parse(text, &path("run.json")) {
         Ok(run) => match parse_results(run, table, &path("frames.csv")) {
-            Ok(recorded) => found.push(Found::Bench(Box::new(recorded))),
+            Ok(recorded) => found.push(Results::Bench(Box::new(recorded))),
             Err(e) => refuse(e),
         },
         Err(e) => refuse(e),
     }
     match json::parse::<Study>(text, &path("study.json")) {
-        // A study alone is one that is not gone on with.
+        // A study without a table is one that will not be resumed.
         Ok(study) => match parse_found(study.clone(), table, &path("times.csv")) {
             Err(e) if !table.is_empty() => refuse(e),
-            _ => found.push(Found::Study(Box::new(study))),
+            _ => found.push(Results::Study(Box::new(study))),
         },
         Err(e) => refuse(e),
     }
     match json::parse::<Ledger>(text, &path("ledger.json")) {
-        Ok(ledger) => found.push(Found::Ledger(Box::new(ledger))),
+        Ok(ledger) => found.push(Results::Ledger(Box::new(ledger))),
         Err(e) => refuse(e),
     }
     if found.is_empty() {
@@ -152,7 +153,7 @@ pub fn results(bytes: &[u8]) -> std::result::Result<(), String> {
     found.into_iter().try_for_each(show)
 }
 
-/// A weather file and its first steps.
+/// Checks the reader of weather files, with their first steps.
 pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
     const MOST_STEPS: usize = 4;
     let container = netcdf::from_bytes(bytes.to_vec())?;
@@ -173,29 +174,30 @@ pub fn weather(bytes: &[u8]) -> std::result::Result<(), String> {
     Ok(())
 }
 
-/// A page of a result and, once more, of itself; two benches are compared as `nimbus compare` does.
-fn show(found: Found) -> std::result::Result<(), String> {
-    if let Found::Bench(recorded) = &found {
+/// Creates a page of results compared with themselves, and compares benches as `nimbus compare`
+/// does.
+fn show(results: Results) -> std::result::Result<(), String> {
+    if let Results::Bench(recorded) = &results {
         drop(Comparison::new(recorded, recorded));
     }
     let source = |name: &str| Source {
         name: name.to_owned(),
         folder: PathBuf::from(NOWHERE),
-        found: found.clone(),
+        results: results.clone(),
     };
     let html = page(&[source("a"), source("b")]).map_err(|e| clean(&e, &[]))?;
     assert!(html.ends_with("</html>"), "a whole page");
     Ok(())
 }
 
-/// The message of an error that an input may give: of bad input, short, and at a place that the
-/// input has.
+/// Checks that an error reports bad input in a short message with a valid line number, and returns
+/// the message.
 fn clean(error: &Error, texts: &[&str]) -> String {
     let message = error.to_string();
     assert_eq!(error.exit_code(), 2, "{message}");
     if let Error::Scene { at, what } = error {
         assert!(
-            !what.is_empty() && what.len() < LONGEST_MESSAGE,
+            !what.is_empty() && what.len() < MAX_MESSAGE,
             "{} bytes of message: {what:.200}",
             what.len()
         );
@@ -205,8 +207,8 @@ fn clean(error: &Error, texts: &[&str]) -> String {
     message
 }
 
-/// JSON's strings, numbers and lists are TOML's but for DEL, which TOML wants escaped, and `:`,
-/// which is `=` there.
+/// Converts JSON to TOML. Strings, numbers and lists are equal in both, except that TOML requires
+/// DEL to be escaped.
 fn to_toml(resolved: &Value) -> String {
     fn string(text: &str) -> String {
         Value::from(text).to_string().replace('\u{7f}', "\\u007f")

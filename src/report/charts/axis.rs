@@ -1,35 +1,40 @@
-//! Axes: which values they show, where a value lies on them, and what their ticks say.
+//! Linear and logarithmic axes with their ticks.
 
 use std::ops::Range;
 
 use super::number::number;
 
-/// A named place on an axis.
+/// A labelled position on an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tick {
+    /// Position on the axis.
     pub at: f64,
+    /// Label.
     pub text: String,
 }
 
+/// An axis. Positions on it are values, or decimal logarithms of values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
+    /// Label of the axis.
     pub name: String,
-    /// In its own measure: the value, or its decimal logarithm.
+    /// First and last position.
     pub range: Range<f64>,
+    /// Labelled positions.
     pub ticks: Vec<Tick>,
     is_log: bool,
-    /// Where an axis of logarithms puts 0.
+    /// Position of the value 0 on a logarithmic axis.
     zero: Option<f64>,
 }
 
-/// Beyond the outermost values, of what they span.
+/// Margin beyond the outermost values, as a share of their span.
 const MARGIN: f64 = 0.06;
-/// Of an axis of logarithms, which one value would leave without a length, in decades.
-const LEAST_MARGIN: f64 = 0.08;
+/// Smallest margin of a logarithmic axis, in decades. A single value spans nothing.
+const MIN_MARGIN: f64 = 0.08;
 
 impl Axis {
-    /// Of the positive among `values`; `with_zero`: what is 0 is drawn too, below a gap. About
-    /// `n_ticks` at most.
+    /// Returns a logarithmic axis for the positive numbers among `values`, with about `n_ticks`
+    /// ticks at most. With `with_zero`, the value 0 has a position below a gap.
     pub fn log(
         name: &str,
         values: impl Iterator<Item = f64>,
@@ -42,7 +47,7 @@ impl Axis {
         if low > high {
             (low, high) = (-1.0, 1.0);
         }
-        let margin = (MARGIN * (high - low)).max(LEAST_MARGIN);
+        let margin = (MARGIN * (high - low)).max(MIN_MARGIN);
         let mut ticks: Vec<Tick> = log_ticks(low - margin..high + margin, n_ticks);
         let zero = with_zero.then_some(low - 3.0 * margin);
         if let Some(at) = zero {
@@ -53,7 +58,7 @@ impl Axis {
         Axis { name: name.to_owned(), range: begin..high + margin, ticks, is_log: true, zero }
     }
 
-    /// From `low` to `high`.
+    /// Returns a linear axis from `low` to `high`.
     pub fn linear(name: &str, low: f64, high: f64, n_ticks: usize) -> Axis {
         let high = if high > low { high } else { low + 1.0 };
         let named = |at: f64| Tick { at, text: number(at) };
@@ -61,7 +66,7 @@ impl Axis {
         Axis { name: name.to_owned(), range: low..high, ticks, is_log: false, zero: None }
     }
 
-    /// A row for every name, the first on top.
+    /// Returns an axis with a row for every name, the first on top.
     pub fn rows(names: &[String]) -> Axis {
         let n = names.len();
         let ticks = names
@@ -77,8 +82,8 @@ impl Axis {
         }
     }
 
-    /// Where `value` lies; None of what has no place.
-    pub fn at(&self, value: f64) -> Option<f64> {
+    /// Returns the position of a value, if it has one.
+    pub fn position(&self, value: f64) -> Option<f64> {
         match (self.is_log, value) {
             (_, v) if !v.is_finite() => None,
             (false, v) => Some(v),
@@ -87,25 +92,25 @@ impl Axis {
         }
     }
 
-    /// Whether an interval that ends at `value` ends within the axis.
-    pub fn shows(&self, value: f64) -> bool {
-        self.at(value).is_some_and(|at| at >= self.range.start && at <= self.range.end)
+    /// Returns whether the axis contains a value.
+    pub fn contains(&self, value: f64) -> bool {
+        self.position(value).is_some_and(|at| at >= self.range.start && at <= self.range.end)
     }
 
-    /// Where an interval's end lies: at the axis' end where it has no place on it.
-    pub fn end_at(&self, value: f64) -> f64 {
+    /// Returns the position of an interval's end, clamped to the axis.
+    pub fn clamped(&self, value: f64) -> f64 {
         let beyond = if value > 0.0 { self.range.end } else { self.range.start };
-        self.at(value).unwrap_or(beyond).clamp(self.range.start, self.range.end)
+        self.position(value).unwrap_or(beyond).clamp(self.range.start, self.range.end)
     }
 }
 
-/// The middle of row `i` of `n`, counted from above.
+/// Returns the position of the middle of row `i` of `n`, counted from the top.
 pub fn row_middle(i: usize, n: usize) -> f64 {
     (n - i) as f64 - 0.5
 }
 
-/// Ticks of an axis of logarithms: every unit of every decade, or fewer of them, or decades, or
-/// every so many.
+/// Returns ticks of a logarithmic axis: as many multiples in every decade as there is room for, or
+/// whole decades, or every so many decades.
 fn log_ticks(range: Range<f64>, n_most: usize) -> Vec<Tick> {
     let n_most = n_most.max(2);
     const UNITS: [&[f64]; 4] =
@@ -126,7 +131,7 @@ fn log_ticks(range: Range<f64>, n_most: usize) -> Vec<Tick> {
     values.into_iter().map(|v| Tick { at: v.log10(), text: number(v) }).collect()
 }
 
-/// Multiples of 1, 2 or 5 times a power of ten within `low` and `high`, `n_most` at most.
+/// Returns the multiples of 1, 2 or 5 times a power of ten from `low` to `high`, at most `n_most`.
 fn linear_steps(low: f64, high: f64, n_most: usize) -> Vec<f64> {
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
@@ -135,7 +140,7 @@ fn linear_steps(low: f64, high: f64, n_most: usize) -> Vec<f64> {
     let decade = 10f64.powf((span / n_most.max(1) as f64).log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0, 20.0].map(|unit| unit * decade);
     let multiples = |step: f64| {
-        // A hair of tolerance: 0.3 / 0.1 is below 3.
+        // With a tolerance, because 0.3 / 0.1 is below 3 in f64.
         let (first, last) =
             ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
         (first..=last).map(|i| i as f64 * step).collect::<Vec<f64>>()
@@ -156,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn ticks_are_round_and_few() {
+    fn ticks_are_round_numbers_within_the_limit() {
         let of = |values: &[f64], n| Axis::log("x", values.iter().copied(), false, n);
         assert_eq!(texts(&of(&[1.0, 100.0], 9)), ["1", "2", "5", "10", "20", "50", "100"]);
         assert_eq!(texts(&of(&[1.0, 100.0], 4)), ["1", "10", "100"]);
@@ -166,21 +171,24 @@ mod tests {
     }
 
     #[test]
-    fn values_that_have_no_log_have_no_place_but_zero() {
+    fn only_positive_values_and_zero_have_a_position() {
         let axis = Axis::log("x", [0.0, 1.0, f64::NAN, 10.0, f64::INFINITY].into_iter(), true, 8);
-        assert_eq!(axis.at(10.0), Some(1.0));
-        assert!(axis.at(0.0).is_some_and(|zero| zero < -0.1 && zero > axis.range.start));
-        assert_eq!((axis.at(f64::NAN), axis.at(f64::INFINITY), axis.at(-1.0)), (None, None, None));
+        assert_eq!(axis.position(10.0), Some(1.0));
+        assert!(axis.position(0.0).is_some_and(|zero| zero < -0.1 && zero > axis.range.start));
         assert_eq!(
-            (axis.end_at(f64::INFINITY), axis.end_at(-3.0)),
+            (axis.position(f64::NAN), axis.position(f64::INFINITY), axis.position(-1.0)),
+            (None, None, None)
+        );
+        assert_eq!(
+            (axis.clamped(f64::INFINITY), axis.clamped(-3.0)),
             (axis.range.end, axis.range.start)
         );
         assert_eq!(
-            (axis.shows(10.0), axis.shows(0.0), axis.shows(1e9), axis.shows(-3.0)),
+            (axis.contains(10.0), axis.contains(0.0), axis.contains(1e9), axis.contains(-3.0)),
             (true, true, false, false)
         );
         assert_eq!(texts(&axis)[0], "0");
         let without = Axis::log("x", std::iter::empty(), false, 8);
-        assert_eq!((without.range.start < without.range.end, without.at(0.0)), (true, None));
+        assert_eq!((without.range.start < without.range.end, without.position(0.0)), (true, None));
     }
 }

@@ -1,42 +1,38 @@
-//! Horizontal bars, a row each.
+//! Horizontal bars, one per row.
 
 use plotters::prelude::*;
 
 use super::axis::row_middle;
-use super::plane::Plane;
+use super::medium::CELL;
+use super::plot_area::PlotArea;
 
-/// Of a row's height, what the bar takes.
+/// Thickness of a bar as a share of its row.
 const THICKNESS: f64 = 0.62;
 
-/// Upper and lower end of the bar in row `i` of `n`, px.
-pub fn span<DB: DrawingBackend>(plane: &Plane<'_, DB>, i: usize, n: usize) -> (i32, i32) {
-    let edge = |d: f64| plane.pixel(0.0, row_middle(i, n) + d * THICKNESS / 2.0).1;
+/// Returns the upper and the lower end of the bar in row `i` of `n`, px.
+pub fn bar_ends<DB: DrawingBackend>(area: &PlotArea<'_, DB>, i: usize, n: usize) -> (i32, i32) {
+    let edge = |d: f64| area.pixel(0.0, row_middle(i, n) + d * THICKNESS / 2.0).1;
     (edge(1.0), edge(-1.0))
 }
 
-/// A bar in row `i` of `n` between two places of the x axis; in a terminal a row of `glyph`.
-pub fn bar<DB: DrawingBackend>(
-    plane: &Plane<'_, DB>,
+/// Draws a bar in row `i` of `n` between two positions of the x axis; in a terminal a row of
+/// `glyph`.
+pub fn draw_bar<DB: DrawingBackend>(
+    area: &PlotArea<'_, DB>,
     (i, n): (usize, usize),
     (from, to): (f64, f64),
-    (color, opacity): (RGBColor, f64),
+    color: RGBColor,
     glyph: char,
 ) -> DrawResult<(), DB> {
     let y = row_middle(i, n);
-    let (left, right) = (plane.pixel(from, y).0, plane.pixel(to, y).0);
-    if plane.look.characters {
-        let cell = super::look::CELL.0;
-        let row = plane.pixel(from, y).1;
-        // A cell belongs to the bar that covers its middle, so that bars beside each other share
-        // none.
-        let (first, end) =
-            ((left + cell / 2).div_euclid(cell), (right + cell / 2).div_euclid(cell));
-        return (first..end).try_for_each(|column| plane.glyph(glyph, (column * cell, row), color));
+    let (left, row) = area.pixel(from, y);
+    let right = area.pixel(to, y).0;
+    if area.medium.is_terminal() {
+        // A cell belongs to the bar that covers its middle, so that adjacent bars share none.
+        let column = |x: i32| (x + CELL.0 / 2).div_euclid(CELL.0);
+        return (column(left)..column(right))
+            .try_for_each(|column| area.glyph(glyph, (column * CELL.0, row), color));
     }
-    let (upper, lower) = span(plane, i, n);
-    if right > left {
-        plane.rectangle([left, upper, right, lower], color.mix(opacity).filled())
-    } else {
-        Ok(())
-    }
+    let (upper, lower) = bar_ends(area, i, n);
+    if right > left { area.rectangle([left, upper, right, lower], color.filled()) } else { Ok(()) }
 }

@@ -1,223 +1,194 @@
-//! Frame times of a bench over the frames of its scene, a line a loop.
+//! Frame times of a bench over the frames of its scene, one line per loop.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::axis::Axis;
 use super::bins::{Bin, bins};
-use super::look::{Look, MUTED, glyph, series};
+use super::chart::{Chart, LegendEntry, Tooltip};
+use super::medium::{MUTED, glyph, series};
 use super::number::number;
-use super::plane::{Behind, Plane};
-use super::{Key, Mark, Place, Plot};
+use super::plot_area::{Canvas, GridLines, PlotArea};
 use crate::measure::stats::percentile;
 use crate::timing::frame_rows::FrameRow;
 use crate::timing::names::sweep_text;
 use crate::timing::results::BenchResults;
 
-/// Where single frames take more than so many times the 99th percentile, they do not flatten all
-/// others: the axis ends below, and a note counts them.
+/// If a frame takes longer than this multiple of the 99th percentile, the axis is cut.
 const CUT_ABOVE: f64 = 3.0;
-/// Where it then ends, by the 99th percentile.
+/// End of a cut axis as a multiple of the 99th percentile. A note counts the frames above it.
 const CUT_AT: f64 = 1.5;
-/// px of a picture that a bin takes at least.
+/// Smallest width of a bin in a picture, px.
 const BIN_PX: i32 = 3;
 
-/// One point of a sweep, or the whole run where there is none.
+/// The chart of one point of a sweep, or of a whole run without sweep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameChart {
     sweep: String,
     loops: Vec<Loop>,
-    /// First frame and name of each, in order.
+    /// First frame and name of every phase, in order.
     phases: Vec<(u32, String)>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 struct Loop {
     name: String,
-    /// Frame and ms, in the order they ran.
+    /// Frame and ms, in the order of execution.
     samples: Vec<(u32, f64)>,
 }
 
-/// A timed frame.
-struct Sample<'a> {
-    sweep: &'a str,
-    phase: &'a str,
-    loop_name: &'a str,
-    frame: u32,
-    ms: f64,
-}
-
-/// The charts of rows of frames.csv; warm-up is left out.
+/// Returns the charts of rows of frames.csv, without warm-up.
 pub fn charts_of_rows(rows: &[FrameRow]) -> Vec<FrameChart> {
     let mut charts = Vec::new();
     for row in rows.iter().filter(|row| !row.warm_up) {
-        let loop_name = loop_name(&row.threading, row.skip);
-        let (sweep, phase) = (row.sweep.as_str(), row.phase.as_str());
-        let sample =
-            Sample { sweep, phase, loop_name: &loop_name, frame: row.frame, ms: row.frame_ms };
-        add(&mut charts, &sample);
+        let name = loop_name(&row.threading, row.skip);
+        add(&mut charts, [&row.sweep, &row.phase, &name], row.frame, row.frame_ms);
     }
     charts
 }
 
-/// The charts of results that were read back.
-pub fn charts_of(recorded: &BenchResults) -> Vec<FrameChart> {
+/// Returns the charts of a bench's results.
+pub fn charts_of(results: &BenchResults) -> Vec<FrameChart> {
     let mut charts = Vec::new();
-    // Loops without a timed frame are not in `recorded.modes`.
-    let timed = recorded
-        .run
-        .cases
-        .iter()
-        .flat_map(|c| c.modes.iter().filter(|m| m.frames > 0).map(move |m| (c, m)));
-    for ((case, mode), times) in timed.zip(&recorded.modes) {
-        let (sweep, loop_name) = (sweep_text(&case.sweep), loop_name(&mode.threading, mode.skip));
+    // `results.modes` holds the loops that have timed frames.
+    let cases = results.run.cases.iter();
+    let timed = cases.flat_map(|c| c.modes.iter().filter(|m| m.frames > 0).map(move |m| (c, m)));
+    for ((case, mode), times) in timed.zip(&results.modes) {
+        let (sweep, name) = (sweep_text(&case.sweep), loop_name(&mode.threading, mode.skip));
         let phase = case.phase.as_deref().unwrap_or_default();
         for (frame, ms) in times.frames.iter().zip(times.blocks.iter().flatten()) {
-            add(
-                &mut charts,
-                &Sample { sweep: &sweep, phase, loop_name: &loop_name, frame: *frame, ms: *ms },
-            );
+            add(&mut charts, [&sweep, phase, &name], *frame, *ms);
         }
     }
     charts
 }
 
-fn loop_name(threading: &str, skip: bool) -> String {
+/// Returns the name of a loop: its threading, and whether it skips no pass.
+pub(super) fn loop_name(threading: &str, skip: bool) -> String {
     if skip { threading.to_owned() } else { format!("{threading} no-skip") }
 }
 
-fn add(charts: &mut Vec<FrameChart>, sample: &Sample<'_>) {
-    let Sample { sweep, phase, loop_name, frame, ms } = *sample;
+fn add(charts: &mut Vec<FrameChart>, [sweep, phase, name]: [&str; 3], frame: u32, ms: f64) {
     let i = charts.iter().position(|c| c.sweep == sweep).unwrap_or_else(|| {
         charts.push(FrameChart { sweep: sweep.to_owned(), loops: Vec::new(), phases: Vec::new() });
         charts.len() - 1
     });
-    let chart = &mut charts[i];
-    match chart.phases.iter_mut().find(|(_, name)| name == phase) {
+    let FrameChart { loops, phases, .. } = &mut charts[i];
+    match phases.iter_mut().find(|(_, other)| other == phase) {
         Some((first, _)) => *first = frame.min(*first),
-        None => chart.phases.push((frame, phase.to_owned())),
+        None => phases.push((frame, phase.to_owned())),
     }
-    match chart.loops.iter_mut().find(|l| l.name == loop_name) {
-        Some(of) => of.samples.push((frame, ms)),
-        None => chart.loops.push(Loop { name: loop_name.to_owned(), samples: vec![(frame, ms)] }),
+    match loops.iter_mut().find(|l| l.name == name) {
+        Some(found) => found.samples.push((frame, ms)),
+        None => loops.push(Loop { name: name.to_owned(), samples: vec![(frame, ms)] }),
     }
 }
 
 impl FrameChart {
-    fn times(&self) -> Vec<f64> {
-        let all = self.loops.iter().flat_map(|l| &l.samples).map(|(_, ms)| *ms);
-        all.filter(|ms| ms.is_finite()).collect()
+    fn samples(&self) -> impl Iterator<Item = &(u32, f64)> {
+        self.loops.iter().flat_map(|l| &l.samples)
     }
 
-    /// Where the axis of times ends, and how many frames took longer.
-    fn top(&self) -> (f64, usize) {
+    fn times(&self) -> Vec<f64> {
+        self.samples().map(|(_, ms)| *ms).filter(|ms| ms.is_finite()).collect()
+    }
+
+    /// Returns the end of the axis of times, ms.
+    fn top(&self) -> f64 {
         let times = self.times();
         let most = times.iter().copied().fold(0.0, f64::max);
         let usual = percentile(&times, 0.99).unwrap_or(0.0);
-        let top =
-            if most > CUT_ABOVE * usual && usual > 0.0 { CUT_AT * usual } else { 1.05 * most };
-        (top, times.iter().filter(|ms| **ms > top).count())
-    }
-
-    fn range(&self) -> (u32, u32) {
-        let frames = || self.loops.iter().flat_map(|l| &l.samples).map(|(frame, _)| *frame);
-        (frames().min().unwrap_or(0), frames().max().unwrap_or(0))
+        if most > CUT_ABOVE * usual && usual > 0.0 { CUT_AT * usual } else { 1.05 * most }
     }
 
     fn draw_loop<DB: DrawingBackend>(
         &self,
-        plane: &Plane<'_, DB>,
+        area: &PlotArea<'_, DB>,
         i: usize,
-        found: &[Bin],
+        bins: &[Bin],
         top: f64,
     ) -> DrawResult<(), DB> {
         let at = |bin: &Bin, ms: f64| (bin.middle(), ms.min(top));
-        if plane.look.characters {
-            for bin in found {
-                let [least, most] = [bin.min, bin.max].map(|ms| at(bin, ms));
-                plane.line(&[least, most], series(i))?;
+        let color = series(i);
+        if area.medium.is_terminal() {
+            for bin in bins {
+                area.line(&[bin.min, bin.max].map(|ms| at(bin, ms)), color)?;
             }
-            for bin in found {
+            return bins.iter().try_for_each(|bin| {
                 let (x, ms) = at(bin, bin.median);
-                plane.glyph(glyph(i), plane.pixel(x, ms), series(i))?;
-            }
-            return Ok(());
+                area.glyph(glyph(i), area.pixel(x, ms), color)
+            });
         }
-        // A gap in the frames is a gap in the line.
-        for run in found.chunk_by(|a, b| u64::from(a.last) + 1 >= u64::from(b.first)) {
+        // Missing frames leave a gap in the line.
+        for run in bins.chunk_by(|a, b| u64::from(a.last) + 1 >= u64::from(b.first)) {
             let above = run.iter().map(|bin| at(bin, bin.max));
             let below = run.iter().rev().map(|bin| at(bin, bin.min));
-            plane.area(&above.chain(below).collect::<Vec<_>>(), series(i).mix(0.2))?;
-            let middle: Vec<(f64, f64)> = run.iter().map(|bin| at(bin, bin.median)).collect();
+            area.polygon(&above.chain(below).collect::<Vec<_>>(), color.mix(0.2))?;
+            let mut middle: Vec<(f64, f64)> = run.iter().map(|bin| at(bin, bin.median)).collect();
             if let [(x, ms)] = middle[..] {
-                plane.line(&[(x - 0.4, ms), (x + 0.4, ms)], series(i).stroke_width(2))?;
+                middle = vec![(x - 0.4, ms), (x + 0.4, ms)];
             }
-            plane.line(&middle, series(i).stroke_width(2))?;
+            area.line(&middle, color.stroke_width(2))?;
         }
         Ok(())
     }
 
     fn draw_phases<DB: DrawingBackend>(
         &self,
-        plane: &Plane<'_, DB>,
-        range: (u32, u32),
+        area: &PlotArea<'_, DB>,
+        first_frame: u32,
         top: f64,
     ) -> DrawResult<(), DB> {
-        let [_, upper, right, _] = plane.bounds();
+        let [_, upper, right, _] = area.bounds();
         let mut phases = self.phases.clone();
         phases.sort();
+        let begin = |first: u32| f64::from(first) - 0.5;
         for (i, (first, name)) in
             phases.iter().enumerate().filter(|(_, (_, name))| !name.is_empty())
         {
-            let x = f64::from(*first) - 0.5;
-            if *first > range.0 {
-                plane.line(&[(x, 0.0), (x, top)], MUTED.stroke_width(1))?;
+            let x = begin(*first);
+            if *first > first_frame {
+                area.line(&[(x, 0.0), (x, top)], MUTED.stroke_width(1))?;
             }
-            let begin = plane.pixel(x, 0.0).0;
-            let end = phases
-                .get(i + 1)
-                .map_or(right, |(next, _)| plane.pixel(f64::from(*next) - 0.5, 0.0).0);
-            let (gap, down) = (plane.look.across(5, 1), plane.look.down(9, 0));
-            if begin + gap + plane.look.width_of(name) <= end {
-                plane.write(name, (begin + gap, upper + down), MUTED, HPos::Left)?;
+            let left = area.pixel(x, 0.0).0 + area.medium.across(5, 1);
+            let end = phases.get(i + 1).map_or(right, |(next, _)| area.pixel(begin(*next), 0.0).0);
+            if left + area.medium.width_of(name) <= end {
+                area.write(name, (left, upper + area.medium.down(9, 0)), MUTED, HPos::Left)?;
             }
         }
         Ok(())
     }
 }
 
-impl Plot for FrameChart {
+impl Chart for FrameChart {
     fn title(&self) -> String {
-        if self.sweep.is_empty() {
-            "Frame time".to_owned()
-        } else {
-            format!("Frame time, {}", self.sweep)
-        }
+        let separator = if self.sweep.is_empty() { "" } else { ", " };
+        format!("Frame time{separator}{}", self.sweep)
     }
 
-    fn keys(&self, _: Look) -> Vec<Key> {
-        let key = |(i, l): (usize, &Loop)| Key {
+    fn legend(&self) -> Vec<LegendEntry> {
+        let entry = |(i, l): (usize, &Loop)| LegendEntry {
             color: series(i),
             glyph: glyph(i),
             name: l.name.clone(),
-            mark: None,
+            marker: None,
         };
-        self.loops.iter().enumerate().map(key).collect()
+        self.loops.iter().enumerate().map(entry).collect()
     }
 
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![
-            "middle: median of a frame's blocks, or of neighbouring frames; about it: \
-             least to greatest"
+            "line: median over the blocks of a frame or of neighbouring frames; band: minimum to \
+             maximum"
                 .to_owned(),
         ];
-        let (top, n_above) = self.top();
+        let (times, top) = (self.times(), self.top());
+        let n_above = times.iter().filter(|ms| **ms > top).count();
         if n_above > 0 {
-            let most = self.times().into_iter().fold(0.0, f64::max);
-            let (top, most) = (number(top), number(most));
+            let most = number(times.iter().copied().fold(0.0, f64::max));
+            let (n, top) = (times.len(), number(top));
             notes.push(format!(
-                "{n_above} of {} frames took longer than {top} ms, up to {most} ms",
-                self.times().len()
+                "{n_above} of {n} frames took longer than {top} ms, up to {most} ms"
             ));
         }
         notes
@@ -231,26 +202,22 @@ impl Plot for FrameChart {
         16
     }
 
-    fn draw<DB: DrawingBackend>(&self, place: &Place<'_, DB>) -> DrawResult<Vec<Mark>, DB> {
-        let (width, height) = place.size();
-        let (first, last) = self.range();
-        let (top, _) = self.top();
-        let n_ticks = (width / place.look.across(70, 9)) as usize;
-        let mut x = Axis::linear(
-            "frame of the scene",
-            f64::from(first) - 0.5,
-            f64::from(last) + 0.5,
-            n_ticks,
-        );
-        // Frames are whole.
+    fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<'_, DB>) -> DrawResult<Vec<Tooltip>, DB> {
+        let (medium, (width, height)) = (canvas.medium, canvas.size());
+        let frames = || self.samples().map(|(frame, _)| *frame);
+        let (first, last) = (frames().min().unwrap_or(0), frames().max().unwrap_or(0));
+        let ends = (f64::from(first) - 0.5, f64::from(last) + 0.5);
+        let n_ticks = (width / medium.across(70, 9)) as usize;
+        let mut x = Axis::linear("frame of the scene", ends.0, ends.1, n_ticks);
+        // There is no half frame.
         x.ticks.retain(|tick| tick.at.fract() == 0.0);
-        let y = Axis::linear("ms", 0.0, top, (height / place.look.down(36, 2)) as usize);
-        let plane = Plane::new(place, &x, &y, Behind::Horizontal)?;
-        let [left, _, right, _] = plane.bounds();
-        let n_bins = ((right - left) / place.look.across(BIN_PX, 1)).max(1) as usize;
-        self.draw_phases(&plane, (first, last), y.range.end)?;
-        for (i, of) in self.loops.iter().enumerate() {
-            self.draw_loop(&plane, i, &bins(&of.samples, first..=last, n_bins), y.range.end)?;
+        let y = Axis::linear("ms", 0.0, self.top(), (height / medium.down(36, 2)) as usize);
+        let area = PlotArea::new(canvas, &x, &y, GridLines::Horizontal)?;
+        let [left, _, right, _] = area.bounds();
+        let n_bins = ((right - left) / medium.across(BIN_PX, 1)).max(1) as usize;
+        self.draw_phases(&area, first, y.range.end)?;
+        for (i, l) in self.loops.iter().enumerate() {
+            self.draw_loop(&area, i, &bins(&l.samples, first..=last, n_bins), y.range.end)?;
         }
         Ok(vec![])
     }

@@ -1,76 +1,76 @@
-//! The ledger as bars: what every approximation is off by, on an axis of logarithms.
+//! A ledger as bars: the error of every approximation on a logarithmic axis.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::axis::{Axis, row_middle};
-use super::bars::{bar, span};
-use super::look::{INK, Look, MUTED, series};
+use super::bars::{bar_ends, draw_bar};
+use super::chart::{Chart, LegendEntry, Tooltip, shortened};
+use super::medium::{INK, MUTED, series};
 use super::number::{number, with_interval};
-use super::plane::{Behind, Plane};
-use super::tradeoff::shortened;
-use super::{Key, Mark, Place, Plot};
+use super::plot_area::{Canvas, GridLines, PlotArea};
 use crate::studies::ledger::records::{Ledger, Row};
 use crate::studies::provenance::Figure;
 
-/// Bars begin a decade and a bit below the least error, so that it has a length.
-const BELOW: f64 = 0.08;
-const N_LETTERS: usize = 30;
+/// Bars begin this much below the smallest error, in decades, so that every bar has a length.
+const BELOW: f64 = 0.33;
+/// Characters of a row's name.
+const NAME_LENGTH: usize = 30;
 
+/// The chart of a ledger.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LedgerChart {
     rows: Vec<Row>,
     total: Figure,
 }
 
+/// Returns the chart of a ledger.
 pub fn chart(ledger: &Ledger) -> LedgerChart {
     LedgerChart { rows: ledger.rows.clone(), total: ledger.total }
 }
 
-fn says(row: &Row) -> String {
+fn tooltip(row: &Row) -> String {
     let Row { name, from, to, error, own_error, is_resolved, .. } = row;
     let rmse = with_interval(error.value, error.low, error.high);
-    let mut lines = vec![name.clone(), format!("{from} for {to}"), format!("RMSE: {rmse}")];
+    let mut text = format!("{name}\n{from} for {to}\nRMSE: {rmse}");
     if !is_resolved {
-        lines.push(format!("not resolved: the references' own error is {}", number(*own_error)));
+        text += &format!("\nnot resolved: the references' own error is {}", number(*own_error));
     }
-    lines.join("\n")
+    text
 }
 
 impl LedgerChart {
     fn errors(&self) -> impl Iterator<Item = f64> + '_ {
-        let of_rows = self.rows.iter().flat_map(|r| [Some(r.error.value), r.error.high]);
-        of_rows
-            .chain([Some(self.total.value), self.total.high])
-            .flatten()
-            .filter(|v| v.is_finite() && *v > 0.0)
+        let figures = self.rows.iter().map(|r| r.error).chain([self.total]);
+        let values = figures.flat_map(|f| [Some(f.value), f.high]).flatten();
+        values.filter(|v| v.is_finite() && *v > 0.0)
     }
 }
 
-/// Where a text of a width begins so that the line, if there is one, does not go through it.
+/// Moves the left end of a text to the right of a vertical line that would cross the text.
 fn beside(at: i32, width: i32, line: Option<i32>) -> i32 {
     const GAP_PX: i32 = 6;
     line.filter(|line| (at - GAP_PX..at + width).contains(line)).map_or(at, |line| line + GAP_PX)
 }
 
-impl Plot for LedgerChart {
+impl Chart for LedgerChart {
     fn title(&self) -> String {
-        "What every approximation is off by".to_owned()
+        "Error of every approximation".to_owned()
     }
 
-    fn keys(&self, _: Look) -> Vec<Key> {
-        let key =
-            |color, glyph, name: &str| Key { color, glyph, name: name.to_owned(), mark: None };
-        let mut keys = vec![key(series(0), '█', "one approximation")];
+    fn legend(&self) -> Vec<LegendEntry> {
+        let entry = |color, glyph, name: &str| LegendEntry {
+            color,
+            glyph,
+            name: name.to_owned(),
+            marker: None,
+        };
+        let mut legend = vec![entry(series(0), '█', "one approximation")];
         if self.rows.iter().any(|r| !r.is_resolved) {
-            keys.push(key(MUTED, '░', "not resolved: its references are no better"));
+            legend.push(entry(MUTED, '░', "not resolved: below the references' own error"));
         }
-        keys.push(key(series(1), '│', "all together"));
-        keys
-    }
-
-    fn notes(&self) -> Vec<String> {
-        vec![]
+        legend.push(entry(series(1), '│', "all together"));
+        legend
     }
 
     fn size(&self) -> (u32, u32) {
@@ -81,64 +81,53 @@ impl Plot for LedgerChart {
         self.rows.len() + 3
     }
 
-    fn draw<DB: DrawingBackend>(&self, place: &Place<'_, DB>) -> DrawResult<Vec<Mark>, DB> {
-        let (look, (width, _)) = (place.look, place.size());
+    fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<'_, DB>) -> DrawResult<Vec<Tooltip>, DB> {
+        let (medium, (width, _)) = (canvas.medium, canvas.size());
         let n = self.rows.len();
-        let names: Vec<String> = self.rows.iter().map(|r| shortened(&r.name, N_LETTERS)).collect();
+        let names: Vec<String> =
+            self.rows.iter().map(|r| shortened(&r.name, NAME_LENGTH)).collect();
         let least = self.errors().fold(f64::INFINITY, f64::min);
         let most = self.errors().fold(0.0, f64::max);
-        // Behind the longest bar there is room for its number.
-        let room = ((most / least).log10().max(1.0) * f64::from(look.across(110, 12))
-            / f64::from(width.max(1)))
-        .max(0.1);
-        let values = [least * 10f64.powf(-BELOW - 0.25), most * 10f64.powf(room)].into_iter();
-        let x = Axis::log("RMSE", values, false, (width / look.across(80, 10)) as usize);
-        let plane = Plane::new(place, &x, &Axis::rows(&names), Behind::Vertical)?;
-        let mut marks = Vec::new();
+        // Room for a number behind the longest bar, in decades.
+        let decades = (most / least).log10().max(1.0);
+        let room = decades * f64::from(medium.across(110, 12)) / f64::from(width.max(1));
+        let ends = [least * 10f64.powf(-BELOW), most * 10f64.powf(room.max(0.1))];
+        let n_ticks = (width / medium.across(80, 10)) as usize;
+        let x = Axis::log("RMSE", ends.into_iter(), false, n_ticks);
+        let area = PlotArea::new(canvas, &x, &Axis::rows(&names), GridLines::Vertical)?;
+        let [left, _, right, _] = area.bounds();
+        let total = x.position(self.total.value);
+        let mut tooltips = Vec::new();
         for (i, row) in self.rows.iter().enumerate() {
-            let (y, (upper, lower)) = (row_middle(i, n), span(&plane, i, n));
-            let middle = plane.pixel(0.0, y).1;
-            let [left, _, right, _] = plane.bounds();
-            marks.push(Mark {
-                place: [left, upper, right - left, (lower - upper).max(1)],
-                says: says(row),
-            });
-            let Some(end) = x.at(row.error.value) else {
-                let why = number(row.error.value);
-                let n_letters = ((right - left) / look.width_of("m")).max(2) as usize;
-                plane.write(
-                    &shortened(&why, n_letters),
-                    (left + look.across(6, 1), middle),
-                    MUTED,
-                    HPos::Left,
-                )?;
+            let (y, (upper, lower)) = (row_middle(i, n), bar_ends(&area, i, n));
+            let middle = area.pixel(0.0, y).1;
+            let rect = [left, upper, right - left, (lower - upper).max(1)];
+            tooltips.push(Tooltip { rect, text: tooltip(row) });
+            let value = number(row.error.value);
+            let Some(end) = x.position(row.error.value) else {
+                let n_letters = ((right - left) / medium.width_of("m")).max(2) as usize;
+                let at = (left + medium.across(6, 1), middle);
+                area.write(&shortened(&value, n_letters), at, MUTED, HPos::Left)?;
                 continue;
             };
             let (color, glyph) = if row.is_resolved { (series(0), '█') } else { (MUTED, '░') };
-            bar(&plane, (i, n), (x.range.start, end), (color, 1.0), glyph)?;
+            draw_bar(&area, (i, n), (x.range.start, end), color, glyph)?;
             let mut last = end;
-            if let (Some(low), Some(high)) = (row.error.low, row.error.high) {
-                last = x.end_at(high);
-                if !look.characters {
-                    plane.whisker(
-                        [(x.end_at(low), y), (last, y)],
-                        [low, high].map(|v| x.shows(v)),
-                        INK,
-                    )?;
-                }
+            if let (false, Some(low), Some(high)) =
+                (medium.is_terminal(), row.error.low, row.error.high)
+            {
+                let ends = [low, high].map(|v| (x.clamped(v), y));
+                last = end.max(ends[1].0);
+                area.interval(ends, [low, high].map(|v| x.contains(v)), INK)?;
             }
-            let at = plane.pixel(if look.characters { end } else { last.max(end) }, y).0
-                + look.across(7, 2);
-            let at = beside(
-                at,
-                look.width_of(&number(row.error.value)),
-                x.at(self.total.value).map(|t| plane.pixel(t, y).0),
-            );
-            plane.write(&number(row.error.value), (at, middle), INK, HPos::Left)?;
+            let at = area.pixel(last, y).0 + medium.across(7, 2);
+            let line = total.map(|t| area.pixel(t, y).0);
+            let at = beside(at, medium.width_of(&value), line);
+            area.write(&value, (at, middle), INK, HPos::Left)?;
         }
-        if let Some(at) = x.at(self.total.value) {
-            plane.line(&[(at, 0.0), (at, n as f64)], series(1).stroke_width(2))?;
+        if let Some(at) = total {
+            area.line(&[(at, 0.0), (at, n as f64)], series(1).stroke_width(2))?;
         }
-        Ok(marks)
+        Ok(tooltips)
     }
 }

@@ -1,32 +1,25 @@
-//! Numbers as people read them.
+//! Numbers formatted for people.
 
-/// Three significant digits at most; powers of ten beyond what is read at a glance: "0", "0.025",
-/// "1.5×10⁻⁶", "∞".
+/// Formats a number with at most three significant digits, very small and large ones with a power
+/// of ten: "0", "0.025", "1.5×10⁻⁶", "∞".
 pub fn number(value: f64) -> String {
-    significant(value, 3)
-}
-
-/// `n` significant digits at most.
-pub fn significant(value: f64, n: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
     if !value.is_finite() {
-        return if value.is_nan() {
-            "—"
-        } else if value > 0.0 {
-            "∞"
-        } else {
-            "−∞"
-        }
-        .to_owned();
+        let text = match value {
+            _ if value.is_nan() => "—",
+            _ if value > 0.0 => "∞",
+            _ => "−∞",
+        };
+        return text.to_owned();
     }
-    // Through the text of the rounded number, so that 9.999 counts as 10.
-    let scientific = format!("{:.*e}", n.saturating_sub(1), value);
+    // The exponent of the rounded number, so that 9.999 becomes 10.
+    let scientific = format!("{value:.2e}");
     let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
     let exponent: i32 = exponent.parse().unwrap_or(0);
     if (-3..5).contains(&exponent) {
-        let places = (n as i32 - 1 - exponent).max(0) as usize;
+        let places = (2 - exponent).max(0) as usize;
         return trimmed(&format!("{value:.places$}"));
     }
     let mantissa = trimmed(mantissa);
@@ -34,7 +27,7 @@ pub fn significant(value: f64, n: usize) -> String {
     if mantissa == "1" { power } else { format!("{mantissa}×{power}") }
 }
 
-/// Without zeros behind the point, and with a true minus.
+/// Removes trailing zeros after the decimal point, and replaces the hyphen by a minus sign.
 fn trimmed(text: &str) -> String {
     let text =
         if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { text };
@@ -47,11 +40,12 @@ fn superscript(n: i32) -> String {
     n.to_string().chars().map(digit).collect()
 }
 
-/// "12.3 (11.9 to 12.8)", "1.5 (1.2 to 1.8)×10⁻⁶", or the value alone.
+/// Formats a value with its interval: "12.3 (11.9 to 12.8)", "1.5 (1.2 to 1.8)×10⁻⁶", or the value
+/// alone.
 pub fn with_interval(value: f64, low: Option<f64>, high: Option<f64>) -> String {
     let (Some(low), Some(high)) = (low, high) else { return number(value) };
     match number(value).split_once('×') {
-        // One power of ten for all three.
+        // All three share one power of ten.
         Some((_, power)) => {
             let scale = 10f64.powf(value.abs().log10().floor());
             let [value, low, high] = [value, low, high].map(|v| number(v / scale));
@@ -66,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_short_and_right() {
+    fn formats_three_significant_digits() {
         for (value, text) in [
             (0.0, "0"),
             (1.0, "1"),

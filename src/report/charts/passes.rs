@@ -1,25 +1,26 @@
-//! What the device's time of a frame goes to: a bar a loop, a part of it a pass.
+//! GPU time of a frame by pass: a bar per loop, with a part per pass.
 
 use plotters::prelude::*;
 use plotters::style::text_anchor::HPos;
 
 use super::axis::Axis;
-use super::bars::{bar, span};
-use super::look::{INK, Look, MUTED, SERIES, series};
+use super::bars::{bar_ends, draw_bar};
+use super::chart::{Chart, LegendEntry, Tooltip, shortened};
+use super::frames::loop_name;
+use super::medium::{INK, MUTED, SERIES_COLORS, series};
 use super::number::number;
-use super::plane::{Behind, Plane};
-use super::tradeoff::shortened;
-use super::{Key, Mark, Place, Plot};
-use crate::timing::records::{Mode, Pass, Run};
+use super::plot_area::{Canvas, GridLines, PlotArea};
+use crate::timing::records::{Case, Mode, Pass, Run};
 
-/// Passes with a colour of their own; the others are drawn as one.
-const N_NAMED: usize = SERIES.len() - 1;
-/// Letters of a bar's name.
-const N_LETTERS: usize = 40;
+/// Number of passes with a colour of their own; the others share one.
+const N_NAMED: usize = SERIES_COLORS.len() - 1;
+/// Characters of a bar's name.
+const NAME_LENGTH: usize = 40;
 
+/// The chart of a run's passes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PassChart {
-    /// Those with a colour, the dearest, in the order of the frame.
+    /// The most expensive passes, in the order of the frame.
     passes: Vec<String>,
     bars: Vec<Bar>,
 }
@@ -27,96 +28,79 @@ pub struct PassChart {
 #[derive(Debug, Clone, PartialEq)]
 struct Bar {
     name: String,
-    /// ms of `passes`, then of all others.
+    /// Time of every one of `passes`, then of all others, ms.
     parts: Vec<f64>,
-    says: String,
+    tooltip: String,
 }
 
-/// ms that an average frame spends in a pass: its median while it runs, in the share of the frames
-/// that run it.
+/// Returns the time of a pass in an average frame, ms: the median of the frames that run the pass,
+/// times their share of all frames.
 pub fn ms_of_frame(pass: &Pass) -> Option<f64> {
     let n = pass.n_run as f64 + pass.n_skipped as f64;
     pass.p50_ms.filter(|ms| ms.is_finite() && n > 0.0).map(|ms| ms * pass.n_run as f64 / n)
 }
 
-/// The chart of a run; None where no pass was timed.
+/// Returns the chart of a run, or None if no pass was timed.
 pub fn chart(run: &Run) -> Option<PassChart> {
-    let loops: Vec<(String, &Mode)> = run
-        .cases
-        .iter()
-        .flat_map(|c| c.modes.iter().map(move |m| (row_name(&c.name(), m), m)))
-        .collect();
-    let mut sums: Vec<(String, f64)> = Vec::new();
-    for (pass, ms) in
-        loops.iter().flat_map(|(_, m)| &m.passes).filter_map(|p| Some((p, ms_of_frame(p)?)))
-    {
+    let modes = || run.cases.iter().flat_map(|c| c.modes.iter().map(move |m| (c, m)));
+    let all = || modes().flat_map(|(_, mode)| &mode.passes);
+    let mut sums: Vec<(&str, f64)> = Vec::new();
+    for (pass, ms) in all().filter_map(|p| Some((p, ms_of_frame(p)?))) {
         match sums.iter_mut().find(|(name, _)| *name == pass.name) {
             Some((_, sum)) => *sum += ms,
-            None => sums.push((pass.name.clone(), ms)),
+            None => sums.push((&pass.name, ms)),
         }
     }
     sums.retain(|(_, sum)| *sum > 0.0);
     sums.sort_by(|a, b| b.1.total_cmp(&a.1));
     sums.truncate(N_NAMED);
     // In the order of the frame, so that two runs of one scene have the same colours.
-    let is_named = |pass: &&Pass| sums.iter().any(|(name, _)| *name == pass.name);
     let mut passes: Vec<String> = Vec::new();
-    for pass in loops.iter().flat_map(|(_, mode)| &mode.passes).filter(is_named) {
-        if !passes.contains(&pass.name) {
-            passes.push(pass.name.clone());
+    for Pass { name, .. } in all() {
+        if sums.iter().any(|(other, _)| other == name) && !passes.contains(name) {
+            passes.push(name.clone());
         }
     }
-    if passes.is_empty() {
-        return None;
-    }
-    let timed =
-        loops.into_iter().filter(|(_, mode)| mode.passes.iter().any(|p| ms_of_frame(p).is_some()));
-    let bars = timed
-        .map(|(name, mode)| Bar { parts: parts(mode, &passes), says: says(&name, mode), name })
-        .collect();
-    Some(PassChart { passes, bars })
+    let timed = modes().filter(|(_, mode)| mode.passes.iter().any(|p| ms_of_frame(p).is_some()));
+    let bar = |(case, mode): (&Case, &Mode)| {
+        let name = row_name(&case.name(), mode);
+        Bar { parts: parts(mode, &passes), tooltip: tooltip(&name, mode), name }
+    };
+    let bars = timed.map(bar).collect();
+    (!passes.is_empty()).then_some(PassChart { passes, bars })
 }
 
-/// A case's loop in words.
+/// Returns the name of a case's loop.
 pub fn row_name(case: &str, mode: &Mode) -> String {
-    let of = if mode.skip { mode.threading.clone() } else { format!("{} no-skip", mode.threading) };
-    if case.is_empty() { of } else { format!("{case}: {of}") }
+    let name = loop_name(&mode.threading, mode.skip);
+    if case.is_empty() { name } else { format!("{case}: {name}") }
 }
 
 fn parts(mode: &Mode, passes: &[String]) -> Vec<f64> {
-    let of = |name: &String| {
-        mode.passes.iter().find(|p| p.name == *name).and_then(ms_of_frame).unwrap_or(0.0)
-    };
-    let named: Vec<f64> = passes.iter().map(of).collect();
-    let others =
-        mode.passes.iter().filter(|p| !passes.contains(&p.name)).filter_map(ms_of_frame).sum();
-    named.into_iter().chain([others]).collect()
+    let mut parts = vec![0.0; passes.len() + 1];
+    for pass in &mode.passes {
+        let i = passes.iter().position(|name| *name == pass.name).unwrap_or(passes.len());
+        parts[i] += ms_of_frame(pass).unwrap_or(0.0);
+    }
+    parts
 }
 
-fn says(name: &str, mode: &Mode) -> String {
-    let line = |p: &Pass| {
-        let ms = ms_of_frame(p).filter(|ms| *ms > 0.0)?;
-        let n = p.n_run.saturating_add(p.n_skipped);
-        let ran = if p.n_skipped > 0 {
-            format!(", ran in {} of {n} frames", p.n_run)
-        } else {
-            String::new()
-        };
-        Some(format!("{}: {} ms{ran}", p.name, number(ms)))
-    };
-    std::iter::once(name.to_owned())
-        .chain(mode.passes.iter().filter_map(line))
-        .collect::<Vec<_>>()
-        .join("\n")
+fn tooltip(name: &str, mode: &Mode) -> String {
+    let mut text = name.to_owned();
+    for p in &mode.passes {
+        let Some(ms) = ms_of_frame(p).filter(|ms| *ms > 0.0) else { continue };
+        text += &format!("\n{}: {} ms", p.name, number(ms));
+        if p.n_skipped > 0 {
+            let n = p.n_run.saturating_add(p.n_skipped);
+            text += &format!(", ran in {} of {n} frames", p.n_run);
+        }
+    }
+    text
 }
 
 impl PassChart {
-    fn longest(&self) -> f64 {
-        self.bars.iter().map(|b| b.parts.iter().sum()).fold(0.0, f64::max)
-    }
-
-    /// In a terminal a part is a row of its pass' first letter; of two passes with one letter the
-    /// second takes its next.
+    /// Returns a character for every pass and for the others: the first letter of the pass's name
+    /// that no pass before it has.
     fn letters(&self) -> Vec<char> {
         let mut letters: Vec<char> = Vec::new();
         for name in &self.passes {
@@ -130,34 +114,25 @@ impl PassChart {
     fn color(&self, i: usize) -> RGBColor {
         if i < self.passes.len() { series(i) } else { MUTED }
     }
-
-    fn has_others(&self) -> bool {
-        self.bars.iter().any(|b| b.parts.last().is_some_and(|ms| *ms > 0.0))
-    }
 }
 
-impl Plot for PassChart {
+impl Chart for PassChart {
     fn title(&self) -> String {
         "GPU time of an average frame by pass".to_owned()
     }
 
-    fn keys(&self, _: Look) -> Vec<Key> {
-        let others = self.has_others().then(|| "others".to_owned());
-        let names = self.passes.iter().cloned().chain(others).enumerate();
-        let letters = self.letters();
-        names
-            .map(|(i, name)| Key {
-                color: self.color(i),
-                glyph: letters.get(i).copied().unwrap_or('.'),
-                name,
-                mark: None,
-            })
-            .collect()
+    fn legend(&self) -> Vec<LegendEntry> {
+        let has_others = self.bars.iter().any(|b| b.parts.last().is_some_and(|ms| *ms > 0.0));
+        let others = has_others.then(|| "others".to_owned());
+        let names = self.passes.iter().cloned().chain(others);
+        let entry =
+            |(i, (name, glyph))| LegendEntry { color: self.color(i), glyph, name, marker: None };
+        names.zip(self.letters()).enumerate().map(entry).collect()
     }
 
     fn notes(&self) -> Vec<String> {
         vec![
-            "of every pass the median while it runs, times the share of the frames that run it"
+            "for every pass: the median of the frames that run it, times their share of all frames"
                 .to_owned(),
         ]
     }
@@ -170,38 +145,33 @@ impl Plot for PassChart {
         self.bars.len() + 3
     }
 
-    fn draw<DB: DrawingBackend>(&self, place: &Place<'_, DB>) -> DrawResult<Vec<Mark>, DB> {
-        let (look, (width, _)) = (place.look, place.size());
+    fn draw<DB: DrawingBackend>(&self, canvas: &Canvas<'_, DB>) -> DrawResult<Vec<Tooltip>, DB> {
+        let (medium, (width, _)) = (canvas.medium, canvas.size());
         let n = self.bars.len();
-        let names: Vec<String> = self.bars.iter().map(|b| shortened(&b.name, N_LETTERS)).collect();
-        let room = look.across(70, 10);
+        let names: Vec<String> =
+            self.bars.iter().map(|b| shortened(&b.name, NAME_LENGTH)).collect();
+        let longest = self.bars.iter().map(|b| b.parts.iter().sum()).fold(0.0, f64::max);
         // Room for the sum behind the longest bar.
-        let end = self.longest()
-            * (1.0 + f64::from(room) / f64::from((width - look.across(200, 30)).max(1)));
-        let x = Axis::linear("ms of a frame", 0.0, end, (width / look.across(80, 10)) as usize);
-        let plane = Plane::new(place, &x, &Axis::rows(&names), Behind::Vertical)?;
+        let room =
+            f64::from(medium.across(70, 10)) / f64::from((width - medium.across(200, 30)).max(1));
+        let n_ticks = (width / medium.across(80, 10)) as usize;
+        let x = Axis::linear("ms of a frame", 0.0, longest * (1.0 + room), n_ticks);
+        let area = PlotArea::new(canvas, &x, &Axis::rows(&names), GridLines::Vertical)?;
         let letters = self.letters();
-        let mut marks = Vec::new();
-        for (i, of) in self.bars.iter().enumerate() {
+        let mut tooltips = Vec::new();
+        for (i, bar) in self.bars.iter().enumerate() {
             let mut from = 0.0;
-            for (part, ms) in of.parts.iter().enumerate() {
-                let glyph = letters.get(part).copied().unwrap_or('.');
-                bar(&plane, (i, n), (from, from + ms), (self.color(part), 1.0), glyph)?;
+            for (part, (ms, glyph)) in bar.parts.iter().zip(&letters).enumerate() {
+                draw_bar(&area, (i, n), (from, from + ms), self.color(part), *glyph)?;
                 from += ms;
             }
-            let (upper, lower) = span(&plane, i, n);
-            let (left, right) = (plane.pixel(0.0, 0.0).0, plane.pixel(from, 0.0).0);
-            plane.write(
-                &number(from),
-                (right + look.across(6, 2), (upper + lower) / 2),
-                INK,
-                HPos::Left,
-            )?;
-            marks.push(Mark {
-                place: [left, upper, (right - left).max(4), lower - upper],
-                says: of.says.clone(),
-            });
+            let (upper, lower) = bar_ends(&area, i, n);
+            let (left, right) = (area.pixel(0.0, 0.0).0, area.pixel(from, 0.0).0);
+            let at = (right + medium.across(6, 2), (upper + lower) / 2);
+            area.write(&number(from), at, INK, HPos::Left)?;
+            let rect = [left, upper, (right - left).max(4), lower - upper];
+            tooltips.push(Tooltip { rect, text: bar.tooltip.clone() });
         }
-        Ok(marks)
+        Ok(tooltips)
     }
 }

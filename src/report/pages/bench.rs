@@ -1,73 +1,69 @@
-//! A bench's times, tables and charts, and the last frame of every case.
+//! A bench: tables and charts of its times, and the last frame of every case.
 
 use std::path::Path;
 
 use maud::{Markup, html};
 
-use super::chart;
+use super::figure::figure;
 use super::pictures::Png;
-use super::provenance::{self, Made};
+use super::provenance::{self, Origin};
 use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
-use crate::report::charts::number::{number, with_interval};
-use crate::report::charts::{frames, passes};
+use crate::report::charts::{frames, number, passes, with_interval};
 use crate::timing::attachments::picture_file;
-use crate::timing::records::PartRecord;
-use crate::timing::records::{Case, Mode, Pass, Run};
+use crate::timing::records::{Case, Measured, Mode, PartRecord, Pass, Run};
 use crate::timing::results::BenchResults;
 
-/// What a case's last frame is called.
-pub fn case_name(run: &Run, i: usize) -> String {
-    named(&run.cases[i])
-}
-
-fn named(case: &Case) -> String {
+/// Returns the name of a case.
+pub fn case_name(case: &Case) -> String {
     let name = case.name();
     if name.is_empty() { "the scene".to_owned() } else { name }
 }
 
-pub fn section(recorded: &BenchResults, folder: &Path) -> Result<Markup> {
-    let run = &recorded.run;
+/// Returns the section of a bench.
+pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
+    let run = &results.run;
     let mut charts = Vec::new();
-    for frames in frames::charts_of(recorded) {
-        charts.push(chart(
-            &frames,
-            "Time from the end of one frame to the end of the next; below is better.",
-        )?);
+    for frames in frames::charts_of(results) {
+        let caption = "Time from the end of one frame to the end of the next; lower is better.";
+        charts.push(figure(&frames, caption)?);
     }
-    let passes = passes::chart(run);
-    let passes = passes
-        .map(|passes| chart(&passes, "What the device's time goes to; shorter is better."))
+    let passes = passes::chart(run)
+        .map(|passes| figure(&passes, "GPU time of every pass; shorter is better."))
         .transpose()?;
-    let mut shown = Vec::new();
-    for i in 0..run.cases.len() {
-        let name = case_name(run, i);
-        let caption = format!("The last frame of {name}");
-        shown
-            .extend(Png::read(folder, &picture_file(i))?.map(|png| png.figure(&caption, &caption)));
+    let mut pictures = Vec::new();
+    for (i, case) in run.cases.iter().enumerate() {
+        let caption = format!("The last frame of {}", case_name(case));
+        let png = Png::read(folder, &picture_file(i))?;
+        pictures.extend(png.map(|png| png.figure(&caption, &caption)));
     }
     Ok(html! {
-        (provenance::section(&Made::of_run(run)))
+        (provenance::section(&Origin::of_run(run)))
         @if !run.chosen.is_empty() {
-            h3 { "What \"auto\" came to" }
+            h3 { "Values chosen for \"auto\"" }
             ul { @for chosen in &run.chosen { li { (chosen) } } }
         }
         @if !run.parts.is_empty() { h3 { "Parts" } (parts(run)) }
-        @if !shown.is_empty() { h3 { "Pictures" } div class="gallery" { @for figure in &shown { (figure) } } }
+        @if !pictures.is_empty() {
+            h3 { "Pictures" }
+            div class="gallery" { @for picture in &pictures { (picture) } }
+        }
         h3 { "Frames" }
         (loops(run))
         @for chart in &charts { (chart) }
         (cases(run))
         h3 { "Passes" }
-        @match &passes { Some(passes) => { (passes) } None => { p { "No pass was timed: the device \
-            has no timestamps." } } }
+        @match &passes {
+            Some(passes) => { (passes) }
+            None => { p { "No pass was timed: the device has no timestamps." } }
+        }
         (pass_table(run))
     })
 }
 
 fn loops(run: &Run) -> Markup {
     let row = |(case, mode): (&Case, &Mode)| -> Vec<Cell> {
-        let of = |m: Option<crate::timing::records::Measured>| m.map(|m| m.of);
+        let of = |m: Option<Measured>| m.map(|m| m.of);
         vec![
             text(&passes::row_name(&case.name(), mode)),
             count(mode.frames),
@@ -102,7 +98,7 @@ fn loops(run: &Run) -> Markup {
     table(caption, &header, &rows)
 }
 
-/// Which node timed what, and how long the first case took there.
+/// Returns the nodes of a distributed sweep, with the times of the first case on each.
 fn parts(run: &Run) -> Markup {
     let row = |part: &PartRecord| -> Vec<Cell> {
         let times = part.base.iter().map(|base| ms(base.p50_ms));
@@ -121,19 +117,19 @@ fn parts(run: &Run) -> Markup {
         ["cases", "node", "begun"].into_iter().chain(loops.iter().map(String::as_str)).collect();
     let rows: Vec<Vec<Cell>> = run.parts.iter().map(row).collect();
     table(
-        "Who timed what, and the median frame time of the first case there: how far nodes differ",
+        "The nodes that timed the cases, with the median frame time of the first case on each",
         &header,
         &rows,
     )
 }
 
-/// The cases, and what overlap and skipping gained in each.
+/// Returns the cases, with the gain from overlap and from skipping.
 fn cases(run: &Run) -> Markup {
     let row = |case: &Case| -> Vec<Cell> {
         let ratio = case.ratio.map(|r| with_interval(r.parallel_by_serial, r.low, r.high));
         let skipping = case.skipping;
         vec![
-            text(&named(case)),
+            text(&case_name(case)),
             count(case.particles as usize),
             text(&format!("{}×{}", case.width, case.height)),
             text(ratio.as_deref().unwrap_or("—")),
@@ -158,7 +154,7 @@ fn cases(run: &Run) -> Markup {
         "same picture, to the byte",
     ];
     table(
-        "The cases, and what overlap and skipping gained",
+        "The cases, with the gain from overlap and from skipping",
         &header,
         &run.cases.iter().map(row).collect::<Vec<_>>(),
     )
@@ -182,10 +178,8 @@ fn pass_table(run: &Run) -> Markup {
     let mut rows = Vec::new();
     for case in &run.cases {
         for mode in &case.modes {
-            // What never ran anywhere is no news.
-            rows.extend(
-                mode.passes.iter().filter(|p| p.n_run > 0).map(|pass| row(case, mode, pass)),
-            );
+            let ran = mode.passes.iter().filter(|p| p.n_run > 0);
+            rows.extend(ran.map(|pass| row(case, mode, pass)));
         }
     }
     let header = [

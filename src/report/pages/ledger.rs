@@ -1,32 +1,37 @@
-//! A ledger: what every approximation is off by, as bars and as a table.
+//! A ledger: the error of every approximation, as bars and as a table.
 
 use maud::{Markup, html};
 
-use super::chart;
-use super::provenance::{self, Made};
+use super::figure::figure as chart_figure;
+use super::provenance::{self, Origin};
 use super::table::{Cell, figure, percent, table, text, value};
 use crate::error::Result;
-use crate::report::charts::number::{number, with_interval};
-use crate::report::charts::{self};
+use crate::report::charts::ledger::chart;
+use crate::report::charts::{number, with_interval};
 use crate::studies::ledger::records::{Ledger, Row};
 
+/// Returns the section of a ledger.
 pub fn section(ledger: &Ledger) -> Result<Markup> {
     let total = with_interval(ledger.total.value, ledger.total.low, ledger.total.high);
-    let caption = "RMSE of two pictures that differ in that approximation alone. Lines across a \
-        bar's end are 95 % intervals.";
+    let caption = "RMSE of two pictures that differ in that approximation alone, with 95 % intervals \
+        at the ends of the bars.";
     Ok(html! {
-        (provenance::section(&Made::of(&ledger.made, ledger.interrupted)))
+        (provenance::section(&Origin::of(&ledger.made, ledger.interrupted)))
         dl class="made" {
-            dt { "Picture" } dd { "frame " (ledger.frame) " at " (number(ledger.time_s)) " s, " (ledger.width) "×" (ledger.height) " pixels, compared at " (ledger.n_pixels) }
+            dt { "Picture" } dd {
+                "frame " (ledger.frame) " at " (number(ledger.time_s)) " s, " (ledger.width) "×"
+                (ledger.height) " pixels, compared at " (ledger.n_pixels)
+            }
             dt { "Magnitude" } dd { (number(ledger.magnitude)) ", root mean square of the \
-                last row's truth" }
+                last row's reference" }
             dt { "All together" } dd { (total) " RMSE; the rows' sum is " (number(ledger.sum)) ", \
                 in quadrature " (number(ledger.quadrature)) }
-            dt { "Total at most the sum" } dd { @if ledger.holds { "yes" } @else { strong { "no: \
-                something is wrong" } } }
+            dt { "Total at most the sum" } dd { @if ledger.holds { "yes" } @else {
+                strong { "no: at least one row is wrong" }
+            } }
         }
         h3 { "Rows" }
-        (chart(&charts::ledger::chart(ledger), caption)?)
+        (chart_figure(&chart(ledger), caption)?)
         (rows(ledger))
     })
 }
@@ -34,7 +39,7 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
 fn rows(ledger: &Ledger) -> Markup {
     let row = |r: &Row| -> Vec<Cell> {
         let resolved =
-            if r.is_resolved { "" } else { "not resolved: the references are no better" };
+            if r.is_resolved { "" } else { "not resolved: below the references' own error" };
         vec![
             text(&r.name),
             text(&r.from),

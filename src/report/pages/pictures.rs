@@ -1,4 +1,4 @@
-//! Pictures within the page, and how two of them differ.
+//! Pictures embedded in the page, and differences of two pictures.
 
 use std::fs;
 use std::path::Path;
@@ -11,20 +11,22 @@ use crate::error::{Error, Result};
 use crate::io::image::{self, png_bytes};
 use crate::measure::picture::flip::{PIXELS_PER_DEGREE, flip};
 use crate::measure::picture::{Errors, errors};
-use crate::report::charts::number::number;
+use crate::report::charts::number;
 
-/// A PNG file as it is.
+/// The bytes of a PNG file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Png {
     bytes: Vec<u8>,
+    /// Width, px.
     pub width: u32,
+    /// Height, px.
     pub height: u32,
 }
 
 impl Png {
-    /// A file of `folder`, and of no other; None where it is not there.
+    /// Reads a file of `folder`; None if there is no such file. Names of other folders are refused,
+    /// because they could put any file of the machine into the page.
     pub fn read(folder: &Path, name: &str) -> Result<Option<Png>> {
-        // A name that leads elsewhere would put any file of the machine into the page.
         let path = folder.join(name);
         if Path::new(name).file_name() != Some(name.as_ref()) {
             return Err(Error::io(
@@ -39,8 +41,7 @@ impl Png {
         }
     }
 
-    /// None where they do not begin as a PNG does: signature, and width and height in the first
-    /// chunk.
+    /// Returns None unless the bytes begin with PNG's signature and header chunk.
     fn of(bytes: Vec<u8>) -> Option<Png> {
         let number = |at: usize| Some(u32::from_be_bytes(bytes.get(at..at + 4)?.try_into().ok()?));
         let is_png = bytes.starts_with(b"\x89PNG\r\n\x1a\n") && bytes.get(12..16)? == b"IHDR";
@@ -48,6 +49,7 @@ impl Png {
         is_png.then_some(Png { bytes, width, height })
     }
 
+    /// Returns the picture with a caption.
     pub fn figure(&self, alt: &str, caption: &str) -> Markup {
         let uri = format!("data:image/png;base64,{}", STANDARD.encode(&self.bytes));
         html! {
@@ -59,54 +61,58 @@ impl Png {
     }
 }
 
-/// Two picture files, by folder and name: side by side, and with a script one over the other behind
-/// a slider; and where they differ. None where one is not there.
-pub fn versus(
+/// Returns two pictures, given by folder and name, and the map of their difference. With scripts,
+/// a slider shows one above the other. None if a picture is missing.
+pub fn comparison(
     label: &str,
     [(folder_a, a), (folder_b, b)]: [(&Path, &str); 2],
 ) -> Result<Option<Markup>> {
     let (Some(png_a), Some(png_b)) = (Png::read(folder_a, a)?, Png::read(folder_b, b)?) else {
         return Ok(None);
     };
-    let apart = apart(&folder_a.join(a), &folder_b.join(b))?;
+    let difference = difference(&folder_a.join(a), &folder_b.join(b))?;
     let of = |name: &str| format!("{label}, {name}");
     Ok(Some(html! {
-        div class="pair" data-label=(label) data-sizes=[apart.is_some().then_some("same")] {
+        div class="pair" data-label=(label) data-sizes=[difference.is_some().then_some("same")] {
             (png_a.figure(&of("A"), &of("A")))
             (png_b.figure(&of("B"), &of("B")))
-            @match &apart {
-                Some(apart) => {
-                    (apart.map.figure(&format!("{label}: FLIP error of every pixel, \
-                        dark for none"), &apart.caption()))
+            @match &difference {
+                Some(difference) => {
+                    (difference.map.figure(&of("FLIP error of every pixel, dark for none"),
+                        &difference.caption()))
                 }
-                None => { p { "A has " (png_a.width) "×" (png_a.height) " pixels, B " (png_b.width) "×" (png_b.height) ": not compared." } }
+                None => { p {
+                    "A has " (png_a.width) "×" (png_a.height) " pixels, B " (png_b.width) "×"
+                    (png_b.height) ": not compared."
+                } }
             }
         }
     }))
 }
 
-/// How far two pictures are apart.
-pub struct Apart {
-    /// Of code values by the greatest, red, green and blue.
-    pub errors: Errors,
-    /// Mean.
-    pub flip: f64,
-    pub map: Png,
+/// The difference of two pictures.
+struct Difference {
+    /// Errors of the display values (0 to 1) of red, green and blue.
+    errors: Errors,
+    /// Mean FLIP error.
+    flip: f64,
+    /// FLIP error of every pixel.
+    map: Png,
 }
 
-impl Apart {
+impl Difference {
     fn caption(&self) -> String {
         let Errors { rmse, max_abs, .. } = self.errors;
         let [flip, rmse, most] = [self.flip, rmse, max_abs].map(number);
         format!(
-            "where they differ: FLIP error, dark for none, mean {flip}; of display values RMSE \
-             {rmse}, greatest {most}"
+            "difference: FLIP error, dark for none, mean {flip}; display values: RMSE {rmse}, \
+             greatest {most}"
         )
     }
 }
 
-/// Of two PNG files of a size; None where their sizes differ.
-pub fn apart(a: &Path, b: &Path) -> Result<Option<Apart>> {
+/// Compares two PNG files; None if their sizes differ.
+fn difference(a: &Path, b: &Path) -> Result<Option<Difference>> {
     let (a, b) = (image::read(a)?, image::read(b)?);
     if (a.width, a.height) != (b.width, b.height) {
         return Ok(None);
@@ -119,7 +125,7 @@ pub fn apart(a: &Path, b: &Path) -> Result<Option<Apart>> {
     let flip = flip(a.width, a.height, &bytes(&a.rgba), &bytes(&b.rgba), PIXELS_PER_DEGREE);
     let map = png_bytes(a.width, a.height, &flip.shown())?;
     let map = Png { bytes: map, width: a.width, height: a.height };
-    Ok(Some(Apart { errors, flip: flip.mean(), map }))
+    Ok(Some(Difference { errors, flip: flip.mean(), map }))
 }
 
 #[cfg(test)]
@@ -127,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_png_files_of_the_folder_itself_get_in() {
+    fn reads_only_png_files_of_the_folder() {
         let dir = tempfile::tempdir().unwrap();
         let folder = dir.path().join("run");
         fs::create_dir(&folder).unwrap();
@@ -143,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_differs_is_measured_and_shown() {
+    fn difference_of_equal_pictures_is_zero() {
         let dir = tempfile::tempdir().unwrap();
         let write = |name: &str, width: u32, value: u8| {
             let path = dir.path().join(name);
@@ -153,9 +159,9 @@ mod tests {
         };
         let (a, b, wide) =
             (write("a.png", 30, 100), write("b.png", 30, 151), write("c.png", 31, 100));
-        let same = apart(&a, &a).unwrap().unwrap();
+        let same = difference(&a, &a).unwrap().unwrap();
         assert_eq!((same.errors.rmse, same.flip), (0.0, 0.0));
-        let other = apart(&a, &b).unwrap().unwrap();
+        let other = difference(&a, &b).unwrap().unwrap();
         assert!(
             (other.errors.rmse - 0.2).abs() < 1e-12 && other.flip > 0.01,
             "{} {}",
@@ -163,6 +169,6 @@ mod tests {
             other.flip
         );
         assert_eq!((other.map.width, other.map.height), (30, 20));
-        assert!(apart(&a, &wide).unwrap().is_none());
+        assert!(difference(&a, &wide).unwrap().is_none());
     }
 }

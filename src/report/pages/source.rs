@@ -1,74 +1,81 @@
-//! What a report is made of: results on disk, whole and of this nimbus' schema, or one message that
-//! says what is wrong.
+//! Results read from disk.
 
+use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::studies::error::records::Study;
 use crate::studies::ledger::records::Ledger;
 use crate::timing::json::{self, ResultFile};
-use crate::timing::results::RUN_FILE;
-use crate::timing::results::{BenchResults, read_results};
+use crate::timing::results::{BenchResults, RUN_FILE, read_results};
 
-/// One result.
+/// The results of one command.
 #[derive(Debug, Clone)]
 pub struct Source {
-    /// As typed, or with the file's name where a folder holds several results.
+    /// The path as typed, with the file's name if the folder holds several results.
     pub name: String,
-    /// Where its pictures lie.
+    /// The folder of the results and their pictures.
     pub folder: PathBuf,
-    pub found: Found,
+    /// The records.
+    pub results: Results,
 }
 
+/// The records of one command.
 #[derive(Debug, Clone)]
-pub enum Found {
+pub enum Results {
+    /// Records of `nimbus bench`.
     Bench(Box<BenchResults>),
+    /// Records of `nimbus error`.
     Study(Box<Study>),
+    /// Records of `nimbus ledger`.
     Ledger(Box<Ledger>),
 }
 
 const FILES: [&str; 3] = [RUN_FILE, Study::FILE, Ledger::FILE];
 
-/// The results in a folder, or one of its files by name.
+/// Reads the results of a folder, or a single file of results.
+///
+/// # Errors
+/// If there are no results, or they are incomplete or of another schema version.
 pub fn read(path: &Path) -> Result<Vec<Source>> {
     if !path.is_dir() {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         let Some(file) = FILES.into_iter().find(|file| *file == name) else {
             let what = format!("expected a results folder, or in one {}", FILES.join(", "));
-            return Err(Error::io(
-                path,
-                if path.exists() { what } else { format!("no such file or folder; {what}") },
-            ));
+            let missing = if path.exists() { "" } else { "no such file or folder; " };
+            return Err(Error::io(path, format!("{missing}{what}")));
         };
         let folder = path.parent().filter(|p| *p != Path::new("")).unwrap_or(Path::new("."));
-        return Ok(vec![source(folder, file, path.display().to_string())?]);
+        return Ok(vec![read_source(folder, file, path)?]);
     }
-    let there: Vec<&str> = FILES.into_iter().filter(|file| path.join(file).exists()).collect();
-    if there.is_empty() {
-        let what = format!("holds no results: none of {}", FILES.join(", "));
-        return Err(Error::io(
+    let found: Vec<&str> = FILES.into_iter().filter(|file| path.join(file).exists()).collect();
+    match found[..] {
+        [] => Err(Error::io(
             path,
-            format!("{what}; expected a folder that bench, error or ledger wrote with --out"),
-        ));
+            format!(
+                "holds no results: none of {}; expected a folder that bench, error or ledger \
+                 wrote with --out",
+                FILES.join(", ")
+            ),
+        )),
+        [file] => Ok(vec![read_source(path, file, path)?]),
+        _ => found.iter().map(|file| read_source(path, file, &path.join(file))).collect(),
     }
-    let name = |file: &str| if there.len() == 1 { path.to_owned() } else { path.join(file) };
-    there.iter().map(|file| source(path, file, name(file).display().to_string())).collect()
 }
 
-fn source(folder: &Path, file: &str, name: String) -> Result<Source> {
-    let path = folder.join(file);
-    let found = match file {
-        RUN_FILE => Found::Bench(Box::new(read_results(folder)?)),
-        Study::FILE => Found::Study(Box::new(json::read(folder)?)),
-        _ => Found::Ledger(Box::new(json::read(&path)?)),
+fn read_source(folder: &Path, file: &str, name: &Path) -> Result<Source> {
+    let results = match file {
+        RUN_FILE => Results::Bench(Box::new(read_results(folder)?)),
+        Study::FILE => Results::Study(Box::new(json::read(folder)?)),
+        _ => Results::Ledger(Box::new(json::read(folder)?)),
     };
-    Ok(Source { name, folder: folder.to_owned(), found })
+    Ok(Source { name: name.display().to_string(), folder: folder.to_owned(), results })
 }
 
-/// Later benches and studies, each beside the first of its kind.
-pub fn pairs(sources: &[Source]) -> Vec<(&Source, &Source)> {
-    let kind = |s: &Source| std::mem::discriminant(&s.found);
+/// Pairs every further bench and study with the first of its kind.
+pub(super) fn comparable_pairs(sources: &[Source]) -> Vec<(&Source, &Source)> {
+    let kind = |s: &Source| discriminant(&s.results);
     let first = |s: &Source| sources.iter().find(|other| kind(other) == kind(s));
-    let comparable = sources.iter().filter(|s| !matches!(s.found, Found::Ledger(_)));
+    let comparable = sources.iter().filter(|s| !matches!(s.results, Results::Ledger(_)));
     comparable.filter_map(|s| Some((first(s)?, s))).filter(|(a, b)| !std::ptr::eq(*a, *b)).collect()
 }

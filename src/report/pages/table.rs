@@ -1,70 +1,74 @@
-//! Tables: complete without a script, and with one sorted by any column.
+//! Tables, sortable by every column if scripts run.
 
 use maud::{Markup, html};
 
-use crate::report::charts::number::{number, with_interval};
+use crate::report::charts::{number, with_interval};
 use crate::studies::provenance::Figure;
 use crate::timing::records::Measured;
 
+/// A cell of a table.
 pub struct Cell {
     content: Markup,
-    /// What it is sorted by, where that is a number.
+    /// The number that sorting compares.
     value: Option<f64>,
     is_number: bool,
 }
 
+/// Returns a cell of text.
 pub fn text(text: &str) -> Cell {
-    // A few words are one thing to the eye.
-    const N_SHORT: usize = 18;
-    let is_short = text.chars().count() <= N_SHORT;
-    Cell {
-        content: html! { span class=[is_short.then_some("short")] { (text) } },
-        value: None,
-        is_number: false,
-    }
-}
-
-pub fn markup(content: Markup) -> Cell {
+    // The page does not wrap short texts.
+    const SHORT: usize = 18;
+    let is_short = text.chars().count() <= SHORT;
+    let content = html! { span class=[is_short.then_some("short")] { (text) } };
     Cell { content, value: None, is_number: false }
 }
 
+/// Returns a cell of a count.
 pub fn count(n: usize) -> Cell {
     Cell { content: html! { (n) }, value: Some(n as f64), is_number: true }
 }
 
-/// "—" where there is none.
+/// Returns a cell of a number, "—" if there is none.
 pub fn value(value: Option<f64>) -> Cell {
-    shown(value, value.map_or("—".to_owned(), number))
+    numeric(value, |v| v, number)
 }
 
-/// With three places, as tables of `bench` have them.
+/// Returns a cell of a time with three decimal places, as in the tables of `bench`.
 pub fn ms(value: Option<f64>) -> Cell {
-    shown(value, value.filter(|v| v.is_finite()).map_or("—".to_owned(), |v| format!("{v:.3}")))
+    numeric(value.filter(|v| v.is_finite()), |v| v, |v| format!("{v:.3}"))
 }
 
+/// Returns a cell of a share, in percent.
 pub fn percent(value: Option<f64>) -> Cell {
-    shown(
-        value,
-        value.filter(|v| v.is_finite()).map_or("—".to_owned(), |v| format!("{:.1} %", 100.0 * v)),
-    )
+    numeric(value.filter(|v| v.is_finite()), |v| v, |v| format!("{:.1} %", 100.0 * v))
 }
 
+/// Returns a cell of a number with its interval.
 pub fn figure(figure: Option<Figure>) -> Cell {
-    let said = |f: Figure| with_interval(f.value, f.low, f.high);
-    shown(figure.map(|f| f.value), figure.map_or("—".to_owned(), said))
+    numeric(figure, |f| f.value, |f| with_interval(f.value, f.low, f.high))
 }
 
-/// The median with its interval.
+/// Returns a cell of a median with its interval.
 pub fn median(measured: Option<Measured>) -> Cell {
-    let said = |m: Measured| with_interval(m.of.p50, m.p50_low, m.p50_high);
-    shown(measured.map(|m| m.of.p50), measured.map_or("—".to_owned(), said))
+    numeric(measured, |m| m.of.p50, |m| with_interval(m.of.p50, m.p50_low, m.p50_high))
 }
 
-fn shown(value: Option<f64>, text: String) -> Cell {
-    Cell { content: html! { (text) }, value: value.filter(|v| v.is_finite()), is_number: true }
+fn numeric<T: Copy>(item: Option<T>, value: fn(T) -> f64, text: fn(T) -> String) -> Cell {
+    let content = item.map_or("—".to_owned(), text);
+    let value = item.map(value).filter(|v| v.is_finite());
+    Cell { content: html! { (content) }, value, is_number: true }
 }
 
-/// A name, a unit or nothing in brackets behind it.
+/// Returns a list of remarks, empty if there are none.
+pub fn remark_list(remarks: &[String]) -> Markup {
+    html! {
+        @if !remarks.is_empty() {
+            ul class="remarks" { @for remark in remarks { li { (remark) } } }
+        }
+    }
+}
+
+/// Returns a table whose first column holds the rows' names.
 pub fn table(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
     let is_number = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|cell| cell.is_number));
     html! {
@@ -77,11 +81,13 @@ pub fn table(caption: &str, header: &[&str], rows: &[Vec<Cell>]) -> Markup {
                 tbody {
                     @for row in rows {
                         tr {
-                            @for (i, cell) in row.iter().enumerate() {
+                            @for (i, Cell { content, value, is_number }) in row.iter().enumerate() {
                                 @if i == 0 {
-                                    th scope="row" data-value=[cell.value] { (cell.content) }
+                                    th scope="row" data-value=[value] { (content) }
                                 } @else {
-                                    td class=[cell.is_number.then_some("number")] data-value=[cell.value] { (cell.content) }
+                                    td class=[is_number.then_some("number")] data-value=[value] {
+                                        (content)
+                                    }
                                 }
                             }
                         }

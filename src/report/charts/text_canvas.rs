@@ -1,4 +1,7 @@
-//! A terminal as something to draw on: braille dots for lines, whole characters for marks and text.
+//! A plotters backend for terminals: Braille dots for lines, whole characters for markers and text.
+//!
+//! Crates for charts in terminals (textplots, rasciigraph) draw single linear line charts. This
+//! backend lets the SVG charts' own code draw logarithmic axes, intervals, bars and labels.
 
 use std::convert::Infallible;
 
@@ -7,27 +10,28 @@ use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
 };
 
-use super::look::{CELL, PLAIN, SERIES};
+use super::medium::{CELL, NEUTRAL_COLORS, SERIES_COLORS};
 
 type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Cell {
-    /// The bits of U+2800 and on.
+    /// Braille dots, as offset from U+2800.
     dots: u8,
     glyph: Option<char>,
     rgb: (u8, u8, u8),
 }
 
-/// Characters in rows; what lies outside is not drawn.
-pub struct Characters {
+/// Rows of characters. Drawing outside of them has no effect.
+pub struct TextCanvas {
     n_columns: usize,
     cells: Vec<Cell>,
 }
 
-impl Characters {
-    pub fn new(n_columns: usize, n_rows: usize) -> Characters {
-        Characters { n_columns, cells: vec![Cell::default(); n_columns * n_rows] }
+impl TextCanvas {
+    /// Creates an empty canvas.
+    pub fn new(n_columns: usize, n_rows: usize) -> TextCanvas {
+        TextCanvas { n_columns, cells: vec![Cell::default(); n_columns * n_rows] }
     }
 
     fn cell(&mut self, column: i32, row: i32) -> Option<&mut Cell> {
@@ -57,7 +61,7 @@ impl Characters {
         }
     }
 
-    /// Rows without blanks at their ends; `colored`: with the codes of an ANSI terminal.
+    /// Returns the rows without trailing spaces; with `colored`, with ANSI colour codes.
     pub fn text(&self, colored: bool) -> String {
         let mut out = String::new();
         for row in self.cells.chunks(self.n_columns.max(1)) {
@@ -85,16 +89,16 @@ fn shown(cell: &Cell) -> char {
     }
 }
 
-/// The terminal's colour for one of ours; its own text colour for any other.
+/// Returns the SGR code of a chart colour, or that of the terminal's text colour.
 pub fn sgr_of(rgb: (u8, u8, u8)) -> u8 {
-    let all = SERIES.iter().chain(&PLAIN);
-    all.into_iter().find(|s| (s.light.0, s.light.1, s.light.2) == rgb).map_or(39, |shade| shade.sgr)
+    let mut all = SERIES_COLORS.iter().chain(&NEUTRAL_COLORS);
+    all.find(|s| (s.light.0, s.light.1, s.light.2) == rgb).map_or(39, |shade| shade.sgr)
 }
 
-/// A brush on characters that outlive it.
-pub struct Brush<'a>(pub &'a mut Characters);
+/// A drawing backend that borrows its canvas.
+pub struct TextBackend<'a>(pub &'a mut TextCanvas);
 
-impl DrawingBackend for Brush<'_> {
+impl DrawingBackend for TextBackend<'_> {
     type ErrorType = Infallible;
 
     fn get_size(&self) -> (u32, u32) {
@@ -111,7 +115,7 @@ impl DrawingBackend for Brush<'_> {
     }
 
     fn draw_pixel(&mut self, point: BackendCoord, color: BackendColor) -> Drawn {
-        // What is half transparent in a picture would hide what lies under it here.
+        // Transparent areas would hide the lines below them.
         if color.alpha > 0.5 {
             self.0.dot(point, color);
         }
@@ -187,7 +191,7 @@ impl DrawingBackend for Brush<'_> {
             VPos::Bottom => (at.1 - 1).div_euclid(CELL.1),
         };
         for (i, glyph) in (0..).zip(text.chars()) {
-            // Text is not cut by the left edge but moved within.
+            // Text that would start left of the edge is moved inside.
             self.0.glyph((column.max(0) + i, row), glyph, style.color());
         }
         Ok(())
@@ -205,30 +209,29 @@ impl DrawingBackend for Brush<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::look::{INK, Look, series};
+    use crate::report::charts::medium::{INK, Medium, series};
     use plotters::prelude::*;
 
     #[test]
-    fn dots_marks_and_text_lie_where_they_were_put() {
-        let mut characters = Characters::new(6, 2);
-        let area = Brush(&mut characters).into_drawing_area();
-        // The top dot of every column of the first row; the bottom right dot of the second row's
-        // last cell.
+    fn draws_dots_markers_and_text_in_their_cells() {
+        let mut characters = TextCanvas::new(6, 2);
+        let area = TextBackend(&mut characters).into_drawing_area();
+        // The top dots of the first row; the bottom right dot of the second row's last cell.
         area.draw(&PathElement::new(vec![(0, 0), (11, 0)], INK)).unwrap();
         area.draw(&Pixel::new((11, 7), INK)).unwrap();
         area.draw(&Circle::new((4, 5), 3, series(0).filled())).unwrap();
-        area.draw_text("ab", &Look::TERMINAL.text(INK), (0, 4)).unwrap();
+        area.draw_text("ab", &Medium::Terminal.text_style(INK), (0, 4)).unwrap();
         drop(area);
         assert_eq!(characters.text(false), "⠉⠉⠉⠉⠉⠉\nab●  ⢀\n");
         assert_eq!(characters.text(true), "⠉⠉⠉⠉⠉⠉\nab\x1b[34m●  \x1b[39m⢀\n");
     }
 
     #[test]
-    fn what_lies_outside_is_left_out() {
-        let mut characters = Characters::new(2, 1);
-        let area = Brush(&mut characters).into_drawing_area();
+    fn ignores_drawing_outside_of_the_canvas() {
+        let mut characters = TextCanvas::new(2, 1);
+        let area = TextBackend(&mut characters).into_drawing_area();
         area.draw(&PathElement::new(vec![(-5, 1), (40, 1)], INK)).unwrap();
-        area.draw_text("long text", &Look::TERMINAL.text(INK), (2, 40)).unwrap();
+        area.draw_text("long text", &Medium::Terminal.text_style(INK), (2, 40)).unwrap();
         drop(area);
         assert_eq!(characters.text(false), "⠒⠒\n");
     }

@@ -1,33 +1,32 @@
-//! A study: its plot, every configuration, what budgets buy, and the pictures.
+//! An error study: its chart, its configurations, the best ones for every budget, and pictures.
 
 use std::path::Path;
 
 use maud::{Markup, html};
 
-use super::pictures::Png;
-use super::provenance::{self, Made};
-use super::table::{Cell, count, figure, markup, table, text, value};
-use super::{chart, pictures};
+use super::figure::figure as chart_figure;
+use super::pictures::{self, Png};
+use super::provenance::{self, Origin};
+use super::table::{Cell, count, figure, remark_list, table, text, value};
 use crate::error::Result;
-use crate::report::charts::number::number;
-use crate::report::charts::tradeoff::{error_of, front_numbers, metric_name, time_of};
-use crate::report::charts::{self};
-use crate::studies::error::records::{Configuration, Front, PictureError, Study};
+use crate::report::charts::error::{chart, error_of, front_numbers, metric_name, time_of};
+use crate::report::charts::number;
+use crate::studies::error::records::{Best, Configuration, Front, PictureError, Study};
 use crate::studies::provenance::Figure;
 
-/// The reference's picture, beside study.json.
-pub const REFERENCE_FILE: &str = "reference.png";
+/// File name of the reference's picture.
+const REFERENCE_FILE: &str = "reference.png";
 
+/// Returns the section of a study.
 pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
-    let caption = "Up and to the right is worse in both. Bars are 95 % intervals; the line joins \
-        the configurations that no other \
-                   beats in time and error at once. Point at one, or step through them with the \
-                   Tab key, to see its settings.";
+    let caption = "Lower is more accurate, left is faster. Bars are 95 % intervals. The line joins \
+        the configurations that no other configuration beats in both time and error. Point at a \
+        configuration, or step through them with the Tab key, to see its settings.";
     Ok(html! {
-        (provenance::section(&Made::of(&study.made, study.interrupted)))
+        (provenance::section(&Origin::of(&study.made, study.interrupted)))
         (reference(study))
         h3 { "Time against error" }
-        (chart(&charts::tradeoff::chart(study), caption)?)
+        (chart_figure(&chart(study), caption)?)
         (configurations(study))
         (best(study))
         (gallery(study, folder)?)
@@ -38,14 +37,23 @@ fn reference(study: &Study) -> Markup {
     let r = &study.reference;
     let all = u64::from(r.width) * u64::from(r.height);
     html! {
-        h3 { "Measured by" }
+        h3 { "Reference" }
         dl class="made" {
-            dt { "Reference" } dd { (r.against) ", frame " (r.frame) " at " (number(r.time_s)) " s, " (r.width) "×" (r.height) " pixels" }
-            dt { "Known at" } dd { @if r.n_pixels as u64 == all { "every pixel" } @else { (r.n_pixels) " of " (all) " pixels" } }
-            dt { "Its own error" } dd { @if let Some(rmse) = r.own_error { (number(rmse)) " RMSE: " } @else { "no bound: " } (r.accuracy) }
+            dt { "Reference" } dd {
+                (r.against) ", frame " (r.frame) " at " (number(r.time_s)) " s, " (r.width) "×"
+                (r.height) " pixels"
+            }
+            dt { "Known at" } dd {
+                @if r.n_pixels as u64 == all { "every pixel" }
+                @else { (r.n_pixels) " of " (all) " pixels" }
+            }
+            dt { "Its own error" } dd {
+                @if let Some(rmse) = r.own_error { (number(rmse)) " RMSE: " }
+                @else { "no bound: " }
+                (r.accuracy)
+            }
             dt { "Magnitude" } dd { (number(r.magnitude)) ", root mean square" }
-            dt { "Computed in" } dd { (number(r.seconds)) " s" @if r.from_cache { ", \
-                earlier, and kept" } }
+            dt { "Computed in" } dd { (number(r.seconds)) " s" @if r.from_cache { ", in an earlier run" } }
             dt { "Reference hash" } dd { code { (r.hash) } }
             dt { "Times" } dd { (study.rounds) " rounds of " (study.frames) " frames of every \
                 configuration in turn" }
@@ -84,14 +92,14 @@ fn configurations(study: &Study) -> Markup {
     ];
     let decides = if study.time == "gpu" { "GPU time" } else { "frame time" };
     let caption = format!(
-        "Every configuration with 95 % intervals; {decides} and {} decide who is on the front, № \
-         is the number in the plot",
+        "Every configuration with 95 % intervals; {decides} and {} determine the front; № is the \
+         number in the chart",
         metric_name(&study.metric)
     );
     table(&caption, &header, &rows)
 }
 
-pub fn front_name(front: Front) -> &'static str {
+fn front_name(front: Front) -> &'static str {
     match front {
         Front::On => "on",
         Front::Near => "near",
@@ -102,20 +110,21 @@ pub fn front_name(front: Front) -> &'static str {
 
 fn remark(error: Option<PictureError>) -> &'static str {
     match error {
-        Some(error) if !error.is_resolved => "not resolved: the reference is no better",
+        Some(error) if !error.is_resolved => "not resolved: below the reference's own error",
         _ => "",
     }
 }
 
 fn best(study: &Study) -> Markup {
-    let row = |b: &crate::studies::error::records::Best| -> Vec<Cell> {
+    let row = |b: &Best| -> Vec<Cell> {
         let found = b.configuration.and_then(|i| study.configurations.get(i));
-        let unit = if b.budget == "ms" { " ms" } else { "" };
+        let unit = match b.budget.as_str() {
+            "ms" => " ms".to_owned(),
+            _ => format!(" {}", metric_name(&study.metric)),
+        };
         vec![
-            markup(
-                html! { "at most " (number(b.value)) (unit) @if b.budget != "ms" { " " (metric_name(&study.metric)) } },
-            ),
-            text(found.map_or("none is within it", |c| &c.name)),
+            text(&format!("at most {}{unit}", number(b.value))),
+            text(found.map_or("none", |c| &c.name)),
             figure(found.and_then(|c| time_of(study, c))),
             figure(found.and_then(|c| error_of(study, c))),
         ]
@@ -124,15 +133,20 @@ fn best(study: &Study) -> Markup {
     if rows.is_empty() {
         html! {}
     } else {
-        table("What a budget buys", &["budget", "best", "time, ms", "error"], &rows)
+        table(
+            "The best configuration for every budget",
+            &["budget", "best", "time, ms", "error"],
+            &rows,
+        )
     }
 }
 
 fn reference_caption(study: &Study) -> &'static str {
     let r = &study.reference;
-    match r.n_pixels as u64 == u64::from(r.width) * u64::from(r.height) {
-        true => "the reference",
-        false => "the reference: every cell has the colour of its one pixel that was computed",
+    if r.n_pixels as u64 == u64::from(r.width) * u64::from(r.height) {
+        "the reference"
+    } else {
+        "the reference: every cell has the colour of its computed pixel"
     }
 }
 
@@ -146,50 +160,55 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
     for c in &study.configurations {
         let (picture, map) = (read(&c.picture)?, read(&c.error_map)?);
         let map = map.map(|map| {
-            map.figure(&format!("Where {} differs from the reference", c.name), "where they differ")
+            map.figure(&format!("Difference of {} from the reference", c.name), "difference")
         });
         let error = error_of(study, c).map_or(String::new(), |e: Figure| {
             format!(", {} {}", metric_name(&study.metric), number(e.value))
         });
         match (picture, &reference) {
             (Some(picture), Some(reference)) => {
-                // The reference stands once in the page: the script takes it from there.
+                // The page contains the reference once; the script takes it from there.
                 let caption = format!("{}{error}", c.name);
                 shown.push(html! {
-                    div class="pair \
-                        against-reference" data-label=(c.name) data-width=(reference.width) {
+                    div class="pair against-reference" data-label=(c.name) data-width=(reference.width) {
                         (picture.figure(&caption, &caption))
                         @if let Some(map) = &map { (map) }
                     }
                 });
             }
-            (Some(picture), None) => shown.push(
-                html! { div class="pair" { (picture.figure(&c.name, &c.name)) @if let Some(map) = &map { (map) } } },
-            ),
+            (Some(picture), None) => shown.push(html! {
+                div class="pair" {
+                    (picture.figure(&c.name, &c.name))
+                    @if let Some(map) = &map { (map) }
+                }
+            }),
             (None, _) => shown.extend(map),
         }
     }
     Ok(html! {
         @if reference.is_some() || !shown.is_empty() { h3 { "Pictures" } }
-        @if let Some(reference) = &reference { div class="reference" { (reference.figure("The reference", reference_caption(study))) } }
+        @if let Some(reference) = &reference {
+            div class="reference" {
+                (reference.figure("The reference", reference_caption(study)))
+            }
+        }
         @for pair in &shown { (pair) }
     })
 }
 
-/// What two studies say of the configurations that both have.
-pub fn versus(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
-    let mut remarks = Vec::new();
-    for (what, differs) in [
+/// Compares the configurations that two studies have in common.
+pub fn comparison(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
+    let remarks: Vec<String> = [
         ("scenes", a.made.scene_hash != b.made.scene_hash),
         ("references", a.reference.hash != b.reference.hash),
         ("devices", a.made.device != b.made.device),
         ("metrics", a.metric != b.metric),
         ("times", a.time != b.time),
-    ] {
-        if differs {
-            remarks.push(format!("A and B have different {what}: compare with care"));
-        }
-    }
+    ]
+    .into_iter()
+    .filter(|(_, differs)| *differs)
+    .map(|(what, _)| format!("A and B have different {what}: compare with care"))
+    .collect();
     let both = || {
         a.configurations
             .iter()
@@ -211,16 +230,18 @@ pub fn versus(a: &Study, b: &Study, [folder_a, folder_b]: [&Path; 2]) -> Result<
     let mut shown = Vec::new();
     for (of_a, of_b) in both() {
         if let (Some(name_a), Some(name_b)) = (&of_a.picture, &of_b.picture) {
-            shown.extend(pictures::versus(&of_a.name, [(folder_a, name_a), (folder_b, name_b)])?);
+            shown.extend(pictures::comparison(
+                &of_a.name,
+                [(folder_a, name_a), (folder_b, name_b)],
+            )?);
         }
     }
     let header =
         ["configuration", "A, ms", "B, ms", "B / A", "A, error", "B, error", "front in A / B"];
     Ok(html! {
-        @if !remarks.is_empty() { ul class="remarks" { @for remark in &remarks { li { (remark) } } } }
-        @if rows.is_empty() { p { "A and B have no \
-            configuration in common." } } @else { (table("Configurations \
-                that both have", &header, &rows)) }
+        (remark_list(&remarks))
+        @if rows.is_empty() { p { "A and B have no configuration in common." } }
+        @else { (table("Configurations in common", &header, &rows)) }
         @for pair in &shown { (pair) }
     })
 }

@@ -1,25 +1,25 @@
-//! Numbers beside points, none over another or over a point.
+//! Placement of labels beside points without overlaps.
 
-use super::look::Look;
+use super::medium::Medium;
 
 /// Upper left and lower right corner, px.
 type Rect = [i32; 4];
 
-/// Where each text goes, its left end and the middle of its height; None where there is no room.
-/// Earlier ones choose first. `points`: what may not be covered, with its radius.
-pub fn placed(
-    look: Look,
-    texts: &[((i32, i32), String)],
+/// Returns the left end and the middle of the height of every label, or None if there is no room
+/// for it. Earlier labels choose first. Labels do not cover `points`, given with their radii.
+pub fn place_labels(
+    medium: Medium,
+    labels: &[((i32, i32), String)],
     points: &[((i32, i32), i32)],
     bounds: [i32; 4],
 ) -> Vec<Option<(i32, i32)>> {
     let mut taken: Vec<Rect> =
         points.iter().map(|((x, y), r)| [x - r, y - r, x + r, y + r]).collect();
     let mut places = Vec::new();
-    for ((x, y), text) in texts {
-        let (width, half) = (look.width_of(text), look.down(8, 1) / 2);
-        let (near, up) = (look.across(8, 1), look.down(13, 1));
-        // Of long texts those above and below are nearer to their point than those beside it.
+    for ((x, y), text) in labels {
+        let (width, half) = (medium.width_of(text), medium.down(8, 1) / 2);
+        let (near, up) = (medium.across(8, 1), medium.down(13, 1));
+        // For long labels, places above and below are nearer to the point than those beside it.
         let sides = [
             (x + near, y - up),
             (x + near, *y),
@@ -59,18 +59,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn no_label_lies_on_another_or_on_a_point() {
+    fn labels_cover_neither_labels_nor_points() {
         let at: Vec<(i32, i32)> = (0..30).map(|i| (100 + i * 7 % 50, 100 + i * 11 % 60)).collect();
         let texts: Vec<_> =
             at.iter().enumerate().map(|(i, at)| (*at, (i + 1).to_string())).collect();
         let points: Vec<_> = at.iter().map(|at| (*at, 5)).collect();
-        let places = placed(Look::PICTURE, &texts, &points, [0, 0, 300, 300]);
+        let places = place_labels(Medium::Picture, &texts, &points, [0, 0, 300, 300]);
         let rects: Vec<Rect> = places
             .iter()
             .zip(&texts)
             .filter_map(|(place, (_, text))| {
                 let (x, y) = (*place)?;
-                Some([x, y - 4, x + Look::PICTURE.width_of(text), y + 4])
+                Some([x, y - 4, x + Medium::Picture.width_of(text), y + 4])
             })
             .collect();
         assert!(rects.len() >= 8 && rects.len() < 30, "{}", rects.len());
@@ -78,11 +78,13 @@ mod tests {
             assert!(rects[..i].iter().all(|b| !overlap(*a, *b)));
             assert!(points.iter().all(|((x, y), r)| !overlap(*a, [x - r, y - r, x + r, y + r])));
         }
-        // A point alone has its label; one in a corner has it within.
-        assert!(placed(Look::PICTURE, &texts[..1], &points[..1], [0, 0, 300, 300])[0].is_some());
+        // A single point has its label; a label in a corner stays within the bounds.
+        assert!(
+            place_labels(Medium::Picture, &texts[..1], &points[..1], [0, 0, 300, 300])[0].is_some()
+        );
         let corner = [((299, 1), "12".to_owned())];
         assert!(
-            placed(Look::PICTURE, &corner, &[((299, 1), 5)], [0, 0, 300, 300])[0]
+            place_labels(Medium::Picture, &corner, &[((299, 1), 5)], [0, 0, 300, 300])[0]
                 .is_some_and(|(x, _)| x < 290)
         );
     }

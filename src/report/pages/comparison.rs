@@ -1,27 +1,26 @@
-//! Two results of a kind: how much faster, and how far their pictures are apart.
+//! Comparison of two results of one kind: ratios of times, and differences of pictures.
 
 use std::path::Path;
 
 use maud::{Markup, html};
 
 use super::bench::case_name;
-use super::pictures;
-use super::source::{Found, Source};
-use super::table::{Cell, count, ms, table, text, value};
-use super::tradeoff;
+use super::source::{Results, Source};
+use super::table::{Cell, count, ms, remark_list, table, text, value};
+use super::{error, pictures};
 use crate::error::Result;
-use crate::report::charts::number::with_interval;
+use crate::report::charts::with_interval;
 use crate::timing::attachments::picture_file;
 use crate::timing::compare::{Comparison, HEADLINE, MeasureComparison, ModeComparison};
 use crate::timing::difference::Difference;
 use crate::timing::results::BenchResults;
 
+/// Returns the comparison of two results. Results of different kinds have none.
 pub fn section(a: &Source, b: &Source) -> Result<Markup> {
-    let inner = match (&a.found, &b.found) {
-        (Found::Bench(of_a), Found::Bench(of_b)) => benches(of_a, of_b, [&a.folder, &b.folder])?,
-        (Found::Study(of_a), Found::Study(of_b)) => {
-            tradeoff::versus(of_a, of_b, [&a.folder, &b.folder])?
-        }
+    let folders = [a.folder.as_path(), &b.folder];
+    let inner = match (&a.results, &b.results) {
+        (Results::Bench(a), Results::Bench(b)) => benches(a, b, folders)?,
+        (Results::Study(a), Results::Study(b)) => error::comparison(a, b, folders)?,
         _ => html! {},
     };
     Ok(html! {
@@ -34,14 +33,17 @@ fn benches(a: &BenchResults, b: &BenchResults, folders: [&Path; 2]) -> Result<Ma
     let Comparison { differences, modes, remarks } = Comparison::new(a, b);
     Ok(html! {
         (differing(&differences))
-        @if !remarks.is_empty() { ul class="remarks" { @for remark in &remarks { li { (remark) } } } }
+        (remark_list(&remarks))
         @if modes.is_empty() { p { "A and B have no timed loop in common." } }
         @for mode in &modes { (headline(mode)) }
         @if !modes.is_empty() {
             (ratios(&modes))
-            p { (HEADLINE) " decides; the other rows are not corrected for many comparisons: of \
-                twenty equal ones, one will seem to differ. "
-                "The intervals know the noise within the runs, not from one start to the next." }
+            p {
+                "The verdict is that of the measure " (HEADLINE) ". The intervals of the other \
+                measures are not corrected for multiple comparisons: of twenty equal measures \
+                about one appears to differ. The intervals include the noise within the runs, \
+                not the variation between starts of the program."
+            }
         }
         (pictures_of(a, b, folders)?)
     })
@@ -57,13 +59,15 @@ fn differing(found: &[Difference]) -> Markup {
 }
 
 fn headline(mode: &ModeComparison) -> Markup {
-    let Some(of) = mode.headline() else { return html! {} };
+    let Some(measure) = mode.headline() else { return html! {} };
     html! {
         p {
             strong { (mode.name) } ": "
-            @if let Some(r) = of.b_by_a { "a \
-                frame of B takes " (with_interval(r.estimate, Some(r.low), Some(r.high))) " of A's time: " }
-            (of.verdict.text())
+            @if let Some(r) = measure.b_by_a {
+                "a frame of B takes " (with_interval(r.estimate, Some(r.low), Some(r.high)))
+                " of A's time: "
+            }
+            (measure.verdict.text())
         }
     }
 }
@@ -100,20 +104,15 @@ fn ratios(modes: &[ModeComparison]) -> Markup {
     table("Medians, their ratios and 95 % intervals", &header, &rows)
 }
 
-/// Of cases of one name, whatever their places.
-fn pictures_of(
-    a: &BenchResults,
-    b: &BenchResults,
-    [folder_a, folder_b]: [&Path; 2],
-) -> Result<Markup> {
-    let mut shown = Vec::new();
-    for (i, of_a) in a.run.cases.iter().enumerate() {
-        let Some(j) = b.run.cases.iter().position(|of_b| of_b.name() == of_a.name()) else {
-            continue;
-        };
-        let files = [(folder_a, picture_file(i)), (folder_b, picture_file(j))];
-        let [file_a, file_b] = [0, 1].map(|k| (files[k].0, files[k].1.as_str()));
-        shown.extend(pictures::versus(&case_name(&a.run, i), [file_a, file_b])?);
+/// Compares the pictures of cases with equal names.
+fn pictures_of(a: &BenchResults, b: &BenchResults, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
+    let mut pairs = Vec::new();
+    for (i, case) in a.run.cases.iter().enumerate() {
+        if let Some(j) = b.run.cases.iter().position(|other| other.name() == case.name()) {
+            let (file_a, file_b) = (picture_file(i), picture_file(j));
+            let files = [(folder_a, file_a.as_str()), (folder_b, &file_b)];
+            pairs.extend(pictures::comparison(&case_name(case), files)?);
+        }
     }
-    Ok(html! { @if !shown.is_empty() { h3 { "Pictures" } @for pair in &shown { (pair) } } })
+    Ok(html! { @if !pairs.is_empty() { h3 { "Pictures" } @for pair in &pairs { (pair) } } })
 }

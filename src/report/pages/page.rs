@@ -1,0 +1,79 @@
+//! The page: its head, contents and sections.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use super::figure::color_rules;
+use super::source::{Results, Source, comparable_pairs};
+use super::{bench, comparison, error, ledger};
+use crate::error::Result;
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// A content security policy that forbids loading anything.
+const POLICY: &str =
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
+
+/// Returns the HTML page of results in their order. Further benches and studies are compared with
+/// the first of their kind.
+///
+/// # Errors
+/// If a picture of the results cannot be read.
+pub fn page(sources: &[Source]) -> Result<String> {
+    let mut sections = Vec::new();
+    for (i, source) in sources.iter().enumerate() {
+        let (kind, markup) = section(source)?;
+        sections.push((format!("{kind}: {}", source.name), format!("run-{i}"), markup));
+    }
+    for (i, (a, b)) in comparable_pairs(sources).into_iter().enumerate() {
+        sections.push((
+            format!("{} against {}", b.name, a.name),
+            format!("versus-{i}"),
+            comparison::section(a, b)?,
+        ));
+    }
+    let title = sources.iter().map(|s| s.name.as_str()).collect::<Vec<_>>().join(", ");
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                meta name="color-scheme" content="light dark";
+                title { "nimbus: " (title) }
+                style { (PreEscaped(color_rules())) (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { "nimbus report" }
+                    @if sections.len() > 1 {
+                        nav aria-label="Contents" { ul {
+                            @for (name, id, _) in &sections { li { a href={ "#" (id) } { (name) } } }
+                        } }
+                    }
+                }
+                main {
+                    @for (name, id, markup) in &sections {
+                        section id=(id) aria-labelledby={ (id) "-title" } {
+                            h2 id={ (id) "-title" } { (name) }
+                            (markup)
+                        }
+                    }
+                }
+                footer { p { "Made by nimbus " (env!("CARGO_PKG_VERSION")) "." } }
+                div id="hint" role="tooltip" hidden {}
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    Ok(markup.into_string())
+}
+
+fn section(source: &Source) -> Result<(&'static str, Markup)> {
+    Ok(match &source.results {
+        Results::Bench(recorded) => ("Bench", bench::section(recorded, &source.folder)?),
+        Results::Study(study) => ("Time against error", error::section(study, &source.folder)?),
+        Results::Ledger(ledger) => ("Ledger", ledger::section(ledger)?),
+    })
+}

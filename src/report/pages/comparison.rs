@@ -105,7 +105,11 @@ fn ratios(modes: &[ModeComparison]) -> Markup {
 }
 
 /// Compares the pictures of cases with equal names.
-fn pictures_of(a: &BenchResults, b: &BenchResults, [folder_a, folder_b]: [&Path; 2]) -> Result<Markup> {
+fn pictures_of(
+    a: &BenchResults,
+    b: &BenchResults,
+    [folder_a, folder_b]: [&Path; 2],
+) -> Result<Markup> {
     let mut pairs = Vec::new();
     for (i, case) in a.run.cases.iter().enumerate() {
         if let Some(j) = b.run.cases.iter().position(|other| other.name() == case.name()) {

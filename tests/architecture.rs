@@ -1,6 +1,5 @@
-//! The rules of ARCHITECTURE.md that a machine can keep: who may import whom, one room one name,
-//! names that say something, no file too long, no `.unwrap()`. The checker is shown bad trees
-//! first, so that silence means something.
+//! The rules of ARCHITECTURE.md that a machine can check: imports between rooms, one name per pass,
+//! meaningful names, file lengths, no `.unwrap()`. The checker is tested on faulty trees first.
 
 #[path = "architecture/source.rs"]
 mod source;
@@ -10,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use source::{Source, Token};
 
-/// Who may import whom. Every room may import itself and `error`.
+/// The rooms that every room may import, besides itself and `error`.
 const MAY_IMPORT: [(&str, &[&str]); 18] = [
     ("error", &[]),
     ("model", &[]),
@@ -80,17 +79,17 @@ const MAY_IMPORT: [(&str, &[&str]); 18] = [
     ("main", &["cli"]),
 ];
 
-/// Words that say nothing about what is inside.
+/// Words that say nothing about the content of a file or module.
 const EMPTY_WORDS: [&str; 9] =
     ["manager", "managers", "util", "utils", "helper", "helpers", "common", "commons", "misc"];
-/// A little above the 400 that the project aims at: the machine stops what has got out of hand.
+/// A little more than the 400 lines that the project aims at.
 const MAX_LINES: usize = 450;
-/// The only crates that the mathematics rests on.
+/// The only crates that `model` may use.
 const MODEL_CRATES: [&str; 3] = ["glam", "libm", "nalgebra"];
 const SHADER_KINDS: [&str; 3] = ["comp", "vert", "frag"];
 
 #[test]
-fn the_house_is_in_order() {
+fn sources_follow_the_architecture() {
     let complaints = check(Path::new(env!("CARGO_MANIFEST_DIR")));
     assert!(complaints.is_empty(), "{} breaches:\n{}", complaints.len(), complaints.join("\n"));
 }
@@ -125,7 +124,7 @@ fn check_imports(source: &Source, complaints: &mut Vec<String>) {
     for import in source.imports() {
         let at = format!("src/{}:{}", source.path, import.line);
         let to = import.path[0].as_str();
-        // A pass and its reference meet in tests.
+        // Tests may compare a pass with its reference.
         let meets_in_test = import.in_test
             && matches!((from, to), ("passes", "reference") | ("reference", "passes"));
         let allowed = to == from || to == "error" || may.contains(&to) || meets_in_test;
@@ -188,7 +187,7 @@ fn empty_words(name: &str) -> Vec<&str> {
     words.filter(|word| EMPTY_WORDS.contains(&word.to_lowercase().as_str())).collect()
 }
 
-/// Every pass has its reference, its test and its shader, all of one name.
+/// Checks that every pass has a reference, a test and a shader of its name.
 fn check_rooms(root: &Path, complaints: &mut Vec<String>) {
     let shaders: Vec<String> =
         files_under(&root.join("shaders")).iter().map(|path| file_name(path)).collect();
@@ -217,7 +216,7 @@ fn check_rooms(root: &Path, complaints: &mut Vec<String>) {
     }
 }
 
-/// Keys of `[dependencies]`, as they are written in Rust.
+/// Returns the keys of `[dependencies]` as Rust identifiers.
 fn dependencies(cargo_toml: &str) -> Vec<String> {
     let section = cargo_toml.lines().skip_while(|line| line.trim() != "[dependencies]").skip(1);
     let section = section.take_while(|line| !line.starts_with('['));
@@ -238,7 +237,7 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap().to_string_lossy().into_owned()
 }
 
-/// A tree of files in a temporary folder, and what the checker says of it.
+/// Checks a tree of files in a temporary folder.
 fn complaints_of(files: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().unwrap();
     let cargo_toml =
@@ -252,7 +251,7 @@ fn complaints_of(files: &[(&str, &str)]) -> Vec<String> {
 }
 
 #[test]
-fn a_tree_in_order_is_passed() {
+fn correct_tree_has_no_complaints() {
     let complaints = complaints_of(&[
         ("src/lib.rs", "pub mod model; pub mod gpu;"),
         ("src/main.rs", "use nimbus::{cli, error::Error}; fn main() {}"),
@@ -282,8 +281,7 @@ fn a_tree_in_order_is_passed() {
     assert_eq!(complaints, [""; 0]);
 }
 
-/// One bad file each, in a tree that is otherwise in order, and a part of the only complaint it
-/// must raise.
+/// A faulty file each, in a tree without other faults, and a part of the only complaint.
 const BREACHES: [(&str, &str, &str); 22] = [
     ("src/model/a.rs", "use crate::io;", "a.rs:1: model may not import io"),
     (
@@ -317,7 +315,7 @@ const BREACHES: [(&str, &str, &str); 22] = [
     ("src/reference/long.rs", LONG, "lines, more than 450"),
 ];
 
-/// 451 lines.
+/// A text of 451 lines.
 const LONG: &str = {
     const LINES: [u8; 451] = [b'\n'; 451];
     match std::str::from_utf8(&LINES) {
@@ -327,7 +325,7 @@ const LONG: &str = {
 };
 
 #[test]
-fn every_breach_is_reported() {
+fn every_violation_is_reported() {
     for (path, text, complaint) in BREACHES {
         let mut files = vec![(path, text)];
         if path == "src/passes/sort.rs" {
@@ -346,7 +344,7 @@ fn every_breach_is_reported() {
 }
 
 #[test]
-fn an_incomplete_room_is_reported() {
+fn incomplete_pass_is_reported() {
     let complaints = complaints_of(&[("src/passes/mod.rs", ""), ("src/passes/grid.rs", "")]);
     assert_eq!(complaints.len(), 3, "{complaints:?}");
     for (complaint, what) in

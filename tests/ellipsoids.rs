@@ -1,5 +1,5 @@
-//! Blobs that are no balls (docs/model.md §14) in every way that draws, against the f64 reference,
-//! within bounds that follow the shaders' own evaluation of their conics.
+//! Ellipsoidal blobs (docs/model.md §14) drawn by every path, compared with the f64 reference
+//! within bounds that follow the shaders' evaluation of conics.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -39,7 +39,7 @@ fn tiled(gpu: &Gpu, format: FilmFormat, portable: bool) -> Tiled {
     }
 }
 
-/// What is drawn, what should be, and how far the two may be apart.
+/// Returns the device's values, the reference values and their bounds.
 fn drawn(
     gpu: &mut Gpu,
     compiler: Option<&Compiler>,
@@ -56,7 +56,7 @@ fn drawn(
     [values, truths, bounds]
 }
 
-/// Every blob of `picture` from a `most`-th to `most` times as high as wide.
+/// Scales the height of every blob by a random factor between 1/`most` and `most`.
 fn shaped(picture: &Picture, seed: u64, most: f32) -> Picture {
     let (mut picture, mut random) = (picture.clone(), Random(seed));
     for particle in &mut picture.particles {
@@ -66,13 +66,13 @@ fn shaped(picture: &Picture, seed: u64, most: f32) -> Picture {
 }
 
 #[test]
-fn ellipsoids_of_all_kinds() {
+fn ellipsoids_match_the_reference() {
     let mut gpu = Gpu::new();
     for (i, (what, picture, _)) in cases().into_iter().enumerate() {
         let picture = shaped(&picture, i as u64, 10.0);
         let formats = if picture.placed.len() > 100 { &FORMATS[1..2] } else { &FORMATS[..] };
         for (target, format) in formats.iter().copied() {
-            // Every third one without what subgroups can do.
+            // Every third case runs without subgroup operations.
             let by_tiles = Way::Tiles(tiled(&gpu, format, i.is_multiple_of(3)));
             for way in [Way::Sprites, by_tiles, Way::Chunks(5, saturated(format))] {
                 let [values, truths, bounds] =
@@ -87,8 +87,7 @@ fn ellipsoids_of_all_kinds() {
     }
 }
 
-/// Flat ones, as cells of the weather are, seen from beside, above and within, with a threshold and
-/// without.
+/// Returns flat blobs, like cells of weather data, seen from the side, from above and from within.
 fn decks(threshold: f64) -> Vec<(&'static str, Picture)> {
     let mut random = Random(8);
     let mut blobs = || {
@@ -112,7 +111,7 @@ fn decks(threshold: f64) -> Vec<(&'static str, Picture)> {
 }
 
 #[test]
-fn decks_from_all_sides() {
+fn flat_blobs_match_the_reference_from_all_sides() {
     let mut gpu = Gpu::new();
     for threshold in [0.0, 0.01] {
         for (what, picture) in decks(threshold) {
@@ -127,8 +126,8 @@ fn decks_from_all_sides() {
                     greatest_ratio(&values, &truths, &bounds)
                 );
                 assert_within(what, &values, &truths, &bounds);
-                // The bound says something where most of the picture is; it is made by the worst of
-                // all opacities, which the eye finds within a blob fifty times as wide as high.
+                // The bound is small for half of the picture. It follows from the largest error of
+                // all opacities, which occurs inside a blob fifty times as wide as high.
                 let mut sorted = bounds.clone();
                 sorted.sort_by(f64::total_cmp);
                 let most = if what == "within" { 1e-2 } else { 1e-3 };
@@ -140,7 +139,7 @@ fn decks_from_all_sides() {
 }
 
 #[test]
-fn among_ellipsoids_balls_are_what_they_are_by_themselves() {
+fn spheres_are_unchanged_by_an_ellipsoid_in_the_scene() {
     let mut gpu = Gpu::new();
     let balls = front();
     let balls = balls.clone().blob(balls.at(0.3, -0.2, 5.0), 0.6, 1.0).blob(
@@ -148,20 +147,20 @@ fn among_ellipsoids_balls_are_what_they_are_by_themselves() {
         1.1,
         0.4,
     );
-    // A blob of no depth makes all be drawn as ellipsoids are.
+    // A blob of optical depth 0 switches all blobs to the shaders for ellipsoids.
     let among = balls.clone().blob(balls.at(0.0, 0.0, 9.0), 0.5, 0.0).shaped(0.5);
     for way in [Way::Sprites, Way::Tiles(tiled(&gpu, F32.1, false))] {
         let [values, _, own] = drawn(&mut gpu, None, &among, F32, way);
         let [alone, _, bounds] = drawn(&mut gpu, None, &balls, F32, way);
         assert!(values != vec![0.0; values.len()]);
-        // One truth, and each within its bound of that.
+        // Both have the same reference, and each is within its own bound.
         let both: Vec<f64> = own.iter().zip(&bounds).map(|(a, b)| a + b).collect();
         assert_within("balls", &values, &alone, &both);
     }
 }
 
 #[test]
-fn wrong_ellipsoids_are_noticed() {
+fn faulty_shaders_exceed_the_bounds() {
     let mut gpu = Gpu::new();
     let sprites = [
         (

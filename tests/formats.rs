@@ -1,6 +1,6 @@
-//! What 10 000 thin layers become in each format of the target: accumulated rounding, and banding.
-//! The truth is 1 − (1 − a)^n, a pixel each; a target that holds few bits stalls where a layer
-//! changes less than it can hold.
+//! Accumulated rounding and banding of 10 000 thin layers in every target format. The reference is
+//! 1 − (1 − a)^n for every pixel. A format of few bits stalls when a layer changes the value by
+//! less than the format resolves.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -22,12 +22,12 @@ use nimbus::model::film::FilmFormat;
 use picture::{FORMATS, Picture};
 
 const N_LAYERS: i32 = 10_000;
-/// Optical depth through a layer's middle.
+/// Optical depth through a layer's centre.
 const THIN: [f64; 2] = [1e-3, 1e-4];
-/// Radiance of red; alpha has 1.
+/// Radiance of the red channel; alpha is 1.
 const RED: f64 = 0.75;
 
-/// `n` coincident blobs, the largest of whose α is about `tau`.
+/// Returns `n` coincident blobs whose largest α is about `tau`.
 fn layers(n: i32, tau: f64) -> Picture {
     let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1);
     (picture.view.width, picture.view.height) = (80, 60);
@@ -39,12 +39,12 @@ fn layers(n: i32, tau: f64) -> Picture {
     picture
 }
 
-/// α of one layer in every pixel.
+/// Returns α of one layer in every pixel.
 fn one_layer(tau: f64) -> Vec<f64> {
     layers(1, tau).truth(FilmFormat::Rgba32f).0.into_iter().skip(3).step_by(4).collect()
 }
 
-/// 1 − (1 − a)^n.
+/// Returns 1 − (1 − a)^n.
 fn law(a: f64) -> f64 {
     -libm::expm1(f64::from(N_LAYERS) * libm::log1p(-a))
 }
@@ -53,13 +53,13 @@ fn channel(values: &[f64], k: usize) -> Vec<f64> {
     values.iter().skip(k).step_by(4).copied().collect()
 }
 
-/// Distance from `c` to the next greater number of half floats.
+/// Returns the distance from `c` to the next larger half-precision number.
 fn ulp(c: f16) -> f64 {
     f16::from_bits(c.to_bits() + 1).to_f64() - c.to_f64()
 }
 
-/// The least half float that a layer no longer lifts by `share` of the distance to the next: where
-/// α (L − C) < share ulp(C).
+/// Returns the smallest half-precision number that another layer raises by less than `share` of the
+/// distance to the next number: α (L − C) < share ulp(C).
 fn stall(alpha: f64, light: f64, share: f64) -> f64 {
     let numbers = (0..=f16::from_f64(light).to_bits()).map(f16::from_bits);
     let stalled = numbers.into_iter().find(|c| alpha * (light - c.to_f64()) < share * ulp(*c));
@@ -67,7 +67,7 @@ fn stall(alpha: f64, light: f64, share: f64) -> f64 {
 }
 
 #[test]
-fn the_reference_is_the_law() {
+fn reference_equals_the_closed_form() {
     for tau in THIN {
         let (values, _) = layers(N_LAYERS, tau).truth(FilmFormat::Rgba32f);
         let (alphas, reds) = (channel(&values, 3), channel(&values, 0));
@@ -79,14 +79,14 @@ fn the_reference_is_the_law() {
 }
 
 #[test]
-fn floats_of_32_bits_keep_every_layer() {
+fn rgba32f_accumulates_every_layer() {
     let mut gpu = Gpu::new();
     for tau in THIN {
         let picture = layers(N_LAYERS, tau);
         let values = channel(&picture.draw(&mut gpu, None, TargetFormat::Rgba32f), 3);
-        // A layer errs by 2⁻²³ of what is written and by what its α is off; those before it count
-        // (1 − α) as much. So n layers are off by n 2⁻²³ at most, and by the share that α is off of
-        // n α (1 − C).
+        // A layer errs by 2⁻²³ of the written value and by the error of its α; earlier errors are
+        // multiplied by 1 − α. Thus n layers err by at most n 2⁻²³, and by the relative error of α
+        // times n α (1 − C).
         let off = layers(1, tau).rounding(FilmFormat::Rgba32f).alpha;
         for (value, a) in values.iter().zip(one_layer(tau)) {
             let (n, truth) = (f64::from(N_LAYERS), law(a));
@@ -98,12 +98,12 @@ fn floats_of_32_bits_keep_every_layer() {
     }
 }
 
-/// Of correct rounding C stands still where α (L − C) < ½ ulp, of rounding toward zero where it is
-/// below a whole one; any device lies between. Until then every layer lifts it by an ulp or more.
+/// With correct rounding C stalls at α (L − C) < ½ ulp, with rounding toward zero below a whole
+/// ulp; devices lie between. Before the stall every layer raises C by at least an ulp.
 #[test]
-fn floats_of_16_bits_stall_where_a_layer_is_below_half_an_ulp() {
+fn rgba16f_stalls_when_a_layer_is_below_half_an_ulp() {
     let mut gpu = Gpu::new();
-    // α and the blending's f32 are off by less than this: a layer on the brink may go either way.
+    // The relative error of α and of blending in f32 is smaller than this.
     const BRINK: f64 = 1e-4;
     for tau in THIN {
         let values = layers(N_LAYERS, tau).draw(&mut gpu, None, TargetFormat::Rgba16f);
@@ -114,8 +114,8 @@ fn floats_of_16_bits_stall_where_a_layer_is_below_half_an_ulp() {
             {
                 let [low, high] = [1.0 + BRINK, 0.5 - BRINK].map(|share| stall(a, light, share));
                 let truth = light * law(a);
-                // Rounding up by half an ulp a layer, it reaches the stall even where the truth has
-                // not yet.
+                // With half an ulp gained per layer, C may reach the stall before the exact value
+                // does.
                 assert!(value <= high, "{value} above {high} (a = {a:e}, L = {light})");
                 if truth > high {
                     assert!(value >= low, "{value} below {low} (a = {a:e}, L = {light})");
@@ -131,33 +131,35 @@ fn floats_of_16_bits_stall_where_a_layer_is_below_half_an_ulp() {
         );
         assert!(n_stalled > 1000 && most > 0.2, "the scene shows it");
     }
-    // By hand: at α = 10⁻³ and L = 1 numbers from ½ on are 2⁻¹¹ apart: 1 − C < 2⁻¹²/10⁻³ from
-    // 0.75586 on, the next number is 0.756347…; at 10⁻⁴ a layer is below half of 2⁻¹² from ¼ on.
+    // By hand: at α = 10⁻³ and L = 1, numbers from ½ on are 2⁻¹¹ apart, and 1 − C < 2⁻¹²/10⁻³ holds
+    // from 0.75586 on, whose next number is 0.756347…; at 10⁻⁴ a layer is below half of 2⁻¹² from ¼
+    // on.
     assert_eq!((stall(1e-3, 1.0, 0.5), stall(1e-4, 1.0, 0.5)), (1549.0 / 2048.0, 0.25));
 }
 
 #[test]
-fn eight_bits_draw_nothing_of_layers_below_half_a_step() {
+fn rgba8_drops_layers_below_half_a_step() {
     let mut gpu = Gpu::new();
     for tau in THIN {
-        // α L < 1/510 is nearer to 0 than to 1/255, and 0 is where it begins.
+        // α L < 1/510 is rounded to 0, the initial value.
         let values = layers(N_LAYERS, tau).draw(&mut gpu, None, TargetFormat::Rgba8);
         assert!(values.iter().all(|v| *v == 0.0));
     }
-    // Just above it something is.
+    // A slightly thicker layer is drawn.
     assert!(layers(4, 3e-3).draw(&mut gpu, None, TargetFormat::Rgba8).iter().any(|v| *v > 0.0));
 }
 
-/// The table of docs/performance.md: `cargo test --release --test formats table -- --nocapture`.
+/// Prints the table of docs/performance.md: `cargo test --release --test formats table --
+/// --nocapture`.
 #[test]
-fn the_table_of_formats() {
+fn table_of_formats() {
     let mut gpu = Gpu::new();
     println!("| α | format | RMS | greatest | levels |");
     for tau in [1e-1, 4e-3, 1e-3, 1e-4] {
         let truth: Vec<f64> = one_layer(tau).into_iter().map(law).collect();
         let covered: Vec<usize> = (0..truth.len()).filter(|i| truth[*i] > 0.0).collect();
-        // Pixels that mirror each other differ in their last bits: the truth's levels are told
-        // apart to 10⁻¹², the formats' spacing is far above.
+        // Mirrored pixels differ in their last bits. Levels are distinguished at 10⁻¹², far below
+        // the spacing of the formats.
         let level = |v: f64| (v * 1e12).round() as u64;
         let levels = |values: &[f64]| {
             covered.iter().map(|i| level(values[*i])).collect::<BTreeSet<u64>>().len()
@@ -174,9 +176,9 @@ fn the_table_of_formats() {
             worst.push(greatest);
             bands.push(levels(&values));
         }
-        // Eight bits are the worst and 32 the best, by orders of magnitude where layers are thin.
+        // For thin layers eight bits are worse than 32 by orders of magnitude.
         assert!(worst[2] < 1e-2 * worst[1] && worst[1] <= worst[0], "{worst:?}");
-        // Where layers are below an ulp of a whole picture's values it shows as bands.
+        // If layers are below an ulp of the picture's values, bands appear.
         assert!(bands[0] < bands[1] && (tau > 1e-3 || 3 * bands[1] < bands[2]), "{bands:?}");
     }
 }

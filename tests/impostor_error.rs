@@ -1,11 +1,11 @@
-//! What an impostor is predicted to be off by against where exact projections show and see its
-//! blobs: random shells, moves and turns (docs/model.md §11 "impostors").
+//! The predicted error of impostors, compared with exact projections of random shells after random
+//! moves and turns of the eye (docs/model.md §11 "impostors").
 
 use glam::{DQuat, DVec2, DVec3};
 use nimbus::model::impostor::{FarField, Shell, View};
 use nimbus::reference::impostors::{seen, shown};
 
-/// A stream of numbers in [0, 1), the same in every run.
+/// A deterministic stream of numbers in [0, 1).
 struct Stream(u64);
 
 impl Stream {
@@ -36,8 +36,8 @@ fn view(eye: DVec3, turn: DQuat, tangents: DVec2) -> View {
     }
 }
 
-/// A shell, and where it is looked at from later: the eye moved by up to `move_share` of the
-/// nearest depth, turned by up to `turn_most`.
+/// Returns a shell and a later view: the eye moved by at most `move_share` of the nearest depth,
+/// and turned by at most `turn_most`.
 fn case(s: &mut Stream, move_share: f64, turn_most: f64) -> (Shell, View) {
     let axis = s.direction();
     let turn = DQuat::from_axis_angle(axis, s.between(0.0, 3.0));
@@ -54,16 +54,15 @@ fn case(s: &mut Stream, move_share: f64, turn_most: f64) -> (Shell, View) {
     (shell, view(eye + moved, turned, tangents))
 }
 
-/// Greatest and least singular directions aside, the width of the picture of a small ball at `c`
-/// along `n`: |n·∂x/∂c|.
+/// Returns the width of the projection of a small ball at `c` along `n`: |n·∂x/∂c|.
 fn width(project: impl Fn(DVec3) -> DVec2, c: DVec3, n: DVec2) -> f64 {
     let h = 1e-5;
     let along = |axis: DVec3| n.dot(project(c + h * axis) - project(c - h * axis)) / (2.0 * h);
     DVec3::new(along(DVec3::X), along(DVec3::Y), along(DVec3::Z)).length()
 }
 
-/// A far point that the shell shows within the view, at the slopes' share `at` in [-1, 1]² of it
-/// and the depth's share.
+/// Returns a far point that the shell shows within the view, from its slopes' share `at` in [-1,
+/// 1]² and its depth's share.
 fn point(shell: &Shell, now: &View, at: DVec2, depth_share: f64) -> DVec3 {
     let on_shell = shell.homography(now) * (at * now.tangents).extend(1.0);
     let inverse =
@@ -72,7 +71,7 @@ fn point(shell: &Shell, now: &View, at: DVec2, depth_share: f64) -> DVec3 {
 }
 
 #[test]
-fn nothing_is_farther_off_than_predicted() {
+fn errors_are_at_most_the_prediction() {
     let mut s = Stream(1);
     let (mut n, mut closest_shift, mut closest_growth) = (0, 0f64, 0f64);
     for i in 0..4000 {
@@ -80,7 +79,7 @@ fn nothing_is_farther_off_than_predicted() {
         let (shell, now) = case(&mut s, move_share, turn);
         let Some(predicted) = shell.predict(&now) else { continue };
         for k in 0..24 {
-            // Corners and ends of the depths first, then anything.
+            // First the corners and the ends of the depths, then random points.
             let at = match k {
                 0..4 => DVec2::new([-1.0, 1.0][k % 2], [-1.0, 1.0][k / 2]),
                 _ => DVec2::new(s.between(-1.0, 1.0), s.between(-1.0, 1.0)),
@@ -116,13 +115,12 @@ fn nothing_is_farther_off_than_predicted() {
 
 #[test]
 fn small_moves_are_predicted_within_a_factor_of_two() {
-    // What a shell that is used again meets: moves of a hundredth of its distance, turns of a few
-    // degrees.
+    // Moves of a hundredth of the distance and turns of a few degrees, as for reused shells.
     let mut s = Stream(2);
     let mut worst = 0f64;
     for _ in 0..500 {
         let (mut shell, now) = case(&mut s, 0.01, 0.05);
-        // Centres alone: sprites that reach in from beside the view widen what is asked for.
+        // Only centres: sprites that reach into the view from beside it enlarge the prediction.
         (shell.far.radius, shell.far.farthest) =
             (0.0, shell.far.farthest.min(4.0 * shell.far.nearest));
         let predicted = shell.predict(&now).expect("a bound");
@@ -142,7 +140,7 @@ fn small_moves_are_predicted_within_a_factor_of_two() {
 }
 
 #[test]
-fn nothing_is_off_where_the_eye_only_turns() {
+fn prediction_is_zero_for_a_turn_of_the_eye() {
     let mut s = Stream(3);
     for _ in 0..200 {
         let (shell, now) = case(&mut s, 0.0, 0.3);
@@ -155,7 +153,7 @@ fn nothing_is_off_where_the_eye_only_turns() {
 }
 
 #[test]
-fn no_bound_where_the_eye_comes_near_or_looks_away() {
+fn no_prediction_near_the_shell_or_looking_away() {
     let mut s = Stream(4);
     let (shell, _) = case(&mut s, 0.0, 0.0);
     let at = |ahead: f64, turn: f64| {

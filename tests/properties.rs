@@ -1,5 +1,5 @@
-//! What must hold of every scene and every number, tried on generated ones; where one fails, it is
-//! made as small as it can be. The same ones in every run.
+//! Properties of every scene and every number, checked on generated inputs, which are the same in
+//! every run.
 
 #[path = "properties/drawn.rs"]
 mod drawn;
@@ -35,8 +35,8 @@ fn load(text: &str, overrides: &[String]) -> Result<LoadedScene, Error> {
     parse_beside(text.to_owned(), Path::new("scene.toml"), overrides, None, &files)
 }
 
-/// A scene's text as the fuzz target has it: what loads is resolved to one that loads to the same
-/// hash, and is played.
+/// Checks a scene's text like the fuzz target: it resolves to a scene with the same hash, whose
+/// frames are computed.
 fn read(text: &str) -> Result<(), String> {
     readers::scene_file([text, scenes::BOXES, scenes::LIST].join("\0").as_bytes())
 }
@@ -52,7 +52,7 @@ fn usual_scenes_load_and_resolve_to_themselves() {
             }
             Err(message) => message,
         };
-        // What one key alone cannot know: the others.
+        // Keys whose validity depends on other keys.
         let together =
             ["`lighting.step`", "`lighting.exponents`", "`camera.position`", "`cloud.", "`draw."];
         prop_assert!(together.iter().any(|key| message.contains(key)), "{message}");
@@ -62,7 +62,7 @@ fn usual_scenes_load_and_resolve_to_themselves() {
 }
 
 #[test]
-fn unusual_scenes_load_or_give_one_error_at_its_place() {
+fn unusual_scenes_load_or_give_one_error_with_its_place() {
     let n_refused = std::cell::Cell::new(0);
     check(600, scenes::unusual(), |text| {
         let Err(message) = read(&text) else { return Ok(()) };
@@ -70,12 +70,12 @@ fn unusual_scenes_load_or_give_one_error_at_its_place() {
         let error = load(&text, &[]).expect_err("it was refused before");
         let Error::Scene { at, what } = &error else { return Err(TestCaseError::fail(message)) };
         prop_assert!(!what.is_empty());
-        // Of a file that it names, or of itself.
+        // The error is in a file that the scene names, or in the scene.
         let lines: Vec<&str> = match at.source.ends_with("scene.toml") {
             true => text.split('\n').collect(),
             false => vec![],
         };
-        // What all phases have together lies at no line.
+        // An error of all phases together has no line.
         if text.contains("[[phase]]") && at.line == 0 {
             return Ok(());
         }
@@ -91,7 +91,7 @@ fn unusual_scenes_load_or_give_one_error_at_its_place() {
 }
 
 #[test]
-fn what_is_set_is_as_if_the_file_said_it() {
+fn overrides_equal_keys_of_the_file() {
     check(200, (scenes::setting(), scenes::setting()), |((table, key, value), (_, _, other))| {
         let set = |value: &str| format!("{table}.{key}={value}");
         let said = |value: &str| {
@@ -106,7 +106,7 @@ fn what_is_set_is_as_if_the_file_said_it() {
         let file = hash(&said(&value), &[]);
         let bare = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
         prop_assert_eq!(&hash(bare, &[set(&value)]), &file);
-        // Whatever the file says, and whatever was set before.
+        // Overrides replace the file's value and earlier overrides.
         prop_assert_eq!(&hash(&said(&other), &[set(&value)]), &file);
         prop_assert_eq!(&hash(&said(&other), &[set("1"), set(&other), set(&value)]), &file);
         Ok(())
@@ -114,22 +114,21 @@ fn what_is_set_is_as_if_the_file_said_it() {
 }
 
 #[test]
-fn whatever_is_set_loads_or_gives_an_error_that_names_it() {
+fn odd_overrides_load_or_are_named_in_the_error() {
     let scene = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
     check(600, vec(scenes::odd_setting(), 1..3), |overrides| {
         let Err(error) = load(scene, &overrides) else { return Ok(()) };
         let Error::Scene { at, .. } = &error else {
             return Err(TestCaseError::fail(error.to_string()));
         };
-        // A scene that lacks what it was made to lack is at fault itself, and so is a file that it
-        // was made to name.
+        // Otherwise the error is in the scene, which may lack a key, or in a file that it names.
         let is_named = overrides.iter().any(|text| at.source == format!("--set {text}"));
         prop_assert!(is_named || !at.source.starts_with("--set"), "{error}");
         Ok(())
     });
 }
 
-/// Any number that a box file takes: zero, or between the least and the greatest, of either sign.
+/// A number that a box file accepts: 0 or between the smallest and the largest, of either sign.
 fn coordinate() -> impl Strategy<Value = f64> {
     prop_oneof![
         Just(0.0),
@@ -161,7 +160,7 @@ fn cloud_box() -> impl Strategy<Value = CloudBox> {
 }
 
 #[test]
-fn boxes_are_read_as_they_were_written_to_the_bit() {
+fn written_boxes_are_read_back_bit_for_bit() {
     check(500, vec(cloud_box(), 0..20), |boxes| {
         let text = box_file::format(&boxes);
         let again = box_file::parse(&text, Path::new("b.dat"))
@@ -171,7 +170,7 @@ fn boxes_are_read_as_they_were_written_to_the_bit() {
             (b.n_particles, numbers.map(|v| v.map(f64::to_bits)))
         };
         prop_assert!(boxes.iter().map(bits).eq(again.iter().map(bits)), "{}", text);
-        // However its words are parted.
+        // Separators do not matter.
         let parted = text.replace(", ", " \t").replace('\n', "\r\n\r\n");
         prop_assert_eq!(
             box_file::parse(&parted, Path::new("b.dat")).map_err(|e| e.to_string()),
@@ -182,8 +181,8 @@ fn boxes_are_read_as_they_were_written_to_the_bit() {
 }
 
 #[test]
-fn texts_of_any_kind_are_read_or_refused() {
-    // Words that files of numbers are made of, in any order.
+fn arbitrary_texts_are_read_or_refused() {
+    // Words of number files, in any order.
     let words = prop::sample::select(
         &[
             "0", "1", "-1", "3", ",", "\n", "\r", " ", "\"", "nan", "1e400", "x", "y", "z",
@@ -192,7 +191,7 @@ fn texts_of_any_kind_are_read_or_refused() {
     );
     check(2000, vec(words, 0..60), |words| {
         let text = words.concat();
-        // Inside is asserted what must hold of each.
+        // The readers contain the assertions.
         let _ = readers::boxes(text.as_bytes());
         let _ = readers::particle_list(text.as_bytes());
         let _ = readers::particle_list(format!("x,y,z,sigma,kappa\n{text}").as_bytes());

@@ -1,9 +1,8 @@
-//! Many frames: the two loops do not drift apart, and nothing grows. Every frame of both is read
-//! back and chained into one hash; validation layers listen; the process' resident memory is
-//! sampled.
+//! Long runs: the serial and the parallel loop produce the same frames, and memory does not grow.
+//! All frames are hashed, validation layers are on, and resident memory is sampled.
 //!
-//! `NIMBUS_SOAK_FRAMES=100000 cargo test --release --test soak -- --nocapture` is the long run
-//! (docs/measured.md).
+//! The long run (docs/measured.md) is `NIMBUS_SOAK_FRAMES=100000 cargo test --release --test soak
+//! -- --nocapture`.
 
 use std::fs;
 use std::path::Path;
@@ -17,20 +16,20 @@ use nimbus::io::scene_file;
 use nimbus::model::scene::Threading;
 use sha2::{Digest, Sha256};
 
-/// Frames of each loop, where `NIMBUS_SOAK_FRAMES` names no other number.
+/// Frames of each loop unless `NIMBUS_SOAK_FRAMES` is set.
 const N_FRAMES: u32 = 600;
-/// Samples of the memory over a run.
+/// Number of memory samples of a run.
 const N_SAMPLES: u32 = 60;
-/// What resident memory may grow by after the first fifth of a run. A leak of 100 bytes a frame is
-/// 8 MB over the other four of 100 000 frames, one of a kilobyte is found in 5000. What is allowed
-/// for is the allocator's and the validation layers' own: pages come by the hundred kilobytes.
+/// Largest growth of resident memory after the first fifth of a run. A leak of 100 bytes a frame is
+/// 8 MB over the other four fifths of 100 000 frames; a leak of 1 KB shows in 5000 frames. The
+/// allocator and the validation layers themselves grow by some hundred kilobytes.
 const MAX_GROWTH_KIB: i64 = 4096;
 
-/// What one loop came to.
+/// The result of one loop.
 struct Soaked {
-    /// SHA-256 of the chain before and of a frame's bytes, from frame to frame.
+    /// SHA-256 of the previous hash and the frame's bytes.
     chain: [u8; 32],
-    /// Resident memory in KiB, evenly over the run.
+    /// Resident memory in KiB, sampled evenly over the run.
     resident_kib: Vec<i64>,
     wall_s: f64,
 }
@@ -46,7 +45,7 @@ fn resident_kib() -> i64 {
     line.trim().trim_end_matches(" kB").parse().expect("a number")
 }
 
-/// Runs `n` frames through one loop, on a device of its own.
+/// Runs `n` frames through one loop on a new device.
 fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
     let scene =
         scene_file::load(Path::new("tests/data/soak.toml"), &[], None).expect("the scene").scene;
@@ -57,8 +56,7 @@ fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
     let (mut n_seen, mut last) = (0, vec![]);
     let on_frame = &mut |times: FrameTimes, renderer: &mut Renderer| {
         assert_eq!(times.i_frame, n_seen, "frames end in their order");
-        // Of the frame that has just ended; the loop does not draw into its picture before this
-        // returns.
+        // The frame that has just ended; its picture is not overwritten before this returns.
         let bytes = renderer.image_bytes()?;
         assert!(bytes != last, "frame {n_seen} is the one before it");
         assert!([Pass::Place, Pass::Second, Pass::Tiles].iter().all(|pass| times.plan.runs(*pass)));
@@ -74,13 +72,13 @@ fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
     stage.run(threading, 0..n, on_frame).expect("the frames run");
     assert_eq!(n_seen, n);
     soaked.wall_s = begin.elapsed().as_secs_f64();
-    // Validation messages, and what was not freed.
+    // Closing reports validation messages and leaks.
     stage.close().expect("nothing was said");
     soaked
 }
 
-/// From the second fifth of the samples to the last one: medians, which a single burst does not
-/// move.
+/// Returns the growth from the second to the last fifth of the samples, by medians, which ignore
+/// single bursts.
 fn growth_kib(samples: &[i64]) -> i64 {
     let fifth = samples.len() / 5;
     let median = |part: &[i64]| {
@@ -119,21 +117,21 @@ fn check(skip: bool) {
     assert!(soaked[0].1.chain == soaked[1].1.chain, "the loops differ");
 }
 
-/// One after the other: it is the whole process' memory.
+/// One test, because both loops share the process's memory.
 #[test]
-fn the_loops_stay_the_same_and_memory_flat() {
+fn loops_agree_and_memory_does_not_grow() {
     [true, false].iter().for_each(|skip| check(*skip));
 }
 
 #[test]
-fn a_leak_would_be_seen() {
+fn growth_detects_a_leak() {
     let leak = |kib_a_sample: i64| {
         (0..60).map(|i| 80_000 + kib_a_sample * i + (i % 3) * 50).collect::<Vec<i64>>()
     };
     assert!(growth_kib(&leak(0)).abs() <= 100);
-    // 100 bytes a frame over 100 000 frames: 163 KiB from one sample to the next.
+    // 100 bytes a frame over 100 000 frames: 163 KiB between samples.
     assert!(growth_kib(&leak(163)) > MAX_GROWTH_KIB);
-    // A burst is none.
+    // A burst is not growth.
     let mut burst = leak(0);
     burst[59] += 9000;
     assert!(growth_kib(&burst).abs() <= 100);

@@ -1,4 +1,4 @@
-//! `nimbus stress` as typed: every case passes on this device, under validation, and is explained.
+//! `nimbus stress`: every case passes on this device, under validation, and is documented.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -15,7 +15,7 @@ fn stress(args: &[&str]) -> (Option<i32>, String, String) {
 }
 
 #[test]
-fn every_case_passes_here() {
+fn every_case_passes() {
     let (code, stdout, stderr) = stress(&["--json", "--validation", "-q"]);
     let report: Value = serde_json::from_str(&stdout).expect("JSON");
     let schema: Value =
@@ -31,7 +31,7 @@ fn every_case_passes_here() {
         list.iter().filter(|c| c["verdict"] != "passed" && c["verdict"] != "not-here").collect();
     assert!(bad.is_empty() && code == Some(0), "{bad:#?}\n{stderr}");
     assert!(list.len() == cases().len() && list.len() >= 80, "{}", list.len());
-    // Nearly all are there on every device, and none compares nothing.
+    // At most one case does not apply to a device, and every other case compares values.
     assert!(list.iter().filter(|c| c["verdict"] == "not-here").count() <= 1);
     assert!(list.iter().all(|c| c["verdict"] == "not-here" || c["n"].as_u64() > Some(0)));
     let seconds: f64 = list.iter().filter_map(|c| c["seconds"].as_f64()).sum();
@@ -39,7 +39,7 @@ fn every_case_passes_here() {
 }
 
 #[test]
-fn every_case_is_explained() {
+fn docs_explain_every_case() {
     let page = std::fs::read_to_string("docs/stability.md").expect("docs/stability.md");
     let mut names = BTreeSet::new();
     for case in cases() {
@@ -55,7 +55,7 @@ fn every_case_is_explained() {
             case.name
         );
     }
-    // And names nothing that is not there.
+    // The page names no other cases.
     for word in page.split('`').skip(1).step_by(2) {
         let is_family = |f: &str| cases().iter().any(|c| c.family() == f);
         if word.split_once('/').is_some_and(|(family, _)| is_family(family)) {
@@ -67,7 +67,7 @@ fn every_case_is_explained() {
 }
 
 #[test]
-fn a_wrong_shader_is_told_and_ends_with_1() {
+fn faulty_shader_fails_with_exit_code_1() {
     let dir = tempfile::tempdir().expect("a folder");
     std::fs::create_dir(dir.path().join("include")).expect("a folder");
     let text = std::fs::read_to_string("shaders/include/functions.glsl").expect("a shader");
@@ -88,7 +88,7 @@ fn a_wrong_shader_is_told_and_ends_with_1() {
 }
 
 #[test]
-fn what_is_typed_wrong_is_told() {
+fn unknown_case_is_reported() {
     let (code, _, stderr) = stress(&["functoins"]);
     assert_eq!(code, Some(2));
     assert!(
@@ -104,9 +104,9 @@ fn what_is_typed_wrong_is_told() {
     );
 }
 
-/// As many threads of the driver as there may be: the same bytes.
+/// Number of the driver's threads: the same bytes.
 #[test]
-fn pictures_do_not_depend_on_the_drivers_threads() {
+fn pictures_are_independent_of_driver_threads() {
     let hash = |threads: &str| {
         let dir = tempfile::tempdir().expect("a folder");
         let out = dir.path().join("out.png").display().to_string();

@@ -1,5 +1,5 @@
-//! Ground of weather files in scenes: the device's picture against the f64 one, what it does to the
-//! light, and what is refused.
+//! Ground of weather files in scenes: the device's picture compared with the reference, its effect
+//! on light, and errors.
 
 #[path = "harness/program.rs"]
 mod program;
@@ -15,7 +15,7 @@ use weather_files::Made;
 const NX: usize = 8;
 const NY: usize = 6;
 
-/// A mountain of 1500 m in the west of 8 x 6 columns of 1 km, and clouds over the east.
+/// A mountain of 1500 m in the west of 8 × 6 columns of 1 km, and clouds in the east.
 fn file() -> Made {
     Made::wrf_of(1, 1, [NX, NY, 5])
         .with_floats("HGT", |h| {
@@ -31,7 +31,7 @@ fn file() -> Made {
         })
 }
 
-/// The folder with a scene of that file, whose cloud has `more` keys.
+/// Writes a scene with that file; `more` holds further keys of the cloud.
 fn scene_of(made: &Made, more: &str) -> TempDir {
     let dir = tempfile::tempdir().expect("a folder");
     fs::write(dir.path().join("w.nc"), made.bytes()).expect("a file");
@@ -80,12 +80,12 @@ fn render(dir: &TempDir, name: &str, more: &[&str]) {
     assert!(output.status.success(), "{more:?}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// f32 lighting and drawing, as in tests/render_reference.rs. The ground's rim, of which a pixel
-/// may show it or not, is out of view.
+/// Error of lighting and drawing in f32, as in tests/render_reference.rs. The ground's edge, where
+/// a pixel may belong to either side, is out of view.
 const RMSE_OF_F32: f64 = 1e-5;
 
 #[test]
-fn the_device_draws_the_ground_as_the_reference_does() {
+fn device_matches_the_reference() {
     let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"\nexaggeration = 1.5");
     let plate = "[[surface]]\ncenter = [3000.0, 400.0, 1000.0]\nu = [900.0, 0.0, 0.0]\nv = [0.0, \
         0.0, -900.0]\n\
@@ -112,16 +112,15 @@ fn the_device_draws_the_ground_as_the_reference_does() {
             ],
         ),
     ] {
-        // Surfaces' own light is another matter: the reference's is in closed form, the device's
-        // marched.
+        // Lit surfaces are not compared: the reference is in closed form, the device marches.
         for plates in ["", plate].into_iter().take(if what == "nothing lit" { 2 } else { 1 }) {
             fs::write(dir.path().join("scene.toml"), format!("{scene}{plates}")).expect("a scene");
             render(&dir, "thin.exr", &[&["--reference", "thin"], &more[..]].concat());
             render(&dir, "drawn.exr", &[&["--validation"], &more[..]].concat());
             let (rmse, max) = differ(&dir, "thin.exr", "drawn.exr");
             println!("{what}, {} plates: RMSE {rmse:.1e}, greatest {max:.1e}", plates.len().min(1));
-            // Pairs of facets err by more than rounding: 1 % of L2 is what lighting.pair_size is
-            // held to.
+            // Pairs of facets err by more than rounding: lighting.pair_size keeps them within 1 %
+            // of L2.
             let most = if what == "two reflections" { 2e-3 } else { RMSE_OF_F32 };
             assert!(rmse <= most, "{what}: {rmse:e}");
         }
@@ -129,7 +128,7 @@ fn the_device_draws_the_ground_as_the_reference_does() {
 }
 
 #[test]
-fn smaller_pictures_chunks_and_shells_have_the_ground_too() {
+fn every_path_draws_the_ground() {
     let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"\nexaggeration = 1.5");
     render(&dir, "full.exr", &[]);
     for (more, most) in [
@@ -142,7 +141,7 @@ fn smaller_pictures_chunks_and_shells_have_the_ground_too() {
         println!("{more:?}: {rmse:.1e}");
         assert!(rmse <= most, "{more:?}: {rmse:e}");
     }
-    // In half the size no more is lost than without ground.
+    // At half resolution the loss is no larger than without ground.
     let loss = |more: &[&str]| {
         render(&dir, "full.exr", more);
         render(
@@ -158,8 +157,8 @@ fn smaller_pictures_chunks_and_shells_have_the_ground_too() {
         println!("half the size: {with:.1e}, without ground {without:.1e}");
         assert!(with < 1.1 * without, "{with:e} {without:e}");
     }
-    // A flight, in both loops, with impostors and without: the same bytes, and validation has
-    // nothing to say.
+    // A flight in both loops, with and without impostors: the same bytes and no validation
+    // messages.
     let bench = ["--frames", "4", "--repeat", "2", "--warmup", "1", "-q", "--validation"];
     let scene = path(&dir, "scene.toml");
     for more in [&["--set", "draw.impostors=\"on\""][..], &[]] {
@@ -169,7 +168,7 @@ fn smaller_pictures_chunks_and_shells_have_the_ground_too() {
 }
 
 #[test]
-fn clouds_throw_their_shadow_on_the_ground_and_it_lightens_them() {
+fn clouds_shade_the_ground_and_the_ground_lights_clouds() {
     let dir = scene_of(&file(), "ground = \"rock\"\nmaterial = \"cloud\"");
     let facets = |more: &[&str]| -> Vec<[f64; 5]> {
         let scene = path(&dir, "scene.toml");
@@ -189,8 +188,8 @@ fn clouds_throw_their_shadow_on_the_ground_and_it_lightens_them() {
     let found = facets(&sun);
     let ground: Vec<_> = found.iter().filter(|f| f[0] == 0.0).collect();
     assert_eq!(ground.len(), NX * NY);
-    // The light comes from the west of above, so the shadow of the east half lies a little west of
-    // it: the easternmost two columns are in it, the plain of the middle west is not.
+    // The light comes from the upper west, so the shadow of the eastern half lies a little west of
+    // it: it covers the two easternmost columns but not the plain in the middle west.
     let cosine = 1.0 / (0.09f64 + 1.0 + 0.04).sqrt();
     let in_shadow: Vec<f64> =
         ground.iter().filter(|f| f[1] > 1900.0 && f[1] < 3000.0).map(|f| f[3]).collect();
@@ -199,7 +198,7 @@ fn clouds_throw_their_shadow_on_the_ground_and_it_lightens_them() {
         ground.iter().filter(|f| f[1] < -3000.0 && f[2] < 100.0).map(|f| f[3] / (2.9 * cosine));
     let lit: Vec<f64> = lit.collect();
     assert!(!lit.is_empty() && lit.iter().all(|light| (light - 1.0).abs() < 0.15), "{lit:?}");
-    // The clouds have light from the ground, which they have not where it is black.
+    // The ground lights the clouds, except if it is black.
     let of_clouds =
         |found: &[[f64; 5]]| found.iter().filter(|f| f[0] == 1.0).map(|f| f[4]).sum::<f64>();
     let black = facets(&[&sun[..], &["--set", "material.1.kd=[0,0,0]"]].concat());
@@ -212,7 +211,7 @@ fn clouds_throw_their_shadow_on_the_ground_and_it_lightens_them() {
 }
 
 #[test]
-fn what_is_wrong_with_the_ground_is_told() {
+fn errors_of_the_ground_are_reported() {
     let said = |made: &Made, more: &str| {
         let dir = scene_of(made, &format!("material = \"cloud\"\n{more}"));
         let output = run(&["render", &path(&dir, "scene.toml"), "-o", &path(&dir, "out.png")]);
@@ -261,10 +260,10 @@ fn what_is_wrong_with_the_ground_is_told() {
         let said = said(&made, more);
         assert!(said.contains(expected), "{said}");
     }
-    // Without a ground nobody asks for HGT.
+    // Without ground, HGT is not needed.
     let dir = scene_of(&file().with_floats("HGT", |h| h[9] = f32::NAN), "material = \"cloud\"");
     render(&dir, "none.exr", &[]);
-    // And `nimbus weather` says what is wrong with it, and all the rest.
+    // `nimbus weather` reports the fault of HGT, and everything else.
     for (made, expected) in [
         (file().with_floats("HGT", |h| h[9] = f32::NAN), "no ground: "),
         (file().with_units("HGT", "feet"), "no ground: "),

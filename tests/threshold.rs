@@ -1,5 +1,5 @@
-//! `draw.threshold`: on random scenes and cameras both draw paths end sprites where the f64
-//! reference does, and the picture changes by no more than what is cut can.
+//! `draw.threshold`: both draw paths end sprites where the f64 reference does, and the picture
+//! changes by no more than the omitted parts.
 
 #[path = "harness/bounded.rs"]
 mod bounded;
@@ -31,8 +31,8 @@ use scenery::Scenery;
 
 const FORMAT: (TargetFormat, FilmFormat) = (TargetFormat::Rgba32f, FilmFormat::Rgba32f);
 
-/// Blobs all around the eye, of optical depths from 10^-4.5 to 3; textured, in part, before a
-/// rectangle or not.
+/// Returns blobs of optical depths from 10^-4.5 to 3 around the eye, with or without textures and a
+/// rectangle behind them.
 fn random(seed: u64, pool: &Arc<Pool>) -> Picture {
     let mut random = Random(seed);
     let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
@@ -94,7 +94,7 @@ fn usual(gpu: &Gpu) -> Tiled {
     }
 }
 
-/// The reference's picture and its bound, by `sprites` or by `tiles`.
+/// Returns the reference picture and its bound for sprites or tiles.
 fn truth(picture: &Picture, way: Way) -> (Vec<f64>, Vec<f64>) {
     match way {
         Way::Sprites => picture.truth(FORMAT.1),
@@ -110,12 +110,11 @@ fn cut_of(picture: &Picture) -> Vec<Omitted> {
     };
     let sheets = picture.sheets();
     let factor = |j: usize, delta: DVec2| picture.factor(&sheets, j, delta);
-    // What stands behind in doubt has no bound.
+    // Pixels with an uncertain background have no bound.
     cut(&picture.view, &behind, &picture.blobs(), Some(&factor))
 }
 
-/// Of each of a pixel's four numbers how much the cut may change it: what is met is of radiances
-/// and of nothing, or of what the rectangle shows.
+/// Returns by how much omitted parts may change each of a pixel's four values.
 fn changes(picture: &Picture) -> Vec<f64> {
     let mut met = picture.radiance();
     met.push(DVec3::ZERO);
@@ -134,7 +133,7 @@ fn changes(picture: &Picture) -> Vec<f64> {
 }
 
 #[test]
-fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
+fn pictures_match_the_reference_and_change_by_the_omitted_parts() {
     let mut gpu = Gpu::new();
     let pool = Arc::new(Pool::new(4).rounded());
     let (mut n_cut, mut closest, mut greatest) = (0, 0f64, 0f64);
@@ -151,7 +150,7 @@ fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
                 greatest = greatest.max(greatest_ratio(&values, &truths, &bounds));
                 (values, truths, bounds)
             });
-            // In true numbers, and as drawn.
+            // Reference values, then drawn values.
             let exact: Vec<f64> = changes.iter().map(|c| c + 1e-13).collect();
             assert_within(&format!("{what}, true numbers"), &on.1, &off.1, &exact);
             let allowed: Vec<f64> =
@@ -169,12 +168,12 @@ fn random_pictures_are_the_references_and_change_no_more_than_is_cut() {
         "{n_cut} numbers cut, up to {closest:.3} of what may be; rounding up to {greatest:.3} \
          of its bound"
     );
-    // The bound is met: a single layer is cut before black.
+    // The bound is attained by a single layer before black.
     assert!(n_cut > 10_000 && closest > 0.5 && closest <= 1.0 + 1e-6, "{n_cut} {closest}");
 }
 
 #[test]
-fn the_number_of_layers_bounds_what_is_cut() {
+fn number_of_layers_bounds_the_omitted_parts() {
     let pool = Arc::new(Pool::new(4).rounded());
     let mut most = Omitted::default();
     for seed in [1, 3, 5, 7, 9] {
@@ -190,7 +189,7 @@ fn the_number_of_layers_bounds_what_is_cut() {
 }
 
 #[test]
-fn wrong_cuts_are_noticed() {
+fn faulty_shaders_exceed_the_bounds() {
     let mut gpu = Gpu::new();
     let mut picture = Picture::new(DVec3::Z * 5.0, DVec3::ZERO, 45.0, 0.1);
     for k in 0..12 {
@@ -225,7 +224,7 @@ fn wrong_cuts_are_noticed() {
 }
 
 #[test]
-fn what_is_below_the_threshold_everywhere_is_not_drawn() {
+fn blobs_below_the_threshold_are_not_drawn() {
     let mut gpu = Gpu::new();
     let tiled = usual(&gpu);
     let mut picture =
@@ -235,7 +234,7 @@ fn what_is_below_the_threshold_everywhere_is_not_drawn() {
         let drawn = |p: &Picture, gpu: &mut Gpu| p.draw_by(gpu, None, FORMAT.0, way);
         assert!(drawn(&picture, &mut gpu).iter().all(|v| *v == 0.0));
         assert!(drawn(&without(&picture), &mut gpu).iter().any(|v| *v > 0.0));
-        // So small a one that f32 has no inverse of it: the same bytes as without.
+        // A threshold so small that its inverse overflows f32 gives the same bytes as none.
         let least = Picture { view: View { threshold: 1e-300, ..picture.view }, ..picture.clone() };
         assert!(drawn(&least, &mut gpu) == drawn(&without(&picture), &mut gpu));
     }

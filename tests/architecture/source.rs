@@ -1,25 +1,25 @@
-//! Just enough Rust to read imports: tokens without comments and strings, and the paths that begin
-//! with `crate`, `nimbus`, `super` or `self`, resolved against the module they stand in.
+//! A reader of imports in Rust sources: tokens without comments and strings, and the paths that
+//! begin with `crate`, `nimbus`, `super` or `self`, resolved relative to their module.
 
 use std::path::Path;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Token {
-    /// An identifier, `::`, or one other character; a string or character is `"`.
+    /// An identifier, `::`, or one other character; `"` stands for a string or character literal.
     pub text: String,
     pub line: usize,
-    /// Inside an item under `#[cfg(test)]`.
+    /// Whether the token is inside an item with `#[cfg(test)]`.
     pub in_test: bool,
 }
 
 pub struct Source {
-    /// Below src/.
+    /// Path below src/.
     pub path: String,
     module: Vec<String>,
     pub tokens: Vec<Token>,
 }
 
-/// One path that leads somewhere in the crate: `crate::gpu::kernel` is ["gpu", "kernel"].
+/// A path to an item of the crate: `crate::gpu::kernel` is ["gpu", "kernel"].
 pub struct Import {
     pub path: Vec<String>,
     pub line: usize,
@@ -37,25 +37,25 @@ impl Source {
             module.pop();
         }
         let mut tokens = tokens(text);
-        // A file `tests.rs` is what a test module of that name was moved to.
+        // A file `tests.rs` holds a test module.
         let all_test = path.file_stem().is_some_and(|stem| stem == "tests");
         mark_tests(&mut tokens, all_test);
         Source { path: path.display().to_string(), module, tokens }
     }
 
-    /// The folder or file right under src/; none for lib.rs, which names them all.
+    /// Returns the folder or file directly below src/; none for lib.rs.
     pub fn room(&self) -> Option<&str> {
         self.module.first().map(String::as_str).filter(|room| *room != "lib")
     }
 
-    /// The pass that this file belongs to; none for passes/mod.rs.
+    /// Returns the pass that the file belongs to; none for passes/mod.rs.
     pub fn pass(&self) -> Option<&str> {
         if self.room() == Some("passes") { self.module.get(1).map(String::as_str) } else { None }
     }
 
     pub fn imports(&self) -> Vec<Import> {
         let mut imports = Vec::new();
-        // Names of the inline modules that are open; None for any other brace.
+        // Names of the enclosing inline modules; None for other braces.
         let mut open: Vec<Option<&str>> = Vec::new();
         for i in 0..self.tokens.len() {
             match self.text(i) {
@@ -77,7 +77,8 @@ impl Source {
         imports
     }
 
-    /// First words of paths into other crates: `ash` of `ash::vk`, not of `crate::ash::vk`.
+    /// Returns the first words of paths to other crates: `ash` of `ash::vk`, but not of
+    /// `crate::ash::vk`.
     pub fn crate_mentions<'a>(&'a self, crates: &'a [String]) -> impl Iterator<Item = &'a Token> {
         self.tokens.iter().enumerate().filter_map(move |(i, token)| {
             let begins_path = self.text(i + 1) == "::" || (i > 0 && self.text(i - 1) == "use");
@@ -91,7 +92,7 @@ impl Source {
     }
 
     fn continues_a_path(&self, i: usize) -> bool {
-        // `use ::ash` starts at the root, all the same.
+        // `use ::ash` starts at the root as well.
         i >= 2
             && self.text(i - 1) == "::"
             && is_identifier(self.text(i - 2))
@@ -120,13 +121,13 @@ impl Source {
         self.read_tree(i, &prefix, imports);
     }
 
-    /// A use tree (or a plain path) at token `i`; returns the token after it.
+    /// Reads a use tree or a plain path at token `i`; returns the index of the token after it.
     fn read_tree(&self, mut i: usize, prefix: &[String], imports: &mut Vec<Import>) -> usize {
         if self.text(i) == "{" {
             i += 1;
             while !matches!(self.text(i), "}" | "") {
                 i = self.read_tree(i, prefix, imports);
-                // `as name` and the comma.
+                // Skips `as name` and the comma.
                 while !matches!(self.text(i), "," | "}" | "") {
                     i += 1;
                 }
@@ -201,8 +202,8 @@ fn end_of_token(chars: &[char], i: usize) -> usize {
     }
 }
 
-/// The end of a string with a prefix: b"…", r"…", r#"…"#, br#"…"#. None if no such string begins
-/// here.
+/// Returns the end of a string with a prefix: b"…", r"…", r#"…"#, br#"…"#. None if no such string
+/// begins here.
 fn string_start(chars: &[char], i: usize) -> Option<usize> {
     let n_letters = chars[i..].iter().take(2).take_while(|c| matches!(c, 'r' | 'b' | 'c')).count();
     let n_hashes = chars[i + n_letters..].iter().take_while(|c| **c == '#').count();
@@ -244,8 +245,7 @@ fn end_of_block_comment(chars: &[char], start: usize) -> usize {
     i
 }
 
-/// Marks every item that stands under `#[cfg(test)]`: up to its `;`, or to the brace that closes
-/// its first one.
+/// Marks every item with `#[cfg(test)]`, up to its `;` or its closing brace.
 fn mark_tests(tokens: &mut [Token], all: bool) {
     let attribute = ["#", "[", "cfg", "(", "test", ")", "]"];
     let mut i = 0;

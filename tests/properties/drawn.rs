@@ -1,5 +1,5 @@
-//! Small pictures of scenes of a few particles: of numbers, opaque at most, and the same to the
-//! byte whether frames leave out what they need not do or not.
+//! Small pictures of random particles: finite values, alpha at most 1, and the same bytes with and
+//! without skipping.
 
 use std::cell::RefCell;
 
@@ -20,7 +20,7 @@ use super::check;
 
 const N_FRAMES: u32 = 3;
 
-/// A scene without its clouds, and these.
+/// A scene's text, its particles, an optional box, and whether there is wind.
 type Made = (String, Vec<Particle>, Option<CloudBox>, bool);
 
 fn blob() -> impl Strategy<Value = Particle> {
@@ -88,7 +88,7 @@ fn with_clouds((text, list, one_box, is_stirred): Made) -> Scene {
     scene
 }
 
-/// Colours and bytes of every frame.
+/// Returns colours and bytes of every frame.
 fn frames(
     context: &StressContext,
     scene: &Scene,
@@ -104,7 +104,7 @@ fn frames(
 }
 
 #[test]
-fn pictures_are_numbers_and_the_same_whatever_is_left_out() {
+fn pictures_are_finite_and_independent_of_skipping() {
     let choice = DeviceChoice { validation: true, ..DeviceChoice::default() };
     let context = StressContext::open(&choice).expect("a Vulkan 1.3 device");
     let n_seen = std::cell::Cell::new(0);
@@ -127,7 +127,7 @@ fn pictures_are_numbers_and_the_same_whatever_is_left_out() {
         }
         Ok(())
     });
-    // An empty picture would be the same, too.
+    // Empty pictures would be equal as well.
     assert!(n_seen.get() > 24, "something is drawn in {} frames", n_seen.get());
     context.close().expect("no validation messages");
 }

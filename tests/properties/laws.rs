@@ -1,4 +1,4 @@
-//! Laws of the model and of what measures it, over the whole of what they may be asked.
+//! Laws of the model and of the statistics over their whole domains.
 
 use glam::DVec3;
 use nimbus::measure::bootstrap::Bootstrap;
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 
 use super::check;
 
-/// A number whose logarithm is even: every magnitude comes up.
+/// A number whose logarithm is uniformly distributed.
 fn magnitude(low: i32, high: i32) -> impl Strategy<Value = f64> {
     (f64::from(low)..=f64::from(high)).prop_map(|e| 10f64.powf(e))
 }
@@ -27,7 +27,7 @@ fn count() -> impl Strategy<Value = Count> {
 }
 
 #[test]
-fn shares_fall_with_distance_and_weights_add_up() {
+fn shares_fall_with_distance_and_weights_sum_to_the_count() {
     let distance = || prop_oneof![magnitude(-15, 15), Just(0.0), 0.0..1000.0];
     check(
         2000,
@@ -53,7 +53,7 @@ fn shares_fall_with_distance_and_weights_add_up() {
                 // units of x.
                 let (x, sum) = (f64::from(n) * share, f64::from(drawn.n - 1) + drawn.last_weight);
                 prop_assert!((sum - x).abs() <= 2.0 * f64::EPSILON * x, "{sum} for {x}");
-                // What is drawn stands for all, as long as there is one to stand for them.
+                // The drawn particles represent all particles, unless none is drawn.
                 let stands_for = sum * drawn.kappa_scale;
                 let expected = if !count.conserve { x } else { f64::from(n) * x.min(1.0) };
                 prop_assert!(
@@ -67,14 +67,14 @@ fn shares_fall_with_distance_and_weights_add_up() {
 }
 
 #[test]
-fn growth_stays_between_its_ends_and_goes_one_way() {
+fn growth_is_monotonic_between_its_ends() {
     let times = || prop_oneof![magnitude(-15, 15), -1e15..1e15, Just(0.0)];
     let to = magnitude(-3, 3).prop_map(|to| to.clamp(MIN_SCALE, MAX_SCALE));
     check(2000, (to, magnitude(-15, 15), times(), times()), |(to, time_s, a, b)| {
         let growth = Growth { to, time_s };
         let (early, late) = (growth.at(a.min(b)), growth.at(a.max(b)));
         let (least, most) = (to.min(1.0), to.max(1.0));
-        // 1 + (to − 1): a rounding of the greater of the two beyond the end.
+        // 1 + (to − 1) is rounded: one unit of the larger end.
         let slack = f64::EPSILON * most;
         for s in [early, late] {
             prop_assert!(s >= least - slack && s <= most + slack, "{s}");
@@ -108,13 +108,13 @@ fn poses_are_orthonormal_or_refused() {
         let camera = Camera { keys, up, fov_y_rad: 0.8, near: 0.01 };
         let Some(pose) = camera.pose(time_s) else { return Ok(()) };
         let up = up.try_normalize().ok_or_else(|| TestCaseError::fail("a pose without an up"))?;
-        // The cross product's own rounding is that of products of 1, and is divided by the sine.
+        // The cross product rounds products of 1, and is divided by the sine.
         let sine = pose.forward.cross(up).length();
         let bound = 8.0 * f64::EPSILON / sine;
         for (a, b) in [(pose.right, pose.up), (pose.up, pose.forward), (pose.forward, pose.right)] {
             prop_assert!(a.dot(b).abs() <= bound && (a.length() - 1.0).abs() <= bound, "{pose:?}");
         }
-        // Above is above: right × forward has a part along up.
+        // The up vector points up: right × forward has a component along up.
         prop_assert!(
             pose.up.dot(up) >= -bound && pose.right.cross(pose.up).dot(-pose.forward) > 0.9
         );
@@ -123,7 +123,7 @@ fn poses_are_orthonormal_or_refused() {
 }
 
 #[test]
-fn a_grid_contains_its_bounds_with_the_margin() {
+fn grid_contains_its_bounds_with_the_margin() {
     let half = || prop_oneof![Just(0.0), magnitude(-15, 15), 0.0..10.0];
     check(2000, ([half(), half(), half()], 1..=2 * MAX_CELLS), |(half, n)| {
         let half = DVec3::from_array(half);
@@ -133,7 +133,7 @@ fn a_grid_contains_its_bounds_with_the_margin() {
             grid.n_cells.max_element() <= n && grid.n_cells.min_element() > 2 * MARGIN_CELLS
         );
         prop_assert!(half == DVec3::ZERO || grid.n_cells.max_element() == n);
-        // A cell in 10⁹ is left over where that saves a layer; and the ends are rounded.
+        // A cell in 10⁹ is left out if that saves a layer; and the ends are rounded.
         let margin = f64::from(MARGIN_CELLS) * grid.cell * (1.0 - 1e-6)
             - 8.0 * f64::EPSILON * half.max_element();
         let below = (-half - grid.low).min_element();
@@ -144,7 +144,7 @@ fn a_grid_contains_its_bounds_with_the_margin() {
 }
 
 #[test]
-fn more_bases_are_never_further_off() {
+fn more_bases_never_increase_the_error() {
     let sampling = prop_oneof![Just(Sampling::Log), Just(Sampling::Uniform)];
     let ends = (0.0..4.0, 0.0..5.0, any::<bool>());
     check(12, (ends, sampling, 0.0..=1.0), |((low, wide, from_zero), sampling, at)| {
@@ -154,7 +154,7 @@ fn more_bases_are_never_further_off() {
         let mut last = f64::INFINITY;
         for n in [1, 2, 3, 5, 8, 13, 21, 32] {
             let error = Basis::new(range, n, sampling).error(ns);
-            // A projection is no longer than what is projected; sums of 1025 rounded products.
+            // A projection is not longer than the projected vector; sums of 1025 rounded products.
             prop_assert!(
                 (0.0..=1.0 + 1e-12).contains(&error) && error <= last + 1e-12,
                 "{n}: {error} after {last}"
@@ -166,7 +166,7 @@ fn more_bases_are_never_further_off() {
 }
 
 #[test]
-fn what_is_shown_is_between_black_and_white_and_brighter_where_there_is_more_light() {
+fn display_values_are_in_range_and_monotonic() {
     check(2000, (any::<f64>(), any::<f64>()), |(a, b)| {
         let (dark, bright) = (srgb_encode(a.min(b)), srgb_encode(a.max(b)));
         prop_assert!(
@@ -175,7 +175,7 @@ fn what_is_shown_is_between_black_and_white_and_brighter_where_there_is_more_lig
         );
         Ok(())
     });
-    // Of neighbours, too: about the foot of the curve it changes its law.
+    // Also between neighbours: the curve changes its formula at its foot.
     check(2000, prop_oneof![0.0..0.01, 0.0..=1.0], |v: f64| {
         prop_assert!(srgb_encode(v) <= srgb_encode(v.next_up()));
         Ok(())
@@ -208,7 +208,7 @@ fn pixels_are_distinct_and_within_the_picture() {
         places.sort_unstable();
         places.dedup();
         prop_assert_eq!(places.len(), pixels.at.len());
-        // Every cell shows its own pixel's value.
+        // Every cell has the value of its pixel.
         let whole: Vec<u32> = (0..width * height).collect();
         let spread = pixels.spread(&pixels.pick(&whole));
         prop_assert_eq!(spread.len(), whole.len());
@@ -228,7 +228,7 @@ fn times() -> impl Strategy<Value = Vec<f64>> {
 }
 
 #[test]
-fn intervals_hold_what_they_are_of() {
+fn intervals_contain_their_estimate() {
     check(60, (times(), times(), any::<u64>()), |(a, b, seed)| {
         for bootstrap in [Bootstrap::default(), Bootstrap::of_neighbours(a.len().min(b.len()))] {
             let bootstrap = Bootstrap { seed, n_resamples: 200, ..bootstrap };
@@ -245,7 +245,7 @@ fn intervals_hold_what_they_are_of() {
 }
 
 #[test]
-fn summaries_are_in_order() {
+fn percentiles_are_ordered() {
     check(1000, times(), |times| {
         let Some(s) = Summary::of(&times) else {
             return Err(TestCaseError::fail("finite values have a summary"));

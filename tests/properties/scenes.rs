@@ -1,11 +1,11 @@
-//! Scenes as texts: such as a user may write, and such as nobody should.
+//! Generators of scene texts, usual and unusual ones.
 
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 
-/// What files of clouds are found under, and what they hold.
+/// Names and contents of the files of clouds.
 pub const BOXES: &str = "9\n2\n6, 1, 2, 1, 0, 0, 0, 0.8\n3, 1, 1, 1, 1.5, 0, -1, 0.5\n";
 pub const LIST: &str =
     "x,y,z,sigma,kappa,r,g,b\n0,0,0,0.4,1.5,1,1,1\n0.5,0.2,-0.3,0.3,2,0.5,0.6,1\n";
@@ -36,15 +36,14 @@ fn vector(low: f64, high: f64) -> BoxedStrategy<String> {
 }
 
 fn range(most: f64) -> BoxedStrategy<String> {
-    // Around what the materials here ask for.
+    // Exponents around those of the materials.
     number(256.0, most).prop_map(|high| format!("[0.5, {high}]")).boxed()
 }
 
-/// A key and what may stand there.
+/// A key with possible values.
 pub type Key = (&'static str, BoxedStrategy<String>);
 
-/// The keys of the scene's single tables, with values that stand by themselves whatever the others
-/// are.
+/// The keys of the scene's single tables, with values that are valid whatever the others are.
 pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
     vec![
         (
@@ -121,7 +120,7 @@ pub fn tables() -> Vec<(&'static str, Vec<Key>)> {
     ]
 }
 
-/// Each key there or not.
+/// Each key is present or not.
 fn some_of(keys: Vec<Key>) -> BoxedStrategy<String> {
     let lines = keys.into_iter().map(|(key, value)| {
         proptest::option::weighted(0.3, value)
@@ -205,7 +204,7 @@ fn phases() -> BoxedStrategy<String> {
         .boxed()
 }
 
-/// A scene of values that may be: nearly all of these load.
+/// A scene of valid values; nearly all of these load.
 pub fn usual() -> BoxedStrategy<String> {
     let single = tables()
         .into_iter()
@@ -215,13 +214,13 @@ pub fn usual() -> BoxedStrategy<String> {
         |s: BoxedStrategy<String>, most: usize| vec(s, 0..=most).prop_map(|all| all.concat());
     let with = (single, maybe(light(), 3), material(), maybe(surface(), 2), maybe(cloud(), 3));
     let plain = with.prop_map(|(a, b, c, d, e)| [a, b, c, d, e].concat());
-    // What the phases have in frames the scene may not say otherwise.
+    // The scene must not set the frames that the phases set.
     let in_phases =
         (maybe(light(), 2), maybe(cloud(), 2), phases()).prop_map(|(a, b, c)| [a, b, c].concat());
     Union::new_weighted(vec![(4, plain.boxed()), (1, in_phases.boxed())]).boxed()
 }
 
-/// A value that hardly any key takes.
+/// A value that hardly any key accepts.
 fn odd() -> BoxedStrategy<String> {
     const ODD: &[&str] = &[
         "nan",
@@ -271,7 +270,7 @@ fn odd() -> BoxedStrategy<String> {
     .boxed()
 }
 
-/// A scene some of whose lines are another's, or nobody's.
+/// A scene with lines of another scene, or with invalid lines.
 pub fn unusual() -> BoxedStrategy<String> {
     let lines = usual().prop_map(|text| text.lines().map(str::to_owned).collect::<Vec<_>>());
     let changes = vec((any::<prop::sample::Index>(), 0..5u8, odd()), 1..5);
@@ -295,7 +294,7 @@ pub fn unusual() -> BoxedStrategy<String> {
         .boxed()
 }
 
-/// Something given with `--set`: a key of the single tables with a value that it takes.
+/// An argument of `--set`: a key of the single tables with a valid value.
 pub fn setting() -> BoxedStrategy<(&'static str, &'static str, String)> {
     let all = tables().into_iter().flat_map(|(table, keys)| {
         keys.into_iter()
@@ -304,7 +303,7 @@ pub fn setting() -> BoxedStrategy<(&'static str, &'static str, String)> {
     Union::new(all).boxed()
 }
 
-/// And what nobody should type.
+/// An invalid argument of `--set`.
 pub fn odd_setting() -> BoxedStrategy<String> {
     let path = prop_oneof![
         select(

@@ -1,15 +1,16 @@
-//! Running error analysis of an f32 evaluation: a number and a bound on how far its f32 evaluation
-//! may lie from it, by what Vulkan promises of each operation (specification, "Precision and
-//! Operation of SPIR-V Instructions"): +, −, × correctly rounded (contraction to fma only rounds
-//! less), division 2.5 ulp, exp and exp2 3 + 2|x| ulp, log and log2 3 ulp or 2⁻²¹ near 1,
-//! inversesqrt 2 ulp. An ulp is at most 2u of the result, u = 2⁻²⁴; a result below the least normal
-//! number may be flushed to zero.
+//! Running error analysis: numbers with a bound on the error of their evaluation in f32.
+//!
+//! The bounds follow Vulkan's guarantees (specification, "Precision and Operation of SPIR-V
+//! Instructions"): +, −, × correctly rounded (contraction to fma only rounds less), division 2.5
+//! ulp, exp and exp2 3 + 2|x| ulp, log and log2 3 ulp or 2⁻²¹ near 1, inversesqrt 2 ulp. An ulp is
+//! at most 2u of the result, u = 2⁻²⁴. A result below the smallest normal number may be flushed to
+//! zero.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
 /// Unit round-off of f32.
 pub const U: f64 = 1.0 / 16_777_216.0;
-/// Least normal f32: what flushing may cost an operation.
+/// Smallest normal f32: the error of a flush to zero.
 const TINY: f64 = 1.175_494_350_822_287_5e-38;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,12 +24,12 @@ impl Bounded {
         Bounded { value, error: 0.0 }
     }
 
-    /// A constant or input that was rounded to f32 once.
+    /// Returns a constant or input that was rounded to f32 once.
     pub fn once(value: f64) -> Bounded {
         Bounded { value, error: U * value.abs() }
     }
 
-    /// The rounding is of the computed number, at most |value| + inherited.
+    /// The computed number is rounded, which is at most |value| + inherited error.
     fn rounded(value: f64, inherited: f64, units: f64) -> Bounded {
         Bounded { value, error: inherited + units * U * (value.abs() + inherited) + TINY }
     }
@@ -49,14 +50,15 @@ impl Bounded {
 
     pub fn over(self, b: Bounded) -> Bounded {
         let value = self.value / b.value;
-        // |a'/b' − a/b| ≤ (δa + |a/b| δb)/|b'|; |b'| ≥ |b| − δb, and a divisor that may be 0 bounds nothing.
+        // |a'/b' − a/b| ≤ (δa + |a/b| δb)/|b'|; |b'| ≥ |b| − δb. If the divisor may be 0, there is
+        // no bound.
         let least = b.value.abs() - b.error;
         let inherited =
             if least > 0.0 { (self.error + value.abs() * b.error) / least } else { f64::INFINITY };
         Bounded::rounded(value, inherited, 5.0)
     }
 
-    /// Times a power of two, or −1: exact.
+    /// Multiplies by a power of two or by −1, which is exact.
     pub fn scaled(self, by: f64) -> Bounded {
         Bounded { value: self.value * by, error: self.error * by.abs() }
     }
@@ -65,22 +67,22 @@ impl Bounded {
         self.times(self)
     }
 
-    /// max(self, 0), which moves errors no further apart.
+    /// Returns max(self, 0), which does not increase errors.
     pub fn at_least_0(self) -> Bounded {
         Bounded { value: self.value.max(0.0), error: self.error }
     }
 
-    /// max(self, a), `a` an f32 number.
+    /// Returns max(self, a) with an f32 number `a`.
     pub fn at_least(self, a: f64) -> Bounded {
         Bounded { value: self.value.max(a), error: self.error }
     }
 
-    /// Cut to [0, 1], which moves errors no further apart.
+    /// Clamps to [0, 1], which does not increase errors.
     pub fn within_0_and_1(self) -> Bounded {
         Bounded { value: self.value.clamp(0.0, 1.0), error: self.error }
     }
 
-    /// √self: 1 / inversesqrt, which is 2 ulp and a division.
+    /// Returns √self: 1 / inversesqrt, which is 2 ulp and a division.
     pub fn root(self) -> Bounded {
         let value = self.value.sqrt();
         let inherited = value - (self.value - self.error).max(0.0).sqrt();
@@ -93,8 +95,8 @@ impl Bounded {
         Bounded::rounded(value, value * self.error.exp_m1(), 2.0 * ulps)
     }
 
-    /// ln, or log2 in units of ln 2: 3 ulp, or 2⁻²¹ from ½ to 2; infinite where the number may be
-    /// 0.
+    /// Returns ln, or log2 in units of ln 2: 3 ulp, or 2⁻²¹ from ½ to 2; unbounded if the number
+    /// may be 0.
     pub fn log(self) -> Bounded {
         let value = self.value.ln();
         let inherited = if self.error < self.value {
@@ -114,7 +116,7 @@ impl Bounded {
     }
 }
 
-/// Σ aᵢbᵢ in any order: the innermost term passes three roundings, as all are taken to.
+/// Returns Σ aᵢbᵢ in any order: every term passes at most three roundings.
 pub fn dot(a: [Bounded; 3], b: [Bounded; 3]) -> Bounded {
     let products = [0, 1, 2].map(|i| a[i].times(b[i]));
     let sum = products[0].plus(products[1]).plus(products[2]);
@@ -129,7 +131,7 @@ pub fn exact3(v: [f32; 3]) -> [Bounded; 3] {
     v.map(|v| Bounded::exact(f64::from(v)))
 }
 
-/// A small reproducible generator (SplitMix64) for test inputs.
+/// A small deterministic generator (SplitMix64) of test inputs.
 pub struct Random(pub u64);
 
 impl Random {
@@ -140,12 +142,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [low, high), rounded to f32.
+    /// Returns a number uniform in [low, high), rounded to f32.
     pub fn within(&mut self, low: f64, high: f64) -> f32 {
         (low + (high - low) * (self.word() >> 11) as f64 / (1u64 << 53) as f64) as f32
     }
 
-    /// A unit vector, rounded to f32.
+    /// Returns a unit vector, rounded to f32.
     pub fn direction(&mut self) -> [f32; 3] {
         loop {
             let v = [0; 3].map(|_| f64::from(self.within(-1.0, 1.0)));
@@ -157,7 +159,7 @@ impl Random {
     }
 }
 
-/// The greatest of |value − truth|/bound; NaN counts as infinite.
+/// Returns the greatest |value − truth|/bound; NaN counts as infinite.
 pub fn greatest_ratio(values: &[f64], truths: &[f64], bounds: &[f64]) -> f64 {
     assert!(values.len() == truths.len() && values.len() == bounds.len());
     let ratio = |i: usize| {

@@ -1,5 +1,5 @@
-//! A headless Chromium, told what to do through a pipe (Chrome DevTools Protocol: JSON messages
-//! that end in a zero byte). No browser is a failure.
+//! A headless Chromium controlled through a pipe with the Chrome DevTools Protocol: JSON messages
+//! that end in a zero byte. A missing browser fails the test.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-/// Of a page that does nothing for long; a loaded machine takes its time.
+/// Time without an answer after which the browser counts as hanging.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 pub struct Browser {
@@ -20,12 +20,12 @@ pub struct Browser {
     from: Receiver<Value>,
     session: String,
     n_sent: u64,
-    /// What it said unasked, in order.
+    /// Events, in order of arrival.
     pub events: Vec<Value>,
     _profile: tempfile::TempDir,
 }
 
-/// The program: `CHROME`, or what is usual.
+/// Returns the browser's program: `CHROME` or a usual name.
 fn program() -> String {
     if let Ok(chosen) = std::env::var("CHROME") {
         return chosen;
@@ -41,10 +41,10 @@ fn program() -> String {
 }
 
 impl Browser {
-    /// A page that is empty yet.
+    /// Starts a browser with an empty page.
     pub fn new() -> Browser {
         let profile = tempfile::tempdir().expect("a folder");
-        // The browser reads from descriptor 3 and writes to 4; a shell can put our pipes there
+        // The browser reads from descriptor 3 and writes to 4. A shell connects the pipes to them
         // without unsafe code.
         let mut child = Command::new("sh")
             .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null 2>&1", &program()])
@@ -107,7 +107,7 @@ impl Browser {
         }
     }
 
-    /// Loads a file and waits until it is all there.
+    /// Loads a file and waits until it is complete.
     pub fn open(&mut self, file: &Path) {
         self.events.clear();
         self.call("Page.navigate", json!({ "url": format!("file://{}", file.display()) }));
@@ -116,7 +116,7 @@ impl Browser {
         }
     }
 
-    /// The value of an expression.
+    /// Returns the value of an expression.
     pub fn eval(&mut self, script: &str) -> Value {
         let params = json!({ "expression": script, "returnByValue": true, "awaitPromise": true });
         let mut answer = self.call("Runtime.evaluate", params);
@@ -128,7 +128,7 @@ impl Browser {
         self.call("Emulation.setScriptExecutionDisabled", json!({ "value": !are_run }));
     }
 
-    /// "light" or "dark", "screen" or "print".
+    /// Emulates "light" or "dark", "screen" or "print".
     pub fn media(&mut self, scheme: &str, media: &str) {
         let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
         self.call("Emulation.setEmulatedMedia", json!({ "media": media, "features": features }));
@@ -152,14 +152,13 @@ impl Browser {
         self.call("Input.dispatchMouseEvent", json!({ "type": "mouseMoved", "x": x, "y": y }));
     }
 
-    /// The whole page as base64 of a PNG file.
+    /// Returns the whole page as a PNG file in base64.
     pub fn picture(&mut self) -> String {
         let params = json!({ "format": "png", "captureBeyondViewport": true });
         self.call("Page.captureScreenshot", params)["data"].as_str().expect("a picture").to_owned()
     }
 
-    /// Errors and warnings of the console, exceptions among them, and what the page asked of a
-    /// network.
+    /// Returns errors and warnings of the console, exceptions, and network requests.
     pub fn complaints(&self) -> Vec<String> {
         let is_complaint = |e: &&Value| match e["method"].as_str().unwrap_or_default() {
             "Runtime.exceptionThrown" => true,
@@ -199,7 +198,7 @@ impl Drop for Browser {
     fn drop(&mut self) {
         self.session.clear();
         let _ = self.to.write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");
-        // It ends itself, and all it started; where it does not, what was started is ended.
+        // Asks the browser to exit, and kills its process group otherwise.
         for _ in 0..100 {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
                 return;

@@ -1,5 +1,5 @@
-//! A virtual display, and hands on its windows: Xvfb and xdotool, which `tools/bootstrap tests`
-//! installs. Missing ones fail.
+//! A virtual display with input for its windows: Xvfb and xdotool, which `tools/bootstrap tests`
+//! installs. If they are missing, the test fails.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -20,11 +20,11 @@ impl Drop for Display {
 }
 
 impl Display {
-    /// Of its own, on a number that is free.
+    /// Starts a display on a free number.
     pub fn open() -> Display {
         let mut server = Command::new("Xvfb")
-            // A server that loses its last client begins anew, and whoever comes at that moment is
-            // lost: xdotool comes and goes.
+            // A server without clients resets itself, and a client that connects at that moment
+            // fails. xdotool connects for every command, so another client stays connected.
             .args([
                 "-displayfd",
                 "1",
@@ -49,14 +49,14 @@ impl Display {
         &self.name
     }
 
-    /// What xdotool answers.
+    /// Returns the output of xdotool.
     pub fn xdotool(&self, args: &[&str]) -> Option<String> {
         let output = Command::new("xdotool").args(args).env("DISPLAY", &self.name).output();
         let output = output.expect("xdotool: tools/bootstrap tests installs it");
         output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
     }
 
-    /// The window of a process, as soon as it has one.
+    /// Waits for the window of a process.
     pub fn window_of(&self, pid: u32) -> String {
         let begin = Instant::now();
         loop {
@@ -69,10 +69,10 @@ impl Display {
         }
     }
 
-    /// Keys go to it from now on.
+    /// Gives a window the keyboard focus.
     pub fn focus(&self, window: &str) {
         self.xdotool(&["windowfocus", "--sync", window]).expect("the focus");
-        // The window is still to hear of it.
+        // The window receives the focus event later.
         std::thread::sleep(Duration::from_millis(500));
     }
 
@@ -80,7 +80,7 @@ impl Display {
         self.xdotool(&["key", "--delay", "30", name]).expect("a key");
     }
 
-    /// Characters, one after the other.
+    /// Types characters.
     pub fn types(&self, text: &str) {
         self.xdotool(&["type", "--delay", "30", "--", text]).expect("text");
     }
@@ -89,7 +89,8 @@ impl Display {
         self.xdotool(&["getwindowname", window]).unwrap_or_default()
     }
 
-    /// What is seen of a window: columns, rows, and a red, a green and a blue byte a pixel.
+    /// Returns the picture of a window: columns, rows, and red, green and blue bytes of every
+    /// pixel.
     pub fn seen(&self, window: &str) -> (u32, u32, Vec<u8>) {
         use x11rb::connection::Connection;
         use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
@@ -114,7 +115,7 @@ impl Display {
             .expect("a size");
     }
 
-    /// From a place in the window to another with a button held.
+    /// Drags from one position of a window to another with a button pressed.
     pub fn drag(&self, window: &str, button: u32, from: [u32; 2], to: [u32; 2]) {
         let [x, y] = from.map(|v| v.to_string());
         let [to_x, to_y] = to.map(|v| v.to_string());

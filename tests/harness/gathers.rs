@@ -1,4 +1,4 @@
-//! The second reflection of a frame in f64, and how near the device's comes to it.
+//! The second reflection of a frame in f64, and bounds on the device's error.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -20,7 +20,7 @@ use nimbus::reference::{grid, morton, place, sort};
 use crate::harness::{Gpu, assert_within_and_say, check_within};
 use crate::rooms::{Frame, frame_by};
 
-/// Every facet's light in f64: facets as the device has them, all else from the scene.
+/// Returns every facet's light in f64, from the device's facets and the scene.
 pub fn reference(f: &Frame) -> Vec<Gathered> {
     let scene = &*f.scene;
     let setting = FrameState::at(scene, &scene.groups(), 0.0).unwrap();
@@ -88,8 +88,8 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
     each(facets.len(), |j| exchange.gather_from(j, &senders, &clusters))
 }
 
-/// The facet of each place. Keys in f32: a difference and a product, which Vulkan promises to round
-/// correctly.
+/// The facet of each position. Keys are computed in f32 by a difference and a product, which Vulkan
+/// rounds correctly.
 fn order(f: &Frame) -> Vec<u32> {
     let (scene, bits) = (&*f.scene, KeyBits::of(f.scene.n_regions() as u32));
     let bounds = scene.region_bounds(&scene.groups(), 0.0, DEPOSIT_CUT_SIGMA);
@@ -117,7 +117,7 @@ pub fn values(f: &Frame) -> [Vec<f64>; 2] {
     [of(0), of(1)]
 }
 
-/// Of I_i and L2, and the bounds of both.
+/// Returns I_i and L2 with their bounds.
 pub type Truths = ([Vec<f64>; 2], [Vec<f64>; 2]);
 
 pub fn truths(found: &[Gathered]) -> Truths {
@@ -135,8 +135,8 @@ pub fn assert_agrees(what: &str, f: &Frame) {
     let (values, (truths, bounds)) = (values(f), truths(&found));
     for (k, quantity) in ["I_i", "L2"].into_iter().enumerate() {
         assert_within_and_say(&format!("{what}, {quantity}"), &values[k], &truths[k], &bounds[k]);
-        // The bound says something: all but a few facets' light is known to a thousandth of the
-        // greatest.
+        // The bound is meaningful: for all but a few facets it is a thousandth of the largest
+        // light.
         let greatest = truths[k].iter().cloned().fold(0.0, f64::max);
         let n_loose = bounds[k].iter().filter(|b| **b > 1e-3 * greatest).count();
         println!("  greatest {greatest:.3e}, {n_loose} of {} loose", bounds[k].len());
@@ -158,7 +158,7 @@ pub fn assert_agrees(what: &str, f: &Frame) {
     println!("  {n} cells unresolved");
 }
 
-/// Whether what `compiler`'s shaders make of the scene is out of the bounds about its truths.
+/// Returns whether the results of `compiler`'s shaders exceed their bounds.
 pub fn is_noticed(
     gpu: &Gpu,
     compiler: &Compiler,

@@ -1,11 +1,11 @@
-//! Laws over generated values, the same ones in every run.
+//! Properties of generated values, which are the same in every run.
 
 use std::fmt::Debug;
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestError, TestRng, TestRunner};
 
-/// Of every one of `cases` values: the first that fails, made smaller, fails the test.
+/// Checks a property for `cases` values. The first value that fails is reduced and fails the test.
 pub fn check<S>(cases: u32, strategy: S, law: impl Fn(S::Value) -> Result<(), TestCaseError>)
 where
     S: Strategy,

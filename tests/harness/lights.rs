@@ -1,4 +1,4 @@
-//! How a light reaches a point, evaluated in f32 (shaders/include/light.glsl): a running bound.
+//! A light's arrival at a point in f32 (shaders/include/light.glsl), with a running bound.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -59,7 +59,7 @@ fn from_afar(toward: DVec3) -> Arrival {
     }
 }
 
-/// A point light or a spot whose vectors are f32 numbers, within ±`reach` of the origin.
+/// Returns a point light or a spot whose vectors are f32 numbers within ±`reach` of the origin.
 pub fn near_light(r: &mut Random, reach: f64, is_spot: bool) -> Light {
     let mut vector = |low: f64, high: f64| double([0; 3].map(|_| r.within(low, high)));
     let (position, intensity) = (vector(-reach, reach), vector(0.0, 5.0));
@@ -79,7 +79,7 @@ pub fn near_light(r: &mut Random, reach: f64, is_spot: bool) -> Light {
     }
 }
 
-/// The records; the inputs are relative to O already.
+/// The records; the inputs are already relative to O.
 pub fn records(lights: &[Light]) -> Vec<LightRecord> {
     lights.iter().map(|l| LightRecord::new(l, DVec3::ZERO)).collect()
 }

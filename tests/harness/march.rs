@@ -1,5 +1,5 @@
-//! The march through the density grid (shaders/transmit.comp), evaluated in f32: a running bound of
-//! its optical depth.
+//! The march through the density grid (shaders/transmit.comp) in f32, with a running bound of its
+//! optical depth.
 
 use glam::{DVec3, IVec3};
 use nimbus::model::grid::GridSpec;
@@ -10,10 +10,11 @@ use nimbus::reference::{rounding, transmit};
 use crate::bounded::{self, Bounded};
 use crate::lights::{arrival, double};
 
-/// The sum of terms, and what they and the sum may err: of f64 sums, when it is rounded to f32.
+/// A sum of terms with the errors of the terms and of the sum. The terms are f64 sums, which are
+/// rounded to f32.
 fn sum_of(terms: &[Bounded], sums: Sums) -> Bounded {
     if sums == Sums::default() {
-        // As it grows.
+        // The running total.
         return terms.iter().fold(Bounded::exact(0.0), |tau, term| tau.plus(*term));
     }
     let (value, error) = terms.iter().fold((0.0, 0.0), |(v, e), t| (v + t.value, e + t.error));
@@ -28,7 +29,7 @@ pub struct March<'a> {
 }
 
 impl March<'_> {
-    /// A cell's: along y a product where it is no cube.
+    /// A cell's size; along y a product if cells are not cubes.
     fn edge(&self, axis: usize) -> Bounded {
         let cell = Bounded::exact(self.spec.cell);
         if axis == 1 && self.spec.aspect != 1.0 {
@@ -38,8 +39,8 @@ impl March<'_> {
         }
     }
 
-    /// How much shorter than `step` cells a step along `d` is: the length of d where the cells are
-    /// cubes.
+    /// Returns the length of a step along `d` as a share of `step` cells: the length of d if the
+    /// cells are cubes.
     fn in_widths(&self, d: [Bounded; 3]) -> Bounded {
         if self.spec.aspect == 1.0 {
             return Bounded::exact(1.0);
@@ -49,8 +50,8 @@ impl March<'_> {
         x.plus(y).plus(z).root()
     }
 
-    /// Where the way enters the box and leaves it or ends: high = low + cell·n, then a difference
-    /// and a quotient, and the greatest of those that enter, the least of those that leave.
+    /// Returns where the ray enters the box, and where it leaves it or ends. high = low + cell·n,
+    /// then a difference and a quotient, the largest entry and the smallest exit.
     fn crossing(&self, p: [f32; 3], d: [Bounded; 3], distance: Bounded) -> [Bounded; 2] {
         let exact = Bounded::exact;
         let (mut enter, mut leave) = (vec![exact(0.0)], vec![distance]);
@@ -73,7 +74,7 @@ impl March<'_> {
         [extreme(&enter, f64::max), extreme(&leave, f64::min)]
     }
 
-    /// τ of a march, term by term, and its sum as it is formed.
+    /// Returns τ of a march with its terms.
     pub fn depth(&self, p: [f32; 3], light: &Light, step: f64, sums: Sums) -> Bounded {
         match sums.precision {
             Precision::F32 => self.depth_in_floats(p, light, step, sums),
@@ -83,8 +84,8 @@ impl March<'_> {
 
     fn depth_in_floats(&self, p: [f32; 3], light: &Light, step: f64, sums: Sums) -> Bounded {
         let way = light.arrival(double(p));
-        // A way that passes the box by less than the rounding would pass through its outermost
-        // cells, which are empty.
+        // A ray that misses the box by less than the rounding would only meet its outermost cells,
+        // which are empty.
         if transmit::crossing(self.spec, double(p), way.toward, way.distance).is_none() {
             return Bounded::exact(0.0);
         }
@@ -105,8 +106,8 @@ impl March<'_> {
             let start = s.times(Bounded::exact(f64::from(k)));
             let rest = length.minus(start);
             let ds = if s.value <= rest.value { s } else { rest };
-            // The lesser of two errs no more than they, and where it surely is the step no more
-            // than that.
+            // The minimum of two lengths errs no more than either, and if it surely is the step, no
+            // more than the step.
             let surely_s = s.value + s.error < rest.value - rest.error;
             let ds =
                 Bounded { error: if surely_s { s.error } else { s.error.max(rest.error) }, ..ds };
@@ -118,10 +119,9 @@ impl March<'_> {
             last_error = rho.value * (rest.error + s.error) + rho.error * s.value;
         }
         let tau = sum_of(&terms, sums);
-        // A length beside a multiple of the step: one step more or less, no longer than the error
-        // of the rest. A last step that the f64 side has and the other lacks is in `last_error`
-        // when it is that short; one that only the other has is as short, in no more density than
-        // there is anywhere.
+        // The length is near a multiple of the step: one step more or fewer, no longer than the
+        // error of the rest. A last step that only the f64 march has is in `last_error`. A last
+        // step that only the f32 march has is as short, and its density is at most the largest one.
         let steps = length.value / s.value;
         let short = length.error + s.error * (steps + 1.0);
         let densest = self.cells.iter().cloned().fold(0.0, f64::max);
@@ -130,8 +130,8 @@ impl March<'_> {
         Bounded { error: tau.error + if beside { last_error + more } else { 0.0 }, ..tau }
     }
 
-    /// The same in doubles: places err by the step, which is an f32 number, and by some hundred
-    /// roundings of doubles.
+    /// In f64: positions err by the step, which is an f32 number, and by some hundred roundings of
+    /// f64.
     fn depth_in_doubles(&self, p: [f32; 3], light: &Light, step: f64, sums: Sums) -> Bounded {
         const SLACK: f64 = 1e-13;
         let way = light.arrival(double(p));
@@ -141,8 +141,7 @@ impl March<'_> {
             return Bounded::exact(0.0);
         };
         let (length, s) = (leave - enter, step / self.spec.cells_along(way.toward));
-        // The step is an f32 number; where cells are no cubes so is 1/aspect, which it is divided
-        // by.
+        // The step is an f32 number; so is its divisor 1/aspect if cells are not cubes.
         let rounded =
             (f64::from((step * self.spec.cell) as f32) / (step * self.spec.cell) - 1.0).abs() * s
                 + if self.spec.aspect == 1.0 { 0.0 } else { bounded::U * s };
@@ -152,7 +151,7 @@ impl March<'_> {
         let mut last_error = 0.0;
         for k in 0..n {
             let start = f64::from(k) * s;
-            // The step's own error, or with the last and shorter one that of all the steps before.
+            // The step's own error; for the last, shorter step the error of all steps before it.
             let moved = f64::from(k + 1) * rounded + SLACK * scale;
             let ds = Bounded { value: s.min(length - start), error: moved.min(s) };
             let at = double(p) + (enter + (start + 0.5 * ds.value)) * way.toward;
@@ -173,7 +172,7 @@ impl March<'_> {
             });
             last_error = rho.value * ds.error + rho.error * s;
         }
-        // A step more or less, as in floats.
+        // A step more or fewer, as in f32.
         let steps = length / s;
         let short = (steps + 1.0) * rounded + SLACK * scale;
         let densest = self.cells.iter().cloned().fold(0.0, f64::max);
@@ -185,7 +184,7 @@ impl March<'_> {
         }
     }
 
-    /// A length from the grid's corner, in cells.
+    /// Returns a length from the grid's corner, in cells.
     fn in_cells(&self, x: Bounded, axis: usize) -> Bounded {
         let wide = x.times(Bounded::once(1.0 / self.spec.cell));
         if axis == 1 && self.spec.aspect != 1.0 {
@@ -195,9 +194,10 @@ impl March<'_> {
         }
     }
 
-    /// Trilinear density: what the position's error makes of it, by the steepest slope among the
-    /// cells around; and the rounding of three levels of (1 − f) a + f b, three operations each, of
-    /// numbers that are not negative. `u`: unit round-off, 0 where no f32 is rounded.
+    /// Returns the trilinear density. Its bound is the position's error times the steepest slope
+    /// among the cells around, and the rounding of three levels of (1 − f) a + f b, three
+    /// operations each, of non-negative numbers. `u`: unit round-off, 0 if nothing is rounded to
+    /// f32.
     fn density_at(&self, x: [Bounded; 3], u: f64) -> Bounded {
         let value =
             nimbus::reference::grid::sample(self.spec, self.cells, DVec3::from(x.map(|x| x.value)));
@@ -221,8 +221,8 @@ impl March<'_> {
         Bounded { value, error: moved + rounding }
     }
 
-    /// Greatest difference of neighbours along each axis among the 4³ cells around, and whether any
-    /// holds something.
+    /// Returns the largest difference of neighbours along each axis among the 4³ cells around, and
+    /// whether any cell is not empty.
     fn slopes(&self, base: IVec3) -> ([f64; 3], bool) {
         let n = self.spec.n_cells.as_ivec3();
         let cell = |at: IVec3| {

@@ -1,4 +1,4 @@
-//! Blobs of all kinds before one eye, and how near the truth users are promised a picture of them.
+//! Pictures of blobs of all kinds, and their documented accuracy.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -21,9 +21,9 @@ pub fn front() -> Picture {
     Picture::new(EYE, DVec3::new(0.3, -0.2, 0.0), 45.0, 0.1)
 }
 
-/// What users are promised: the root mean square over the picture, of full scale. Half floats round
-/// once to 2^-11 of a value at most; f32 errs by some units of 2^-24 a layer, and where rounding
-/// decides on an edge by the step there, in few pixels.
+/// Returns the documented RMSE over the picture, relative to full scale. Half floats round once, by
+/// 2^-11 of a value; f32 errs by some units of 2^-24 a layer, and in a few pixels by the
+/// discontinuity at a sprite's edge.
 pub fn assert_small(
     what: &str,
     format: FilmFormat,
@@ -34,7 +34,7 @@ pub fn assert_small(
     let sum: f64 = values.iter().zip(truths).map(|(a, b)| ((a - b) / scale).powi(2)).sum();
     let rms = (sum / values.len() as f64).sqrt();
     let most = match format {
-        // Half a step, evenly spread: 1/(255 sqrt 12).
+        // A uniformly distributed half step: 1/(255 sqrt 12).
         FilmFormat::Rgba8 => 1.2 / (255.0 * 12f64.sqrt()),
         FilmFormat::Rgba16f => 1e-3,
         FilmFormat::Rgba32f => 2e-6 * n_layers.max(1) as f64,
@@ -43,8 +43,8 @@ pub fn assert_small(
     assert!(rms <= most, "{what}: rms {rms:e}, more than {most:e}");
 }
 
-/// Blobs thin and opaque, some in one place, before and behind the eye, of sigma from 10^`least` to
-/// 1.
+/// Returns thin and opaque blobs, some coincident, in front of and behind the eye, of sigma from
+/// 10^`least` to 1.
 pub fn mixed(n: usize, seed: u64, tau_most: f64, least: f64) -> Picture {
     let mut random = Random(seed);
     let mut picture = front();
@@ -52,7 +52,7 @@ pub fn mixed(n: usize, seed: u64, tau_most: f64, least: f64) -> Picture {
     for k in 0..n {
         let mut within = |low: f64, high: f64| f64::from(random.within(low, high));
         let at = picture.at(within(-3.0, 3.0), within(-2.5, 2.5), within(-1.0, 9.0));
-        // Every fifth lies where the one before does.
+        // Every fifth blob coincides with the one before it.
         last = if k % 5 == 4 { last } else { at };
         let sigma = 10f64.powf(within(least, 0.0));
         picture = picture.blob(last, sigma, tau_most * within(0.0, 1.0).powi(3));
@@ -60,13 +60,13 @@ pub fn mixed(n: usize, seed: u64, tau_most: f64, least: f64) -> Picture {
     picture
 }
 
-/// Pictures of all that can be drawn: what it is, and the least that the greatest number of it is;
-/// 0: nothing shows.
+/// Returns pictures of every kind with their names and a lower bound of their largest value; 0: the
+/// picture is empty.
 pub fn cases() -> Vec<(String, Picture, f64)> {
     let mut all = Vec::new();
     let mut case =
         |what: &str, picture: Picture, least: f64| all.push((what.to_owned(), picture, least));
-    // Above 1/8 the opacity of `tiles` has another form.
+    // Above 1/8 the tile path evaluates opacity by another formula.
     for (seed, tau_most) in [(1, 0.125), (2, 3.0), (3, 30.0)] {
         case(&format!("tau up to {tau_most}"), mixed(150, seed, tau_most, -4.0), 0.1);
     }
@@ -108,7 +108,7 @@ pub fn cases() -> Vec<(String, Picture, f64)> {
     all
 }
 
-/// Facets of their own and shared ones; groups that are drawn in part.
+/// Own and shared facets; groups that are drawn in part.
 fn lit_and_weighted() -> [(&'static str, Picture); 3] {
     let mut random = Random(77);
     let picture = mixed(40, 9, 1.0, -2.0);

@@ -1,6 +1,6 @@
-//! What every GPU test starts from: a device with validation and synchronization validation on, and
-//! the promise that it has said nothing when the test ends. No device, or no validation layer, is a
-//! failure.
+//! The base of every GPU test: a device with validation and synchronization validation, and the
+//! assertion that there are no messages when the test ends. Without a device or a validation layer
+//! the test fails.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -27,7 +27,7 @@ impl Gpu {
         Gpu { commands, compiler, device, instance }
     }
 
-    /// A device buffer that holds `data`.
+    /// Uploads `data` to a device buffer.
     pub fn upload<T: Pod>(&mut self, data: &[T]) -> Buffer {
         let n = data.len() as u64;
         let mut staging = Buffer::new::<T>(&self.device, "test.staging", n, MemoryUsage::Upload)
@@ -41,13 +41,13 @@ impl Gpu {
         buffer
     }
 
-    /// A device buffer of `n` records of unknown content.
+    /// Allocates a device buffer of `n` records of undefined content.
     pub fn buffer<T: Pod>(&self, n: usize) -> Buffer {
         Buffer::new::<T>(&self.device, "test.buffer", n as u64, MemoryUsage::Device)
             .expect("buffer")
     }
 
-    /// The first `n` records of a device buffer.
+    /// Reads the first `n` records of a device buffer.
     pub fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Vec<T> {
         let readback =
             Buffer::new::<T>(&self.device, "test.readback", n as u64, MemoryUsage::Readback)
@@ -65,7 +65,7 @@ impl Gpu {
 }
 
 impl Drop for Gpu {
-    /// Fails the test on any validation message.
+    /// Closes the device and fails on any validation message.
     fn drop(&mut self) {
         if !std::thread::panicking() {
             let said = self.instance.messages().take();
@@ -74,8 +74,7 @@ impl Drop for Gpu {
     }
 }
 
-/// The greatest |value − truth| − bound over all elements, which must not be positive; `what` names
-/// the quantity.
+/// Asserts that no |value − truth| exceeds its bound; `what` names the quantity.
 pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
     assert_eq!(values.len(), truths.len(), "{what}: lengths");
     let check = |i: usize| {
@@ -96,7 +95,7 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
 }
 
 impl Gpu {
-    /// The test's own kernel `name`, which may include what nimbus's shaders include.
+    /// Compiles the test's own kernel `name`, which may include nimbus's shader files.
     pub fn test_kernel(
         &self,
         name: &str,
@@ -111,8 +110,8 @@ impl Gpu {
             .expect("the test's kernel")
     }
 
-    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant
-    /// that a test must notice.
+    /// Returns a compiler of nimbus's shaders with `from` replaced by `to` in `file`: a faulty
+    /// variant that a test must detect.
     pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{file} does not hold {from}");
@@ -120,8 +119,8 @@ impl Gpu {
     }
 }
 
-/// The greatest error/bound over all elements, or what is out of bound: [`assert_within`] for
-/// checks that must fail.
+/// Returns the greatest error/bound, or the first element beyond its bound. [`assert_within`] is
+/// for checks that must pass.
 pub fn check_within(
     what: &str,
     values: &[f64],
@@ -130,7 +129,7 @@ pub fn check_within(
 ) -> Result<f64, String> {
     assert!(values.len() == truths.len() && values.len() == bounds.len(), "{what}: lengths");
     let error = |i: usize| (values[i] - truths[i]).abs();
-    // Written so that NaN is bad.
+    // Written so that NaN counts as beyond the bound.
     let bad: Vec<usize> =
         (0..values.len()).filter(|i| !matches!(error(*i), e if e <= bounds[*i])).collect();
     if let Some(&i) = bad.first() {
@@ -146,16 +145,16 @@ pub fn check_within(
         .fold(0.0, f64::max))
 }
 
-/// Asserts that all elements are within their bounds, says how much of its bound the worst one
-/// used, and proves that one element just beyond its bound, wherever it lies, or one NaN would have
-/// been noticed.
+/// Asserts that all elements are within their bounds and prints the largest error/bound. Verifies
+/// that a single element slightly beyond its bound, wherever it is, or a single NaN would be
+/// detected.
 pub fn assert_within_and_say(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
     match check_within(what, values, truths, bounds) {
         Ok(ratio) => println!("{what}: {} elements, greatest error/bound {ratio:.3}", values.len()),
         Err(bad) => panic!("{bad}"),
     }
     for i in [0, values.len() / 2, values.len() - 1] {
-        // Half a bound beyond it; where the bound is 0, any difference.
+        // Half a bound beyond the bound; if the bound is 0, any difference.
         let beyond = truths[i] + 1.5 * bounds[i] + 1e-30 + 1e-15 * truths[i].abs();
         for wrong in [beyond, f64::NAN] {
             let mut corrupted = values.to_vec();

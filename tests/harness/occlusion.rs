@@ -1,5 +1,5 @@
-//! Whether rectangles hide a way as f32 decides it (shaders/include/occlude.glsl): a verdict that
-//! holds whatever the rounding, or none, where an edge or a plane is nearer than the rounding.
+//! Occlusion of a ray by rectangles as f32 decides it (shaders/include/occlude.glsl): a verdict
+//! that holds for every rounding, or none near edges and planes.
 
 use glam::DVec3;
 use nimbus::model::light::Light;
@@ -35,7 +35,7 @@ fn times(a: Point, by: Bounded) -> Point {
     a.map(|a| a.times(by))
 }
 
-/// a ≤ b, if that is sure.
+/// Returns whether a ≤ b, if that is certain.
 fn at_most(a: Bounded, b: Bounded) -> Option<bool> {
     ((a.value - b.value).abs() > a.error + b.error).then_some(a.value <= b.value)
 }
@@ -48,7 +48,7 @@ fn normal(s: &Surface) -> Point {
     s.normal().to_array().map(Bounded::once)
 }
 
-/// The signed distance from the plane, or exactly 0 within it; nothing where that is not sure.
+/// Returns the signed distance from the plane, or exactly 0 within it; None if that is uncertain.
 fn side(s: &Surface, p: Point) -> Option<Bounded> {
     let o = minus(p, exact(s.center));
     let e = dot(normal(s), o);
@@ -57,9 +57,9 @@ fn side(s: &Surface, p: Point) -> Option<Bounded> {
     Some(if at_most(absolute(e), threshold)? { Bounded::exact(0.0) } else { e })
 }
 
-/// Whether the signs differ; a direction along the plane has none.
+/// Returns whether the signs differ; None for a direction along the plane.
 fn are_apart(a: Bounded, b: Bounded) -> Option<bool> {
-    // What is 0 but for underflow is a sum of exact zeros.
+    // A sum of exact zeros is 0, except for underflow.
     const NOTHING: f64 = 1e-30;
     let sign = |v: Bounded| match v {
         v if v.value == 0.0 && v.error < NOTHING => Some(0.0),
@@ -106,7 +106,7 @@ fn hides(s: &Surface, p: Point, light: &Light) -> Option<bool> {
     }
 }
 
-/// Whether anything but surface `i_own` hides the light from `p`.
+/// Returns whether any surface except `i_own` hides the light from `p`.
 pub fn verdict(surfaces: &[Surface], i_own: u32, p: Point, light: &Light) -> Verdict {
     let others = surfaces.iter().zip(0u32..).filter(|(_, i)| *i != i_own);
     let all: Vec<Option<bool>> = others.map(|(s, _)| hides(s, p, light)).collect();

@@ -1,5 +1,5 @@
-//! A picture of sprites, over rectangles or not, its inputs in f32 for the GPU and in f64 for the
-//! reference, and the bound between the two.
+//! A picture of sprites, with or without rectangles: inputs in f32 for the GPU and in f64 for the
+//! reference, and the bound between both.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -24,11 +24,11 @@ use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};
 use crate::sheets::Paper;
 
-/// What a view depth may be off, as a share of the distance: a difference and an f32 axis a term,
-/// three products and two sums.
+/// Error of a view depth relative to the distance: a difference and an f32 axis per term, three
+/// products and two sums.
 pub const DEPTH: f64 = 16.0 * U;
 
-/// What one_minus_exp promises.
+/// Error of one_minus_exp.
 const ONE_MINUS_EXP: f64 = 1e-6;
 
 pub const FORMATS: [(TargetFormat, FilmFormat); 3] = [
@@ -37,23 +37,23 @@ pub const FORMATS: [(TargetFormat, FilmFormat); 3] = [
     (TargetFormat::Rgba32f, FilmFormat::Rgba32f),
 ];
 
-/// How `tiles` draws a picture.
+/// Parameters of the tile path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tiled {
     pub invocations: u32,
-    /// Without what subgroups can do.
+    /// Without subgroup operations.
     pub portable: bool,
     pub most_pairs: Option<u64>,
     pub most_tiles: Option<u32>,
     pub saturated: f64,
 }
 
-/// What draws a picture.
+/// A drawing path.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Way {
     Sprites,
     Tiles(Tiled),
-    /// So many; and what may be left out.
+    /// Number of chunks, and the saturation beyond which layers are left out.
     Chunks(u32, f64),
 }
 
@@ -63,18 +63,18 @@ pub struct Picture {
     pub view: View,
     pub placed: Vec<PlacedRecord>,
     pub particles: Vec<ParticleRecord>,
-    /// Far to near, where that is not the depths' own order.
+    /// Order from far to near, if it is not the order of depths.
     pub in_order: Option<Vec<u32>>,
-    /// Radiance of the particles' facets; without it they are drawn in their own colours.
+    /// Radiance of the particles' facets; without it particles have their own colours.
     pub lit: Option<Vec<LitRecord>>,
-    /// Facet of each particle, where they are not in the particles' order.
+    /// Facet of each particle, if not in the order of particles.
     pub i_facet: Option<Vec<u32>>,
-    /// Group of each particle and what is drawn of each group, where not all is.
+    /// Group of each particle and the drawn part of each group, if not all particles are drawn.
     pub drawn: Option<(Vec<u32>, Vec<DrawnRecord>)>,
     /// Rectangles under the sprites.
     pub scenery: Option<Scenery>,
-    /// Group of each particle, as in `drawn` where that is there; each group's texture; the pool,
-    /// as it is rounded.
+    /// Group of each particle, as in `drawn` if that is set; each group's texture; the pool, as it
+    /// is rounded.
     pub textured: Option<(Vec<u32>, Vec<TexturedRecord>, Arc<Pool>)>,
 }
 
@@ -112,7 +112,7 @@ impl Picture {
         }
     }
 
-    /// A blob whose τ through the centre is `tau`.
+    /// Adds a blob whose optical depth through the centre is `tau`.
     pub fn blob(mut self, position: DVec3, sigma: f64, tau: f64) -> Picture {
         let kappa = if sigma > 0.0 { (tau / (SQRT_TAU * sigma)) as f32 } else { 1.0 };
         let shade = 0.5 + 0.4 * (self.placed.len() as f32).sin();
@@ -131,7 +131,7 @@ impl Picture {
         self
     }
 
-    /// The last blob's σ along y is `aspect` times that along x and z.
+    /// Sets the aspect of the last blob: its σ along y relative to that along x and z.
     pub fn shaped(mut self, aspect: f64) -> Picture {
         if let Some(last) = self.particles.last_mut() {
             last.aspect = aspect as f32;
@@ -139,12 +139,12 @@ impl Picture {
         self
     }
 
-    /// Whether some blob is no ball.
+    /// Returns whether some blob is an ellipsoid.
     pub fn has_ellipsoids(&self) -> bool {
         self.particles.iter().any(|p| p.aspect != 1.0)
     }
 
-    /// The eye's offset `x` right, `y` up, `z` forward in the scene.
+    /// Returns the position at an offset of `x` right, `y` up and `z` forward of the eye.
     pub fn at(&self, x: f64, y: f64, z: f64) -> DVec3 {
         let p = &self.view.pose;
         p.position + x * p.right + y * p.up + z * p.forward
@@ -161,7 +161,7 @@ impl Picture {
         blobs.enumerate().map(|(i, b)| Blob { kappa: b.kappa * self.weight(i), ..b }).collect()
     }
 
-    /// Factor on particle `i`'s κ; 0 where it is not drawn.
+    /// Returns the factor on particle `i`'s κ; 0 if it is not drawn.
     fn weight(&self, i: usize) -> f64 {
         let Some((i_group, drawn)) = &self.drawn else { return 1.0 };
         let group = drawn[i_group[i] as usize];
@@ -176,7 +176,7 @@ impl Picture {
 
     pub fn radiance(&self) -> Vec<DVec3> {
         match &self.lit {
-            // Their f32 sum is rounded alike on both sides.
+            // The f32 sum is rounded equally on both sides.
             Some(lit) => {
                 let facets =
                     self.i_facet.clone().unwrap_or_else(|| (0..self.placed.len() as u32).collect());
@@ -197,7 +197,7 @@ impl Picture {
         order.into_iter().filter(|i| self.weight(*i as usize) > 0.0).collect()
     }
 
-    /// The reference's picture and its bound for `format`.
+    /// Returns the reference's picture and its bound for `format`.
     pub fn truth(&self, format: FilmFormat) -> (Vec<f64>, Vec<f64>) {
         let rounding = self.rounding(format);
         let (blobs, radiance, order) = (self.blobs(), self.radiance(), self.order());
@@ -219,7 +219,7 @@ impl Picture {
         (value.concat(), bound.concat())
     }
 
-    /// The texture's factor on particle `j`'s τ.
+    /// Returns the texture's factor on particle `j`'s τ.
     pub fn factor(&self, sheets: &[Option<SplatTexture>], j: usize, delta: DVec2) -> f64 {
         match (&sheets[j], &self.textured) {
             (Some(sheet), Some((_, _, pool))) => sheet.factor(pool, delta),
@@ -227,7 +227,7 @@ impl Picture {
         }
     }
 
-    /// What each pixel may show of the rectangles.
+    /// Returns the candidates of each pixel among the rectangles.
     pub fn behind(&self, format: FilmFormat) -> Vec<Candidates> {
         let scenery = self.scenery.as_ref().expect("rectangles");
         let rounding = Rounding::of(format, 0.0, 0.0);
@@ -238,8 +238,8 @@ impl Picture {
             .collect()
     }
 
-    /// The truth of a pixel, with the sprites' own error in the bound of its depth; without any
-    /// bound where it is not the only candidate.
+    /// Returns the reference of a pixel, with the sprites' error in the bound of its depth. Without
+    /// a bound if there are several candidates.
     pub fn widened(&self, candidates: &Candidates) -> OpaquePixel {
         let truth = candidates[0];
         if candidates.len() > 1 {
@@ -257,7 +257,7 @@ impl Picture {
         OpaquePixel { depth_bound: 1.01 * (truth.depth_bound + of_sprites * truth.depth), ..truth }
     }
 
-    /// What each particle shows of the pool.
+    /// Returns each particle's texture factors.
     pub fn sheets(&self) -> Vec<Option<SplatTexture>> {
         let pose = &self.view.pose;
         let sheet = |(i, p): (usize, &PlacedRecord)| {
@@ -277,20 +277,19 @@ impl Picture {
         self.placed.iter().enumerate().map(sheet).collect()
     }
 
-    /// How the shaders' α and edges may be off: the worst of all pixels in all blobs, each by a
-    /// running bound.
+    /// Returns the largest error of the shaders' α and edges over all pixels of all blobs, by
+    /// running bounds.
     pub fn rounding(&self, format: FilmFormat) -> Rounding {
         let (off_alpha, edge) = self.worst(false);
         let mut rounding = Rounding::of(format, off_alpha, edge);
-        // Beside the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C
+        // Besides the store into the target there are four f32 roundings: L1 + L2, α·L, (1 − α)·C
         // and their sum.
         rounding.unit += 2.0 * U;
         rounding.depth = DEPTH;
         rounding
     }
 
-    /// Relative error of an opacity, and of a sprite's edge, as `tiles` evaluates them or
-    /// `sprites`.
+    /// Returns the relative error of an opacity and of a sprite's edge, in tiles or as sprites.
     pub fn worst(&self, tiled: bool) -> (f64, f64) {
         let (mut off_alpha, mut edge) = (ONE_MINUS_EXP, 8.0 * U);
         for ((blob, placed), sheet) in self.blobs().iter().zip(&self.placed).zip(self.sheets()) {
@@ -325,7 +324,7 @@ impl Picture {
                     };
                     let tau = sprite.deep(self.ray(i, j));
                     let cut_error = self.cut_error(tau);
-                    // The cut: e <= cutoff²/2, three roundings; or the threshold's.
+                    // The cutoff: e ≤ cutoff²/2, three roundings; or the threshold's.
                     if at_cut > -0.2 * cut.max(1.0) {
                         let error = if tiled { std::f64::consts::LN_2 * e.error } else { e.error };
                         edge = edge.max(0.51 * (error + cut_error) / cut.max(1.0) + 4.0 * U);
@@ -350,7 +349,7 @@ impl Picture {
         (off_alpha, edge)
     }
 
-    /// What the shaders' ln(τ₀/threshold) is off, or their log2 of it.
+    /// Returns the error of the shaders' ln(τ₀/threshold), or of their log2.
     fn cut_error(&self, tau: Bounded) -> f64 {
         let inverse = Bounded::once(1.0 / self.view.threshold);
         if self.view.threshold > 0.0 { tau.times(inverse).log().error } else { 0.0 }
@@ -404,7 +403,7 @@ impl Picture {
     }
 }
 
-/// What the vertex shader hands on.
+/// Outputs of the vertex shader.
 pub struct Sprite {
     pub s: [Bounded; 2],
     pub z: Bounded,
@@ -412,7 +411,7 @@ pub struct Sprite {
     pub ellipsoid: Option<Ellipsoid>,
 }
 
-/// What the shaders' shape_of says.
+/// Values of the shaders' shape_of.
 #[derive(Debug, Clone, Copy)]
 pub struct Ellipsoid {
     y: [Bounded; 3],
@@ -426,13 +425,13 @@ impl Ellipsoid {
         Ellipsoid { y: y.map(Bounded::once), inverse: Bounded::exact(1.0).over(square) }
     }
 
-    /// Along y, and across it.
+    /// Components along y and across it.
     fn parts(&self, v: [Bounded; 3]) -> (Bounded, [Bounded; 3]) {
         let up = dot(self.y, v);
         (up, [0, 1, 2].map(|k| v[k].minus(up.times(self.y[k]))))
     }
 
-    /// conic_of.
+    /// Evaluates conic_of.
     fn conic(&self, s: [Bounded; 2], scale: Bounded) -> [Bounded; 3] {
         let (zero, one) = (Bounded::exact(0.0), Bounded::exact(1.0));
         let (up_x, x) = self.parts([zero, one, s[1].scaled(-1.0)]);
@@ -460,23 +459,23 @@ impl Sprite {
         [ray[0].minus(self.s[0]), ray[1].minus(self.s[1])]
     }
 
-    /// τ of a ray through the centre in this direction.
+    /// Returns τ of a ray through the centre in this direction.
     fn deep(&self, ray: [Bounded; 2]) -> Bounded {
         let Some(e) = &self.ellipsoid else { return self.tau };
         let [rest, along, white] = e.squares(ray);
         self.tau.times(rest.plus(along).over(white).root())
     }
 
-    /// b²/2σ² by the conic, times whatever `scale` is more than z²/2σ².
+    /// Returns b²/2σ² by the conic, times the part of `scale` above z²/2σ².
     fn by_conic(&self, e: &Ellipsoid, ray: [Bounded; 2], scale: Bounded) -> Bounded {
         let ([xx, xy, yy], [dx, dy]) = (e.conic(self.s, scale), self.difference(ray));
         let sum = xx.times(dx).times(dx).plus(xy.times(dx).times(dy)).plus(yy.times(dy).times(dy));
-        // A product more where it is divided by way of an inverse.
+        // One more product if the division is by an inverse.
         sum.times(Bounded::exact(1.0).over(e.squares(ray)[2]))
     }
 
-    /// The same in powers of two, as `tiles` evaluates it: a polynomial along the row over the
-    /// norm.
+    /// Evaluates the same in powers of two, as the tile path does: a polynomial along the row over
+    /// the norm.
     fn tiled_exponent(&self, ray: [Bounded; 2]) -> Bounded {
         let (one, s) = (Bounded::exact(1.0), &self.s);
         // log2 e is one more factor.
@@ -492,7 +491,7 @@ impl Sprite {
         a.times(dx).plus(b).times(dx).plus(c).times(one.over(norm))
     }
 
-    /// b²/2σ² as the fragment shader evaluates it.
+    /// Evaluates b²/2σ² as the fragment shader does.
     fn exponent(&self, ray: [Bounded; 2]) -> Bounded {
         if let Some(e) = &self.ellipsoid {
             return self.by_conic(e, ray, self.z);

@@ -1,4 +1,4 @@
-//! A picture as the device draws it, in each of the ways that there are.
+//! Rendering of a test picture by every drawing path of the device.
 
 use glam::DVec3;
 use half::f16;
@@ -18,17 +18,17 @@ use super::{Picture, Tiled, Way};
 use crate::bounded::U;
 use crate::harness::Gpu;
 
-/// What the passes are given.
+/// Input buffers of the passes.
 struct Uploaded {
     n_entries: u32,
     n_surface_facets: u32,
-    /// As `sprites` takes them; the fourth is the facets' light.
+    /// Buffers of the sprite path; the fourth holds the facets' light.
     of_sprites: [Buffer; 9],
     regions: Buffer,
     n_regions: u32,
 }
 
-/// What draws.
+/// The passes.
 enum Made {
     Sprites(Sprites),
     Tiles(Box<Tiling>, f64),
@@ -36,7 +36,8 @@ enum Made {
 }
 
 impl Picture {
-    /// Four numbers a pixel from the GPU. Without particles and with rectangles those alone.
+    /// Draws the picture and returns four numbers per pixel. Without particles only rectangles are
+    /// drawn.
     pub fn draw(
         &self,
         gpu: &mut Gpu,
@@ -46,7 +47,7 @@ impl Picture {
         self.draw_by(gpu, compiler, format, Way::Sprites)
     }
 
-    /// The same in the way that is given.
+    /// Draws the picture by the given path.
     pub fn draw_by(
         &self,
         gpu: &mut Gpu,
@@ -139,7 +140,7 @@ impl Picture {
                 Made::Tiles(Box::new(self.tiling(gpu, compiler, format, &tiled)), tiled.saturated)
             }
             Way::Chunks(n_chunks, saturated) => {
-                // Room for more than there are, as where some are culled.
+                // Capacity for more particles than there are, as after culling.
                 let (size, n) =
                     ([self.view.width, self.view.height], self.placed.len() as u32 + 37);
                 let variant = [lit, grouped, weighted, textured, threshold, ellipsoids];
@@ -153,9 +154,9 @@ impl Picture {
     fn upload(&self, gpu: &mut Gpu) -> Uploaded {
         let scenery = self.scenery.clone().unwrap_or_default();
         let entries: Vec<[u32; 2]> = self.order().into_iter().map(|i| [0, i]).collect();
-        // Facets of surfaces come before those of particles.
+        // Facets of surfaces precede those of particles.
         let facets = [&scenery.lit, self.lit.as_deref().unwrap_or(&[])].concat();
-        // What names a facet counts the surfaces' too.
+        // Facet indices count the surfaces' facets as well.
         let n_before = scenery.lit.len() as u32;
         let named: Vec<u32> = self.i_facet.iter().flatten().map(|i| i + n_before).collect();
         let (of_drawn, of_groups) = self.drawn.clone().unwrap_or_default();
@@ -235,7 +236,7 @@ impl Picture {
             weighted: self.drawn.is_some(),
             format,
             behind: self.scenery.is_some(),
-            // A rounding above what the blobs are made of in f32.
+            // One rounding above the blobs' own numbers in f32.
             tau_most: tau_most * (1.0 + 8.0 * U),
             portable: tiled.portable,
             most_pairs: tiled.most_pairs,

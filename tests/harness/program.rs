@@ -1,5 +1,4 @@
-//! The program as users run it: its pictures in a temporary folder, and how far two of them are
-//! apart.
+//! The program as users run it, with pictures in a temporary folder, and differences of pictures.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -22,7 +21,7 @@ pub fn path(dir: &TempDir, name: &str) -> String {
     dir.path().join(name).to_str().expect("UTF-8").to_owned()
 }
 
-/// RMSE and greatest difference of two pictures.
+/// Returns RMSE and greatest difference of two pictures.
 pub fn differ(dir: &TempDir, a: &str, b: &str) -> (f64, f64) {
     let output = run(&["compare", &path(dir, a), &path(dir, b), "--json"]);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,5 +1,5 @@
-//! Ground in pictures: its records, and what of the reference's picture of it a rasteriser and f32
-//! may decide otherwise.
+//! Ground in pictures: its records, and the candidates of a pixel that a rasteriser and f32 may
+//! choose from.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -15,7 +15,7 @@ use nimbus::reference::terrain::Triangle;
 
 use crate::bounded::{Bounded, Random, U, dot, exact3};
 
-/// Vulkan promises vertices 4 bits below the pixel; and what f32 does to a place of some hundred
+/// Vulkan guarantees 4 subpixel bits for vertices; f32 adds the error of a position of some hundred
 /// pixels.
 const SNAP: f64 = 1.0 / 16.0 + 1e-3;
 
@@ -24,11 +24,11 @@ pub struct Relief {
     pub regions: Vec<RegionRecord>,
     pub points: Vec<FacetRecord>,
     pub lit: Vec<LitRecord>,
-    /// Facets before those of the first ground.
+    /// Number of facets before those of the first ground.
     pub n_before: u32,
 }
 
-/// What a pixel may show: colour, near/z, and what both may be off.
+/// A candidate of a pixel: colour, near/z, and their errors.
 #[derive(Debug, Clone, Copy)]
 pub struct Candidate {
     pub values: [f64; 5],
@@ -42,14 +42,14 @@ fn double(v: [f32; 3]) -> DVec3 {
 }
 
 impl Relief {
-    /// As many facets of other things lie before it.
+    /// Number of facets of other objects before the ground's.
     pub fn after(n_before: u32) -> Relief {
         let other = LitRecord { first: [77.0; 3], ..LitRecord::default() };
         Relief { n_before, lit: vec![other; n_before as usize], ..Relief::default() }
     }
 
-    /// Ground of `n` points `step` apart, x east and −z north, of a height each; each with its own
-    /// radiance.
+    /// Returns ground of `n` points at distance `step`, x east and −z north, with a height and a
+    /// radiance each.
     pub fn ground(
         mut self,
         origin: DVec3,
@@ -103,7 +103,7 @@ impl Relief {
         self.regions.iter().flat_map(of_region).collect()
     }
 
-    /// What each pixel may show; `ray`: the shader's ray through pixel (i, j).
+    /// Returns the candidates of each pixel; `ray` is the shader's ray through pixel (i, j).
     pub fn candidates(
         &self,
         view: &View,
@@ -144,8 +144,8 @@ impl Relief {
     }
 }
 
-/// The greatest depth of what is seen around a pixel's centre, as far as vertices may be off;
-/// infinite where nothing is.
+/// Returns the greatest visible depth around a pixel's centre, within the error of vertices;
+/// infinite if nothing is visible.
 fn farthest<'a>(
     view: &View,
     halves: impl Iterator<Item = &'a Triangle> + Clone,
@@ -164,7 +164,7 @@ fn farthest<'a>(
     rays.map(nearest).fold(0.0, f64::max)
 }
 
-/// What of it lies before the eye, in pixels.
+/// Returns the part in front of the eye, in pixels.
 fn shape(half: &Triangle, view: &View) -> Vec<DVec2> {
     let pose = &view.pose;
     let at_eye = half.points().map(|p| {
@@ -185,20 +185,20 @@ fn shape(half: &Triangle, view: &View) -> Vec<DVec2> {
     cut.into_iter().map(|p| p.truncate() / p.z / view.pixel() + half).collect()
 }
 
-/// Whether a place is in a convex shape, or within [`SNAP`] of its sides.
+/// Returns whether a point is in a convex polygon, or within [`SNAP`] of its sides.
 fn is_within(shape: &[DVec2], place: DVec2) -> bool {
     let n = shape.len();
     let area: f64 = (0..n).map(|k| shape[k].perp_dot(shape[(k + 1) % n])).sum();
     let side = |k: usize| {
         let (a, b) = (shape[k], shape[(k + 1) % n]);
-        // Off by SNAP along both axes.
+        // Moved by SNAP along both axes.
         let reach = SNAP * (b - a).abs().element_sum();
         area.signum() * (b - a).perp_dot(place - a) >= -reach
     };
     n >= 3 && (0..n).all(side)
 }
 
-/// A half as its records have it.
+/// A half cell as in its records.
 struct Drawn {
     center: [f32; 3],
     points: [[f32; 3]; 3],
@@ -211,7 +211,7 @@ impl Drawn {
     }
 }
 
-/// What the vertex shader hands on.
+/// Outputs of the vertex shader.
 struct Seen {
     n: [Bounded; 3],
     q: Bounded,
@@ -236,7 +236,7 @@ impl Seen {
         let [p, b, d] = drawn.points;
         let from_eye = [0, 1, 2].map(|k| center[k].minus(eye[k]));
         let c = along_view([0, 1, 2].map(|k| Bounded::exact(f64::from(p[k])).plus(from_eye[k])));
-        // The subtraction is rounded correctly: the shader's length is this one.
+        // The subtraction is correctly rounded: the shader's length equals this one.
         let length = |to: [f32; 3]| {
             f64::from([0, 1, 2].map(|k| (to[k] - p[k]).abs()).into_iter().fold(0f32, f32::max))
         };
@@ -259,7 +259,7 @@ impl Seen {
         }
     }
 
-    /// What is shown of it where `hit` says, from one side or from both where f32 cannot tell.
+    /// Returns the visible colour at `hit`, from one side, or from both if f32 may choose either.
     fn candidates(
         &self,
         hit: &Hit,
@@ -268,7 +268,7 @@ impl Seen {
         drawn: &Drawn,
     ) -> Vec<Candidate> {
         let inverse = Bounded::exact(1.0).over(dot(ray, self.n));
-        // Cut to where it reaches, so never off by more than that.
+        // Clamped to its range, so the error is at most the range.
         let reach = |f: fn(f64, f64) -> f64, from: f64| {
             self.depths.iter().map(|d| d.value.max(self.near)).fold(from, f)
         };

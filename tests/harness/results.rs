@@ -1,4 +1,4 @@
-//! Results of a bench that never ran, for tests of what is done with results.
+//! Results of an imaginary bench.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use nimbus::timing::machine::{Clocks, Cpu, Device};
 use nimbus::timing::records::{Block, Case, Mode, Run};
 use serde_json::json;
 
-/// A loop of `frames` timed frames, of which nothing is said.
+/// Returns a loop of `frames` timed frames without measurements.
 pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {
     Mode {
         threading: threading.to_owned(),
@@ -35,7 +35,7 @@ pub fn mode(threading: &str, frames: usize, warm_up: usize) -> Mode {
     }
 }
 
-/// A run of one case, a block a loop.
+/// Returns a run of one case with a block per loop.
 pub fn run(modes: Vec<Mode>) -> Run {
     let block = |m: &Mode| Block { case: 0, threading: m.threading.clone(), skip: m.skip };
     Run {
@@ -81,7 +81,7 @@ pub fn run(modes: Vec<Mode>) -> Run {
     }
 }
 
-/// Frame `frame`, timed, of 1 ms.
+/// Returns the row of frame `frame`, timed, of 1 ms.
 pub fn row(threading: &str, frame: u32) -> FrameRow {
     FrameRow {
         phase: String::new(),

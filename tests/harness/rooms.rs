@@ -1,4 +1,4 @@
-//! Scenes of rectangles at random, as texts, and what the device makes of a scene.
+//! Random scenes of rectangles as texts, and the device's results for a scene.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -17,13 +17,13 @@ use nimbus::model::scene::Scene;
 use crate::bounded::Random;
 use crate::harness::Gpu;
 
-/// What every scene here begins with: the picture does not matter.
+/// The beginning of every scene; the picture is not used.
 pub const HEAD: &str = "title = 'room'\n[film]\nwidth = 8\nheight = 8\n";
 
-/// A light from everywhere.
+/// A light from all directions.
 pub const SKY: &str = "[[light]]\nkind = 'sky'\nirradiance = [0.3, 0.4, 0.6]\nconstant = 0.2\n";
 
-/// A rectangle and its material, as they are written.
+/// Returns the text of a rectangle and its material.
 #[derive(Debug, Clone, Copy)]
 pub struct Plate {
     pub center: DVec3,
@@ -39,7 +39,7 @@ fn list(v: DVec3) -> String {
     format!("{:?}", v.to_array())
 }
 
-/// Materials and surfaces.
+/// The text of materials and surfaces.
 pub fn plates_text(plates: &[Plate]) -> String {
     let mut text = String::new();
     for (i, p) in plates.iter().enumerate() {
@@ -55,7 +55,7 @@ pub fn plates_text(plates: &[Plate]) -> String {
     text
 }
 
-/// Between 0 and 1.
+/// Returns a number from 0 to 1.
 fn share(r: &mut Random) -> f64 {
     f64::from(r.within(0.0, 1.0))
 }
@@ -64,8 +64,8 @@ fn vector(r: &mut Random, low: f64, high: f64) -> DVec3 {
     DVec3::from([0; 3].map(|_| f64::from(r.within(low, high))))
 }
 
-/// Rectangles of half axes 0.3…0.8 about centres within ±`reach`: K_d 0.2…0.6, K_s up to `ks`, n_s
-/// from 1 to 100 evenly in its logarithm.
+/// Returns rectangles of half axes 0.3…0.8 with centres within ±`reach`: K_d 0.2…0.6, K_s up to
+/// `ks`, n_s from 1 to 100, uniform in its logarithm.
 pub fn random_plates(r: &mut Random, n: usize, reach: f64, ks: f64) -> Vec<Plate> {
     let mut one = || {
         let [a, b] = [0; 2].map(|_| DVec3::from(r.direction().map(f64::from)));
@@ -83,7 +83,7 @@ pub fn random_plates(r: &mut Random, n: usize, reach: f64, ks: f64) -> Vec<Plate
     (0..n).map(|_| one()).collect()
 }
 
-/// A sun from a random direction and a lamp at a random place.
+/// Returns a sun from a random direction and a lamp at a random position.
 pub fn sun_and_lamp(r: &mut Random, reach: f64) -> String {
     let (d, p) = (DVec3::from(r.direction().map(f64::from)), vector(r, -reach, reach));
     let sun = format!(
@@ -102,7 +102,7 @@ pub struct Frame {
     pub scene: Arc<Scene>,
     /// The lighting origin O.
     pub origin: DVec3,
-    /// Relative to O.
+    /// Facets relative to O.
     pub eye: DVec3,
     pub facets: Vec<FacetRecord>,
     pub lit: Vec<LitRecord>,
@@ -110,7 +110,7 @@ pub struct Frame {
     pub lights: Vec<LightRecord>,
 }
 
-/// The scene's first frame, by the compiler's shaders.
+/// Renders the scene's first frame with the compiler's shaders.
 pub fn frame_by(gpu: &Gpu, compiler: &Compiler, scene: Scene) -> Frame {
     let scene = Arc::new(scene);
     let mut renderer = Renderer::new(&gpu.device, compiler, &scene, true).expect("a renderer");

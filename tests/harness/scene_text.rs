@@ -1,4 +1,4 @@
-//! Scenes as texts: a folder that holds one, what it loads as, and the message that it earns.
+//! Scenes as texts: folders with a scene, loading, and error messages.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -13,7 +13,7 @@ use tempfile::TempDir;
 pub const BOXES: &str = "3\n1\n3, 1, 1, 1, 0, 0, 0, 1\n";
 pub const CLOUD: &str = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
 
-/// A folder with `scene.toml` and the box file `b.dat`.
+/// Writes a folder with `scene.toml` and the box file `b.dat`.
 pub fn folder(scene: &str) -> (TempDir, PathBuf) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("scene.toml");
@@ -31,7 +31,7 @@ pub fn good(scene: &str) -> LoadedScene {
     load_with(scene, &[], None).unwrap()
 }
 
-/// The message for `scene`, the folder cut off.
+/// Returns the message for `scene`, without the folder's path.
 pub fn message(scene: &str, overrides: &[&str]) -> String {
     let (dir, path) = folder(scene);
     let overrides: Vec<String> = overrides.iter().map(|s| s.to_string()).collect();
@@ -44,7 +44,7 @@ pub fn assert_message(scene: &str, expected: &str) {
     assert_eq!(message(scene, &[]), expected, "for\n{scene}");
 }
 
-/// A table in tests/data: `== line:column: message`, then the scene that earns it.
+/// Reads a table of tests/data: `== line:column: message`, then the scene with that error.
 pub fn assert_table(table: &str) {
     for case in table.strip_prefix("== ").unwrap().split("\n== ") {
         let (expected, scene) = case.split_once('\n').unwrap();
@@ -52,7 +52,7 @@ pub fn assert_table(table: &str) {
     }
 }
 
-/// JSON's strings, numbers and lists are TOML's; only `:` is `=` there.
+/// Strings, numbers and lists of JSON are valid TOML; `:` becomes `=`.
 pub fn to_toml(resolved: &Value) -> String {
     fn inline(v: &Value) -> String {
         match v {

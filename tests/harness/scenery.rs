@@ -1,5 +1,5 @@
-//! Rectangles under a picture's sprites: their records, the reference's picture of them, and what
-//! of it an f32 evaluation may decide otherwise.
+//! Rectangles under a picture's sprites: their records, the reference picture, and the candidates
+//! of a pixel that f32 may choose from.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -16,13 +16,12 @@ use crate::bounded::{Bounded, Random, U, dot, exact3};
 #[derive(Debug, Clone, Default)]
 pub struct Scenery {
     pub regions: Vec<RegionRecord>,
-    /// Of all facets, region after region.
+    /// Radiance of all facets, region after region.
     pub lit: Vec<LitRecord>,
 }
 
-/// What a pixel may show. Most pixels have one candidate. Others have several: a ray that passes
-/// within rounding of an edge or of the near plane, and two rectangles equally near within
-/// rounding.
+/// The candidates of a pixel. Most pixels have one. Several occur if a ray passes within rounding
+/// of an edge or of the near plane, or if two rectangles are equally near within rounding.
 pub type Candidates = Vec<OpaquePixel>;
 
 fn double(v: [f32; 3]) -> DVec3 {
@@ -30,7 +29,7 @@ fn double(v: [f32; 3]) -> DVec3 {
 }
 
 impl Scenery {
-    /// A rectangle whose facets each have their own radiance.
+    /// Returns a rectangle whose facets have radiances of their own.
     pub fn rectangle(mut self, center: DVec3, u: DVec3, v: DVec3, subdivide: [u32; 2]) -> Scenery {
         let brdf = Brdf { kd: DVec3::ONE, ks: DVec3::ZERO, ns: 1.0 };
         let surface = Surface { center, u, v, i_material: 0, subdivide };
@@ -52,7 +51,7 @@ impl Scenery {
         self
     }
 
-    /// The rectangles as their records have them.
+    /// Returns the rectangles as in their records.
     pub fn surfaces(&self) -> Vec<Surface> {
         let of = |r: &RegionRecord| Surface {
             center: double(r.center),
@@ -68,14 +67,15 @@ impl Scenery {
         self.lit.iter().map(|l| double(l.first) + double(l.second)).collect()
     }
 
-    /// Lines along which a pixel may have several candidates: edges, and where two rectangles
-    /// cross.
+    /// Lines along which a pixel may have several candidates: edges, and intersections of two
+    /// rectangles.
     pub fn n_lines(&self) -> usize {
         let n = self.regions.len();
         4 * n + n * n.saturating_sub(1) / 2
     }
 
-    /// Candidates of every pixel, the truth first; `ray`: the shader's ray through pixel (i, j).
+    /// Returns the candidates of every pixel, the reference first; `ray` is the shader's ray
+    /// through pixel (i, j).
     pub fn candidates(
         &self,
         view: &View,
@@ -108,7 +108,7 @@ impl Scenery {
     }
 }
 
-/// What the vertex shader hands on.
+/// Outputs of the vertex shader.
 struct Seen {
     n: [Bounded; 3],
     q: Bounded,
@@ -117,9 +117,9 @@ struct Seen {
     lengths: [f64; 2],
 }
 
-/// Where a ray meets a rectangle in f32, if it may.
+/// A possible intersection of a ray with a rectangle in f32.
 struct Found {
-    /// Whether it surely does.
+    /// Whether the intersection is certain.
     is_sure: bool,
     is_side_sure: bool,
     /// near/z.
@@ -153,7 +153,7 @@ impl Seen {
         let (size, q) = (d.scaled(sign), self.q.scaled(sign));
         let least = Bounded::once(near).times(size);
         let absolute = |x: Bounded| if x.value < 0.0 { x.scaled(-1.0) } else { x };
-        // What must not be negative for a hit, each a comparison of two computed numbers.
+        // Numbers that are not negative for a hit, each a comparison of two computed numbers.
         let reach = |x: Bounded, length: f64| (Bounded::exact(length).times(size), absolute(x));
         let pairs = [
             (q, Bounded::exact(0.0)),
@@ -164,7 +164,7 @@ impl Seen {
         let is_never = pairs.iter().any(|(a, b)| a.value + a.error < b.value - b.error);
         let is_sure = pairs.iter().all(|(a, b)| a.value - a.error > b.value + b.error)
             && size.value > size.error;
-        // Where d may have either sign, so may q: no hit only if that of s and t is far from both.
+        // If d may have either sign, so may q: only s and t far from both exclude a hit.
         let may_turn = size.value <= size.error;
         let is_far = pairs[2..].iter().any(|(a, b)| a.value + a.error < b.value - b.error);
         if is_far || (is_never && !may_turn) {
@@ -180,7 +180,7 @@ impl Seen {
 /// A rectangle that a pixel may show.
 struct Met {
     found: Found,
-    /// The geometry, to the bit: equal ones come out equally near, and the last one is seen.
+    /// The exact geometry: equal rectangles are equally near, and the last one is visible.
     geometry: [[f32; 3]; 3],
     sides: Vec<OpaquePixel>,
 }
@@ -199,7 +199,7 @@ impl Met {
             let color = radiance(surface, facets, &Hit { is_front, ..*hit });
             let off = if is_front { radiance_bound(surface, facets, &found) } else { DVec3::ZERO };
             let (color, off) = (color.extend(1.0).to_array(), off.extend(0.0).to_array());
-            // Correct rounding errs by u_t, faithful by 2 u_t, of the number written.
+            // Correct rounding errs by u_t, faithful rounding by 2 u_t, of the written number.
             let stored = |k: usize| {
                 2.0 * rounding.unit * (color[k].abs() + off[k]).max(rounding.least_normal)
             };
@@ -213,14 +213,14 @@ impl Met {
         Met { found, geometry: [region.center, region.u, region.v], sides }
     }
 
-    /// Whether it is surely seen before `other`, which comes earlier if `is_later`.
+    /// Returns whether it is certainly in front of `other`, which comes earlier if `is_later`.
     fn hides(&self, other: &Met, is_later: bool) -> bool {
         let (a, b) = (self.found.depth, other.found.depth);
         (is_later && self.geometry == other.geometry) || a.value - a.error > b.value + b.error
     }
 }
 
-/// What f32 may make of the interpolation.
+/// Returns the error of the interpolation in f32.
 fn radiance_bound(surface: &Surface, facets: &[DVec3], found: &Found) -> DVec3 {
     let [n_u, n_v] = surface.subdivide.map(|n| n as usize);
     let step = |from: usize, to: usize| (facets[from] - facets[to]).abs();
@@ -234,12 +234,12 @@ fn radiance_bound(surface: &Surface, facets: &[DVec3], found: &Found) -> DVec3 {
     // ((s/2 + 1/2) n − 1/2): one rounding of at most 1, two of at most n.
     let place = |x: Bounded, n: usize| (0.5 * x.error + 3.0 * U) * n as f64;
     let moved = place(found.s, n_u) * along_u + place(found.t, n_v) * along_v;
-    // L1 + L2 one rounding, each of two mixes three (1 − a, product, sum) of at most the greatest
-    // radiance.
+    // L1 + L2 is one rounding; each of two interpolations has three (1 − a, product, sum) of at
+    // most the greatest radiance.
     moved.min(most - least) + 8.0 * U * most
 }
 
-/// All that may be seen.
+/// All candidates.
 fn candidates(met: Vec<Met>) -> Candidates {
     let is_hidden = |i: usize| {
         (0..met.len()).any(|k| k != i && met[k].found.is_sure && met[k].hides(&met[i], k > i))

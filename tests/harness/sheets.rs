@@ -1,4 +1,4 @@
-//! How far the shaders' evaluation of a texture may lie from the law: a running bound.
+//! Running bounds of the shaders' evaluation of a texture.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -11,31 +11,31 @@ use nimbus::reference::texture::{Level, PERIOD_SIGMA, Pool, QUANTUM, SIDE, Splat
 use crate::bounded::{Bounded, U};
 use crate::picture::Picture;
 
-/// What unit_at promises.
+/// Error of unit_at.
 const UNIT_AT: f64 = 10.0 * U;
 
-/// What the vertex shader hands on of a texture.
+/// Outputs of the vertex shader for a texture.
 pub struct Paper<'a> {
     sheet: SplatTexture,
     pool: &'a Pool,
     level: &'a Level,
     fade: Bounded,
     turn: [Bounded; 2],
-    /// Most that n changes from a texel to the next; most that n_l, n_{l+1} are.
+    /// Largest change of n from a texel to the next; largest n_l and n_{l+1}.
     slope: f64,
     heights: [f64; 2],
-    /// What n may differ by rounding from one level to the next.
+    /// Difference of n between two levels that rounding may exchange.
     step: f64,
 }
 
 impl Paper<'_> {
-    /// `z_in_sigma`: view depth over σ; `pixel`: the slopes' difference from a pixel to the next.
+    /// `z_in_sigma`: view depth over σ; `pixel`: difference of slopes between neighbouring pixels.
     pub fn new(sheet: SplatTexture, pool: &Pool, z_in_sigma: Bounded, pixel: f64) -> Paper<'_> {
         let dense =
             Bounded::once(SIDE as f64 / PERIOD_SIGMA).times(z_in_sigma.times(Bounded::once(pixel)));
         let level = &pool.0[sheet.i_field][sheet.level];
-        // Where the level itself is uncertain the next one's numbers may stand in place of these;
-        // they are rounded anew.
+        // If the level is uncertain, the numbers of the next level may replace these; they are
+        // rounded again.
         let near_step = (dense.value.log2() - dense.value.log2().round()).abs()
             < 2.0 * dense.error / dense.value;
         let fade = Bounded {
@@ -45,7 +45,8 @@ impl Paper<'_> {
         let stretch = Bounded::once(side(sheet.level) as f64 / PERIOD_SIGMA).times(z_in_sigma);
         let unit = |value| Bounded { value, error: UNIT_AT };
         let turn = [sheet.angle.cos(), sheet.angle.sin()].map(|v| stretch.times(unit(v)));
-        // n is continuous and piecewise bilinear: no steeper anywhere than its neighbours differ.
+        // n is continuous and piecewise bilinear: nowhere steeper than the differences of
+        // neighbours.
         let slope = (1.0 - sheet.fade) * steepest(&level.own, level.side)
             + sheet.fade * steepest(&level.above, level.side);
         let heights =
@@ -62,7 +63,7 @@ impl Paper<'_> {
         }
     }
 
-    /// s n − s² ⟨n²⟩/2 as the fragment shader evaluates it.
+    /// Evaluates s n − s² ⟨n²⟩/2 as the fragment shader does.
     pub fn exponent(&self, d: [Bounded; 2]) -> Bounded {
         let (sheet, s) = (&self.sheet, self.sheet.strength);
         let [a, b] = self.turn;
@@ -74,7 +75,7 @@ impl Paper<'_> {
         let [own, above] = self.heights;
         let height = (1.0 - sheet.fade) * own + sheet.fade * above;
         // Two gains of three roundings, their products and sum; two interpolations of three
-        // roundings, on differences of at most twice the height; the mean's subtraction.
+        // roundings, on differences of at most twice the height; the subtraction of the mean.
         let half = sheet.half_square();
         let error = s * self.slope * (x.error + y.error)
             + s * (self.fade.error * (own + above) + self.step)
@@ -86,7 +87,7 @@ impl Paper<'_> {
     }
 }
 
-/// Greatest difference between neighbours.
+/// Returns the greatest difference between neighbours.
 fn steepest(n: &[f64], side: usize) -> f64 {
     let at = |i: usize, j: usize| n[i % side + side * (j % side)];
     let of = |k: usize| {
@@ -96,8 +97,8 @@ fn steepest(n: &[f64], side: usize) -> f64 {
     (0..n.len()).map(of).fold(0.0, f64::max)
 }
 
-/// Blobs of one texture each, from larger than the picture to smaller than a pixel, so that every
-/// level and what lies between two is met; a plain one among them.
+/// Returns blobs of one texture each, from larger than the picture to smaller than a pixel, so that
+/// every level and everything between levels occurs; one blob has no texture.
 pub fn textured(mut picture: Picture, pool: &Arc<Pool>) -> Picture {
     let sizes = [1.3, 0.6, 0.41, 0.3, 0.2, 0.13, 0.1, 0.07, 0.05, 0.035, 0.02, 0.012, 0.006];
     for (k, sigma) in sizes.into_iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Blobs in two clouds with all that their facets are made of, and the bounds on those.
+//! Blobs in two clouds with all inputs of their facets, and bounds on the facets.
 
 use glam::{DVec3, UVec3, Vec3};
 use nimbus::gpu::Compiler;
@@ -24,11 +24,11 @@ pub const SIGMA_MEANS: [f32; 4] = [0.15, 0.17, 0.25, 0.29];
 /// Two clouds of two groups each, numbers 3 and 1.
 pub const REGIONS: [u32; 4] = [3, 3, 1, 1];
 pub const N_PER_CLOUD: u32 = 1500;
-/// The clouds' facets come after those of the surfaces.
+/// The clouds' facets follow those of the surfaces.
 pub const N_SURFACE_FACETS: usize = 5;
-/// Relative error of the shader's 1 − e^−t; tests/functions.rs holds it to that.
+/// Relative error of the shader's 1 − e^−t, as checked by tests/functions.rs.
 const ONE_MINUS_EXP_ERROR: f64 = 1e-6;
-/// Relative error of length(v) of three squares: 3 + 2 roundings under the root halve, and the
+/// Relative error of length(v) of three squares: half of 3 + 2 roundings under the root; and the
 /// root, which Vulkan derives from inversesqrt (2 ulp = 4 u) and a division (5 u).
 pub const LENGTH_ERROR: f64 = 2.5 + 4.0 + DIVISION_ERROR;
 
@@ -44,7 +44,7 @@ pub struct Scene {
     pub i_group: Vec<u32>,
 }
 
-/// A colour that no two blobs share.
+/// A colour for every blob.
 pub fn color(b: &Blob) -> [f32; 3] {
     b.position.as_vec3().to_array()
 }
@@ -54,13 +54,14 @@ fn f32_of(v: DVec3) -> DVec3 {
 }
 
 impl Scene {
-    /// Two balls of blobs, one fine and one coarse, and a few blobs in the empty space around.
+    /// Returns two balls of blobs, one fine and one coarse, and a few blobs in the empty space
+    /// around.
     pub fn new() -> Scene {
         Scene::of_shape(1.0)
     }
 
-    /// The same of blobs from a third of `aspect` to `aspect` times as high as wide, if that is not
-    /// 1, in cells as flat.
+    /// Returns the same with aspects from a third of `aspect` to `aspect`, unless that is 1, in
+    /// cells of the same aspect.
     pub fn of_shape(aspect: f64) -> Scene {
         let n_cells = UVec3::new(60, (40.0 / aspect) as u32, 44);
         let spec = GridSpec { aspect, n_cells, cell: 0.25, low: DVec3::new(-7.0, -5.0, -5.5) };
@@ -109,7 +110,7 @@ impl Scene {
         (density, made)
     }
 
-    /// Facets of the particles, or of `runs` of them if there are any, and then each particle's
+    /// Computes facets of the particles, or of `runs` if there are any, and then each particle's
     /// facet.
     pub fn run_groups(
         &self,
@@ -161,7 +162,7 @@ impl Scene {
         });
         let n = if runs.is_empty() { n } else { runs.len() };
         let density = gpu.download::<f32>(&density, n_cells).into_iter().map(f64::from).collect();
-        // What lies before is the surfaces'.
+        // The surfaces' facets come first.
         let made = gpu.download(&made, N_SURFACE_FACETS + n).split_off(N_SURFACE_FACETS);
         (density, made, gpu.download(&i_facet, self.blobs.len()))
     }
@@ -182,16 +183,16 @@ impl Scene {
         facets(&self.spec, cells, &self.blobs, &means, &regions, &self.centers())
     }
 
-    /// Bound on the sampled density at `p`, where the sample's own position is rounded: its f32
-    /// evaluation meets a cell coordinate off by `e`, and ρ changes by at most the difference of
-    /// neighbouring cells times that; the three interpolations then round numbers below the
-    /// greatest cell around, twice each, and a difference three times.
+    /// Returns the bound on the density sampled at `p`. The f32 evaluation has a cell coordinate
+    /// off by `e`, and ρ changes by at most the difference of neighbouring cells times that. The
+    /// three interpolations then round numbers below the largest cell around, twice each, and a
+    /// difference three times.
     fn sample_error(&self, cells: &[f64], p: DVec3, sigma: f64, astray: f64) -> f64 {
         let n = self.spec.n_cells.as_ivec3();
         let edges = self.spec.edges();
         let g = (p - self.spec.low) / edges - 0.5;
-        // p + 2√5σd: the product's two and the sum's rounding; less low; times 1/h, itself rounded,
-        // and along y 1/a likewise; less ½.
+        // p + 2√5σd: the product's two roundings and the sum's; minus low; times 1/h, itself
+        // rounded, and along y 1/a likewise; minus ½.
         let reach = p.abs() + 3.0 * GRADIENT_RADIUS_SIGMA * sigma;
         let e =
             (U * (reach + (p - self.spec.low).abs() * 5.0) / edges + U * g.abs() + astray / edges)
@@ -203,7 +204,7 @@ impl Scene {
             for y in from.y..=to.y {
                 for x in from.x..=to.x {
                     let inside = x >= 0 && y >= 0 && z >= 0 && x < n.x && y < n.y && z < n.z;
-                    // Beyond the last centres there is nothing.
+                    // Beyond the outermost centres the density is 0.
                     let v = if inside { cells[(x + n.x * (y + n.y * z)) as usize] } else { 0.0 };
                     (low, high) = (low.min(v), high.max(v));
                 }
@@ -212,14 +213,14 @@ impl Scene {
         (high - low) * e.element_sum() + 15.0 * U * high
     }
 
-    /// Relative error of an area; an ellipsoid's mean width takes two logarithms and two
-    /// exponentials beside: with |log2 a| < 6 and 3 ulp a logarithm, 2⁻²¹ about 1, and 3 + 2|x| an
-    /// exponential, 320 roundings in all, that of its depth among them.
+    /// Relative error of an area. An ellipsoid's mean width takes two more logarithms and two
+    /// exponentials: with |log2 a| < 6 and 3 ulp a logarithm, 2⁻²¹ about 1, and 3 + 2|x| an
+    /// exponential, 320 roundings in total, including those of its depth.
     pub fn area_error(&self) -> f64 {
         AREA_ERROR + if self.has_ellipsoids() { 320.0 * U } else { 0.0 }
     }
 
-    /// Bounds on normal, position and area of blob `i`.
+    /// Returns bounds on normal, position and area of blob `i`.
     pub fn bound(&self, cells: &[f64], i: usize, facet: &Facet) -> (f64, DVec3, f64) {
         let blob = &self.blobs[i];
         let scale = blob.sigma.max(f64::from(SIGMA_MEANS[self.i_group[i] as usize]));
@@ -235,12 +236,12 @@ impl Scene {
         (normal, around.shell_bound(normal, facet), facet.area * self.area_error())
     }
 
-    /// Bound on the normal that `facet` has around a point.
+    /// Returns the bound on `facet`'s normal around a point.
     pub fn normal_bound(&self, cells: &[f64], at: &Around, facet: &Facet) -> f64 {
         let center = self.centers()[facet.region as usize];
         let axes = DVec3::new(1.0, at.aspect, 1.0);
         let (g, s) = gradient(&self.spec, cells, at.p, at.scale, at.aspect);
-        // Where a sample is taken off its place.
+        // The sample's offset.
         let scale_error = at.scale_error * at.aspect.max(1.0) + at.scale * at.aspect_error;
         let astray = at.p_error + GRADIENT_RADIUS_SIGMA * scale_error;
         // Σ w δρ over the directions, and 14 sums and a product each of the running total.
@@ -250,13 +251,14 @@ impl Scene {
         };
         let dg = directions().iter().map(sampled).sum::<f64>() + 18.0 * U * s;
         let to_center = (at.p - center).length();
-        // p − c rounds once; length and quotient follow. The very centre has no direction, in both.
+        // p − c rounds once; length and quotient follow. The exact centre has no direction on
+        // either side.
         let turned = if to_center > 0.0 { 2.0 * at.p_error / to_center } else { 0.0 };
         let d_away = U * (1.0 + LENGTH_ERROR + DIVISION_ERROR) * 2.0 + turned;
         let away = if to_center > 0.0 { (at.p - center) / to_center } else { DVec3::Y };
         let q = facet.conditioning;
         let normal = if s == 0.0 {
-            // Nothing around, and nothing that a sample off its place would meet.
+            // No density around, and none that a displaced sample would meet.
             if dg > 0.0 { 2.0 } else { d_away }
         } else {
             // |G| errs by √3 dg, S by dg.
@@ -272,8 +274,8 @@ impl Scene {
                 d_away
             } else {
                 // The unit gradient turns by 2√3 dg/|G|: the error grows with 1/(q S). Then the
-                // blend v = t·down + (1−t)·away, whose own length divides. Of an ellipsoid what is
-                // off is stretched with it; the quotient by a is rounded, and a may be off.
+                // blend v = t·down + (1−t)·away, whose own length divides. For an ellipsoid the
+                // error is stretched with it; the quotient by a is rounded, and a may be off.
                 let down = -(g / axes);
                 let wrong = dg + g.y.abs() * (at.aspect_error / at.aspect + DIVISION_ERROR * U);
                 let d_down =
@@ -284,12 +286,12 @@ impl Scene {
                 2.0 * dv / (blend.length() - dv).max(1e-9) + U * (LENGTH_ERROR + DIVISION_ERROR)
             }
         };
-        // No two unit vectors are farther apart than 2.
+        // Two unit vectors are at most 2 apart.
         normal.min(2.0 + 1e-6)
     }
 }
 
-/// What a facet is computed from, as far as the GPU has it.
+/// Inputs of a facet, as far as the GPU has them.
 pub struct Around {
     pub p: DVec3,
     pub p_error: f64,
@@ -301,9 +303,9 @@ pub struct Around {
 
 impl Around {
     pub fn shell_bound(&self, normal: f64, facet: &Facet) -> DVec3 {
-        // Of an ellipsoid Σn/√(nᵀΣn), Σ = diag(1, a², 1), is at most max(1, a) long and changes by
-        // no more than twice max(1, a²)/min(1, a) of what n does, and by 2 max(1, a) of what a
-        // does; eight roundings more, and the root's.
+        // For an ellipsoid Σn/√(nᵀΣn), Σ = diag(1, a², 1), is at most max(1, a) long. It changes by
+        // at most 2 max(1, a²)/min(1, a) times the error of n and by 2 max(1, a) times the error of
+        // a; eight more roundings, and the root's.
         let a = self.aspect;
         let (wide, steep) =
             (a.max(1.0), if a == 1.0 { 1.0 } else { 2.0 * a.max(1.0).powi(2) / a.min(1.0) });

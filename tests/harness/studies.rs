@@ -1,4 +1,4 @@
-//! Studies and ledgers that nobody made, for tests of what is done with them.
+//! Imaginary studies and ledgers.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -41,12 +41,12 @@ pub fn provenance() -> Provenance {
     }
 }
 
-/// ±`part` of the value.
+/// Returns a value with an interval of ±`part` of it.
 pub fn about(value: f64, part: f64) -> Figure {
     Figure { value, low: Some(value * (1.0 - part)), high: Some(value * (1.0 + part)) }
 }
 
-/// Of these GPU ms and RMSE.
+/// Returns a configuration with the given GPU time, ms, and RMSE.
 pub fn configuration(settings: &[(&str, &str)], ms: f64, rmse: f64, front: Front) -> Configuration {
     let setting = |(key, value): &(&str, &str)| Setting {
         key: (*key).to_owned(),
@@ -105,8 +105,7 @@ pub fn study(configurations: Vec<Configuration>) -> Study {
     }
 }
 
-/// Twenty-odd settings of three knobs: time falls and error grows with each, four on the front, two
-/// near it.
+/// Returns some twenty configurations of three knobs: four on the front, two near it.
 pub fn usual_study() -> Study {
     let mut all = vec![configuration(&[], 40.0, 2.0e-4, Front::Off)];
     let front = [(4.0, 0.06), (7.5, 0.02), (13.0, 0.0031), (26.0, 1.9e-4)];

@@ -1,4 +1,4 @@
-//! The ways to form a sum, and its error.
+//! The summations and their error.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 

@@ -1,4 +1,4 @@
-//! The truth of a picture that `tiles` or `chunks` draw, and the bound on it.
+//! The reference of a picture drawn in tiles or chunks, and its bound.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -11,7 +11,7 @@ use nimbus::reference::{Blob, chunks};
 use crate::picture::Picture;
 
 impl Picture {
-    /// The most blobs that are seen in one pixel.
+    /// Returns the largest number of visible blobs in one pixel.
     pub fn most_layers(&self) -> usize {
         let (view, blobs) = (&self.view, self.blobs());
         let pixels = (0..view.height).flat_map(|j| (0..view.width).map(move |i| (i, j)));
@@ -30,7 +30,7 @@ impl Picture {
         self.near_first(format, saturated, true)
     }
 
-    /// The same of `chunks`.
+    /// Returns the same for chunks.
     pub fn chunked_truth(&self, format: FilmFormat, saturated: f64) -> (Vec<f64>, Vec<f64>) {
         self.near_first(format, saturated, false)
     }

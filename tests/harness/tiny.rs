@@ -1,5 +1,5 @@
-//! A scene of four blobs in a folder of its own, which every command draws in a moment, and what a
-//! program says of it.
+//! A scene of four blobs in its own folder, which every command renders quickly, and runs of the
+//! program on it.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -41,7 +41,7 @@ file = "blobs.csv"
 const BLOBS: &str =
     "x,y,z,radius,kappa\n-2,0,0,1.2,0.8\n0.5,1,1,1,1.1\n1.5,-1,-1,1.4,0.6\n3,0.5,0,0.7,1.5\n";
 
-/// A study of it that takes a moment; knobs are to be named.
+/// Arguments of a short study of the scene; knobs are added.
 pub const SHORT: [&str; 7] =
     ["error", "scene.toml", "-q", "--rounds=2", "--frames=1", "--pixels=all", "--time=frame"];
 pub const OUT: [&str; 2] = ["--out", "out"];
@@ -54,7 +54,7 @@ pub fn names(json: &Value) -> Vec<&str> {
     study(json).iter().map(|c| c["name"].as_str().expect("a name")).collect()
 }
 
-/// The scene, with a cache of references of its own.
+/// Writes the scene, with its own cache of references.
 pub struct Tiny {
     dir: TempDir,
 }
@@ -64,13 +64,13 @@ impl Tiny {
         Tiny::with("")
     }
 
-    /// With `more` at the scene's end.
+    /// Writes the scene with `more` at its end.
     pub fn with(more: &str) -> Tiny {
         let dir = tempfile::tempdir().expect("a folder");
         let tiny = Tiny { dir };
         fs::write(tiny.path("scene.toml"), format!("{SCENE}{more}")).expect("the scene");
         fs::write(tiny.path("blobs.csv"), BLOBS).expect("the blobs");
-        // Shaders are not what is kept apart: compiled anew they would take most of the time.
+        // The shader cache is shared: compiling shaders again would take most of the time.
         let spirv = Compiler::default_cache().expect("a place for caches");
         fs::create_dir_all(&spirv).expect("the shaders' cache");
         fs::create_dir(tiny.cache()).expect("the cache");
@@ -94,7 +94,7 @@ impl Tiny {
         self.path("cache")
     }
 
-    /// The references that are kept.
+    /// The cached references.
     pub fn kept(&self) -> Vec<PathBuf> {
         let folder = self.cache().join("references");
         folder
@@ -102,7 +102,7 @@ impl Tiny {
             .map_or(Vec::new(), |files| files.map(|file| file.expect("a file").path()).collect())
     }
 
-    /// The program in the scene's folder.
+    /// Runs the program in the scene's folder.
     fn command(&self, args: &[&str]) -> std::process::Command {
         let mut command = nimbus(args);
         command.current_dir(self.dir.path()).env("NIMBUS_CACHE_DIR", self.cache());
@@ -117,7 +117,7 @@ impl Tiny {
         self.command(args).spawn().expect("the program begins")
     }
 
-    /// Of a run that must succeed what it prints.
+    /// Returns the output of a run that must succeed.
     pub fn good(&self, args: &[&str]) -> String {
         let output = self.run(args);
         let stderr = String::from_utf8_lossy(&output.stderr);
@@ -125,14 +125,14 @@ impl Tiny {
         String::from_utf8(output.stdout).expect("UTF-8")
     }
 
-    /// Of a run that must be refused its one message.
+    /// Returns the only message of a run that must be refused.
     pub fn refused(&self, args: &[&str]) -> String {
         let output = self.run(args);
         let stderr = String::from_utf8(output.stderr).expect("UTF-8");
         assert_eq!((output.status.code(), output.stdout.len()), (Some(2), 0), "{args:?}: {stderr}");
         let message =
             stderr.strip_prefix("error: ").unwrap_or_else(|| panic!("{args:?}: {stderr}"));
-        // What clap refuses has a hint below it.
+        // clap adds a hint below its message.
         let message =
             message.trim_end().trim_end_matches("For more information, try '--help'.").trim_end();
         assert!(!message.contains('\n'), "{args:?}: {stderr}");
@@ -140,7 +140,7 @@ impl Tiny {
     }
 }
 
-/// What `json` has that docs/`schema` does not allow.
+/// Returns the violations of docs/`schema` in `json`.
 pub fn assert_valid(json: &Value, schema: &str) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(schema);
     let schema: Value =
@@ -153,12 +153,12 @@ pub fn assert_valid(json: &Value, schema: &str) {
     assert!(complaints.is_empty(), "{complaints:#?}");
 }
 
-/// Width and height of a picture.
+/// Returns width and height of a picture.
 pub fn size(path: &Path) -> (u32, u32) {
     image::image_dimensions(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Rows of a CSV file by the names of its columns.
+/// Returns the rows of a CSV file by the names of its columns.
 pub struct Table {
     header: csv::StringRecord,
     pub rows: Vec<csv::StringRecord>,
@@ -181,7 +181,7 @@ impl Table {
         &row[i]
     }
 
-    /// None where nothing stands.
+    /// None for an empty field.
     pub fn number(&self, row: &csv::StringRecord, column: &str) -> Option<f64> {
         let text = self.text(row, column);
         (!text.is_empty()).then(|| text.parse().unwrap_or_else(|_| panic!("{column}: {text}")))

@@ -1,5 +1,5 @@
-//! Ways of light to facets, past rectangles and through a density grid, on the device and in f64,
-//! and the running bound of what the device makes of them.
+//! Rays of light to facets, past rectangles and through a density grid, on the device and in f64,
+//! with running bounds of the device's results.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -22,7 +22,7 @@ use crate::march::March;
 use crate::occlusion::{Verdict, verdict};
 use crate::sums::PLAIN;
 
-/// All inputs are f32 numbers, the same on both sides.
+/// All inputs are f32 numbers, equal on both sides.
 pub struct Case {
     pub spec: GridSpec,
     pub density: Vec<f32>,
@@ -31,20 +31,20 @@ pub struct Case {
     pub lights: Vec<Light>,
 }
 
-/// The region of the clouds' facets, whatever the number of surfaces.
+/// The region of the clouds' facets, independent of the number of surfaces.
 const CLOUD: u32 = 100;
 
 pub fn in_cloud(position: [f32; 3]) -> FacetRecord {
     FacetRecord { position, i_region: CLOUD, ..FacetRecord::default() }
 }
 
-/// Blobs in a slab of cells that are no power of two, suns from all sides and the sky. Facets
-/// inside the grid.
+/// Returns blobs in a slab of cells that are no power of two, suns from all sides and the sky. The
+/// facets are inside the grid.
 pub fn case() -> Case {
     case_of_cells(1.0)
 }
 
-/// The same of blobs, and cells, so many times as high as wide.
+/// Returns the same with the given aspect of blobs and cells.
 pub fn case_of_cells(aspect: f64) -> Case {
     let mut r = Random(21);
     let blobs: Vec<Blob> = (0..25)
@@ -83,8 +83,8 @@ pub fn sun(direction: DVec3) -> Light {
     Light::Directional { direction, irradiance: DVec3::ONE }
 }
 
-/// A corner of three walls around the cloud, tilted plates inside and outside of it; facets on all
-/// of them, in the cloud and far out; lamps and spots among them.
+/// Returns a corner of three walls around the cloud, tilted rectangles inside and outside of it,
+/// facets on all of them, in the cloud and far away, and lamps and spots among them.
 pub fn room() -> Case {
     let mut r = Random(22);
     let mut case = case();
@@ -98,7 +98,7 @@ pub fn room() -> Case {
     for i in 0..6 {
         let (u, other) = (double(r.direction()), double(r.direction()));
         let v = u.cross(other).normalize();
-        // The last one small and far out: its facets' rounded centres do not lie in its plane.
+        // The last one is small and far away: its facets' rounded centres are not in its plane.
         let (scale, reach) =
             if i < 5 { (f64::from(r.within(0.5, 1.5)), 4.0) } else { (0.05, 60.0) };
         let center = double([0; 3].map(|_| r.within(-reach, reach)));
@@ -124,7 +124,7 @@ pub fn room() -> Case {
 }
 
 impl Case {
-    /// Transmittances, and what clouds alone let through.
+    /// Transmittances, in total and of clouds alone.
     pub fn run(
         &self,
         gpu: &mut Gpu,
@@ -203,8 +203,8 @@ impl Case {
         [all.transmittance(&receivers, &self.lights), all.through(&receivers, &self.lights)]
     }
 
-    /// Bounds of both, and how many decisions rounding may turn: there the bound is what the
-    /// decision is worth.
+    /// Returns the bounds of both, and the number of decisions that rounding may change; for these
+    /// the bound is the effect of the decision.
     pub fn bounds(&self, step: f64, forward: f64) -> ([Vec<f64>; 2], usize) {
         self.bounds_as(step, forward, PLAIN)
     }
@@ -222,7 +222,7 @@ impl Case {
             }
             let tau = march.depth(f.position, l, step, sums);
             let depth = tau.times(Bounded::once(1.0 - forward));
-            // Transmittance through nothing is exact by the shader's own test.
+            // The shader's own test makes transmittance through nothing exact.
             let through = if depth.value + depth.error > 0.0 {
                 depth.scaled(-1.0).exp()
             } else {

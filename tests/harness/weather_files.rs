@@ -1,5 +1,5 @@
 //! Weather files made by hand: NetCDF classic in its three versions ("The NetCDF Classic Format
-//! Specification"), and within it a small WRF file that a test changes.
+//! Specification"), and a small WRF file that tests modify.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -12,15 +12,15 @@ pub enum Attr {
 }
 
 pub enum Data {
-    /// Of every step.
+    /// The same values at every step.
     Floats(Vec<f32>),
-    /// Of every step its own.
+    /// Own values at every step.
     Rows(Vec<String>),
 }
 
 pub struct Var {
     pub name: String,
-    /// Numbers of dimensions; number 0 is Time, the record dimension.
+    /// Indices of dimensions; index 0 is Time, the record dimension.
     pub dims: Vec<usize>,
     pub attrs: Vec<(String, Attr)>,
     pub data: Data,
@@ -40,8 +40,8 @@ pub const NY: usize = 3;
 pub const NZ: usize = 5;
 
 impl Made {
-    /// A whole WRF file of 4 x 3 columns and 5 levels of 500 m, with a cloud on the second and
-    /// third level of three columns.
+    /// Returns a complete WRF file of 4 × 3 columns and 5 levels of 500 m, with a cloud on the
+    /// second and third level of three columns.
     pub fn wrf(version: u8, n_steps: u32) -> Self {
         Made::wrf_of(version, n_steps, [NX, NY, NZ])
     }
@@ -136,9 +136,9 @@ impl Made {
         bytes
     }
 
-    /// Header; variables without steps; then step by step the others.
+    /// Header; variables without steps; then the others, step by step.
     pub fn write(&self, to: &mut impl Write) -> io::Result<()> {
-        // The header's length does not depend on the offsets in it.
+        // The header's length does not depend on its offsets.
         let mut offset = self.header(&vec![0; self.vars.len()]).len() as u64;
         let mut begins = vec![0; self.vars.len()];
         for with_steps in [false, true] {

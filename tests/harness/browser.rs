@@ -198,7 +198,7 @@ impl Drop for Browser {
     fn drop(&mut self) {
         self.session.clear();
         let _ = self.to.write_all(b"{\"id\":0,\"method\":\"Browser.close\"}\0");
-        // Asks the browser to exit, and kills its process group otherwise.
+        // The browser ends its own processes; if it does not exit, it is killed.
         for _ in 0..100 {
             if matches!(self.child.try_wait(), Ok(Some(_))) {
                 return;

@@ -23,8 +23,8 @@ impl Display {
     /// Starts a display on a free number.
     pub fn open() -> Display {
         let mut server = Command::new("Xvfb")
-            // A server without clients resets itself, and a client that connects at that moment
-            // fails. xdotool connects for every command, so another client stays connected.
+            // -noreset: otherwise the server resets when its last client leaves, and a client that
+            // connects at that moment fails. Every call of xdotool is a client.
             .args([
                 "-displayfd",
                 "1",

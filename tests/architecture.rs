@@ -1,13 +1,16 @@
 //! The rules of ARCHITECTURE.md that a machine can check: imports between rooms, one name per pass,
 //! meaningful names, file lengths, no `.unwrap()`. The checker is tested on faulty trees first.
 
+#[path = "architecture/faulty_trees.rs"]
+mod faulty_trees;
 #[path = "architecture/source.rs"]
 mod source;
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use source::{Source, Token};
+use source::{Import, Source, Token};
 
 /// The rooms that every room may import, besides itself and `error`.
 const MAY_IMPORT: [(&str, &[&str]); 18] = [
@@ -86,6 +89,8 @@ const EMPTY_WORDS: [&str; 9] =
 const MAX_LINES: usize = 450;
 /// The only crates that `model` may use.
 const MODEL_CRATES: [&str; 3] = ["glam", "libm", "nalgebra"];
+/// Rooms whose files still import each other in circles.
+const ROOMS_WITH_CIRCLES: [&str; 0] = [];
 const SHADER_KINDS: [&str; 3] = ["comp", "vert", "frag"];
 
 #[test]
@@ -96,6 +101,7 @@ fn sources_follow_the_architecture() {
 
 fn check(root: &Path) -> Vec<String> {
     let mut complaints = Vec::new();
+    let mut sources = Vec::new();
     let crates = dependencies(&fs::read_to_string(root.join("Cargo.toml")).unwrap());
     for path in files_under(&root.join("src")) {
         check_name_and_length(root, &path, &mut complaints);
@@ -105,8 +111,10 @@ fn check(root: &Path) -> Vec<String> {
             check_imports(&source, &mut complaints);
             check_crates(&source, &crates, &mut complaints);
             check_words_and_unwrap(&source, &mut complaints);
+            sources.push(source);
         }
     }
+    check_circles(&sources, &mut complaints);
     for path in files_under(&root.join("shaders")) {
         check_name_and_length(root, &path, &mut complaints);
     }
@@ -138,6 +146,45 @@ fn check_imports(source: &Source, complaints: &mut Vec<String>) {
                     "{at}: the pass {own} imports {other}, and no pass imports a pass"
                 ));
             }
+        }
+    }
+}
+
+/// Checks that the files of a room do not import each other in a circle. Tests and re-exports do
+/// not count.
+fn check_circles(sources: &[Source], complaints: &mut Vec<String>) {
+    let file = |path: &[String]| {
+        (1..=path.len())
+            .rev()
+            .find_map(|n| sources.iter().position(|source| source.module == path[..n]))
+    };
+    let edges: Vec<BTreeSet<usize>> = sources
+        .iter()
+        .map(|source| {
+            let counts = |i: &Import| {
+                !i.in_test && !i.is_reexport && i.path.first().map(String::as_str) == source.room()
+            };
+            source.imports().into_iter().filter(counts).filter_map(|i| file(&i.path)).collect()
+        })
+        .collect();
+    let reached = |from: usize| {
+        let (mut found, mut open) = (BTreeSet::new(), vec![from]);
+        while let Some(i) = open.pop() {
+            open.extend(edges[i].iter().filter(|j| found.insert(**j)));
+        }
+        found
+    };
+    let all: Vec<BTreeSet<usize>> = (0..sources.len()).map(reached).collect();
+    let mut circles = BTreeSet::new();
+    for (i, source) in sources.iter().enumerate() {
+        let circle: Vec<&str> = all[i]
+            .iter()
+            .filter(|j| all[**j].contains(&i))
+            .map(|j| sources[*j].path.as_str())
+            .collect();
+        let is_known = source.room().is_some_and(|room| ROOMS_WITH_CIRCLES.contains(&room));
+        if circle.len() > 1 && !is_known && circles.insert(circle.clone()) {
+            complaints.push(format!("src/: a circle of imports: {}", circle.join(", ")));
         }
     }
 }
@@ -235,121 +282,4 @@ fn files_under(folder: &Path) -> Vec<PathBuf> {
 
 fn file_name(path: &Path) -> String {
     path.file_name().unwrap().to_string_lossy().into_owned()
-}
-
-/// Checks a tree of files in a temporary folder.
-fn complaints_of(files: &[(&str, &str)]) -> Vec<String> {
-    let folder = tempfile::tempdir().unwrap();
-    let cargo_toml =
-        [("Cargo.toml", "[dependencies]\nash = \"1\"\nglam = \"1\"\nserde_json = \"1\"\n")];
-    for (path, text) in cargo_toml.iter().chain(files) {
-        let path = folder.path().join(path);
-        fs::create_dir_all(path.parent().unwrap()).unwrap();
-        fs::write(path, text).unwrap();
-    }
-    check(folder.path())
-}
-
-#[test]
-fn correct_tree_has_no_complaints() {
-    let complaints = complaints_of(&[
-        ("src/lib.rs", "pub mod model; pub mod gpu;"),
-        ("src/main.rs", "use nimbus::{cli, error::Error}; fn main() {}"),
-        (
-            "src/model/box.rs",
-            "use super::life; use glam::DVec3; // use crate::gpu;\nconst A: &str = \"crate::gpu\";",
-        ),
-        ("src/model/life.rs", "fn f<'a>(x: &'a str) -> char { let _ = r#\"crate::\"gpu\"#; '\"' }"),
-        (
-            "src/gpu/device.rs",
-            "use ash::vk; use crate::error::Result; /* crate::model /* nested */ crate::io */",
-        ),
-        (
-            "src/passes/sort.rs",
-            "use crate::{gpu::{self, kernel::Kernel}, layout::key};\n#[cfg(test)]\nmod tests { use \
-             super::*; use crate::reference::sort; fn f() { g().unwrap(); } }",
-        ),
-        ("src/passes/sprites.rs", "pub use ash::vk;"),
-        ("src/reference/sort.rs", "use crate::model::{boxes, camera as eye};"),
-        ("src/reference/sprites/mod.rs", ""),
-        ("src/cli/bench.rs", "fn f() { let e = crate::timing::records::cpu(); e.unwrap_or(1); }"),
-        ("tests/pass_sort.rs", ""),
-        ("tests/pass_sprites.rs", ""),
-        ("shaders/sort_scatter.comp", ""),
-        ("shaders/sprites.vert", ""),
-    ]);
-    assert_eq!(complaints, [""; 0]);
-}
-
-/// A faulty file each, in a tree without other faults, and a part of the only complaint.
-const BREACHES: [(&str, &str, &str); 22] = [
-    ("src/model/a.rs", "use crate::io;", "a.rs:1: model may not import io"),
-    (
-        "src/io/a.rs",
-        "use crate::{\n    model,\n    gpu::device,\n};",
-        "a.rs:3: io may not import gpu",
-    ),
-    ("src/io/a.rs", "use crate::{error::{Error, Result}, measure};", "io may not import measure"),
-    ("src/gpu/a.rs", "fn f() -> crate::model::Scene {}", "gpu may not import model"),
-    ("src/gpu/a/b.rs", "use super::super::super::model::film;", "gpu may not import model"),
-    (
-        "src/gpu/a.rs",
-        "#[cfg(test)]\nmod tests { use super::super::super::model; }",
-        "a.rs:2: gpu may not import model",
-    ),
-    ("src/measure/a.rs", "use crate :: frame;", "measure may not import frame"),
-    ("src/frame/a.rs", "use crate::reference::sort;", "frame may not import reference"),
-    ("src/passes/sort.rs", "use crate::reference::sort;", "passes may not import reference"),
-    ("src/passes/sort.rs", "use crate::passes::grid::Grid;", "no pass imports a pass"),
-    ("src/passes/sort.rs", "use super::{grid::Grid};", "no pass imports a pass"),
-    ("src/error.rs", "use crate::model;", "error may not import model"),
-    ("src/model/a.rs", "use crate::*;", "model may not import *"),
-    ("src/main.rs", "use nimbus::gpu;", "main may not import gpu"),
-    ("src/odds/a.rs", "", "\"odds\" is no room"),
-    ("src/model/a.rs", "fn f() { serde_json::json!(1); }", "not on serde_json"),
-    ("src/frame/a.rs", "use ash::vk;", "only gpu speaks ash"),
-    ("src/model/a.rs", "fn f() { g().\n  unwrap(); }", "a.rs:1: .unwrap() outside tests"),
-    ("src/model/a.rs", "mod string_utils {}", "string_utils says nothing"),
-    ("src/model/box_helper.rs", "", "\"helper\" in a name"),
-    ("shaders/include/common.glsl", "", "\"common\" in a name"),
-    ("src/reference/long.rs", LONG, "lines, more than 450"),
-];
-
-/// A text of 451 lines.
-const LONG: &str = {
-    const LINES: [u8; 451] = [b'\n'; 451];
-    match std::str::from_utf8(&LINES) {
-        Ok(text) => text,
-        Err(_) => "",
-    }
-};
-
-#[test]
-fn every_violation_is_reported() {
-    for (path, text, complaint) in BREACHES {
-        let mut files = vec![(path, text)];
-        if path == "src/passes/sort.rs" {
-            files.extend([
-                ("src/reference/sort.rs", ""),
-                ("tests/pass_sort.rs", ""),
-                ("shaders/sort.comp", ""),
-            ]);
-        }
-        let complaints = complaints_of(&files);
-        assert!(
-            complaints.len() == 1 && complaints[0].contains(complaint),
-            "{path}: {text}\n{complaints:?}"
-        );
-    }
-}
-
-#[test]
-fn incomplete_pass_is_reported() {
-    let complaints = complaints_of(&[("src/passes/mod.rs", ""), ("src/passes/grid.rs", "")]);
-    assert_eq!(complaints.len(), 3, "{complaints:?}");
-    for (complaint, what) in
-        complaints.iter().zip(["src/reference/grid.rs", "tests/pass_grid.rs", "shaders/grid"])
-    {
-        assert!(complaint.contains(what), "{complaint}");
-    }
 }

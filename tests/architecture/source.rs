@@ -15,7 +15,8 @@ pub struct Token {
 pub struct Source {
     /// Path below src/.
     pub path: String,
-    module: Vec<String>,
+    /// Path of the module: src/gpu/kernel.rs and src/gpu/kernel/mod.rs are ["gpu", "kernel"].
+    pub module: Vec<String>,
     pub tokens: Vec<Token>,
 }
 
@@ -24,6 +25,8 @@ pub struct Import {
     pub path: Vec<String>,
     pub line: usize,
     pub in_test: bool,
+    /// Whether the path belongs to a `pub use`.
+    pub is_reexport: bool,
 }
 
 impl Source {
@@ -55,6 +58,7 @@ impl Source {
 
     pub fn imports(&self) -> Vec<Import> {
         let mut imports = Vec::new();
+        let children: Vec<&str> = self.declared_modules().collect();
         // Names of the enclosing inline modules; None for other braces.
         let mut open: Vec<Option<&str>> = Vec::new();
         for i in 0..self.tokens.len() {
@@ -71,10 +75,27 @@ impl Source {
                 {
                     self.read_path(i, open.iter().flatten(), &mut imports);
                 }
+                name if children.contains(&name)
+                    && self.text(i + 1) == "::"
+                    && !self.continues_a_path(i) =>
+                {
+                    let n_before = imports.len();
+                    self.read_tree(i, &self.module, &mut imports);
+                    let is_reexport = i >= 2
+                        && self.text(i - 1) == "use"
+                        && matches!(self.text(i - 2), "pub" | ")");
+                    imports[n_before..].iter_mut().for_each(|i| i.is_reexport = is_reexport);
+                }
                 _ => {}
             }
         }
         imports
+    }
+
+    /// Returns the modules that the file declares with `mod name;`.
+    fn declared_modules(&self) -> impl Iterator<Item = &str> {
+        let is_declared = |i: &usize| self.text(*i) == "mod" && self.text(i + 2) == ";";
+        (0..self.tokens.len()).filter(is_declared).map(|i| self.text(i + 1))
     }
 
     /// Returns the first words of paths to other crates: `ash` of `ash::vk`, but not of
@@ -145,7 +166,7 @@ impl Source {
             return self.read_tree(i + 2, &path, imports);
         }
         let Token { line, in_test, .. } = self.tokens[i.min(self.tokens.len() - 1)];
-        imports.push(Import { path, line, in_test });
+        imports.push(Import { path, line, in_test, is_reexport: false });
         i + 1
     }
 }

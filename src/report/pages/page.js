@@ -7,13 +7,14 @@
     hint.hidden = false;
     const at = mark.getBoundingClientRect(), own = hint.getBoundingClientRect();
     const width = document.documentElement.clientWidth;
-    const left = Math.max(8, Math.min(at.left + at.width / 2 - own.width / 2, width - own.width - 8));
+    const middle = at.left + at.width / 2 - own.width / 2;
+    const left = Math.max(8, Math.min(middle, width - own.width - 8));
     const above = at.top - own.height - 8;
     hint.style.left = `${left + scrollX}px`;
     hint.style.top = `${(above > 0 ? above : at.bottom + 8) + scrollY}px`;
   };
   for (const mark of document.querySelectorAll(".mark")) {
-    // The browser's own hint would lie over ours.
+    // The browser's own tooltip would cover this one.
     mark.querySelector("title")?.remove();
     mark.addEventListener("pointerenter", () => show(mark));
     mark.addEventListener("pointerleave", () => { if (document.activeElement !== mark) hide(); });
@@ -31,7 +32,10 @@
     const [a, b] = [before, after].map((img) => make("img", { src: img.src, alt: img.alt }));
     const edge = make("div", { className: "edge" });
     const range = make("input", { type: "range", min: 0, max: 100, step: 1, value: 50 });
-    range.setAttribute("aria-label", `${pair.dataset.label}: how much of ${left} is shown, of ${right} the rest`);
+    range.setAttribute(
+      "aria-label",
+      `${pair.dataset.label}: share of ${left} that is shown; the rest shows ${right}`,
+    );
     const set = () => {
       b.style.clipPath = `inset(0 0 0 ${range.value}%)`;
       edge.style.left = `${range.value}%`;
@@ -44,7 +48,8 @@
       set();
     });
     set();
-    const ends = make("div", { className: "ends" }, make("span", { textContent: left }), make("span", { textContent: right }));
+    const names = [left, right].map((textContent) => make("span", { textContent }));
+    const ends = make("div", { className: "ends" }, ...names);
     pair.prepend(make("div", { className: "slider" }, stack, range, ends));
   };
   for (const pair of document.querySelectorAll(".pair[data-sizes=same]")) {
@@ -79,7 +84,8 @@
   };
   for (const table of document.querySelectorAll("table.sortable")) {
     [...table.tHead.rows[0].cells].forEach((header, i) => {
-      const button = make("button", { type: "button", textContent: header.textContent, title: "Sort by this column" });
+      const textContent = header.textContent;
+      const button = make("button", { type: "button", textContent, title: "Sort by this column" });
       button.addEventListener("click", () => sort(table, i, header));
       header.replaceChildren(button);
     });

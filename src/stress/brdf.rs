@@ -215,8 +215,8 @@ fn first_with(
             .windows(3)
             .map(|w| (w[2] - 2.0 * w[1] + w[0]).abs())
             .fold(0.0, f64::max);
-        // The gap is off by 15.6 u |chord|, and by as much again by the directions' own 9 u: 31 u
-        // |chord| moves t by 16 u/|chord| of itself; its roots add 16 u.
+        // The gap is off by 15.6 u |chord|, and by as much again by the directions' own 9 u. In
+        // total 31 u |chord|, which moves t by 16 u/|chord| of itself. Its roots add 16 u.
         let chord = (n - h).length();
         let off = (16.0 + 16.0 / chord.max(1e-3)) * U_F32 * t.max(1.0);
         let rounding = 8.0 * U_F32 * table.iter().map(|v| v.abs()).fold(0.0, f64::max);

@@ -1,6 +1,7 @@
-//! Frames that must have the same bytes however they are computed: repeated, with other workgroup
-//! sizes, on one or two threads, with and without skipping, alone or in sequence, from poisoned
-//! memory.
+//! Frames that must have the same bytes however they are computed.
+//!
+//! The variants are: repeated, other workgroup sizes, one or two threads, with and without
+//! skipping, alone or in sequence, poisoned memory.
 
 use glam::DVec3;
 

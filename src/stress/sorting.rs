@@ -73,8 +73,8 @@ fn keys(ctx: &mut StressContext, c: &mut Comparison) -> Result<()> {
         .iter()
         .map(|z| [*z, RADIUS as f32, (65536.0 / (2.0 * RADIUS)) as f32, 0.0])
         .collect();
-    // The upper 23 and the lower 9 bits of the key as mantissas of numbers from 1 to 2: the key's
-    // own bits as a float could be NaN, whose bits may change.
+    // The upper 23 and the lower 9 bits of the key as mantissas of numbers from 1 to 2. The key's
+    // own bits may form a NaN, whose bits may change.
     let body = "uint key = key_of(x.x, 32u, x.y, x.z); \
         return vec4(uintBitsToFloat(0x3f800000u | key >> 9), \
         uintBitsToFloat(0x3f800000u | key & 0x1ffu), float(key_of(x.x, 16u, x.y, x.z)), 0.0);";

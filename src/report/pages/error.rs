@@ -53,7 +53,9 @@ fn reference(study: &Study) -> Markup {
                 (r.accuracy)
             }
             dt { "Magnitude" } dd { (number(r.magnitude)) ", root mean square" }
-            dt { "Computed in" } dd { (number(r.seconds)) " s" @if r.from_cache { ", in an earlier run" } }
+            dt { "Computed in" } dd {
+                (number(r.seconds)) " s" @if r.from_cache { ", in an earlier run" }
+            }
             dt { "Reference hash" } dd { code { (r.hash) } }
             dt { "Times" } dd { (study.rounds) " rounds of " (study.frames) " frames of every \
                 configuration in turn" }
@@ -170,7 +172,11 @@ fn gallery(study: &Study, folder: &Path) -> Result<Markup> {
                 // The page contains the reference once; the script takes it from there.
                 let caption = format!("{}{error}", c.name);
                 shown.push(html! {
-                    div class="pair against-reference" data-label=(c.name) data-width=(reference.width) {
+                    div
+                        class="pair against-reference"
+                        data-label=(c.name)
+                        data-width=(reference.width)
+                    {
                         (picture.figure(&caption, &caption))
                         @if let Some(map) = &map { (map) }
                     }

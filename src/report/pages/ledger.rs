@@ -13,8 +13,8 @@ use crate::studies::ledger::records::{Ledger, Row};
 /// Returns the section of a ledger.
 pub fn section(ledger: &Ledger) -> Result<Markup> {
     let total = with_interval(ledger.total.value, ledger.total.low, ledger.total.high);
-    let caption = "RMSE of two pictures that differ in that approximation alone, with 95 % intervals \
-        at the ends of the bars.";
+    let caption = "RMSE of two pictures that differ in that approximation alone, with 95 % \
+        intervals at the ends of the bars.";
     Ok(html! {
         (provenance::section(&Origin::of(&ledger.made, ledger.interrupted)))
         dl class="made" {

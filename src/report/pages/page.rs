@@ -49,7 +49,9 @@ pub fn page(sources: &[Source]) -> Result<String> {
                     h1 { "nimbus report" }
                     @if sections.len() > 1 {
                         nav aria-label="Contents" { ul {
-                            @for (name, id, _) in &sections { li { a href={ "#" (id) } { (name) } } }
+                            @for (name, id, _) in &sections {
+                                li { a href={ "#" (id) } { (name) } }
+                            }
                         } }
                     }
                 }

@@ -13,73 +13,29 @@ use std::path::{Path, PathBuf};
 use source::{Import, Source, Token};
 
 /// The rooms that every room may import, besides itself and `error`.
-const MAY_IMPORT: [(&str, &[&str]); 18] = [
-    ("error", &[]),
-    ("model", &[]),
-    ("io", &["model"]),
-    ("layout", &["model"]),
-    ("reference", &["model"]),
-    ("gpu", &[]),
-    ("passes", &["layout", "gpu"]),
-    ("frame", &["passes", "layout", "gpu", "model"]),
-    ("measure", &[]),
-    ("inspect", &["model", "io", "layout", "reference", "gpu", "passes", "frame"]),
-    ("timing", &["model", "io", "gpu", "frame", "measure"]),
-    ("studies", &["model", "io", "layout", "reference", "gpu", "frame", "measure", "timing"]),
-    ("stress", &["model", "io", "layout", "reference", "gpu", "passes", "frame"]),
-    ("report", &["io", "measure", "timing", "studies"]),
-    (
-        "viewer",
-        &[
-            "model",
-            "io",
-            "layout",
-            "reference",
-            "gpu",
-            "passes",
-            "frame",
-            "measure",
-            "timing",
-            "studies",
-        ],
-    ),
-    (
-        "farm",
-        &[
-            "model",
-            "io",
-            "layout",
-            "reference",
-            "gpu",
-            "passes",
-            "frame",
-            "measure",
-            "timing",
-            "studies",
-            "report",
-        ],
-    ),
+const MAY_IMPORT: [(&str, &str); 18] = [
+    ("error", ""),
+    ("model", ""),
+    ("io", "model"),
+    ("layout", "model"),
+    ("reference", "model"),
+    ("gpu", ""),
+    ("passes", "layout gpu"),
+    ("frame", "passes layout gpu model"),
+    ("measure", ""),
+    ("inspect", "model io layout reference gpu passes frame"),
+    ("timing", "model io gpu frame measure"),
+    ("studies", "model io layout reference gpu frame measure timing"),
+    ("stress", "model io layout reference gpu passes frame"),
+    ("report", "io measure timing studies"),
+    ("viewer", "model io layout reference gpu passes frame measure timing studies"),
+    ("farm", "model io layout reference gpu passes frame measure timing studies report"),
     (
         "cli",
-        &[
-            "model",
-            "io",
-            "layout",
-            "reference",
-            "gpu",
-            "passes",
-            "frame",
-            "measure",
-            "inspect",
-            "timing",
-            "studies",
-            "stress",
-            "report",
-            "viewer",
-            "farm",
-        ],
+        "model io layout reference gpu passes frame measure inspect timing studies stress report \
+         viewer farm",
     ),
-    ("main", &["cli"]),
+    ("main", "cli"),
 ];
 
 /// Words that say nothing about the content of a file or module.
@@ -135,7 +91,8 @@ fn check_imports(source: &Source, complaints: &mut Vec<String>) {
         // Tests may compare a pass with its reference.
         let meets_in_test = import.in_test
             && matches!((from, to), ("passes", "reference") | ("reference", "passes"));
-        let allowed = to == from || to == "error" || may.contains(&to) || meets_in_test;
+        let allowed =
+            to == from || to == "error" || may.split(' ').any(|room| room == to) || meets_in_test;
         if !allowed {
             complaints.push(format!("{at}: {from} may not import {to}"));
         }

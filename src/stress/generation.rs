@@ -189,16 +189,12 @@ fn spread(ctx: &mut StressContext, c: &mut Comparison, b: CloudBox) -> Result<()
             return;
         }
         let u = uniforms(SEED, 0, i, n_attempts.saturating_sub(1));
-        for axis in 0..3 {
+        for (axis, u) in u[..3].iter().enumerate() {
             // P (6): |P_x| is at most pi/2 and, by P (5), pi; half of the sum is added.
-            let truth = 0.5 * (2.0 * u[axis] - 1.0) * b.extent[axis];
+            let truth = 0.5 * (2.0 * u - 1.0) * b.extent[axis];
             let bound = 0.75 * PI * 1.001 + 4.0 * U_F32 * b.extent[axis];
-            c.add(
-                record.position[axis],
-                truth,
-                bound,
-                format_args!("position of particle {i}, axis {axis}"),
-            );
+            let at = format_args!("position of particle {i}, axis {axis}");
+            c.add(record.position[axis], truth, bound, at);
         }
     })?;
     c.remark(format!("{n_folded} of {} folded", b.n_particles));

@@ -6,7 +6,9 @@ use bytemuck::Pod;
 
 use crate::error::{Error, Result};
 use crate::frame::stage::{Bed, DeviceChoice, Player};
-use crate::gpu::{Buffer, Commands, Compiler, Device, Field, Kernel, MemoryUsage, Recorder, Sources};
+use crate::gpu::{
+    Buffer, Commands, Compiler, Device, Field, Kernel, MemoryUsage, Recorder, Sources,
+};
 use crate::layout::facet::{FacetRecord, LitRecord};
 use crate::layout::particle::{ParticleRecord, PlacedRecord};
 use crate::layout::record;
@@ -176,7 +178,8 @@ impl StressContext {
     /// Uploads `data` to a new device buffer.
     pub(super) fn upload<T: Pod>(&mut self, data: &[T]) -> Result<Buffer> {
         let n = data.len() as u64;
-        let mut staging = Buffer::new::<T>(self.device(), "stress.staging", n, MemoryUsage::Upload)?;
+        let mut staging =
+            Buffer::new::<T>(self.device(), "stress.staging", n, MemoryUsage::Upload)?;
         staging.write(data)?;
         let buffer = self.buffer::<T>(data.len())?;
         self.copy(&staging, &buffer)?;

@@ -94,7 +94,7 @@ fn unusual_scenes_load_or_give_one_error_with_its_place() {
 fn overrides_equal_keys_of_the_file() {
     check(200, (scenes::setting(), scenes::setting()), |((table, key, value), (_, _, other))| {
         let set = |value: &str| format!("{table}.{key}={value}");
-        let said = |value: &str| {
+        let scene_with = |value: &str| {
             format!("[{table}]\n{key} = {value}\n[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n")
         };
         let hash = |text: &str, overrides: &[String]| {
@@ -103,12 +103,12 @@ fn overrides_equal_keys_of_the_file() {
                 other => other.to_string(),
             })
         };
-        let file = hash(&said(&value), &[]);
+        let file = hash(&scene_with(&value), &[]);
         let bare = "[[cloud]]\nfrom = 'boxes'\nfile = 'b.dat'\n";
         prop_assert_eq!(&hash(bare, &[set(&value)]), &file);
         // Overrides replace the file's value and earlier overrides.
-        prop_assert_eq!(&hash(&said(&other), &[set(&value)]), &file);
-        prop_assert_eq!(&hash(&said(&other), &[set("1"), set(&other), set(&value)]), &file);
+        prop_assert_eq!(&hash(&scene_with(&other), &[set(&value)]), &file);
+        prop_assert_eq!(&hash(&scene_with(&other), &[set("1"), set(&other), set(&value)]), &file);
         Ok(())
     });
 }

@@ -63,17 +63,17 @@ fn in_time<T: Send + 'static>(
 
 /// Parses every input and compares the messages with the list.
 fn assert_as_listed(target: &str, read: Reader) {
-    let mut said = String::new();
+    let mut report = String::new();
     for (name, bytes) in inputs(target) {
         let outcome = in_time(&format!("{target}/{name}"), LONGEST, move || read(&bytes));
         let line = match outcome {
             Ok(()) => "read".to_owned(),
             Err(message) => message.replace(readers::NOWHERE, "").replace('\n', " | "),
         };
-        said += &format!("{name}: {line}\n");
+        report += &format!("{name}: {line}\n");
     }
     let listed = fs::read_to_string(folder(target).with_extension("txt")).unwrap_or_default();
-    assert!(said == listed, "{target}.txt says otherwise; this is what is said:\n{said}");
+    assert!(report == listed, "{target}.txt lists other messages; the messages are:\n{report}");
     assert_memory(target);
 }
 

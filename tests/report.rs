@@ -227,7 +227,7 @@ fn bad_input_gives_one_message_and_no_page() {
     fs::create_dir(&cut).expect("a folder");
     fs::write(format!("{cut}/study.json"), "{\"schema\": 1,").expect("a file");
     let picture = path(&dir, "study/reference.png");
-    for (given, said) in [
+    for (given, expected) in [
         (
             empty.as_str(),
             "holds no results: none of run.json, study.json, ledger.json; expected a \
@@ -243,16 +243,16 @@ fn bad_input_gives_one_message_and_no_page() {
         let output = run(&["report", &study, given, "-o", &page]);
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert_eq!((output.status.code(), stderr.lines().count()), (Some(2), 1), "{stderr}");
-        assert!(stderr.contains(said), "{stderr}");
-        assert!(!PathBuf::from(&page).exists(), "{said}");
+        assert!(stderr.contains(expected), "{stderr}");
+        assert!(!PathBuf::from(&page).exists(), "{expected}");
     }
-    for (output, said) in [
+    for (output, expected) in [
         ("page.pdf", "expected a file name that ends in .html"),
         ("gone/page.html", "does not exist"),
     ] {
         let output = run(&["report", &study, "-o", &path(&dir, output)]);
         assert_eq!(output.status.code(), Some(2));
-        assert!(String::from_utf8_lossy(&output.stderr).contains(said));
+        assert!(String::from_utf8_lossy(&output.stderr).contains(expected));
     }
     // Existing files stay without --force; a file may be named instead of its folder.
     assert!(run(&["report", &study, "-o", &page]).status.success());

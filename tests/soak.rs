@@ -73,7 +73,7 @@ fn soak(threading: Threading, skip: bool, n: u32) -> Soaked {
     assert_eq!(n_seen, n);
     soaked.wall_s = begin.elapsed().as_secs_f64();
     // Closing reports validation messages and leaks.
-    stage.close().expect("nothing was said");
+    stage.close().expect("no validation messages or leaks");
     soaked
 }
 

@@ -116,8 +116,8 @@ fn pictures_are_independent_of_driver_threads() {
             .output()
             .expect("the program runs");
         assert!(output.status.success());
-        let told: Value = serde_json::from_slice(&output.stdout).expect("JSON");
-        (told["hash"].clone(), std::fs::read(dir.path().join("out.png")).expect("a picture"))
+        let printed: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        (printed["hash"].clone(), std::fs::read(dir.path().join("out.png")).expect("a picture"))
     };
     let one = hash("1");
     assert!(one == hash("2") && one == hash("7"));

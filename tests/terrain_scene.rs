@@ -212,7 +212,7 @@ fn clouds_shade_the_ground_and_the_ground_lights_clouds() {
 
 #[test]
 fn errors_of_the_ground_are_reported() {
-    let said = |made: &Made, more: &str| {
+    let render_error = |made: &Made, more: &str| {
         let dir = scene_of(made, &format!("material = \"cloud\"\n{more}"));
         let output = run(&["render", &path(&dir, "scene.toml"), "-o", &path(&dir, "out.png")]);
         assert_eq!(output.status.code(), Some(2));
@@ -257,8 +257,8 @@ fn errors_of_the_ground_are_reported() {
             "w.nc: step 0: HGT is 1000000 m at row 1, column 1, expected -1000 to 200000",
         ),
     ] {
-        let said = said(&made, more);
-        assert!(said.contains(expected), "{said}");
+        let message = render_error(&made, more);
+        assert!(message.contains(expected), "{message}");
     }
     // Without ground, HGT is not needed.
     let dir = scene_of(&file().with_floats("HGT", |h| h[9] = f32::NAN), "material = \"cloud\"");
@@ -271,7 +271,7 @@ fn errors_of_the_ground_are_reported() {
     ] {
         let dir = scene_of(&made, "");
         let output = run(&["weather", &path(&dir, "w.nc")]);
-        let said = String::from_utf8_lossy(&output.stdout).into_owned();
-        assert!(output.status.success() && said.contains(expected), "{said}");
+        let report = String::from_utf8_lossy(&output.stdout).into_owned();
+        assert!(output.status.success() && report.contains(expected), "{report}");
     }
 }

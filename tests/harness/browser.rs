@@ -95,15 +95,15 @@ impl Browser {
         }
         self.to.write_all(format!("{message}\0").as_bytes()).expect("the browser listens");
         loop {
-            let mut said = self
+            let mut message = self
                 .from
                 .recv_timeout(PATIENCE)
                 .unwrap_or_else(|e| panic!("{method}: no answer: {e}"));
-            if said["id"] == json!(id) {
-                assert!(said.get("error").is_none(), "{method}: {said}");
-                return said["result"].take();
+            if message["id"] == json!(id) {
+                assert!(message.get("error").is_none(), "{method}: {message}");
+                return message["result"].take();
             }
-            self.events.push(said);
+            self.events.push(message);
         }
     }
 
@@ -178,20 +178,20 @@ impl Browser {
 }
 
 fn listen(from: ChildStdout) -> Receiver<Value> {
-    let (said, heard) = mpsc::channel();
+    let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
         let mut from = BufReader::new(from);
         let mut message = Vec::new();
         while from.read_until(0, &mut message).is_ok_and(|n| n > 0) {
             message.pop();
             let Ok(value) = serde_json::from_slice(&message) else { break };
-            if said.send(value).is_err() {
+            if sender.send(value).is_err() {
                 break;
             }
             message.clear();
         }
     });
-    heard
+    receiver
 }
 
 impl Drop for Browser {

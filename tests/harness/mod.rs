@@ -68,8 +68,8 @@ impl Drop for Gpu {
     /// Closes the device and fails on any validation message.
     fn drop(&mut self) {
         if !std::thread::panicking() {
-            let said = self.instance.messages().take();
-            assert!(said.is_empty(), "validation messages:\n{}", said.join("\n"));
+            let messages = self.instance.messages().take();
+            assert!(messages.is_empty(), "validation messages:\n{}", messages.join("\n"));
         }
     }
 }

@@ -20,15 +20,15 @@ pub fn tooltips(browser: &mut Browser) {
     );
     let at = [0, 1].map(|i| at[i].as_f64().expect("a number"));
     browser.point_at(at[0], at[1]);
-    let said = browser.eval(hint);
-    let said = said.as_str().expect("text");
+    let text = browser.eval(hint);
+    let text = text.as_str().expect("text");
     // The fastest configuration of the front is first.
     assert!(
-        said.contains("draw.resolution=0.25, draw.threshold=0.05")
-            && said.contains("GPU time of a frame: 4 (3.8 to 4.2) ms"),
-        "{said}"
+        text.contains("draw.resolution=0.25, draw.threshold=0.05")
+            && text.contains("GPU time of a frame: 4 (3.8 to 4.2) ms"),
+        "{text}"
     );
-    assert!(said.contains("RMSE from the reference \"thin\": 0.06 (0.048 to 0.072)"), "{said}");
+    assert!(text.contains("RMSE from the reference \"thin\": 0.06 (0.048 to 0.072)"), "{text}");
     browser.point_at(1.0, 1.0);
     assert_eq!(browser.eval(hint), json!(""));
     browser.eval("document.querySelector('#run-2 .mark').focus()");

@@ -148,36 +148,6 @@ impl DrawingBackend for TextBackend<'_> {
         points.windows(2).try_for_each(|pair| self.draw_line(pair[0], pair[1], style))
     }
 
-    fn draw_rect<S: BackendStyle>(
-        &mut self,
-        a: BackendCoord,
-        b: BackendCoord,
-        style: &S,
-        fill: bool,
-    ) -> Drawn {
-        for y in a.1..=b.1 {
-            for x in a.0..=b.0 {
-                let is_edge = x == a.0 || x == b.0 || y == a.1 || y == b.1;
-                if fill || is_edge {
-                    self.draw_pixel((x, y), style.color())?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn draw_circle<S: BackendStyle>(
-        &mut self,
-        center: BackendCoord,
-        _: u32,
-        style: &S,
-        fill: bool,
-    ) -> Drawn {
-        let at = (center.0.div_euclid(CELL.0), center.1.div_euclid(CELL.1));
-        self.0.glyph(at, if fill { '●' } else { '○' }, style.color());
-        Ok(())
-    }
-
     fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, at: BackendCoord) -> Drawn {
         let n = text.chars().count() as i32;
         let column = at.0.div_euclid(CELL.0);
@@ -219,7 +189,7 @@ mod tests {
         // The top dots of the first row; the bottom right dot of the second row's last cell.
         area.draw(&PathElement::new(vec![(0, 0), (11, 0)], INK)).unwrap();
         area.draw(&Pixel::new((11, 7), INK)).unwrap();
-        area.draw(&Circle::new((4, 5), 3, series(0).filled())).unwrap();
+        area.draw_text("●", &Medium::Terminal.text_style(series(0)), (4, 5)).unwrap();
         area.draw_text("ab", &Medium::Terminal.text_style(INK), (0, 4)).unwrap();
         drop(area);
         assert_eq!(characters.text(false), "⠉⠉⠉⠉⠉⠉\nab●  ⢀\n");

@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::figure::figure;
 use super::pictures::Png;
-use super::provenance::{self, Origin};
+use super::provenance;
 use super::table::{Cell, count, median, ms, percent, table, text, value};
 use crate::error::Result;
 use crate::report::charts::{frames, number, passes, with_interval};
@@ -38,7 +38,7 @@ pub fn section(results: &BenchResults, folder: &Path) -> Result<Markup> {
         pictures.extend(png.map(|png| png.figure(&caption, &caption)));
     }
     Ok(html! {
-        (provenance::section(&Origin::of_run(run)))
+        (provenance::section(run)?)
         @if !run.chosen.is_empty() {
             h3 { "Values chosen for \"auto\"" }
             ul { @for chosen in &run.chosen { li { (chosen) } } }

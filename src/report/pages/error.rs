@@ -6,7 +6,7 @@ use maud::{Markup, html};
 
 use super::figure::figure as chart_figure;
 use super::pictures::{self, Png};
-use super::provenance::{self, Origin};
+use super::provenance;
 use super::table::{Cell, count, figure, remark_list, table, text, value};
 use crate::error::Result;
 use crate::report::charts::error::{chart, error_of, front_numbers, metric_name, time_of};
@@ -23,7 +23,7 @@ pub fn section(study: &Study, folder: &Path) -> Result<Markup> {
         the configurations that no other configuration beats in both time and error. Point at a \
         configuration, or step through them with the Tab key, to see its settings.";
     Ok(html! {
-        (provenance::section(&Origin::of(&study.made, study.interrupted)))
+        (provenance::section(study)?)
         (reference(study))
         h3 { "Time against error" }
         (chart_figure(&chart(study), caption)?)

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 
 use super::figure::figure as chart_figure;
-use super::provenance::{self, Origin};
+use super::provenance;
 use super::table::{Cell, figure, percent, table, text, value};
 use crate::error::Result;
 use crate::report::charts::ledger::chart;
@@ -16,7 +16,7 @@ pub fn section(ledger: &Ledger) -> Result<Markup> {
     let caption = "RMSE of two pictures that differ in that approximation alone, with 95 % \
         intervals at the ends of the bars.";
     Ok(html! {
-        (provenance::section(&Origin::of(&ledger.made, ledger.interrupted)))
+        (provenance::section(ledger)?)
         dl class="made" {
             dt { "Picture" } dd {
                 "frame " (ledger.frame) " at " (number(ledger.time_s)) " s, " (ledger.width) "×"

@@ -3,70 +3,37 @@
 use std::collections::BTreeMap;
 
 use maud::{Markup, html};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
+use crate::error::{Error, Result};
 use crate::report::charts::number;
-use crate::studies::provenance::Provenance;
 use crate::timing::machine::{Clocks, Cpu, Device};
-use crate::timing::records::Run;
 
-/// The origin of a run, a study or a ledger.
-pub struct Origin<'a> {
-    nimbus: &'a str,
-    revision: &'a str,
-    date: &'a str,
-    command: &'a [String],
-    scene_file: Option<&'a str>,
-    scene_hash: &'a str,
-    scene: &'a serde_json::Value,
-    device: &'a Device,
-    cpu: &'a Cpu,
-    environment: &'a BTreeMap<String, String>,
-    clocks: &'a Clocks,
+/// The keys that the records of benches, studies and ledgers have in common.
+#[derive(Deserialize)]
+struct Origin {
+    nimbus: String,
+    revision: String,
+    date: String,
+    command: Vec<String>,
+    scene_file: Option<String>,
+    scene_hash: String,
+    scene: Value,
+    device: Device,
+    cpu: Cpu,
+    environment: BTreeMap<String, String>,
+    clocks: Clocks,
     interrupted: bool,
 }
 
-impl<'a> Origin<'a> {
-    /// Returns the origin of a bench.
-    pub fn of_run(run: &'a Run) -> Origin<'a> {
-        Origin {
-            nimbus: &run.nimbus,
-            revision: &run.revision,
-            date: &run.date,
-            command: &run.command,
-            scene_file: None,
-            scene_hash: &run.scene_hash,
-            scene: &run.scene,
-            device: &run.device,
-            cpu: &run.cpu,
-            environment: &run.environment,
-            clocks: &run.clocks,
-            interrupted: run.interrupted,
-        }
-    }
-
-    /// Returns the origin of a study or a ledger.
-    pub fn of(p: &'a Provenance, interrupted: bool) -> Origin<'a> {
-        Origin {
-            nimbus: &p.nimbus,
-            revision: &p.revision,
-            date: &p.date,
-            command: &p.command,
-            scene_file: Some(&p.scene_file),
-            scene_hash: &p.scene_hash,
-            scene: &p.scene,
-            device: &p.device,
-            cpu: &p.cpu,
-            environment: &p.environment,
-            clocks: &p.clocks,
-            interrupted,
-        }
-    }
-}
-
-/// Returns the list of what produced a result.
-pub fn section(origin: &Origin<'_>) -> Markup {
-    let Device { name, driver, api, kind, uuid } = origin.device;
-    let scene = serde_json::to_string_pretty(origin.scene).unwrap_or_default();
+/// Returns the list of what produced a record.
+pub fn section(record: &impl Serialize) -> Result<Markup> {
+    let origin: Origin = serde_json::to_value(record)
+        .and_then(serde_json::from_value)
+        .map_err(|cause| Error::Fault { what: format!("a record without its origin: {cause}") })?;
+    let Device { name, driver, api, kind, uuid } = &origin.device;
+    let scene = serde_json::to_string_pretty(&origin.scene).unwrap_or_default();
     let period = origin
         .clocks
         .timestamp_period_ns
@@ -75,7 +42,7 @@ pub fn section(origin: &Origin<'_>) -> Markup {
         .clocks
         .timestamp_overhead_ns
         .map(|ns| format!(", {} ns for an empty pass", number(ns)));
-    html! {
+    Ok(html! {
         @if origin.interrupted {
             p class="warning" {
                 strong { "Interrupted:" } " the page shows the finished part only."
@@ -92,7 +59,7 @@ pub fn section(origin: &Origin<'_>) -> Markup {
                 @if origin.environment.is_empty() {
                     "none of the variables that affect drivers is set"
                 }
-                @for (key, value) in origin.environment { code { (key) "=" (value) } " " }
+                @for (key, value) in &origin.environment { code { (key) "=" (value) } " " }
             }
             dt { "Clocks" } dd {
                 "host: resolution " (number(origin.clocks.resolution_ns)) " ns, "
@@ -102,9 +69,9 @@ pub fn section(origin: &Origin<'_>) -> Markup {
             dt { "Date" } dd { time datetime=(origin.date) { (origin.date) } }
             dt { "nimbus" } dd { (origin.nimbus) ", revision " code { (origin.revision) } }
             dt { "Command" } dd { code { (origin.command.join(" ")) } }
-            @if let Some(file) = origin.scene_file { dt { "Scene" } dd { code { (file) } } }
+            @if let Some(file) = &origin.scene_file { dt { "Scene" } dd { code { (file) } } }
             dt { "Scene hash" } dd { code { (origin.scene_hash) } }
         }
         details { summary { "The scene with every default filled in" } pre { (scene) } }
-    }
+    })
 }

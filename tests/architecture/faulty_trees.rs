@@ -115,17 +115,17 @@ fn circle_of_imports_is_reported() {
     for (files, circle) in [
         (
             &[
-                ("src/model/a.rs", "use super::b::B;"),
-                ("src/model/b.rs", "use crate::model::c;"),
-                ("src/model/c/mod.rs", "mod d;\nfn f() { d::g() }"),
-                ("src/model/c/d.rs", "use super::super::a;"),
+                ("src/gpu/a.rs", "use super::b::B;"),
+                ("src/gpu/b.rs", "use crate::gpu::c;"),
+                ("src/gpu/c/mod.rs", "mod d;\nfn f() { d::g() }"),
+                ("src/gpu/c/d.rs", "use super::super::a;"),
             ][..],
-            Some("model/a.rs, model/b.rs, model/c/d.rs, model/c/mod.rs"),
+            Some("gpu/a.rs, gpu/b.rs, gpu/c/d.rs, gpu/c/mod.rs"),
         ),
         (
             &[
-                ("src/model/c/mod.rs", "mod d;\npub use d::D;\npub struct C;"),
-                ("src/model/c/d.rs", "use super::C;\n#[cfg(test)]\nmod tests { use super::*; }"),
+                ("src/gpu/c/mod.rs", "mod d;\npub use d::D;\npub struct C;"),
+                ("src/gpu/c/d.rs", "use super::C;\n#[cfg(test)]\nmod tests { use super::*; }"),
             ],
             None,
         ),

@@ -15,7 +15,7 @@ use nimbus::studies::provenance::Figure;
 use nimbus::timing::frame_rows::FrameRow;
 use nimbus::timing::records::{Pass, Run};
 use studies::{configuration, row, study, usual_ledger, usual_study};
-use svg::{Axes, PX, draw, elements, log_axes, number, parse, points, text, tooltips, value};
+use svg::{Axes, PX, draw, elements, log_axes, number, parse, points, tooltips, value};
 
 #[test]
 fn error_chart_draws_points_at_their_time_and_error() {
@@ -63,7 +63,7 @@ fn error_chart_draws_intervals_with_caps_within_the_axes() {
     assert!(!has(axes.log(9.0, 0.01), axes.log(12.5, 0.01)));
     // An interval beyond the axis ends at its end, without a cap: three caps instead of four.
     let caps = |svg: &str| {
-        let doc = parsed(svg);
+        let doc = parse(svg);
         let lines = elements(&doc, "polyline").filter(|n| n.attribute("stroke") == Some("#005FA3"));
         lines
             .map(points)
@@ -124,9 +124,9 @@ fn error_chart_labels_do_not_overlap() {
         .filter(|n| {
             n.attribute("text-anchor") == Some("start")
                 && n.attribute("dy") == Some("0.5ex")
-                && text(*n).parse::<u32>().is_ok()
+                && svg::text(*n).parse::<u32>().is_ok()
         })
-        .map(|n| (number(n, "x"), number(n, "y"), text(n).len()))
+        .map(|n| (number(n, "x"), number(n, "y"), svg::text(n).len()))
         .collect();
     assert!(labels.len() >= 10 && labels.len() < 34, "{}", labels.len());
     for (i, a) in labels.iter().enumerate() {
@@ -169,7 +169,7 @@ fn error_chart_draws_degenerate_studies() {
     }
     let (n, svg, _) = whole(&study(vec![one.clone(), exact.clone()]));
     let doc = parse(&svg);
-    let zero = elements(&doc, "text").find(|t| text(*t) == "0").expect("a tick that says 0");
+    let zero = elements(&doc, "text").find(|t| svg::text(*t) == "0").expect("a tick that says 0");
     assert!(
         n == 2 && tooltips(&doc).iter().any(|((_, y), _)| (y - number(zero, "y")).abs() <= PX),
         "{svg}"
@@ -310,7 +310,7 @@ fn pass_chart_bars_have_the_passes_times() {
     let doc = parse(&svg);
     let ticks: Vec<(f64, f64)> = elements(&doc, "text")
         .filter(|n| n.attribute("text-anchor") == Some("middle"))
-        .filter_map(|n| Some((value(&text(n))?, number(n, "x"))))
+        .filter_map(|n| Some((value(&svg::text(n))?, number(n, "x"))))
         .collect();
     let px = |ms: f64| Axes::px([ticks[0], ticks[ticks.len() - 1]], ms);
     // The grid runs in every other frame: 1 ms of an average frame, then 4 ms of tiles; half of
@@ -344,7 +344,7 @@ fn ledger_chart_bars_end_at_the_errors() {
     let doc = parse(&svg);
     let ticks: Vec<(f64, f64)> = elements(&doc, "text")
         .filter(|n| n.attribute("text-anchor") == Some("middle"))
-        .filter_map(|n| Some((value(&text(n))?.log10(), number(n, "x"))))
+        .filter_map(|n| Some((value(&svg::text(n))?.log10(), number(n, "x"))))
         .collect();
     let px = |v: f64| Axes::px([ticks[0], ticks[ticks.len() - 1]], v.log10());
     let ends: Vec<f64> = elements(&doc, "rect")
@@ -361,7 +361,7 @@ fn ledger_chart_bars_end_at_the_errors() {
         assert!((end - px(error)).abs() <= PX, "{end} for {error}");
     }
     // The error 0 has no bar on a logarithmic axis, but a number.
-    assert!(elements(&doc, "text").any(|n| text(n) == "0"));
+    assert!(elements(&doc, "text").any(|n| svg::text(n) == "0"));
     let total = elements(&doc, "polyline")
         .map(points)
         .find(|l| l.len() == 2 && (l[0].0 - px(found.total.value)).abs() <= PX);

@@ -1,11 +1,12 @@
 //! Small pictures of random particles: finite values, alpha at most 1, and the same bytes with and
 //! without skipping.
 
-use std::cell::RefCell;
+use std::path::Path;
 
 use glam::DVec3;
 use nimbus::frame::serial;
 use nimbus::frame::stage::DeviceChoice;
+use nimbus::io::scene_file::parse;
 use nimbus::model::boxes::{CloudBox, Form};
 use nimbus::model::cloud::{Cloud, CloudSource, Particle};
 use nimbus::model::growth::Growth;

@@ -1,6 +1,7 @@
-//! What every GPU test starts from: a device with validation and synchronization validation on, and
-//! the promise that it has said nothing when the test ends. No device, or no validation layer, is a
-//! failure.
+//! The GPU of a test: a device with validation and synchronization validation.
+//!
+//! A test fails on any validation message about its own device. It also fails without a device or
+//! without the validation layer.
 
 #![allow(dead_code, reason = "each test binary uses its own part")]
 
@@ -10,6 +11,7 @@ use bytemuck::Pod;
 use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage, Recorder};
 use nimbus::passes;
 
+/// A device, and what a test needs to run kernels on it.
 pub struct Gpu {
     pub commands: Commands,
     pub compiler: Compiler,
@@ -27,7 +29,7 @@ impl Gpu {
         Gpu { commands, compiler, device, instance }
     }
 
-    /// A device buffer that holds `data`.
+    /// Returns a device buffer that holds `data`.
     pub fn upload<T: Pod>(&mut self, data: &[T]) -> Buffer {
         let n = data.len() as u64;
         let mut staging = Buffer::new::<T>(&self.device, "test.staging", n, MemoryUsage::Upload)
@@ -41,13 +43,13 @@ impl Gpu {
         buffer
     }
 
-    /// A device buffer of `n` records of unknown content.
+    /// Returns a device buffer of `n` records of unknown content.
     pub fn buffer<T: Pod>(&self, n: usize) -> Buffer {
         Buffer::new::<T>(&self.device, "test.buffer", n as u64, MemoryUsage::Device)
             .expect("buffer")
     }
 
-    /// The first `n` records of a device buffer.
+    /// Returns the first `n` records of a device buffer.
     pub fn download<T: Pod>(&mut self, buffer: &Buffer, n: usize) -> Vec<T> {
         let readback =
             Buffer::new::<T>(&self.device, "test.readback", n as u64, MemoryUsage::Readback)
@@ -68,19 +70,18 @@ impl Drop for Gpu {
     /// Fails the test on any validation message.
     fn drop(&mut self) {
         if !std::thread::panicking() {
-            let said = self.instance.messages().take();
-            assert!(said.is_empty(), "validation messages:\n{}", said.join("\n"));
+            let messages = self.instance.messages().take();
+            assert!(messages.is_empty(), "validation messages:\n{}", messages.join("\n"));
         }
     }
 }
 
-/// The greatest |value − truth| − bound over all elements, which must not be positive; `what` names
-/// the quantity.
+/// Asserts that every value is within its bound of the truth; `what` names the quantity.
 pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
     assert_eq!(values.len(), truths.len(), "{what}: lengths");
     let check = |i: usize| {
         let error = (values[i] - truths[i]).abs();
-        // Written so that NaN fails.
+        // The comparison fails for NaN.
         if error <= bounds[i] { None } else { Some((i, error)) }
     };
     let bad: Vec<_> = (0..values.len()).filter_map(check).collect();
@@ -96,7 +97,7 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
 }
 
 impl Gpu {
-    /// The test's own kernel `name`, which may include what nimbus's shaders include.
+    /// Compiles the test's own kernel `name`, which may include nimbus's includes.
     pub fn test_kernel(
         &self,
         name: &str,
@@ -111,8 +112,8 @@ impl Gpu {
             .expect("the test's kernel")
     }
 
-    /// A compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong variant
-    /// that a test must notice.
+    /// Returns a compiler of nimbus's shaders with `from` replaced by `to` in `file`: the wrong
+    /// variant that a test must notice.
     pub fn wrong_compiler(file: &str, from: &str, to: &str) -> Compiler {
         let mut sources = passes::sources();
         assert!(sources.replace(file, from, to), "{file} does not hold {from}");
@@ -120,7 +121,7 @@ impl Gpu {
     }
 }
 
-/// The greatest error/bound over all elements, or what is out of bound: [`assert_within`] for
+/// Returns the greatest error/bound over all elements, or names an element out of bound: for
 /// checks that must fail.
 pub fn check_within(
     what: &str,
@@ -130,7 +131,7 @@ pub fn check_within(
 ) -> Result<f64, String> {
     assert!(values.len() == truths.len() && values.len() == bounds.len(), "{what}: lengths");
     let error = |i: usize| (values[i] - truths[i]).abs();
-    // Written so that NaN is bad.
+    // The comparison fails for NaN.
     let bad: Vec<usize> =
         (0..values.len()).filter(|i| !matches!(error(*i), e if e <= bounds[*i])).collect();
     if let Some(&i) = bad.first() {
@@ -146,9 +147,8 @@ pub fn check_within(
         .fold(0.0, f64::max))
 }
 
-/// Asserts that all elements are within their bounds, says how much of its bound the worst one
-/// used, and proves that one element just beyond its bound, wherever it lies, or one NaN would have
-/// been noticed.
+/// Asserts that all elements are within their bounds and prints the greatest error/bound. It also
+/// proves that one element just beyond its bound, or one NaN, would be noticed.
 pub fn assert_within_and_say(what: &str, values: &[f64], truths: &[f64], bounds: &[f64]) {
     match check_within(what, values, truths, bounds) {
         Ok(ratio) => println!("{what}: {} elements, greatest error/bound {ratio:.3}", values.len()),

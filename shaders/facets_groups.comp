@@ -110,7 +110,7 @@ void main() {
 #if ELLIPSOIDS
         float aspect =
             run.n_particles > 1u
-                ? (sigma > 0.0 ? clamp(spread.y / sigma, LEAST_ASPECT, 1.0 / LEAST_ASPECT) : 1.0)
+                ? (sigma > 0.0 ? clamp(spread.y / sigma, MIN_ASPECT, 1.0 / MIN_ASPECT) : 1.0)
                 : particles[first].aspect;
 #else
         float aspect = 1.0;

@@ -16,7 +16,7 @@ const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;
 // Least aspect of a blob, and least inverse of one.
-const float LEAST_ASPECT = 1e-3;
+const float MIN_ASPECT = 1e-3;
 
 vec3 unit_or(vec3 v, vec3 otherwise) {
     float l = length(v);

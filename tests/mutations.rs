@@ -203,7 +203,7 @@ const FAULTS: &[Fault] = &[
     ),
     (
         "pi forgotten in what a diffuse surface sends",
-        "first.comp",
+        "include/first.glsl",
         "0.318309886183791",
         "1.0",
         "brdf/exponent-0",

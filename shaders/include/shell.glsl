@@ -1,5 +1,11 @@
-// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, `density` and the
-// push constants' grid.
+// The facet on a blob's shell (docs/model.md §11 "facets"). Needs
+// records.glsl, functions.glsl and the push constants' grid.
+
+READS(0, Placed, placed)
+READS(1, Particle, particles)
+READS(2, uint, i_group)
+READS(3, Group, groups)
+layout(binding = 4) uniform samplerBuffer density;
 
 #include "density.glsl"
 

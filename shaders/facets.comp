@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "functions.glsl"
@@ -16,11 +15,6 @@ layout(push_constant) uniform Push {
     uint n_particles;
     uint i_first_facet;
 } push;
-READS(0, Placed, placed)
-READS(1, Particle, particles)
-READS(2, uint, i_group)
-READS(3, Group, groups)
-layout(binding = 4) uniform samplerBuffer density;
 WRITES(5, Facet, facets)
 
 #include "shell.glsl"

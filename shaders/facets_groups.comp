@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "functions.glsl"
@@ -16,11 +15,6 @@ layout(push_constant) uniform Push {
     uint n_facets;
     uint i_first_facet;
 } push;
-READS(0, Placed, placed)
-READS(1, Particle, particles)
-READS(2, uint, i_group)
-READS(3, Group, groups)
-layout(binding = 4) uniform samplerBuffer density;
 // Particle at each place of the order.
 READS(5, uint, order)
 READS(6, Run, runs)
@@ -110,7 +104,7 @@ void main() {
 #if ELLIPSOIDS
         float aspect =
             run.n_particles > 1u
-                ? (sigma > 0.0 ? clamp(spread.y / sigma, LEAST_ASPECT, 1.0 / LEAST_ASPECT) : 1.0)
+                ? (sigma > 0.0 ? clamp(spread.y / sigma, MIN_ASPECT, 1.0 / MIN_ASPECT) : 1.0)
                 : particles[first].aspect;
 #else
         float aspect = 1.0;

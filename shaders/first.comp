@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
@@ -10,22 +9,14 @@
 // and radiance L1 of every facet, linear RGB.
 // Law: L1 = K_d c I_d/pi + K_s sum E f S(w). Source: C (15).
 
-const float INV_PI = 0.318309886183791;
-
 layout(push_constant) uniform Push {
     vec3 eye;
     uint n_facets;
     uint n_lights;
 } push;
-READS(0, Facet, facets)
-READS(1, Light, lights)
-READS(2, float, transmittance)
-layout(binding = 3) uniform usamplerBuffer regions;
-#include "regions.glsl"
-layout(binding = 4) uniform samplerBuffer table;
 UPDATES(5, Lit, lit)
 
-#include "lobe.glsl"
+#include "first.glsl"
 
 void main() {
     FOR_EACH(j, push.n_facets) {

@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
@@ -10,8 +9,6 @@
 // In: facets, lights, transmittance [facet][light], the table of basis functions. Out: T1
 // [light][row], row = basis and facet; cleared Lit records. Source: C (13)-(16).
 
-const float INV_PI = 0.318309886183791;
-
 layout(push_constant) uniform Push {
     vec3 eye;
     uint n_facets;
@@ -20,17 +17,11 @@ layout(push_constant) uniform Push {
     uint n_rows;
     uint i_vectors;
 } push;
-READS(0, Facet, facets)
-READS(1, Light, lights)
-READS(2, float, transmittance)
-layout(binding = 3) uniform usamplerBuffer regions;
-#include "regions.glsl"
-layout(binding = 4) uniform samplerBuffer table;
 // [light][row]
 WRITES(5, float, t1)
 WRITES(6, Lit, lit)
 
-#include "lobe.glsl"
+#include "first.glsl"
 
 void main() {
     FOR_EACH(j, push.n_facets) {

@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 
@@ -8,7 +7,7 @@
 // In: entries (key, particle). Out: the entries twice, with NO_PARTICLE in place of the near ones
 // and of the far ones. Exact: it only copies.
 
-// last_key: greatest key of a far entry. is_new: 1 decides anew by the keys who is far, 0 keeps the
+// last_key: greatest key of a far entry. is_new: 1 tells far entries by their keys, 0 keeps the
 // last decision.
 layout(push_constant) uniform Push {
     uint n_entries;

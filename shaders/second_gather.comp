@@ -2,7 +2,6 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "light.glsl"
 #include "occlude.glsl"

@@ -1,7 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_KHR_shader_subgroup_arithmetic : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "each.glsl"
 #include "light.glsl"
@@ -33,9 +32,10 @@ READS(5, uint, order)
 // Source of each place.
 READS(6, uint, leaves)
 WRITES(7, Source, sources)
-// [source][light]. w: sum of A g, g the facet's share of the light's energy. xyz of a cloud's: sum
-// of A g c, c the facet's own colour. xyz of a surface's: A times the greatest share at a point,
-// the clouds' transmittance, and the mask of surfaces whose shadows reach the facet.
+// [source][light]. w: sum of A g, g the facet's share of the light's energy.
+// xyz of a cloud's: sum of A g c, c the facet's own colour.
+// xyz of a surface's: A times the greatest share at a point, the clouds' transmittance, and the
+// mask of surfaces whose shadows reach the facet.
 WRITES(8, vec4, fluxes)
 // [source][light] of surfaces' facets: the shares at the points over the greatest.
 WRITES(9, Packed, cell_samples)

@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "camera.glsl"
 #include "plane.glsl"
@@ -23,10 +22,10 @@ layout(location = 1) flat out vec4 out_plane;
 layout(location = 2) flat out vec4 out_s;
 layout(location = 3) flat out vec4 out_t;
 
-// A corner's coordinate errs by less than this share of |C|_1 + |u|_1 + |v|_1. In units of 2^-24 of
-// numbers that are at most that sum: 1 for C's subtraction, 6 for dividing u and v by their lengths
-// and multiplying again, 3 for the dot product, 2 for the sums; and 13 for a crossing of the near
-// plane (two differences, a quotient of 5, product, sum, and those of both ends): 25, 1.5e-6.
+// A corner's coordinate errs by less than this share of |C|_1 + |u|_1 + |v|_1. Roundings in units
+// of 2^-24 of that sum: 1 for C's subtraction, 6 for dividing u and v by their lengths and
+// multiplying again, 3 for the dot product, 2 for the sums. A crossing of the near plane adds 13:
+// two differences, a quotient of 5, product, sum, and those of both ends. Together 25, 1.5e-6.
 const float ROUNDING = 2e-6;
 
 // Widens low and high to the slopes of p, which errs by at most e < z/2 along each axis.

@@ -1,6 +1,5 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "camera.glsl"
 #include "plane.glsl"

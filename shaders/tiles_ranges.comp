@@ -1,7 +1,6 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
-#include "buffers.glsl"
 #include "records.glsl"
 #include "tiles.glsl"
 

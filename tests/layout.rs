@@ -187,9 +187,10 @@ void main() { copies[gl_WorkGroupID.x] = region_at(gl_WorkGroupID.x); }
     assert!(text_of("tiles_splat.comp").contains("texelFetch(particles, int(3 * i + 1))"));
     assert!(text_of("tiles_splat.comp").contains("texelFetch(lit, 4 * facet + 2)"));
     let gather = text_of("include/gather.glsl");
-    for (record, n_texels) in
-        [("sources", size_of::<SourceRecord>() / 16), ("stencils", size_of::<PackedRecord>() / 16)]
-    {
+    for (record, n_texels) in [
+        ("sources", size_of::<SourceRecord>() / 16),
+        ("cell_samples", size_of::<PackedRecord>() / 16),
+    ] {
         let first = gather.split(&format!("texelFetch({record}, k)")).next().unwrap();
         assert!(first.ends_with("Float(") || first.ends_with("Packed("), "{record}");
         let stride = first.rsplit_once("* ").unwrap().1.split(';').next().unwrap();

@@ -208,7 +208,7 @@ fn wrong_light_is_noticed() {
         ("include/light.glsl", "max(d, light.radius)", "d"),
         ("include/light.glsl", "cone * cone", "cone"),
         ("include/light.glsl", "dot(toward, light.toward)", "dot(toward, -light.toward)"),
-        ("first.comp", "0.318309886183791", "0.3183"),
+        ("include/first.glsl", "0.318309886183791", "0.3183"),
         ("first.comp", "* facet.color", ""),
         ("first.comp", "region_at(facet.i_region)", "region_at(0u)"),
         ("first.comp", "j * push.n_lights + l", "l * push.n_facets + j"),

@@ -41,7 +41,7 @@ Plane ramp(Plane plane) {
 vec4 inside(Plane ramp, float along) { return clamp(on_row(ramp, along), 0.0, 1.0); }
 
 // Returns cos cos/d^2 over one row of parts, without the source's cosine times d. The value is the
-// mean over the part as in rectangle_form(), of half axes u/4 and v/4; parts wider than their
+// mean over the part as in rectangle_form(), of half axes u/4 and v/4. Parts wider than their
 // distance count as discs. o: the row's middle from the receiver.
 vec4 row_of_forms(vec3 o, vec3 u, vec3 v, vec3 receiver_normal, float part) {
     float uu = 0.0625 * dot(u, u), vv = 0.0625 * dot(v, v);

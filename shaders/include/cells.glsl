@@ -12,8 +12,8 @@ const float LOBE_STEP = 3.0;
 // shadow edges need (docs/measured.md).
 const float LOBE_PARTS = 1.5;
 // The half vector turns by at most this share of a cell's width over its distance between centre
-// and corner: half the direction's turn, of half a diagonal of sqrt 2. It is twice that where the
-// light is as near as the receiver.
+// and corner. It is half the direction's turn, of half a diagonal of sqrt 2, and twice that where
+// the light is as near as the receiver.
 const float TURN = 0.75;
 // A cluster that a shadow's edge crosses is opened down to this share of the opening angle's
 // diameter.
@@ -47,7 +47,7 @@ struct Walk {
 Walk start_walk(uint s) { return Walk(s, 0u, uvec2(0u)); }
 
 // Facets are deferred before they are split, so that the loop over cells does not run once for
-// every facet: a device that runs both sides of a condition runs an empty loop at least once.
+// every facet. A device that runs both sides of a condition runs an empty loop at least once.
 #ifndef MAX_DEFERRED
 #define MAX_DEFERRED 8
 #endif
@@ -140,7 +140,7 @@ float cluster_form(LoadedSource source, vec3 receiver_normal, vec3 direction, fl
 #endif
 
 // Returns by how much a cell of this width over its distance is wider than `limit` widths of the
-// region's lobes. gap: of the half vector from the normal; turn: its change within the cell. The
+// region's lobes. gap: of the half vector from the normal. turn: its change within the cell. The
 // narrowest lobe counts that the material has at any time, so that the cells do not depend on the
 // time.
 float lobe_excess(Region region, float gap, float turn, float width, float limit) {
@@ -278,8 +278,8 @@ bool may_have_edge(LoadedSource source, SourceView view) {
 }
 
 // Returns what the quarters of a facet's cell send on of light l's energy: A times the share that
-// arrives at each of their visible points. own: finds the light at the cell's own points; else
-// takes it from the facet's parts that they lie in.
+// arrives at each of their visible points. own: finds the light at the cell's own points. Otherwise
+// the facet's parts that the points lie in give the light.
 vec4 arriving_by(
     uint i, LoadedSource source, Walk walk, Cell cell, CellSamples seen, uint i_own, const bool own,
     uint l

@@ -1,8 +1,8 @@
 // Whether a surface's rectangle lies between two points, or before a light (docs/model.md §7). Both
 // of its sides occlude.
 
-// A point nearer to a rectangle's plane than this share of its distance from the centre lies in the
-// plane, but for the rounding of its coordinates (a few 2^-24); the rectangle does not hide such a
+// A point lies in a rectangle's plane where its distance is below this share of its distance from
+// the centre: the rounding of its coordinates (a few 2^-24). The rectangle does not hide such a
 // point.
 const float IN_PLANE = 9.5367431640625e-7;
 

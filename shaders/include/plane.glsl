@@ -1,7 +1,7 @@
-// A plane C + s u + t v, solved for a ray by Cramer's rule.
-// U x V, C.(U x V); V x C, |u|; C x U, |v|. C from the eye, directions U = u/|u|, V = v/|v|, all
-// along (right, up, forward); |.| is the greatest component, since f32 holds no product of two
-// lengths of 1e-15 with a third.
+// A plane C + s u + t v, solved for a ray by Cramer's rule: U x V, C.(U x V); V x C, |u|; C x U,
+// |v|.
+// C is relative to the eye; U = u/|u| and V = v/|v|, all along (right, up, forward). |.| is the
+// greatest component, since f32 holds no product of two lengths of 1e-15 with a third.
 struct RayPlane {
     vec4 normal;
     vec4 s;

@@ -1,5 +1,7 @@
 // The records of src/layout/, in std430. tests/layout.rs compares names, offsets and sizes.
 
+#include "buffers.glsl"
+
 struct Particle {
     vec3 position;
     float sigma;

@@ -1,5 +1,11 @@
-// The facet on a blob's shell (docs/model.md §11 "facets"). Needs functions.glsl, `density` and the
-// push constants' grid.
+// The facet on a blob's shell (docs/model.md §11 "facets"). Needs
+// records.glsl, functions.glsl and the push constants' grid.
+
+READS(0, Placed, placed)
+READS(1, Particle, particles)
+READS(2, uint, i_group)
+READS(3, Group, groups)
+layout(binding = 4) uniform samplerBuffer density;
 
 #include "density.glsl"
 
@@ -16,7 +22,7 @@ const float CONDITION_LOW = 0.02;
 const float CONDITION_HIGH = 0.10;
 const float SQRT_TAU = 2.50662827463;
 // Least aspect of a blob, and least inverse of one.
-const float LEAST_ASPECT = 1e-3;
+const float MIN_ASPECT = 1e-3;
 
 vec3 unit_or(vec3 v, vec3 otherwise) {
     float l = length(v);

@@ -68,8 +68,8 @@ ADDING(SUM3, REAL3)
 
 #elif SUMMATION == PAIRWISE
 
-// Terms are added up by blocks of BLOCK, and blocks as a binary counter counts: part k is the sum
-// of 2^k blocks and holds a value where bit k of the number of blocks is set; the last part takes
+// Terms are added up by blocks of BLOCK, and blocks as a binary counter counts. Part k is the sum
+// of 2^k blocks; it holds a value where bit k of the number of blocks is set. The last part takes
 // the rest. There is no loop and no index, so that parts can lie in registers.
 const uint BLOCK = 8u;
 const uint N_PARTS = 12u;

@@ -1,13 +1,10 @@
 // How a receiver walks the sources of a pairing: wholes one by one, deferred ones cell by cell
-// (docs/model.md §11 "second"). The includer defines what is added:
-//   void add_whole(uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver,
-//   float share);
-//   void add_cell(uint i, LoadedSource source, SourceView view, Region emitter, Receiver receiver,
-//   CellSamples seen, Walk walk, Cell cell, float part, uint i_own, const bool own);
-//   void add_unresolved(uint i, LoadedSource source, SourceView view, Region emitter, Receiver
-//   receiver, float area);
-// own: the cell's light is found at its own points, not taken from its facet's. add_unresolved: for
-// a cell that stayed too wide.
+// (docs/model.md §11 "second"). main() is here, too. The includer defines three functions.
+// add_whole() adds a source as a whole.
+// add_cell() adds a cell; own: its light is found at its own points, not taken from its facet's.
+// add_unresolved() counts a cell that stayed too wide.
+// With STORES_PAIRINGS it also defines clear() and store_pairing(), for the sums of one pairing.
+// store_receiver() stores the rest.
 
 // Facets whose cells a driver cut short all the same.
 float n_cut = 0.0;

@@ -60,6 +60,7 @@ pub const SHADERS: &[(&str, &str)] = shader_texts![
     "include/cull.glsl",
     "include/density.glsl",
     "include/each.glsl",
+    "include/first.glsl",
     "include/functions.glsl",
     "include/gather.glsl",
     "include/impostors.glsl",

@@ -10,6 +10,7 @@ use bytemuck::Pod;
 use nimbus::gpu::{Buffer, Commands, Compiler, Device, Instance, MemoryUsage, Recorder};
 use nimbus::passes;
 
+/// A device, and what a test needs to run kernels on it.
 pub struct Gpu {
     pub commands: Commands,
     pub compiler: Compiler,
@@ -79,7 +80,7 @@ pub fn assert_within(what: &str, values: &[f64], truths: &[f64], bounds: &[f64])
     assert_eq!(values.len(), truths.len(), "{what}: lengths");
     let check = |i: usize| {
         let error = (values[i] - truths[i]).abs();
-        // Written so that NaN fails.
+        // The comparison fails for NaN.
         if error <= bounds[i] { None } else { Some((i, error)) }
     };
     let bad: Vec<_> = (0..values.len()).filter_map(check).collect();

@@ -1,0 +1,12 @@
+// The buffers that first.comp and first_tensor.comp read. Needs records.glsl and light.glsl.
+
+const float INV_PI = 0.318309886183791;
+
+READS(0, Facet, facets)
+READS(1, Light, lights)
+READS(2, float, transmittance)
+layout(binding = 3) uniform usamplerBuffer regions;
+#include "regions.glsl"
+layout(binding = 4) uniform samplerBuffer table;
+
+#include "lobe.glsl"

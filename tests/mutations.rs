@@ -202,7 +202,7 @@ const FAULTS: &[Fault] = &[
     ),
     (
         "missing 1/pi in diffuse reflection",
-        "first.comp",
+        "include/first.glsl",
         "0.318309886183791",
         "1.0",
         "brdf/exponent-0",

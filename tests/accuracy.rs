@@ -15,8 +15,8 @@ use harness::Gpu;
 use nimbus::model::basis::{Basis, evaluate};
 use nimbus::model::material::Brdf;
 use nimbus::model::scene::Scene;
-use nimbus::reference::area::mean::each;
 use nimbus::reference::area::{Accuracy, AreaScene, Estimate};
+use nimbus::reference::parallel::parallel_map;
 use rooms::{Frame, HEAD, Plate, frame, plates_text, random_plates, sun_and_lamp};
 use scene_text::load_with;
 
@@ -56,7 +56,7 @@ fn truths(scene: &Scene, eye: DVec3, stride: usize, relative: f64) -> Vec<(usize
     let brdfs = brdfs(scene);
     let scenery = AreaScene::new(&scene.surfaces, &brdfs, &scene.lights, &[], 0.0, &[]);
     let places = places(scene);
-    each(places.len().div_ceil(stride), |k| {
+    parallel_map(places.len().div_ceil(stride), |k| {
         let (s, i) = places[k * stride];
         let receiver = scenery.on_surface(s, scene.surfaces[s].facet_center(i));
         let toward = (eye - receiver.position).normalize();
@@ -167,7 +167,7 @@ fn what_the_lights_bring_is_right_to_rounding() {
             for light in &f.scene.lights {
                 let arrival = light.arrival(at.position);
                 let e = light.energy()
-                    * light.share(at.normal, &arrival, scenery.in_light(at.position, light));
+                    * light.share(at.normal, &arrival, scenery.visibility(at.position, light));
                 // What cos θ and the lobe can turn by: coordinates up to 4 rounded to f32, by the
                 // lamp's distance.
                 let turn = 8.0 * f64::from(f32::EPSILON) * (1.0 + 4.0 / arrival.distance.min(4.0));

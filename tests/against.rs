@@ -7,8 +7,7 @@ use std::fs;
 
 use nimbus::io::scene_file::load;
 use nimbus::model::scene::Scene;
-use nimbus::reference::picture::kind::{Reference, ReferenceKind};
-use nimbus::reference::picture::pixels::Pixels;
+use nimbus::reference::picture::{Pixels, Reference, ReferenceKind};
 
 fn scene(text: &str, points: &str) -> Scene {
     let dir = tempfile::tempdir().unwrap();
@@ -19,7 +18,7 @@ fn scene(text: &str, points: &str) -> Scene {
 
 fn reference(scene: &Scene, against: &str) -> Reference {
     let pixels = Pixels::all(scene.film.width, scene.film.height);
-    against.parse::<ReferenceKind>().unwrap().reference(scene, 0.0, &pixels, &|_, _| ()).unwrap()
+    against.parse::<ReferenceKind>().unwrap().render(scene, 0.0, &pixels, &|_, _| ()).unwrap()
 }
 
 /// One pixel, looking along -z at what stands at the origin.

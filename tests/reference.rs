@@ -13,7 +13,9 @@ use nimbus::reference::generate::{
     uniforms,
 };
 use nimbus::reference::rounding::{U_F32, particle_bound};
-use nimbus::reference::sprites::{Rounding, View, alpha, render, render_with_bound};
+use nimbus::reference::sprites::{
+    Bounded, OpaquePixel, Rounding, Sprites, View, alpha, render, render_over,
+};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 const FORMS: [Form; 2] = [Form::Centred, Form::Printed];
@@ -290,6 +292,17 @@ fn f32_evaluations_stay_within_their_bound() {
     }
 }
 
+/// Blobs without textures.
+fn plain<'a>(blobs: &'a [Blob], radiance: &'a [DVec3], order: &'a [u32]) -> Sprites<'a> {
+    Sprites { blobs, radiance, order, factor: None }
+}
+
+/// The picture over nothing and its bound.
+fn over_nothing(view: &View, sprites: &Sprites, rounding: &Rounding) -> Bounded {
+    let nothing = vec![OpaquePixel::EMPTY; (view.width * view.height) as usize];
+    render_over(view, &nothing, sprites, rounding)
+}
+
 fn view(width: u32, height: u32) -> View {
     let pose = Pose { position: DVec3::ZERO, right: DVec3::X, up: DVec3::Y, forward: DVec3::NEG_Z };
     View {
@@ -321,7 +334,7 @@ fn scattered(n: u32, nearest: f64) -> (Vec<Blob>, Vec<DVec3>) {
 fn one_blob_at_two_pixels() {
     let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.6 };
     let color = DVec3::new(0.2, 0.5, 2.0);
-    let image = render(&view(5, 3), &[blob], &[color], &[0]);
+    let image = render(&view(5, 3), &plain(&[blob], &[color], &[0]));
     // Centre pixel: b = 0, τ = √(2π)κσ. Column 3 of the middle row: direction (2·3.5/5 − 1)·5/3 =
     // 2/3 to the right of forward, b = 3·(2/3)/√(1 + 4/9) = 6/√13, e^{−b²/2} = e^{−18/13}.
     for (i, tau) in [(7, 0.6 * SQRT_TAU), (8, 0.6 * SQRT_TAU * (-18.0f64 / 13.0).exp())] {
@@ -333,7 +346,7 @@ fn one_blob_at_two_pixels() {
     let mut moved = view(5, 3);
     moved.pose.position = DVec3::X;
     let raised = Blob { position: blob.position + DVec3::X + DVec3::Y, ..blob };
-    let image = render(&moved, &[raised], &[color], &[0]);
+    let image = render(&moved, &plain(&[raised], &[color], &[0]));
     assert!(image[2][3] > image[12][3]);
     assert!((alpha(blob.deepest()) + (-0.6 * SQRT_TAU).exp_m1()).abs() < 1e-15);
 }
@@ -343,15 +356,17 @@ fn what_is_behind_near_or_absent_is_not_drawn() {
     let zeros = vec![[0.0; 4]; 15];
     let at = |z| Blob { aspect: 1.0, position: DVec3::Z * z, sigma: 1.0, kappa: 0.6 };
     for z in [3.0, 0.0, -0.0999, f64::NAN] {
-        assert_eq!(render(&view(5, 3), &[at(z)], &[DVec3::ONE], &[0]), zeros);
+        assert_eq!(render(&view(5, 3), &plain(&[at(z)], &[DVec3::ONE], &[0])), zeros);
     }
-    assert_eq!(render(&view(5, 3), &[], &[], &[]), zeros);
-    assert_ne!(render(&view(5, 3), &[at(-0.1)], &[DVec3::ONE], &[0]), zeros);
+    assert_eq!(render(&view(5, 3), &plain(&[], &[], &[])), zeros);
+    assert_ne!(render(&view(5, 3), &plain(&[at(-0.1)], &[DVec3::ONE], &[0])), zeros);
     // Beyond three σ nothing: b = 3·(4/5·5/3)/√(1 + 16/9) = 2.4 at column 4.
-    let image = render(&view(5, 3), &[Blob { sigma: 0.79, ..at(-3.0) }], &[DVec3::ONE], &[0]);
+    let image =
+        render(&view(5, 3), &plain(&[Blob { sigma: 0.79, ..at(-3.0) }], &[DVec3::ONE], &[0]));
     assert_eq!(image[9], [0.0; 4]);
     assert!(
-        render(&view(5, 3), &[Blob { sigma: 0.81, ..at(-3.0) }], &[DVec3::ONE], &[0])[9][3] > 0.0
+        render(&view(5, 3), &plain(&[Blob { sigma: 0.81, ..at(-3.0) }], &[DVec3::ONE], &[0]))[9][3]
+            > 0.0
     );
 }
 
@@ -362,15 +377,15 @@ fn equal_colors_hide_the_order_and_equal_layers_multiply() {
     let view = view(24, 16);
     let forth: Vec<u32> = (0..60).collect();
     let back: Vec<u32> = (0..60).rev().collect();
-    let a = render(&view, &blobs, &[color; 60], &forth);
-    let b = render(&view, &blobs, &[color; 60], &back);
+    let a = render(&view, &plain(&blobs, &[color; 60], &forth));
+    let b = render(&view, &plain(&blobs, &[color; 60], &back));
     // C = c(1 − T) whatever the order; 60 layers of a few roundings of numbers below 1.
     for (a, b) in a.iter().zip(&b) {
         assert!((0..4).all(|k| (a[k] - b[k]).abs() < 1e-13) && (a[2] - 0.9 * a[3]).abs() < 1e-13);
     }
     let layer = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma: 1.0, kappa: 0.1 };
-    let image = render(&view, &[layer; 7], &[color; 7], &[0, 1, 2, 3, 4, 5, 6]);
-    let one = render(&view, &[layer], &[color], &[0]);
+    let image = render(&view, &plain(&[layer; 7], &[color; 7], &[0, 1, 2, 3, 4, 5, 6]));
+    let one = render(&view, &plain(&[layer], &[color], &[0]));
     assert!(
         image
             .iter()
@@ -398,7 +413,7 @@ fn no_rectangle_is_too_small() {
     let (blobs, radiance) = scattered(300, 0.05);
     let view = view(40, 30);
     let order: Vec<u32> = (0..300).collect();
-    let image = render(&view, &blobs, &radiance, &order);
+    let image = render(&view, &plain(&blobs, &radiance, &order));
     for (pixel, k) in image.iter().zip(0..) {
         let composed = layers(&view, &blobs, &radiance, k % 40, k / 40)
             .iter()
@@ -417,8 +432,8 @@ fn half_float_targets_stay_within_their_bound() {
     let order: Vec<u32> = (0..600).collect();
     const ALPHA: f64 = 1e-4;
     let rounding = Rounding::of(FilmFormat::Rgba16f, ALPHA, 0.0);
-    let (image, bounds) = render_with_bound(&view, &blobs, &radiance, &order, &rounding);
-    assert_eq!(image, render(&view, &blobs, &radiance, &order));
+    let (image, bounds) = over_nothing(&view, &plain(&blobs, &radiance, &order), &rounding);
+    assert_eq!(image, render(&view, &plain(&blobs, &radiance, &order)));
     let mut ratios = Vec::new();
     for k in 0..1200 {
         let mut stored = [0.0; 4];
@@ -452,7 +467,7 @@ fn a_sprites_edge_may_fall_either_way() {
         let blob = Blob { aspect: 1.0, position: DVec3::NEG_Z * 3.0, sigma, kappa: 0.6 };
         let bound = |edge| {
             let rounding = Rounding::of(FilmFormat::Rgba32f, 0.0, edge);
-            render_with_bound(&view(5, 3), &[blob], &[DVec3::ONE], &[0], &rounding).1[9][3]
+            over_nothing(&view(5, 3), &plain(&[blob], &[DVec3::ONE], &[0]), &rounding).1[9][3]
         };
         let step = alpha(blob.deepest() * (-0.5 * (2.4 / sigma).powi(2)).exp());
         assert!(bound(1e-8) < 1e-6 && (bound(1e-6) - step).abs() < 1e-6);

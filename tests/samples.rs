@@ -7,9 +7,10 @@ use std::sync::atomic::AtomicBool;
 use nimbus::error::Error;
 use nimbus::io::scene_file;
 use nimbus::model::scene::Scene;
-use nimbus::reference::picture::kind::ReferenceKind;
-use nimbus::reference::picture::pixels::{Pixels, Tile};
-use nimbus::reference::picture::samples::{Mean, N_VALUES, Pairs, Subject, Sums, sums};
+use nimbus::reference::picture::{
+    MeanPicture, N_VALUES, PairwiseSum, Pixels, ReferenceKind, ReferenceRequest, SampleSums, Tile,
+    sums,
+};
 
 fn loaded(scene: &str, set: &[&str]) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(scene);
@@ -17,12 +18,16 @@ fn loaded(scene: &str, set: &[&str]) -> Scene {
     scene_file::load(&path, &set, None).expect("a scene").at_frame(0)
 }
 
-fn of(subject: &Subject<'_>, pixels: &Pixels, samples: std::ops::Range<u32>) -> Sums {
+fn of(
+    subject: &ReferenceRequest<'_>,
+    pixels: &Pixels,
+    samples: std::ops::Range<u32>,
+) -> SampleSums {
     sums(subject, pixels, samples, &AtomicBool::new(false), &|_, _| ()).expect("sums")
 }
 
 /// Tiles of `size`, each of ranges of two samples.
-fn in_parts(subject: &Subject<'_>, n: u32, [columns, rows]: [u32; 2]) -> Sums {
+fn in_parts(subject: &ReferenceRequest<'_>, n: u32, [columns, rows]: [u32; 2]) -> SampleSums {
     let film = subject.scene.film;
     let whole = Pixels::all(film.width, film.height);
     let mut values = vec![f64::NAN; N_VALUES * whole.at.len()];
@@ -30,7 +35,7 @@ fn in_parts(subject: &Subject<'_>, n: u32, [columns, rows]: [u32; 2]) -> Sums {
         for left in (0..film.width).step_by(columns as usize) {
             let (width, height) = (columns.min(film.width - left), rows.min(film.height - top));
             let pixels = Pixels::tile(film.width, film.height, Tile { left, top, width, height });
-            let mut pairs = Pairs::default();
+            let mut pairs = PairwiseSum::default();
             (0..n)
                 .step_by(2)
                 .for_each(|first| pairs.push(of(subject, &pixels, first..n.min(first + 2))));
@@ -40,7 +45,7 @@ fn in_parts(subject: &Subject<'_>, n: u32, [columns, rows]: [u32; 2]) -> Sums {
             }
         }
     }
-    Sums { n_samples: n, values }
+    SampleSums { n_samples: n, values }
 }
 
 #[test]
@@ -73,8 +78,11 @@ fn tiles_and_ranges_are_the_whole_to_the_bit() {
         ),
     ] {
         let scene = loaded(scene, &[&size[..], more].concat());
-        let subject =
-            Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
+        let subject = ReferenceRequest {
+            kind: of_which.parse().expect("a reference"),
+            scene: &scene,
+            time_s: 0.0,
+        };
         let pixels = Pixels::all(scene.film.width, scene.film.height);
         let whole = of(&subject, &pixels, 0..3);
         assert!(
@@ -120,8 +128,11 @@ fn a_pixel_has_what_covers_its_area() {
     std::fs::write(&file, WALL).expect("a file");
     let scene = scene_file::load(&file, &[], None).expect("a scene").at_frame(0);
     for of_which in ["thin", "volume", "model"] {
-        let subject =
-            Subject { of: of_which.parse().expect("a reference"), scene: &scene, time_s: 0.0 };
+        let subject = ReferenceRequest {
+            kind: of_which.parse().expect("a reference"),
+            scene: &scene,
+            time_s: 0.0,
+        };
         let alpha = |n: u32| -> Vec<f64> {
             let mean = of(&subject, &Pixels::all(8, 8), 0..n).mean();
             mean.rgba.iter().map(|v| v[3]).collect()
@@ -153,7 +164,7 @@ fn a_pixel_has_what_covers_its_area() {
 }
 
 /// Root mean square of the differences of two pictures, of the greatest channel.
-fn differ(a: &Mean, b: &Mean) -> f64 {
+fn differ(a: &MeanPicture, b: &MeanPicture) -> f64 {
     let of =
         |(a, b): (&[f64; 4], &[f64; 4])| (0..3).map(|k| (a[k] - b[k]).powi(2)).fold(0.0, f64::max);
     let sum: f64 = a.rgba.iter().zip(&b.rgba).map(of).sum();
@@ -164,7 +175,8 @@ fn differ(a: &Mean, b: &Mean) -> f64 {
 fn more_samples_are_nearer_and_say_so() {
     let size = ["film.width=8", "film.height=6"];
     let scene = loaded("scenes/study-light.toml", &size);
-    let subject = Subject { of: ReferenceKind::Reflections(3), scene: &scene, time_s: 0.0 };
+    let subject =
+        ReferenceRequest { kind: ReferenceKind::Reflections(3), scene: &scene, time_s: 0.0 };
     let pixels = Pixels::all(8, 6);
     // Others than those that are judged.
     let truth = of(&subject, &pixels, 1000..1064).mean();
@@ -183,7 +195,7 @@ fn more_samples_are_nearer_and_say_so() {
 #[test]
 fn it_ends_when_it_is_asked_to() {
     let scene = loaded("scenes/hello.toml", &["film.width=8", "film.height=6"]);
-    let subject = Subject { of: ReferenceKind::Thin, scene: &scene, time_s: 0.0 };
+    let subject = ReferenceRequest { kind: ReferenceKind::Thin, scene: &scene, time_s: 0.0 };
     let stop = AtomicBool::new(true);
     let ended = sums(&subject, &Pixels::all(8, 6), 0..1_000_000, &stop, &|_, _| ());
     assert!(matches!(ended, Err(Error::Interrupted)), "{ended:?}");

@@ -25,7 +25,7 @@ use nimbus::model::film::FilmFormat;
 use nimbus::passes;
 use nimbus::reference::sprites::{OpaquePixel, View};
 use nimbus::reference::texture::Pool;
-use nimbus::reference::threshold::{Omitted, cut};
+use nimbus::reference::threshold::{Omitted, omitted};
 use picture::{Picture, Tiled, Way};
 use scenery::Scenery;
 
@@ -111,7 +111,7 @@ fn cut_of(picture: &Picture) -> Vec<Omitted> {
     let sheets = picture.sheets();
     let factor = |j: usize, delta: DVec2| picture.factor(&sheets, j, delta);
     // What stands behind in doubt has no bound.
-    cut(&picture.view, &behind, &picture.blobs(), Some(&factor))
+    omitted(&picture.view, &behind, &picture.blobs(), Some(&factor))
 }
 
 /// Of each of a pixel's four numbers how much the cut may change it: what is met is of radiances

@@ -20,8 +20,7 @@ use crate::io::image;
 use crate::measure::picture::map::error_map;
 use crate::model::film::Film;
 use crate::model::scene::Scene;
-use crate::reference::picture::pixels::Pixels;
-use crate::reference::picture::whole::Work;
+use crate::reference::picture::{Pixels, RenderStage};
 use crate::report::charts::{self, Plot};
 use crate::studies::error::design::{Design, name_of, settings};
 use crate::studies::error::files;
@@ -293,7 +292,7 @@ fn load_with(args: &ErrorArgs, options: &super::SceneArgs, settings: &[Setting])
 fn reference(args: &ErrorArgs, scene: &Scene, time_s: f64, pixels: &Pixels) -> Result<Kept> {
     let quiet = args.options.quiet;
     let shown = Mutex::new(Shown::spinner(quiet));
-    let on_part = |work: Work, n: usize| {
+    let on_part = |work: RenderStage, n: usize| {
         shown.lock().unwrap_or_else(PoisonError::into_inner).advance(work, n, quiet);
     };
     let folder = reference_cache::default_folder();

@@ -22,7 +22,7 @@ pub trait Animation: Debug + Send + Sync {
 /// A cloud's particles, and what bounds them at all times.
 #[derive(Debug, Clone)]
 pub struct AnimatedParticles {
-    pub mover: Arc<dyn Animation>,
+    pub animation: Arc<dyn Animation>,
     pub n_particles: u32,
     /// Of the positions.
     pub low: DVec3,
@@ -40,6 +40,6 @@ pub struct AnimatedParticles {
 
 impl PartialEq for AnimatedParticles {
     fn eq(&self, other: &AnimatedParticles) -> bool {
-        Arc::ptr_eq(&self.mover, &other.mover) && self.n_particles == other.n_particles
+        Arc::ptr_eq(&self.animation, &other.animation) && self.n_particles == other.n_particles
     }
 }

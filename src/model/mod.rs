@@ -20,6 +20,7 @@ pub mod impostor;
 pub mod light;
 pub mod material;
 pub mod moisture;
+pub mod pair_rules;
 pub mod pairings;
 pub mod philox;
 pub mod resolution;

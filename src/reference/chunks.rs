@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use super::sprites::OpaquePixel;
+use super::sprites::{Bounded, OpaquePixel};
 use super::tiles::{Composed, Composition, U, render_by};
 
 /// C ← C + (1 − A) α L, A ← A + (1 − A) α: the device keeps A, so what passes is off by a share of
@@ -29,7 +29,7 @@ fn under(pixel: &mut Composed, alpha: f64, off: f64, radiance: DVec3) {
 }
 
 /// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
-pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
+pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
     let (values, mut bounds) = render_by(of, behind, under);
     // It is blended over what stands behind in no fewer bits than the film's: source and factor are
     // rounded, too.
@@ -50,7 +50,7 @@ mod tests {
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
     use crate::reference::Blob;
-    use crate::reference::sprites::{Rounding, View, render_over as far_to_near};
+    use crate::reference::sprites::{Rounding, Sprites, View, render_over as far_to_near};
 
     const VIEW: View = View {
         width: 1,
@@ -80,15 +80,8 @@ mod tests {
         behind: OpaquePixel,
     ) -> ([f64; 4], [f64; 4]) {
         let order: Vec<u32> = (0..blobs.len() as u32).collect();
-        let of = Composition {
-            view: &VIEW,
-            blobs,
-            radiance: colors,
-            order: &order,
-            factor: None,
-            rounding,
-            saturated: 0.0,
-        };
+        let sprites = Sprites { blobs, radiance: colors, order: &order, factor: None };
+        let of = Composition { view: &VIEW, sprites, rounding, saturated: 0.0 };
         let (values, bounds) = render_over(&of, &[behind]);
         (values[0], bounds[0])
     }
@@ -104,7 +97,11 @@ mod tests {
             assert!((v - by_hand).abs() < 1e-15, "{value:?}");
         }
         assert!(bound.iter().all(|b| *b > 0.0 && *b < 2e-6), "{bound:?}");
-        let (other, _) = far_to_near(&VIEW, &[behind], &blobs, &colors, &[0, 1], &Rounding::NONE);
+        let (other, _) = {
+            let sprites =
+                Sprites { blobs: &blobs, radiance: &colors, order: &[0, 1], factor: None };
+            far_to_near(&VIEW, &[behind], &sprites, &Rounding::NONE)
+        };
         assert!(value.iter().zip(other[0]).all(|(a, b)| (a - b).abs() < 1e-15));
     }
 

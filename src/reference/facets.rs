@@ -8,8 +8,8 @@ use std::f64::consts::PI;
 use glam::DVec3;
 
 use super::Blob;
-use super::area::mean::each;
 use super::grid::{density, sample};
+use super::parallel::parallel_map;
 use crate::model::cloud::{MIN_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
@@ -65,7 +65,8 @@ fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64
     })
 }
 
-/// Unit normal and conditioning q of a blob at `p` in a cloud about `center`.
+/// Returns the unit normal and the conditioning q of a blob of shape (σ, aspect) at `p` in a cloud
+/// about `center`.
 pub fn normal(
     spec: &GridSpec,
     cells: &[f64],
@@ -73,11 +74,11 @@ pub fn normal(
     [sigma, aspect]: [f64; 2],
     center: DVec3,
 ) -> (DVec3, f64) {
-    toward_less(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
+    blended_normal(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
 }
 
 /// The unit normal down the gradient G beside S, and q.
-fn toward_less((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
+fn blended_normal((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
     let t = smoothstep(CONDITIONING, q);
@@ -109,67 +110,62 @@ fn shell(p: DVec3, [sigma, aspect]: [f64; 2], n: DVec3) -> DVec3 {
     p + SHELL_SIGMA * sigma / n.dot(to).sqrt() * to
 }
 
-/// One facet a blob. `sigma_means[j]` is the mean σ of blob j's group, which bounds the scale of
-/// its facet from below; `regions[j]` its cloud; `cloud_centers` are relative to O.
+/// The particles that facets are made of. *Shape*: all by particle.
+#[derive(Debug, Clone, Copy)]
+pub struct FacetSources<'a> {
+    /// Placed blobs.
+    pub blobs: &'a [Blob],
+    /// Mean σ of each particle's group, which bounds the scale of its facet from below.
+    pub sigma_means: &'a [f64],
+    /// Index of each particle's cloud.
+    pub regions: &'a [u32],
+    /// Colours, linear RGB.
+    pub colors: &'a [DVec3],
+}
+
+/// Returns one facet a blob, with normals from the density grid. `cloud_centers` are relative to
+/// the lighting origin.
 pub fn facets(
     spec: &GridSpec,
     cells: &[f64],
-    blobs: &[Blob],
-    sigma_means: &[f64],
-    regions: &[u32],
+    sources: &FacetSources<'_>,
     cloud_centers: &[DVec3],
 ) -> Vec<Facet> {
-    let of = |p: DVec3, [sigma, aspect]: [f64; 2]| gradient(spec, cells, p, sigma, aspect);
-    let facet = |(i, blob): (usize, &Blob)| {
-        let center = cloud_centers[regions[i] as usize];
-        facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
-    };
-    blobs.iter().enumerate().map(facet).collect()
+    let facet = |i| facet_of(sources, i, cloud_centers, |x| sample(spec, cells, x));
+    (0..sources.blobs.len()).map(facet).collect()
 }
 
-/// One facet a blob, its normal from the blobs' own density Σ κ e^{−|x − p|²/2σ²} in place of a
-/// grid's.
-pub fn closed(
-    blobs: &[Blob],
-    sigma_means: &[f64],
-    regions: &[u32],
-    cloud_centers: &[DVec3],
-) -> Vec<Facet> {
-    let of =
-        |p: DVec3, [sigma, aspect]: [f64; 2]| gradient_of(|x| density(blobs, x), p, sigma, aspect);
-    each(blobs.len(), |i| {
-        let (blob, center) = (&blobs[i], cloud_centers[regions[i] as usize]);
-        facet_of(blob, blob.sigma.max(sigma_means[i]), regions[i], center, of)
+/// Returns one facet a blob, with normals from the blobs' own density instead of a grid's.
+pub fn from_density(sources: &FacetSources<'_>, cloud_centers: &[DVec3]) -> Vec<Facet> {
+    parallel_map(sources.blobs.len(), |i| {
+        facet_of(sources, i, cloud_centers, |x| density(sources.blobs, x))
     })
 }
 
 fn facet_of(
-    blob: &Blob,
-    scale: f64,
-    region: u32,
-    center: DVec3,
-    gradient: impl Fn(DVec3, [f64; 2]) -> (DVec3, f64),
+    sources: &FacetSources<'_>,
+    i: usize,
+    cloud_centers: &[DVec3],
+    density: impl Fn(DVec3) -> f64,
 ) -> Facet {
-    let shape = [scale, blob.aspect];
-    let (normal, conditioning) =
-        toward_less(gradient(blob.position, shape), blob.aspect, blob.position, center);
-    Facet {
-        position: shell(blob.position, shape, normal),
-        normal,
-        area: area(blob),
-        region,
-        conditioning,
-    }
+    let (blob, region) = (&sources.blobs[i], sources.regions[i]);
+    let shape = [blob.sigma.max(sources.sigma_means[i]), blob.aspect];
+    let center = cloud_centers[region as usize];
+    on_shell(blob.position, shape, area(blob), region, center, density)
 }
 
-/// What facets of several particles are made of, by particle; `regions` and `cloud_centers` as for
-/// [`facets`].
-#[derive(Debug, Clone, Copy)]
-pub struct FacetSources<'a> {
-    pub blobs: &'a [Blob],
-    pub sigma_means: &'a [f64],
-    pub regions: &'a [u32],
-    pub colors: &'a [DVec3],
+/// Returns the facet on the shell of a blob of shape (σ, aspect) at `p`.
+fn on_shell(
+    p: DVec3,
+    shape: [f64; 2],
+    area: f64,
+    region: u32,
+    center: DVec3,
+    density: impl Fn(DVec3) -> f64,
+) -> Facet {
+    let gradient = gradient_of(density, p, shape[0], shape[1]);
+    let (normal, conditioning) = blended_normal(gradient, shape[1], p, center);
+    Facet { position: shell(p, shape, normal), normal, area, region, conditioning }
 }
 
 /// What a run of particles is as one blob.
@@ -198,7 +194,7 @@ fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 /// The particles `run` as one; `ellipsoids`: some of the scene's blobs are no balls.
-pub fn bunch(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob {
+pub fn merged(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob {
     let at = |i: &u32| m.blobs[*i as usize];
     let by_mass = weights(run.iter().map(|i| at(i).mass()));
     let areas: Vec<f64> = run.iter().map(|i| area(&at(i))).collect();
@@ -230,33 +226,25 @@ pub fn bunch(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob 
     }
 }
 
-/// One facet a run of `order`, and its colour. A run is [first, end), of one cloud's particles.
+/// Returns one facet a run of `order`, with its colour. A run [first, end) holds particles of one
+/// cloud.
 pub fn grouped(
     spec: &GridSpec,
     cells: &[f64],
-    members: &FacetSources<'_>,
+    sources: &FacetSources<'_>,
     cloud_centers: &[DVec3],
     order: &[u32],
     runs: &[(u64, u64)],
 ) -> Vec<(Facet, DVec3)> {
-    let ellipsoids = members.blobs.iter().any(|b| b.aspect != 1.0);
+    let ellipsoids = sources.blobs.iter().any(|b| b.aspect != 1.0);
     let of = |&(first, end): &(u64, u64)| {
         let run = &order[first as usize..end as usize];
-        let b = bunch(members, run, ellipsoids);
-        let (shape, region) =
-            ([b.sigma.max(b.sigma_mean), b.aspect], members.regions[run[0] as usize]);
-        let (normal, conditioning) =
-            normal(spec, cells, b.position, shape, cloud_centers[region as usize]);
-        (
-            Facet {
-                position: shell(b.position, shape, normal),
-                normal,
-                area: b.area,
-                region,
-                conditioning,
-            },
-            b.color,
-        )
+        let b = merged(sources, run, ellipsoids);
+        let region = sources.regions[run[0] as usize];
+        let (shape, center) =
+            ([b.sigma.max(b.sigma_mean), b.aspect], cloud_centers[region as usize]);
+        let facet = on_shell(b.position, shape, b.area, region, center, |x| sample(spec, cells, x));
+        (facet, b.color)
     };
     runs.iter().map(of).collect()
 }
@@ -269,6 +257,14 @@ mod tests {
 
     const SPEC: GridSpec =
         GridSpec { aspect: 1.0, n_cells: UVec3::splat(50), cell: 0.2, low: DVec3::splat(-5.0) };
+
+    fn sources<'a>(
+        blobs: &'a [Blob],
+        sigma_means: &'a [f64],
+        regions: &'a [u32],
+    ) -> FacetSources<'a> {
+        FacetSources { blobs, sigma_means, regions, colors: &[] }
+    }
 
     fn ball() -> Vec<f64> {
         deposit(&SPEC, &[Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 }])
@@ -329,7 +325,8 @@ mod tests {
             Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
             Blob { aspect: 1.0, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
         ];
-        let facets = closed(&blobs, &[0.4, 0.4], &[0, 0], &[DVec3::new(0.0, 9.0, 0.0)]);
+        let facets =
+            from_density(&sources(&blobs, &[0.4, 0.4], &[0, 0]), &[DVec3::new(0.0, 9.0, 0.0)]);
         assert!(
             (facets[1].normal - DVec3::X).length() < 1e-12
                 && facets[1].conditioning > CONDITIONING.1
@@ -339,8 +336,9 @@ mod tests {
         assert!((facets[0].normal + DVec3::Y).length() < 1e-12);
         // A fine grid says the same.
         let off = [blobs[0], Blob { position: DVec3::new(0.9, -0.5, 0.3), ..blobs[1] }];
-        let by_grid = super::facets(&SPEC, &ball(), &off, &[0.4; 2], &[0; 2], &[DVec3::ZERO])[1];
-        let found = closed(&off, &[0.4; 2], &[0; 2], &[DVec3::ZERO])[1];
+        let by_grid =
+            super::facets(&SPEC, &ball(), &sources(&off, &[0.4; 2], &[0; 2]), &[DVec3::ZERO])[1];
+        let found = from_density(&sources(&off, &[0.4; 2], &[0; 2]), &[DVec3::ZERO])[1];
         assert!(found.normal.dot(by_grid.normal) > 1f64.to_radians().cos());
     }
 
@@ -369,9 +367,7 @@ mod tests {
         let facets = facets(
             &SPEC,
             &empty,
-            &[blob, blob],
-            &[0.0; 2],
-            &[1, 0],
+            &sources(&[blob, blob], &[0.0; 2], &[1, 0]),
             &[DVec3::new(1.0, 1.0, 4.0), DVec3::ONE],
         );
         assert_eq!(
@@ -398,7 +394,7 @@ mod tests {
             regions: &[0; 4],
             colors: &colors,
         };
-        let b = bunch(&members, &[0, 1], false);
+        let b = merged(&members, &[0, 1], false);
         assert!(
             (b.position - DVec3::X * 4.0).length() < 1e-14 && (b.sigma_mean - 5.0).abs() < 1e-14
         );
@@ -407,7 +403,7 @@ mod tests {
         assert!((b.area - a0 - a1).abs() < 1e-13);
         assert!((b.color - DVec3::new(a0, a1, 0.0) / (a0 + a1)).length() < 1e-15);
         // Neither of the last two has mass or area: they count alike.
-        let b = bunch(&members, &[2, 3], false);
+        let b = merged(&members, &[2, 3], false);
         assert_eq!(
             (b.position, b.sigma_mean, b.area, b.color),
             (DVec3::X * 2.0, 3.0, 0.0, DVec3::splat(0.5))
@@ -431,7 +427,7 @@ mod tests {
         let colors = [DVec3::X; 3];
         let members =
             FacetSources { blobs: &blobs, sigma_means: &means, regions: &regions, colors: &colors };
-        let single = facets(&SPEC, &cells, &blobs, &means, &regions, &centers);
+        let single = facets(&SPEC, &cells, &members, &centers);
         let of_runs =
             grouped(&SPEC, &cells, &members, &centers, &[0, 2, 1], &[(0, 1), (1, 2), (2, 3)]);
         for ((facet, color), i) in of_runs.into_iter().zip([0, 2, 1]) {

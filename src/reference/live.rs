@@ -111,7 +111,7 @@ pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
     let disc = match &cloud.source {
         CloudSource::Disc(disc) => disc,
         CloudSource::Animated(m) => {
-            let particles = m.mover.at(time_s).unwrap_or_default();
+            let particles = m.animation.at(time_s).unwrap_or_default();
             return particles.iter().map(|p| generate::given(p, groups.first())).collect();
         }
         CloudSource::Boxes { .. } | CloudSource::Particles(_) => return generate::cloud(cloud),

@@ -5,7 +5,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Blob;
-use super::area::mean::each;
+use super::parallel::parallel_map;
 use crate::model::camera::Pose;
 use crate::model::film::FilmFormat;
 
@@ -161,12 +161,12 @@ struct Layered {
     value: [f64; 4],
     bound: [f64; 4],
     /// View depth of what stands behind, and how far that may be off.
-    behind: (f64, f64),
+    opaque: (f64, f64),
 }
 
 impl From<&OpaquePixel> for Layered {
     fn from(b: &OpaquePixel) -> Layered {
-        Layered { value: b.color, bound: b.bound, behind: (b.depth, b.depth_bound) }
+        Layered { value: b.color, bound: b.bound, opaque: (b.depth, b.depth_bound) }
     }
 }
 
@@ -209,67 +209,54 @@ fn over_steps(
     [new, if bound.is_finite() { bound.min(1.0) } else { bound }]
 }
 
-/// Picture of `blobs` in the order given (far to near), blob j of radiance `radiance[j]`.
-pub fn render(view: &View, blobs: &[Blob], radiance: &[DVec3], order: &[u32]) -> Vec<[f64; 4]> {
-    render_with_bound(view, blobs, radiance, order, &Rounding::NONE).0
-}
-
-/// The picture, and per channel a bound on what a target that rounds as `rounding` says may differ
-/// from it.
-pub fn render_with_bound(
-    view: &View,
-    blobs: &[Blob],
-    radiance: &[DVec3],
-    order: &[u32],
-    rounding: &Rounding,
-) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    let nothing = vec![OpaquePixel::EMPTY; view.width as usize * view.height as usize];
-    render_over(view, &nothing, blobs, radiance, order, rounding)
-}
-
-/// The same over `behind`, a pixel each.
-pub fn render_over(
-    view: &View,
-    behind: &[OpaquePixel],
-    blobs: &[Blob],
-    radiance: &[DVec3],
-    order: &[u32],
-    rounding: &Rounding,
-) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    render_textured(view, behind, blobs, radiance, order, rounding, None)
-}
-
-/// Factor on τ of blob j where the ray's slopes from the eye are those of its centre and a
-/// difference.
+/// Returns a factor on τ of blob `j` where the ray's slopes from the eye differ from its centre's
+/// by the second argument.
 pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
 
-/// The same with a factor on each blob's τ.
-pub fn render_textured(
+/// Blobs to draw, with their radiance, order and textures.
+#[derive(Clone, Copy)]
+pub struct Sprites<'a> {
+    /// Placed blobs.
+    pub blobs: &'a [Blob],
+    /// Radiance by blob, W m⁻² sr⁻¹, linear RGB.
+    pub radiance: &'a [DVec3],
+    /// Indices of the drawn blobs, far to near.
+    pub order: &'a [u32],
+    /// Factor on τ; `None` for plain blobs.
+    pub factor: Option<Factor<'a>>,
+}
+
+impl Sprites<'_> {
+    pub(super) fn factor(&self, j: usize, delta: DVec2) -> f64 {
+        self.factor.map_or(1.0, |f| f(j, delta))
+    }
+}
+
+/// A picture as [C_r, C_g, C_b, A], and by how much a device's may differ, channel by channel.
+pub type Bounded = (Vec<[f64; 4]>, Vec<[f64; 4]>);
+
+/// Returns the picture of `sprites` over nothing.
+pub fn render(view: &View, sprites: &Sprites<'_>) -> Vec<[f64; 4]> {
+    let nothing = vec![OpaquePixel::EMPTY; view.width as usize * view.height as usize];
+    render_over(view, &nothing, sprites, &Rounding::NONE).0
+}
+
+/// Returns the picture over `opaque`, one a pixel, and a bound on what a target that rounds as
+/// `rounding` says may differ from it.
+pub fn render_over(
     view: &View,
-    behind: &[OpaquePixel],
-    blobs: &[Blob],
-    radiance: &[DVec3],
-    order: &[u32],
+    opaque: &[OpaquePixel],
+    sprites: &Sprites<'_>,
     rounding: &Rounding,
-    factor: Option<Factor<'_>>,
-) -> (Vec<[f64; 4]>, Vec<[f64; 4]>) {
-    let mut pixels: Vec<Layered> = behind.iter().map(Layered::from).collect();
+) -> Bounded {
+    let mut pixels: Vec<Layered> = opaque.iter().map(Layered::from).collect();
     let width = view.width as usize;
     let n_rows = view.height.div_ceil(N_THREADS).max(1);
     std::thread::scope(|scope| {
         for (band, i) in pixels.chunks_mut((width * n_rows as usize).max(1)).zip(0u32..) {
             scope.spawn(move || {
-                for &j in order {
-                    let j = j as usize;
-                    let of_blob = |delta: DVec2| factor.map_or(1.0, |f| f(j, delta));
-                    draw(
-                        view,
-                        &blobs[j],
-                        radiance[j],
-                        &of_blob,
-                        (&mut *band, i * n_rows),
-                        rounding,
-                    );
+                for &j in sprites.order {
+                    draw(view, sprites, j as usize, (&mut *band, i * n_rows), rounding);
                 }
             });
         }
@@ -279,16 +266,6 @@ pub fn render_textured(
 
 /// Bands of rows that are drawn side by side; the result does not depend on it.
 const N_THREADS: u32 = 2;
-
-/// Blobs, their radiance, in which order they are drawn (far to near), and the factor on the τ of
-/// each.
-#[derive(Clone, Copy)]
-pub struct Layers<'a> {
-    pub blobs: &'a [Blob],
-    pub radiance: &'a [DVec3],
-    pub order: &'a [u32],
-    pub factor: Option<Factor<'a>>,
-}
 
 /// Pixels one in each cell of a part of a picture.
 #[derive(Debug, Clone, Copy)]
@@ -303,42 +280,34 @@ pub struct Raster<'a> {
     pub at: &'a [[u32; 2]],
 }
 
-/// The values of [`render_textured`] at the pixels of `raster` alone, over `behind`, one each.
-/// `on_row` hears how many rows of cells there are each time that one more is done.
+/// Returns the values of [`render_over`] at the pixels of `raster` alone, over `opaque`, one each.
+/// `on_row` is told the number of rows of cells each time one more is done.
 pub fn render_at(
     view: &View,
     raster: &Raster<'_>,
-    behind: &[OpaquePixel],
-    layers: &Layers<'_>,
+    opaque: &[OpaquePixel],
+    sprites: &Sprites<'_>,
     on_row: &(dyn Fn(usize) + Sync),
 ) -> Vec<[f64; 4]> {
-    let met =
-        |&j: &u32| Some((j as usize, Met::new(view, &layers.blobs[j as usize], &Rounding::NONE)?));
-    let met: Vec<(usize, Met)> = layers.order.iter().filter_map(met).collect();
+    let none = Rounding::NONE;
+    let footprint = |&j: &u32| Some((j as usize, sprites.footprint(view, j as usize, &none)?));
+    let footprints: Vec<(usize, Footprint)> = sprites.order.iter().filter_map(footprint).collect();
     let Raster { first: [left, top], cell, at, .. } = *raster;
     let n_columns = raster.n_columns as usize;
     let n_rows = at.len().div_ceil(n_columns.max(1));
-    let rows = each(n_rows, |i| {
+    let rows = parallel_map(n_rows, |i| {
         let here = i * n_columns..((i + 1) * n_columns).min(at.len());
-        let mut pixels: Vec<Layered> = behind[here.clone()].iter().map(Layered::from).collect();
+        let mut pixels: Vec<Layered> = opaque[here.clone()].iter().map(Layered::from).collect();
         let (first, end) = (top + i as u32 * cell, top + (i as u32 + 1) * cell);
-        for (j, met) in met.iter().filter(|(_, met)| met.rows.0 < end && met.rows.1 > first) {
-            let [from, to] =
-                [met.columns.0, met.columns.1].map(|column| column.saturating_sub(left));
+        for (j, f) in footprints.iter().filter(|(_, f)| f.rows.0 < end && f.rows.1 > first) {
+            let [from, to] = [f.columns.0, f.columns.1].map(|column| column.saturating_sub(left));
             let (from, to) = (from / cell, to.div_ceil(cell));
             for (k, pixel) in pixels.iter_mut().enumerate().take(to as usize).skip(from as usize) {
                 let [column, row] = at[here.start + k];
-                let is_met = (met.columns.0..met.columns.1).contains(&column)
-                    && (met.rows.0..met.rows.1).contains(&row);
-                if is_met {
-                    let of_blob = |delta: DVec2| layers.factor.map_or(1.0, |f| f(*j, delta));
-                    met.lay(
-                        view,
-                        (&layers.blobs[*j], layers.radiance[*j]),
-                        &of_blob,
-                        ([column, row], pixel),
-                        &Rounding::NONE,
-                    );
+                if (f.columns.0..f.columns.1).contains(&column)
+                    && (f.rows.0..f.rows.1).contains(&row)
+                {
+                    sprites.lay(view, *j, f, [column, row], pixel, &none);
                 }
             }
         }
@@ -348,92 +317,120 @@ pub fn render_at(
     rows.into_iter().flatten().map(|p| p.value).collect()
 }
 
-/// One blob over the rows from `first_row` that `band` holds. `factor` on its τ, by the difference
-/// of slopes.
+/// Draws blob `j` over the rows from `first_row` on that `band` holds.
 fn draw(
     view: &View,
-    blob: &Blob,
-    radiance: DVec3,
-    factor: &dyn Fn(DVec2) -> f64,
+    sprites: &Sprites<'_>,
+    j: usize,
     (band, first_row): (&mut [Layered], u32),
     r: &Rounding,
 ) {
-    let Some(met) = Met::new(view, blob, r) else { return };
+    let Some(footprint) = sprites.footprint(view, j, r) else { return };
     let n_rows = (band.len() / view.width as usize) as u32;
-    for row in met.rows.0.max(first_row)..met.rows.1.min(first_row + n_rows) {
-        for column in met.columns.0..met.columns.1 {
+    for row in footprint.rows.0.max(first_row)..footprint.rows.1.min(first_row + n_rows) {
+        for column in footprint.columns.0..footprint.columns.1 {
             let pixel = &mut band[((row - first_row) * view.width + column) as usize];
-            met.lay(view, (blob, radiance), factor, ([column, row], pixel), r);
+            sprites.lay(view, j, &footprint, [column, row], pixel, r);
         }
     }
 }
 
-/// A blob as a view meets it.
-struct Met {
-    /// Off the eye, and along the view.
-    c: DVec3,
-    depth: f64,
-    /// How far it is above the smallest size, and whether rounding decides that.
-    above: f64,
-    of_size: bool,
-    /// Outside of which it is not seen.
+/// A blob as a view sees it.
+struct Footprint {
+    seen: Seen,
+    /// Columns and rows (first, end) outside which the blob is not seen.
     columns: (u32, u32),
     rows: (u32, u32),
 }
 
-impl Met {
-    /// None where nothing of it is seen.
-    fn new(view: &View, blob: &Blob, r: &Rounding) -> Option<Met> {
+/// A blob in front of the eye.
+pub(super) struct Seen {
+    /// Offset from the eye, and view depth.
+    c: DVec3,
+    depth: f64,
+    /// How much wider than the smallest size it is, and whether rounding decides that.
+    above: f64,
+    of_size: bool,
+}
+
+/// A blob's layer in one pixel.
+pub(super) struct Layer {
+    /// Opacity that is drawn: 0 where only rounding could draw the blob.
+    pub alpha: f64,
+    /// By how much a device's opacity may differ.
+    pub off: f64,
+}
+
+impl Seen {
+    /// Returns `None` if the blob is in front of the near plane, has no size, or is too small.
+    pub fn new(view: &View, blob: &Blob, r: &Rounding) -> Option<Seen> {
         let c = blob.position - view.pose.position;
         let depth = c.dot(view.pose.forward);
         if !(depth >= view.near && blob.sigma > 0.0) {
             return None;
         }
+        let (above, off_size) = view.above_smallest(blob, c, r.depth);
+        (above >= -off_size).then_some(Seen { c, depth, above, of_size: above.abs() < off_size })
+    }
+
+    /// Returns blob `j`'s layer along `ray` before an opaque pixel of that depth, given with its
+    /// bound; `None` if neither the law nor rounding draws it.
+    pub fn layer(
+        &self,
+        view: &View,
+        sprites: &Sprites<'_>,
+        j: usize,
+        ray: DVec3,
+        (opaque, opaque_bound): (f64, f64),
+        r: &Rounding,
+    ) -> Option<Layer> {
+        let line = sprites.blobs[j].along(self.c, ray);
+        let cut = view.cut(line.depth);
+        // A sprite ends in a step at its edge, and rounding decides on which side a pixel lies. The
+        // depth of the opaque pixel decides likewise.
+        let beyond = 0.5 * line.off.powi(2) - cut;
+        let (on_edge, at_opaque) =
+            (beyond.abs() <= r.slack(cut), (self.depth - opaque).abs() < opaque_bound);
+        let is_in = beyond <= 0.0 && cut > 0.0;
+        if (!is_in && !on_edge) || (self.depth > opaque && !at_opaque) {
+            return None;
+        }
+        let delta = view.slopes_of(ray) - view.slopes_of(self.c);
+        let alpha = alpha(sprites.factor(j, delta) * line.tau());
+        let is_uncertain = on_edge || at_opaque || self.of_size;
+        let off = if is_uncertain { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
+        let is_drawn = is_in && self.depth <= opaque && self.above >= 0.0;
+        Some(Layer { alpha: if is_drawn { alpha } else { 0.0 }, off })
+    }
+}
+
+impl Sprites<'_> {
+    fn footprint(&self, view: &View, j: usize, r: &Rounding) -> Option<Footprint> {
+        let blob = &self.blobs[j];
+        let seen = Seen::new(view, blob, r)?;
         let most = view.cut(blob.deepest());
         let reach = (2.0 * (most + r.slack(most)).max(0.0)).sqrt();
         if reach <= 0.0 {
             return None;
         }
-        let (above, off_size) = view.above_smallest(blob, c, r.depth);
-        if above < -off_size {
-            return None;
-        }
-        let [columns, rows] = view.rectangle(blob, c, reach);
-        Some(Met { c, depth, above, of_size: above.abs() < off_size, columns, rows })
+        let [columns, rows] = view.rectangle(blob, seen.c, reach);
+        Some(Footprint { seen, columns, rows })
     }
 
-    /// Lays the blob over a pixel.
+    /// Lays blob `j` over a pixel.
     fn lay(
         &self,
         view: &View,
-        (blob, radiance): (&Blob, DVec3),
-        factor: &dyn Fn(DVec2) -> f64,
-        ([column, row], pixel): ([u32; 2], &mut Layered),
+        j: usize,
+        footprint: &Footprint,
+        [column, row]: [u32; 2],
+        pixel: &mut Layered,
         r: &Rounding,
     ) {
-        let Met { c, depth, above, of_size, .. } = *self;
-        let d = view.ray(column, row);
-        let line = blob.along(c, d);
-        let (cut, delta) = (view.cut(line.depth), view.slopes_of(d) - view.slopes_of(c));
-        let slack = r.slack(cut);
-        let alpha = alpha(factor(delta) * line.tau());
-        let (behind, behind_bound) = pixel.behind;
-        // At its edge a sprite ends in a step, and b's rounding decides on which side a pixel lies.
-        // The depth of what stands behind decides likewise.
-        let beyond = 0.5 * line.off.powi(2) - cut;
-        let (on_edge, at_behind) = (beyond.abs() <= slack, (depth - behind).abs() < behind_bound);
-        let is_in = beyond <= 0.0 && cut > 0.0;
-        if (!is_in && !on_edge) || (depth > behind && !at_behind) {
-            return;
+        let ray = view.ray(column, row);
+        if let Some(layer) = footprint.seen.layer(view, self, j, ray, pixel.opaque, r) {
+            pixel.over(layer.alpha, layer.off, self.radiance[j], r);
         }
-        let off =
-            if on_edge || at_behind || of_size { (1.0 + r.alpha) * alpha } else { r.alpha * alpha };
-        pixel.over(
-            if is_in && depth <= behind && above >= 0.0 { alpha } else { 0.0 },
-            off,
-            radiance,
-            r,
-        );
     }
 }
 
@@ -474,8 +471,11 @@ mod tests {
                 depth_bound,
                 ..OpaquePixel::EMPTY
             };
-            let (value, bound) =
-                render_over(&VIEW, &[behind], &blobs, &colors, &[1, 0], &Rounding::NONE);
+            let (value, bound) = {
+                let sprites =
+                    Sprites { blobs: &blobs, radiance: &colors, order: &[1, 0], factor: None };
+                render_over(&VIEW, &[behind], &sprites, &Rounding::NONE)
+            };
             (value[0], bound[0])
         };
         let is = |a: [f64; 4], b: [f64; 4]| (0..4).all(|k| (a[k] - b[k]).abs() < 1e-15);

@@ -33,7 +33,7 @@ impl Omitted {
 }
 
 /// The picture's pixels before `behind`. `factor` on each blob's τ, as its texture has it.
-pub fn cut(
+pub fn omitted(
     view: &View,
     behind: &[OpaquePixel],
     blobs: &[Blob],
@@ -103,7 +103,7 @@ mod tests {
             kappa: tau / SQRT_TAU,
         };
         let of = |blobs: &[Blob], depth: f64| {
-            cut(&view, &[OpaquePixel { depth, ..OpaquePixel::EMPTY }; 3], blobs, None)
+            omitted(&view, &[OpaquePixel { depth, ..OpaquePixel::EMPTY }; 3], blobs, None)
         };
         let nothing = Omitted::default();
         // τ = 0.2/e there: below the threshold. 0.3/e: not. 0.09: nowhere above it.
@@ -122,7 +122,7 @@ mod tests {
         // Pixels are one slope wide, σ = 1 at depth 2 half of one.
         let of = |smallest: f64| {
             let view = View { threshold: 0.0, smallest, ..view };
-            cut(&view, &[OpaquePixel::EMPTY; 3], &[blob(0.2)], None)
+            omitted(&view, &[OpaquePixel::EMPTY; 3], &[blob(0.2)], None)
                 .iter()
                 .map(|c| c.n_layers)
                 .sum::<u32>()

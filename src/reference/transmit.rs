@@ -6,12 +6,8 @@ use glam::DVec3;
 
 use super::grid::sample;
 use super::occlude::{Rectangle, is_clear};
-use crate::model::grid::GridSpec;
+use crate::model::grid::{GridSpec, MAX_MARCH_STEPS};
 use crate::model::light::Light;
-
-/// Greatest number of march steps, 8 a cell along the longest axis of the largest grid: no `step`
-/// knob hangs a GPU. A march that would need more ends after this many.
-pub const MAX_STEPS: u32 = 4096;
 
 /// What light can meet on its way, and how it is marched through.
 #[derive(Debug, Clone, Copy)]
@@ -53,7 +49,7 @@ pub fn crossing(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64) -> Option<(f
 /// Number of march steps of `step` over `length`, the last one shorter.
 pub fn n_steps(length: f64, step: f64) -> u32 {
     // `as` saturates; NaN (0/0) becomes 0 and then 1.
-    ((length / step).ceil() as u32).clamp(1, MAX_STEPS)
+    ((length / step).ceil() as u32).clamp(1, MAX_MARCH_STEPS)
 }
 
 /// τ = Σ ρ(x_k) s_k from `p` along unit `d` over `distance`: steps of `step` cells from where the
@@ -242,7 +238,7 @@ mod tests {
         let leave = crossing(&SPEC, p[0], DVec3::new(-0.6, 0.8, 0.0), f64::INFINITY);
         assert_eq!(leave, Some((0.0, 0.25 / 0.6)));
         assert_eq!([n_steps(3.75, 0.25), n_steps(3.76, 0.25), n_steps(0.0, 0.25)], [15, 16, 1]);
-        assert_eq!(n_steps(3.75, 1e-9), MAX_STEPS);
+        assert_eq!(n_steps(3.75, 1e-9), MAX_MARCH_STEPS);
     }
 
     #[test]
@@ -265,7 +261,7 @@ mod tests {
             optical_depth(&SPEC, &margin, DVec3::new(x, 1.0, 1.0), DVec3::X, f64::INFINITY, 1.0)
         };
         assert!(tau(2.5) > 0.0 && (tau(2.5 - 1e-9) - tau(2.5 + 1e-9)).abs() < 1e-7);
-        // In a grid the march ends after MAX_STEPS.
+        // In a grid the march ends after MAX_MARCH_STEPS.
         let short = optical_depth(&SPEC, &[1.0; 128], DVec3::ONE, DVec3::X, f64::INFINITY, 1e-4);
         assert!((short - 4096.0 * 0.5e-4).abs() < 1e-12);
     }

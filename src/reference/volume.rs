@@ -136,7 +136,7 @@ pub fn render(
 ) -> Vec<Pixel> {
     let volume = Volume::new(view, blobs, radiance);
     let width = view.width as usize;
-    super::area::mean::each(view.height as usize, |j| {
+    super::parallel::parallel_map(view.height as usize, |j| {
         volume.row(j as u32, &behind[j * width..][..width])
     })
     .concat()

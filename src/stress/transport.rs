@@ -13,7 +13,7 @@ use crate::layout::sums::SumMacros;
 use crate::model::scene::Scene;
 use crate::model::sums::{Precision, Summation, Sums};
 use crate::model::surface::Surface;
-use crate::reference::picture::stages::FrameReference;
+use crate::reference::picture::FrameReference;
 use crate::reference::rounding::{U_F32, sum_error};
 
 pub const CASES: &[Case] = &[
@@ -165,7 +165,7 @@ fn touching(desk: &mut Desk) -> Result<Found> {
         "[[light]]\nkind = 'directional'\ndirection = [0.2, -1, -0.7]\nirradiance = [1, 1, 1]\n";
     let scene = room(desk, "gather = 'exact'", lights, DULL, vec![floor([0.0; 3], 7), wall])?;
     let played = desk.play(&scene, 0)?;
-    let truth = FrameReference::of(&scene, 0.0)?;
+    let truth = FrameReference::new(&scene, 0.0)?;
     let mut c = Comparison::default();
     second(&mut c, &played);
     let most = truth.second.iter().map(|l| l.max_element()).fold(0.0, f64::max);

@@ -11,9 +11,9 @@ use nimbus::model::grid::DEPOSIT_CUT_SIGMA;
 use nimbus::model::light::Light;
 use nimbus::model::pairings::pairings;
 use nimbus::model::scene::{Gather, Scene};
-use nimbus::reference::area::mean::each;
+use nimbus::reference::emulation::{Exchange, Facet, Gathered, Region};
 use nimbus::reference::occlude::Rectangle;
-use nimbus::reference::second::{Exchange, Facet, Gathered, Region};
+use nimbus::reference::parallel::parallel_map;
 use nimbus::reference::transmit::{Obstacles, Receiver};
 use nimbus::reference::{grid, morton, place, sort};
 
@@ -82,10 +82,10 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
     };
     let senders = exchange.senders();
     if scene.lighting.gather != Gather::Tree {
-        return each(facets.len(), |j| exchange.gather(j, &senders));
+        return parallel_map(facets.len(), |j| exchange.gather(j, &senders));
     }
     let clusters = exchange.clusters(&order(f), &senders, scene.lighting.theta);
-    each(facets.len(), |j| exchange.gather_from(j, &senders, &clusters))
+    parallel_map(facets.len(), |j| exchange.gather_from(j, &senders, &clusters))
 }
 
 /// The facet of each place. Keys in f32: a difference and a product, which Vulkan promises to round

@@ -49,24 +49,24 @@ pub struct Estimate {
     pub n_evaluations: usize,
 }
 
-/// A triangle of piece `i_piece` in its rectangle's coordinates.
+/// A triangle of piece `i_region` in its rectangle's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cell {
     pub corners: [DVec2; 3],
-    pub i_piece: usize,
+    pub i_region: usize,
 }
 
 pub trait Integrand {
     /// Per unit area of the rectangle's coordinates.
-    fn at(&self, i_piece: usize, x: DVec2) -> Sample;
+    fn at(&self, i_region: usize, x: DVec2) -> Sample;
     /// Whether the cell is small enough for the rules to see all that there is in it.
     fn is_resolved(&self, cell: &Cell) -> bool;
     /// Squared length of the step `d`.
-    fn length_squared(&self, i_piece: usize, d: DVec2) -> f64;
+    fn length_squared(&self, i_region: usize, d: DVec2) -> f64;
     /// What the rules' difference is multiplied by: 1 where the integrand is smooth within cells,
     /// so that the greater degree errs much less than the lesser; more where it bends and both err
     /// alike.
-    fn doubt(&self) -> f64 {
+    fn safety_factor(&self) -> f64 {
         1.0
     }
 }
@@ -80,7 +80,7 @@ impl Cell {
     /// Halves across the longest edge.
     fn halves(&self, f: &dyn Integrand) -> [Cell; 2] {
         let edge =
-            |i: usize| f.length_squared(self.i_piece, self.corners[(i + 1) % 3] - self.corners[i]);
+            |i: usize| f.length_squared(self.i_region, self.corners[(i + 1) % 3] - self.corners[i]);
         let lengths = [edge(0), edge(1), edge(2)];
         let i = (0..3).fold(0, |best, i| if lengths[i] > lengths[best] { i } else { best });
         let [a, b, c] = [self.corners[i], self.corners[(i + 1) % 3], self.corners[(i + 2) % 3]];
@@ -90,9 +90,9 @@ impl Cell {
 }
 
 /// A polygon as a fan of triangles.
-pub fn triangles(polygon: &Polygon, i_piece: usize) -> impl Iterator<Item = Cell> {
+pub fn triangles(polygon: &Polygon, i_region: usize) -> impl Iterator<Item = Cell> {
     (1..polygon.len().saturating_sub(1))
-        .map(move |i| Cell { corners: [polygon[0], polygon[i], polygon[i + 1]], i_piece })
+        .map(move |i| Cell { corners: [polygon[0], polygon[i], polygon[i + 1]], i_region })
 }
 
 /// Barycentric coordinates, the weight in the rule of degree 8 and in that of degree 5.
@@ -134,7 +134,7 @@ fn orbit(nodes: &mut Vec<Node>, x: f64, y: f64, high: f64, low: f64) {
 }
 
 /// A cell with its integral.
-struct Measured {
+struct CellEstimate {
     /// The greater share of the totals that the error of radiance or irradiance is: who is greatest
     /// is halved next.
     key: f64,
@@ -143,31 +143,31 @@ struct Measured {
     error: [DVec3; 2],
 }
 
-impl PartialEq for Measured {
+impl PartialEq for CellEstimate {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
-impl Eq for Measured {}
-impl PartialOrd for Measured {
+impl Eq for CellEstimate {}
+impl PartialOrd for CellEstimate {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
         Some(self.cmp(other))
     }
 }
-impl Ord for Measured {
+impl Ord for CellEstimate {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
         self.key.total_cmp(&other.key)
     }
 }
 
 /// A cell whose error is a smaller share of the total has only rounding left to halve away.
-const LEAST_KEY: f64 = 1e-17;
+const MIN_KEY: f64 = 1e-17;
 
-fn measure(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> Measured {
+fn integrate_cell(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> CellEstimate {
     let [a, b, c] = cell.corners;
     let (mut high, mut low) = (NOTHING, NOTHING);
     for &([x, y, z], w_high, w_low) in nodes {
-        let value = f.at(cell.i_piece, x * a + y * b + z * c);
+        let value = f.at(cell.i_region, x * a + y * b + z * c);
         for k in 0..2 {
             high[k] += w_high * value[k];
             low[k] += w_low * value[k];
@@ -178,26 +178,26 @@ fn measure(f: &dyn Integrand, nodes: &[Node], cell: Cell) -> Measured {
         }
     }
     let area = cell.area();
-    let error = [0, 1].map(|k| f.doubt() * area * (high[k] - low[k]).abs());
-    Measured { key: 0.0, cell, value: high.map(|v| area * v), error }
+    let error = [0, 1].map(|k| f.safety_factor() * area * (high[k] - low[k]).abs());
+    CellEstimate { key: 0.0, cell, value: high.map(|v| area * v), error }
 }
 
 /// What halving a cell changed is an error too that each half may still have: where the integrand
 /// is smooth it is less than the rules' difference, across a jump it is not.
-fn distrust(halves: &mut [Measured; 2], whole: &Measured) {
+fn widen_errors(halves: &mut [CellEstimate; 2], whole: &CellEstimate) {
     for k in 0..2 {
         let change = 0.5 * (halves[0].value[k] + halves[1].value[k] - whole.value[k]).abs();
         halves.iter_mut().for_each(|half| half.error[k] = half.error[k].max(change));
     }
 }
 
-fn key(m: &Measured, scale: [f64; 2]) -> f64 {
+fn key(m: &CellEstimate, scale: [f64; 2]) -> f64 {
     let share = |k: usize| if scale[k] > 0.0 { m.error[k].max_element() / scale[k] } else { 0.0 };
     share(0).max(share(1))
 }
 
 /// Sum of value and error over all cells, on top of what is known exactly.
-fn total<'a>(known: Sample, cells: impl Iterator<Item = &'a Measured>) -> (Sample, [DVec3; 2]) {
+fn total<'a>(known: Sample, cells: impl Iterator<Item = &'a CellEstimate>) -> (Sample, [DVec3; 2]) {
     cells.fold((known, [DVec3::ZERO; 2]), |(v, e), m| {
         (
             [v[0] + m.value[0], v[1] + m.value[1], v[2] + m.value[2]],
@@ -237,14 +237,15 @@ pub fn integrate(
     let nodes = nodes();
     let (cells, all_resolved) = resolve(f, cells, (accuracy.max_evaluations / nodes.len()).max(1));
     let mut n_evaluations = cells.len() * nodes.len();
-    let measured: Vec<Measured> = cells.into_iter().map(|cell| measure(f, &nodes, cell)).collect();
-    let (mut value, mut error) = total(known, measured.iter());
+    let estimates: Vec<CellEstimate> =
+        cells.into_iter().map(|cell| integrate_cell(f, &nodes, cell)).collect();
+    let (mut value, mut error) = total(known, estimates.iter());
     let scale = [0, 1].map(|k| value[k].abs().max_element() + error[k].max_element());
-    let keyed = |mut m: Measured| {
+    let keyed = |mut m: CellEstimate| {
         m.key = key(&m, scale);
         m
     };
-    let mut heap: BinaryHeap<Measured> = measured.into_iter().map(keyed).collect();
+    let mut heap: BinaryHeap<CellEstimate> = estimates.into_iter().map(keyed).collect();
     let met =
         |v: &Sample, e: &[DVec3; 2]| accuracy.is_met(v[0], e[0]) && accuracy.is_met(v[1], e[1]);
     while all_resolved
@@ -252,12 +253,12 @@ pub fn integrate(
         && !met(&value, &error)
     {
         let Some(worst) = heap.pop() else { break };
-        if worst.key.is_nan() || worst.key <= LEAST_KEY {
+        if worst.key.is_nan() || worst.key <= MIN_KEY {
             heap.push(worst);
             break;
         }
-        let mut halves = worst.cell.halves(f).map(|cell| measure(f, &nodes, cell));
-        distrust(&mut halves, &worst);
+        let mut halves = worst.cell.halves(f).map(|cell| integrate_cell(f, &nodes, cell));
+        widen_errors(&mut halves, &worst);
         for half in halves.map(keyed) {
             (0..3).for_each(|k| value[k] += half.value[k]);
             (0..2).for_each(|k| error[k] += half.error[k]);

@@ -5,7 +5,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::visibility::{AT_EDGE, Rect, Source};
+use super::visibility::AT_EDGE;
+use crate::reference::occlude::{Rectangle, Source};
 
 /// Corners in order.
 pub type Polygon = Vec<DVec2>;
@@ -24,7 +25,7 @@ pub struct Line(pub [f64; 3]);
 
 impl Line {
     /// Where the plane through `point` with `normal` meets the plane of `rect`.
-    pub fn of_plane(rect: &Rect, normal: DVec3, point: DVec3) -> Line {
+    pub fn of_plane(rect: &Rectangle, normal: DVec3, point: DVec3) -> Line {
         Line([normal.dot(rect.center - point), normal.dot(rect.u), normal.dot(rect.v)])
     }
 
@@ -65,13 +66,13 @@ pub fn area(polygon: &[DVec2]) -> f64 {
 
 /// The lines that bound the shadow of `blocker` on `rect`, lit or seen from `source`; none where
 /// there is no shadow.
-pub fn shadow(rect: &Rect, blocker: &Rect, source: Source) -> Option<[Line; 5]> {
+pub fn shadow(rect: &Rectangle, blocker: &Rectangle, source: Source) -> Option<[Line; 5]> {
     let side = match source {
-        Source::At(a) => blocker.side_of(a),
+        Source::At(a) => blocker.side(a),
         Source::Toward(d) => blocker.normal.dot(d),
     };
     // A source in the blocker's plane is not hidden by it, and neither is what lies in that plane.
-    let far = |x: DVec2| blocker.side_of(rect.point(x.x, x.y)) * side < 0.0;
+    let far = |x: DVec2| blocker.side(rect.point(x.x, x.y)) * side < 0.0;
     if side == 0.0 || !WHOLE.iter().any(|&x| far(x)) {
         return None;
     }
@@ -120,9 +121,10 @@ pub fn split(polygon: Polygon, lines: &[Line]) -> (Polygon, Vec<Polygon>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::reference::area::visibility::met;
 
-    fn rect(center: DVec3, u: DVec3, v: DVec3) -> Rect {
-        Rect { center, u, v, normal: u.cross(v).normalize() }
+    fn rect(center: DVec3, u: DVec3, v: DVec3) -> Rectangle {
+        Rectangle { center, u, v, normal: u.cross(v).normalize(), facet: (u, v) }
     }
 
     #[test]
@@ -140,7 +142,7 @@ mod tests {
     fn shadows_by_hand() {
         let floor = rect(DVec3::ZERO, 4.0 * DVec3::Z, 4.0 * DVec3::X);
         let blocker = rect(DVec3::Y, 0.5 * DVec3::Z, DVec3::X);
-        let shadow_of = |r: &Rect, source| {
+        let shadow_of = |r: &Rectangle, source| {
             shadow(&floor, r, source)
                 .map_or(0.0, |lines| area(&split(WHOLE.to_vec(), &lines).0) * 16.0)
         };
@@ -175,7 +177,7 @@ mod tests {
         // outside as `met` has it.
         let floor =
             rect(DVec3::ZERO, DVec3::new(2.0, 0.3, 0.0), DVec3::new(-0.45, 3.0, 0.0).rotate_y(0.4));
-        let floor = Rect { v: floor.normal.cross(floor.u), ..floor };
+        let floor = Rectangle { v: floor.normal.cross(floor.u), ..floor };
         let blocker =
             rect(DVec3::new(0.2, 0.4, 0.7), DVec3::new(0.5, 0.1, 0.4), DVec3::new(-0.1, 0.5, 0.0));
         for source in [
@@ -190,7 +192,7 @@ mod tests {
             let mut n_inside = 0;
             for i in 0..10_000u32 {
                 let x = DVec2::new(f64::from(i % 100), f64::from(i / 100)) * 0.02 - 0.99;
-                let hidden = blocker.met(floor.point(x.x, x.y), source).is_some();
+                let hidden = met(&blocker, floor.point(x.x, x.y), source).is_some();
                 assert_eq!(hidden, lines.iter().all(|l| l.at(x) > 0.0), "{x}");
                 n_inside += u32::from(hidden);
             }

@@ -7,10 +7,12 @@ use std::f64::consts::{FRAC_1_PI, TAU};
 
 use glam::DVec3;
 
-use super::visibility::{Rect, Source};
-use super::{AreaScene, Receiver, mean, reflectance};
+use super::scene::{AreaScene, Receiver, reflectance};
+use super::visibility::met;
 use crate::model::material::Brdf;
 use crate::model::philox::{philox4x32_10, uniform};
+use crate::reference::occlude::{Rectangle, Source};
+use crate::reference::parallel::parallel_map;
 
 /// Second word of the key, so that paths share no numbers with particles.
 const KEY: u32 = 0x7061_7468;
@@ -22,7 +24,7 @@ const PATHS_A_JOB: u32 = 1024;
 pub struct Reflected {
     pub radiance: DVec3,
     /// One standard error of the mean, every channel; 0 for the first reflection, which needs no
-    /// chance. It is of the same paths: too small where few of them met the light, 0 where none
+    /// sampling. It is of the same paths: too small where few of them met the light, 0 where none
     /// did. Below a tenth of the radiance, which takes a hundred paths that meet it, differences
     /// from the truth are normal numbers of it (`tests/area.rs`).
     pub error: DVec3,
@@ -48,18 +50,18 @@ impl AreaScene<'_> {
         at: &Receiver,
         toward: DVec3,
         k: usize,
-        chance: PathSampling,
+        sampling: PathSampling,
     ) -> Vec<Reflected> {
         let first = Reflected { radiance: self.first(at, toward), error: DVec3::ZERO };
         let n_more = k.saturating_sub(1);
-        let n_jobs = chance.n_paths.div_ceil(PATHS_A_JOB);
+        let n_jobs = sampling.n_paths.div_ceil(PATHS_A_JOB);
         let job = |i: usize| {
             let i = i as u32;
-            let paths = i * PATHS_A_JOB..chance.n_paths.min((i + 1) * PATHS_A_JOB);
+            let paths = i * PATHS_A_JOB..sampling.n_paths.min((i + 1) * PATHS_A_JOB);
             let mut sums = vec![(DVec3::ZERO, DVec3::ZERO); n_more + 1];
             for i_path in paths {
                 let mut all = DVec3::ZERO;
-                let found = self.path(at, toward, n_more, (chance, i_path));
+                let found = self.path(at, toward, n_more, (sampling, i_path));
                 for (sum, l) in sums.iter_mut().zip(found) {
                     *sum = (sum.0 + l, sum.1 + l * l);
                     all += l;
@@ -68,8 +70,8 @@ impl AreaScene<'_> {
             }
             sums
         };
-        let sums = mean::each(n_jobs as usize, job).into_iter().reduce(add).unwrap_or_default();
-        let n = f64::from(chance.n_paths);
+        let sums = parallel_map(n_jobs as usize, job).into_iter().reduce(add).unwrap_or_default();
+        let n = f64::from(sampling.n_paths);
         let of = |(sum, squares): (DVec3, DVec3)| {
             let radiance = sum / n;
             let variance =
@@ -90,13 +92,13 @@ impl AreaScene<'_> {
         at: &Receiver,
         toward: DVec3,
         n_more: usize,
-        (chance, i_path): (PathSampling, u32),
+        (sampling, i_path): (PathSampling, u32),
     ) -> Vec<DVec3> {
         let (mut at, mut toward, mut weight) = (*at, toward, DVec3::ONE);
         let mut found = vec![DVec3::ZERO; n_more];
         for (i, l) in found.iter_mut().enumerate() {
             let draw = |turn: u32| {
-                philox4x32_10([chance.seed, KEY], [i_path, i as u32, turn, chance.i_sample])
+                philox4x32_10([sampling.seed, KEY], [i_path, i as u32, turn, sampling.i_sample])
                     .map(uniform)
             };
             let Some((next, direction, w)) = self.step(&at, toward, draw(0), draw(1)) else {
@@ -117,7 +119,7 @@ impl AreaScene<'_> {
         u: [f64; 4],
         more: [f64; 4],
     ) -> Option<(Receiver, DVec3, DVec3)> {
-        let to_discs = match (self.discs.is_empty(), self.rects.is_empty()) {
+        let to_discs = match (self.discs.is_empty(), self.rectangles.is_empty()) {
             (true, _) => 0.0,
             (false, true) => 1.0,
             (false, false) => 0.5,
@@ -130,8 +132,8 @@ impl AreaScene<'_> {
         if cosine <= 0.0 {
             return None;
         }
-        let (i, t) = nearest(&self.rects, at.position, direction)?;
-        if self.rects[i].normal.dot(direction) >= 0.0 {
+        let (i, t) = nearest(&self.rectangles, at.position, direction)?;
+        if self.rectangles[i].normal.dot(direction) >= 0.0 {
             return None;
         }
         let position = at.position + t * direction;
@@ -151,7 +153,7 @@ impl AreaScene<'_> {
         chosen: f64,
     ) -> Option<(Receiver, DVec3, DVec3)> {
         let pairs: Vec<f64> = (0..self.discs.len())
-            .map(|i| if at.i_disc == Some(i) { 0.0 } else { self.pair(i, at) })
+            .map(|i| if at.i_disc == Some(i) { 0.0 } else { self.disc_form_factor(i, at) })
             .collect();
         let sum: f64 = pairs.iter().sum();
         let mut left = u * sum;
@@ -161,7 +163,7 @@ impl AreaScene<'_> {
         });
         // None lies before it, or rounding led past the last.
         let i = drawn.or_else(|| pairs.iter().rposition(|pair| *pair > 0.0))?;
-        let (e, direction) = self.of_disc(i, at, DVec3::splat(sum / (pairs[i] * chosen)));
+        let (e, direction) = self.disc_light(i, at, DVec3::splat(sum / (pairs[i] * chosen)));
         let w = e * reflectance(&at.brdf, at.normal, direction, toward);
         (w != DVec3::ZERO).then(|| (self.on_disc(i), direction, w))
     }
@@ -171,9 +173,9 @@ fn add(a: Sums, b: Sums) -> Sums {
     a.into_iter().zip(b).map(|((s, q), (t, r))| (s + t, q + r)).collect()
 }
 
-fn nearest(rects: &[Rect], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
-    let met = |(i, r): (usize, &Rect)| r.met(p, Source::Toward(direction)).map(|t| (i, t));
-    rects.iter().enumerate().filter_map(met).min_by(|a, b| a.1.total_cmp(&b.1))
+fn nearest(rectangles: &[Rectangle], p: DVec3, direction: DVec3) -> Option<(usize, f64)> {
+    let hit = |(i, r): (usize, &Rectangle)| met(r, p, Source::Toward(direction)).map(|t| (i, t));
+    rectangles.iter().enumerate().filter_map(hit).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Share of directions drawn from the lobe: none for an eye behind. It sees no lobe, and its half

@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::*;
 use crate::model::camera::Pose;
 use crate::model::cloud::SQRT_TAU;
-use crate::reference::sprites;
+use crate::reference::sprites::{self, Sprites};
 
 /// Eye at the origin, looking along −z. Of one pixel or of three by three the middle one's ray is
 /// the axis.
@@ -108,14 +108,18 @@ fn far_apart_blobs_are_thin_sprites() {
     let blobs =
         [blob(4.0, 0.2, 0.8), blob(8.0, 0.25, 1.7), blob(20.0, 0.6, 3.0), blob(30.0, 0.5, 0.02)];
     let colors = [RED, BLUE, COLOR, DVec3::ONE];
-    let thin = sprites::render(&view(3), &blobs, &colors, &[3, 2, 1, 0]);
+    let thin = |order: &[u32]| {
+        let sprites = Sprites { blobs: &blobs, radiance: &colors, order, factor: None };
+        sprites::render(&view(3), &sprites)
+    };
+    let sorted = thin(&[3, 2, 1, 0]);
     let thick = render(&view(3), &[OpaquePixel::EMPTY; 9], &blobs, &colors);
-    for (a, b) in thick.iter().zip(&thin) {
+    for (a, b) in thick.iter().zip(&sorted) {
         assert_is(*a, DVec3::from_slice(b), b[3], a.error);
         assert!(a.error < 4e-6);
     }
     // The other way round they are not: what is compared is the order too.
-    let wrong = sprites::render(&view(3), &blobs, &colors, &[0, 1, 2, 3]);
+    let wrong = thin(&[0, 1, 2, 3]);
     assert!((wrong[4][0] - thick[4].color[0]).abs() > 0.1);
 }
 

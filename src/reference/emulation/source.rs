@@ -1,9 +1,18 @@
 //! What a facet has of the lights and sends on, and how it lies in the lights' shadows: model.md
 //! §11 "second".
 
-use super::stencil::{Edges, Patch};
-use super::*;
-use crate::model::light::MIN_PENUMBRA;
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+
+use super::bounded::{Bounded, Decision};
+use super::coverage::{Coverage, Patch};
+use super::exchange::Exchange;
+use super::form::{PairGeometry, half_angle, lobe};
+use super::occluder::shadow;
+use super::roundings::{MARCH, MIN_DISTANCE, ROUNDINGS, U};
+use crate::model::light::{Light, MIN_PENUMBRA};
+use crate::reference::occlude::{Rectangle, Source, source_of};
 
 /// Rounding of a number from 0 to 1 to 16 bits, nearest; and f32's on the way.
 const SIXTEEN_BITS: f64 = 0.5 / 65_535.0 + 4.0 * U;
@@ -11,20 +20,20 @@ const SIXTEEN_BITS: f64 = 0.5 / 65_535.0 + 4.0 * U;
 /// What a facet has of one light.
 pub struct Lit<'a> {
     /// Whether a shadow tears it.
-    pub torn: Decision,
+    pub crossed: Decision,
     /// The rectangles whose shadow meets it, and from where.
     rectangles: Vec<&'a Rectangle>,
     source: Source,
     /// g_l at its points, of a surface's facet, and as kept in 16 bits of their greatest.
-    points: Vec<Known>,
+    points: Vec<Bounded>,
     /// g.
-    pub mean: Known,
+    pub mean: Bounded,
 }
 
 /// What a facet has of all lights.
 pub struct Sender<'a> {
     pub lights: Vec<Lit<'a>>,
-    pub torn: Decision,
+    pub crossed: Decision,
 }
 
 impl Exchange<'_> {
@@ -32,7 +41,10 @@ impl Exchange<'_> {
     pub fn senders(&self) -> Vec<Sender<'_>> {
         let of = |i: usize| {
             let lights: Vec<_> = (0..self.lights.len()).map(|k| self.lit(i, k)).collect();
-            Sender { torn: lights.iter().map(|l| l.torn).fold(Decision::NO, Decision::or), lights }
+            Sender {
+                crossed: lights.iter().map(|l| l.crossed).fold(Decision::NO, Decision::or),
+                lights,
+            }
         };
         (0..self.facets.len()).map(of).collect()
     }
@@ -47,29 +59,30 @@ impl Exchange<'_> {
                 facet.position,
                 self.known(self.transmittance, i, i_light),
             );
-            return Lit { torn: Decision::NO, rectangles: vec![], source, points: vec![], mean };
+            return Lit { crossed: Decision::NO, rectangles: vec![], source, points: vec![], mean };
         };
         let shadows = self.others(facet.i_region, facet.i_region);
         let shadows = shadows.map(|(_, r)| (r, shadow(r, source, &ball)));
         // One that only rounding may bring here hides nothing of the facet: it is within the ball.
-        let met: Vec<_> = shadows.filter(|(_, s)| s.torn.or(s.hidden).is_possible()).collect();
-        let torn = met.iter().map(|(_, s)| s.torn).fold(Decision::NO, Decision::or);
+        let met: Vec<_> = shadows.filter(|(_, s)| s.crossed.or(s.hidden).is_possible()).collect();
+        let crossed = met.iter().map(|(_, s)| s.crossed).fold(Decision::NO, Decision::or);
         let rectangles = met.into_iter().map(|(r, _)| r).collect();
-        let mut lit = Lit { torn, rectangles, source, points: vec![], mean: Known::NOTHING };
+        let mut lit = Lit { crossed, rectangles, source, points: vec![], mean: Bounded::ZERO };
         lit.points = self.shares_over(i, i_light, &lit, &Patch { q: facet.position, u, v });
-        lit.mean = lit.points.iter().copied().fold(Known::NOTHING, Known::plus).scaled(1.0 / 16.0);
+        lit.mean = lit.points.iter().copied().fold(Bounded::ZERO, Bounded::plus).scaled(1.0 / 16.0);
         let greatest = lit.points.iter().map(|p| p.value).fold(0.0, f64::max);
         lit.points.iter_mut().for_each(|p| p.error += greatest * SIXTEEN_BITS);
         lit
     }
 
     /// g_l at a cell's points.
-    fn shares_over(&self, i: usize, i_light: usize, lit: &Lit, patch: &Patch) -> Vec<Known> {
-        let edges = lit.rectangles.iter().map(|r| Edges::new(r, lit.source, patch, self.slack()));
-        let edges: Vec<_> = edges.filter(|e| !e.is_nothing()).collect();
+    fn shares_over(&self, i: usize, i_light: usize, lit: &Lit, patch: &Patch) -> Vec<Bounded> {
+        let edges =
+            lit.rectangles.iter().map(|r| Coverage::new(r, lit.source, patch, self.slack()));
+        let edges: Vec<_> = edges.filter(|e| !e.is_zero()).collect();
         let through = self.known(self.through, i, i_light);
         let at = |at: DVec2| {
-            let v = edges.iter().map(|e| e.hidden(at).rest()).fold(through, Known::times);
+            let v = edges.iter().map(|e| e.hidden(at).complement()).fold(through, Bounded::times);
             self.share_at(i, i_light, patch.point(at), v)
         };
         Patch::middles().map(at).collect()
@@ -82,32 +95,35 @@ impl Exchange<'_> {
         i: usize,
         i_light: usize,
         sender: &Sender,
-        cell: &Cell,
+        (scale, at): (f64, DVec2),
         patch: &Patch,
-    ) -> Vec<Known> {
+    ) -> Vec<Bounded> {
         let lit = &sender.lights[i_light];
-        let part = |at: DVec2| {
-            let on_facet = cell.at + at * cell.scale();
+        let part = |point: DVec2| {
+            let on_facet = at + point * scale;
             let index = ((on_facet + 1.0) * 2.0).floor().as_usizevec2();
             lit.points[index.x + 4 * index.y]
         };
         let of_facet: Vec<_> = Patch::middles().map(part).collect();
-        if cell.level == 0 || !sender.torn.is_possible() {
+        if scale == 1.0 || !sender.crossed.is_possible() {
             return of_facet;
         }
         let own = self.shares_over(i, i_light, lit, patch);
-        own.into_iter().zip(of_facet).map(|(own, other)| own.where_or(sender.torn, other)).collect()
+        own.into_iter()
+            .zip(of_facet)
+            .map(|(own, other)| own.select(sender.crossed, other))
+            .collect()
     }
 
     /// A transmittance of facet `i`.
-    fn known(&self, transmittances: &[f64], i: usize, i_light: usize) -> Known {
+    fn known(&self, transmittances: &[f64], i: usize, i_light: usize) -> Bounded {
         let value = transmittances[i * self.lights.len() + i_light];
         let depth = if value > 0.0 { -value.ln() } else { 0.0 };
-        Known { value, error: value * depth * MARCH * 4.0 * U }
+        Bounded { value, error: value * depth * MARCH * 4.0 * U }
     }
 
     /// g at `x` on facet `i` where `v` of the light gets through.
-    pub(super) fn share_at(&self, i: usize, i_light: usize, x: DVec3, v: Known) -> Known {
+    pub(super) fn share_at(&self, i: usize, i_light: usize, x: DVec3, v: Bounded) -> Bounded {
         let (light, n) = (&self.lights[i_light], self.facets[i].normal);
         let arrival = light.arrival(x);
         let own = |v: f64| light.share(n, &arrival, v);
@@ -125,7 +141,7 @@ impl Exchange<'_> {
         } else {
             v.error * (own(1.0) - own(0.0)) + ROUNDINGS * U * own(v.value) + turned
         };
-        Known { value: own(v.value), error }
+        Bounded { value: own(v.value), error }
     }
 
     /// Between the unit normal at the end of `way` and the half vector of a light that is not the
@@ -134,27 +150,33 @@ impl Exchange<'_> {
         &self,
         i_light: usize,
         q: DVec3,
-        way: &Way,
+        way: &PairGeometry,
         moved: f64,
-    ) -> Option<Known> {
+    ) -> Option<Bounded> {
         let light = &self.lights[i_light];
         let arrival = light.arrival(q);
         let turn = way.turn
             + self.turn(arrival.distance)
-            + 2.0 * moved / arrival.distance.max(LEAST_DISTANCE);
+            + 2.0 * moved / arrival.distance.max(MIN_DISTANCE);
         (!light.is_sky()).then(|| half_angle(way.n_i, arrival.toward, -way.way, turn))
     }
 
     /// Radiance of facet `i` against `way` from `q` under shares `g` of the lights, and its error.
-    pub(super) fn radiance(&self, i: usize, way: &Way, q: DVec3, g: &[Known]) -> (DVec3, DVec3) {
+    pub(super) fn radiance(
+        &self,
+        i: usize,
+        way: &PairGeometry,
+        q: DVec3,
+        g: &[Bounded],
+    ) -> (DVec3, DVec3) {
         let source = &self.facets[i];
         let region = &self.regions[source.i_region];
         let (mut sum, mut error) = (DVec3::ZERO, DVec3::ZERO);
         for (k, (light, g)) in
-            self.lights.iter().zip(g).enumerate().filter(|(_, (_, g))| !g.is_nothing())
+            self.lights.iter().zip(g).enumerate().filter(|(_, (_, g))| !g.is_zero())
         {
             let glossy = region.lobe.as_ref().zip(self.light_angle(k, q, way, 0.0));
-            let glossy = glossy.map_or(Known::NOTHING, |(table, angle)| lobe(table, angle));
+            let glossy = glossy.map_or(Bounded::ZERO, |(table, angle)| lobe(table, angle));
             let f = region.brdf.kd * source.color / PI + region.brdf.ks * glossy.value;
             sum += light.energy() * f * g.value;
             error += light.energy()

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::doubt::Decision;
+use super::bounded::Decision;
 
 /// What a receiver gathers.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -40,12 +40,12 @@ impl Gathered {
     }
 
     /// `is` where `d`, else `other`; both where rounding may turn it.
-    pub(super) fn by(
+    pub(super) fn choose(
         d: Decision,
         is: impl Fn() -> Gathered,
         other: impl Fn() -> Gathered,
     ) -> Gathered {
-        match (d.taken, d.sure) {
+        match (d.is_true, d.is_sure) {
             (true, true) => is(),
             (false, true) => other(),
             (true, false) => is().or(&other()),

@@ -3,7 +3,7 @@
 use super::*;
 use crate::model::basis::{Basis, Sampling};
 use crate::model::philox::{philox4x32_10, uniform};
-use crate::reference::area::mean::each;
+use crate::reference::parallel::parallel_map;
 use crate::reference::transmit::{Obstacles, Receiver as Place};
 
 const EYE: DVec3 = DVec3::new(2.0, 3.0, 6.0);
@@ -82,7 +82,7 @@ impl Room {
         }
         let exchange = Exchange { eye: self.eye, ..scene.exchange(&self.lights, &through) };
         let senders = exchange.senders();
-        each(scene.facets.len().div_ceil(stride), |k| {
+        parallel_map(scene.facets.len().div_ceil(stride), |k| {
             (k * stride, exchange.gather(k * stride, &senders))
         })
     }
@@ -120,7 +120,7 @@ fn rooms_are_those_of_the_areas_and_their_bounds_small() {
         let room = random(seed);
         let truth = AreaScene::new(&room.surfaces, &room.brdfs, &room.lights, &[], 0.0, &[]);
         let found = room.gather(13);
-        let truths = each(found.len(), |k| {
+        let truths = parallel_map(found.len(), |k| {
             let (s, i) = (found[k].0 as u32 / (SIDE * SIDE), found[k].0 as u32 % (SIDE * SIDE));
             let at = truth.on_surface(s as usize, room.surfaces[s as usize].facet_center(i));
             // A tenth of what is looked for.

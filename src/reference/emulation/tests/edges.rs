@@ -1,10 +1,10 @@
 //! What is hidden of a cell, against areas.
 
-use super::super::stencil::{Edges, Patch};
+use super::super::coverage::{Coverage, Patch};
 use super::*;
 use crate::model::philox::{philox4x32_10, uniform};
 use crate::reference::area::clip;
-use crate::reference::area::visibility::Rect;
+use crate::reference::occlude::Source;
 
 const SLACK: f64 = 8.0 * U * 4.0;
 
@@ -20,7 +20,7 @@ fn table(y: f64, [x0, z0]: [f64; 2], [x1, z1]: [f64; 2]) -> Rectangle {
 }
 
 fn hidden(r: &Rectangle, source: Source, patch: &Patch) -> f64 {
-    let edges = Edges::new(r, source, patch, SLACK);
+    let edges = Coverage::new(r, source, patch, SLACK);
     Patch::middles().map(|at| edges.hidden(at).value).sum::<f64>() / 16.0
 }
 
@@ -104,7 +104,11 @@ fn what_random_rectangles_hide_is_near_their_shadow_s_area() {
         let blocker = plane(DVec3::new(0.3 * c.x, 1.0 + 0.5 * c.y, 0.3 * c.z), 0.4 * u, 0.3 * v, 1);
         let ceiling = plane(2.0 * DVec3::Y, 0.5 * DVec3::X, 0.5 * DVec3::Z, 1);
         for source in [EYE, Source::Toward(DVec3::new(0.28, -0.96, 0.0))] {
-            let shadow = clip::shadow(&Rect::of(&ceiling), &Rect::of(&blocker), source);
+            let shadow = clip::shadow(
+                &Rectangle::new(&ceiling, DVec3::ZERO),
+                &Rectangle::new(&blocker, DVec3::ZERO),
+                source,
+            );
             let area = shadow.map_or(0.0, |lines| {
                 clip::area(&clip::split(clip::WHOLE.to_vec(), &lines).0) / 4.0
             });
@@ -128,7 +132,7 @@ fn bounds_hold_what_rounding_does_and_no_more() {
     // An edge that rounding moves by 1e-7 hides as much more or less as the bound says, and it says
     // little.
     let at = |x: f64| table(1.0, [x, -0.2], [9.0, 0.3]);
-    let edges = |x: f64| Edges::new(&at(x), EYE, &above(), SLACK);
+    let edges = |x: f64| Coverage::new(&at(x), EYE, &above(), SLACK);
     for k in 0..20 {
         let x = -0.2 + 0.021 * f64::from(k);
         for part in Patch::middles() {

@@ -4,13 +4,21 @@ mod edges;
 mod rooms;
 mod tree;
 
-use glam::UVec3;
+use std::f64::consts::{FRAC_1_PI, PI};
 
+use glam::{DVec3, UVec3};
+
+use super::roundings::U;
 use super::*;
 use crate::model::basis::N_NODES;
-use crate::model::pairings::pairings;
+use crate::model::grid::GridSpec;
+use crate::model::light::Light;
+use crate::model::material::Brdf;
+use crate::model::pairings::{Pairing, pairings};
+use crate::model::scene::Pairs;
 use crate::model::surface::Surface;
 use crate::reference::area::{Accuracy, AreaScene, Receiver};
+use crate::reference::occlude::Rectangle;
 
 const SPEC: GridSpec = GridSpec { aspect: 1.0, n_cells: UVec3::ONE, cell: 1.0, low: DVec3::ZERO };
 const PAIRS: Pairs = Pairs { size: 0.5, levels: 6, steps: 16 };

@@ -1,12 +1,11 @@
-//! What a rectangle hides of a cell's parts: model.md §11 "second", *Edges*. Functions that are
+//! What a rectangle hides of a cell's parts: model.md §11 "second", *Coverage*. Functions that are
 //! positive behind it and within its edges, linear over the cell, as ramps along each part.
 
 use glam::{DVec2, DVec3};
 
-use super::doubt::Known;
-use super::rims::{OF_UNITS, sides_of};
-use crate::reference::area::visibility::Source;
-use crate::reference::occlude::{IN_PLANE, Rectangle};
+use super::bounded::Bounded;
+use super::occluder::{OF_UNITS, sides_of};
+use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
 
 /// Of a cell's half axes, half a part's sides.
 const HALF_PART: f64 = 0.25;
@@ -67,30 +66,30 @@ type Five = [Linear; 5];
 /// What a rectangle hides of a cell from where it is seen: by the law, and what rounding may make
 /// of it; none where the eye is in its plane.
 #[derive(Debug, Clone)]
-pub struct Edges(Vec<Option<Five>>);
+pub struct Coverage(Vec<Option<Five>>);
 
-impl Edges {
+impl Coverage {
     /// `slack`: what the distance of a point from a plane is known to.
-    pub fn new(r: &Rectangle, source: Source, patch: &Patch, slack: f64) -> Edges {
+    pub fn new(r: &Rectangle, source: Source, patch: &Patch, slack: f64) -> Coverage {
         let (side, signs) = sides_of(r, source, slack);
         let of =
             |sign: &f64| (*sign != 0.0).then(|| five(r, source, patch, side.abs(), *sign, slack));
-        Edges(signs.iter().map(of).collect())
+        Coverage(signs.iter().map(of).collect())
     }
 
     /// Whether it hides anything of any part.
-    pub fn is_nothing(&self) -> bool {
-        Patch::middles().all(|at| self.hidden(at).is_nothing())
+    pub fn is_zero(&self) -> bool {
+        Patch::middles().all(|at| self.hidden(at).is_zero())
     }
 
     /// h of the part about `at`.
-    pub fn hidden(&self, at: DVec2) -> Known {
+    pub fn hidden(&self, at: DVec2) -> Bounded {
         let by =
             |five: &Option<Five>, off: f64| five.as_ref().map_or(0.0, |five| share(five, at, off));
         let value = by(&self.0[0], 0.0);
         let least = self.0.iter().map(|f| by(f, -1.0)).fold(value, f64::min);
         let most = self.0.iter().map(|f| by(f, 1.0)).fold(value, f64::max);
-        Known::between(least, value, most)
+        Bounded::between(least, value, most)
     }
 }
 

@@ -4,9 +4,10 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::doubt::{Decision, Known};
-use super::{NEAR, ROUNDINGS};
+use super::bounded::{Bounded, Decision};
+use super::roundings::ROUNDINGS;
 use crate::model::basis::evaluate;
+use crate::model::pair_rules::NEAR;
 
 /// Half vectors of opposite ways turn with any rounding.
 const OPPOSITE: f64 = 1e-6;
@@ -16,7 +17,7 @@ const BENDING: f64 = 6.0;
 
 /// From receiver `n_j` to emitter `n_i` along the unit `way`, d long and known to `turn`.
 #[derive(Debug, Clone, Copy)]
-pub struct Way {
+pub struct PairGeometry {
     pub n_j: DVec3,
     pub n_i: DVec3,
     pub way: DVec3,
@@ -24,33 +25,33 @@ pub struct Way {
     pub turn: f64,
 }
 
-impl Way {
+impl PairGeometry {
     /// (c_i ⁺)(c_j ⁺), the second known to `bending` turns.
-    fn product(&self, c_j: f64, bending: f64) -> Known {
+    fn product(&self, c_j: f64, bending: f64) -> Bounded {
         let c_i = -self.n_i.dot(self.way);
         let value = c_i.max(0.0) * c_j.max(0.0);
         let most = (c_i + self.turn).max(0.0) * (c_j + bending * self.turn).max(0.0);
-        Known { value, error: most - value + ROUNDINGS * self.turn * value }
+        Bounded { value, error: most - value + ROUNDINGS * self.turn * value }
     }
 
     /// cos cos/(d² + A/π).
-    pub fn disc_form(&self, area: f64) -> Known {
+    pub fn disc_form(&self, area: f64) -> Bounded {
         self.product(self.n_j.dot(self.way), 1.0).scaled(1.0 / (self.d2 + area * FRAC_1_PI))
     }
 
     /// That of a surface's facet or part: of one wider than its distance a disc's.
-    pub fn part_form(&self, u: DVec3, v: DVec3) -> Known {
+    pub fn part_form(&self, u: DVec3, v: DVec3) -> Bounded {
         let b = 2.0 * u.length().max(v.length()) / self.d2.sqrt();
         let wide = Decision::above(b, NEAR, b * ROUNDINGS * self.turn);
-        self.disc_form(4.0 * u.length() * v.length()).where_or(wide, self.rectangle_form(u, v))
+        self.disc_form(4.0 * u.length() * v.length()).select(wide, self.rectangle_form(u, v))
     }
 
     /// The mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second derivatives.
-    pub fn rectangle_form(&self, u: DVec3, v: DVec3) -> Known {
-        let Way { n_j, way, d2, .. } = *self;
+    pub fn rectangle_form(&self, u: DVec3, v: DVec3) -> Bounded {
+        let PairGeometry { n_j, way, d2, .. } = *self;
         let c_j = n_j.dot(way);
         if c_j <= -self.turn {
-            return Known::NOTHING;
+            return Bounded::ZERO;
         }
         let along = |a: DVec3| {
             c_j * (6.0 * a.dot(way).powi(2) - a.length_squared()) - 2.0 * n_j.dot(a) * a.dot(way)
@@ -58,18 +59,18 @@ impl Way {
         let form =
             self.product(c_j + 2.0 / (3.0 * d2) * (along(u) + along(v)), BENDING).scaled(1.0 / d2);
         if c_j > 0.0 {
-            form.where_or(Known { value: c_j, error: self.turn }.is_positive(), Known::NOTHING)
+            form.select(Bounded { value: c_j, error: self.turn }.is_positive(), Bounded::ZERO)
         } else {
-            Known::NOTHING.or(form)
+            Bounded::ZERO.or(form)
         }
     }
 }
 
 /// Angle |n − h| between `n` and the half vector of two unit vectors, which are off by `turn`
 /// together.
-pub fn half_angle(n: DVec3, a: DVec3, b: DVec3, turn: f64) -> Known {
+pub fn half_angle(n: DVec3, a: DVec3, b: DVec3, turn: f64) -> Bounded {
     let sum = a + b;
-    Known {
+    Bounded {
         value: (n - sum.normalize_or_zero()).length(),
         error: 2.0 * turn / sum.length().max(OPPOSITE),
     }
@@ -80,12 +81,12 @@ pub fn width(ns: f64) -> f64 {
 }
 
 /// The lobe at an angle.
-pub fn lobe(table: &[f64], angle: Known) -> Known {
+pub fn lobe(table: &[f64], angle: Bounded) -> Bounded {
     let at = |a: f64| evaluate(table, 0.5 * a * a);
     let (value, low, high) = (
         at(angle.value),
         at((angle.value - angle.error).max(0.0)),
         at((angle.value + angle.error).min(2.0)),
     );
-    Known { value, error: (value - low).abs().max((value - high).abs()) }
+    Bounded { value, error: (value - low).abs().max((value - high).abs()) }
 }

@@ -1,7 +1,7 @@
 //! Clusters by numbers worked by hand.
 
 use super::*;
-use crate::reference::second::tree::positive_part;
+use crate::reference::emulation::cluster_view::positive_part;
 
 /// Over the facets as they stand: no test here has more than a few, or asks where they lie.
 fn through_a_tree(exchange: &Exchange, theta: f64) -> Gathered {

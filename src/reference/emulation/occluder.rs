@@ -5,12 +5,12 @@ use std::f64::consts::SQRT_2;
 
 use glam::DVec3;
 
-use super::doubt::{Decision, Known};
-use crate::reference::area::visibility::Source;
-use crate::reference::occlude::{IN_PLANE, Rectangle};
+use super::bounded::{Bounded, Decision};
+use super::roundings::U;
+use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
 
 /// What unit vectors, their products and quotients are known to.
-pub const OF_UNITS: f64 = 8.0 * super::U;
+pub const OF_UNITS: f64 = 8.0 * U;
 /// No divisor is less: what it divides ends beyond all bounds, in either sense.
 const LEAST: f64 = 1e-30;
 
@@ -19,7 +19,7 @@ const LEAST: f64 = 1e-30;
 #[derive(Debug, Clone, Copy)]
 pub struct Ball {
     pub at: DVec3,
-    pub radius: Known,
+    pub radius: Bounded,
     pub slack: f64,
 }
 
@@ -29,9 +29,9 @@ pub struct Shadow {
     /// The ball's middle is hidden.
     pub hidden: Decision,
     /// A rim runs through it.
-    pub torn: Decision,
+    pub crossed: Decision,
     /// h, the share of it that is hidden.
-    pub share: Known,
+    pub share: Bounded,
 }
 
 /// Signs of a plane's side that may be found where it is `raw`, known to `slack`; the law's first.
@@ -67,7 +67,7 @@ pub fn sides_of(r: &Rectangle, source: Source, slack: f64) -> (f64, Vec<f64>) {
 
 /// Where the way to `q` meets the plane; known to what; and how much larger than the ball its image
 /// is there.
-fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Known) {
+fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Bounded) {
     match source {
         Source::At(p) => {
             let (d, length) = (q - p, q.distance(p));
@@ -75,17 +75,17 @@ fn foot(source: Source, q: DVec3, a: f64, b: f64, slack: f64) -> (DVec3, f64, Kn
             let (t, slant) = (a / apart, length / apart.abs());
             let t_error = slack * (a.abs() + b.abs()) / (apart * apart);
             let slant_error = (2.0 * slant + 1.0) * slack / apart.abs();
-            let stretch = Known { value: slant.max(1.0), error: slant_error };
+            let stretch = Bounded { value: slant.max(1.0), error: slant_error };
             (
                 p + d * t,
                 slack + length * t_error,
-                Known { value: t.abs(), error: t_error }.times(stretch),
+                Bounded { value: t.abs(), error: t_error }.times(stretch),
             )
         }
         Source::Toward(w) => {
             let slope = if a.abs() < LEAST { LEAST } else { a };
             let moved = slack + slack / slope.abs() + b.abs() * OF_UNITS / (slope * slope);
-            let stretch = Known { value: 1.0 / slope.abs(), error: OF_UNITS / (slope * slope) };
+            let stretch = Bounded { value: 1.0 / slope.abs(), error: OF_UNITS / (slope * slope) };
             (q - w * (b / slope), moved, stretch)
         }
     }
@@ -98,23 +98,23 @@ pub fn shadow(r: &Rectangle, source: Source, ball: &Ball) -> Shadow {
     let (foot, moved, stretch) = foot(source, q, a, b, slack);
     let o = foot - r.center;
     let beyond = |axis: DVec3| o.dot(axis).abs() / axis.length() - axis.length();
-    let m = Known { value: beyond(r.u).max(beyond(r.v)), error: moved };
+    let m = Bounded { value: beyond(r.u).max(beyond(r.v)), error: moved };
     let reach = stretch.times(radius);
     let apart = Decision::of(of_a.iter().flat_map(|x| of_b.iter().map(move |y| x * y < 0.0)));
     // From within its plane a rectangle hides nothing.
     let parts = Decision::of(of_a.iter().map(|x| *x != 0.0));
     let near = Decision::above(radius.value, b.abs(), slack + radius.error);
-    let across = Known { value: m.value.abs(), ..m };
-    let torn = parts
+    let across = Bounded { value: m.value.abs(), ..m };
+    let crossed = parts
         .and(apart.and(Decision::greater(reach, across)).or(near.and(Decision::greater(reach, m))));
     let half = (SQRT_2 * reach.value).max(f64::MIN_POSITIVE);
     let ramp = |m: f64| (0.5 - m / half).clamp(0.0, 1.0);
     let off = m.error + reach.error / SQRT_2;
-    let share = Known::between(ramp(m.value + off), ramp(m.value), ramp(m.value - off));
+    let share = Bounded::between(ramp(m.value + off), ramp(m.value), ramp(m.value - off));
     Shadow {
-        hidden: apart.and(Decision::greater(m, Known::NOTHING).not()),
-        torn,
-        share: share.where_or(apart, Known::NOTHING),
+        hidden: apart.and(Decision::greater(m, Bounded::ZERO).not()),
+        crossed,
+        share: share.select(apart, Bounded::ZERO),
     }
 }
 

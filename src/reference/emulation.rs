@@ -1,0 +1,31 @@
+//! Emulation of the pass `second`: its own approximation of C (16) in f64, with a running bound on
+//! what an f32 evaluation of the same may differ (model.md §7, §11 "second", "tree").
+//!
+//! The law itself is [`super::area::AreaScene::second`]. This room follows the shaders step by step
+//! (which facets are divided, which clusters are opened, how shadow edges are smoothed), so that a
+//! test can compare a device's values within rounding and notice a single wrong constant.
+//!
+//! In: facets, regions, lights and their transmittances, the density grid, all relative to the
+//! lighting origin. Out, a receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye, RGB.
+
+mod bounded;
+mod cells;
+mod cluster;
+mod cluster_gather;
+mod cluster_view;
+mod coverage;
+mod exchange;
+mod form;
+mod gathered;
+mod occluder;
+mod pairs;
+mod roundings;
+mod source;
+#[cfg(test)]
+mod tests;
+mod view;
+
+pub use cluster::Clusters;
+pub use exchange::{Exchange, Facet, Region};
+pub use gathered::Gathered;
+pub use source::Sender;

@@ -10,8 +10,9 @@ mod tests;
 use glam::DVec3;
 
 use super::Blob;
+use super::parallel::parallel_map;
 use super::sprites::{OpaquePixel, View};
-use piece::{March, Ray};
+use piece::{RayBlob, RayIntegral, RayIntegrator};
 
 /// One pixel: premultiplied colour and alpha.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,21 +20,6 @@ pub struct Pixel {
     pub color: [f64; 4],
     /// What its radiance may be off, greatest channel: an estimate (model.md §11 "volume").
     pub error: f64,
-}
-
-/// One blob where a ray passes it. Lengths along the ray are view depths.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Passed {
-    /// Where the ray is nearest to its centre.
-    center: f64,
-    /// σ/|d|.
-    width: f64,
-    /// τ of the whole line.
-    depth: f64,
-    radiance: DVec3,
-    /// Beyond these less than [`OMITTED`] of optical depth lies, all blobs together.
-    from: f64,
-    to: f64,
 }
 
 /// Optical depth that all blobs together may have where they are taken to have ended: each its
@@ -83,18 +69,18 @@ impl<'a> Volume<'a> {
         let inside = |(from, to): (u32, u32), i: u32| (from..to).contains(&i);
         let of_row: Vec<usize> =
             (0..self.blobs.len()).filter(|&k| inside(self.places[k][1], j)).collect();
-        let mut march = March::default();
+        let mut integrator = RayIntegrator::default();
         let pixel = |(i, behind): (u32, OpaquePixel)| {
             let ray = self.view.ray(i, j);
             let near = of_row.iter().filter(|&&k| inside(self.places[k][0], i));
             let passed = near.filter_map(|&k| self.pass(k, ray, behind.depth)).collect();
-            self.pixel(&mut march, passed, &behind)
+            self.pixel(&mut integrator, passed, &behind)
         };
         columns.map(pixel).collect()
     }
 
     /// Blob `k` along `ray` from the near plane to `end`, where it is there at all.
-    fn pass(&self, k: usize, ray: DVec3, end: f64) -> Option<Passed> {
+    fn pass(&self, k: usize, ray: DVec3, end: f64) -> Option<RayBlob> {
         let blob = &self.blobs[k];
         let c = blob.position - self.view.pose.position;
         let depth = blob.along(c, ray).tau();
@@ -103,11 +89,24 @@ impl<'a> Volume<'a> {
             (blob.whiten(c).dot(white) / white.length_squared(), blob.sigma / white.length());
         let reach = reach(depth, self.omitted) * width;
         let (from, to) = ((center - reach).max(self.view.near), (center + reach).min(end));
-        (from < to).then_some(Passed { center, width, depth, radiance: self.radiance[k], from, to })
+        (from < to).then_some(RayBlob {
+            center,
+            width,
+            depth,
+            radiance: self.radiance[k],
+            from,
+            to,
+        })
     }
 
-    fn pixel(&self, march: &mut March, passed: Vec<Passed>, behind: &OpaquePixel) -> Pixel {
-        let Ray { color, tau, error } = march.integrate(&passed, ACCURACY * self.brightest);
+    fn pixel(
+        &self,
+        integrator: &mut RayIntegrator,
+        passed: Vec<RayBlob>,
+        behind: &OpaquePixel,
+    ) -> Pixel {
+        let RayIntegral { color, tau, error } =
+            integrator.integrate(&passed, ACCURACY * self.brightest);
         let through = (-tau).exp();
         let [r, g, b, a] = behind.color;
         let shown = color + through * DVec3::new(r, g, b);
@@ -136,8 +135,6 @@ pub fn render(
 ) -> Vec<Pixel> {
     let volume = Volume::new(view, blobs, radiance);
     let width = view.width as usize;
-    super::parallel::parallel_map(view.height as usize, |j| {
-        volume.row(j as u32, &behind[j * width..][..width])
-    })
-    .concat()
+    parallel_map(view.height as usize, |j| volume.row(j as u32, &behind[j * width..][..width]))
+        .concat()
 }

@@ -6,7 +6,6 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use glam::DVec3;
 use libm::erfc;
 
-use super::Passed;
 use crate::model::cloud::SQRT_TAU;
 
 /// A piece may be so many σ of the narrowest blob in it long before the rules are asked: over 3 σ a
@@ -23,9 +22,24 @@ const LEAST_SHARE: f64 = 1e-6;
 /// Of a piece's share what may be lost to blobs that its points do not look at.
 const SHARE_OF_FAINT: f64 = 0.1;
 
+/// One blob where a ray passes it. Lengths along the ray are view depths.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RayBlob {
+    /// Where the ray is nearest to its centre.
+    pub center: f64,
+    /// σ/|d|.
+    pub width: f64,
+    /// τ of the whole line.
+    pub depth: f64,
+    pub radiance: DVec3,
+    /// Beyond these less than [`OMITTED`] of optical depth lies, all blobs together.
+    pub from: f64,
+    pub to: f64,
+}
+
 /// What a ray gathers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Ray {
+pub(super) struct RayIntegral {
     pub color: DVec3,
     /// Optical depth of all of it.
     pub tau: f64,
@@ -46,7 +60,7 @@ struct Active {
 
 /// Scratch that rays share.
 #[derive(Debug, Default)]
-pub(super) struct March {
+pub(super) struct RayIntegrator {
     /// Blobs of the pieces from the whole ray down to the one at hand, one list after the other.
     lists: Vec<usize>,
     active: Vec<Active>,
@@ -58,14 +72,14 @@ struct Piece {
     a: f64,
     b: f64,
     level: u32,
-    /// Its blobs, among [`March::lists`].
+    /// Its blobs, among [`RayIntegrator::lists`].
     first: usize,
 }
 
-impl March {
+impl RayIntegrator {
     /// `tolerance`: the error that all pieces share.
-    pub fn integrate(&mut self, passed: &[Passed], tolerance: f64) -> Ray {
-        let mut ray = Ray { color: DVec3::ZERO, tau: 0.0, error: 0.0 };
+    pub fn integrate(&mut self, passed: &[RayBlob], tolerance: f64) -> RayIntegral {
+        let mut ray = RayIntegral { color: DVec3::ZERO, tau: 0.0, error: 0.0 };
         let a = passed.iter().map(|p| p.from).fold(f64::INFINITY, f64::min);
         let b = passed.iter().map(|p| p.to).fold(f64::NEG_INFINITY, f64::max);
         if a < b {
@@ -77,7 +91,13 @@ impl March {
         ray
     }
 
-    fn visit(&mut self, passed: &[Passed], piece: Piece, accuracy: (f64, f64), ray: &mut Ray) {
+    fn visit(
+        &mut self,
+        passed: &[RayBlob],
+        piece: Piece,
+        accuracy: (f64, f64),
+        ray: &mut RayIntegral,
+    ) {
         let Piece { a, b, level, first } = piece;
         let own = self.lists.len();
         for k in first..own {
@@ -128,7 +148,7 @@ impl March {
 
     /// Fills `active` with the blobs listed from `first` on, over [a, b]; their mean radiance and
     /// optical depth there.
-    fn look(&mut self, passed: &[Passed], a: f64, b: f64, first: usize) -> (DVec3, f64) {
+    fn look(&mut self, passed: &[RayBlob], a: f64, b: f64, first: usize) -> (DVec3, f64) {
         self.active.clear();
         let (mut tau, mut weighted) = (0.0, DVec3::ZERO);
         for &i in &self.lists[first..] {
@@ -162,7 +182,7 @@ impl March {
 
     /// ∫ Σ β_j (L_j − L̄) e^{−τ} over [a, b], where τ is `tau` before it, and what the two rules
     /// differ by.
-    fn quadrature(&self, passed: &[Passed], (a, b): (f64, f64), tau: f64) -> (DVec3, f64) {
+    fn quadrature(&self, passed: &[RayBlob], (a, b): (f64, f64), tau: f64) -> (DVec3, f64) {
         let half = 0.5 * (b - a);
         let at = |x: f64| self.source(passed, 0.5 * (a + b) + half * x, tau);
         let middle = at(0.0);
@@ -178,7 +198,7 @@ impl March {
     }
 
     /// Σ β_j (L_j − L̄) e^{−τ} at view depth z.
-    fn source(&self, passed: &[Passed], z: f64, tau: f64) -> DVec3 {
+    fn source(&self, passed: &[RayBlob], z: f64, tau: f64) -> DVec3 {
         let (mut tau, mut sum) = (tau, DVec3::ZERO);
         for k in &self.active {
             let p = &passed[k.i];

@@ -23,16 +23,16 @@ pub const NEAR: f64 = 1.0;
 
 /// Facets wider than this share of pair_size are divided where shadow edges cross both the
 /// receiver's view of them and a light on them.
-pub const RIM: f64 = 0.125;
+pub const EDGE_WIDTH: f64 = 0.125;
 
 /// The same where a shadow edge crosses only one of the two.
-pub const SINGLE: f64 = 0.25;
+pub const SINGLE_EDGE_WIDTH: f64 = 0.25;
 
 /// Cells wider than this many pair_size are quartered; narrower ones are evaluated at 4 × 4 points.
-pub const BROAD: f64 = 3.0;
+pub const CELL_WIDTH: f64 = 3.0;
 
 /// Clusters that a shadow edge crosses are opened down to this share of θ.
-pub const TORN: f64 = 0.5;
+pub const CLUSTER_EDGE_WIDTH: f64 = 0.5;
 
 /// Opening angle of a cloud's clusters over that of surfaces': their facets overlap and face every
 /// way, so that they need a smaller angle for the same error, 1 % of L2 at θ = 0.4.

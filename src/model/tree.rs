@@ -14,7 +14,7 @@ pub struct Tree {
     pub n_nodes: Vec<u32>,
     /// Node of each facet, in the order of facets.
     pub leaves: Vec<u32>,
-    /// Clusters by height. Those of `merges[h]` depend only on lower ones.
+    /// Clusters by height. A cluster of `merges[h]` depends only on lower ones.
     pub merges: Vec<Vec<u32>>,
 }
 

@@ -1,7 +1,10 @@
 //! Facets of cloud particles, model.md §5 and §11 "facets": one a particle, or one a run of
-//! particles in Morton order taken as one blob; on the blob's shell, its normal from the density
-//! around it where that has a direction, else away from the cloud's centre. In: the density grid
-//! and the placed blobs. Out: positions relative to O, unit normals, areas in scene units².
+//! particles in Morton order merged to one blob. A facet lies on the blob's shell. Its normal
+//! follows the density's gradient if that has a direction, and otherwise points away from the
+//! cloud's centre.
+//!
+//! In: the density grid and the placed blobs. Out: positions relative to O, unit normals, areas in
+//! scene units².
 
 use std::f64::consts::PI;
 
@@ -13,30 +16,34 @@ use super::parallel::parallel_map;
 use crate::model::cloud::{MIN_ASPECT, SIGMA_PER_RADIUS, SQRT_TAU};
 use crate::model::grid::GridSpec;
 
-/// Radius of the quadrature's sphere, in σ: points at √5 s integrate a Gaussian of standard
-/// deviation s = 2σ to degree 5.
+/// Radius of the quadrature's sphere, σ: points at √5 s integrate a Gaussian of standard deviation
+/// s = 2σ to degree 5.
 pub const GRADIENT_RADIUS_SIGMA: f64 = 4.472_135_954_999_58;
-/// A facet's distance from its blob's centre, in σ.
+/// Distance of a facet from its blob's centre, σ.
 pub const SHELL_SIGMA: f64 = 1.5;
-/// Conditioning q below which only the cloud's centre decides, and above which only the gradient
-/// does.
+/// Range of the conditioning q: below, only the cloud's centre decides the normal; above, only the
+/// gradient.
 pub const CONDITIONING: (f64, f64) = (0.02, 0.10);
 /// Weights of the 14-point quadrature of degree 5 on the sphere: 6/15 + 8·3/40 = 1.
 const AXIS_WEIGHT: f64 = 1.0 / 15.0;
 const CORNER_WEIGHT: f64 = 3.0 / 40.0;
 
+/// A facet that receives and reflects light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Facet {
+    /// Centre.
     pub position: DVec3,
+    /// Unit normal.
     pub normal: DVec3,
+    /// Area, scene units².
     pub area: f64,
-    /// Number of the cloud.
+    /// Index of the region; of the cloud in this module.
     pub region: u32,
-    /// q = |G|/S: 0 where the density around has no direction, at most 1.
+    /// q = |G|/S, from 0, where the density has no direction, to 1.
     pub conditioning: f64,
 }
 
-/// The 14 directions and their weights.
+/// Returns the quadrature's 14 directions with their weights.
 pub fn directions() -> [(DVec3, f64); 14] {
     let corner = 1.0 / 3f64.sqrt();
     std::array::from_fn(|i| {
@@ -49,14 +56,14 @@ pub fn directions() -> [(DVec3, f64); 14] {
     })
 }
 
-/// G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of 2σ, and S
-/// = Σ w ρ(p + 2√5 σ A d); A = diag(1, a, 1) makes of the sphere the blob's own shape, and the
-/// gradient is one in the space where that is a ball (§14).
+/// Returns G = Σ w ρ(p + 2√5 σ A d) d, a multiple of the gradient of ρ smoothed by a Gaussian of
+/// 2σ, and S = Σ w ρ(p + 2√5 σ A d). A = diag(1, a, 1) gives the sphere the blob's shape, so that
+/// the gradient is one in the space where the blob is a ball (§14).
 pub fn gradient(spec: &GridSpec, cells: &[f64], p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
     gradient_of(|x| sample(spec, cells, x), p, sigma, aspect)
 }
 
-/// The same of any density ρ.
+/// Returns G and S of any density ρ.
 fn gradient_of(density: impl Fn(DVec3) -> f64, p: DVec3, sigma: f64, aspect: f64) -> (DVec3, f64) {
     let axes = DVec3::new(1.0, aspect, 1.0);
     directions().iter().fold((DVec3::ZERO, 0.0), |(g, s), &(d, w)| {
@@ -77,7 +84,7 @@ pub fn normal(
     blended_normal(gradient(spec, cells, p, sigma, aspect), aspect, p, center)
 }
 
-/// The unit normal down the gradient G beside S, and q.
+/// Returns the unit normal from the gradient G and the sum S, and q.
 fn blended_normal((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) -> (DVec3, f64) {
     let away = (p - center).try_normalize().unwrap_or(DVec3::Y);
     let q = if s > 0.0 { g.length() / s } else { 0.0 };
@@ -87,15 +94,17 @@ fn blended_normal((g, s): (DVec3, f64), aspect: f64, p: DVec3, center: DVec3) ->
     ((t * down + (1.0 - t) * away).try_normalize().unwrap_or(away), q)
 }
 
-/// GLSL's smoothstep: the cubic with zero slope at both ends.
+/// Returns the cubic step with zero slope at both ends, as GLSL's smoothstep.
 pub fn smoothstep(ends: (f64, f64), x: f64) -> f64 {
     let t = ((x - ends.0) / (ends.1 - ends.0)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w, w the mean of an ellipsoid's areas, seen from
-/// all directions, over that of a ball of R: by Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p =
-/// 1.6075, within 1.1 % of a quarter of its surface.
+/// Returns the area of a facet: π R² w (1 − e^{−τ₀}), R = 3σ, τ₀ = √(2π) κ σ a/w.
+///
+/// w is an ellipsoid's projected area, averaged over all directions, over that of a ball of R. It
+/// is taken from Thomsen's formula ((1 + 2 a^p)/3)^{1/p}, p = 1.6075, which is within 1.1 % of a
+/// quarter of the surface.
 pub fn area(blob: &Blob) -> f64 {
     const P: f64 = 1.6075;
     let radius = blob.sigma / SIGMA_PER_RADIUS;
@@ -104,7 +113,7 @@ pub fn area(blob: &Blob) -> f64 {
     -PI * radius * radius * wider * libm::expm1(-depth)
 }
 
-/// Where the shell of 1.5 σ of a blob about `p` has the normal `n`.
+/// Returns the point of a blob's shell of 1.5 σ where the normal is `n`.
 fn shell(p: DVec3, [sigma, aspect]: [f64; 2], n: DVec3) -> DVec3 {
     let to = DVec3::new(n.x, aspect * aspect * n.y, n.z);
     p + SHELL_SIGMA * sigma / n.dot(to).sqrt() * to
@@ -168,24 +177,25 @@ fn on_shell(
     Facet { position: shell(p, shape, normal), normal, area, region, conditioning }
 }
 
-/// What a run of particles is as one blob.
+/// A run of particles merged to one blob.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MergedBlob {
     /// p̄ = Σ m p/Σ m, m = κσ³a.
     pub position: DVec3,
-    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m); where some blobs are ellipsoids √(Σ m (σ² + (x² +
+    /// σ_g = √(Σ m (σ² + |p − p̄|²/3)/Σ m). If some blobs are ellipsoids: √(Σ m (σ² + (x² +
     /// z²)/2)/Σ m) of p − p̄.
     pub sigma: f64,
-    /// √(Σ m (a²σ² + y²)/Σ m) over that, or 1.
+    /// √(Σ m (a²σ² + y²)/Σ m) over σ_g; 1 if all blobs are balls.
     pub aspect: f64,
-    /// Mean σ̄ of the members' groups, by mass.
+    /// Mean σ̄ of the particles' groups, by mass.
     pub sigma_mean: f64,
+    /// Sum of the particles' facet areas.
     pub area: f64,
-    /// Mean by area.
+    /// Mean colour by area.
     pub color: DVec3,
 }
 
-/// Weights that are all 0 count alike.
+/// Normalises weights; if all are 0 they count alike.
 fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
     let weights: Vec<f64> = of.collect();
     let sum: f64 = weights.iter().sum();
@@ -193,7 +203,8 @@ fn weights(of: impl Iterator<Item = f64>) -> Vec<f64> {
     weights.into_iter().map(|w| if sum > 0.0 { w / sum } else { equal }).collect()
 }
 
-/// The particles `run` as one; `ellipsoids`: some of the scene's blobs are no balls.
+/// Merges the particles `run` to one blob. `ellipsoids` tells whether some of the scene's blobs are
+/// not balls.
 pub fn merged(m: &FacetSources<'_>, run: &[u32], ellipsoids: bool) -> MergedBlob {
     let at = |i: &u32| m.blobs[*i as usize];
     let by_mass = weights(run.iter().map(|i| at(i).mass()));
@@ -307,9 +318,8 @@ mod tests {
         for p in [DVec3::new(1.0, 0.5, 0.3), DVec3::new(-0.7, 0.2, 1.5), DVec3::new(0.0, -2.0, 0.0)]
         {
             let (n, q) = normal(&SPEC, &cells, p, [0.4, 1.0], DVec3::new(3.0, 3.0, -3.0));
-            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction is off by what
-            // the deposit's cut at 3σ makes of a ball (a cube: 0.27 %) and by cells of 0.2: below
-            // one degree.
+            // q ≈ (2σ/3)|p|/1.2² > 0.1, so the gradient alone decides. Its direction errs by the
+            // deposit's cut at 3σ (a cube: 0.27 %) and by cells of 0.2: below one degree.
             assert!(
                 q > CONDITIONING.1 && n.dot(p.normalize()) > 1f64.to_radians().cos(),
                 "{p} {n} {q}"
@@ -319,8 +329,8 @@ mod tests {
 
     #[test]
     fn in_closed_form_a_ball_has_the_gradient_of_its_gaussian() {
-        // Of one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and
-        // exactly so by symmetry on an axis. Far from all blobs only the cloud's centre is left.
+        // For one blob the quadrature's points lie at p + r d: along −∇ρ up to its degree, and
+        // exactly so by symmetry on an axis. Far from all blobs only the cloud's centre counts.
         let blobs = [
             Blob { aspect: 1.0, position: DVec3::ZERO, sigma: 1.2, kappa: 1.0 },
             Blob { aspect: 1.0, sigma: 0.4, position: DVec3::X, kappa: 0.0 },
@@ -332,9 +342,9 @@ mod tests {
                 && facets[1].conditioning > CONDITIONING.1
         );
         assert!((facets[1].position - DVec3::X * 1.6).length() < 1e-12);
-        // At its own centre nothing points anywhere: away from the cloud's.
+        // At its own centre the gradient vanishes: the normal points away from the cloud's.
         assert!((facets[0].normal + DVec3::Y).length() < 1e-12);
-        // A fine grid says the same.
+        // A fine grid gives the same.
         let off = [blobs[0], Blob { position: DVec3::new(0.9, -0.5, 0.3), ..blobs[1] }];
         let by_grid =
             super::facets(&SPEC, &ball(), &sources(&off, &[0.4; 2], &[0; 2]), &[DVec3::ZERO])[1];
@@ -402,7 +412,7 @@ mod tests {
         let (a0, a1) = (area(&blobs[0]), area(&blobs[1]));
         assert!((b.area - a0 - a1).abs() < 1e-13);
         assert!((b.color - DVec3::new(a0, a1, 0.0) / (a0 + a1)).length() < 1e-15);
-        // Neither of the last two has mass or area: they count alike.
+        // Neither of the last two has mass or area, so they count alike.
         let b = merged(&members, &[2, 3], false);
         assert_eq!(
             (b.position, b.sigma_mean, b.area, b.color),

@@ -1,8 +1,9 @@
-//! The f64 twin of every GPU pass, one room a pass, written from the mathematics (model.md), never
-//! from a shader.
+//! The f64 reference of every GPU pass, one module a pass, written from the mathematics (model.md)
+//! and not from a shader. The exception is [`emulation`], which says so.
 //!
-//! Each room is plain functions over slices and takes its stage's inputs as arguments, so that a
-//! test can feed it exactly what the GPU had and so measure one stage alone.
+//! Every module consists of functions over slices that take their stage's inputs as arguments. A
+//! test can pass exactly what the GPU had, and so measure one stage alone. [`picture`] puts the
+//! stages together.
 
 pub mod area;
 pub mod blob;

@@ -132,11 +132,11 @@ mod tests {
     }
 
     #[test]
-    fn a_table_hides_what_is_above_it_from_what_is_below() {
+    fn a_table_hides_points_above_from_points_below() {
         let t = table();
         let (below, above) = (DVec3::new(0.0, 0.0, 3.0), DVec3::new(2.0, 4.0, 3.0));
         assert!(t.hides(below, above) && t.hides(above, below));
-        // Both above; ending below; past the edge at x = 3, of which the edge itself still hides.
+        // Both above; ending below; past the edge at x = 3, where the edge itself still hides.
         assert!(!t.hides(above + DVec3::Y, above) && !t.hides(below, DVec3::new(2.0, 1.9, 3.0)));
         let under = |x: f64| DVec3::new(x, 1.0, 3.0);
         assert!(
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_shades_what_the_light_passes_through_it_to() {
+    fn a_table_shades_points_behind_it() {
         let t = table();
         let below = DVec3::new(1.0, -5.0, 3.0);
         assert!(
@@ -155,7 +155,7 @@ mod tests {
                 && !t.shades(below, DVec3::NEG_Y)
                 && !t.shades(below, DVec3::X)
         );
-        // 7 up and 2 aside is the edge, in exact numbers.
+        // 7 up and 2 aside meets the edge in exact numbers.
         assert!(
             t.shades(below, DVec3::new(2.0, 7.0, 0.0))
                 && !t.shades(below, DVec3::new(2.0, 6.9, 0.0))
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_in_the_plane_is_not_hidden() {
+    fn points_in_the_plane_are_not_hidden() {
         let t = table();
         // f32's own rounding of such a point, at a distance of a thousand: 3e-5.
         for off in [0.0, 3e-5, -3e-5] {
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn the_facet_s_own_rectangle_does_not_count() {
+    fn a_facets_own_rectangle_does_not_hide() {
         let lamp = Light::Point {
             position: DVec3::new(1.0, 9.0, 3.0),
             intensity: DVec3::ONE,

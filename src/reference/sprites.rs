@@ -1,6 +1,8 @@
-//! Drawing, model.md §9 and §11 "sprites": thin blobs composed far to near with premultiplied
-//! "over", in f64; beside it a bound on what a target of few bits may differ. In: blobs and eye
-//! relative to O, an order. Out: [width × height] of [C_r, C_g, C_b, A], row 0 at the top.
+//! Sprites, model.md §9 and §11 "sprites": thin blobs composed far to near with premultiplied
+//! "over", in f64, with a bound on what a target of few bits may differ.
+//!
+//! In: blobs and eye relative to O, an order. Out: [row][column] of [C_r, C_g, C_b, A], row 0 at
+//! the top.
 
 use glam::{DVec2, DVec3};
 
@@ -9,63 +11,70 @@ use super::parallel::parallel_map;
 use crate::model::camera::Pose;
 use crate::model::film::FilmFormat;
 
-/// What a picture is taken with; `pose.position` is the eye relative to O.
+/// A view: camera, picture size and cuts. `pose.position` is the eye relative to O.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
+    /// Columns.
     pub width: u32,
+    /// Rows.
     pub height: u32,
+    /// Pose of the camera.
     pub pose: Pose,
+    /// Vertical field of view.
     pub fov_y_rad: f64,
     /// Least view depth of a drawn particle's centre.
     pub near: f64,
-    /// Sprites end at this many σ.
+    /// Radius at which sprites end, σ.
     pub cutoff: f64,
-    /// And where their optical depth falls under this.
+    /// Optical depth below which sprites end.
     pub threshold: f64,
-    /// Blobs whose σ is narrower than so many pixels are left out; 0: none.
+    /// Width in pixels of σ below which blobs are left out; 0 leaves out none.
     pub smallest: f64,
-    /// Where in a pixel its ray goes through: off its centre, to the right and down, pixels within
-    /// ±½.
+    /// Offset of the rays from the pixels' centres, to the right and down, pixels within ±½.
     pub shift: DVec2,
 }
 
-/// How a GPU may depart from the mathematics while drawing.
+/// Permitted departures of a device from the mathematics while drawing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rounding {
     /// u_t: unit round-off of the target's channels.
     pub unit: f64,
     /// Least normal number of the target: below it the error no longer shrinks with the value.
     pub least_normal: f64,
-    /// Of a target that holds 0 to 1 in equal steps, one of them; 0 of floats. What it blends is
-    /// cut to that range.
+    /// Step of a target that holds 0 to 1 in equal steps, which clamps what it blends; 0 for
+    /// floats.
     pub step: f64,
     /// Relative error of each α.
     pub alpha: f64,
-    /// Error of b²/2σ², halved: a share of what that is at the cut, or of 1 where it is less there
-    /// (so a relative error of b). Nearer to the cut a sprite may end or not.
+    /// Relative error of b. Half the error of b²/2σ², as a share of its value at the cut, or of 1
+    /// if that is less. Nearer to the cut a sprite may end or not.
     pub edge: f64,
-    /// What a view depth may be off, as a share of the distance, where it decides on a size.
+    /// Error of a view depth where it decides on a size, as a share of the distance.
     pub depth: f64,
 }
 
-/// What stands behind the sprites in a pixel.
+/// The opaque background of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OpaquePixel {
+    /// Premultiplied colour and alpha.
     pub color: [f64; 4],
-    /// Per channel, what the target may differ from it.
+    /// Bound on the target's difference, channel by channel.
     pub bound: [f64; 4],
-    /// View depth: of particles whose centre lies beyond it nothing is drawn.
+    /// View depth. Particles whose centre lies beyond are hidden.
     pub depth: f64,
-    /// A particle within this of `depth` may be drawn or not.
+    /// Range about `depth` in which a particle may be hidden or not.
     pub depth_bound: f64,
 }
 
 impl OpaquePixel {
+    /// No background.
     pub const EMPTY: OpaquePixel =
         OpaquePixel { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
 }
 
 impl Rounding {
+    /// Returns the rounding of a format, with relative errors of each α and of the distances at
+    /// edges.
     pub fn of(format: FilmFormat, alpha: f64, edge: f64) -> Rounding {
         let unit = format.unit_roundoff();
         let (unit, least_normal, step) = match format {
@@ -76,21 +85,22 @@ impl Rounding {
         Rounding { unit, least_normal, step, alpha, edge, depth: 0.0 }
     }
 
-    /// How far from the cut b²/2σ² is sure to lie on its side of it.
+    /// Returns the distance from the cut beyond which rounding cannot move b²/2σ² across it.
     pub(super) fn slack(&self, cut: f64) -> f64 {
         (2.0 + self.edge) * self.edge * cut.max(1.0)
     }
 
+    /// Exact arithmetic.
     pub const NONE: Rounding =
         Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
 
-    /// What the target holds of an opaque colour.
+    /// Returns what the target holds of an opaque colour.
     pub fn stored(&self, behind: OpaquePixel) -> OpaquePixel {
         if self.step == 0.0 {
             return behind;
         }
         let color = behind.color.map(|v| v.clamp(0.0, 1.0));
-        // To one of the two steps beside it.
+        // It is rounded to one of the two neighbouring steps.
         OpaquePixel { color, bound: behind.bound.map(|e| e + self.step), ..behind }
     }
 }
@@ -101,24 +111,23 @@ impl View {
         (tan * f64::from(self.width) / f64::from(self.height), tan)
     }
 
-    /// b²/2σ² where a sprite ends whose centre has the optical depth `tau` (model.md §11
-    /// "threshold"); where it is not above 0 nothing is drawn.
+    /// Returns b²/2σ² where a sprite of central optical depth `tau` ends (model.md §11
+    /// "threshold"). If it is not positive nothing is drawn.
     pub fn cut(&self, tau: f64) -> f64 {
-        // Without a threshold the logarithm is infinite, or of 0/0 no number, which `min` leaves
-        // out.
+        // Without a threshold the logarithm is infinite, or NaN for 0/0, which `min` ignores.
         (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
     }
 
-    /// How much wider than the smallest one, over the eye's offset `c` from it, a blob's σ is:
-    /// where that is below 0 nothing of it is drawn (model.md §11 "cull"). And how far a GPU's
-    /// answer may lie from it, `depth` as in [`Rounding`].
+    /// Returns by how much a blob's σ exceeds the smallest drawn width, `c` its offset from the
+    /// eye; if negative the blob is not drawn (model.md §11 "cull"). The second value bounds a
+    /// device's error, with `depth` as in [`Rounding`].
     pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
         let width = self.smallest * self.pixel();
         (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())
     }
 
-    /// Direction through pixel (column `i`, row `j` from the top), at its centre but for `shift`;
-    /// its view depth is 1.
+    /// Returns the ray through the pixel in column `i` and row `j`, at its centre plus `shift`. Its
+    /// view depth is 1.
     pub fn ray(&self, i: u32, j: u32) -> DVec3 {
         let (slope_x, slope_y) = self.half_slopes();
         let x = 2.0 * (f64::from(i) + 0.5 + self.shift.x) / f64::from(self.width) - 1.0;
@@ -126,27 +135,27 @@ impl View {
         self.pose.forward + x * slope_x * self.pose.right + y * slope_y * self.pose.up
     }
 
-    /// Slopes of the way `offset` from the eye.
+    /// Returns the slopes of the direction `offset`.
     pub fn slopes_of(&self, offset: DVec3) -> DVec2 {
         DVec2::new(offset.dot(self.pose.right), offset.dot(self.pose.up))
             / offset.dot(self.pose.forward)
     }
 
-    /// Difference of slopes from a pixel to the next.
+    /// Returns the difference of slopes between neighbouring pixels.
     pub fn pixel(&self) -> f64 {
         2.0 * self.half_slopes().1 / f64::from(self.height)
     }
 
-    /// Columns and rows (from, to; to excluded) outside which no ray meets `blob`, `c` off the eye,
-    /// out to `reach` σ. May be too large, never too small.
+    /// Returns the columns and rows (first, end) outside which no ray meets `blob` out to `reach`
+    /// σ, `c` its offset from the eye. The range may be too large, never too small.
     pub(super) fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
         let (slope_x, slope_y) = self.half_slopes();
         let [x, y] = [self.pose.right, self.pose.up]
             .map(|side| blob.slopes(c, [side, self.pose.forward], reach));
         let pixels = |(low, high): (f64, f64), slope: f64, n: u32| {
             let at = |s: f64| 0.5 * (s / slope + 1.0) * f64::from(n);
-            // One pixel to either side, of which a shift takes up to half, for the rounding of the
-            // tangents; `as` saturates, and min keeps it inside.
+            // One pixel to either side covers the rounding of the tangents and a shift of up to
+            // half a pixel. `as` saturates, and `min` keeps it inside.
             let from = ((at(low) - 1.0).floor() as u32).min(n);
             (from, ((at(high) + 1.0).ceil() as u32).clamp(from, n))
         };
@@ -155,12 +164,12 @@ impl View {
     }
 }
 
-/// One pixel while it is composed.
+/// A pixel while it is composed.
 #[derive(Debug, Clone, Copy)]
 struct Layered {
     value: [f64; 4],
     bound: [f64; 4],
-    /// View depth of what stands behind, and how far that may be off.
+    /// View depth of the background, and its bound.
     opaque: (f64, f64),
 }
 
@@ -171,8 +180,8 @@ impl From<&OpaquePixel> for Layered {
 }
 
 impl Layered {
-    /// C ← αL + (1−α)C, A ← α + (1−α)A, in true numbers; the target has `off` instead of α and
-    /// rounds the result.
+    /// Composes C ← αL + (1−α)C, A ← α + (1−α)A. The target's α is within `off`, and it rounds the
+    /// result.
     fn over(&mut self, alpha: f64, off: f64, radiance: DVec3, r: &Rounding) {
         let source = [radiance.x, radiance.y, radiance.z, 1.0];
         for ((v, e), s) in self.value.iter_mut().zip(&mut self.bound).zip(source) {
@@ -183,16 +192,16 @@ impl Layered {
             // C' − C'_t = (1 − α)(C − C_t) + (α − α_t)(L − C_t), |C_t − C| ≤ e.
             let inherited = (1.0 - alpha) * *e + off * ((s - *v).abs() + *e);
             *v = alpha * s + (1.0 - alpha) * *v;
-            // Correct rounding errs by u_t, faithful by 2 u_t, of the number written.
+            // Correct rounding errs by u_t of the number written, faithful rounding by 2 u_t.
             *e = inherited + 2.0 * r.unit * (v.abs() + inherited).max(r.least_normal);
         }
     }
 }
 
-/// The same of a target of equal steps, which cuts source and result to [0, 1]; value and bound. It
-/// may blend in its own few bits (Vulkan, "Blending": no less precise than the target): source,
-/// factor, product and sum are then each rounded to a step, half a step off where rounding is
-/// correct.
+/// Composes on a target of equal steps, which clamps source and result to [0, 1]; returns value and
+/// bound. The target may blend in its own few bits (Vulkan, "Blending": no less precise than the
+/// target). Source, factor, product and sum are then each rounded to a step, half a step off where
+/// rounding is correct.
 fn over_steps(
     [value, bound]: [f64; 2],
     source: f64,
@@ -200,17 +209,17 @@ fn over_steps(
     off: f64,
     r: &Rounding,
 ) -> [f64; 2] {
-    // No difference of source and target as in floats: a source that is cut does not follow α.
+    // The difference of source and target does not bound the error as in floats, since a clamped
+    // source does not follow α.
     let inherited = (1.0 - alpha) * bound + off * (source.abs() + value.abs() + bound);
     let new = ((alpha * source).clamp(0.0, 1.0) + (1.0 - alpha) * value).clamp(0.0, 1.0);
     let bound =
         inherited + 2.0 * r.step + 2.0 * r.unit * (alpha * source.abs() + value + inherited);
-    // Both lie in [0, 1]; what has no bound keeps none.
+    // Both values lie in [0, 1], so the bound is at most 1 unless it is infinite.
     [new, if bound.is_finite() { bound.min(1.0) } else { bound }]
 }
 
-/// Returns a factor on τ of blob `j` where the ray's slopes from the eye differ from its centre's
-/// by the second argument.
+/// A factor on τ of blob `j`, given the difference of the ray's slopes from its centre's.
 pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
 
 /// Blobs to draw, with their radiance, order and textures.
@@ -232,7 +241,8 @@ impl Sprites<'_> {
     }
 }
 
-/// A picture as [C_r, C_g, C_b, A], and by how much a device's may differ, channel by channel.
+/// A picture as [C_r, C_g, C_b, A], and by how much a device's picture may differ, channel by
+/// channel.
 pub type Bounded = (Vec<[f64; 4]>, Vec<[f64; 4]>);
 
 /// Returns the picture of `sprites` over nothing.
@@ -264,19 +274,19 @@ pub fn render_over(
     pixels.iter().map(|p| (p.value, p.bound)).unzip()
 }
 
-/// Bands of rows that are drawn side by side; the result does not depend on it.
+/// Number of bands of rows that are drawn in parallel. The result does not depend on it.
 const N_THREADS: u32 = 2;
 
-/// Pixels one in each cell of a part of a picture.
+/// Pixels of a part of a picture, one in each cell of a grid.
 #[derive(Debug, Clone, Copy)]
 pub struct Raster<'a> {
     /// [column, row] of the part's first pixel.
     pub first: [u32; 2],
-    /// Cells in a row of them.
+    /// Number of cells in a row.
     pub n_columns: u32,
-    /// Pixels along a side of a cell.
+    /// Side of a cell, pixels.
     pub cell: u32,
-    /// [column, row] of the picture, rows of cells from the top.
+    /// [column, row] of every pixel in the picture, rows of cells from the top.
     pub at: &'a [[u32; 2]],
 }
 
@@ -317,7 +327,7 @@ pub fn render_at(
     rows.into_iter().flatten().map(|p| p.value).collect()
 }
 
-/// Draws blob `j` over the rows from `first_row` on that `band` holds.
+/// Draws blob `j` over the rows that `band` holds, from `first_row` on.
 fn draw(
     view: &View,
     sprites: &Sprites<'_>,
@@ -434,7 +444,7 @@ impl Sprites<'_> {
     }
 }
 
-/// α = 1 − e^{−τ}.
+/// Returns α = 1 − e^{−τ}.
 pub fn alpha(tau: f64) -> f64 {
     -libm::expm1(-tau)
 }
@@ -458,7 +468,7 @@ mod tests {
     };
 
     #[test]
-    fn what_stands_behind_shows_through_and_hides() {
+    fn the_background_shows_through_and_hides() {
         // α = 1 − e^{−ln 2} = ½ through the centres; colours (1, 0, 0) at depth 2 and (0, 1, 0) at
         // depth 4.
         let kappa = std::f64::consts::LN_2 / (SQRT_TAU * 0.25);
@@ -482,8 +492,8 @@ mod tests {
         assert!(is(over(5.0, 0.0).0, [0.5, 0.25, 0.25, 1.0]));
         assert!(is(over(3.0, 0.0).0, [0.5, 0.0, 0.5, 1.0]));
         assert!(is(over(1.0, 0.0).0, [0.0, 0.0, 1.0, 1.0]));
-        // Equal depth is drawn; where that is uncertain, the bound covers both: (0.5, 0.25, 0.25)
-        // and (0.5, 0, 0.5).
+        // A blob at equal depth is drawn. If that is uncertain the bound covers both results: (0.5,
+        // 0.25, 0.25) and (0.5, 0, 0.5).
         assert!(is(over(4.0, 0.0).0, [0.5, 0.25, 0.25, 1.0]) && is(over(4.0, 0.0).1, [0.0; 4]));
         assert!(is(over(4.0, 1e-9).1, [0.0, 0.25, 0.25, 0.0]));
         let (value, bound) = over(4.0 - 1e-10, 1e-9);

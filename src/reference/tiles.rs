@@ -1,6 +1,7 @@
-//! tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, and a bound on what f32 in
-//! that order may differ. In: blobs and eye relative to O, an order far to near. Out: as `sprites`,
-//! of which it is the same picture.
+//! Sprites in tiles, model.md §11 "tiles": thin blobs composed near to far, in f64, with a bound on
+//! what f32 in that order may differ.
+//!
+//! In: blobs and eye relative to O, an order far to near. Out: the same picture as `sprites`.
 
 use glam::DVec3;
 
@@ -9,20 +10,24 @@ use super::sprites::{Bounded, OpaquePixel, Rounding, Seen, Sprites, View};
 /// Unit round-off of f32.
 pub(super) const U: f64 = 1.0 / 16_777_216.0;
 
-/// One pixel while it is composed: true numbers, and what the device's may differ from them.
+/// A pixel while it is composed: exact values, and bounds on the device's differences.
 pub(super) struct Composed {
+    /// Composed colour.
     pub color: DVec3,
+    /// Transmittance.
     pub passed: f64,
+    /// Bound on the colour's difference.
     pub off_color: DVec3,
+    /// Bound on the transmittance's difference.
     pub off_passed: f64,
 }
 
-/// Puts a layer of true opacity, on the device within the second number of the device's, under what
-/// is composed.
+/// Adds a layer of an exact opacity under the composed ones; the device's opacity is within the
+/// second number.
 pub(super) type AddLayer = fn(&mut Composed, f64, f64, DVec3);
 
 impl Composed {
-    /// A layer of true opacity `alpha`, on the device within `off` of `device_alpha`.
+    /// Adds a layer of opacity `alpha`, which the device has within `off`.
     fn under(&mut self, alpha: f64, off: f64, radiance: DVec3) {
         let (passed, here) = (self.passed, self.passed * alpha);
         // T = 1 - A is rounded; (T + dT)(a + da) - T a, rounded once.
@@ -35,7 +40,7 @@ impl Composed {
         self.off_color +=
             U * (here + off_here) * radiance.abs() + U * (self.color.abs() + self.off_color);
         self.passed -= here;
-        // A + T a: what A is off by goes on times 1 - a; the sum is rounded as what it is.
+        // A + T a: the error of A is multiplied by 1 − a, and the sum is rounded.
         self.off_passed = self.off_passed * ((1.0 - alpha).abs() + off)
             + passed * off
             + off_one_minus * (alpha + off)
@@ -43,7 +48,7 @@ impl Composed {
             + U * (1.0 - self.passed + self.off_passed);
     }
 
-    /// Over what stands behind: the pixel, and its bound. `most`: the brightest radiance there is.
+    /// Returns the pixel over its background, and its bound. `most` is the brightest radiance.
     fn over(
         &self,
         under: &OpaquePixel,
@@ -51,7 +56,7 @@ impl Composed {
         saturated: f64,
         most: f64,
     ) -> ([f64; 4], [f64; 4]) {
-        // What is left out behind a tile none of whose pixels lets `saturated` through.
+        // Layers behind a tile all of whose pixels let less than `saturated` through are left out.
         let skipped = if self.passed - self.off_passed < saturated { saturated } else { 0.0 };
         let channel = |k: usize| {
             let (front, off, most) = match k {
@@ -66,7 +71,8 @@ impl Composed {
                 + skipped * most;
             let inherited = inherited + 2.0 * U * (value.abs() + inherited);
             if r.step > 0.0 {
-                // Cut to its range at the end alone, to one of the two steps beside it.
+                // The result is clamped once at the end, and rounded to one of the two neighbouring
+                // steps.
                 return (value.clamp(0.0, 1.0), inherited + r.step);
             }
             (value, inherited + 2.0 * r.unit * (value.abs() + inherited).max(r.least_normal))
@@ -90,12 +96,13 @@ pub struct Composition<'a> {
     pub saturated: f64,
 }
 
-/// The picture over `behind`, a pixel each, and per channel a bound on what the device may differ.
+/// Returns the picture over `behind`, one a pixel, and per channel a bound on what the device may
+/// differ.
 pub fn render_over(of: &Composition<'_>, behind: &[OpaquePixel]) -> Bounded {
     render_by(of, behind, Composed::under)
 }
 
-/// The same where a device composes by another form of the law, with errors of its own.
+/// Composes as a device that uses another form of the law, with errors of its own.
 pub(super) fn render_by(of: &Composition<'_>, behind: &[OpaquePixel], layer: AddLayer) -> Bounded {
     let (view, most) =
         (of.view, of.sprites.radiance.iter().map(|l| l.abs().max_element()).fold(0.0, f64::max));

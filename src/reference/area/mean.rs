@@ -1,4 +1,4 @@
-//! Means over a surface or one of its facets, and work spread over the processor's threads.
+//! Means of radiance and irradiance over a surface or one of its facets.
 
 use glam::{DVec2, DVec3};
 
@@ -8,25 +8,28 @@ use super::resolve::{self, ViewOfSurface};
 use super::scene::AreaScene;
 use crate::model::surface::Surface;
 
-/// Of the error asked for, the inner integral's share: it adds to the outer one's.
+/// Share of the accuracy that the inner integral gets; its error adds to the outer one's.
 const INNER_SHARE: f64 = 0.1;
 
-/// Of L2 over a surface: it bends wherever a corner appears behind an edge, and there the two
-/// rules' errors are numbers of one size and no fixed sign, of whose difference one is seldom more
-/// than three times.
+/// Safety factor on the error of L2's mean over a surface. L2 has a kink wherever a corner appears
+/// behind an edge. There the two rules' errors are of one size and no fixed sign, and one is seldom
+/// more than three times their difference.
 const SAFETY_FACTOR: f64 = 3.0;
 
 /// A rectangle within a surface's (s, t).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
+    /// Low corner.
     pub low: DVec2,
+    /// High corner.
     pub high: DVec2,
 }
 
 impl Window {
+    /// The whole surface.
     pub const WHOLE: Window = Window { low: DVec2::NEG_ONE, high: DVec2::ONE };
 
-    /// Facet `i` of a surface.
+    /// Returns the window of facet `i` of a surface.
     pub fn facet(surface: &Surface, i: u32) -> Window {
         let [n_u, n_v] = surface.subdivide;
         let at = |k: u32, n: u32| 2.0 * f64::from(k) / f64::from(n) - 1.0;
@@ -50,7 +53,7 @@ impl Window {
 }
 
 impl AreaScene<'_> {
-    /// Mean of L1 toward the eye at `eye`, and of I_d.
+    /// Returns the means of L1 toward the eye at `eye`, and of I_d.
     pub fn mean_first(
         &self,
         i_surface: usize,
@@ -67,7 +70,7 @@ impl AreaScene<'_> {
         adaptive::integrate(&mean, cells, NOTHING, accuracy)
     }
 
-    /// Mean of L2 toward the eye at `eye`, and of I_i.
+    /// Returns the means of L2 toward the eye at `eye`, and of I_i.
     pub fn mean_second(
         &self,
         i_surface: usize,
@@ -97,7 +100,7 @@ struct Mean<'s, 'a> {
     eye: DVec3,
     window: &'s Window,
     of: Quantity,
-    /// Of what is integrated at every point.
+    /// Accuracy of the value at every point.
     accuracy: &'s Accuracy,
 }
 

@@ -1,5 +1,5 @@
-//! The second reflection, C (16), as the law has it: radiance and irradiance at a receiver,
-//! integrated over the areas of all surfaces, plus the facets of clouds and ground as discs.
+//! The law of the second reflection, C (16): radiance and irradiance at a receiver, integrated over
+//! the areas of all surfaces. The facets of clouds and ground count as discs.
 
 use std::f64::consts::{FRAC_1_PI, PI};
 

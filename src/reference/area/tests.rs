@@ -1,4 +1,4 @@
-//! Numbers worked by hand and published ones, then agreement with paths that share no quadrature.
+//! Values worked by hand and published ones, and agreement with paths that share no quadrature.
 
 use super::mean::Window;
 use super::paths::PathSampling;
@@ -25,7 +25,7 @@ fn at(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// A unit square at height `y` that faces down: under a sky it is lit by the constant share alone.
+/// A unit square at height `y` that faces down. A sky lights it by the constant share alone.
 fn ceiling(y: f64) -> Surface {
     rect(at(0.0, y, 0.0), 0.5 * DVec3::X, 0.5 * DVec3::Z)
 }
@@ -38,12 +38,12 @@ fn glossy(kd: f64, ks: f64, ns: f64) -> Brdf {
     Brdf { kd: DVec3::splat(kd), ks: DVec3::splat(ks), ns }
 }
 
-/// A white surface that no other light reaches has L1 = 1 under it.
+/// A white surface that no other light reaches has L1 = 1 under this sky.
 const GLOW: Light = Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 };
 
 fn close(e: &Estimate, irradiance: f64, relative: f64) {
     let off = (e.irradiance.x - irradiance).abs();
-    // The true value's own digits are beyond the tolerance; 1e-13 for the sums' roundings.
+    // The expected value is accurate beyond the tolerance; 1e-13 covers the sums' roundings.
     assert!(off <= e.irradiance_error + 1e-13 * irradiance, "{e:?} is not {irradiance}");
     assert!(e.irradiance_error <= relative * irradiance, "{e:?}");
 }
@@ -69,7 +69,7 @@ fn form_factors_from_an_element() {
 }
 
 #[test]
-fn a_receiver_that_touches_what_it_sees_converges() {
+fn a_receiver_that_touches_an_emitter_converges() {
     // B-4 as the element nears the wall's foot: F = ½ − Y/2 …, by its closed form with X = 2, Y =
     // 2c.
     let wall = rect(at(0.0, 0.5, 0.0), 0.5 * DVec3::Y, 0.5 * DVec3::Z);
@@ -82,9 +82,9 @@ fn a_receiver_that_touches_what_it_sees_converges() {
             "{c}: {f} {truth} {error}"
         );
     }
-    // In the wall's plane nothing of it is seen.
+    // In the wall's plane nothing of the wall is seen.
     assert_eq!(form_factor(&wall, DVec3::ZERO, UP, &FINE).0, 0.0);
-    // Parallel plates a hair apart see only each other.
+    // Parallel plates that almost touch see only each other.
     let (f, error) = form_factor(&ceiling(1e-5), at(0.1, 0.0, 0.2), UP, &Accuracy::relative(1e-7));
     assert!((f - 1.0).abs() < 1e-8 + error && error < 1e-7);
 }
@@ -126,7 +126,7 @@ fn cube(albedo: Brdf) -> (Vec<Surface>, Vec<Brdf>) {
 }
 
 #[test]
-fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
+fn a_furnace_reflects_powers_of_its_albedo() {
     let (faces, brdfs) = cube(matte(0.7));
     let sky = [Light::Sky { irradiance: DVec3::splat(PI), constant: 1.0 }];
     let s = AreaScene::new(&faces, &brdfs, &sky, &[], 0.0, &[]);
@@ -140,7 +140,7 @@ fn a_furnace_holds_albedo_after_one_reflection_and_its_square_after_two() {
             close(&e, PI * 0.7, 1e-7);
         }
     }
-    // Paths drawn by the cosine carry the albedo itself: no chance is left.
+    // Paths drawn by the cosine carry the albedo exactly, without variance.
     let receiver = s.on_surface(2, faces[2].center + 0.3 * faces[2].u);
     let found = s.reflections(
         &receiver,
@@ -165,7 +165,7 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
             (receiver.normal.any_orthonormal_vector() - depth * receiver.normal).normalize();
         let e = s.second(&receiver, toward, &Accuracy::relative(1e-7));
         assert!((e.radiance.x - 0.35).abs() <= e.error && e.error <= 1e-7 * 0.35, "{e:?}");
-        // All directions are drawn by the cosine: no chance is left, only 2000 sums' roundings.
+        // All directions are drawn by the cosine, so that only the rounding of 2000 sums is left.
         let found = s.reflections(
             &receiver,
             toward,
@@ -179,7 +179,7 @@ fn an_eye_behind_sees_the_diffuse_part_alone() {
 }
 
 #[test]
-fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
+fn blockers_and_blobs_attenuate() {
     let lamp = ceiling(2.0);
     let receiver = Receiver::new(DVec3::ZERO, UP, matte(0.5));
     let second = |surfaces: &[Surface], blobs: &[Blob]| {
@@ -187,15 +187,15 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
         AreaScene::new(surfaces, &brdfs, &[GLOW], blobs, 0.0, &[]).second(&receiver, UP, &FINE)
     };
     let free = second(&[lamp], &[]);
-    // A black one with its edge through the axis, level and leaning.
+    // A black blocker with its edge through the axis, level and leaning.
     for lean in [0.0, 0.7] {
         let along = DVec3::X.rotate_z(lean);
         let blocker = rect(at(0.0, 1.0, 0.0) + 3.0 * along, 3.0 * along, 9.0 * DVec3::Z);
         let s = AreaScene::new(&[lamp, blocker], &[matte(1.0), matte(0.0)], &[GLOW], &[], 0.0, &[]);
         close(&s.second(&receiver, UP, &FINE), 0.5 * free.irradiance.x, 1e-9);
     }
-    // A wide blob, seen through its centre by every ray within a small lamp: e^{−τ}, τ hardly
-    // varying with direction.
+    // A wide blob that every ray to a small lamp crosses near its centre: e^{−τ}, with τ nearly
+    // constant.
     let small = rect(at(0.0, 200.0, 0.0), 0.1 * DVec3::X, 0.1 * DVec3::Z);
     let blob = Blob { aspect: 1.0, position: at(0.0, 100.0, 0.0), sigma: 5.0, kappa: 0.2 };
     let ratio = second(&[small], &[blob]).irradiance.x / second(&[small], &[]).irradiance.x;
@@ -206,8 +206,8 @@ fn a_blocker_takes_half_and_a_blob_what_it_absorbs() {
 #[test]
 fn a_lobe_of_any_width_is_found() {
     // Eye along the normal, a lamp that fills the lobe: ∫ K_s (n+2)/2π cos^n γ cos 2γ · 4 cos γ
-    // dω_h = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1); below cos 22.5° there
-    // is nothing left.
+    // dω_h = 4 K_s (n+2) ∫ c^{n+1} (2c² − 1) dc = 4 K_s (2(n+2)/(n+4) − 1). Below cos 22.5° nothing
+    // is left.
     let lamp = rect(UP, DVec3::X, DVec3::Z);
     let sun = [Light::Directional { direction: UP, irradiance: DVec3::ONE }];
     let nothing = matte(0.0);
@@ -257,7 +257,7 @@ fn means_of_the_first_reflection_hold_the_lights_flux() {
     }
 }
 
-/// Twelve rectangles at random in a box of half edge 2, four of them glossy, and lights.
+/// Twelve random rectangles in a box of half edge 2, four of them glossy, and lights.
 fn random_scene(seed: u32) -> (Vec<Surface>, Vec<Brdf>, Vec<Light>) {
     let mut n = 0;
     let mut next = || {
@@ -328,28 +328,28 @@ fn quadrature_and_paths_agree_in_random_scenes() {
                 PathSampling { n_paths: 20_000, seed, i_sample: 0 },
             )[1];
             for c in 0..3 {
-                // Light of radiance about 1 that fewer than one path in 20 000 meets is not in the
-                // sample's variance.
+                // Light of radiance about 1 that fewer than one path in 20 000 meets does not show
+                // in the sample's variance.
                 let (off, sigma) = (
                     (e.radiance[c] - found.radiance[c]).abs(),
                     found.error[c].hypot(e.error) + 5e-5,
                 );
                 if e.radiance[c] > 0.0 {
-                    // 126 normal numbers: beyond 5 of them one in 2e-5 such tests.
+                    // Of 126 normal numbers, one lies beyond 5 in 2e-5 such tests.
                     assert!(off < 5.0 * sigma, "{seed} {receiver:?} {e:?} {found:?}");
                     (n, chi2) = (n + 1.0, chi2 + (off / sigma).powi(2));
                 }
             }
         }
     }
-    // The channels of one receiver are nearly one number, so the sum has a third of the freedom: 5
-    // √(2/(n/3)).
+    // The channels of one receiver are nearly equal, so that the sum has a third of the degrees of
+    // freedom: 5 √(2/(n/3)).
     let expected: f64 = 1.0;
     assert!(n > 60.0 && chi2 / n < expected + 5.0 * (6.0 / n).sqrt(), "{chi2} of {n}");
 }
 
 #[test]
-fn the_error_bounds_what_a_finer_integral_finds() {
+fn the_error_bounds_the_distance_to_a_finer_integral() {
     let (surfaces, brdfs, lights) = random_scene(7);
     let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     let off_by = |i: usize| {
@@ -373,7 +373,7 @@ fn the_error_bounds_what_a_finer_integral_finds() {
 }
 
 #[test]
-fn a_mean_is_that_of_its_facets() {
+fn a_mean_is_the_mean_of_its_facets() {
     let (surfaces, brdfs, lights) = random_scene(3);
     let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     let (eye, accuracy) = (at(3.0, 4.0, 5.0), Accuracy::relative(1e-3));
@@ -394,8 +394,8 @@ fn a_mean_is_that_of_its_facets() {
 
 #[test]
 fn a_pair_of_discs_by_hand() {
-    // Sun straight down with E = π on a white disc of area π facing up at the origin; a receiver
-    // one above it, facing down: E = L A/(d² + A/π) = π/2.
+    // Sun straight down with E = π on a white disc of area π facing up at the origin, and a
+    // receiver one above it facing down: E = L A/(d² + A/π) = π/2.
     let disc = DiscFacet { position: DVec3::ZERO, normal: UP, area: PI, kd: DVec3::ONE };
     let sun = [Light::Directional { direction: at(0.0, -1.0, 0.0), irradiance: DVec3::splat(PI) }];
     let discs = [disc, DiscFacet { position: UP, normal: -UP, ..disc }];
@@ -406,13 +406,13 @@ fn a_pair_of_discs_by_hand() {
             && (e.radiance.x - 0.5).abs() < 1e-15
             && e.error == 0.0
     );
-    // Its own light does not fall on itself.
+    // A disc does not light itself.
     assert_eq!(s.second(&s.on_disc(0), UP, &FINE).irradiance, DVec3::ZERO);
     assert_eq!(s.irradiance(&s.on_disc(0)), DVec3::splat(PI));
 }
 
 #[test]
-fn where_evaluations_run_out_the_error_has_no_end() {
+fn the_error_is_infinite_when_evaluations_run_out() {
     let s = AreaScene::new(&[ceiling(1e-5)], &[matte(1.0)], &[GLOW], &[], 0.0, &[]);
     let few = Accuracy { relative: 1e-6, absolute: 0.0, max_evaluations: 200 };
     let e = s.second(&Receiver::new(DVec3::ZERO, UP, matte(1.0)), UP, &few);
@@ -420,7 +420,7 @@ fn where_evaluations_run_out_the_error_has_no_end() {
 }
 
 #[test]
-fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
+fn the_error_of_a_mean_bounds_the_distance_to_a_finer_one() {
     let eye = at(3.0, 4.0, 5.0);
     let check = |s: &AreaScene, i: usize, window: &Window| {
         let truth = s.mean_second(i, window, eye, &Accuracy::relative(1e-3));
@@ -438,7 +438,7 @@ fn the_error_of_a_mean_bounds_what_a_finer_one_finds() {
     let (surfaces, brdfs, lights) = random_scene(0);
     let s = AreaScene::new(&surfaces, &brdfs, &lights, &[], 0.0, &[]);
     parallel_map(6, |i| check(&s, i, &Window::facet(&surfaces[i], 5 + 3 * i as u32)));
-    // A polished floor under a small lamp that faces it, and a small lamp a hair above it.
+    // A polished floor under a small lamp that faces it, and a small lamp just above it.
     let floor = rect(DVec3::ZERO, 2.0 * DVec3::Z, 2.0 * DVec3::X);
     let lamp = |x: f64, y: f64, half: f64| rect(at(x, y, 0.37), half * DVec3::X, half * DVec3::Z);
     let surfaces = [floor, lamp(0.5, 1.0, 0.01), lamp(-1.2, 0.02, 0.05)];

@@ -7,8 +7,8 @@ use crate::reference::Blob;
 use crate::reference::grid::optical_depth_exact;
 use crate::reference::occlude::{Rectangle, Source};
 
-/// A rectangle counts as larger by this share, so that walls that meet let nothing through
-/// whatever their edges' rounding: some thousand f64 roundings of a coordinate.
+/// Enlargement of rectangles, as a share, so that walls that meet let nothing through whatever
+/// their edges' rounding: some thousand f64 roundings of a coordinate.
 pub const AT_EDGE: f64 = 1e-12;
 
 /// Returns where the way from `p` to `source` meets `rectangle`, edges included.
@@ -21,7 +21,7 @@ pub fn is_open(rectangles: &[Rectangle], p: DVec3, source: Source) -> bool {
     rectangles.iter().all(|r| met(r, p, source).is_none())
 }
 
-/// Returns e^{−(1−g)τ}, g = `forward`, τ through all blobs between `p` and `source`, in closed form.
+/// Returns e^{−(1−g)τ}, τ through all blobs between `p` and `source` in closed form; `forward` is g.
 pub fn transmittance(blobs: &[Blob], forward: f64, p: DVec3, source: Source) -> f64 {
     if blobs.is_empty() {
         return 1.0;
@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rectangle_hides_what_is_behind_it_from_both_sides_and_nothing_in_its_plane() {
+    fn a_rectangle_hides_from_both_sides_and_nothing_in_its_plane() {
         let s = [floor(1.0)];
         let at = |x, y, z| DVec3::new(x, y, z);
         assert!(
@@ -107,7 +107,7 @@ mod tests {
         assert!(
             (passing - whole * 0.682_689_492_137_085_9 * 0.606_530_659_712_633_4).abs() < 1e-14
         );
-        // Droplets that scatter forward count for 1 − g.
+        // Forward scattering leaves a share of 1 − g.
         let v = transmittance(&[blob, blob], 0.85, far, Source::Toward(DVec3::X));
         assert!((v - (-0.3 * whole).exp()).abs() < 1e-14);
         assert_eq!(transmittance(&[blob], 0.0, far, Source::At(far)), 1.0);

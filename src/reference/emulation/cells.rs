@@ -1,4 +1,5 @@
-//! Facets by their cells, cells by 4 × 4 points: model.md §11 "second", *Closely*.
+//! Light from a facet by its cells, and from cells by 4 × 4 points: model.md §11 "second",
+//! *Closely*.
 
 use glam::DVec2;
 
@@ -8,20 +9,23 @@ use super::gathered::Gathered;
 use super::roundings::ROUNDINGS;
 use super::source::Sender;
 use super::view::View;
-use crate::model::pair_rules::{BROAD, LOBE_PARTS, LOBE_STEP};
+use crate::model::pair_rules::{CELL_WIDTH, LOBE_PARTS, LOBE_STEP};
 use crate::reference::occlude::{Rectangle, Source};
 
-/// Of a cell, a part.
+/// Area of a part over that of its cell.
 const PART: f64 = 1.0 / 16.0;
 
-/// A part of a facet: 4^level of them, this one's centre at `at` in the facet's half axes.
+/// A cell of a facet: one of 4^level.
 #[derive(Debug, Clone, Copy)]
 pub struct Cell {
+    /// Number of divisions.
     pub level: u32,
+    /// Centre, in the facet's half axes.
     pub at: DVec2,
 }
 
 impl Cell {
+    /// Returns the cell's size as a share of the facet's.
     pub fn scale(&self) -> f64 {
         0.5f64.powi(self.level as i32)
     }
@@ -33,7 +37,7 @@ impl Cell {
 }
 
 impl View<'_> {
-    /// What a cell of facet `i`, a surface's, sends, by its quarters or by points.
+    /// Returns the light from a cell of facet `i` of a surface, by its quarters or by points.
     pub fn cell(&self, i: usize, cell: &Cell, sender: &Sender) -> Gathered {
         let (x, scale) = (self.exchange, cell.scale());
         let (u, v) = x.axes(i).unwrap_or_default();
@@ -43,7 +47,7 @@ impl View<'_> {
         let side = 2.0 * patch.u.length().max(patch.v.length());
         let b = side / way.d2.sqrt();
         let b = Bounded { value: b, error: b * ROUNDINGS * way.turn };
-        let wide = Decision::above(b.value, BROAD * x.pairs.size, b.error);
+        let wide = Decision::above(b.value, CELL_WIDTH * x.pairs.size, b.error);
         let open = self.faces(&way, side).and(wide.or(self.facet_meets_lobe(
             i,
             &way,
@@ -60,7 +64,7 @@ impl View<'_> {
         Gathered::choose(open, quarters, || self.by_points(i, cell, &patch, sender))
     }
 
-    /// A cell by the middles of its parts, and by its quarters for the lobes.
+    /// Returns the light from a cell by the centres of its parts, with lobes evaluated by quarters.
     fn by_points(&self, i: usize, cell: &Cell, patch: &Patch, sender: &Sender) -> Gathered {
         let (x, p) = (self.exchange, self.receiver.position);
         let area = 4.0 * patch.u.length() * patch.v.length();

@@ -1,4 +1,4 @@
-//! Clusters of facets that send as one, and the gather that opens them: model.md §11 "tree".
+//! Clusters of facets that send light as one: model.md §11 "tree".
 
 use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
@@ -11,7 +11,7 @@ use super::roundings::{ROUNDINGS, U};
 use super::source::Sender;
 use crate::model::tree::Tree;
 
-/// Facets below a node as one. What each number is known to stands beside it.
+/// The facets below a node as one emitter. Beside each number stands a bound on its error.
 #[derive(Debug, Clone)]
 pub(super) struct Cluster {
     pub(super) position: DVec3,
@@ -22,10 +22,10 @@ pub(super) struct Cluster {
     pub(super) area: f64,
     pub(super) moments: DMat3,
     pub(super) moments_error: f64,
-    /// Σ of the facets' diffuse fluxes, RGB.
+    /// Sum of the facets' diffuse fluxes, RGB.
     pub(super) flux: DVec3,
     pub(super) flux_error: DVec3,
-    /// By light Σ A g.
+    /// Σ A g by light.
     pub(super) lights: Vec<Bounded>,
 }
 
@@ -34,9 +34,9 @@ pub struct Clusters {
     pub(super) theta: f64,
     pub(super) n_nodes: Vec<u32>,
     pub(super) nodes: Vec<Cluster>,
-    /// Facet of each node that is one.
+    /// Facet of every leaf.
     pub(super) facets: Vec<usize>,
-    /// By region its nodes, the root first.
+    /// Nodes of every region, the root first.
     pub(super) regions: Vec<Range<usize>>,
 }
 
@@ -46,14 +46,14 @@ impl Clusters {
     }
 }
 
-/// The nodes right below one.
+/// Returns the children of a node.
 fn children(n_nodes: &[u32], node: usize) -> impl Iterator<Item = usize> {
     let end = node + n_nodes[node] as usize;
     let next = move |from: usize| (from < end).then_some(from);
     std::iter::successors(next(node + 1), move |c| next(c + n_nodes[*c] as usize))
 }
 
-/// x xᵀ.
+/// Returns x xᵀ.
 pub(super) fn square(x: DVec3) -> DMat3 {
     DMat3::from_cols(x * x.x, x * x.y, x * x.z)
 }
@@ -70,7 +70,7 @@ fn sum_of(channels: DVec3, error: DVec3) -> Bounded {
 }
 
 impl Exchange<'_> {
-    /// The trees of clusters over `order`, the facet of each place.
+    /// Builds the trees of clusters over `order`, the facet of each place.
     pub fn clusters(&self, order: &[u32], senders: &[Sender], theta: f64) -> Clusters {
         let mut tree = Tree::default();
         let regions: Vec<_> = (0..self.regions.len())
@@ -108,7 +108,7 @@ impl Exchange<'_> {
         }
     }
 
-    /// A facet as what clusters are made of.
+    /// Returns a facet as a leaf.
     fn leaf(&self, i: usize, sender: &Sender) -> Cluster {
         let (facet, radius) = (&self.facets[i], self.radius(i));
         let kd = facet.area * FRAC_1_PI * self.regions[facet.i_region].brdf.kd * facet.color;
@@ -139,7 +139,7 @@ impl Exchange<'_> {
         }
     }
 
-    /// The cluster of nodes of one region.
+    /// Merges nodes of one region.
     fn merged(&self, below: &[&Cluster]) -> Cluster {
         let fluxes: Vec<Bounded> = below.iter().map(|c| sum_of(c.flux, c.flux_error)).collect();
         let shines = fluxes.iter().copied().fold(Bounded::ZERO, Bounded::plus).is_positive();
@@ -147,7 +147,7 @@ impl Exchange<'_> {
         let weights = if shines.is_true { fluxes } else { areas.collect() };
         let total = weights.iter().copied().fold(Bounded::ZERO, Bounded::plus);
         let inverse = if total.value > 0.0 { 1.0 / total.value } else { 0.0 };
-        // By share of the whole; where it may be another's weights that count, as much as there is.
+        // Error of a weight as a share of the whole; 1 if rounding may choose the other weights.
         let off = |k: usize| match total.value > total.error && shines.is_sure {
             true => weights[k].error / (total.value - total.error),
             false => 1.0,
@@ -162,7 +162,7 @@ impl Exchange<'_> {
         let moved = all().map(|(k, c)| off(k) * c.position.distance(position)).sum::<f64>()
             + most(&|c| c.moved)
             + ROUNDINGS * U * self.reach;
-        // Of a surface it is the plane's.
+        // All facets of a surface have the plane's normal.
         let is_one = below.iter().all(|c| c.normal == below[0].normal && c.turned == 0.0);
         let spread: f64 = all().map(|(k, c)| off(k) * c.normal.distance(normal)).sum();
         let turned = if is_one { 0.0 } else { spread + most(&|c| c.turned) + ROUNDINGS * U };

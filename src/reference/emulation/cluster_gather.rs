@@ -1,4 +1,4 @@
-//! The gather from clusters: which are opened, and what the others send as one.
+//! The gather from clusters: which are opened, and the light that the others send as one.
 
 use super::bounded::{Bounded, Decision};
 use super::cluster::{Cluster, Clusters};
@@ -10,10 +10,10 @@ use super::occluder::Ball;
 use super::roundings::{MIN_DISTANCE, ROUNDINGS, U};
 use super::source::Sender;
 use super::view::View;
-use crate::model::pair_rules::{CLOUD_THETA, EVEN, LOBE_STEP, TORN};
+use crate::model::pair_rules::{CLOUD_THETA, CLUSTER_EDGE_WIDTH, EVEN, LOBE_STEP};
 
 impl Exchange<'_> {
-    /// I_i and L2 of facet `j` from clusters.
+    /// Returns I_i and L2 of facet `j` from clusters.
     pub fn gather_from(&self, j: usize, senders: &[Sender], clusters: &Clusters) -> Gathered {
         self.received(j, senders, |view, e| {
             let root = (!clusters.regions[e].is_empty()).then_some(clusters.regions[e].start);
@@ -23,7 +23,7 @@ impl Exchange<'_> {
 }
 
 impl View<'_> {
-    /// What the facets below a node send to receiver `j`.
+    /// Returns the light that the facets below a node send to receiver `j`.
     pub fn of_node(&self, j: usize, clusters: &Clusters, i_region: usize, node: usize) -> Gathered {
         if clusters.n_nodes[node] == 1 {
             let i = clusters.facets[node];
@@ -39,11 +39,13 @@ impl View<'_> {
             slack: self.exchange.slack() + cluster.moved,
         };
         let form = sight.form();
-        let crossed =
-            match form.is_positive().and(above(sight.rho.scaled(2.0), TORN * clusters.theta)) {
-                Decision { is_true: false, is_sure: true } => Decision::NO,
-                reached => reached.and(self.is_crossed(i_region, &ball)),
-            };
+        let crossed = match form
+            .is_positive()
+            .and(above(sight.rho.scaled(2.0), CLUSTER_EDGE_WIDTH * clusters.theta))
+        {
+            Decision { is_true: false, is_sure: true } => Decision::NO,
+            reached => reached.and(self.is_crossed(i_region, &ball)),
+        };
         let open = self.is_wide(&sight, i_region, clusters.theta).or(crossed);
         Gathered::choose(open, below, || self.of_cluster(&sight, i_region, &ball, form))
     }
@@ -71,8 +73,8 @@ impl View<'_> {
         }
     }
 
-    /// Some of it may be before the receiver and the receiver before it, and it is too near, too
-    /// coarse, or too wide for a lobe.
+    /// Returns whether the cluster must be opened: it and the receiver may see each other, and it
+    /// is too near, too coarse, or too wide for a lobe.
     fn is_wide(&self, sight: &ClusterView, i_region: usize, theta: f64) -> Decision {
         let (x, cluster) = (self.exchange, sight.cluster);
         let length = sight.way.n_i.length();
@@ -97,7 +99,7 @@ impl View<'_> {
         sends.and(near.or(sight.is_coarse(theta)).or(lobes))
     }
 
-    /// A cluster as one.
+    /// Returns the light of a cluster as one emitter.
     fn of_cluster(
         &self,
         sight: &ClusterView,
@@ -127,7 +129,7 @@ impl View<'_> {
     }
 }
 
-/// a > b.
+/// Returns whether a > b.
 fn above(a: Bounded, b: f64) -> Decision {
     Decision::above(a.value, b, a.error)
 }

@@ -10,26 +10,29 @@ use super::form::PairGeometry;
 use super::roundings::{MIN_DISTANCE, ROUNDINGS, U};
 use crate::model::pair_rules::{CLOUD_THETA, MIXED};
 
-/// No nearer counts a surface's cluster its nearest point.
+/// Least distance of a surface's cluster from its nearest point, as a share of its distance.
 const NEAREST: f64 = 0.01;
-/// Of the deviation, what an f32 evaluation of the positive part may err: an erf that is known to
-/// 2.5e-6, times half of up to six deviations, less the farther out.
+/// Error of the positive part in f32, as a share of the deviation: an erf accurate to 2.5e-6, times
+/// half of up to six deviations, less farther out.
 const OF_POSITIVE_PART: f64 = 3e-6;
 
 /// A cluster as a receiver sees it.
 pub(super) struct ClusterView<'a> {
+    /// The cluster.
     pub cluster: &'a Cluster,
+    /// Whether it belongs to a surface.
     pub is_surface: bool,
-    /// With its mean normal, and the turn that the cluster's own place leaves it.
+    /// Geometry of the pair with the mean normal; its turn includes the error of the cluster's
+    /// place.
     pub way: PairGeometry,
-    /// ρ.
+    /// ρ: radius over distance.
     pub rho: Bounded,
-    /// Of 1/d², what it is known to.
+    /// Relative error of 1/d².
     pub of_inverse: f64,
 }
 
 impl ClusterView<'_> {
-    /// With the mean normal made a unit vector.
+    /// Returns the geometry with the mean normal normalised.
     pub fn unit_way(&self) -> PairGeometry {
         let length = self.way.n_i.length().max(MIN_DISTANCE);
         PairGeometry {
@@ -39,10 +42,12 @@ impl ClusterView<'_> {
         }
     }
 
+    /// Returns the cosine at the receiver.
     pub fn c_j(&self) -> Bounded {
         Bounded { value: self.way.n_j.dot(self.way.way), error: self.way.turn }
     }
 
+    /// Returns the cosine at the cluster, for its mean normal.
     pub fn c_i(&self) -> Bounded {
         Bounded {
             value: -self.way.n_i.dot(self.way.way),
@@ -50,7 +55,7 @@ impl ClusterView<'_> {
         }
     }
 
-    /// The mean of cos cos/d² over the cluster.
+    /// Returns the mean of cos cos/d² over the cluster.
     pub fn form(&self) -> Bounded {
         let (c_i, c_j) = (self.c_i(), self.c_j());
         let both = c_i.is_positive().and(c_j.is_positive());
@@ -81,9 +86,11 @@ impl ClusterView<'_> {
         Bounded { value, error }.scaled(1.0 / self.way.d2)
     }
 
-    /// Half the second derivatives times the moments. Its terms are products of the cosines and of
-    /// N with unit vectors, each at most tr N: they change by 14 (c_i) + 14 (c_j) + 24 + 20 turns
-    /// of the way at most, by 14 + 4 + 5 of the normal's, and by 12 + 2 + 8 + 1 of N's error.
+    /// Returns half the second derivatives times the moments N.
+    ///
+    /// Its terms are products of the cosines and of N with unit vectors, each at most tr N. They
+    /// change by at most 14 (c_i) + 14 (c_j) + 24 + 20 turns of the way, by 14 + 4 + 5 of the
+    /// normal's, and by 12 + 2 + 8 + 1 of N's error.
     fn bend(&self) -> Bounded {
         let ClusterView { cluster, way, .. } = self;
         let (c_i, c_j) = (self.c_i().value, self.c_j().value);
@@ -97,11 +104,11 @@ impl ClusterView<'_> {
         Bounded { value, error }
     }
 
-    /// What the extent may change of the form factor, more than θ allows.
+    /// Returns whether the extent may change the form factor by more than θ allows.
     pub fn is_coarse(&self, theta: f64) -> Decision {
         let (c_i, c_j, cluster) = (self.c_i(), self.c_j(), self.cluster);
         let length = Bounded { value: self.way.n_i.length(), error: cluster.turned + 8.0 * U };
-        // `s` errors more of each.
+        // `s` is the number of errors added to each quantity.
         let wrong = |s: f64| {
             let rho = (self.rho.value + s * self.rho.error).max(0.0);
             let length = (length.value - s * length.error).clamp(0.0, 1.0);
@@ -126,12 +133,12 @@ fn positive(mean: Bounded, variance: Bounded) -> Bounded {
         positive_part(mean.value + s * mean.error, (variance.value + s * variance.error).max(0.0))
     };
     let known = Bounded::between(at(-1.0), at(0.0), at(1.0));
-    // Nor is a deviation less than 1e-6 told from that.
+    // A deviation below 1e-6 is not told from that.
     let of_evaluation = OF_POSITIVE_PART * (variance.value + variance.error).max(0.0).sqrt() + 1e-6;
     Bounded { error: known.error + of_evaluation, ..known }
 }
 
-/// P(m, s²): the mean of the positive part of a normal distribution.
+/// Returns P(m, s²), the mean of the positive part of a normal distribution.
 pub fn positive_part(mean: f64, variance: f64) -> f64 {
     let s = variance.max(0.0).sqrt();
     if s == 0.0 {

@@ -9,24 +9,29 @@ use super::roundings::ROUNDINGS;
 use crate::model::basis::evaluate;
 use crate::model::pair_rules::NEAR;
 
-/// Half vectors of opposite ways turn with any rounding.
+/// Least length of a half vector's sum; that of opposite directions turns with any rounding.
 const OPPOSITE: f64 = 1e-6;
-/// What the mean's bracket {…}·2/(3d²) turns with its ways: of widths up to the distance (|u|, |v|
-/// ≤ d/2) at most 2/3 · 2 · (6 + 2 + 1)/4 · 2.
+/// Turn of the mean's bracket {…}·2/(3d²) per turn of the direction. For widths up to the distance
+/// (|u|, |v| ≤ d/2) it is at most 2/3 · 2 · (6 + 2 + 1)/4 · 2.
 const BENDING: f64 = 6.0;
 
-/// From receiver `n_j` to emitter `n_i` along the unit `way`, d long and known to `turn`.
+/// Geometry of a receiver and an emitter.
 #[derive(Debug, Clone, Copy)]
 pub struct PairGeometry {
+    /// Normal of the receiver.
     pub n_j: DVec3,
+    /// Normal of the emitter.
     pub n_i: DVec3,
+    /// Unit direction from receiver to emitter.
     pub way: DVec3,
+    /// Squared distance.
     pub d2: f64,
+    /// Error of the direction, radians.
     pub turn: f64,
 }
 
 impl PairGeometry {
-    /// (c_i ⁺)(c_j ⁺), the second known to `bending` turns.
+    /// Returns (c_i ⁺)(c_j ⁺); the second errs by `bending` turns.
     fn product(&self, c_j: f64, bending: f64) -> Bounded {
         let c_i = -self.n_i.dot(self.way);
         let value = c_i.max(0.0) * c_j.max(0.0);
@@ -34,19 +39,21 @@ impl PairGeometry {
         Bounded { value, error: most - value + ROUNDINGS * self.turn * value }
     }
 
-    /// cos cos/(d² + A/π).
+    /// Returns cos cos/(d² + A/π).
     pub fn disc_form(&self, area: f64) -> Bounded {
         self.product(self.n_j.dot(self.way), 1.0).scaled(1.0 / (self.d2 + area * FRAC_1_PI))
     }
 
-    /// That of a surface's facet or part: of one wider than its distance a disc's.
+    /// Returns the form of a surface's facet or part; if it is wider than its distance, that of a
+    /// disc.
     pub fn part_form(&self, u: DVec3, v: DVec3) -> Bounded {
         let b = 2.0 * u.length().max(v.length()) / self.d2.sqrt();
         let wide = Decision::above(b, NEAR, b * ROUNDINGS * self.turn);
         self.disc_form(4.0 * u.length() * v.length()).select(wide, self.rectangle_form(u, v))
     }
 
-    /// The mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second derivatives.
+    /// Returns the mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second
+    /// derivatives.
     pub fn rectangle_form(&self, u: DVec3, v: DVec3) -> Bounded {
         let PairGeometry { n_j, way, d2, .. } = *self;
         let c_j = n_j.dot(way);
@@ -66,7 +73,7 @@ impl PairGeometry {
     }
 }
 
-/// Angle |n − h| between `n` and the half vector of two unit vectors, which are off by `turn`
+/// Returns |n − h| between `n` and the half vector of two unit vectors, which err by `turn`
 /// together.
 pub fn half_angle(n: DVec3, a: DVec3, b: DVec3, turn: f64) -> Bounded {
     let sum = a + b;
@@ -76,11 +83,12 @@ pub fn half_angle(n: DVec3, a: DVec3, b: DVec3, turn: f64) -> Bounded {
     }
 }
 
+/// Returns the width of a lobe.
 pub fn width(ns: f64) -> f64 {
     ns.max(1.0).powf(-0.5)
 }
 
-/// The lobe at an angle.
+/// Returns the lobe at an angle.
 pub fn lobe(table: &[f64], angle: Bounded) -> Bounded {
     let at = |a: f64| evaluate(table, 0.5 * a * a);
     let (value, low, high) = (

@@ -10,10 +10,10 @@ use super::gathered::Gathered;
 use super::roundings::ROUNDINGS;
 use super::source::Sender;
 use super::view::View;
-use crate::model::pair_rules::{LOBE_STEP, RIM, SINGLE};
+use crate::model::pair_rules::{EDGE_WIDTH, LOBE_STEP, SINGLE_EDGE_WIDTH};
 
 impl Exchange<'_> {
-    /// I_i and L2 of facet `j` from `senders`.
+    /// Returns I_i and L2 of facet `j` from `senders`.
     pub fn gather(&self, j: usize, senders: &[Sender]) -> Gathered {
         let of_region = |e: usize| {
             (0..self.facets.len()).filter(move |&i| i != j && self.facets[i].i_region == e)
@@ -23,7 +23,7 @@ impl Exchange<'_> {
 }
 
 impl View<'_> {
-    /// What facet `i` sends, as a whole or by its cells.
+    /// Returns the light from facet `i`, as a whole or by its cells.
     pub(super) fn of_facet(&self, i: usize) -> Gathered {
         let (x, q) = (self.exchange, self.exchange.facets[i].position);
         let way = self.way(i, q);
@@ -40,16 +40,20 @@ impl View<'_> {
             .and(above(1.0).or(self.facet_meets_lobe(i, &way, q, b, LOBE_STEP)));
         let sends = |rim: f64| form.is_positive().and(above(rim));
         let (sender, ball, i_region) = (&self.senders[i], x.ball(i), x.facets[i].i_region);
-        let crossed =
-            if sends(RIM).is_possible() { self.is_crossed(i_region, &ball) } else { Decision::NO };
-        // What of a light is crossed matters where something of the facet is seen.
-        let light = if sender.crossed.is_possible() && sends(SINGLE).is_possible() {
+        let crossed = if sends(EDGE_WIDTH).is_possible() {
+            self.is_crossed(i_region, &ball)
+        } else {
+            Decision::NO
+        };
+        // A shadow edge of a light matters only where the facet is seen.
+        let light = if sender.crossed.is_possible() && sends(SINGLE_EDGE_WIDTH).is_possible() {
             sender.crossed.and(self.visible_share(i_region, &ball).is_positive())
         } else {
             Decision::NO
         };
-        let by_rims =
-            sends(SINGLE).and(crossed.or(light)).or(sends(RIM).and(crossed.and(sender.crossed)));
+        let by_rims = sends(SINGLE_EDGE_WIDTH)
+            .and(crossed.or(light))
+            .or(sends(EDGE_WIDTH).and(crossed.and(sender.crossed)));
         let cell = Cell { level: 0, at: DVec2::ZERO };
         Gathered::choose(
             wide.or(by_rims),
@@ -58,7 +62,7 @@ impl View<'_> {
         )
     }
 
-    /// Facet `i` as one.
+    /// Returns the light from facet `i` as one emitter.
     pub(super) fn whole(&self, i: usize, way: &PairGeometry, form: Bounded) -> Gathered {
         let x = self.exchange;
         if form.is_zero() {

@@ -1,5 +1,5 @@
-//! What a facet has of the lights and sends on, and how it lies in the lights' shadows: model.md
-//! §11 "second".
+//! Light that a facet receives from the lights and sends on, and the shadows on it: model.md §11
+//! "second".
 
 use std::f64::consts::PI;
 
@@ -14,30 +14,32 @@ use super::roundings::{MARCH, MIN_DISTANCE, ROUNDINGS, U};
 use crate::model::light::{Light, MIN_PENUMBRA};
 use crate::reference::occlude::{Rectangle, Source, source_of};
 
-/// Rounding of a number from 0 to 1 to 16 bits, nearest; and f32's on the way.
+/// Rounding to 16 bits of a number from 0 to 1, and f32's rounding before.
 const SIXTEEN_BITS: f64 = 0.5 / 65_535.0 + 4.0 * U;
 
-/// What a facet has of one light.
-pub struct Lit<'a> {
-    /// Whether a shadow tears it.
+/// Light of one source on a facet.
+pub struct LightOnFacet<'a> {
+    /// Whether a shadow edge crosses the facet.
     pub crossed: Decision,
-    /// The rectangles whose shadow meets it, and from where.
+    /// Rectangles whose shadow meets the facet, and the source.
     rectangles: Vec<&'a Rectangle>,
     source: Source,
-    /// g_l at its points, of a surface's facet, and as kept in 16 bits of their greatest.
+    /// g_l at the points of a surface's facet, rounded to 16 bits of their greatest.
     points: Vec<Bounded>,
-    /// g.
+    /// g, the mean over the facet.
     pub mean: Bounded,
 }
 
-/// What a facet has of all lights.
+/// Light of all sources on a facet.
 pub struct Sender<'a> {
-    pub lights: Vec<Lit<'a>>,
+    /// Light of every source.
+    pub lights: Vec<LightOnFacet<'a>>,
+    /// Whether a shadow edge of some source crosses the facet.
     pub crossed: Decision,
 }
 
 impl Exchange<'_> {
-    /// What every facet has of the lights.
+    /// Returns the light of all sources on every facet.
     pub fn senders(&self) -> Vec<Sender<'_>> {
         let of = |i: usize| {
             let lights: Vec<_> = (0..self.lights.len()).map(|k| self.lit(i, k)).collect();
@@ -49,7 +51,7 @@ impl Exchange<'_> {
         (0..self.facets.len()).map(of).collect()
     }
 
-    fn lit(&self, i: usize, i_light: usize) -> Lit<'_> {
+    fn lit(&self, i: usize, i_light: usize) -> LightOnFacet<'_> {
         let (facet, ball, source) =
             (&self.facets[i], self.ball(i), source_of(&self.lights[i_light]));
         let Some((u, v)) = self.axes(i) else {
@@ -59,15 +61,23 @@ impl Exchange<'_> {
                 facet.position,
                 self.known(self.transmittance, i, i_light),
             );
-            return Lit { crossed: Decision::NO, rectangles: vec![], source, points: vec![], mean };
+            return LightOnFacet {
+                crossed: Decision::NO,
+                rectangles: vec![],
+                source,
+                points: vec![],
+                mean,
+            };
         };
         let shadows = self.others(facet.i_region, facet.i_region);
         let shadows = shadows.map(|(_, r)| (r, shadow(r, source, &ball)));
-        // One that only rounding may bring here hides nothing of the facet: it is within the ball.
+        // A rectangle that only rounding brings here hides nothing of the facet, which lies within
+        // the ball.
         let met: Vec<_> = shadows.filter(|(_, s)| s.crossed.or(s.hidden).is_possible()).collect();
         let crossed = met.iter().map(|(_, s)| s.crossed).fold(Decision::NO, Decision::or);
         let rectangles = met.into_iter().map(|(r, _)| r).collect();
-        let mut lit = Lit { crossed, rectangles, source, points: vec![], mean: Bounded::ZERO };
+        let mut lit =
+            LightOnFacet { crossed, rectangles, source, points: vec![], mean: Bounded::ZERO };
         lit.points = self.shares_over(i, i_light, &lit, &Patch { q: facet.position, u, v });
         lit.mean = lit.points.iter().copied().fold(Bounded::ZERO, Bounded::plus).scaled(1.0 / 16.0);
         let greatest = lit.points.iter().map(|p| p.value).fold(0.0, f64::max);
@@ -75,8 +85,14 @@ impl Exchange<'_> {
         lit
     }
 
-    /// g_l at a cell's points.
-    fn shares_over(&self, i: usize, i_light: usize, lit: &Lit, patch: &Patch) -> Vec<Bounded> {
+    /// Returns g_l at a cell's points.
+    fn shares_over(
+        &self,
+        i: usize,
+        i_light: usize,
+        lit: &LightOnFacet,
+        patch: &Patch,
+    ) -> Vec<Bounded> {
         let edges =
             lit.rectangles.iter().map(|r| Coverage::new(r, lit.source, patch, self.slack()));
         let edges: Vec<_> = edges.filter(|e| !e.is_zero()).collect();
@@ -88,8 +104,8 @@ impl Exchange<'_> {
         Patch::middles().map(at).collect()
     }
 
-    /// g_l at a cell's points: its own where a shadow tears its facet, else those of the facet's
-    /// sixteenths.
+    /// Returns g_l at a cell's points: its own if a shadow edge crosses its facet, else those of
+    /// the facet's sixteenths.
     pub(super) fn shares_of(
         &self,
         i: usize,
@@ -115,14 +131,14 @@ impl Exchange<'_> {
             .collect()
     }
 
-    /// A transmittance of facet `i`.
+    /// Returns a transmittance of facet `i` with its error.
     fn known(&self, transmittances: &[f64], i: usize, i_light: usize) -> Bounded {
         let value = transmittances[i * self.lights.len() + i_light];
         let depth = if value > 0.0 { -value.ln() } else { 0.0 };
         Bounded { value, error: value * depth * MARCH * 4.0 * U }
     }
 
-    /// g at `x` on facet `i` where `v` of the light gets through.
+    /// Returns g at `x` on facet `i` where the transmittance is `v`.
     pub(super) fn share_at(&self, i: usize, i_light: usize, x: DVec3, v: Bounded) -> Bounded {
         let (light, n) = (&self.lights[i_light], self.facets[i].normal);
         let arrival = light.arrival(x);
@@ -134,7 +150,7 @@ impl Exchange<'_> {
             _ => 0.0,
         };
         let turned = self.turn(arrival.distance) * v.value * arrival.falloff * (2.0 + cone);
-        // A lamp so far behind the facet that no rounding brings it before.
+        // The lamp is so far behind the facet that no rounding brings it before.
         let behind = !light.is_sky() && n.dot(arrival.toward) < -self.turn(arrival.distance);
         let error = if behind {
             0.0
@@ -144,8 +160,8 @@ impl Exchange<'_> {
         Bounded { value: own(v.value), error }
     }
 
-    /// Between the unit normal at the end of `way` and the half vector of a light that is not the
-    /// sky and the way back; `q`, that end, is off by `moved`.
+    /// Returns the angle between the unit normal at the end `q` of `way` and the half vector of a
+    /// light and the way back; `None` for a sky. `q` errs by `moved`.
     pub(super) fn light_angle(
         &self,
         i_light: usize,
@@ -161,7 +177,8 @@ impl Exchange<'_> {
         (!light.is_sky()).then(|| half_angle(way.n_i, arrival.toward, -way.way, turn))
     }
 
-    /// Radiance of facet `i` against `way` from `q` under shares `g` of the lights, and its error.
+    /// Returns the radiance of facet `i` against `way` from `q` under shares `g` of the lights, and
+    /// its error.
     pub(super) fn radiance(
         &self,
         i: usize,

@@ -14,16 +14,20 @@ use super::source::Sender;
 use crate::model::pair_rules::{LOBE_REACH, TURN};
 use crate::reference::occlude::{Rectangle, Source};
 
-/// A receiver, and by emitting region the rectangles that count before it.
+/// A receiver's view.
 pub(super) struct View<'a> {
+    /// The exchange.
     pub exchange: &'a Exchange<'a>,
+    /// The receiver.
     pub receiver: &'a Facet,
+    /// Rectangles that may hide part of every emitting region.
     pub before: Vec<Vec<(&'a Rectangle, Decision)>>,
+    /// Light on every facet.
     pub senders: &'a [Sender<'a>],
 }
 
 impl Exchange<'_> {
-    /// What facet `j` gathers where `gathered` says from each region what.
+    /// Returns the light on facet `j` from all regions, with `gathered` for each of them.
     pub(super) fn received<'a>(
         &'a self,
         j: usize,
@@ -43,8 +47,8 @@ impl Exchange<'_> {
         let front = (self.eye - receiver.position).dot(receiver.normal) > 0.0;
         let ks = if front { region.brdf.ks } else { DVec3::ZERO };
         sum.second = albedo * sum.indirect + ks * sum.glossy;
-        // Their sums pass as many roundings as there are terms: a hundredth of the bound already in
-        // `error` at most.
+        // The sums are rounded as often as they have terms, which adds at most a hundredth of the
+        // bound in `error`.
         sum.indirect_error = sum.error[0];
         sum.second_error = albedo * sum.error[0] + ks * sum.error[1];
         sum
@@ -52,7 +56,7 @@ impl Exchange<'_> {
 }
 
 impl View<'_> {
-    /// The way to `q` on facet `i`.
+    /// Returns the geometry of the pair with `q` on facet `i`.
     pub(super) fn way(&self, i: usize, q: DVec3) -> PairGeometry {
         let o = q - self.receiver.position;
         let n_i = self.exchange.facets[i].normal;
@@ -66,7 +70,8 @@ impl View<'_> {
         }
     }
 
-    /// Some of what is `side` wide may be before the receiver, and the receiver is before it.
+    /// Returns whether part of an emitter `side` wide may be in front of the receiver, and the
+    /// receiver in front of the emitter.
     pub(super) fn faces(&self, way: &PairGeometry, side: f64) -> Decision {
         let d = way.d2.sqrt();
         let slack = ROUNDINGS * way.turn * d;
@@ -74,7 +79,8 @@ impl View<'_> {
         ahead.and(Decision::above(-d * way.n_i.dot(way.way), 0.0, slack))
     }
 
-    /// A lobe is met by what is `b` wide at `q` on facet `i`, and wider than `step` says.
+    /// Returns whether an emitter `b` wide at `q` on facet `i` meets a lobe and is wider than
+    /// `step` allows.
     pub(super) fn facet_meets_lobe(
         &self,
         i: usize,
@@ -89,8 +95,8 @@ impl View<'_> {
         self.meets_lobe(x.facets[i].i_region, angles, way, b, step * x.pairs.size)
     }
 
-    /// A lobe is met by what is `b` wide, and wider than `limit` widths of it: the emitter's by one
-    /// of the lights that shine there, each with its angle; the receiver's.
+    /// Returns whether an emitter `b` wide meets a lobe and is wider than `limit` widths of it: the
+    /// emitter's own lobe for a light with its angle, or the receiver's.
     pub(super) fn meets_lobe(
         &self,
         i_region: usize,
@@ -119,14 +125,14 @@ impl View<'_> {
         found
     }
 
-    /// Of the receiver's half vector between `way` and the eye.
+    /// Returns the angle of the receiver's half vector between `way` and the eye.
     pub(super) fn eye_angle(&self, way: &PairGeometry) -> Bounded {
         let to_eye = self.exchange.eye - self.receiver.position;
         let turn = way.turn + self.exchange.turn(to_eye.length());
         half_angle(self.receiver.normal, way.way, to_eye.normalize_or_zero(), turn)
     }
 
-    /// A rim runs through a ball on a region as the receiver sees it.
+    /// Returns whether a shadow edge crosses a ball on a region, seen from the receiver.
     pub(super) fn is_crossed(&self, i_region: usize, ball: &Ball) -> Decision {
         let from = Source::At(self.receiver.position);
         let crossed =
@@ -134,7 +140,7 @@ impl View<'_> {
         self.before[i_region].iter().map(crossed).fold(Decision::NO, Decision::or)
     }
 
-    /// Π (1 − h_r) of a ball on a region.
+    /// Returns Π (1 − h_r), the visible share of a ball on a region.
     pub(super) fn visible_share(&self, i_region: usize, ball: &Ball) -> Bounded {
         let from = Source::At(self.receiver.position);
         let seen = |(r, counts): &(&Rectangle, Decision)| {
@@ -143,7 +149,7 @@ impl View<'_> {
         self.before[i_region].iter().map(seen).fold(Bounded::ONE, Bounded::times)
     }
 
-    /// What facet `i` sends from `q` under shares `g` of the lights, times `by`.
+    /// Returns the light from `q` on facet `i` under shares `g` of the lights, times `by`.
     pub(super) fn sent(
         &self,
         i: usize,
@@ -155,7 +161,7 @@ impl View<'_> {
         self.arrives(way, self.exchange.radiance(i, way, q, g), by)
     }
 
-    /// A radiance and its error times `by`, along the way.
+    /// Returns the light of a radiance with its error, times `by`, along the way.
     pub(super) fn arrives(
         &self,
         way: &PairGeometry,

@@ -13,7 +13,9 @@ use crate::reference::terrain;
 /// Surfaces, ground, lights and materials at one time; positions relative to the lighting origin.
 #[derive(Debug, Clone)]
 pub(super) struct LocalScene {
+    /// Surfaces.
     pub surfaces: Vec<Surface>,
+    /// Lights.
     pub lights: Vec<Light>,
     /// Material of every region: surfaces, ground, clouds.
     brdfs: Vec<Brdf>,
@@ -22,6 +24,7 @@ pub(super) struct LocalScene {
 }
 
 impl LocalScene {
+    /// Collects the solids and lights of `scene` relative to `origin`.
     pub fn new(scene: &Scene, origin: DVec3, time_s: f64) -> LocalScene {
         let terrains = scene.terrains.iter().zip(scene.surfaces.len() as u32..);
         let brdf = |i: usize| scene.region_material(i).at(time_s);

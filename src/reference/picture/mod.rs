@@ -1,9 +1,10 @@
 //! Whole pictures in f64, computed from a scene alone: no device, no files.
 //!
-//! [`ReferenceKind`] names the reference and [`ReferenceKind::render`] draws it. [`sums`] draws
-//! any range of samples at any pixels, so that a picture can be computed in parts and put together
-//! to the same bits. [`FrameReference`] holds every stage of one frame up to the light on its
-//! facets, and [`drawn_as_set`] draws it with the scene's own drawing settings.
+//! - [`ReferenceKind`] names the reference, and [`ReferenceKind::render`] draws it.
+//! - [`sums`] draws any range of samples at any pixels, so that a picture can be computed in parts
+//!   and put together to the same bits.
+//! - [`FrameReference`] holds every stage of one frame up to the light on its facets.
+//! - [`drawn_as_set`] draws a frame with the scene's own drawing settings.
 
 mod background;
 mod error_estimate;

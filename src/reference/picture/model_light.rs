@@ -1,6 +1,7 @@
-//! Light by the model itself at any point, without the approximations that make it cheap:
-//! transmittance in closed form, normals from the blobs' own density, one facet a particle, areas
-//! integrated, the BRDF itself, and any number of reflections.
+//! Light by the model itself at any point, without the approximations that make it cheap.
+//!
+//! Transmittance has its closed form, normals come from the blobs' own density, every particle has
+//! a facet, areas are integrated, and the BRDF is used itself. Any number of reflections counts.
 
 use glam::DVec3;
 
@@ -26,11 +27,14 @@ pub(super) struct ModelScene {
 /// Radiance toward the eye, W m⁻² sr⁻¹, with its error estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RadianceEstimate {
+    /// Radiance.
     pub radiance: DVec3,
+    /// Error estimate.
     pub error: ErrorEstimate,
 }
 
 impl RadianceEstimate {
+    /// No light.
     pub const DARK: RadianceEstimate = RadianceEstimate {
         radiance: DVec3::ZERO,
         error: ErrorEstimate { quadrature: 0.0, chance: 0.0 },
@@ -70,6 +74,7 @@ impl ModelScene {
         ModelScene { discs, eye: frame.state.pose.position - origin, local }
     }
 
+    /// Returns the surfaces.
     pub fn surfaces(&self) -> &[Surface] {
         &self.local.surfaces
     }
@@ -93,6 +98,7 @@ pub(super) struct ModelLight<'a> {
 }
 
 impl<'a> ModelLight<'a> {
+    /// Prepares the light of `frame` with that number of reflections.
     pub fn new(
         scene: &Scene,
         model: &'a ModelScene,

@@ -18,13 +18,19 @@ use crate::reference::volume::Volume;
 
 /// A scene and the light in it.
 pub(super) struct ModelPicture<'a> {
+    /// The scene.
     pub scene: &'a Scene,
+    /// Its particles.
     pub frame: &'a FrameReference,
+    /// Everything that its light meets.
     pub model: &'a ModelScene,
+    /// The light.
     pub light: ModelLight<'a>,
     /// Lights surfaces at their facets and interpolates, instead of at every pixel.
     pub by_facet: bool,
+    /// The pixels to draw.
     pub pixels: &'a Pixels,
+    /// Called as parts are done.
     pub on_progress: OnProgress<'a>,
 }
 

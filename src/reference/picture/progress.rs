@@ -11,6 +11,6 @@ pub enum RenderStage {
     Sampling,
 }
 
-/// A callback that is told the stage and its number of parts each time one more part is done.
-/// It is called from any thread.
+/// A callback with a stage and its number of parts. It is called from any thread each time one more
+/// part is done.
 pub type OnProgress<'a> = &'a (dyn Fn(RenderStage, usize) + Sync);

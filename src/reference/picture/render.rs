@@ -23,7 +23,7 @@ pub struct Reference {
     pub rgba: Vec<[f64; 4]>,
     /// Root mean square of the pixels' error estimates.
     pub own_error: f64,
-    /// What that estimate consists of, in words.
+    /// Description of that estimate.
     pub accuracy: String,
     /// Time to compute the picture.
     pub seconds: f64,

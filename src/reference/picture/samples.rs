@@ -77,7 +77,7 @@ pub fn sums(
     let ReferenceRequest { kind, scene, time_s } = *request;
     kind.check(scene, time_s)?;
     let n = samples.len();
-    // Progress of a single sample is told by its parts, of several samples by the sample.
+    // A single sample reports progress by its parts, several samples report whole samples.
     let inner: OnProgress = if n > 1 { &|_, _| () } else { on_progress };
     with_renderer(kind, (scene, time_s), pixels, inner, |render| {
         let mut pairs = PairwiseSum::default();
@@ -152,8 +152,8 @@ impl SampleSums {
 
 /// Sum of neighbouring ranges of samples as one fixed tree of pairs: (0 + 1) + (2 + 3), and so on.
 /// Ranges whose length is a power of two, and that begin at a multiple of it, are nodes of that
-/// tree. So a sum put together from ranges in order has the same bits as one that was never cut,
-/// and rounding grows with the tree's height, not with the number of samples.
+/// tree. A sum put together from ranges in order therefore has the same bits as one that was never
+/// cut. Rounding grows with the tree's height, not with the number of samples.
 #[derive(Debug, Default)]
 pub struct PairwiseSum {
     /// Sums of complete subtrees, each shorter than the one before it.

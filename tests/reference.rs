@@ -1,5 +1,5 @@
-//! The f64 reference on hand-worked and published numbers. Rooms small enough are tested in their
-//! own file.
+//! The f64 reference on values worked by hand and published ones. Modules that are small enough are
+//! tested in their own file.
 
 use glam::{DVec2, DVec3};
 use half::f16;
@@ -40,7 +40,7 @@ fn one_box(n_particles: u32, extent: DVec3, radius_max: f64) -> CloudBox {
     CloudBox { n_particles, extent, center: DVec3::ZERO, radius_max }
 }
 
-/// Numbers in [0, 1) for the tests' own choices.
+/// Numbers in [0, 1) that select the tests' own inputs.
 fn lots(i: u32) -> [f64; 4] {
     uniforms(0x7e57, 0, i, 0)
 }
@@ -62,7 +62,7 @@ fn a_particle_worked_by_hand() {
         0.5,
         0,
     );
-    // 16 digits and some ten roundings of numbers below 8.
+    // 16 digits, and some ten roundings of numbers below 8.
     let expected = DVec3::new(1.2012904103575917, 0.7691475461587762, 1.5784238024958326);
     assert!((p.position - expected).length() < 1e-14, "{}", p.position);
     assert_eq!((p.n_attempts, p.folded), (1, false));
@@ -72,7 +72,7 @@ fn a_particle_worked_by_hand() {
     // 3.428321058021832, which was found by a scan of 10⁶ steps: its error is below 1e-12.
     assert!((p.radius - 1.564123895265403).abs() < 1e-11);
     assert!((p.sigma - p.radius * 0.5 / 3.0).abs() < 1e-15);
-    // Printed, box 6 × 10 × 8: y repeats z.
+    // In the printed form y repeats z; box 6 × 10 × 8.
     let printed = generate_particle(
         &one_box(1, DVec3::new(6.0, 10.0, 8.0), 2.0),
         0,
@@ -141,7 +141,7 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
         Acceptance::of(&particles),
         Acceptance { n_attempts: 50 * 64, n_accepted: 0, n_folded: 50 }
     );
-    // A point moves nothing: sin 0 everywhere, and the centre is inside.
+    // A box without extent moves nothing: sin 0 everywhere, and the centre is inside.
     let point = generate_box(&one_box(3, DVec3::ZERO, 0.0), 0, 1, Form::Centred, 1.0, 1.0);
     assert!(point.iter().all(|p| p.n_attempts == 1 && p.position == DVec3::ZERO && p.kappa == 0.0));
     assert_eq!(Acceptance::of(&[]).rate(), None);
@@ -149,8 +149,8 @@ fn a_needle_ends_at_its_bound_and_is_folded() {
 
 #[test]
 fn folding_mirrors_at_the_faces() {
-    // By hand, h = 2: 3 is one beyond the face and comes back to 1; 7 passes both and lands on 1 …
-    // (period 8).
+    // By hand, h = 2: 3 is one beyond the face and is folded to 1; 7 passes both faces and lands on
+    // 1 … (period 8).
     let cases = [
         (0.0, 0.0),
         (2.0, 2.0),
@@ -181,11 +181,11 @@ fn radii_have_their_mean_and_positions_their_symmetry() {
             let variance = (0..particles.len()).map(|i| (f(i) - mean).powi(2)).sum::<f64>() / n;
             (mean, (variance / n).sqrt())
         };
-        // Five standard errors: a chance of 6e-7 a comparison, and the seed is fixed.
+        // Five standard errors have a probability of 6e-7 a comparison, and the seed is fixed.
         let (mean, error) = mean_of(&|i| particles[i].radius);
         assert!((mean - mean_radius(form, 2.1)).abs() < 5.0 * error);
         if form == Form::Centred {
-            // X, Y → −X, −Y turns P_x, P_y and both swirls around and leaves Z: x and y are
+            // X, Y → −X, −Y reverses P_x, P_y and both swirls and leaves Z, so that x and y are
             // symmetric together. z is not, because acceptance along x depends on the sign of Z.
             for axis in 0..2 {
                 let (mean, error) = mean_of(&|i| particles[i].position[axis]);
@@ -243,15 +243,15 @@ impl InF32<'_> {
 #[test]
 fn f32_evaluations_stay_within_their_bound() {
     let good = |x: f32| f64::from(x).sin() as f32;
-    // The worst that the assumptions allow, its signs taken from the argument's bits.
+    // The greatest error that the assumptions allow, with signs taken from the argument's bits.
     let poor = |x: f32| {
         let sign = |bit: u32| if x.to_bits() >> bit & 1 == 0 { 1.0 } else { -1.0 };
         let x = f64::from(x);
         let moved = (x + sign(0) * 2.0 * U_F32 * x.abs()).sin();
-        // Rounding to f32 is up to 2⁻²⁵ of the 2⁻²² allowed, or of small ones one of seven units.
+        // Rounding to f32 is up to 2⁻²⁵ of the 2⁻²² allowed, or one of seven units for small sines.
         (moved + sign(1) * U_F32 * (6.0 * moved.abs()).min(3.5)) as f32
     };
-    // The paper's boxes accept before the bound on attempts; one so thin mostly folds.
+    // The paper's boxes accept before the bound on attempts; such a thin box mostly folds.
     let mut boxes = paper_boxes();
     boxes.push(one_box(0, DVec3::new(7.4, 0.03, 2.9), 2.0));
     for (form, sine) in
@@ -287,7 +287,7 @@ fn f32_evaluations_stay_within_their_bound() {
              other {n_other}, folded {n_folded} of {n}"
         );
         assert!(median < 1000.0 && n_folded > 100);
-        // The bounds are some 1e-6 of boxes of size 1, with a few attempts each.
+        // The bounds are some 1e-6 for boxes of size 1 with a few attempts each.
         assert!(n_other <= n_undecided && f64::from(n_undecided) < 1e-3 * f64::from(n));
     }
 }
@@ -342,7 +342,7 @@ fn one_blob_at_two_pixels() {
         let expected = [0.2 * a, 0.5 * a, 2.0 * a, a];
         assert!((0..4).all(|k| (image[i][k] - expected[k]).abs() < 1e-15), "{i}");
     }
-    // The eye moved and the particle with it: the same picture. Up on the image is up in the scene.
+    // Eye and particle moved together give the same picture. Up in the picture is up in the scene.
     let mut moved = view(5, 3);
     moved.pose.position = DVec3::X;
     let raised = Blob { position: blob.position + DVec3::X + DVec3::Y, ..blob };
@@ -360,7 +360,7 @@ fn what_is_behind_near_or_absent_is_not_drawn() {
     }
     assert_eq!(render(&view(5, 3), &plain(&[], &[], &[])), zeros);
     assert_ne!(render(&view(5, 3), &plain(&[at(-0.1)], &[DVec3::ONE], &[0])), zeros);
-    // Beyond three σ nothing: b = 3·(4/5·5/3)/√(1 + 16/9) = 2.4 at column 4.
+    // Beyond three σ the pixel is empty: b = 3·(4/5·5/3)/√(1 + 16/9) = 2.4 at column 4.
     let image =
         render(&view(5, 3), &plain(&[Blob { sigma: 0.79, ..at(-3.0) }], &[DVec3::ONE], &[0]));
     assert_eq!(image[9], [0.0; 4]);
@@ -394,8 +394,8 @@ fn equal_colors_hide_the_order_and_equal_layers_multiply() {
     );
 }
 
-/// The pixel's layers by the definition, without rectangles: α and radiance of every blob, far to
-/// near.
+/// The pixel's layers by definition, without bounding rectangles: α and radiance of every blob, far
+/// to near.
 fn layers(view: &View, blobs: &[Blob], radiance: &[DVec3], i: u32, j: u32) -> Vec<(f64, DVec3)> {
     let d = view.ray(i, j);
     let seen =
@@ -409,7 +409,7 @@ fn layers(view: &View, blobs: &[Blob], radiance: &[DVec3], i: u32, j: u32) -> Ve
 
 #[test]
 fn no_rectangle_is_too_small() {
-    // Many of these reach beside or behind the eye.
+    // Many of these blobs reach beside or behind the eye.
     let (blobs, radiance) = scattered(300, 0.05);
     let view = view(40, 30);
     let order: Vec<u32> = (0..300).collect();
@@ -439,7 +439,7 @@ fn half_float_targets_stay_within_their_bound() {
         let mut stored = [0.0; 4];
         for (i, &(alpha, l)) in layers(&view, &blobs, &radiance, k % 40, k / 40).iter().enumerate()
         {
-            // α off by as much as allowed, its sign by lot.
+            // α errs by as much as allowed, with random sign.
             let alpha = alpha * (1.0 + ALPHA * (2.0 * lots(i as u32)[0].round() - 1.0));
             for (c, s) in stored.iter_mut().zip([l.x, l.y, l.z, 1.0]) {
                 *c = f16::from_f64(alpha * s + (1.0 - alpha) * *c).to_f64();

@@ -1,5 +1,5 @@
-//! References by samples: means over a pixel's area, and parts that are put together to the bits of
-//! the whole.
+//! References by samples: means over a pixel's area, and parts that are put together to the same
+//! bits as the whole.
 
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
@@ -26,7 +26,7 @@ fn of(
     sums(subject, pixels, samples, &AtomicBool::new(false), &|_, _| ()).expect("sums")
 }
 
-/// Tiles of `size`, each of ranges of two samples.
+/// Computes tiles of `size`, each in ranges of two samples.
 fn in_parts(subject: &ReferenceRequest<'_>, n: u32, [columns, rows]: [u32; 2]) -> SampleSums {
     let film = subject.scene.film;
     let whole = Pixels::all(film.width, film.height);
@@ -92,15 +92,15 @@ fn tiles_and_ranges_are_the_whole_to_the_bit() {
         for size in [[4, 5], [11, 7]] {
             assert!(in_parts(&subject, 3, size) == whole, "{what}: tiles of {size:?}");
         }
-        // Samples differ from each other: ranges that were mistaken for others would show.
+        // Samples differ, so that confused ranges would be noticed.
         let [a, b] = [0..1, 1..2].map(|range| of(&subject, &pixels, range));
         assert!(a.values != b.values, "{what}");
     }
 }
 
-/// A white wall a unit before the eye, which sees two units of it in eight pixels. It ends 0.3 of a
-/// pixel into column 4, and 0.6 of one below the upper edge of row 2; to the left and below it ends
-/// out of sight.
+/// A white wall one unit before the eye, which sees two units of it in eight pixels. It ends 0.3 of
+/// a pixel into column 4, and 0.6 of a pixel below the upper edge of row 2. To the left and below
+/// it ends out of sight.
 const WALL: &str = r#"
 [film]
 width = 8
@@ -141,14 +141,14 @@ fn a_pixel_has_what_covers_its_area() {
         // is covered.
         let at = |values: &[f64], column: usize, row: usize| values[8 * row + column];
         let one = alpha(1);
-        // Its centre is outside in both.
+        // The centre is outside in both.
         assert_eq!(
             [at(&one, 4, 5), at(&one, 1, 2), at(&one, 1, 5), at(&one, 6, 5)],
             [0.0, 0.0, 1.0, 0.0]
         );
         for n in [64, 512] {
             let many = alpha(n);
-            // A sequence of low discrepancy: a few samples off, not √n.
+            // A sequence of low discrepancy errs by a few samples, not by √n.
             let off = 4.0 / f64::from(n);
             for (column, row, covered) in
                 [(4, 5, 0.3), (1, 2, 0.4), (4, 2, 0.12), (1, 5, 1.0), (6, 5, 0.0)]
@@ -163,7 +163,7 @@ fn a_pixel_has_what_covers_its_area() {
     }
 }
 
-/// Root mean square of the differences of two pictures, of the greatest channel.
+/// Root mean square difference of two pictures, of the greatest channel.
 fn differ(a: &MeanPicture, b: &MeanPicture) -> f64 {
     let of =
         |(a, b): (&[f64; 4], &[f64; 4])| (0..3).map(|k| (a[k] - b[k]).powi(2)).fold(0.0, f64::max);
@@ -178,14 +178,15 @@ fn more_samples_are_nearer_and_say_so() {
     let subject =
         ReferenceRequest { kind: ReferenceKind::Reflections(3), scene: &scene, time_s: 0.0 };
     let pixels = Pixels::all(8, 6);
-    // Others than those that are judged.
+    // Samples other than those that are compared.
     let truth = of(&subject, &pixels, 1000..1064).mean();
     let mut before = f64::INFINITY;
     for n in [2u32, 8, 32] {
         let mean = of(&subject, &pixels, 0..n).mean();
         let (off, said) = (differ(&mean, &truth), mean.own_error);
         println!("{n} samples: off by {off:.2e}, said {said:.2e}");
-        // Too large, as samples are spread evenly, and by no more than some ten times.
+        // The stated error is too large, as samples are spread evenly, but by no more than some ten
+        // times.
         assert!(off < 1.5 * said + truth.own_error && off < before, "{n}: {off} {said}");
         assert!(said < 20.0 * off, "{n}: {off} {said}");
         before = off;

@@ -291,7 +291,7 @@ pub struct Raster<'a> {
 }
 
 /// Returns the values of [`render_over`] at the pixels of `raster` alone, over `opaque`, one each.
-/// `on_row` is told the number of rows of cells each time one more is done.
+/// `on_row` is called with the number of rows of cells done, after each.
 pub fn render_at(
     view: &View,
     raster: &Raster<'_>,

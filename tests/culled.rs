@@ -27,9 +27,10 @@ use nimbus::io::scene_file;
 use nimbus::model::film::FilmFormat;
 use nimbus::model::scene::Scene;
 use nimbus::model::sort_bits::SortBits;
+use nimbus::reference::composite::OpaquePixel;
 use nimbus::reference::sort::order;
-use nimbus::reference::sprites::{OpaquePixel, View};
 use nimbus::reference::threshold::omitted;
+use nimbus::reference::view::View;
 use picture::Picture;
 
 const FORMAT: FilmFormat = FilmFormat::Rgba32f;

@@ -10,7 +10,8 @@ use harness::{Gpu, assert_within_and_say, check_within};
 use nimbus::gpu::Compiler;
 use nimbus::layout::facet::FacetRecord;
 use nimbus::model::cloud::runs;
-use nimbus::reference::facets::{CONDITIONING, Facet, FacetSources, grouped, merged};
+use nimbus::reference::facet_runs::{grouped, merged};
+use nimbus::reference::facets::{CONDITIONING, Facet, FacetSources};
 use nimbus::reference::morton;
 use nimbus::reference::rounding::DIVISION_ERROR;
 use shells::{

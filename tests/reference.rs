@@ -8,14 +8,14 @@ use nimbus::model::camera::Pose;
 use nimbus::model::cloud::{SQRT_TAU, box_kappa};
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
+use nimbus::reference::composite::{OpaquePixel, Rounding};
 use nimbus::reference::generate::{
     Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, offset, radius,
     uniforms,
 };
 use nimbus::reference::rounding::{U_F32, particle_bound};
-use nimbus::reference::sprites::{
-    Bounded, OpaquePixel, Rounding, Sprites, View, alpha, render, render_over,
-};
+use nimbus::reference::sprites::{Bounded, Sprites, alpha, render, render_over};
+use nimbus::reference::view::View;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 const FORMS: [Form; 2] = [Form::Centred, Form::Printed];

@@ -195,8 +195,12 @@ pub fn boxes(stage: &mut Stage) -> Result<Vec<BoxRow>> {
 /// The same from the reference.
 pub fn boxes_reference(scene: &Scene) -> Vec<BoxRow> {
     let tried = |g: Generated| (u64::from(g.n_attempts), g.folded);
-    let tries: Vec<_> =
-        scene.clouds.iter().flat_map(crate::reference::generate::cloud).map(tried).collect();
+    let tries: Vec<_> = scene
+        .clouds
+        .iter()
+        .flat_map(|c| crate::reference::live::cloud(c, 0.0))
+        .map(tried)
+        .collect();
     box_rows(scene, &tries)
 }
 

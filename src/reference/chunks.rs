@@ -5,7 +5,8 @@
 
 use glam::DVec3;
 
-use super::sprites::{Bounded, OpaquePixel};
+use super::composite::OpaquePixel;
+use super::sprites::Bounded;
 use super::tiles::{Composed, Composition, U, render_by};
 
 /// Blends a layer: C ← C + (1 − A) α L, A ← A + (1 − A) α. The device stores A, so the error of the
@@ -51,7 +52,9 @@ mod tests {
     use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
     use crate::reference::Blob;
-    use crate::reference::sprites::{Rounding, Sprites, View, render_over as far_to_near};
+    use crate::reference::composite::Rounding;
+    use crate::reference::sprites::{Sprites, render_over as far_to_near};
+    use crate::reference::view::View;
 
     const VIEW: View = View {
         width: 1,

@@ -4,7 +4,7 @@
 use glam::DVec3;
 
 use super::Blob;
-use super::sprites::View;
+use super::view::View;
 
 /// Permitted treatment of a particle by a device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

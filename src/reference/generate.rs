@@ -9,7 +9,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use glam::DVec3;
 
 use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor, radius_shape};
-use crate::model::cloud::{Cloud, CloudSource, Group, Particle, SIGMA_PER_RADIUS, box_kappa};
+use crate::model::cloud::{Group, Particle, SIGMA_PER_RADIUS, box_kappa};
 use crate::model::philox::{philox4x32_10, uniform};
 
 /// A particle relative to its group.
@@ -173,24 +173,6 @@ pub fn generate_box(
     (0..b.n_particles)
         .map(|i| generate_particle(b, i_box, seed, form, optical_depth, radius_scale, i))
         .collect()
-}
-
-/// Returns all particles of a cloud at time 0, in the order of its groups.
-pub fn cloud(cloud: &Cloud) -> Vec<Generated> {
-    match &cloud.source {
-        CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
-            .iter()
-            .zip(0u32..)
-            .flat_map(|(b, i_box)| {
-                generate_box(b, i_box, cloud.seed, *form, *optical_depth, *radius_scale)
-            })
-            .collect(),
-        CloudSource::Particles(list) => {
-            let groups = cloud.groups(0, 0);
-            list.iter().map(|p| given(p, groups.first())).collect()
-        }
-        CloudSource::Disc(_) | CloudSource::Animated(_) => super::live::cloud(cloud, 0.0),
-    }
 }
 
 /// Returns a particle of a list relative to its group's origin.

@@ -1,7 +1,7 @@
 //! Number of blobs over each pixel, a measure of a picture's cost before anything is drawn.
 
 use super::Blob;
-use super::sprites::View;
+use super::view::View;
 
 /// Returns the number of blobs in whose rectangles, out to `reach` σ, each pixel lies: about its
 /// number of layers.

@@ -119,7 +119,15 @@ pub fn cloud(cloud: &Cloud, time_s: f64) -> Vec<Generated> {
             let particles = m.animation.at(time_s).unwrap_or_default();
             return particles.iter().map(|p| generate::given(p, groups.first())).collect();
         }
-        CloudSource::Boxes { .. } | CloudSource::Particles(_) => return generate::cloud(cloud),
+        CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => {
+            let of = |(b, i): (_, u32)| {
+                generate::generate_box(b, i, cloud.seed, *form, *optical_depth, *radius_scale)
+            };
+            return boxes.iter().zip(0..).flat_map(of).collect();
+        }
+        CloudSource::Particles(list) => {
+            return list.iter().map(|p| generate::given(p, groups.first())).collect();
+        }
     };
     let center = groups.first().map_or(DVec3::ZERO, |g| g.center);
     let of = |i| {

@@ -8,10 +8,12 @@
 pub mod area;
 pub mod blob;
 pub mod chunks;
+pub mod composite;
 pub mod contract;
 pub mod count;
 pub mod cull;
 pub mod emulation;
+pub mod facet_runs;
 pub mod facets;
 pub mod first;
 pub mod generate;
@@ -36,6 +38,7 @@ pub mod tiles;
 pub mod transmit;
 pub mod upsample;
 pub mod upsample_bound;
+pub mod view;
 pub mod volume;
 
 pub use blob::Blob;

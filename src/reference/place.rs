@@ -128,6 +128,7 @@ mod tests {
     use crate::model::growth::Growth;
     use crate::model::gust::Gust;
     use crate::model::texture::Texture;
+    use crate::reference::live;
 
     #[test]
     fn groups_are_placed_by_wind_centre_and_origin() {
@@ -163,8 +164,7 @@ mod tests {
         let offsets = offsets(&groups, &clouds, 10.0, origin);
         // Bounds of the first list: x from 2 to 6, centre 4; 10 s of wind along z.
         assert_eq!(offsets, [DVec3::new(3.0, 0.0, 9.0), DVec3::new(1e9 - 1.0, -1.0, -1.0)]);
-        let generated: Vec<Generated> =
-            clouds.iter().flat_map(super::super::generate::cloud).collect();
+        let generated: Vec<Generated> = clouds.iter().flat_map(|c| live::cloud(c, 0.0)).collect();
         let relative: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
         assert_eq!(relative, [DVec3::X * -2.0, DVec3::X * 2.0, DVec3::ZERO]);
         let placed = place(&relative, &groups, &offsets);
@@ -204,7 +204,7 @@ mod tests {
         // After 1 s half of the growth from 1 to 3 is done; about x = 2 the list lies from −2 to 10
         // then.
         assert!((scale(&cloud, 1.0) - 2.0).abs() < 1e-15 && scale(&cloud, -1.0) == 1.0);
-        let given = super::super::generate::cloud(&cloud);
+        let given = live::cloud(&cloud, 0.0);
         let grown = grown(&given, &groups, &clouds, 1.0);
         let positions: Vec<DVec3> = grown.iter().map(|g| g.position).collect();
         let placed = place(&positions, &groups, &offsets(&groups, &clouds, 1.0, DVec3::ZERO));

@@ -7,217 +7,9 @@
 use glam::{DVec2, DVec3};
 
 use super::Blob;
+use super::composite::{Layered, OpaquePixel, Rounding};
 use super::parallel::parallel_map;
-use crate::model::camera::Pose;
-use crate::model::film::FilmFormat;
-
-/// A view: camera, picture size and cuts. `pose.position` is the eye relative to O.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Pose of the camera.
-    pub pose: Pose,
-    /// Vertical field of view.
-    pub fov_y_rad: f64,
-    /// Least view depth of a drawn particle's centre.
-    pub near: f64,
-    /// Radius at which sprites end, σ.
-    pub cutoff: f64,
-    /// Optical depth below which sprites end.
-    pub threshold: f64,
-    /// Width in pixels of σ below which blobs are left out; 0 leaves out none.
-    pub smallest: f64,
-    /// Offset of the rays from the pixels' centres, to the right and down, pixels within ±½.
-    pub shift: DVec2,
-}
-
-/// Permitted departures of a device from the mathematics while drawing.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Rounding {
-    /// u_t: unit round-off of the target's channels.
-    pub unit: f64,
-    /// Least normal number of the target: below it the error no longer shrinks with the value.
-    pub least_normal: f64,
-    /// Step of a target that holds 0 to 1 in equal steps, which clamps what it blends; 0 for
-    /// floats.
-    pub step: f64,
-    /// Relative error of each α.
-    pub alpha: f64,
-    /// Relative error of b. Half the error of b²/2σ², as a share of its value at the cut, or of 1
-    /// if that is less. Nearer to the cut a sprite may end or not.
-    pub edge: f64,
-    /// Error of a view depth where it decides on a size, as a share of the distance.
-    pub depth: f64,
-}
-
-/// The opaque background of a pixel.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OpaquePixel {
-    /// Premultiplied colour and alpha.
-    pub color: [f64; 4],
-    /// Bound on the target's difference, channel by channel.
-    pub bound: [f64; 4],
-    /// View depth. Particles whose centre lies beyond are hidden.
-    pub depth: f64,
-    /// Range about `depth` in which a particle may be hidden or not.
-    pub depth_bound: f64,
-}
-
-impl OpaquePixel {
-    /// No background.
-    pub const EMPTY: OpaquePixel =
-        OpaquePixel { color: [0.0; 4], bound: [0.0; 4], depth: f64::INFINITY, depth_bound: 0.0 };
-}
-
-impl Rounding {
-    /// Returns the rounding of a format, with relative errors of each α and of the distances at
-    /// edges.
-    pub fn of(format: FilmFormat, alpha: f64, edge: f64) -> Rounding {
-        let unit = format.unit_roundoff();
-        let (unit, least_normal, step) = match format {
-            FilmFormat::Rgba8 => (0.0, 0.0, 2.0 * unit),
-            FilmFormat::Rgba16f => (unit, 2f64.powi(-14), 0.0),
-            FilmFormat::Rgba32f => (unit, 2f64.powi(-126), 0.0),
-        };
-        Rounding { unit, least_normal, step, alpha, edge, depth: 0.0 }
-    }
-
-    /// Returns the distance from the cut beyond which rounding cannot move b²/2σ² across it.
-    pub(super) fn slack(&self, cut: f64) -> f64 {
-        (2.0 + self.edge) * self.edge * cut.max(1.0)
-    }
-
-    /// Exact arithmetic.
-    pub const NONE: Rounding =
-        Rounding { unit: 0.0, least_normal: 0.0, step: 0.0, alpha: 0.0, edge: 0.0, depth: 0.0 };
-
-    /// Returns what the target holds of an opaque colour.
-    pub fn stored(&self, behind: OpaquePixel) -> OpaquePixel {
-        if self.step == 0.0 {
-            return behind;
-        }
-        let color = behind.color.map(|v| v.clamp(0.0, 1.0));
-        // It is rounded to one of the two neighbouring steps.
-        OpaquePixel { color, bound: behind.bound.map(|e| e + self.step), ..behind }
-    }
-}
-
-impl View {
-    pub(super) fn half_slopes(&self) -> (f64, f64) {
-        let tan = (0.5 * self.fov_y_rad).tan();
-        (tan * f64::from(self.width) / f64::from(self.height), tan)
-    }
-
-    /// Returns b²/2σ² where a sprite of central optical depth `tau` ends (model.md §11
-    /// "threshold"). If it is not positive nothing is drawn.
-    pub fn cut(&self, tau: f64) -> f64 {
-        // Without a threshold the logarithm is infinite, or NaN for 0/0, which `min` ignores.
-        (0.5 * self.cutoff * self.cutoff).min((tau / self.threshold).ln())
-    }
-
-    /// Returns by how much a blob's σ exceeds the smallest drawn width, `c` its offset from the
-    /// eye; if negative the blob is not drawn (model.md §11 "cull"). The second value bounds a
-    /// device's error, with `depth` as in [`Rounding`].
-    pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
-        let width = self.smallest * self.pixel();
-        (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())
-    }
-
-    /// Returns the ray through the pixel in column `i` and row `j`, at its centre plus `shift`. Its
-    /// view depth is 1.
-    pub fn ray(&self, i: u32, j: u32) -> DVec3 {
-        let (slope_x, slope_y) = self.half_slopes();
-        let x = 2.0 * (f64::from(i) + 0.5 + self.shift.x) / f64::from(self.width) - 1.0;
-        let y = 1.0 - 2.0 * (f64::from(j) + 0.5 + self.shift.y) / f64::from(self.height);
-        self.pose.forward + x * slope_x * self.pose.right + y * slope_y * self.pose.up
-    }
-
-    /// Returns the slopes of the direction `offset`.
-    pub fn slopes_of(&self, offset: DVec3) -> DVec2 {
-        DVec2::new(offset.dot(self.pose.right), offset.dot(self.pose.up))
-            / offset.dot(self.pose.forward)
-    }
-
-    /// Returns the difference of slopes between neighbouring pixels.
-    pub fn pixel(&self) -> f64 {
-        2.0 * self.half_slopes().1 / f64::from(self.height)
-    }
-
-    /// Returns the columns and rows (first, end) outside which no ray meets `blob` out to `reach`
-    /// σ, `c` its offset from the eye. The range may be too large, never too small.
-    pub(super) fn rectangle(&self, blob: &Blob, c: DVec3, reach: f64) -> [(u32, u32); 2] {
-        let (slope_x, slope_y) = self.half_slopes();
-        let [x, y] = [self.pose.right, self.pose.up]
-            .map(|side| blob.slopes(c, [side, self.pose.forward], reach));
-        let pixels = |(low, high): (f64, f64), slope: f64, n: u32| {
-            let at = |s: f64| 0.5 * (s / slope + 1.0) * f64::from(n);
-            // One pixel to either side covers the rounding of the tangents and a shift of up to
-            // half a pixel. `as` saturates, and `min` keeps it inside.
-            let from = ((at(low) - 1.0).floor() as u32).min(n);
-            (from, ((at(high) + 1.0).ceil() as u32).clamp(from, n))
-        };
-        // Rows count downward.
-        [pixels(x, slope_x, self.width), pixels((-y.1, -y.0), slope_y, self.height)]
-    }
-}
-
-/// A pixel while it is composed.
-#[derive(Debug, Clone, Copy)]
-struct Layered {
-    value: [f64; 4],
-    bound: [f64; 4],
-    /// View depth of the background, and its bound.
-    opaque: (f64, f64),
-}
-
-impl From<&OpaquePixel> for Layered {
-    fn from(b: &OpaquePixel) -> Layered {
-        Layered { value: b.color, bound: b.bound, opaque: (b.depth, b.depth_bound) }
-    }
-}
-
-impl Layered {
-    /// Composes C ← αL + (1−α)C, A ← α + (1−α)A. The target's α is within `off`, and it rounds the
-    /// result.
-    fn over(&mut self, alpha: f64, off: f64, radiance: DVec3, r: &Rounding) {
-        let source = [radiance.x, radiance.y, radiance.z, 1.0];
-        for ((v, e), s) in self.value.iter_mut().zip(&mut self.bound).zip(source) {
-            if r.step > 0.0 {
-                [*v, *e] = over_steps([*v, *e], s, alpha, off, r);
-                continue;
-            }
-            // C' − C'_t = (1 − α)(C − C_t) + (α − α_t)(L − C_t), |C_t − C| ≤ e.
-            let inherited = (1.0 - alpha) * *e + off * ((s - *v).abs() + *e);
-            *v = alpha * s + (1.0 - alpha) * *v;
-            // Correct rounding errs by u_t of the number written, faithful rounding by 2 u_t.
-            *e = inherited + 2.0 * r.unit * (v.abs() + inherited).max(r.least_normal);
-        }
-    }
-}
-
-/// Composes on a target of equal steps, which clamps source and result to [0, 1]; returns value and
-/// bound. The target may blend in its own few bits (Vulkan, "Blending": no less precise than the
-/// target). Source, factor, product and sum are then each rounded to a step, half a step off where
-/// rounding is correct.
-fn over_steps(
-    [value, bound]: [f64; 2],
-    source: f64,
-    alpha: f64,
-    off: f64,
-    r: &Rounding,
-) -> [f64; 2] {
-    // The difference of source and target does not bound the error as in floats, since a clamped
-    // source does not follow α.
-    let inherited = (1.0 - alpha) * bound + off * (source.abs() + value.abs() + bound);
-    let new = ((alpha * source).clamp(0.0, 1.0) + (1.0 - alpha) * value).clamp(0.0, 1.0);
-    let bound =
-        inherited + 2.0 * r.step + 2.0 * r.unit * (alpha * source.abs() + value + inherited);
-    // Both values lie in [0, 1], so the bound is at most 1 unless it is infinite.
-    [new, if bound.is_finite() { bound.min(1.0) } else { bound }]
-}
+use super::view::View;
 
 /// A factor on τ of blob `j`, given the difference of the ray's slopes from its centre's.
 pub type Factor<'a> = &'a (dyn Fn(usize, DVec2) -> f64 + Sync);
@@ -291,7 +83,7 @@ pub struct Raster<'a> {
 }
 
 /// Returns the values of [`render_over`] at the pixels of `raster` alone, over `opaque`, one each.
-/// `on_row` is called with the number of rows of cells done, after each.
+/// Calls `on_row` with the number of all rows of cells each time a row is done.
 pub fn render_at(
     view: &View,
     raster: &Raster<'_>,
@@ -452,6 +244,7 @@ pub fn alpha(tau: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::camera::Pose;
     use crate::model::cloud::SQRT_TAU;
 
     /// Eye at the origin, looking along −z, one pixel.

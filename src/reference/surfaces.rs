@@ -6,7 +6,8 @@
 
 use glam::DVec3;
 
-use super::sprites::{OpaquePixel, View};
+use super::composite::OpaquePixel;
+use super::view::View;
 use crate::model::surface::Surface;
 
 /// Intersection of a ray with a rectangle.

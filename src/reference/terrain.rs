@@ -6,9 +6,10 @@
 
 use glam::{DVec2, DVec3};
 
+use super::composite::OpaquePixel;
 use super::facets::Facet;
-use super::sprites::{OpaquePixel, View};
 use super::surfaces::{Hit, meet};
+use super::view::View;
 use crate::model::surface::Surface;
 use crate::model::terrain::{HALVES, Terrain};
 

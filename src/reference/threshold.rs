@@ -3,7 +3,9 @@
 //! layers of every pixel.
 
 use super::Blob;
-use super::sprites::{Factor, OpaquePixel, View};
+use super::composite::OpaquePixel;
+use super::sprites::Factor;
+use super::view::View;
 
 /// Omitted layers of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -5,7 +5,9 @@
 
 use glam::DVec3;
 
-use super::sprites::{Bounded, OpaquePixel, Rounding, Seen, Sprites, View};
+use super::composite::{OpaquePixel, Rounding};
+use super::sprites::{Bounded, Seen, Sprites};
+use super::view::View;
 
 /// Unit round-off of f32.
 pub(super) const U: f64 = 1.0 / 16_777_216.0;

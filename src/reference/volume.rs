@@ -11,8 +11,9 @@ mod tests;
 use glam::DVec3;
 
 use super::Blob;
+use super::composite::OpaquePixel;
 use super::parallel::parallel_map;
-use super::sprites::{OpaquePixel, View};
+use super::view::View;
 use piece::{RayBlob, RayIntegral, RayIntegrator};
 
 /// A pixel of the volume.

@@ -48,7 +48,7 @@ pub fn reference(f: &Frame) -> Vec<Gathered> {
         .collect();
     let groups = scene.groups();
     let generated: Vec<_> =
-        scene.clouds.iter().flat_map(nimbus::reference::generate::cloud).collect();
+        scene.clouds.iter().flat_map(|c| nimbus::reference::live::cloud(c, 0.0)).collect();
     let offsets = place::offsets(&groups, &scene.clouds, 0.0, origin);
     let rest: Vec<DVec3> = generated.iter().map(|g| g.position).collect();
     let blobs = place::blobs(&generated, &place::place(&rest, &groups, &offsets));

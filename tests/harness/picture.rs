@@ -16,9 +16,11 @@ use nimbus::model::camera::{Camera, CameraKey};
 use nimbus::model::cloud::SQRT_TAU;
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
+use nimbus::reference::composite::{OpaquePixel, Rounding};
 use nimbus::reference::sort::{depths, key32, order};
-use nimbus::reference::sprites::{OpaquePixel, Rounding, Sprites, View, render_over};
+use nimbus::reference::sprites::{Sprites, render_over};
 use nimbus::reference::texture::{Pool, SplatTexture, Textured};
+use nimbus::reference::view::View;
 
 use crate::bounded::{Bounded, U, dot, exact3};
 use crate::scenery::{Candidates, Scenery};

@@ -4,7 +4,8 @@
 
 use glam::DVec2;
 use nimbus::model::film::FilmFormat;
-use nimbus::reference::sprites::{OpaquePixel, Rounding, Sprites};
+use nimbus::reference::composite::{OpaquePixel, Rounding};
+use nimbus::reference::sprites::Sprites;
 use nimbus::reference::tiles::{self, Composition};
 use nimbus::reference::{Blob, chunks};
 

@@ -8,7 +8,8 @@ use super::pixels::{Pixels, Tile};
 use crate::model::scene::{LightingMode, Scene};
 use crate::model::surface::Surface;
 use crate::model::terrain::Terrain;
-use crate::reference::sprites::{OpaquePixel, View};
+use crate::reference::composite::OpaquePixel;
+use crate::reference::view::View;
 use crate::reference::{surfaces, terrain};
 
 /// Returns the camera's view relative to the lighting origin, with the scene's drawing settings.

@@ -157,7 +157,7 @@ impl FrameReference {
         };
         let (mut facets, colors): (Vec<Facet>, Vec<DVec3>) = if scene.groups_facets() {
             let (order, runs) = (self.morton_order(scene, &regions), scene.facet_runs());
-            reference::facets::grouped(grid, cells, &sources, &centers, &order, &runs)
+            reference::facet_runs::grouped(grid, cells, &sources, &centers, &order, &runs)
                 .into_iter()
                 .unzip()
         } else {

@@ -11,9 +11,10 @@ use super::progress::{OnProgress, RenderStage};
 use super::scene_light::{PixelSample, RenderedPixels, volume_at};
 use crate::model::scene::Scene;
 use crate::model::surface::Surface;
+use crate::reference::composite::OpaquePixel;
 use crate::reference::parallel::parallel_map;
-use crate::reference::sprites::{OpaquePixel, View};
 use crate::reference::surfaces;
+use crate::reference::view::View;
 use crate::reference::volume::Volume;
 
 /// A scene and the light in it.

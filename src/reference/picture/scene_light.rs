@@ -9,8 +9,10 @@ use super::pixels::Pixels;
 use super::progress::{OnProgress, RenderStage};
 use super::sprites::{drawn_blobs, textures};
 use crate::model::scene::Scene;
+use crate::reference::composite::OpaquePixel;
 use crate::reference::parallel::parallel_map;
-use crate::reference::sprites::{self, Factor, OpaquePixel, Raster, Sprites, View};
+use crate::reference::sprites::{self, Factor, Raster, Sprites};
+use crate::reference::view::View;
 use crate::reference::volume::{Pixel, Volume};
 
 /// How overlapping blobs are composed (model.md §9).

@@ -6,8 +6,8 @@ use super::frame::FrameReference;
 use crate::model::cloud::Group;
 use crate::model::count::MIN_DRAWN;
 use crate::model::scene::Scene;
-use crate::reference::sprites::View;
 use crate::reference::texture::{Pool, SplatTexture, Textured};
+use crate::reference::view::View;
 use crate::reference::{Blob, count, place, sort};
 
 /// Returns the texture pool and every particle's part of it; `None` if no cloud is textured.

@@ -125,12 +125,13 @@ fn in_a_furnace_every_reflection_is_the_albedo_of_the_one_before() {
 
 #[test]
 fn light_through_a_finer_grid_comes_nearer_to_the_closed_form() {
-    let points = "x,y,z,sigma,kappa\n0,0,0,0.6,1.5\n0.9,0.5,0.2,0.5,2\n-0.8,0.3,-0.4,0.55,1\n0.2,-0.8,0.3,0.4,3\n";
+    let points = "x,y,z,sigma,kappa\n0,0,0,0.6,1.5\n0.9,0.5,0.2,0.5,2\n\
+                  -0.8,0.3,-0.4,0.55,1\n0.2,-0.8,0.3,0.4,3\n";
     let rmse = |grid: u32| {
         let light = format!(
-            "[lighting]\nmode = \"first\"\nforward = 0.0\nstep = 0.5\ngrid = \
-             {grid}\n[[light]]\nkind = \"directional\"\ndirection = [-0.5, -1, -0.3]\nirradiance \
-             = [3, 3, 3]\n"
+            "[lighting]\nmode = \"first\"\nforward = 0.0\nstep = 0.5\ngrid = {grid}\n\
+             [[light]]\nkind = \"directional\"\ndirection = [-0.5, -1, -0.3]\n\
+             irradiance = [3, 3, 3]\n"
         );
         let film = FILM
             .replace("width = 1, height = 1", "width = 24, height = 18")

@@ -96,14 +96,14 @@ struct Differences {
     sum: f64,
 }
 
-/// Least share of the mean that a standard error may be to count: with a greater one too few paths
-/// met the light.
-const BELIEVED: f64 = 0.1;
+/// Greatest standard error, as a share of the mean, of a comparison that counts. A greater one says
+/// that too few paths met the light.
+const MAX_PATH_ERROR: f64 = 0.1;
 
 impl Differences {
     /// `found` ± `error` by paths, `truth` ± `own` by quadrature.
     fn add(&mut self, [found, error]: [f64; 2], [truth, own]: [f64; 2], what: &str) {
-        if found == 0.0 || error > BELIEVED * found {
+        if found == 0.0 || error > MAX_PATH_ERROR * found {
             return;
         }
         let z = (found - truth) / error.hypot(own);

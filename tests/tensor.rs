@@ -175,12 +175,13 @@ fn numbers(lit: &[LitRecord]) -> Vec<f64> {
         .collect()
 }
 
-/// What the two ways may differ in. Both add the same cells' terms, no more than n of them, each
-/// rounded FACTORS times; T splits a lobe into bases of both signs, so what is rounded is a sum of
-/// magnitudes: where gathering at once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j,
-/// tensors multiply it by no more than K_d/π + Σ|C_b| max|v_b| of either. φ itself is at most I_i
-/// over the least diffuse albedo/π of any emitter, since no lobe takes away more than `negative` of
-/// it.
+/// Returns a bound on the difference of the two methods, value by value.
+///
+/// Both methods add the terms of the same cells, at most n of them, each rounded FACTORS times.
+/// Tensors split a lobe into bases of both signs, so a sum of magnitudes is rounded. Gathering at
+/// once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j; tensors multiply it by at most K_d/π
+/// + Σ|C_b| max|v_b| of each. φ is at most I_i over the least of any emitter's diffuse albedo/π
+/// less the lobe's negative part.
 fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     let basis = basis_of(scene).expect("a basis");
     let shape = Shape::of(scene, basis.n_bases());
@@ -291,7 +292,10 @@ fn a_scene_too_large_for_tensors_is_gathered_at_once() {
         ]
         [[material]]
         name = "m"
-        path = [{ time_s = 0, kd = [0.5, 0.5, 0.5], ks = [0.1, 0.1, 0.1] }, { time_s = 1, kd = [0.1, 0.1, 0.1] }]
+        path = [
+            { time_s = 0, kd = [0.5, 0.5, 0.5], ks = [0.1, 0.1, 0.1] },
+            { time_s = 1, kd = [0.1, 0.1, 0.1] },
+        ]
         [[surface]]
         center = [0, 0, 0]
         u = [0, 0, 1]

@@ -179,9 +179,9 @@ fn numbers(lit: &[LitRecord]) -> Vec<f64> {
 ///
 /// Both methods add the terms of the same cells, at most n of them, each rounded FACTORS times.
 /// Tensors split a lobe into bases of both signs, so a sum of magnitudes is rounded. Gathering at
-/// once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j; tensors multiply it by at most K_d/π
-/// + Σ|C_b| max|v_b| of each. φ is at most I_i over the least of any emitter's diffuse albedo/π
-/// less the lobe's negative part.
+/// once multiplies a flux φ = Σ E A g/(d² + …) by f_i and f_j; tensors multiply it by at most
+/// K_d/π + Σ|C_b| max|v_b| of each. φ is at most I_i over the least of any emitter's diffuse
+/// albedo/π less the lobe's negative part.
 fn bounds(scene: &Scene, fused: &Frames) -> Vec<f64> {
     let basis = basis_of(scene).expect("a basis");
     let shape = Shape::of(scene, basis.n_bases());

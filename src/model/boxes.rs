@@ -42,10 +42,11 @@ pub fn radius_shape(r: f64) -> f64 {
     r + FRAC_PI_2 * r.sin()
 }
 
-/// Returns the greatest value of [`radius_shape`] over [0, `radius_max`]. Interior maxima lie at R*
-/// + 2πk, cos R* = −2/π, and grow with k, so only the last one inside and the right end can be
-/// greatest.
-pub fn radius_shape_max(radius_max: f64) -> f64 {
+/// Returns the greatest value of [`radius_shape`] over [0, `radius_max`].
+///
+/// Interior maxima lie at R* + 2πk, cos R* = −2/π, and grow with k. Only the last one inside and
+/// the right end can be greatest.
+fn radius_shape_max(radius_max: f64) -> f64 {
     let first = (-2.0 / PI).acos();
     let end = radius_shape(radius_max);
     if radius_max < first {

@@ -48,7 +48,7 @@ impl Gust {
     pub const CALM: Gust = Gust { amplitude: 0.0, length: 1.0, period_s: 1.0, n_waves: 16 };
 
     /// Returns whether there are no gusts.
-    pub fn is_calm(&self) -> bool {
+    fn is_calm(&self) -> bool {
         self.amplitude == 0.0
     }
 

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec2, DVec3};
 /// Least ratio of a view depth now to the depth when the impostor was drawn; below it no bound is
 /// known. Reused impostors have ratios near 1, since an error of few pixels lets the eye move only
 /// a short way.
-pub const MIN_DEPTH_RATIO: f64 = 0.9;
+const MIN_DEPTH_RATIO: f64 = 0.9;
 
 /// A view. Slopes are those of rays along (right, up, forward).
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -15,7 +15,7 @@ pub const LATENT_HEAT_T0: f64 = 2.501e6;
 /// Fall of that latent heat with temperature, J/(kg K).
 pub const LATENT_HEAT_FALL: f64 = 2361.0;
 /// Latent heat of sublimation, J/kg; it hardly depends on temperature.
-pub const SUBLIMATION_HEAT: f64 = 2.834e6;
+const SUBLIMATION_HEAT: f64 = 2.834e6;
 
 /// Law of the saturation vapour pressure E(T) over water.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -136,7 +136,7 @@ pub struct Gases {
 }
 
 /// Constants of air, with c_p as in Bolton (1980) and Emanuel (1994).
-pub const GASES: Gases = Gases {
+const GASES: Gases = Gases {
     r_dry: 287.04,
     r_vapour: R_VAPOUR,
     cp_dry: 1005.7,
@@ -186,7 +186,7 @@ impl Parcel {
     }
 
     /// Returns the lifted condensation level for any E(T), given as ln(E/E₀), and other constants.
-    pub fn condensation_by(
+    fn condensation_by(
         &self,
         log_saturation: &dyn Fn(f64) -> f64,
         vapour_pa: f64,

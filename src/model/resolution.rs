@@ -4,10 +4,10 @@
 use glam::DVec2;
 
 /// Number of taps of the interpolation along an axis.
-pub const N_TAPS: u32 = 6;
+const N_TAPS: u32 = 6;
 /// Columns and rows of a low-resolution picture are a multiple of this, so that rows begin with a
 /// whole texel.
-pub const ALIGNED: u32 = 4;
+const ALIGNED: u32 = 4;
 /// Relative difference of depths up to which two pixels show one surface; a share of the nearer
 /// depth.
 pub const ALIKE: f64 = 1.0 / 16.0;

@@ -4,7 +4,7 @@
 
 /// Number of children of a node. On a surface in Morton order four are a quadrant each; a cloud's
 /// octant takes two levels.
-pub const FAN: u32 = 4;
+const FAN: u32 = 4;
 
 /// Nodes in depth-first order, parents before their children.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

@@ -21,7 +21,7 @@ pub enum Compared {
 }
 
 /// Returns the code values of the pixel in column `x` and row `y`.
-pub fn code_values(film: &Film, x: usize, y: usize, pixel: DVec4) -> DVec3 {
+fn code_values(film: &Film, x: usize, y: usize, pixel: DVec4) -> DVec3 {
     255.0 * film.display(pixel.truncate(), pixel.w) + DVec3::splat(dither(x, y))
 }
 

@@ -20,7 +20,7 @@ use crate::model::sums::{Precision, Summation, Sums};
 pub const U_F32: f64 = 1.0 / 16_777_216.0;
 
 /// Unit round-off of f64.
-pub const U_F64: f64 = U_F32 / 536_870_912.0;
+const U_F64: f64 = U_F32 / 536_870_912.0;
 
 /// Greatest absolute error of the f32 sine at its reduced argument: 4 units of round-off at 1.
 pub const SINE_ERROR: f64 = 4.0 * U_F32;
@@ -154,7 +154,7 @@ pub fn radius_bound(form: Form, radius_max: f64, u4: f64, u: f64) -> f64 {
 
 /// Returns a bound on the folded offset of an offset `v` with error `error`. w is evaluated as a −
 /// 4h·floor(a/4h), a = v + h, and the result is clamped to [−h, h].
-pub fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
+fn fold_bound(v: f64, half: f64, error: f64, u: f64) -> f64 {
     if half <= 0.0 {
         return 0.0;
     }

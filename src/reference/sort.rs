@@ -11,7 +11,7 @@ pub fn depths(forward: DVec3, positions: &[DVec3]) -> Vec<f64> {
 
 /// Returns m, which maps f32 to u32 monotonically: −0 just below +0, NaN beyond the infinity of its
 /// sign.
-pub fn monotone(z: f32) -> u32 {
+fn monotone(z: f32) -> u32 {
     let bits = z.to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }

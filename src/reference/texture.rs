@@ -209,7 +209,7 @@ fn doubled(n: &[f64], side: usize) -> Vec<f64> {
 }
 
 /// Interpolates bilinearly between the nodes of a periodic field.
-pub fn bilinear(n: &[f64], side: usize, at: DVec2) -> f64 {
+fn bilinear(n: &[f64], side: usize, at: DVec2) -> f64 {
     let low = at.floor();
     let share = at - low;
     let node = |dx: f64, dy: f64| {

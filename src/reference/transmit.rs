@@ -86,7 +86,7 @@ pub fn n_samples(spec: &GridSpec, p: DVec3, d: DVec3, distance: f64, step: f64) 
 
 impl Obstacles<'_> {
     /// Returns e^{−(1−g)τ} on the way from `p` to the light.
-    pub fn through_the_cloud(&self, p: DVec3, light: &Light) -> f64 {
+    fn through_the_cloud(&self, p: DVec3, light: &Light) -> f64 {
         let way = light.arrival(p);
         let tau = optical_depth(self.spec, self.cells, p, way.toward, way.distance, self.step);
         (-(1.0 - self.forward) * tau).exp()

@@ -22,7 +22,7 @@ pub struct OpaqueLayer<'a> {
 pub type Summed = ([f64; 4], [f64; 4]);
 
 /// Returns Lagrange's weights of the n taps from −(n/2 − 1) on, at t in [0, 1).
-pub fn lagrange(n: i32, t: f64) -> Vec<f64> {
+fn lagrange(n: i32, t: f64) -> Vec<f64> {
     let taps = || 1 - n / 2..=n / 2;
     let weight = |k: i32| {
         let others = taps().filter(|m| *m != k);

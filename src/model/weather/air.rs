@@ -10,9 +10,9 @@ pub const R_DRY: f64 = 287.0;
 /// Specific heat of dry air at constant pressure, J/(kg K): 7/2 of [`R_DRY`], so that R/c_p is 2/7.
 pub const HEAT_CAPACITY: f64 = 3.5 * R_DRY;
 /// Potential temperature minus WRF's T, K.
-pub const THETA_BASE_K: f64 = 300.0;
+const THETA_BASE_K: f64 = 300.0;
 /// Pressure at which potential temperature equals temperature, Pa.
-pub const P0_PA: f64 = 1e5;
+const P0_PA: f64 = 1e5;
 /// Molecular weight of water over that of dry air.
 pub const EPSILON: f64 = 0.622;
 /// Range of air temperatures on Earth, K. Values outside are not temperatures; Bolton's formula has

@@ -9,12 +9,12 @@ use super::grid::Grid;
 
 /// Relative humidity above which a cell has clouds, between Sundqvist's 0.75 over land and 0.85
 /// over sea.
-pub const CRITICAL_HUMIDITY: f64 = 0.8;
+const CRITICAL_HUMIDITY: f64 = 0.8;
 /// Liquid water of a cloud as a share of the adiabatic one; mixing removes the rest. A choice:
 /// stratocumulus has 0.6 to 0.9, cumulus half and less.
-pub const ADIABATIC_SHARE: f64 = 0.5;
+const ADIABATIC_SHARE: f64 = 0.5;
 /// Greatest water content of a cloud, kg/kg; beyond it, rain removes water.
-pub const MAX_WATER_RATIO: f64 = 0.5e-3;
+const MAX_WATER_RATIO: f64 = 0.5e-3;
 /// Latent heat of evaporation, J/kg, at 0 °C.
 const LATENT_HEAT: f64 = 2.501e6;
 
@@ -29,7 +29,7 @@ pub fn fraction(humidity: f64) -> f64 {
 
 /// Returns the water that rising saturated air condenses, kg/kg per metre: (c_p/L)(Γ_d − Γ_s).
 /// *Source*: Γ_s is the moist-adiabatic lapse rate of the Glossary of Meteorology (AMS).
-pub fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
+fn condensed_per_metre(p_pa: f64, t_k: f64) -> f64 {
     let q = saturation_ratio(p_pa, t_k);
     let dry = GRAVITY / HEAT_CAPACITY;
     let (warmth, spread) =

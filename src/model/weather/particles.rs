@@ -19,7 +19,7 @@ pub const AFFORDED: usize = 10;
 pub const SPREAD: f64 = 0.45;
 /// Additional distance of the centres from a cell's edge, σ_xy. Thick clouds then leak less into
 /// clear columns, and the loss between two cloudy cells is small.
-pub const INSET: f64 = 0.5;
+const INSET: f64 = 0.5;
 /// σ of a uniform distribution over a length of 1: 1/√12.
 const EVEN: f64 = 0.288_675_134_594_812_9;
 /// σ_z over the thickness of a cell with several blobs. Their heights, over half of the cell, add

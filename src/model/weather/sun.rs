@@ -10,7 +10,7 @@ use glam::DVec3;
 const J2000_DAYS: f64 = 10_957.5;
 
 /// Returns right ascension and declination, radians, at `time_s` (seconds from 1970-01-01, UTC).
-pub fn equatorial(time_s: f64) -> (f64, f64) {
+fn equatorial(time_s: f64) -> (f64, f64) {
     let n = time_s / 86_400.0 - J2000_DAYS;
     let longitude = 280.460 + 0.985_647_4 * n;
     let anomaly = (357.528 + 0.985_600_3 * n).to_radians();

@@ -21,7 +21,8 @@ pub fn is_open(rectangles: &[Rectangle], p: DVec3, source: Source) -> bool {
     rectangles.iter().all(|r| met(r, p, source).is_none())
 }
 
-/// Returns e^{−(1−g)τ}, τ through all blobs between `p` and `source` in closed form; `forward` is g.
+/// Returns e^{−(1−g)τ}, τ through all blobs between `p` and `source` in closed form. `forward` is
+/// g.
 pub fn transmittance(blobs: &[Blob], forward: f64, p: DVec3, source: Source) -> f64 {
     if blobs.is_empty() {
         return 1.0;

@@ -24,7 +24,7 @@ impl Exchange<'_> {
 
 impl View<'_> {
     /// Returns the light that the facets below a node send to receiver `j`.
-    pub fn of_node(&self, j: usize, clusters: &Clusters, i_region: usize, node: usize) -> Gathered {
+    fn of_node(&self, j: usize, clusters: &Clusters, i_region: usize, node: usize) -> Gathered {
         if clusters.n_nodes[node] == 1 {
             let i = clusters.facets[node];
             return if i == j { Gathered::default() } else { self.of_facet(i) };

@@ -54,7 +54,7 @@ impl PairGeometry {
 
     /// Returns the mean of cos cos/d² over a rectangle of half axes `u`, `v`, to the second
     /// derivatives.
-    pub fn rectangle_form(&self, u: DVec3, v: DVec3) -> Bounded {
+    fn rectangle_form(&self, u: DVec3, v: DVec3) -> Bounded {
         let PairGeometry { n_j, way, d2, .. } = *self;
         let c_j = n_j.dot(way);
         if c_j <= -self.turn {

@@ -139,7 +139,7 @@ impl Exchange<'_> {
     }
 
     /// Returns g at `x` on facet `i` where the transmittance is `v`.
-    pub(super) fn share_at(&self, i: usize, i_light: usize, x: DVec3, v: Bounded) -> Bounded {
+    fn share_at(&self, i: usize, i_light: usize, x: DVec3, v: Bounded) -> Bounded {
         let (light, n) = (&self.lights[i_light], self.facets[i].normal);
         let arrival = light.arrival(x);
         let own = |v: f64| light.share(n, &arrival, v);

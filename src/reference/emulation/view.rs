@@ -126,7 +126,7 @@ impl View<'_> {
     }
 
     /// Returns the angle of the receiver's half vector between `way` and the eye.
-    pub(super) fn eye_angle(&self, way: &PairGeometry) -> Bounded {
+    fn eye_angle(&self, way: &PairGeometry) -> Bounded {
         let to_eye = self.exchange.eye - self.receiver.position;
         let turn = way.turn + self.exchange.turn(to_eye.length());
         half_angle(self.receiver.normal, way.way, to_eye.normalize_or_zero(), turn)

@@ -131,8 +131,23 @@ impl Cloud {
     /// Returns the cloud's groups, with particle indices counted from `i_first`. Empty boxes give
     /// empty groups, so that a group's index is its box's index.
     pub fn groups(&self, i_cloud: usize, mut i_first: u32) -> Vec<Group> {
-        let (cloud_center, facing_from, gust_reach) =
-            (self.center(), self.facing_from(), self.gust.reach());
+        let at_rest = Group {
+            i_cloud,
+            i_first,
+            n_particles: 0,
+            center: DVec3::ZERO,
+            cloud_center: self.center(),
+            facing_from: self.facing_from(),
+            scale: 1.0,
+            half_extent: DVec3::ZERO,
+            sigma_max: 0.0,
+            sigma_y_max: 0.0,
+            sigma_mean: 0.0,
+            aspects: [1.0; 3],
+            kappa_max: 0.0,
+            mass_max: 0.0,
+            gust_reach: self.gust.reach(),
+        };
         match &self.source {
             CloudSource::Boxes { boxes, form, optical_depth, radius_scale } => boxes
                 .iter()
@@ -141,23 +156,18 @@ impl Cloud {
                         max_radius(*form, b.radius_max) * radius_scale * SIGMA_PER_RADIUS;
                     let kappa = box_kappa(b, *form, *optical_depth, *radius_scale);
                     let group = Group {
-                        i_cloud,
                         i_first,
                         n_particles: b.n_particles,
                         center: b.center,
-                        cloud_center,
-                        facing_from,
-                        scale: 1.0,
                         half_extent: 0.5 * b.extent,
                         sigma_max,
                         sigma_y_max: sigma_max,
                         sigma_mean: mean_radius(*form, b.radius_max)
                             * radius_scale
                             * SIGMA_PER_RADIUS,
-                        aspects: [1.0; 3],
                         kappa_max: kappa,
                         mass_max: mass(kappa, sigma_max),
-                        gust_reach,
+                        ..at_rest
                     };
                     // A scene with more particles than u32 can count is refused later; until then
                     // only its bounds are used.
@@ -165,30 +175,9 @@ impl Cloud {
                     group
                 })
                 .collect(),
-            CloudSource::Particles(list) => {
-                vec![Group {
-                    cloud_center,
-                    facing_from,
-                    gust_reach,
-                    ..list_group(list, i_cloud, i_first)
-                }]
-            }
-            CloudSource::Disc(disc) => {
-                vec![Group {
-                    cloud_center,
-                    facing_from,
-                    gust_reach,
-                    ..disc_group(disc, self.wind, i_cloud, i_first)
-                }]
-            }
-            CloudSource::Animated(m) => {
-                vec![Group {
-                    cloud_center,
-                    facing_from,
-                    gust_reach,
-                    ..moving_group(m, i_cloud, i_first)
-                }]
-            }
+            CloudSource::Particles(list) => vec![list_group(list, at_rest)],
+            CloudSource::Disc(disc) => vec![disc_group(disc, self.wind, at_rest)],
+            CloudSource::Animated(m) => vec![animated_group(m, at_rest)],
         }
     }
 }
@@ -200,17 +189,12 @@ pub fn box_kappa(b: &CloudBox, form: Form, optical_depth: f64, radius_scale: f64
     if sigma > 0.0 { optical_depth / (SQRT_TAU * sigma) } else { 0.0 }
 }
 
-fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
+fn list_group(list: &[Particle], at_rest: Group) -> Group {
     let low = list.iter().map(|p| p.position).reduce(DVec3::min).unwrap_or(DVec3::ZERO);
     let high = list.iter().map(|p| p.position).reduce(DVec3::max).unwrap_or(DVec3::ZERO);
     Group {
-        i_cloud,
-        i_first,
         n_particles: list.len() as u32,
         center: 0.5 * (low + high),
-        cloud_center: DVec3::ZERO,
-        facing_from: DVec3::ZERO,
-        scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: list.iter().map(|p| p.sigma).fold(0.0, f64::max),
         sigma_y_max: list.iter().map(|p| p.sigma * p.aspect).fold(0.0, f64::max),
@@ -218,7 +202,7 @@ fn list_group(list: &[Particle], i_cloud: usize, i_first: u32) -> Group {
         aspects: aspects(list),
         kappa_max: list.iter().map(|p| p.kappa).fold(0.0, f64::max),
         mass_max: list.iter().map(|p| mass(p.kappa, p.sigma) * p.aspect).fold(0.0, f64::max),
-        gust_reach: 0.0,
+        ..at_rest
     }
 }
 
@@ -234,36 +218,25 @@ fn aspects(list: &[Particle]) -> [f64; 3] {
 }
 
 /// Returns a group whose bounds hold over the particles' whole life, so that they stand still.
-fn disc_group(disc: &Disc, wind: DVec3, i_cloud: usize, i_first: u32) -> Group {
+fn disc_group(disc: &Disc, wind: DVec3, at_rest: Group) -> Group {
     let (low, high) = disc.bounds(wind);
     Group {
-        i_cloud,
-        i_first,
         n_particles: disc.n_particles,
         center: 0.5 * (low + high),
-        cloud_center: DVec3::ZERO,
-        facing_from: DVec3::ZERO,
-        scale: 1.0,
         half_extent: 0.5 * (high - low),
         sigma_max: disc.sigma_max(),
         sigma_y_max: disc.sigma_max(),
         sigma_mean: disc.sigma_mean(),
-        aspects: [1.0; 3],
         kappa_max: disc.kappa(),
         mass_max: disc.mass_max(),
-        gust_reach: 0.0,
+        ..at_rest
     }
 }
 
-fn moving_group(m: &AnimatedParticles, i_cloud: usize, i_first: u32) -> Group {
+fn animated_group(m: &AnimatedParticles, at_rest: Group) -> Group {
     Group {
-        i_cloud,
-        i_first,
         n_particles: m.n_particles,
         center: 0.5 * (m.low + m.high),
-        cloud_center: DVec3::ZERO,
-        facing_from: DVec3::ZERO,
-        scale: 1.0,
         half_extent: 0.5 * (m.high - m.low),
         sigma_max: m.sigma_max,
         sigma_y_max: m.sigma_y_max,
@@ -271,7 +244,7 @@ fn moving_group(m: &AnimatedParticles, i_cloud: usize, i_first: u32) -> Group {
         aspects: [MIN_ASPECT, m.aspect_mean, 1.0 / MIN_ASPECT],
         kappa_max: m.kappa_max,
         mass_max: m.mass_max,
-        gust_reach: 0.0,
+        ..at_rest
     }
 }
 

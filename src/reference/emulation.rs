@@ -8,7 +8,6 @@
 //! In: facets, regions, lights and their transmittances, the density grid, all relative to the
 //! lighting origin. Out, a receiver: I_i (W m⁻²) and L2 (W m⁻² sr⁻¹) toward the eye, RGB.
 
-mod bounded;
 mod cells;
 mod cluster;
 mod cluster_gather;

@@ -7,6 +7,7 @@
 
 pub mod area;
 pub mod blob;
+mod bounded;
 pub mod chunks;
 pub mod composite;
 pub mod contract;

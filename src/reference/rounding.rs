@@ -12,6 +12,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::DVec3;
 
+use super::bounded::Bounded;
 use super::generate::{is_inside, offset, uniforms};
 use crate::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, radius_factor};
 use crate::model::sums::{Precision, Summation, Sums};
@@ -59,53 +60,13 @@ pub fn erf_bound(x: f64) -> f64 {
     FORMULA + quotient + u * (1.0 - q + quotient)
 }
 
-/// A number with a bound on the error of its f32 evaluation.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Rounded {
-    value: f64,
-    error: f64,
-}
-
-impl Rounded {
-    fn exact(value: f64) -> Rounded {
-        Rounded { value, error: 0.0 }
-    }
-
-    /// Returns an input or constant that was rounded to f32 once.
-    fn once(value: f64, u: f64) -> Rounded {
-        Rounded { value, error: u * value.abs() }
-    }
-
-    /// Returns an operation's result `value` whose inputs' errors give `inherited`. The computed
-    /// number is rounded, whose magnitude is at most |value| + inherited.
-    fn operation(value: f64, inherited: f64, u: f64) -> Rounded {
-        Rounded { value, error: inherited + u * (value.abs() + inherited) }
-    }
-
-    fn plus(self, b: Rounded, u: f64) -> Rounded {
-        Rounded::operation(self.value + b.value, self.error + b.error, u)
-    }
-
-    /// |ab − a'b'| ≤ |a|δb + |b|δa + δaδb.
-    fn times(self, b: Rounded, u: f64) -> Rounded {
-        let inherited =
-            self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
-        Rounded::operation(self.value * b.value, inherited, u)
-    }
-
-    fn halved(self) -> Rounded {
-        Rounded { value: 0.5 * self.value, error: 0.5 * self.error }
-    }
-
-    /// |sin(a + e) − sin a| ≤ |cos a||e| + e²/2, e the argument's own error and that of its
-    /// reduction.
-    fn sine(self, u: f64) -> Rounded {
-        let e = self.error + REDUCTION_ERROR * u * (self.value.abs() + self.error);
-        // The sine of a small argument errs by 3.5 ulp of itself.
-        let own = SINE_ERROR.min(7.0 * u * (self.value.sin().abs() + e));
-        let error = self.value.cos().abs() * e + 0.5 * e * e + own;
-        Rounded { value: self.value.sin(), error }
-    }
+/// Returns the sine: |sin(a + e) − sin a| ≤ |cos a||e| + e²/2, e the argument's own error and that
+/// of its reduction.
+fn sine(a: Bounded, u: f64) -> Bounded {
+    let e = a.error + REDUCTION_ERROR * u * (a.value.abs() + a.error);
+    // The sine of a small argument errs by 3.5 ulp of itself.
+    let own = SINE_ERROR.min(7.0 * u * (a.value.sin().abs() + e));
+    Bounded { value: a.value.sin(), error: a.value.cos().abs() * e + 0.5 * e * e + own }
 }
 
 /// Returns a bound, axis by axis, on |f32 − f64| of the offset P (1)–(7) proposed by the uniforms
@@ -118,21 +79,21 @@ pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec
             Form::Printed => v,
             Form::Centred => 2.0 * v - 1.0,
         };
-        Rounded::exact(share).times(Rounded::once(length, u), u)
+        Bounded::exact(share).times(Bounded::once(length, u)).rounded(u)
     };
     let (x, y, z) =
         (spread(u123[0], extent.x), spread(u123[1], extent.y), spread(u123[2], extent.z));
-    let (pi, half_pi) = (Rounded::once(PI, u), Rounded::once(FRAC_PI_2, u));
+    let (pi, half_pi) = (Bounded::once(PI, u), Bounded::once(FRAC_PI_2, u));
     // P (4): δP = π/2 δsin + 2u|P|, δsin = |cos(Y/2)|(δY/2 + 2u|Y/2|) + SINE_ERROR.
-    let phase = |v: Rounded| half_pi.times(v.halved().sine(u), u);
+    let phase = |v: Bounded| half_pi.times(sine(v.scaled(0.5), u)).rounded(u);
     let (p_x, p_y, p_z) = (phase(y), phase(x), phase(z));
     // P (5): the argument t = P_x Z/2 has δt = |Z/2|δP_x + |P_x/2|δZ + u|t|, and P_x' = P_x + π sin
     // t has δP_x' = δP_x + πδsin t + 2u|π sin t| + u|P_x'|. The second line starts from δP_x'.
-    let swirl = |p: Rounded| pi.times(p.times(z, u).halved().sine(u), u);
-    let p_x = p_x.plus(swirl(p_x), u);
-    let p_y = p_y.plus(swirl(p_x), u);
+    let swirl = |p: Bounded| pi.times(sine(p.times(z).rounded(u).scaled(0.5), u)).rounded(u);
+    let p_x = p_x.plus(swirl(p_x)).rounded(u);
+    let p_y = p_y.plus(swirl(p_x)).rounded(u);
     // P (6)–(7): one rounded sum, one exact halving.
-    let v = [x.plus(p_x, u), y.plus(p_y, u), z.plus(p_z, u)].map(|v| v.halved().error);
+    let v = [x.plus(p_x), y.plus(p_y), z.plus(p_z)].map(|v| v.rounded(u).scaled(0.5).error);
     match form {
         Form::Printed => DVec3::new(v[0], v[2], v[2]),
         Form::Centred => DVec3::from_array(v),
@@ -143,12 +104,14 @@ pub fn position_bound(extent: DVec3, form: Form, u123: [f64; 3], u: f64) -> DVec
 /// is rounded to f32 once.
 pub fn radius_bound(form: Form, radius_max: f64, u4: f64, u: f64) -> f64 {
     // δR = 2u|R| as for X above; R' = R + π/2 sin R; factor·R'.
-    let r = Rounded::exact(u4).times(Rounded::once(radius_max, u), u);
-    let r = r.plus(Rounded::once(FRAC_PI_2, u).times(r.sine(u), u), u);
+    let r = Bounded::exact(u4).times(Bounded::once(radius_max, u)).rounded(u);
+    let r = r.plus(Bounded::once(FRAC_PI_2, u).times(sine(r, u)).rounded(u)).rounded(u);
     match form {
         // Without a factor there is no rounding.
         Form::Printed => r.error,
-        Form::Centred => Rounded::once(radius_factor(form, radius_max), u).times(r, u).error,
+        Form::Centred => {
+            Bounded::once(radius_factor(form, radius_max), u).times(r).rounded(u).error
+        }
     }
 }
 

@@ -3,13 +3,13 @@
 
 use glam::DVec2;
 
-use super::bounded::{Bounded, Decision};
 use super::coverage::{Coverage, Patch};
 use super::gathered::Gathered;
 use super::roundings::ROUNDINGS;
 use super::source::Sender;
 use super::view::View;
 use crate::model::pair_rules::{CELL_WIDTH, LOBE_PARTS, LOBE_STEP};
+use crate::reference::bounded::{Bounded, Decision};
 use crate::reference::occlude::{Rectangle, Source};
 
 /// Area of a part over that of its cell.

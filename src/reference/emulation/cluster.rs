@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use glam::{DMat3, DVec3};
 
-use super::bounded::Bounded;
 use super::exchange::Exchange;
 use super::roundings::{ROUNDINGS, U};
 use super::source::Sender;
 use crate::model::tree::Tree;
+use crate::reference::bounded::Bounded;
 
 /// The facets below a node as one emitter. Beside each number stands a bound on its error.
 #[derive(Debug, Clone)]

@@ -1,6 +1,5 @@
 //! The gather from clusters: which are opened, and the light that the others send as one.
 
-use super::bounded::{Bounded, Decision};
 use super::cluster::{Cluster, Clusters};
 use super::cluster_view::ClusterView;
 use super::exchange::Exchange;
@@ -11,6 +10,7 @@ use super::roundings::{MIN_DISTANCE, ROUNDINGS, U};
 use super::source::Sender;
 use super::view::View;
 use crate::model::pair_rules::{CLOUD_THETA, CLUSTER_EDGE_WIDTH, EVEN, LOBE_STEP};
+use crate::reference::bounded::{Bounded, Decision};
 
 impl Exchange<'_> {
     /// Returns I_i and L2 of facet `j` from clusters.

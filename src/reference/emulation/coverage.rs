@@ -4,8 +4,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::bounded::Bounded;
 use super::occluder::{OF_UNITS, sides_of};
+use crate::reference::bounded::Bounded;
 use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
 
 /// Half a part's side, in the cell's half axes.

@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::bounded::{Bounded, Decision};
 use super::occluder::{Ball, hides_all, meets};
 use super::roundings::{MARCH, MIN_DISTANCE, ROUNDINGS, U};
 use crate::model::grid::GridSpec;
@@ -12,6 +11,7 @@ use crate::model::light::Light;
 use crate::model::material::Brdf;
 use crate::model::pairings::Pairing;
 use crate::model::scene::Pairs;
+use crate::reference::bounded::{Bounded, Decision};
 use crate::reference::grid::sample;
 use crate::reference::occlude::Rectangle;
 use crate::reference::transmit::crossing;
@@ -134,7 +134,7 @@ impl Exchange<'_> {
 
     /// Returns the ball about facet `i`.
     pub(super) fn ball(&self, i: usize) -> Ball {
-        let radius = Bounded { value: self.radius(i), error: 0.0 };
+        let radius = Bounded::exact(self.radius(i));
         Ball { at: self.facets[i].position, radius, slack: self.slack() }
     }
 

@@ -5,8 +5,8 @@ use std::f64::consts::SQRT_2;
 
 use glam::DVec3;
 
-use super::bounded::{Bounded, Decision};
 use super::roundings::U;
+use crate::reference::bounded::{Bounded, Decision};
 use crate::reference::occlude::{IN_PLANE, Rectangle, Source};
 
 /// Error of unit vectors, their products and quotients.

@@ -2,7 +2,6 @@
 
 use glam::DVec2;
 
-use super::bounded::{Bounded, Decision};
 use super::cells::Cell;
 use super::exchange::Exchange;
 use super::form::PairGeometry;
@@ -11,6 +10,7 @@ use super::roundings::ROUNDINGS;
 use super::source::Sender;
 use super::view::View;
 use crate::model::pair_rules::{EDGE_WIDTH, LOBE_STEP, SINGLE_EDGE_WIDTH};
+use crate::reference::bounded::{Bounded, Decision};
 
 impl Exchange<'_> {
     /// Returns I_i and L2 of facet `j` from `senders`.

@@ -5,13 +5,13 @@ use std::f64::consts::PI;
 
 use glam::{DVec2, DVec3};
 
-use super::bounded::{Bounded, Decision};
 use super::coverage::{Coverage, Patch};
 use super::exchange::Exchange;
 use super::form::{PairGeometry, half_angle, lobe};
 use super::occluder::shadow;
 use super::roundings::{MARCH, MIN_DISTANCE, ROUNDINGS, U};
 use crate::model::light::{Light, MIN_PENUMBRA};
+use crate::reference::bounded::{Bounded, Decision};
 use crate::reference::occlude::{Rectangle, Source, source_of};
 
 /// Rounding to 16 bits of a number from 0 to 1, and f32's rounding before.

@@ -4,7 +4,6 @@ use std::f64::consts::FRAC_1_PI;
 
 use glam::DVec3;
 
-use super::bounded::{Bounded, Decision};
 use super::exchange::{Exchange, Facet};
 use super::form::{PairGeometry, half_angle, lobe, width};
 use super::gathered::Gathered;
@@ -12,6 +11,7 @@ use super::occluder::{Ball, shadow};
 use super::roundings::{ROUNDINGS, U};
 use super::source::Sender;
 use crate::model::pair_rules::{LOBE_REACH, TURN};
+use crate::reference::bounded::{Bounded, Decision};
 use crate::reference::occlude::{Rectangle, Source};
 
 /// A receiver's view.

@@ -15,6 +15,22 @@ impl Bounded {
     /// Exactly 1.
     pub const ONE: Bounded = Bounded { value: 1.0, error: 0.0 };
 
+    /// Returns an exact number.
+    pub fn exact(value: f64) -> Bounded {
+        Bounded { value, error: 0.0 }
+    }
+
+    /// Returns an input or constant that was rounded once.
+    pub fn once(value: f64, u: f64) -> Bounded {
+        Bounded::exact(value).rounded(u)
+    }
+
+    /// Returns the number after a rounding. The computed number is rounded, whose magnitude is at
+    /// most |value| + error.
+    pub fn rounded(self, u: f64) -> Bounded {
+        Bounded { error: self.error + u * (self.value.abs() + self.error), ..self }
+    }
+
     /// Returns `value` whose evaluation lies between `low` and `high`.
     pub fn between(low: f64, value: f64, high: f64) -> Bounded {
         Bounded { value, error: (high - value).max(value - low) }
@@ -25,7 +41,7 @@ impl Bounded {
         Bounded { value: self.value + b.value, error: self.error + b.error }
     }
 
-    /// Returns the product.
+    /// Returns the product: |ab − a'b'| ≤ |a|δb + |b|δa + δaδb.
     pub fn times(self, b: Bounded) -> Bounded {
         let error = self.value.abs() * b.error + b.value.abs() * self.error + self.error * b.error;
         Bounded { value: self.value * b.value, error }

@@ -44,7 +44,7 @@ impl View {
 
     /// Returns by how much a blob's σ exceeds the smallest drawn width, `c` its offset from the
     /// eye; if negative the blob is not drawn (model.md §11 "cull"). The second value bounds a
-    /// device's error, with `depth` as in [`Rounding`].
+    /// device's error, with `depth` as in [`super::composite::Rounding`].
     pub fn above_smallest(&self, blob: &Blob, c: DVec3, depth: f64) -> (f64, f64) {
         let width = self.smallest * self.pixel();
         (blob.widest() - width * c.dot(self.pose.forward), width * depth * c.length())

@@ -1,5 +1,7 @@
-//! Particles of discs and their life, model.md §2, in f64. In: a cloud and a time. Out: its
-//! particles relative to their group's centre.
+//! Particles of clouds at a time, model.md §1 and §2, in f64. Discs have a life and animations have
+//! keys; boxes and lists do not depend on the time.
+//!
+//! In: a cloud and a time. Out: its particles relative to their group's centre.
 
 use glam::DVec3;
 

@@ -4,8 +4,7 @@ use super::one_box;
 use glam::DVec3;
 use nimbus::model::boxes::{CloudBox, Form, MAX_ATTEMPTS, mean_radius};
 use nimbus::reference::generate::{
-    Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, offset, radius,
-    uniforms,
+    Acceptance, decision_margin, fold, generate_box, generate_particle, is_inside, uniforms,
 };
 use nimbus::reference::rounding::{U_F32, particle_bound};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -14,7 +13,7 @@ const FORMS: [Form; 2] = [Form::Centred, Form::Printed];
 
 /// The boxes of the paper's Table 2 in the order of the file: count, extents, centre, R_max.
 fn paper_boxes() -> Vec<CloudBox> {
-    let text = include_str!("../scenes/cubes-554.dat");
+    let text = include_str!("../../scenes/cubes-554.dat");
     let rows = text
         .lines()
         .skip(2)

@@ -9,7 +9,7 @@ use nimbus::model::cloud::{SQRT_TAU, box_kappa};
 use nimbus::model::film::FilmFormat;
 use nimbus::reference::Blob;
 use nimbus::reference::composite::{OpaquePixel, Rounding};
-use nimbus::reference::generate::uniforms;
+use nimbus::reference::generate::{offset, radius, uniforms};
 use nimbus::reference::sprites::{Bounded, Sprites, alpha, render, render_over};
 use nimbus::reference::view::View;
 use std::f64::consts::FRAC_PI_2;
